@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from drivers.errors import LimitError
 
@@ -43,6 +43,30 @@ class Instrument(Protocol):
     def self_test(self) -> list[Check]: ...
 
     def close(self) -> None: ...
+
+
+class Alarm(Protocol):
+    """An alarm of a drive, its cause in words, and what a person does about it."""
+
+    @property
+    def code(self) -> int: ...
+    @property
+    def text(self) -> str: ...
+    @property
+    def remedy(self) -> str: ...
+    @property
+    def resettable(self) -> bool:
+        """Whether a command can reset it once its cause is gone."""
+
+
+@runtime_checkable
+class HasAlarm(Protocol):
+    """A drive that stops with an alarm, which a person resets."""
+
+    def alarm(self) -> Alarm | None: ...
+
+    def reset_alarm(self) -> None:
+        """Raises StageAlarm if it stays."""
 
 
 def require_positive(settings: object, *names: str) -> None:

@@ -1,7 +1,7 @@
 """Oriental Motor AZ drive (AZD) turning a hollow rotary stage (DGII), by Modbus RTU.
 
 Safe by design: limits are checked before anything is sent, arrival is measured and not assumed, an alarm
-is never cleared silently, and a stop can always be sent. Source: AZ function manual, see oriental_az_table.
+is never cleared silently, and a stop can always be sent. Source: AZ function manual, see `registers`.
 """
 
 from __future__ import annotations
@@ -67,11 +67,27 @@ class RotaryStage:
         driver_c, motor_c = self._unit.read_block(az.DRIVER_TEMPERATURE, az.MOTOR_TEMPERATURE)
         referenced = self.referenced()
         return [
-            Check("alarm", alarm is None, f"{alarm.code:02X} {alarm.text}" if alarm else "none"),
+            Check("alarm", alarm is None, f"{alarm.code:02X} {alarm.text}. {alarm.words}" if alarm else "none"),
             Check("communication", error == 0, f"error {error:02X}" if error else "no error"),
             Check("coordinates", True, "set" if referenced else "not set: home first"),
             Check("temperature", max(driver_c, motor_c) < WARM_C, f"drive {driver_c:.1f} C, motor {motor_c:.1f} C"),
+            *self._parameters(),
         ]
+
+    def _parameters(self) -> Iterator[Check]:
+        """The parameters that the settings make the driver write: whether they hold what such a parameter can hold.
+
+        A wrong address would change another parameter of the drive.
+        """
+        if timeout_s := self.settings.communication_timeout_s:
+            register = self.settings.communication_timeout
+            found_s = self._unit.read(register)
+            advice = "compare the address with the drive's manual: it is not confirmed for AZ drives"
+            yield Check("time-out", found_s in (0.0, timeout_s), f"{found_s:g} s in {register}; {advice}")
+        if self.settings.own_limits:
+            action, high, low = self._unit.read_block(*az.OWN_LIMITS)
+            is_action = action in az.ACTIONS and low <= high
+            yield Check("own limits", is_action, f"action {action:g}, {low:g} .. {high:g} steps in {az.OVERTRAVEL}")
 
     def close(self) -> None:
         """Nothing to release: the wire belongs to the bench."""
@@ -265,14 +281,9 @@ class RotaryStage:
 
     def _require_no_alarm(self, alarm: Alarm | None) -> None:
         if alarm is not None:
-            how = (
-                "then reset the alarm, or switch the drive off and on"
-                if alarm.resettable
-                else "the alarm needs a power cycle"
-            )
             raise StageAlarm(
                 f"{self.name}: has stopped with alarm {alarm.code:02X}, {alarm.text}",
-                f"{alarm.remedy}; {how}",
+                alarm.words,
                 alarm.code,
             )
 

@@ -2,6 +2,21 @@
 
 Source: AZ function manual, HM-60262; [M] from memory.
 
+Parameters that the program writes on request were compared with public code, as the manual was not at hand. No address
+below was seen in the manual of an AZ drive or tried on one:
+
+0x0388, 0x038A   software limits: supported for AZ drives. heyannnn/Oriental_CvD_Controller_Murata reads them there as
+                 parameters 01C4h and 01C5h (az_define.py; oriental_az.py, readLimit), and a Modbus address is twice the
+                 number of the parameter: the alarm reset is 00C0h there and 0x0180 here. CVD drives have them at these
+                 addresses (drivers/cvd_define.py of the same project).
+0x0386           action at a software limit: supported in part. CVD and AR drives have it there, and its neighbours are
+                 those of AZ drives: the limits above, and below the direction (EtherCAT object 41C2h: Glowbuzzer,
+                 azd-ked.h).
+0x138A           communication time-out: open. Public code for the maker's BLV-R drives writes it there, after their
+                 manual HP-5141J; AR drives have it at 0x1200. It is off unless the bench file sets it.
+
+`rig check` reads these parameters where the bench file uses them, and shows what it finds.
+
 32-bit values, high word first. Default line: 115200 baud, 8 data bits, even parity. Functions 03, 06, 10h, 17h.
 """
 
@@ -37,11 +52,10 @@ HOME_END = 1 << 4  # [M] on while coordinates are set
 READY, ALARM_ON, BUSY = (1 << bit for bit in (5, 7, 8))
 MOVE, IN_POSITION = (1 << bit for bit in (13, 14))
 
-# The drive's own limits; steps. The maker's CVD and AR drives have them here, behind the motor's direction at 0x0384;
-# AZ drives have the direction there too: it is their EtherCAT object 41C2h, which is 4000h and half of 0x0384. That the
-# limits follow it in the AZ as well is likely, and not confirmed by its manual (HM-60262).
+# The drive's own limits; steps.
 OVERTRAVEL = Register(0x0386, "int32", "action at a software limit")
 BRAKE_AND_ALARM = 3  # [M] brake, then alarm 67; -1 none, 0 and 1 stop or brake, 2 and 3 the same with the alarm
+ACTIONS = range(-1, BRAKE_AND_ALARM + 1)
 HIGH_LIMIT = Register(0x0388, "int32", "positive software limit", "step")
 LOW_LIMIT = Register(0x038A, "int32", "negative software limit", "step")
 OWN_LIMITS = (OVERTRAVEL, HIGH_LIMIT, LOW_LIMIT)
@@ -73,6 +87,12 @@ class Alarm:
         """Whether `reset_alarm` can clear it once its cause is gone."""
         return self.code not in RESETTABLE_BY_POWER_ONLY
 
+    @property
+    def words(self) -> str:
+        """What a person does about it: removes the cause, then ends the alarm."""
+        reset = "then reset the alarm with `rig check --reset`, or switch the drive off and on"
+        return f"{self.remedy}; {reset if self.resettable else 'the alarm needs a power cycle'}"
+
 
 COORDINATES_NOT_SET = 0x4A
 COMMUNICATION_TIMEOUT = 0x85
@@ -101,7 +121,7 @@ _WORDS: dict[int, tuple[str, str]] = {
     0x84: ("RS-485 communication error", "Check shielding, termination, baud rate and parity of the line"),
     COMMUNICATION_TIMEOUT: (
         "RS-485 communication time-out",
-        "The controller went silent; find out why, then reset the alarm",
+        "Find out why the controller fell silent",
     ),
     0xF0: ("processor error", _POWER),
 }
@@ -123,11 +143,11 @@ class Settings:
 
     With a `communication_timeout_s`, the drive stops by itself (alarm 85) when its controller falls silent for so long
     in the middle of a move; 0 is off. It is off unless the bench file sets it, since the address of the drive's
-    parameter "Communication timeout (Modbus)", which counts ms, is from memory [M]: look it up in HM-60262 first. AR
-    drives of the same maker have theirs elsewhere, at 0x1200.
+    parameter "Communication timeout (Modbus)", which counts ms, is not confirmed for AZ drives (see above): look it
+    up in HM-60262 first.
 
     With `own_limits`, `limits_deg` are written into the drive as its software limits and read back, before the first
-    move: it brakes there by itself, whoever sent it. Off unless the bench file sets it: see oriental_az_table.
+    move: it brakes there by itself, whoever sent it. Off unless the bench file sets it.
 
     Raises ValueError for what no stage can be.
     """

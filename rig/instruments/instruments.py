@@ -215,15 +215,22 @@ def connected(bench: Bench, tap: Tap | None = None) -> Iterator[Rig]:
         yield Rig(bench, drivers, wiring.clock, wiring.world if servers else None, servers, wiring.links.person)
 
 
-def checked(bench: Bench) -> dict[str, tuple[Identity | None, list[Check]]]:
-    """Identity and self-test of every instrument. One that does not answer has no identity and a failed check."""
+def checked(
+    bench: Bench, before: Callable[[Driver], object] | None = None
+) -> dict[str, tuple[Identity | None, list[Check]]]:
+    """Identity and self-test of every instrument. One that does not answer has no identity and a failed check.
+
+    `before`, if given, is called with each driver before its self-test.
+    """
     with wired(bench) as wiring:
-        return {role: _check(wiring, role) for role in bench.instruments}
+        return {role: _check(wiring, role, before) for role in bench.instruments}
 
 
-def _check(wiring: Wiring, role: str) -> tuple[Identity | None, list[Check]]:
+def _check(wiring: Wiring, role: str, before: Callable[[Driver], object] | None) -> tuple[Identity | None, list[Check]]:
     try:
         driver = wiring.connect(role)
+        if before is not None:
+            before(driver)
         return driver.identify(), driver.self_test()
     except (DriverError, InstrumentFailed) as error:
         return None, [Check("answers", False, str(error))]

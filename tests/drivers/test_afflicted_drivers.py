@@ -256,7 +256,10 @@ def test_a_drive_stops_by_itself_when_its_controller_falls_silent(
     small_world.advance(clock.now())
     stood = small_world.motor_angle_deg("alpha")
     assert 15.0 < stood < 40.0  # a second at 30 deg/s, and braking
-    with pytest.raises(StageAlarm, match=r"alarm 85, RS-485 communication time-out. The controller went silent"):
+    with pytest.raises(
+        StageAlarm,
+        match=r"alarm 85, RS-485 communication time-out. Find out why the controller fell silent; then reset",
+    ):
         stage.wait()
     assert clock.now() - began_s < 5.1
     stage.stop()

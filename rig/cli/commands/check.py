@@ -9,7 +9,8 @@ from pathlib import Path
 import click
 
 from calibrations.text import columns
-from drivers.instrument import Check, Identity
+from drivers.errors import StageAlarm
+from drivers.instrument import Check, HasAlarm, Identity, Instrument
 from rig.bench import DEFAULT, read_bench
 from rig.bench.certificates import EXPIRED, certificates, expired
 from rig.bench.file import HAND
@@ -25,17 +26,22 @@ NOT_MET, FAILED = 1, 3
 @click.option(
     "--example-hand", is_flag=True, help="Print the bench file of a simulated sensor in a hand, without stages."
 )
+@click.option("--reset", is_flag=True, help="Show the alarm of each drive, and reset it after a question.")
 @json_option
-def command(bench_file: Path | None, example: bool, example_hand: bool, as_json: bool) -> int:
+def command(bench_file: Path | None, example: bool, example_hand: bool, reset: bool, as_json: bool) -> int:
     """Connect to every instrument of the bench, identify it and run its self-test.
+
+    --reset asks before it resets an alarm: first remove its cause. Nothing moves by a reset.
 
     Exit status 1: an instrument's certificate has expired. 3: an instrument does not answer, or fails its self-test.
     """
     if example or example_hand:
         click.echo((HAND if example_hand else DEFAULT).read_text(encoding="utf-8"), nl=False)
         return 0
+    if reset and as_json:
+        raise click.UsageError("--reset asks a person; leave out --json")
     bench = read_bench(bench_file)
-    found, due = checked(bench), certificates(bench)
+    found, due = checked(bench, _reset if reset else None), certificates(bench)
     late = expired(bench, datetime.now(UTC).date())
     if as_json:
         papers = {
@@ -53,6 +59,25 @@ def command(bench_file: Path | None, example: bool, example_hand: bool, as_json:
     if not all(test.ok for _, tests in found.values() for test in tests):
         return FAILED
     return NOT_MET if late else 0
+
+
+def _reset(driver: Instrument) -> None:
+    """Reset the alarm of a drive if a person wants it. An alarm that stays fails the self-test afterwards."""
+    if not isinstance(driver, HasAlarm):
+        return
+    if (alarm := driver.alarm()) is None:
+        click.echo(f"{driver.name}: no alarm", err=True)
+        return
+    click.echo(f"{driver.name}: alarm {alarm.code:02X}, {alarm.text}. {alarm.remedy}.", err=True)
+    if not alarm.resettable:
+        click.echo(f"{driver.name}: no command resets this alarm; it needs a power cycle", err=True)
+    elif click.confirm(f"Is the cause removed, and is nobody near the rig? Reset the alarm of {driver.name}", err=True):
+        try:
+            driver.reset_alarm()
+        except StageAlarm as stays:
+            click.echo(str(stays), err=True)
+        else:
+            click.echo(f"{driver.name}: the alarm is reset", err=True)
 
 
 def _rows(role: str, identity: Identity | None, tests: list[Check]) -> list[tuple[str, ...]]:
