@@ -115,6 +115,15 @@ class Url:
         return self.path.removeprefix("/")
 
     @property
+    def on_a_network(self) -> bool:
+        """Whether other computers can reach the wire: a network address, and not one of this computer alone."""
+        if self.scheme == "visa":
+            return self.path.upper().startswith(("TCPIP", "VICP"))
+        if self.scheme == "ca":
+            return self.host not in ("localhost", "127.0.0.1", "::1")  # an EPICS record is there for all clients
+        return self.scheme in ("tcp", "rtu+tcp") and not self.line.startswith("127.")
+
+    @property
     def rtu(self) -> bool:
         """Whether the frames on the wire are those of Modbus RTU."""
         return self.scheme not in ("tcp", "ca")

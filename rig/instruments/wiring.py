@@ -66,7 +66,8 @@ def wired(bench: Bench, tap: Tap | None = None) -> Iterator[Wiring]:
     """The wires of the bench, before any instrument is connected. All wires and servers are closed at the end.
 
     `tap` is called for every message. Raises BenchError for two roles on one unit of one line, and Busy if another
-    process uses a real instrument: a second connection would disturb it.
+    process of this computer uses a real instrument: a second connection would disturb it. Another computer is not seen,
+    see `on_a_network`.
     """
     check_lines(bench, f"bench {bench.name!r}, key instruments")  # a bench from a record has no file
     with ExitStack() as stack:
@@ -82,6 +83,12 @@ def wired(bench: Bench, tap: Tap | None = None) -> Iterator[Wiring]:
         links = Links(clock, tap)
         stack.callback(links.close)
         yield Wiring(bench, clock, links, world, servers)
+
+
+def on_a_network(bench: Bench) -> list[str]:
+    """The roles of real instruments that other computers can reach. The lock of a wire holds for this computer only."""
+    own = {role: part for role, part in bench.instruments.items() if not part.simulated and part.url != PERSON}
+    return [role for role, part in own.items() if Url.parse(part.url).on_a_network]
 
 
 def world_of(bench: Bench) -> World | Batch:

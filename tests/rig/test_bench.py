@@ -10,7 +10,7 @@ import yaml
 from drivers.transport import Address
 from rig.bench import DEFAULT, Bench, drivers, read_bench
 from rig.errors import BenchError
-from rig.instruments.wiring import wired
+from rig.instruments.wiring import on_a_network, wired
 
 ONE_INPUT = {"vx": 1, "vy": 1}
 ALPHA = {"driver": "oriental_az", "url": "simulated"}
@@ -270,3 +270,24 @@ def test_the_configuration_is_that_of_procedure_settings_and_bench() -> None:
     others = [("sweep", {"step_deg": 5.0}), ("soak", {"step_deg": 10.0})]
     assert same not in [bench.configuration(name, settings) for name, settings in others]
     assert same != bench.model_copy(update={"seed": 2}).configuration("sweep", {"step_deg": 10.0})
+
+
+@pytest.mark.parametrize(
+    ("url", "shared"),
+    [
+        ("tcp://192.168.1.40:502", True),
+        ("rtu+tcp://converter:4001", True),
+        ("visa:TCPIP0::10.0.0.7::INSTR", True),
+        ("ca:13IDC:m1", True),
+        ("ca://localhost:5064/13IDC:m1", False),
+        ("tcp://127.0.0.1:502", False),
+        ("rtu+tcp://localhost:4001", False),
+        ("serial:/dev/ttyUSB0?baud=115200", False),
+        ("visa:USB0::0x2A8D::0x0101::MY1::INSTR", False),
+        ("simulated", False),
+    ],
+)
+def test_instruments_that_other_computers_can_reach_are_known(url: str, shared: bool) -> None:
+    bench = read_bench()
+    parts = {**bench.instruments, "oven": bench.instruments["oven"].model_copy(update={"url": url})}
+    assert on_a_network(bench.model_copy(update={"instruments": parts})) == (["oven"] if shared else [])

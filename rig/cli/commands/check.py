@@ -16,6 +16,7 @@ from rig.bench.certificates import EXPIRED, certificates, expired
 from rig.bench.file import HAND
 from rig.cli.terminal.output import bench_option, emit, json_option, notes
 from rig.instruments.instruments import checked
+from rig.instruments.wiring import on_a_network
 
 NOT_MET, FAILED = 1, 3
 
@@ -56,9 +57,19 @@ def command(bench_file: Path | None, example: bool, example_hand: bool, reset: b
         for name, certificate in due.items():
             click.echo(f"{name}: certificate {certificate.number}, due {certificate.due}")
         notes(f"{fault}; have it calibrated again" for fault in late)
+        notes(_shared(on_a_network(bench)))
     if not all(test.ok for _, tests in found.values() for test in tests):
         return FAILED
     return NOT_MET if late else 0
+
+
+def _shared(roles: list[str]) -> list[str]:
+    """The remark about instruments that another computer could use at the same time."""
+    remark = (
+        f"On a network: {', '.join(roles)}. This program keeps other runs of this computer away from them, and cannot "
+        "see other computers. Let one computer use them at a time, and keep their network apart."
+    )
+    return [remark] if roles else []
 
 
 def _reset(driver: Instrument) -> None:
