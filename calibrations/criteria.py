@@ -29,6 +29,7 @@ MOST_SLOW_NOISE = 2.5  # excess: white and slow noise of a sensor alone leave le
 MOST_UNEXPLAINED = 1 / 5  # of the excess variance: with more left, the catalogue has not explained the data
 MOST_BY_FORM = 1 / 16  # of the excess variance: less may be the form of a named cause, which is approximate
 LEAST_SHARE = 0.05  # of the excess variance: a step that explains less may be the wrong form of a strong effect
+FORM_PART = 0.1  # of an effect's size: what its form may differ by from the one that acts
 REFINEMENT = 0.02  # of the greatest cost of loss: an effect that costs less refines the form of another
 NEGLIGIBLE = 0.02  # of a deviation or density: a noise model this near is as good as right
 

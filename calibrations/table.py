@@ -171,6 +171,10 @@ class Table:
         columns = {name: values[where] for name, values in self.columns.items()}
         return replace(self, columns=MappingProxyType(columns), labels=labels, numbers=self.numbered(where))
 
+    def with_outputs(self, outputs: Array) -> Table:
+        """The same table with other outputs, shape (n, axes)."""
+        return replace(self, columns={**self.columns, **dict(zip(self.output_names, outputs.T, strict=True))})
+
     def numbered(self, rows: NDArray[np.intp]) -> NDArray[np.intp]:
         """The numbers by which a person knows these rows: those of a run's poses, or of a file's rows, from 0."""
         return rows if self.numbers is None else self.numbers[rows]

@@ -21,7 +21,6 @@ from calibrations.criteria import (
     MOST_EFFECTS,
     MOST_UNEXPLAINED,
     NO_MORE_THAN_NOISE,
-    REFINEMENT,
     WRONG_FLOOR,
 )
 from calibrations.design.experiment import separating_experiment
@@ -31,8 +30,9 @@ from calibrations.discovery.fit_doubts import fit_doubts
 from calibrations.discovery.outliers import caution, fit_without, kept, told
 from calibrations.discovery.places import places
 from calibrations.discovery.plausibility import Finding, refusal, rejection
+from calibrations.discovery.refinements import causes
 from calibrations.discovery.results import Candidate, Diagnosis, Discovery, Findings, Place, Step
-from calibrations.discovery.search import Path, Settled, cost, find_path, first_order, is_complete, recounted, settled
+from calibrations.discovery.search import Path, Settled, find_path, is_complete, recounted, settled
 from calibrations.discovery.structure import plainer, structure_of
 from calibrations.discovery.summary import step_shares
 from calibrations.discovery.verdict import Verdict
@@ -278,7 +278,7 @@ class Rows(Dataset[Fit]):
             baseline=path.start,
             steps=steps,
             candidates=_next_first(path, stand),
-            causes=_causes(steps),
+            causes=causes(steps, len(path.first)),
             alternatives=rivals,
             left=left.text if left else None,
             pattern=left,
@@ -526,17 +526,6 @@ def _in_order(start: Fit, stand: Settled, effects: Mapping[str, Effect]) -> tupl
         steps.append(Step(name, present, after))
         present = after
     return tuple(steps)
-
-
-def _causes(steps: tuple[Step[Fit], ...]) -> tuple[str, ...]:
-    if not steps:
-        return ()
-    tied = {term.name for term in steps[0].before.model.terms if term.tied}
-    end = steps[-1].after
-    costs = {s.name: (first_order(end, s.name, shared=True) if s.name in tied else cost(end, s.name))[0] for s in steps}
-    approximate = [s.name for s in steps if not s.effect.exact]
-    greatest = max((costs[name] for name in approximate), default=0.0)
-    return tuple(name for name, lost in costs.items() if name not in approximate or lost >= REFINEMENT * greatest)
 
 
 def _require_new(found: Fit, name: str, model: str) -> None:

@@ -368,8 +368,7 @@ def _with(model: Model, added: list[Addition]) -> Model:
 
 def _less(table: Table, part: Array | float) -> Table:
     """The table with a part (channels, n) taken off its outputs."""
-    outputs = table.outputs - np.broadcast_to(part, (len(table.axes), table.n)).T
-    return replace(table, columns={**table.columns, **dict(zip(table.output_names, outputs.T, strict=True))})
+    return table.with_outputs(table.outputs - np.broadcast_to(part, (len(table.axes), table.n)).T)
 
 
 def _derivatives(start: Fit, effect: Effect) -> Array:

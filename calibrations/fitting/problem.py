@@ -22,13 +22,15 @@ from calibrations.fitting.table_noise import scatter
 from calibrations.geometry.smooth import smooth_columns
 from calibrations.means.noise import Processes, norm_std, white_std
 from calibrations.model import Model
-from calibrations.model.chain import Near, Step, backward, forward
+from calibrations.model.chain import Near, Step, backward, force, forward, sensed
 from calibrations.model.parameters import Layout
+from calibrations.motion.spectrum import sample_output
 from calibrations.motion.stretches import Stretches, make_stretches
 from calibrations.table import Array, Table
 from calibrations.tables import FITTED
 
 STRENGTH = "field-strength"
+SMALL = 1e-6  # of an output's range: the step of a derivative
 
 
 def check_kind(kind: str, source: str) -> None:
@@ -103,16 +105,24 @@ class Problem:
 
     def residual_by(self, steps: Sequence[Step]) -> Array:
         """As `residual`, of effects with their values: those of the model, and what else one wants to try."""
-        return self._reduced(self._samples.outputs - forward(self._samples, steps))
+        return self._reduced(self.samples.outputs - forward(self.samples, steps))
 
     @property
-    def _samples(self) -> Table:
+    def samples(self) -> Table:
         """The rows whose output the model predicts."""
         return self.table
 
     def _reduced(self, error: Array) -> Array:
         """An error of each axis, shape (samples, axes), by channel."""
         return error.T
+
+    def sensed(self, theta: Array) -> Array:
+        """What the samples sense along the sensing axes, (samples, 3)."""
+        return force(self.samples, self.layout.steps(theta))
+
+    def of_output(self, theta: Array, changes: Array) -> Array:  # noqa: ARG002
+        """What changes of the response, (samples, axes, m), make of the residual, to first order, (channels, n, m)."""
+        return np.stack([self._reduced(-change) for change in np.moveaxis(changes, 2, 0)], axis=2)
 
     @property
     def rounds(self) -> bool:
@@ -152,7 +162,7 @@ class Problem:
         if not np.isfinite(layout.prior).any():
             return {}
         steps = layout.steps(theta)
-        columns = Near(self._samples, [steps[i] for i in even]).columns
+        columns = Near(self.samples, [steps[i] for i in even]).columns
         known: dict[int, Array] = {}
         for k, slot in enumerate(layout.slots):
             if slot.term in even and (of := columns.get(even.index(slot.term))) is not None:
@@ -167,7 +177,7 @@ class Problem:
 
         An entry of an effect that only adds to the output changes that effect's contribution and nothing else.
         """
-        samples = self._samples
+        samples = self.samples
         steps = self.layout.steps(theta)
         even = [i for i, (effect, _) in enumerate(steps) if stairs or not effect.rounds]
         near, beside_stairs = Near(samples, steps), Near(samples, [steps[i] for i in even])
@@ -245,6 +255,21 @@ class PositionProblem(Problem):
         error: Array = np.linalg.norm(backward(self.table, steps), axis=1)[:, None] - 1.0
         return error.T
 
+    def sensed(self, theta: Array) -> Array:
+        """As the model has it from the outputs."""
+        steps = self.layout.steps(theta)
+        return sensed(backward(self.table, steps), self.table, steps)
+
+    def of_output(self, theta: Array, changes: Array) -> Array:
+        """By how the magnitude follows each output."""
+        outputs, found = self.table.outputs, np.zeros((self.table.n, changes.shape[2]))
+        for k, axis in enumerate(np.eye(outputs.shape[1])):
+            little = SMALL * float(np.ptp(outputs[:, k]))
+            near = (self.on(self.table.with_outputs(outputs + s * little * axis)).residual(theta) for s in (1.0, -1.0))
+            ahead, behind = near
+            found -= ((ahead - behind)[0] / (2 * little))[:, None] * changes[:, k]
+        return found[None]
+
     @property
     def adds(self) -> bool:
         """A magnitude is not linear in any parameter."""
@@ -309,8 +334,13 @@ class MotionProblem(Problem):
         return self.table.white
 
     @property
-    def _samples(self) -> Table:
+    def samples(self) -> Table:
         return self.table.samples
+
+    def of_output(self, theta: Array, changes: Array) -> Array:
+        """Behind the output filter."""
+        filtered = [sample_output(change, self.samples) for change in np.moveaxis(changes, 2, 0)]
+        return super().of_output(theta, np.stack(filtered, axis=2))
 
     def _reduced(self, error: Array) -> Array:
         return self.table.parts(error)

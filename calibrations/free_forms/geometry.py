@@ -14,6 +14,7 @@ from itertools import combinations
 
 import numpy as np
 
+from calibrations.criteria import FORM_PART
 from calibrations.free_forms.chain import own_base_size
 from calibrations.free_forms.form import CROSS
 from calibrations.free_forms.search import SearchResult
@@ -26,7 +27,6 @@ CLOSE = 8.0  # of chi-square: explanations that this data does not tell apart
 LINEAR_PART = 2.0  # of a curve's odd part: the standard deviation of a mechanism's own linear part
 EVEN_PART = 1.0  # the same of its even part
 EVEN, ODD = (2, 4, 6), (3, 5)  # powers of the driver
-FORM_PART = 0.1  # of a place's size: what its form may differ by from the one that acts there
 LEAST_LINE = 0.3  # noise floors: a smaller linear part is left out
 SEEN = 3.5  # standard uncertainties: a smaller linear part may be noise
 IMMATERIAL = 0.15  # noise floors: a smaller angle is no matter

@@ -1,0 +1,131 @@
+"""Which effects of a found model are causes, and which only refine the form of a larger one.
+
+The form of a mechanism is never quite that of the catalogue, and what the formula leaves looks like further effects. So
+each effect is tested beside another form of every larger one: a smooth function at the same place, with a Gaussian
+prior of a tenth of the larger effect's size. An effect that such a form may replace stays in the model and is no cause.
+
+Source  Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425: what a model misses as a random function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from calibrations.criteria import FORM_PART, REFINEMENT, SIGNIFICANT
+from calibrations.discovery.results import Step
+from calibrations.discovery.search import cost, first_order
+from calibrations.discovery.significance import chance, of_search
+from calibrations.fitting.fit import Fit
+from calibrations.free_forms.bases import Basis, Line, Spline, spline
+from calibrations.free_forms.form import Factor, Form
+from calibrations.free_forms.place_names import place_of_effect
+from calibrations.table import Array
+
+BASE = ("bias", "scale-factor")
+DRIVERS: dict[str, tuple[str, Factor]] = {
+    "own-response": ("own", ""),
+    "cross-response": ("cross", ""),
+    "z-response": ("out-of-plane", ""),
+    "scale-over-cross": ("cross", "force"),
+    "scale-over-z": ("out-of-plane", "force"),
+    "temperature-bias": ("temperature", ""),
+    "temperature-scale": ("temperature", "force"),
+    "time-bias": ("time", ""),
+    "time-scale": ("time", "force"),
+    "output": ("output", ""),
+}
+LINEAR = ("cross-response", "z-response", "scale-over-cross", "scale-over-z")  # whose linear parts are geometry
+LEAD_S = 60.0  # by which the sensor may be ahead of its thermometer
+INTERVALS = 8
+FORCES = Spline(-1.1, 1.1, INTERVALS)
+
+
+def causes(steps: tuple[Step[Fit], ...], tried: int) -> tuple[str, ...]:
+    """The effects of a search that are causes, in the order of its steps; `tried`: how many it chose among."""
+    if not steps:
+        return ()
+    tied = {term.name for term in steps[0].before.model.terms if term.tied}
+    end = steps[-1].after
+    costs = {s.name: (first_order(end, s.name, shared=True) if s.name in tied else cost(end, s.name))[0] for s in steps}
+    approximate = [s.name for s in steps if not s.effect.exact]
+    greatest = max((costs[name] for name in approximate), default=0.0)
+    material = [name for name, lost in costs.items() if name not in approximate or lost >= REFINEMENT * greatest]
+    if len(material) < 2:
+        return tuple(material)
+    found: list[str] = []
+    for name in sorted(material, key=lambda n: -costs[n]):
+        forms = [_whitened_forms(end, other) for other in found]
+        if not forms or name in BASE or of_search(chance(*_beside(end, name, np.hstack(forms))), tried) < SIGNIFICANT:
+            found.append(name)
+    return tuple(name for name in material if name in found)
+
+
+def _beside(end: Fit, name: str, forms: Array) -> tuple[float, int]:
+    """Growth of the whitened sum of squares without an effect, to first order, and the number of its parameters.
+
+    `forms`: columns that may replace it, whitened, (rows, m), for coefficients of prior N(0, 1).
+    """
+    white, mine = end.whitened[:, 1:], end.problem.layout.of_effect(name)
+    size = np.linalg.norm(white, axis=0)
+    white = white / np.where(size > 0, size, 1.0)
+    signal = white[:, mine] @ (end.theta[mine] * size[mine])
+    others, m = white[:, ~mine], forms.shape[1]
+    rows = np.block([[others, forms], [np.zeros((m, others.shape[1])), np.eye(m)]])
+    target = np.append(signal, np.zeros(m))
+    lost = target - rows @ np.linalg.lstsq(rows, target, rcond=1e-9)[0]
+    return float(lost @ lost), int(mine.sum())
+
+
+def _whitened_forms(end: Fit, name: str) -> Array:
+    """Other forms of an effect, whitened, (rows, m): columns for coefficients of prior N(0, 1)."""
+    white = end.whitened[:, 1:]
+    base = white[:, np.any([end.problem.layout.of_effect(each) for each in BASE], axis=0)]
+    mine = end.problem.layout.of_effect(name)
+    own = np.linalg.norm(_freed(white[:, mine] @ end.theta[mine], base))
+    blocks = [np.zeros((len(white), 0))]
+    for form, part in _forms(end, name):
+        columns = _freed(end.noise.whiten(_columns(end, form)), base)
+        size = np.linalg.norm(columns)
+        blocks.append(columns * (part * own / size if size > 0 else 0.0))
+    return np.hstack(blocks)
+
+
+def _freed(rows: Array, base: Array) -> Array:
+    return rows - base @ np.linalg.lstsq(base, rows, rcond=1e-9)[0]
+
+
+def _forms(end: Fit, name: str) -> Iterator[tuple[Form, float]]:
+    """The forms that an effect may have, and the size of each as a part of the effect's."""
+    place, table = place_of_effect(name), end.problem.samples
+    if place not in DRIVERS:
+        return
+    driver, factor = DRIVERS[place]
+    if driver not in ("temperature", "time", "output"):
+        yield Form(place, "curve", driver, (FORCES,), factor), FORM_PART
+        if place in LINEAR:
+            yield Form(place, "line", driver, (Line(-1.0, 1.0),), factor), 1.0
+        return
+    if driver == "output":
+        bases: tuple[Basis, ...] = tuple(spline(v, INTERVALS) for v in table.outputs.T)
+    else:
+        x = table.column("temperature_c") if driver == "temperature" else table.time_s
+        bases = (spline(x, INTERVALS),)
+    yield Form(place, "curve", driver, bases, factor), FORM_PART
+    if driver == "temperature" and "t_s" in table:
+        for lead in (-LEAD_S, LEAD_S):
+            yield Form(place, "lead", driver, (Line(float(x.min()), float(x.max())),), factor, lead_s=lead), 1.0
+
+
+def _columns(end: Fit, form: Form) -> Array:
+    """d residual / d the coefficients of a form of every axis, (channels, n, m)."""
+    problem = end.problem
+    samples, force = problem.samples, problem.sensed(end.theta)
+    found = []
+    for k in range(len(samples.axes)):
+        for column in form.columns(samples, force, samples.outputs[:, k], k).T:
+            change = np.zeros(samples.outputs.shape)
+            change[:, k] = column
+            found.append(change)
+    return problem.of_output(end.theta, np.stack(found, axis=2))
