@@ -34,9 +34,9 @@ def temperature_rate_c_s(table: Table) -> Array:
 
 @lru_cache(maxsize=64)
 def leading_temperature(table: Table, lead_s: float) -> Array:
-    """The same without the thermometer's noise: a local line over some rows."""
+    """The same without the noise of the thermometer: a local line over some rows; as logged where no time changes."""
     shown = table.column("temperature_c")
-    if "t_s" not in table:
+    if "t_s" not in table or not np.ptp(table.time_s) > 0:
         return shown
     return np.interp(table.time_s + lead_s, table.time_s, _smooth(shown, min(SMOOTHED_ROWS, 2 * (table.n // 4) + 1)))
 

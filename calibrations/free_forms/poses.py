@@ -71,8 +71,8 @@ class PoseData:
 
     @property
     def timed(self) -> bool:
-        """Whether the time was logged."""
-        return "t_s" in self.table
+        """Whether the time was logged, and changes."""
+        return "t_s" in self.table and float(np.ptp(self.table.time_s)) > 0
 
     @property
     def since(self) -> Array:

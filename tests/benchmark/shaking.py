@@ -223,7 +223,7 @@ def _record(
     if m and m.response:
         v = v + m.response(signals, size)
     v = v + NOISE_V / np.sqrt(2 * step) * random.standard_normal(v.shape)
-    v = _low_pass(v, CORNER_HZ * (1 - size) if m and m.corner else CORNER_HZ)
+    v = _low_pass(v, CORNER_HZ / (1 + size) if m and m.corner else CORNER_HZ)
     at = np.arange(n) / RATE_HZ
     late = np.interp(at, t, m.delay(signals, size)) if m and m.delay else 0.0
     shown = m.displacement(signals, size) if m and m.displacement else x
