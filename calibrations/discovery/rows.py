@@ -269,7 +269,9 @@ class Rows(Dataset[Fit]):
         structure = better or structure_of(stand.end)
         left = structure if stand.end.pooled_excess > MATERIAL else None
         steps = _in_order(path.start, stand, effects)
-        rivals = {name: c.indistinguishable_from for name, c in stand.beside.items() if c.indistinguishable_from}
+        named = causes(steps, len(path.first))
+        beside = {name: stand.beside[name].indistinguishable_from for name in named if name in stand.beside}
+        rivals = {name: others for name, others in beside.items() if others}
         separations = {name: separating_experiment(name, others, self.table) for name, others in rivals.items()}
         found = Findings(
             data=self,
@@ -278,7 +280,7 @@ class Rows(Dataset[Fit]):
             baseline=path.start,
             steps=steps,
             candidates=_next_first(path, stand),
-            causes=causes(steps, len(path.first)),
+            causes=named,
             alternatives=rivals,
             left=left.text if left else None,
             pattern=left,

@@ -14,7 +14,7 @@ from pathlib import Path
 import calibrations as cal
 from calibrations.table import Table
 from tests.benchmark.hidden import Answer, Score, score, summary, timed
-from tests.benchmark.shaking import LAYOUTS, MECHANISMS, OUTSIDE, UNKNOWN, measured, of_size
+from tests.benchmark.shaking import LAYOUTS, MECHANISMS, OUTSIDE, UNKNOWN, measured, size_for
 
 SEEDS, PROCESSES, LIMIT_S = 3, 2, 200
 TIMES = (10.0, 3.0, 30.0)  # noise floors that the linear model leaves
@@ -38,7 +38,8 @@ def answered(case: Case) -> Score:
     """The answer of the search on one case."""
     name, layout, times, seed = case
     mechanism = {**MECHANISMS, **OUTSIDE}.get(name)
-    table: Table = of_size(mechanism, times, layout, seed) if mechanism else measured(None, 0.0, layout, seed)
+    acting = ((mechanism, size_for(mechanism, times, layout, seed)),) if mechanism else ()
+    table: Table = measured(acting, layout, seed)
 
     def search(_: Path) -> Answer:
         found = cal.discover(table, "linear")

@@ -163,33 +163,34 @@ OUTSIDE: Mapping[str, Mechanism] = {
 }
 
 
-def measured(mechanism: Mechanism | None, size: float, layout: str, seed: int) -> Table:
-    """The table of all records. `size`: of the mechanism, in the unit of its formula."""
+Acting = tuple[tuple[Mechanism, float], ...]  # with the size of each, in the unit of its formula
+
+
+def measured(acting: Acting, layout: str, seed: int) -> Table:
+    """The table of all records."""
     random = np.random.default_rng([seed, 5])
     q, warmer = float(random.normal()), 1.0 if seed % 2 else -1.0
-    lines, rest_s = LAYOUTS[layout]
-    records = [_record(mechanism, size, lines, rest_s, number, q, warmer, random) for number in range(len(ATTITUDES))]
+    records = [_record(acting, *LAYOUTS[layout], number, q, warmer, random) for number in range(len(ATTITUDES))]
     columns = {name: np.concatenate([r[name] for r in records]) for name in records[0]}
     constants = {"filter_corner_hz": CORNER_HZ, "sample_rate_hz": RATE_HZ, "gravity_m_s2": GRAVITY}
-    cause = mechanism.cause if mechanism else "nothing"
-    return Table.from_columns("motion", columns, constants, f"{cause}, {layout}, {seed}")
+    causes = ", ".join(mechanism.cause for mechanism, _ in acting)
+    return Table.from_columns("motion", columns, constants, f"{causes or 'nothing'}, {layout}, {seed}")
 
 
-def of_size(mechanism: Mechanism, times: float, layout: str, seed: int) -> Table:
-    """The table on which the linear model leaves about `times` the noise floor."""
+def size_for(mechanism: Mechanism, times: float, layout: str, seed: int) -> float:
+    """The size of which the linear model leaves about `times` the noise floor."""
     size, wanted = mechanism.begin, times**2 - 1
     for _ in range(6):
-        table = measured(mechanism, size, layout, seed)
+        table = measured(((mechanism, size),), layout, seed)
         left = max(fit(read_model("linear"), table).pooled_excess ** 2 - 1, 0.02)
         if abs(np.log(left / wanted)) < 0.4:
             break
         size *= float(np.clip(np.sqrt(wanted / left), 0.1, 30.0))
-    return table
+    return size
 
 
 def _record(
-    m: Mechanism | None,
-    size: float,
+    acting: Acting,
     lines: tuple[tuple[float, float], ...],
     rest_s: float,
     number: int,
@@ -199,43 +200,46 @@ def _record(
 ) -> dict[str, Array]:
     n, step = int(RECORD_S * RATE_HZ), 1 / (RATE_HZ * FINER)
     t = np.arange(-LEAD_S, RECORD_S + LEAD_S, step)
-    first_s = BETWEEN_S + number * (RECORD_S + GAP_S)
-    alpha, beta = ATTITUDES[number]
-    level = 0.4 + 0.3 * (number % 3) if rest_s else 1.0
-    ramp = np.clip((t - rest_s) / 0.4, 0.0, 1.0) if rest_s else np.ones(len(t))
-    x = level * ramp**3 * (10 - 15 * ramp + 6 * ramp**2) * sum(
-        a * np.sin(2 * np.pi * f * t + k) for k, (a, f) in enumerate(lines)
-    )  # fmt: skip
+    since = BETWEEN_S + number * (RECORD_S + GAP_S) + t
+    x = _displacement(t, lines, rest_s, 0.4 + 0.3 * (number % 3) if rest_s else 1.0)
     motion = np.gradient(np.gradient(x, step), step) / GRAVITY
-    true = m.angles(alpha, beta, size, q) if m and m.angles else (alpha, beta)
-    force = np.tile(Rotation.from_euler("yz", true, degrees=True).apply([0.0, 0.0, 1.0]), (len(t), 1))
-    if m and m.tilt:
-        up = Rotation.from_euler("x", size, degrees=True).apply([0.0, 0.0, 1.0])
-        force = np.tile(Rotation.from_euler("yz", true, degrees=True).apply(up), (len(t), 1))
+    true, tilt = ATTITUDES[number], 0.0
+    for m, size in acting:
+        true = m.angles(*true, size, q) if m.angles else true
+        tilt += size if m.tilt else 0.0
+    up = Rotation.from_euler("x", tilt, degrees=True).apply([0.0, 0.0, 1.0])
+    force = np.tile(Rotation.from_euler("yz", true, degrees=True).apply(up), (len(t), 1))
     force[:, 0] += motion
-    since = first_s + t
-    signals = Signals((alpha, beta), since, x, motion, force, _temperature(since, warmer), q)
-    if m and m.force:
-        force = force + m.force(signals, size)
-    if m and m.turn:
-        force = Rotation.from_euler("xyz", [0.3 * size * q, 0.0, size], degrees=True).inv().apply(force)
+    signals = Signals(ATTITUDES[number], since, x, motion, force, _temperature(since, warmer), q)
+    for m, size in acting:
+        force = force + m.force(signals, size) if m.force else force
+        if m.turn:
+            force = Rotation.from_euler("xyz", [0.3 * size * q, 0.0, size], degrees=True).inv().apply(force)
     v = 2.5 + np.array([0.01, -0.02]) + np.array([1.0, 1.02]) * force[:, :2]
-    if m and m.response:
-        v = v + m.response(signals, size)
+    v = v + sum((m.response(signals, size) for m, size in acting if m.response), np.zeros(v.shape))
     v = v + NOISE_V / np.sqrt(2 * step) * random.standard_normal(v.shape)
-    v = _low_pass(v, CORNER_HZ / (1 + size) if m and m.corner else CORNER_HZ)
+    v = _low_pass(v, CORNER_HZ / (1 + sum(size for m, size in acting if m.corner)))
     at = np.arange(n) / RATE_HZ
-    late = np.interp(at, t, m.delay(signals, size)) if m and m.delay else 0.0
-    shown = m.displacement(signals, size) if m and m.displacement else x
+    late = sum((np.interp(at, t, m.delay(signals, size)) for m, size in acting if m.delay), np.zeros(n))
+    for m, size in acting:
+        x = m.displacement(signals, size) if m.displacement else x
+    first_s = float(since[0]) + LEAD_S
     return {
         "t_s": at + first_s,
-        "displacement_m": np.interp(at, t, shown) + PROBE_M * random.standard_normal(n),
-        "alpha_deg": np.full(n, alpha),
-        "beta_deg": np.full(n, beta),
+        "displacement_m": np.interp(at, t, x) + PROBE_M * random.standard_normal(n),
+        "alpha_deg": np.full(n, ATTITUDES[number][0]),
+        "beta_deg": np.full(n, ATTITUDES[number][1]),
         "temperature_c": _temperature(first_s + at - 8, warmer) + 0.01 * random.standard_normal(n),  # it lags by 8 s
         "vx_v": np.interp(at - late, t, v[:, 0]),
         "vy_v": np.interp(at - late, t, v[:, 1]),
     }
+
+
+def _displacement(t: Array, lines: tuple[tuple[float, float], ...], rest_s: float, level: float) -> Array:
+    """Of the mover, m, which begins gently where it rests first."""
+    ramp = np.clip((t - rest_s) / 0.4, 0.0, 1.0) if rest_s else np.ones(len(t))
+    waves = (a * np.sin(2 * np.pi * f * t + k) for k, (a, f) in enumerate(lines))
+    return np.asarray(level * ramp**3 * (10 - 15 * ramp + 6 * ramp**2) * sum(waves, np.zeros(len(t))))
 
 
 def _temperature(since: Array, warmer: float) -> Array:

@@ -1,0 +1,42 @@
+"""An effect that another form of a larger one may replace is no cause, and one of its own is."""
+
+from __future__ import annotations
+
+import pytest
+
+from calibrations.discovery.results import Discovery
+from calibrations.fitting.fit import Fit
+from calibrations.loop import discover
+from calibrations.model.file import read_model
+from tests.benchmark.shaking import MECHANISMS, measured, size_for
+
+
+def discovered(**floors: float) -> Discovery[Fit]:
+    """The answer where each mechanism alone would leave so many noise floors."""
+    every = {MECHANISMS[name.replace("_", "-")]: times for name, times in floors.items()}
+    acting = tuple((m, size_for(m, times, "two lines", 0)) for m, times in every.items())
+    return discover(measured(acting, "two lines", 0), read_model("linear"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["z-axis-bias", "cross-axis-bias", "temperature-scale"])
+def test_what_the_formula_of_a_mechanism_leaves_in_motion_has_no_name(name: str) -> None:
+    found = discovered(**{name: 10.0})
+    assert found.causes == (name,)
+    assert len(found.steps) > 1  # the error still falls
+    assert found.end.held_out_excess < 1.3
+    assert set(found.alternatives) <= {name}
+
+
+def test_a_clean_record_gets_no_name() -> None:
+    assert discover(measured((), "two lines", 1), read_model("linear")).causes == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("second", ["sampling-delay", "temperature-bias", "axis-misalignment"])
+def test_a_second_cause_keeps_its_name(second: str) -> None:
+    found = discovered(**{"quadratic-nonlinearity": 10.0, second: 8.0})
+    named = {"quadratic-nonlinearity", second}
+    replaced = {other for name in found.causes for other in found.alternatives.get(name, ())}
+    assert named <= {*found.causes, *replaced}
+    assert len(found.causes) == 2
