@@ -37,15 +37,17 @@ DRIVERS: dict[str, tuple[str, Factor]] = {
     "output": ("output", ""),
 }
 LINEAR = ("cross-response", "z-response", "scale-over-cross", "scale-over-z")  # whose linear parts are geometry
-LEAD_S = 60.0  # by which the sensor may be ahead of its thermometer
+LEAD_S, LEADS = 15.0, 4.0  # by which the sensor may be ahead of its thermometer, and how often that
 INTERVALS = 8
 FORCES = Spline(-1.1, 1.1, INTERVALS)
 
 
 def causes(steps: tuple[Step[Fit], ...], tried: int) -> tuple[str, ...]:
-    """The effects of a search that are causes, in the order of its steps; `tried`: how many it chose among."""
-    if not steps:
-        return ()
+    """The effects of a search that are causes, in the order of its steps.
+
+    steps  one or more
+    tried  how many effects the search chose among
+    """
     tied = {term.name for term in steps[0].before.model.terms if term.tied}
     end = steps[-1].after
     costs = {s.name: (first_order(end, s.name, shared=True) if s.name in tied else cost(end, s.name))[0] for s in steps}
@@ -115,7 +117,7 @@ def _forms(end: Fit, name: str) -> Iterator[tuple[Form, float]]:
     yield Form(place, "curve", driver, bases, factor), FORM_PART
     if driver == "temperature" and "t_s" in table:
         for lead in (-LEAD_S, LEAD_S):
-            yield Form(place, "lead", driver, (Line(float(x.min()), float(x.max())),), factor, lead_s=lead), 1.0
+            yield Form(place, "lead", driver, (Line(float(x.min()), float(x.max())),), factor, lead_s=lead), LEADS
 
 
 def _columns(end: Fit, form: Form) -> Array:

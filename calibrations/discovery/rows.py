@@ -30,7 +30,6 @@ from calibrations.discovery.fit_doubts import fit_doubts
 from calibrations.discovery.outliers import caution, fit_without, kept, told
 from calibrations.discovery.places import places
 from calibrations.discovery.plausibility import Finding, refusal, rejection
-from calibrations.discovery.refinements import causes
 from calibrations.discovery.results import Candidate, Diagnosis, Discovery, Findings, Place, Step
 from calibrations.discovery.search import Path, Settled, find_path, is_complete, recounted, settled
 from calibrations.discovery.structure import plainer, structure_of
@@ -269,7 +268,7 @@ class Rows(Dataset[Fit]):
         structure = better or structure_of(stand.end)
         left = structure if stand.end.pooled_excess > MATERIAL else None
         steps = _in_order(path.start, stand, effects)
-        named = causes(steps, len(path.first))
+        named = _causes(steps, len(path.first))
         beside = {name: stand.beside[name].indistinguishable_from for name in named if name in stand.beside}
         rivals = {name: others for name, others in beside.items() if others}
         separations = {name: separating_experiment(name, others, self.table) for name, others in rivals.items()}
@@ -528,6 +527,15 @@ def _in_order(start: Fit, stand: Settled, effects: Mapping[str, Effect]) -> tupl
         steps.append(Step(name, present, after))
         present = after
     return tuple(steps)
+
+
+def _causes(steps: tuple[Step[Fit], ...], tried: int) -> tuple[str, ...]:
+    """The effects of a search that are causes; one alone is."""
+    if len(steps) < 2:
+        return tuple(step.name for step in steps)
+    from calibrations.discovery.refinements import causes  # most searches end at one effect
+
+    return causes(steps, tried)
 
 
 def _require_new(found: Fit, name: str, model: str) -> None:

@@ -161,7 +161,7 @@ def _nominal(table: Table) -> float:
     if table.type.field:
         return sphere_radius(table)
     spread = float(np.median(np.ptp(table.outputs, axis=0))) / 2
-    return table.number("output_per_g", spread or 1.0)
+    return abs(table.number("output_per_g", spread or 1.0))
 
 
 def _exists(constant: str, term: Term) -> bool:

@@ -161,3 +161,9 @@ def test_what_no_effect_explains_is_described() -> None:
     assert found.verdict == "unexplained"
     assert found.residual_structure is not None
     assert "is off throughout" in found.residual_structure
+
+
+def test_a_sensor_that_points_the_other_way_has_a_negative_scale_factor() -> None:
+    found = discover(shaken.record(shaken.TWO, 20.0, scale_v=(-1.0, -1.0), delay_s=1e-3), LINEAR)
+    assert found.causes == ("sampling-delay",)
+    assert value(found.end.model, "scale-factor", "scale")[0] == pytest.approx(-1.0, rel=0.01)
