@@ -26,7 +26,9 @@ def cases(seeds: int) -> Iterator[Case]:
     """Every cause with each seed; layouts and sizes in turn."""
     for seed in range(seeds):
         for name in (*MECHANISMS, *OUTSIDE, "null"):
-            yield name, list(LAYOUTS)[seed % 3], TIMES[(seed // 3 + seed) % 3], seed
+            layout = list(LAYOUTS)[seed % 3]
+            if name != "vibration-rectification" or layout == "rests and levels":  # else it is a bias
+                yield name, layout, TIMES[(seed // 3 + seed) % 3], seed
 
 
 def kind_of(case: Case) -> str:
