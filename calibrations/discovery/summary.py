@@ -78,7 +78,7 @@ def summary_lines(found: Discovery[Fit]) -> list[Line]:
         if step.name in told or (step.name in found.refinements and not step.name.startswith(PREFIX)):
             continue
         change = rms(in_milli_rows(step.after.residual - step.before.residual, end))
-        p = chance(*first_order(end, step.name, shared=True))
+        p = chance(*first_order(end, step.name))
         effects = () if step.name.startswith(PREFIX) else (step.name,)
         at = place_of_effect(step.name) or "-"
         lines.append((at, effects, float(np.sqrt(np.mean(change**2))), 1 - p, tuple(alternatives.get(step.name, ()))))

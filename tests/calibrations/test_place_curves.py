@@ -86,6 +86,14 @@ def test_the_summary_has_a_line_for_each_cause_and_the_shares_of_the_steps_add_u
     assert "certainty" in text
 
 
+def test_an_effect_with_one_parameter_is_certain_where_the_data_show_it() -> None:
+    leaning = np.radians(0.33) * FORCES[:, 0]
+    found = discover(table(np.column_stack([np.zeros_like(leaning), leaning])), read_model("linear"))
+    (line,) = summary_lines(found)
+    assert line.effects == ("axis-nonorthogonality",)
+    assert line.certainty > 0.9999
+
+
 def test_without_variance_beyond_the_noise_a_step_has_no_share() -> None:
     found = Rows(table()).add(named("free:own-response", {}), read_model("linear"), catalogue())
     assert step_shares(found) == [None]
