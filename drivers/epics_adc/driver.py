@@ -1,6 +1,7 @@
 """Analog records of EPICS as a converter: whatever an IOC measures, the rig records.
 
-All channels are read at once, a few times a second; the reading of a record carries its alarm and its time stamp. A
+All channels are read at once, a few times a second, and not monitored: a monitor leaves out changes below the record's
+deadband (MDEL), so its values are no even sampling. The reading of a record carries its alarm and its time stamp. A
 record with an alarm, and one that an IOC does not process as often as it is read, are refused: a repeated reading would
 count as a new one.
 
