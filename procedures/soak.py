@@ -51,7 +51,7 @@ def soak(
         poses = list(group)
         if until_steady and path.startswith(HOLD) and rig.steady(rig.measured(), oven_c):
             break
-        if off_s and path == f"{REVERSAL} 0" and is_first(poses[0]):
+        if off_s and path == f"{REVERSAL} 0" and is_first(poses[0]) and not rig.measured():
             _cold_start(rig, off_s)
         _keep_on(rig, off_s, oven_c)
         if path.startswith(HOLD):

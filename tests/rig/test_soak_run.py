@@ -15,14 +15,18 @@ import pytest
 import yaml
 
 from calibrations.analyses.forecast import Bounds, Forecast, SoakForecast
+from procedures.catalogue import find
 from procedures.soak import schedule
-from rig.bench import DEFAULT
+from rig.bench import DEFAULT, read_bench
 from rig.record import Record
 from rig.record.measured import Measured
 from rig.results.evaluate import names
 from rig.results.soak import night
+from rig.runs.runner import resume, start
 from rig.runs.soak_forecast import SoakForecaster, lines, outlook
+from rig.services.exclusion import exclude
 from tests.rig.nursery import Harm, Nursery
+from tests.rig.rigging import Onlooker, sigterm_at
 
 pytestmark = pytest.mark.sockets
 Rig = Callable[..., Any]
@@ -127,6 +131,23 @@ def test_until_steady_it_ends_early_and_says_when(rig: Rig, cold: str) -> None:
     assert 0 < t_s[0] < 60
     last_h = t_s[-1] / 3600
     assert document["results"]["steady-state-time"]["value"] < last_h < 12
+
+
+@pytest.mark.slow
+def test_a_soak_that_measures_its_first_pose_again_stays_on(rig: Rig, cold: str) -> None:
+    """A second cold start in mid-run would warm the sensor up anew, and all times would count from it."""
+    settings = {**SHORT, "duration_s": 10.0, "dwell_s": 0.2, "off_s": 20.0, "oven_c": 0.0}
+    with Record() as record:
+        with sigterm_at(12):
+            start(record, read_bench(Path(cold)), find("soak"), settings, Onlooker())
+        (stopped,) = record.runs()
+        begun = Measured.named(record, stopped.run)
+        on_s, before_s = begun.readings(), begun.table().time_s
+        exclude(record, stopped.run, [0], "touched")
+        resume(record, stopped.run, Onlooker())
+        done = Measured.named(record, stopped.run)
+        assert done.readings() == on_s
+        assert list(done.table().time_s[: len(before_s) - 1]) == list(before_s[1:])
 
 
 @pytest.mark.slow
