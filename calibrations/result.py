@@ -7,10 +7,12 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from calibrations.errors import CalibrationError
+from calibrations.frames import data_frame
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from calibrations.presentation.chart import Picture
 
 
 class Shown(ABC):
@@ -42,12 +44,15 @@ class Result(Shown):
     def plot(self) -> Figure:
         """The picture that shows the result best."""
 
+    @abstractmethod
+    def pictures(self) -> Sequence[Picture]:
+        """The pictures of the report, which a notebook shows below the text."""
+
     def to_dataframe(self) -> Any:
         """The result's rows as a pandas.DataFrame. Raises CalibrationError where pandas is not installed."""
-        try:
-            import pandas
-        except ImportError:
-            raise CalibrationError(
-                "a data frame needs pandas, which is not installed; run: pip install 'inertial-rig[pandas]'"
-            ) from None
-        return pandas.DataFrame(list(self.records()))
+        return data_frame(list(self.records()))
+
+    def _repr_html_(self) -> str:
+        from calibrations.presentation.notebook import result_html  # the terminal needs no pictures
+
+        return result_html(self.report(), self.pictures())

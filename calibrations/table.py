@@ -12,12 +12,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.errors import DataError, MissingColumn, nearest
+from calibrations.frames import data_frame, html_table
 from calibrations.tables import FILE_KINDS, KINDS, Kind
+from calibrations.text import columns
 
 Array = NDArray[np.float64]
 Constant = str | float
@@ -35,10 +38,11 @@ AXES = ("x", "y", "z")
 MILLI = {"g": "mg", "field": "‰ of the field", "deg/s": "mdeg/s"}  # thousandths of what is sensed
 STANDARD_GRAVITY = 9.80665
 GRAVITY_M_S2 = (9.76, 9.84)  # local gravity on Earth: from the highest mountain near the equator to the poles
+FIRST, LAST = 5, 3  # rows of a long table that a terminal and a notebook show
 LARGEST = 1e30  # in any unit: what is measured is smaller, and its fourth power must still be a number
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Table:
     """Columns of equal length (float64), text columns, and constants. Made by `from_columns` or `read_csv`."""
 
@@ -95,6 +99,39 @@ class Table:
                 f'{self.source}: the constant "{name}" is {value!r}, not a number; correct the line '
                 f"`# {name}: ...`, or remove it"
             ) from None
+
+    def __repr__(self) -> str:
+        head, rows = self._shown()
+        return f"{self._title}\n\n{columns(head, rows)}"
+
+    def _repr_html_(self) -> str:
+        return html_table(*self._shown(), caption=self._title)
+
+    @property
+    def _title(self) -> str:
+        known = f"; {', '.join(f'{name}: {value}' for name, value in self.constants.items())}" if self.constants else ""
+        return f"{self.n} rows of {self.kind}{f', {self.source}' if self.source else ''}{known}"
+
+    def _shown(self) -> tuple[list[str], list[list[str]]]:
+        """Head and rows of a view: all rows, or the first and last of many."""
+        many = self.n > FIRST + LAST
+        rows = [*range(FIRST), *range(self.n - LAST, self.n)] if many else list(range(self.n))
+        cells = [
+            [str(k), *(f"{v[k]:.6g}" for v in self.columns.values()), *(t[k] for t in self.labels.values())]
+            for k in rows
+        ]
+        if many:
+            cells.insert(FIRST, ["..."] * len(cells[0]))
+        return ["", *self.columns, *self.labels], cells
+
+    def to_dataframe(self) -> Any:
+        """The columns, with those of texts, as a pandas.DataFrame; the constants are in its `attrs`.
+
+        Raises CalibrationError where pandas is not installed.
+        """
+        frame = data_frame({**self.columns, **self.labels})
+        frame.attrs.update(self.constants)
+        return frame
 
     @property
     def content(self) -> str:

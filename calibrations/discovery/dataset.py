@@ -15,7 +15,7 @@ from calibrations.model import Model
 
 if TYPE_CHECKING:
     from calibrations.discovery.enough import Enough
-    from calibrations.presentation.chart import Chart
+    from calibrations.presentation.chart import Chart, Picture
 
 Cells = tuple[Sequence[str], Sequence[Sequence[str]]]  # head and rows of a table of text
 
@@ -209,6 +209,14 @@ class Dataset(ABC, Generic[F]):
     @abstractmethod
     def steps_chart(self, found: Discovery[F]) -> Chart:
         """The error after each step."""
+
+    @abstractmethod
+    def fit_album(self, found: F) -> list[Picture]:
+        """The pictures of a fit beside these data, with captions."""
+
+    @abstractmethod
+    def steps_album(self, found: Discovery[F]) -> list[Picture]:
+        """The pictures of a discovery, with captions."""
 
     def remarks(self, found: F) -> list[str]:  # noqa: ARG002
         """Sentences on an error that cannot be right."""

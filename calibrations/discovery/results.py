@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from calibrations.discovery.patterns import Pattern
     from calibrations.discovery.plausibility import Finding
     from calibrations.free_forms.naming import ActingPlace
-    from calibrations.presentation.chart import Chart
+    from calibrations.presentation.chart import Chart, Picture
 
 
 class Measured(Protocol):
@@ -130,6 +130,10 @@ class Comparison(Result, Generic[F]):
     def plot(self) -> Figure:
         """The residual, or the Allan deviations."""
         return _drawn(self.data.fit_chart(self.fit))
+
+    def pictures(self) -> list[Picture]:
+        """The model beside the data."""
+        return self.data.fit_album(self.fit)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -369,6 +373,10 @@ class Diagnosis(_Answer[F]):
         """The residual of the given model, or its Allan deviations."""
         return _drawn(self.findings.data.fit_chart(self.fit))
 
+    def pictures(self) -> list[Picture]:
+        """The given model beside the data."""
+        return self.findings.data.fit_album(self.fit)
+
     @property
     def judgement(self) -> Judgement:
         """The judgement on the given model."""
@@ -443,6 +451,10 @@ class Discovery(_Answer[F]):
     def plot(self) -> Figure:
         """Error by model."""
         return _drawn(self.findings.data.steps_chart(self))
+
+    def pictures(self) -> list[Picture]:
+        """Error by model, and what each effect explains."""
+        return self.findings.data.steps_album(self)
 
     @property
     def judgement(self) -> Judgement:

@@ -50,7 +50,7 @@ from calibrations.text import quantity, rounded
 if TYPE_CHECKING:
     from calibrations.discovery.enough import Enough
     from calibrations.discovery.structural import StructuralSearch
-    from calibrations.presentation.chart import Chart
+    from calibrations.presentation.chart import Chart, Picture
 
 INFLUENCES = ("temperature_c", "supply_v", "t_s")  # that a product may know
 
@@ -467,6 +467,18 @@ class Rows(Dataset[Fit]):
         from calibrations.presentation.charts.discovery import levels, waterfall
 
         return waterfall(levels(found))
+
+    def fit_album(self, found: Fit) -> list[Picture]:
+        """Measurement and model, the residual, and its pattern."""
+        from calibrations.presentation.charts.fit import fit_album
+
+        return fit_album(found)
+
+    def steps_album(self, found: Discovery[Fit]) -> list[Picture]:
+        """Error by model, each effect's curve, and the curves of places."""
+        from calibrations.presentation.charts.discovery import steps_album
+
+        return steps_album(found)
 
     def remarks(self, found: Fit) -> list[str]:
         """A residual below the noise floor, which only a wrong floor leaves."""

@@ -15,10 +15,12 @@ import numpy as np
 import scipy  # its room of optimization is loaded where it is first entered
 from scipy.linalg import lstsq, qr
 
+from calibrations.errors import UnknownName, nearest
 from calibrations.fitting.held_out import folds, held_out
-from calibrations.fitting.identifiability import RELATIVE_RANK, estimates
+from calibrations.fitting.identifiability import RELATIVE_RANK, covariance, estimates
 from calibrations.fitting.noise_fit import estimate, widening
 from calibrations.fitting.problem import Problem
+from calibrations.frames import data_frame
 from calibrations.free_forms.place_names import PREFIX
 from calibrations.means.noise import Noise, rms, white_only
 from calibrations.model import Model
@@ -29,6 +31,8 @@ from calibrations.text import columns, quantity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from calibrations.presentation.chart import Picture
 
 ROUNDS = 2
 NEWTON_STEPS = 20
@@ -77,10 +81,7 @@ class Fit(Result):
 
     def records(self) -> list[dict[str, Any]]:
         """A row a parameter."""
-        return [
-            {"parameter": key, "value": e.value, "std": e.std, "unit": e.unit, "identified": e.identified}
-            for key, e in self.params.items()
-        ]
+        return self.params.records()
 
     def plot(self) -> Figure:
         """The residual."""
@@ -88,6 +89,46 @@ class Fit(Result):
         from calibrations.presentation.static import draw
 
         return draw(residual_chart(self))
+
+    def pictures(self) -> list[Picture]:
+        """Measurement and model, the residual, and its pattern."""
+        from calibrations.presentation.charts.fit import fit_album
+
+        return fit_album(self)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of the parameters in the order of `params`, shape (p, p): its diagonal has the squares of `std`.
+
+        NaN in the rows and columns of parameters that the data do not determine.
+        """
+        cautious = cautiously(self)
+        found = covariance(cautious.information, self.problem.layout.typical)[0]
+        wider = _wider(cautious)
+        known = np.array([e.std is not None for e in self.params.values()])
+        return np.where(np.outer(known, known), np.outer(wider, wider) * found, np.nan)
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation coefficients of the parameters in the order of `params`, shape (p, p), by the noise.
+
+        NaN for parameters that the data do not determine. Uncertain inputs, such as the stages' angles, correlate
+        parameters further; the certificate and the report include them.
+        """
+        std = np.sqrt(np.diag(self.covariance))
+        return np.asarray(self.covariance / np.outer(std, std))
+
+    def to_dataframe(self, of: str = "parameters") -> Any:
+        """The parameters, or their "covariance" or "correlation" with names, as a pandas.DataFrame.
+
+        Raises CalibrationError for another name, and where pandas is not installed.
+        """
+        if of == "parameters":
+            return super().to_dataframe()
+        matrices = {"covariance": lambda: self.covariance, "correlation": lambda: self.correlation}
+        if of not in matrices:
+            raise UnknownName(f'a fit has no data frame of "{of}"{nearest(of, ["parameters", *matrices])}')
+        return data_frame(matrices[of](), index=list(self.params), columns=list(self.params))
 
     @property
     def table(self) -> Table:

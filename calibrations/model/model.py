@@ -9,12 +9,15 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from html import escape
+from typing import Any
 
 from calibrations.effects import Effect
 from calibrations.errors import UnknownParameter, nearest
+from calibrations.frames import data_frame, html_table
 from calibrations.result import Shown
 from calibrations.table import Table
-from calibrations.text import columns, concise
+from calibrations.text import columns, concise, minus, rounded, unit, value_text
 
 NOT_FITTED = 'the model has no value for "{}"; fit it to data first'
 
@@ -104,6 +107,30 @@ class Parameters(Mapping[str, Estimate]):
     def __repr__(self) -> str:
         return columns(("parameter", "value"), [(key, e.text) for key, e in self.items()])
 
+    def _repr_html_(self) -> str:
+        return html_table(("parameter", "value", "standard uncertainty", "unit"), map(_cells, self.items()))
+
+    def to_dataframe(self) -> Any:
+        """A row a parameter as a pandas.DataFrame. Raises CalibrationError where pandas is not installed."""
+        return data_frame(self.records())
+
+    def records(self) -> list[dict[str, Any]]:
+        """Key, value, standard uncertainty, unit, and whether the data identify it; a row a parameter."""
+        return [
+            {"parameter": key, "value": e.value, "std": e.std, "unit": e.unit, "identified": e.identified}
+            for key, e in self.items()
+        ]
+
+
+def _cells(item: tuple[str, Estimate]) -> tuple[str, str, str, str]:
+    """Key, value, standard uncertainty and unit as text; the reason, where the data do not identify the value."""
+    key, e = item
+    if not e.identified:
+        return key, e.text, "", ""
+    if not e.std:
+        return key, minus(f"{e.value:.6g}"), "", unit(e.unit)
+    return key, value_text(e.value, e.std), rounded(e.std, 2), unit(e.unit)
+
 
 def _key(*parts: str) -> str:
     return ".".join(part for part in parts if part)
@@ -147,6 +174,9 @@ class Model(Shown):
         rows = [(key, e.text) for key, e in self.params.items()]
         head = f"{self.name}: {', '.join(self.effects)}"
         return f"{head}\n{columns(('parameter', 'value'), rows)}" if rows else f"{head}; not fitted yet"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{escape(self.name)}: {escape(', '.join(self.effects))}</p>{self.params._repr_html_()}"
 
     @property
     def effects(self) -> tuple[str, ...]:

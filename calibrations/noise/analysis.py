@@ -35,6 +35,8 @@ from calibrations.table import Array
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from calibrations.presentation.chart import Picture
+
 Document = dict[str, Any]
 MODEL = "still"  # the search begins with white noise alone
 ORDER = (
@@ -204,6 +206,12 @@ class NoiseAnalysis(Result):
         from calibrations.presentation.static import draw
 
         return draw(noise_album(self)[0].chart)
+
+    def pictures(self) -> list[Picture]:
+        """Allan deviation and spectrum of each channel."""
+        from calibrations.presentation.charts.noise import noise_album
+
+        return noise_album(self)
 
     def spoils(self, disturbance: Disturbance) -> tuple[str, ...]:
         """The coefficients that a disturbance changes, or would change had it not been removed."""

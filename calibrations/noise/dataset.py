@@ -37,7 +37,7 @@ from calibrations.noise.search import Search, candidates, search
 from calibrations.text import quantity, rounded, sentence
 
 if TYPE_CHECKING:
-    from calibrations.presentation.chart import Chart
+    from calibrations.presentation.chart import Chart, Picture
 
 HEAD = (
     "model", "log-likelihood gained", "lost without it alone", "mismatch / chance", "other half",
@@ -312,6 +312,18 @@ class StillRecord(Dataset[NoiseFit]):
         from calibrations.presentation.charts.noise import steps_chart
 
         return steps_chart(found.start, found.steps)
+
+    def fit_album(self, found: NoiseFit) -> list[Picture]:
+        """Allan deviation and spectrum."""
+        from calibrations.presentation.charts.noise import still_album
+
+        return still_album(found, found)
+
+    def steps_album(self, found: Discovery[NoiseFit]) -> list[Picture]:
+        """Error by model, Allan deviation and spectrum of the given and of the final model."""
+        from calibrations.presentation.charts.noise import steps_picture, still_album
+
+        return [steps_picture(found), *still_album(found.end, found.start)]
 
     def remarks(self, found: NoiseFit) -> list[str]:
         """Lines that the log-likelihood does not include."""

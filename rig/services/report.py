@@ -100,7 +100,7 @@ def _on_a_model(request: Request, asked: Loaded, tell: Callable[[str], None]) ->
         from calibrations.presentation.charts.noise import still_album
         from calibrations.presentation.report.still import still_report
 
-        pictures = still_album(found, beside.fit)
+        pictures = still_album(found.end, beside.fit)
         return pictures, lambda: still_report(found, beside, today(), program(), pictures)
     from calibrations.presentation.charts.discovery import album
     from calibrations.presentation.report.report import report

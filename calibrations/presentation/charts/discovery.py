@@ -27,14 +27,11 @@ from calibrations.presentation.chart import (
     one,
 )
 from calibrations.presentation.charts.fit import (
-    MOST_ROWS,
     change_of,
     drawn_channels,
-    failure_chart,
-    measurement_chart,
+    fit_album,
     most_telling,
     residual,
-    residual_chart,
     row_height,
     scale_of,
 )
@@ -130,23 +127,19 @@ def album(found: Discovery[Fit], compared: Comparison[Fit], motion: MotionResult
 
     The result of a run of the procedure motion comes first, if it is given.
     """
-    fit = compared.fit
-    model, rows = fit.model.name, fit.table.type.rows
-    kind = fit.table.type
+    falling, *effects = steps_album(found)
+    return [*(_evaluated(each) for each in (motion,) if each), falling, *fit_album(compared.fit), *effects]
+
+
+def steps_album(found: Discovery[Fit]) -> list[Picture]:
+    """Error by model, each effect's curve, and the curves of places."""
+    rows = found.start.table.type.rows
     fall = (
         "Error of the model before and after each effect, as a multiple of the noise floor (grey): "
         f"bars on the {rows} of the fit, diamonds on {rows} that the fit did not use."
     )
-    shown, mapped = (text.format(model) for text in (kind.measurement_caption, kind.failure_caption))
-    left = f"Measured less the model {model}. The grey band is the noise floor, one standard deviation each way."
-    if len(fit.channels) > len(drawn_channels(fit, fit.residual)):
-        left += f" Only the {MOST_ROWS} outputs with the largest residual are drawn."
     return [
-        *(_evaluated(each) for each in (motion,) if each),
         Picture("waterfall", "Error by model", fall, waterfall(levels(found))),
-        Picture("measurement", "Measurement and model", shown, measurement_chart(fit)),
-        Picture("residual", "Residual", left, residual_chart(fit)),
-        Picture("failure", "Residual pattern", mapped, failure_chart(fit)),
         *(_curve(step, found) for step in tried(found)),
         *place_pictures(found),
     ]

@@ -24,6 +24,7 @@ from calibrations.presentation.chart import (
     Chart,
     Line,
     Panel,
+    Picture,
     Points,
     Rule,
     Scale,
@@ -58,6 +59,20 @@ HALF_SPHERES = 2.3  # between the centres of both maps
 SMALL_ROW, ROW = 2.0, 3.0  # inches: a motion has many channels
 MOST_ROWS = 4  # channels of a motion that are drawn
 ACROSS_PX, DOWN_PX, LEAST_PX, MOST_PX = 900.0, 330.0, 3.0, 10.0  # of a map of poses: its width, height; its markers
+
+
+def fit_album(fit: Fit) -> list[Picture]:
+    """The model and its data, the residual, and the residual pattern."""
+    model, kind = fit.model.name, fit.table.type
+    shown, mapped = (text.format(model) for text in (kind.measurement_caption, kind.failure_caption))
+    left = f"Measured less the model {model}. The grey band is the noise floor, one standard deviation each way."
+    if len(fit.channels) > len(drawn_channels(fit, fit.residual)):
+        left += f" Only the {MOST_ROWS} outputs with the largest residual are drawn."
+    return [
+        Picture("measurement", "Measurement and model", shown, measurement_chart(fit)),
+        Picture("residual", "Residual", left, residual_chart(fit)),
+        Picture("failure", "Residual pattern", mapped, failure_chart(fit)),
+    ]
 
 
 def measurement_chart(fit: Fit) -> Chart:

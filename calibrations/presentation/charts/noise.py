@@ -195,19 +195,31 @@ def _off(found: NoiseFit) -> str:
     return " and ".join(f"{100 * value:.2g} %" for value in mismatch(found).values())
 
 
-def still_album(found: Discovery[NoiseFit], given: NoiseFit) -> list[Picture]:
-    """Both charts of a report on a noise model. `given` is the model as it was given."""
-    end = found.end
+def steps_picture(found: Discovery[NoiseFit]) -> Picture:
+    """Error by model, with its caption."""
+    caption = (
+        "Mismatch of the model before and after each effect, as a multiple of what chance leaves (grey): bars on the "
+        "whole record, diamonds on the part that the fit did not use."
+    )
+    return Picture("waterfall", "Error by model", caption, steps_chart(found.start, found.steps))
+
+
+def still_album(end: NoiseFit, given: NoiseFit) -> list[Picture]:
+    """Both charts of a report on a noise model, fitted. `given` is the model as it was given; both may be the same."""
     name, cleaned = end.model.name, end.still is not given.still
+    line = f"The broken grey line is the model {given.model.name}, the full line {name}; thin lines are its parts."
+    other = f", the broken grey line is the model {given.model.name}"
+    if _alike(end, given):
+        line, other = f"The full line is the model {name}; thin lines are its parts.", ""
     averaging = (
-        "Difference of neighbouring means over the time of a mean. Dots are measured, bars are intervals of 95 %. The "
-        f"broken grey line is the model {given.model.name}, the full line {name}; thin lines are its parts."
+        "Difference of neighbouring means over the time of a mean. Dots are measured, bars are intervals of 95 %. "
+        + line
     )
     if cleaned:
         averaging += " Rings are the record as measured; dots are the record after removing non-noise signals."
     power = (
         "Power over frequency, one-sided, without the lines that were found. Dots are averages over narrow bands; the "
-        f"grey band holds 95 % of them by the model {name}, the broken grey line is the model {given.model.name}."
+        f"grey band holds 95 % of them by the model {name}{other}."
     )
     curves, densities = [], []
     into = Scaled(1.0, end.still.unit)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -21,6 +22,12 @@ def figure(picture: Picture) -> dict[str, Any]:
     """A picture as a page takes it: drawn, with title and caption."""
     drawn = Markup(inline(picture.chart, picture.name, f"{picture.title}. {picture.caption}"))  # noqa: S704 made here
     return {"svg": drawn, "title": picture.title, "caption": picture.caption}
+
+
+def figures_html(pictures: Sequence[Picture]) -> str:
+    """The pictures as the reports show them, each with title and caption: HTML text."""
+    shown = _templates().get_template("picture.html").module
+    return "".join(str(shown.picture(figure(each))) for each in pictures)  # type: ignore[attr-defined]
 
 
 @cache

@@ -1,0 +1,31 @@
+"""Rows for notebooks: as a pandas.DataFrame, and as a table in HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import Any
+
+from calibrations.errors import CalibrationError
+
+
+def data_frame(data: Any, **layout: Any) -> Any:
+    """`pandas.DataFrame(data, **layout)`. Raises CalibrationError where pandas is not installed."""
+    try:
+        import pandas
+    except ImportError:
+        raise CalibrationError(
+            "a data frame needs pandas, which is not installed; run: pip install 'inertial-rig[notebook]'"
+        ) from None
+    return pandas.DataFrame(data, **layout)
+
+
+def html_table(head: Sequence[str], rows: Iterable[Sequence[object]], caption: str = "") -> str:
+    """A table in HTML; every cell is text."""
+    above = f"<caption>{escape(caption)}</caption>" if caption else ""
+    body = "".join(f"<tr>{_cells('td', row)}</tr>" for row in rows)
+    return f"<table>{above}<thead><tr>{_cells('th', head)}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _cells(tag: str, row: Sequence[object]) -> str:
+    return "".join(f"<{tag}>{escape(str(cell))}</{tag}>" for cell in row)
