@@ -144,10 +144,26 @@ class Measured:
 
     def table(self) -> Table:
         """A row for each pose or, in a run of another kind, for each sample. Raises RecordError without a row."""
+        return self.part(self.run.kind) if (whole := self.imported()) is None else self._included(whole)
+
+    def imported(self) -> Table | None:
+        """The table as it was imported, with the excluded rows; None for a measured run."""
         numbers, labels = self.record.columns(self.run.run)
-        if numbers:
-            return Table.from_columns(self.run.kind, numbers, self.run.constants, self.run.run, labels)
-        return self.part(self.run.kind)
+        if not numbers:
+            return None
+        return Table.from_columns(self.run.kind, numbers, self.run.constants, self.run.run, labels)
+
+    def _included(self, table: Table) -> Table:
+        """The rows without an exclusion. They keep their numbers. Raises RecordError without any."""
+        excluded = list(self.record.excluded(self.run.run))
+        if not excluded:
+            return table
+        if len(excluded) == table.n:
+            raise RecordError(
+                f"run {self.run.run}: all {table.n} rows are excluded; include one again, as with "
+                f"`rig exclude {self.run.run} {excluded[0]} --include`"
+            )
+        return table.rows(~np.isin(np.arange(table.n), excluded))
 
     def part(self, kind: str, path: str = "") -> Table:
         """A table of `kind` from the poses whose path begins with `path`. Raises RecordError."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from sqlalchemy import Connection, Integer, Row, Select, exists, false, func, select
@@ -14,7 +14,7 @@ from rig.record import codec
 from rig.record.checksum import is_damaged
 from rig.record.file import RECOVER
 from rig.record.schema import arrivals, columns, insert_or, newest_first, poses, readings, runs, states
-from rig.record.values import Block, Kept, Run
+from rig.record.values import Block, Event, Kept, Run
 
 LAST = "last"  # the newest run, in the place of an id
 POSE = ("alpha_deg", "beta_deg", "direction", "path", "mount_deg", "flip", "up", "rate_deg_s")
@@ -46,6 +46,24 @@ def select_beginning(name: str) -> Select[Any]:
 def run_of(row: Row[Any]) -> Run:
     """The run of a row of `select_runs`."""
     return Run(**{name: value for name, value in row._mapping.items() if name != "checksum"})
+
+
+def imported_rows(at: Connection, run: str) -> int:
+    """The number of rows of an imported table; 0 for a measured run."""
+    length = func.max(func.length(columns.c.numbers, type_=Integer) // 8)
+    return at.execute(select(length).where(columns.c.run == run)).scalar_one() or 0
+
+
+def excluded_rows(events: Iterable[Event]) -> dict[int, str]:
+    """The reason of each excluded row of an imported table, by its number: its columns stay as they were imported."""
+    reasons: dict[int, str] = {}
+    for event in events:
+        match event.what.split():
+            case ["pose", number, "excluded"]:
+                reasons[int(number)] = event.text
+            case ["pose", number, "included"]:
+                reasons.pop(int(number), None)
+    return dict(sorted(reasons.items()))
 
 
 def pose_of(row: Row[Any]) -> Pose:

@@ -36,6 +36,8 @@ from rig.record.rows import (
     POSE,
     damage_text,
     dwell_of,
+    excluded_rows,
+    imported_rows,
     kept_of,
     place_text,
     pose_of,
@@ -178,11 +180,12 @@ class Record:
     def exclude(self, run: str, number: int, reason: str | None) -> None:
         """Exclude a pose from every analysis, with a reason that stays as an event; None includes it again.
 
-        Raises RecordError for an unknown pose.
+        For a row of an imported table the event alone says it. Raises RecordError for an unknown pose.
         """
         chosen = (poses.c.run == run) & (poses.c.number == number)
         with self._engine.begin() as to:
-            if not to.execute(update(poses).where(chosen).values(excluded=reason)).rowcount:
+            known = to.execute(update(poses).where(chosen).values(excluded=reason)).rowcount
+            if not known and not 0 <= number < imported_rows(to, run):
                 raise RecordError(f"run {run} has no pose {number}; `rig show {run} --poses` lists its poses")
             what = f"pose {number} {'included' if reason is None else 'excluded'}"
             to.execute(insert(events), {"run": run, "at": now(), "what": what, "text": reason or "again"})
@@ -277,10 +280,12 @@ class Record:
             return [pose_of(sound(row, poses)) for row in at.execute(query)]
 
     def excluded(self, run: str) -> dict[int, str]:
-        """The reason of each excluded pose, by its number."""
+        """The reason of each excluded pose, or row of an imported table, by its number."""
         chosen = (poses.c.run == run) & poses.c.excluded.is_not(None)
         query = select(poses.c.number, poses.c.excluded).where(chosen).order_by(poses.c.number)
         with self._reading() as at:
+            if imported_rows(at, run):
+                return excluded_rows(self.events(run))
             return {row.number: row.excluded for row in at.execute(query)}
 
     def next_number(self, run: str) -> int:

@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from calibrations.tables import MEANS
-from rig.errors import UnknownRun
+from rig.errors import RecordError, UnknownRun
 from rig.lease import lease
 from rig.record import Record, Run
 from rig.results import judged
@@ -18,25 +18,30 @@ RESULTS = "results"  # the event that says how they were made anew
 def exclude(record: Record, name: str, numbers: Sequence[int], reason: str | None) -> Run:
     """Leave poses out, with a reason; None takes them in again. The run as it is then.
 
-    Results of a complete run are evaluated again. Raises UnknownRun, RecordError for a pose that is not there, Busy
-    while a process works on the run.
+    Results of a complete run are evaluated again. Raises UnknownRun, RecordError for a pose that is not there or a
+    sample of an imported record, Busy while a process works on the run.
     """
     run = record.run(name)
+    if not run.bench and run.kind not in MEANS:
+        raise RecordError(
+            f"run {run.run} is an imported table of {run.kind}: its rows are samples, and a single sample cannot be "
+            "excluded; remove it from the file and import the file again"
+        )
     with lease(record.folder, run.run, f"run {run.run}"):
         for number in numbers:
             record.exclude(run.run, number, reason)
-        if run.state == "complete":
+        if run.state == "complete" and run.bench:  # an imported table has no results
             _evaluate_again(record, run)
     return record.run(run.run)
 
 
 def numbered_run(data: str) -> str | None:
-    """The run that `data` names, where it has poses that can be left out; None of a file, and of an imported table."""
+    """The run that `data` names, where it has poses that can be left out; None of a file, and of samples."""
     if Path(data).exists():
         return None
     with suppress(UnknownRun), Record.to_find(data) as record:
         run = record.run(data.partition("/")[0])
-        return run.run if run.bench and run.kind in MEANS else None
+        return run.run if run.kind in MEANS else None
     return None
 
 

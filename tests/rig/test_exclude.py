@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rig.lease import lease
@@ -145,6 +146,55 @@ def test_what_cannot_be_is_refused(rig: Rig, run: str, words: tuple[str, ...], w
     assert (ended.status, ended.out) == (2, "")
     assert re.search(why, ended.err)
     assert events(run) == before
+
+
+@pytest.fixture
+def imported(rig: Rig, tmp_path: Path) -> str:
+    """An imported table of four poses, the third with a wrong output."""
+    file = tmp_path / "four.csv"
+    file.write_text("alpha_deg,beta_deg,vx_v,path\n90,0,3.5,a\n90,90,2.5,b\n90,180,9.9,c\n90,270,2.5,d\n")
+    return str(json.loads(rig("import", str(file), "--json").out)["run"])
+
+
+def test_a_row_of_an_imported_table_is_left_out_and_comes_back(rig: Rig, imported: str) -> None:
+    with Record() as record:
+        whole = table_of(record, imported)
+        assert exclude(record, imported, [2], "bumped").results == {}
+        assert record.excluded(imported) == {2: "bumped"}
+        rest = table_of(record, imported)
+        assert (list(rest.column("vx_v")), rest.labels["path"]) == ([3.5, 2.5, 2.5], ("a", "b", "d"))
+        assert list(rest.numbered(np.arange(3))) == [0, 1, 3]
+    shown = json.loads(rig("show", imported, "--poses", "--json").out)
+    assert shown["columns"]["vx_v"]["max"] == 3.5
+    assert [row["excluded"] for row in shown["kept"]] == [None, None, "bumped", None]
+    assert "2     c     90         180       9.9   bumped" in rig("show", imported, "--poses").out
+    assert rig("exclude", imported, "2", "--include").status == 0
+    with Record() as record:
+        assert record.excluded(imported) == {}
+        assert table_of(record, imported).digest == whole.digest
+
+
+@pytest.mark.parametrize(("row", "status"), [("3", 0), ("4", 2)])
+def test_only_a_row_of_the_table_can_be_left_out(rig: Rig, imported: str, row: str, status: int) -> None:
+    assert rig("exclude", imported, row, "--reason", "x").status == status
+
+
+def test_without_any_row_an_imported_table_names_the_way_back(rig: Rig, imported: str) -> None:
+    with Record() as record:
+        exclude(record, imported, range(4), "all wrong")
+    ended = rig("fit", imported, "--model", "linear")
+    assert ended.status == 2
+    assert f"all 4 rows are excluded; include one again, as with `rig exclude {imported} 0 --include`" in ended.err
+    assert rig("show", imported).status == 0
+
+
+def test_a_single_sample_of_an_imported_record_cannot_be_left_out(rig: Rig, tmp_path: Path) -> None:
+    file = tmp_path / "still.csv"
+    file.write_text("t_s,vx_v\n" + "".join(f"{k / 10},{2.5 + k % 3 / 1000}\n" for k in range(40)))
+    run = json.loads(rig("import", str(file), "--kind", "still", "--json").out)["run"]
+    ended = rig("exclude", run, "3", "--reason", "x")
+    assert ended.status == 2
+    assert "is an imported table of still: its rows are samples" in ended.err
 
 
 def test_a_run_that_goes_on_is_left_alone(rig: Rig, run: str) -> None:

@@ -14,7 +14,7 @@ from rig.cli.terminal.output import emit, json_option
 @click.option("--include", is_flag=True, help="Include the pose again.")
 @json_option
 def command(run: str, pose: int, reason: str | None, include: bool, as_json: bool) -> None:
-    """Exclude pose number POSE of RUN from every analysis.
+    """Exclude pose number POSE of RUN, or that row of an imported table, from every analysis.
 
     The pose stays in the record, with the reason and the date. The results of a complete run are computed again; an
     incomplete run measures the pose again on `rig resume`. `rig show RUN --poses` lists the numbers.

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from calibrations.errors import CalibrationError
+from calibrations.tables import MEANS
 from calibrations.text import columns, duration
 from rig.bench.certificates import EXPIRED
 from rig.cli.terminal.output import emit, json_option
@@ -36,7 +37,7 @@ def command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
         turns = [Event(line.at, line.what, line.text) for line in record.lines(run, TURNS)]
         events = sorted([*record.events(run), *turns], key=lambda event: event.at)
         ranges = _ranges(record, found)
-        listed = [_pose(number, kept) for number, kept in enumerate(record.kept(run))] if poses else None
+        listed = _poses(record, found) if poses else None
         lines = record.lines(run) if wants_log else []
         known = lives(found, record.runs())
     if as_json:
@@ -64,6 +65,19 @@ def _ranges(record: Record, run: Run) -> Ranges:
         prefix = f"{sensor}." if sensor else ""
         found |= {prefix + name: (float(v.min()), float(v.max())) for name, v in table.columns.items()}
     return found
+
+
+def _poses(record: Record, run: Run) -> list[dict[str, Any]]:
+    """Every pose as JSON, or every row of an imported table, with the reason if it is excluded."""
+    table = Measured(record, run).imported() if not run.bench and run.kind in MEANS else None
+    if table is None:
+        return [_pose(number, kept) for number, kept in enumerate(record.kept(run.run))]
+    reasons = record.excluded(run.run)
+    cells = {**table.labels, **{name: values.tolist() for name, values in table.columns.items()}}
+    return [
+        {"pose": number, **{name: values[number] for name, values in cells.items()}, "excluded": reasons.get(number)}
+        for number in range(table.n)
+    ]
 
 
 def _pose(number: int, kept: Kept) -> dict[str, Any]:
@@ -116,6 +130,8 @@ def _listed(poses: Sequence[Mapping[str, Any]]) -> list[str]:
     """The poses as a table."""
     if not poses:
         return []
+    if "means_v" not in poses[0]:
+        return _rows(poses)
     channels = list(poses[0]["means_v"])
     rows = [
         (
@@ -132,6 +148,17 @@ def _listed(poses: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
     head = ("pose", "alpha", "beta", "path", "t", *(f"{name} V" for name in channels), "C", "excluded because")
     return columns(head, rows).splitlines()
+
+
+def _rows(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The rows of an imported table."""
+    head = [name for name in rows[0] if name != "excluded"]
+    cells = [[*(_cell(row[name]) for name in head), row["excluded"] or ""] for row in rows]
+    return columns([*head, "excluded because"], cells).splitlines()
+
+
+def _cell(value: object) -> str:
+    return f"{value:.7g}" if isinstance(value, float) else str(value)
 
 
 def _document(run: Run, events: list[Event], ranges: Ranges) -> dict[str, object]:

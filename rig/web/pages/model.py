@@ -109,7 +109,7 @@ class Workbench:
         ui.run_javascript("document.querySelector('.parameters')?.scrollIntoView({block: 'start'})")
 
     def _exclude_dialog(self) -> Callable[[Sequence[int]], None] | None:
-        """The dialog that excludes selected poses; None for data that are not a run of the rig."""
+        """The dialog that excludes selected poses; None for a file and for samples."""
         return partial(run_record.ask, self.data, done=self.afresh) if numbered_run(self.data) else None
 
     def afresh(self) -> None:

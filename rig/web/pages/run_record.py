@@ -46,7 +46,7 @@ MOST_NAMED = 8
 
 
 def left_out(data: str) -> dict[int, str]:
-    """Reasons of excluded poses by number; empty for data that are not a run of the rig."""
+    """Reasons of excluded poses by number; empty for a file and for samples."""
     run = numbered_run(data)
     if run is None:
         return {}
@@ -100,7 +100,7 @@ async def change(data: str, numbers: Sequence[int], reason: str | None, done: Ca
 def _change(data: str, numbers: Sequence[int], reason: str | None) -> None:
     run = numbered_run(data)
     if run is None:
-        raise RecordError(f"{data} is not a run of the rig; add a column `excluded` to the file")
+        raise RecordError(f"{data} is not a table of poses in the record; in a file, add a column `excluded`")
     with Record.to_find(run) as record:
         exclude(record, run, numbers, reason)
 
