@@ -179,6 +179,15 @@ def test_rigs_whose_runs_share_a_name_keep_them_apart(own: Record, lab: Record, 
         assert push(other, lab, run) == Pushed(run, theirs.name, "there", theirs.digest)
 
 
+def test_an_excluded_row_of_an_imported_table_is_excluded_by_the_next_push(own: Record, lab: Record) -> None:
+    run = a_table(own)
+    push(own, lab, run)
+    own.exclude(run, 1, "bumped")
+    assert unsent(own, lab) == [run]
+    push(own, lab, run)
+    assert lab.excluded(run) == own.excluded(run) == {1: "bumped"}
+
+
 def test_a_pose_that_is_excluded_later_is_excluded_by_the_next_push(own: Record, lab: Record) -> None:
     run = a_run(own)
     pushed(own, lab.where)
