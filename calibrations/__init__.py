@@ -12,6 +12,8 @@ A library of its own: tables in, frozen results out, no instrument needed.
     diagnose         missing effects discover           missing effects, added one by one
     noise            noise of a still sensor
     compensate       outputs back to specific force
+    add              a model with one effect more
+    Effect, Parameter  what a class of your own needs to be an effect
 
 The functions are in `calibrations.face`, and load what they need when they are called.
 """
@@ -20,6 +22,9 @@ from __future__ import annotations
 
 import calibrations.noise
 import calibrations.table  # noqa: F401 both are bound before the functions of the same names, which replace them
-from calibrations.face import compare, compensate, diagnose, discover, fit, noise, read, table
+from calibrations.effects import Effect, Parameter
+from calibrations.face import add, compare, compensate, diagnose, discover, fit, noise, read, table
 
-__all__ = ["compare", "compensate", "diagnose", "discover", "fit", "noise", "read", "table"]
+__all__ = [
+    "Effect", "Parameter", "add", "compare", "compensate", "diagnose", "discover", "fit", "noise", "read", "table",
+]  # fmt: skip

@@ -4,22 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from calibrations.errors import DataError
+from calibrations.errors import DataError, ModelError
+from calibrations.result import Result
 from calibrations.table import AXES, Array, Constant, Table
 from calibrations.tables import KINDS
 
 if TYPE_CHECKING:
     from calibrations.discovery.results import Comparison, Diagnosis, Discovery
+    from calibrations.effects import Effect
     from calibrations.fitting.fit import Fit
     from calibrations.model import Model
     from calibrations.noise.analysis import NoiseAnalysis
     from calibrations.noise.record import Samples
 
-    GivenModel = Model | str | Path  # a model, the name of a shipped one, or a model file
+    GivenModel = Model | Fit | Discovery[Fit] | str | Path  # a name is that of a shipped model; a path, a model file
+    GivenEffect = Effect | type[Effect] | str | Path  # a name is that of an effect of the catalogue; a path, its file
 
 MOST_UNEVEN = 0.5  # of a step, by which steps of time may differ
 NOT_CHANNELS = ("t_s", "temperature_c", "supply_v")
@@ -61,23 +64,46 @@ def compare(data: Table, model: GivenModel) -> Comparison[Fit]:
     return compared(data, _model(model))
 
 
-def diagnose(data: Table, model: GivenModel) -> Diagnosis[Fit]:
-    """Which physical effect `model` misses on `data`."""
+def diagnose(data: Table, model: GivenModel, effects: Iterable[GivenEffect] = ()) -> Diagnosis[Fit]:
+    """Which physical effect `model` misses on `data`; `effects` of your own are tried beside those of the catalogue."""
+    from calibrations.effects.catalogue import with_own
     from calibrations.loop import diagnose as diagnosed
 
-    return diagnosed(data, _model(model))
+    return diagnosed(data, _model(model), with_own(effects))
 
 
-def discover(data: Table, model: GivenModel, without: Sequence[str] = (), enough: str = "") -> Discovery[Fit]:
+def discover(
+    data: Table,
+    model: GivenModel,
+    without: Sequence[str] = (),
+    enough: str = "",
+    effects: Iterable[GivenEffect] = (),
+) -> Discovery[Fit]:
     """`model` with the effects that it misses on `data`, added one by one. Raises ModelError.
 
     without   places of the signal chain, such as "own-response", that the search leaves out
     enough    an error on unseen data at which the search stops, such as "0.5mg", "2mV" or "1.5floors"
+    effects   of your own, beside those of the catalogue: classes, or their files
     """
     from calibrations.discovery.enough import parse_enough
+    from calibrations.effects.catalogue import with_own
     from calibrations.loop import discover as discovered
 
-    return discovered(data, _model(model), without=without, enough=parse_enough(enough) if enough else None)
+    stop = parse_enough(enough) if enough else None
+    return discovered(data, _model(model), with_own(effects), without, stop)
+
+
+def add(model: GivenModel, effect: GivenEffect) -> Model:
+    """`model` with one effect more, which `fit` then estimates. Raises ModelError where the model has it already.
+
+    `effect` is the name of one of the catalogue, the file of one of your own, or a class that derives from `Effect`.
+    """
+    from calibrations.effects.catalogue import chosen
+
+    before, added = _model(model), chosen(effect)
+    if before.holds(added.name):
+        raise ModelError(f"{before.name}: {added.name} is already in the model; it has {', '.join(before.effects)}")
+    return before.with_effect(added)
 
 
 def noise(data: Table | Array, rate_hz: float | None = None) -> NoiseAnalysis:
@@ -93,33 +119,37 @@ def noise(data: Table | Array, rate_hz: float | None = None) -> NoiseAnalysis:
     return analyse(reduce_record(_channels(given, rate_hz), given.source, given.constants, every_deviation=True))
 
 
-def compensate(model: GivenModel, outputs: Array, **columns: Array) -> Array:
-    """The specific force along the reference axes, g, shape (n, axes), from outputs of the model's axes, (n, axes).
+def compensate(model: GivenModel, outputs: Table | Columns | Array, **columns: float | Array) -> Any:
+    """The specific force along the reference axes in g, shape (n, axes), from outputs of the model's axes.
 
-    `columns` are what the model follows beside the outputs, shape (n,): temperature_c, supply_v, t_s. Samples are taken
-    independently of each other. Raises ModelError where the model has no values or cannot be inverted.
+    `model` may be a fit or a discovery. `outputs` is an array (n, axes), in the order of the model's axes; or a table,
+    a mapping or a pandas.DataFrame with the columns of data files (vx_v or ax, and so on). A data frame gives a data
+    frame with its index. A gyroscope's model gives deg/s, a magnetometer's the field as a share of its strength.
+
+    `columns` are what the model follows beside the outputs, where the data do not have it: temperature_c, supply_v,
+    t_s; shape (n,), or one number. Samples are taken independently of each other. Raises ModelError where the model has
+    no values or cannot be inverted, DataError where the outputs do not fit the model.
     """
-    from calibrations.compensation.inverse import invert_model
+    from calibrations.compensation.samples import compensate as compensated
 
-    made = invert_model(_model(model))
-    values = np.atleast_2d(np.asarray(outputs, dtype=float))
-    if made.program.remembered:
-        raise DataError(
-            f"{made.model.name}: has hysteresis, so its inverse needs earlier samples; use `rig compensate`"
-        )
-    if values.shape[1] != len(made.forward.axes):
-        raise DataError(f"outputs have shape {values.shape}; the model has the axes {', '.join(made.forward.axes)}")
-    given = {**dict(zip((f"v{axis}" for axis in made.forward.axes), values.T, strict=True)), **columns}
-    if missing := [name for name in made.program.inputs if name not in given]:
-        raise DataError(f"{made.model.name}: needs {', '.join(missing)}, as in {missing[0]}=array")
-    found = made.program.run(given)
-    return np.column_stack([found[name] for name in made.program.sought])
+    return compensated(_model(model), outputs, columns)
 
 
-def _model(model: GivenModel) -> Model:
+def _model(given: GivenModel) -> Model:
+    """The model that is given by its name or file, or that a fit or a discovery has. Raises ModelError, UnknownName."""
+    from calibrations.model import Model
     from calibrations.model.file import read_model
 
-    return read_model(model) if isinstance(model, (str, Path)) else model
+    if isinstance(given, (str, Path)):
+        return read_model(given)
+    model = given if isinstance(given, Model) else getattr(given, "model", None)
+    if isinstance(model, Model):
+        return model
+    hint = "; its fit is in its member `fit`" if isinstance(getattr(given, "fit", None), Result) else ""
+    raise ModelError(
+        f"a model is needed, and a {type(given).__name__} was given; give the name of a model, its file, a model, a "
+        f"fit or a discovery{hint}"
+    )
 
 
 def _channels(table: Table, rate_hz: float | None) -> Iterator[Samples]:

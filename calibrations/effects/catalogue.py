@@ -11,7 +11,7 @@ import traceback
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache, wraps
 from pathlib import Path
-from types import ModuleType
+from types import MethodType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from calibrations.errors import ModelError, UnknownName, nearest
 
 LOG = logging.getLogger(__name__)  # what is not called off is printed to standard error
 SHIPPED = ("signal", "noise")  # folders
+CHOSEN = "_chosen"  # of an effect that was made from a user's class
 
 
 @cache
@@ -54,6 +55,58 @@ def find(name: str, effects: Mapping[str, Effect]) -> Effect:
     if name not in effects:
         raise UnknownName(f'unknown effect "{name}"{nearest(name, effects)}')
     return effects[name]
+
+
+def with_own(given: Iterable[Effect | type[Effect] | str | Path]) -> Mapping[str, Effect]:
+    """The catalogue, and effects of a user's own beside it. Raises ModelError as `chosen` does."""
+    if isinstance(given, (str, Path, Effect, type)):
+        given = (given,)
+    own = {effect.name: effect for effect in map(chosen, given)}
+    return {**catalogue(), **own}
+
+
+def chosen(given: Effect | type[Effect] | str | Path) -> Effect:
+    """An effect by its name in the catalogue, its file (.py), or as a class, such as one of a notebook's cell.
+
+    Raises UnknownName with the nearest, ModelError for what is no whole effect, and for the name of a shipped one.
+    """
+    if isinstance(given, Path) or (isinstance(given, str) and given.endswith(".py")):
+        return read_effect(Path(given))
+    if isinstance(given, str):
+        return find(given, catalogue())
+    if isinstance(given, Effect) and (given is catalogue().get(given.name) or vars(given).get(CHOSEN)):
+        return given
+    cls = type(given) if isinstance(given, Effect) else given
+    if not (isinstance(cls, type) and issubclass(cls, Effect)):
+        raise ModelError(
+            f"{given!r} is not an effect; give its name, its file, or a class that derives from cal.Effect"
+        )
+    return _of_class(cls)
+
+
+def _of_class(cls: type[Effect]) -> Effect:
+    """The effect of a user's class. A message names the class and the method where something fails."""
+    effect = cls()
+    _require_parts(effect, cls.__name__)
+    if effect.name in catalogue():
+        raise ModelError(f"{cls.__name__}: {effect.name} is already in the catalogue; give the class another name")
+    first = next(iter((cls.__doc__ or "").strip().splitlines()), "")
+    described = {
+        "summary": effect.summary or first or "an effect of your own, not described",
+        "formula": effect.formula or f"{cls.__name__}, formula not described",
+        "symptom": effect.symptom or "not described",
+    }
+    guards = {
+        method: MethodType(guarded(getattr(cls, method), Path(_file(cls, method)), cls.__name__), effect)
+        for method in (*effect.places, *(["follow"] if effect.memory else []))
+    }
+    vars(effect).update(described | guards | {CHOSEN: True})
+    return effect
+
+
+def _file(cls: type[Effect], method: str) -> str:
+    """Where the method of a class was written; of a notebook, its cell."""
+    return str(getattr(cls, method).__code__.co_filename)
 
 
 def read_effect(path: Path) -> Effect:
@@ -104,16 +157,21 @@ def _of_module(module: ModuleType, path: Path) -> Effect:
         raise ModelError(f"{path}: must define one effect, `class {wanted}(Effect):`; it defines {names}")
     effect = found[0]()
     effect.name = path.stem.replace("_", "-")
-    if not effect.parameters:
-        raise ModelError(f'{path}: {wanted} has no parameter, as in slope = Parameter("{{out}}/K", typical=0.005)')
-    if not effect.places:
-        raise ModelError(f"{path}: {wanted} acts nowhere; define at least one of the methods {', '.join(HOOKS)}")
+    _require_parts(effect, f"{path}: {wanted}")
     if not effect.summary or not effect.symptom:
         raise ModelError(
             f'{path}: the docstring of {wanted} must begin with "{effect.name}: what happens." and have a line '
             '"Symptom ..."'
         )
     return effect
+
+
+def _require_parts(effect: Effect, where: str) -> None:
+    """Raise ModelError for an effect without a parameter, or without a place where it acts."""
+    if not effect.parameters:
+        raise ModelError(f'{where} has no parameter, as in slope = Parameter("{{out}}/K", typical=0.005)')
+    if not effect.places:
+        raise ModelError(f"{where} acts nowhere; define at least one of the methods {', '.join(HOOKS)}")
 
 
 def class_name(path: Path) -> str:
@@ -144,21 +202,21 @@ def _refuse_old_form(path: Path) -> None:
         )
 
 
-def fault(path: Path, error: BaseException) -> ModelError:
-    """`error`, raised in the file `path`, with the line of that file where it was raised."""
+def fault(path: Path, error: BaseException, name: str = "") -> ModelError:
+    """`error`, raised in the file `path`, with the line where it was raised. Messages name the file, or `name`."""
     frames = traceback.extract_tb(error.__traceback__)
     lines = [frame.lineno for frame in frames if Path(frame.filename).absolute() == path.absolute()]
     line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
-    where = f"{path}, line {line}" if line else str(path)
+    where = f"{name or path}, line {line}" if line else name or str(path)
     if isinstance(error, ModelError):  # of a class that is no effect
         return ModelError(f"{where}: {error}")
     what = error.msg if isinstance(error, SyntaxError) else str(error)
     return ModelError(f"{where}: {type(error).__name__}: {what}")
 
 
-def guarded(hook: Callable[..., Any], path: Path) -> Callable[..., Any]:
+def guarded(hook: Callable[..., Any], path: Path, name: str = "") -> Callable[..., Any]:
     """The method `hook` of a user's effect. It raises ModelError where it fails, and where its result is not an array
-    of finite numbers with the shape of its first argument. A pose is not checked.
+    of finite numbers with the shape of its first argument. A pose is not checked. Messages name the file, or `name`.
     """
 
     @wraps(hook)
@@ -166,9 +224,9 @@ def guarded(hook: Callable[..., Any], path: Path) -> Callable[..., Any]:
         try:
             result = hook(self, given, *more)
         except Exception as error:
-            raise fault(path, error) from error
+            raise fault(path, error, name) from error
         if isinstance(given, np.ndarray):
-            _check(result, given, f"{path}: {hook.__name__}()")
+            _check(result, given, f"{name or path}: {hook.__name__}()")
         return result
 
     return call

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import calibrations as cal
-from calibrations.errors import DataError
+from calibrations.effects import Values
+from calibrations.errors import DataError, MissingColumn, ModelError
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
 
@@ -42,3 +43,32 @@ def test_importing_the_package_loads_no_analysis() -> None:
     code = "import sys, calibrations; print([m for m in ('scipy', 'numba', 'yaml') if m in sys.modules])"
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ended.stdout.split() == ["[]"]
+
+
+def test_a_fit_compensates_columns_by_name_and_refuses_what_does_not_fit() -> None:
+    a, data = force_and_table()
+    found = cal.fit(data, "linear")
+    for given in (data, dict(data.columns), data.outputs):
+        assert np.abs(cal.compensate(found, given) - a).max() < 5e-4
+    three = np.column_stack([data.outputs, data.outputs[:, 0]])
+    with pytest.raises(DataError, match=r"shape \(\d+, 3\); the model has the axes x, y.*outputs\[:, \[0, 1\]\]"):
+        cal.compensate(found, three)
+    with pytest.raises(DataError, match=r"outputs\.T"):
+        cal.compensate(found, data.outputs.T)
+    with pytest.raises(MissingColumn, match='the column "vy_v" is missing'):
+        cal.compensate(found, {"vx_v": data.column("vx_v")})
+    with pytest.raises(ModelError, match="its fit is in its member `fit`"):
+        cal.compensate(cal.compare(data, "linear"), data)
+
+
+def test_an_effect_of_ones_own_is_refused_by_its_name() -> None:
+    class Bias(cal.Effect):
+        shift = cal.Parameter("{out}", typical=0.1)
+
+        def transduction(self, a: Array, table: Table, p: Values) -> Array:
+            return np.zeros((2, 2))
+
+    with pytest.raises(ModelError, match="Bias: bias is already in the catalogue"):
+        cal.add("linear", Bias)
+    with pytest.raises(ModelError, match=r"Wrong: transduction\(\) must give an array of shape"):
+        cal.fit(force_and_table()[1], cal.add("linear", type("Wrong", (Bias,), {})))

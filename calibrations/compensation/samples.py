@@ -1,0 +1,111 @@
+"""The inverse of a model on samples in memory: an array, columns by name, a data frame, or a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from calibrations.compensation.inverse import Compensation, invert_model
+from calibrations.errors import DataError, MissingColumn, nearest
+from calibrations.frames import data_frame
+from calibrations.model import Model
+from calibrations.table import AXES, Array, Table
+from calibrations.tables import KINDS
+
+NAMES = {"g": "a{}_g", "field": "m{}", "deg/s": "g{}_deg_s"}  # columns of what is sensed, by its unit
+
+
+def compensate(model: Model, samples: Any, columns: Mapping[str, Any]) -> Any:
+    """What the sensor senses, from `samples` and further `columns`: an array (n, axes), or a data frame for one.
+
+    Raises ModelError where the model has no values or cannot be inverted, DataError where the samples do not fit it.
+    """
+    made = invert_model(model)
+    if made.program.remembered:
+        raise DataError(f"{model.name}: has hysteresis, so its inverse needs earlier samples; use `rig compensate`")
+    named = _named(samples)
+    given = dict(columns)
+    if named is None:
+        outputs = _array(samples, made.forward.axes)
+    else:
+        outputs = _columns(named, made)
+        given = {name: named[name] for name in made.program.inputs if name in named} | given
+    found = made.program.run(_inputs(made, outputs, given))
+    forces = np.column_stack([found[name] for name in made.program.sought])
+    if not hasattr(samples, "iloc"):
+        return forces
+    names = [NAMES[made.unit].format(axis) for axis in made.forward.axes]
+    return data_frame(forces, index=samples.index, columns=names)
+
+
+def _named(samples: Any) -> Mapping[str, Any] | None:
+    """The columns of samples by name; None for an array."""
+    if isinstance(samples, Table):
+        return samples.columns
+    if isinstance(samples, Mapping):
+        return samples
+    return dict(samples.items()) if hasattr(samples, "iloc") and hasattr(samples, "columns") else None
+
+
+def _array(samples: Any, axes: tuple[str, ...]) -> Array:
+    """Outputs (n, axes). One sample may be (axes,), and samples of one axis (n,)."""
+    outputs = _numbers(samples, "the outputs")
+    if outputs.ndim == 1:
+        outputs = outputs[:, None] if len(axes) == 1 else outputs[None, :]
+    if outputs.ndim == 2 and outputs.shape[1] == len(axes):
+        return outputs
+    wanted = f"the model has the axes {', '.join(axes)}, so (n, {len(axes)}) is needed"
+    hint = "give a column for each of these axes"
+    if outputs.ndim == 2 and outputs.shape[0] == len(axes):
+        hint = "exchange rows and columns, as in outputs.T"
+    elif outputs.ndim == 2 and outputs.shape[1] == len(AXES):
+        hint = f"select their columns, as in outputs[:, {[AXES.index(axis) for axis in axes]}]"
+    raise DataError(f"the outputs have shape {np.shape(samples)}; {wanted}: {hint}")
+
+
+def _columns(named: Mapping[str, Any], made: Compensation) -> Array:
+    """Outputs (n, axes) from columns with the names of data files. Raises MissingColumn."""
+    kinds = [kind for kind in KINDS.values() if kind.input_unit == made.unit]
+    wanted = list(dict.fromkeys(_outputs(kind.outputs, made.forward.axes) for kind in kinds))
+    wanted = [names for names in wanted if len(names) == len(made.forward.axes)]
+    for names in wanted:
+        if all(name in named for name in names):
+            return np.column_stack([_numbers(named[name], f'the column "{name}"') for name in names])
+    close = max(wanted, key=lambda names: sum(name in named for name in names))
+    missing = next(name for name in close if name not in named)
+    raise MissingColumn(
+        f'the column "{missing}" is missing{nearest(missing, map(str, named))}. The model has the axes '
+        f"{', '.join(made.forward.axes)}; name the columns of its outputs {' or '.join(map(', '.join, wanted))}"
+    )
+
+
+def _outputs(names: tuple[str, ...], axes: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(name for axis, name in zip(AXES, names, strict=False) if axis in axes)
+
+
+def _inputs(made: Compensation, outputs: Array, given: Mapping[str, Any]) -> dict[str, Array]:
+    """All inputs of the program, a value a row. Raises DataError for one that is missing or of another length."""
+    if missing := [name for name in made.program.inputs[len(made.forward.axes) :] if name not in given]:
+        raise DataError(
+            f"{made.model.name}: needs {', '.join(missing)}; give an array with a value for each row, or one number, "
+            f"as in {missing[0]}=..."
+        )
+    inputs = {f"v{axis}": values for axis, values in zip(made.forward.axes, outputs.T, strict=True)}
+    for name, column in given.items():
+        values = _numbers(column, f'the column "{name}"')
+        if values.shape not in ((), (len(outputs),)):
+            raise DataError(
+                f'the column "{name}" has shape {values.shape}, and there are {len(outputs)} rows of outputs; give one '
+                "value for each row, or one number for all"
+            )
+        inputs[name] = np.broadcast_to(values, len(outputs))
+    return inputs
+
+
+def _numbers(values: Any, what: str) -> Array:
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise DataError(f"{what}: not numbers, but {type(values).__name__}; give an array of numbers") from None
