@@ -31,7 +31,7 @@ GROUPS = {
         "compare", "fit", "diagnose", "add", "discover", "noise", "report", "effects", "models",
     ),
     "Hand over": ("certificate", "compensate", "export", "export-model", "push"),
-    "Look after": ("control", "history", "doctor"),
+    "Look after": ("control", "history", "doctor", "completion"),
     "Many sensors": ("fleet",),
 }  # fmt: skip
 

@@ -111,10 +111,18 @@ class Measured:
 
     @classmethod
     def named(cls, record: Record, name: str) -> Measured:
-        """`RUN`, or `RUN/SENSOR` of a batch. Raises UnknownRun; RecordError for a batch without a sensor."""
+        """`RUN`, or `RUN/SENSOR` of a batch; a name of the sensor that finds the run (`last a1`) chooses it as well.
+
+        Raises UnknownRun; RecordError for a batch without a sensor.
+        """
         run_id, slash, sensor = name.partition("/")
         run = record.run(run_id)
         known = sensors_of(run)
+        if known and not slash and not run.run.startswith(run_id):
+            last = [
+                member for written, member in run.sensors.items() if member and f" {run_id}".endswith(f" {written}")
+            ]
+            slash, sensor = ("/", last[0]) if last else ("", "")
         if slash and sensor not in known:
             listed = did_you_mean(sensor, known) if known else f" It has one sensor; write {run_id}."
             raise UnknownRun(f"run {run_id} has no sensor {sensor!r}.{listed}")

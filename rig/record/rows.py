@@ -43,6 +43,14 @@ def select_beginning(name: str) -> Select[Any]:
     return select_runs().where(runs.c.run.startswith(name, autoescape=True) if name else false())
 
 
+def runs_of_sensor(runs: Sequence[Run], name: str) -> list[Run]:
+    """The runs, in their order, of the sensor that `SENSOR`, `last SENSOR` or `last PROCEDURE SENSOR` names."""
+    wanted = name.removeprefix(f"{LAST} ")
+    procedure, _, sensor = wanted.partition(" ")
+    of_procedure = [run for run in runs if run.procedure == procedure and sensor in run.sensors]
+    return [run for run in runs if wanted in run.sensors] or (of_procedure if wanted != name else [])
+
+
 def run_of(row: Row[Any]) -> Run:
     """The run of a row of `select_runs`."""
     return Run(**{name: value for name, value in row._mapping.items() if name != "checksum"})

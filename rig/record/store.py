@@ -44,6 +44,7 @@ from rig.record.rows import (
     put,
     put_state,
     run_of,
+    runs_of_sensor,
     select_beginning,
     select_named,
     select_runs,
@@ -255,8 +256,9 @@ class Record:
         return found
 
     def run(self, name: str) -> Run:
-        """The run with this id, or whose id alone begins so; `last` and `last PROCEDURE` are the newest ones.
+        """The run with this id, or whose id alone begins so, or the only one of the sensor with this name or serial.
 
+        `last` is the newest run; `last PROCEDURE`, `last SENSOR` and `last PROCEDURE SENSOR` the newest of these.
         Raises UnknownRun with a suggestion; RecordError if the entry of the run is damaged.
         """
         with self._reading() as at:
@@ -270,6 +272,14 @@ class Record:
             listed = ", ".join(sorted(row.run for row in rows)[:MOST_LISTED])
             raise UnknownRun(f"{len(rows)} runs in {self.where} begin with {name!r}: {listed}; write more of the id")
         wanted = name.removeprefix(f"{LAST} ")
+        if of_sensor := runs_of_sensor(self.runs(), name):
+            if len(of_sensor) == 1 or wanted != name:
+                return of_sensor[0]
+            listed = ", ".join(each.run for each in of_sensor[:MOST_LISTED])
+            raise UnknownRun(
+                f"{len(of_sensor)} runs in {self.where} are of the sensor {name!r}: {listed}"
+                f"{' ...' if of_sensor[MOST_LISTED:] else ''}; write an id, or '{LAST} {name}' for the newest one"
+            )
         raise UnknownRun(f"no run {name!r} in {self.where}.{did_you_mean(wanted, list(dict.fromkeys(known))[-20:])}")
 
     def poses(self, run: str) -> list[Pose]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrations.text import as_written
 from procedures.session import Dwell, Pose, Samples
 
 
@@ -36,6 +37,15 @@ class Run:
     results: Mapping[str, Any]
     rows: int
     uid: str = ""
+
+    @property
+    def sensors(self) -> dict[str, str]:
+        """Each name and serial number of a sensor -> its name in the batch, "" without a batch, or for several."""
+        if batch := self.bench.get("sensors"):
+            given = {member: {member, *_names(each, "name")} for member, each in batch.items()}
+            owners = {name: [m for m in given if name in given[m]] for name in set().union(*given.values())}
+            return {name: members[0] if len(members) == 1 else "" for name, members in sorted(owners.items())}
+        return dict.fromkeys(_names(self.constants, "sensor"), "")
 
     @property
     def extent(self) -> str:
@@ -104,3 +114,7 @@ class Event:
     at: str
     what: str
     text: str
+
+
+def _names(sensor: Mapping[str, Any], key: str) -> list[str]:
+    return [as_written(sensor[each]) for each in (key, "serial") if sensor.get(each)]

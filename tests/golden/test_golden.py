@@ -21,7 +21,15 @@ from tests.golden.transcript import commands, difference, made, placeholder
 FOLDER = Path(__file__).parent
 ROOT = FOLDER.parents[1]
 FILES = sorted(path.stem for path in FOLDER.glob("*.txt"))
-WITHOUT = {"demo", "doctor", "push", "resume", "simulate", "web"}  # they serve, need a server, or are tested whole
+WITHOUT = {
+    "completion",
+    "demo",
+    "doctor",
+    "push",
+    "resume",
+    "simulate",
+    "web",
+}  # they serve, need a server, or are tested whole
 REFUSALS = "refusals"  # commands that end with status 2, print nothing on standard output, and change nothing
 REFUSED = re.compile(r"\$ rig .*\n(!.*\n)+exit status 2")
 REMEDY = "if this is meant: pytest tests/golden --update-golden, and read the difference that git shows"

@@ -17,6 +17,7 @@ from rig.cli import GROUPS, Commands, main
 from rig.cli import rig as group
 from rig.cli.terminal.failure import BROKEN_PIPE, PROGRAM_FAULT, exit_status, status_of
 from rig.errors import BenchError, InstrumentFailed, Stopped
+from rig.record import Record
 
 COMMANDS = Commands().list_commands(click.Context(group))
 
@@ -142,6 +143,28 @@ def test_a_shell_gets_its_completion_script(
     monkeypatch.setattr("click.shell_completion.BashComplete._check_version", lambda *_: None)
     monkeypatch.setenv("_RIG_COMPLETE", f"{shell}_source")
     assert f"_RIG_COMPLETE={shell}_complete" in completed(capsysbinary)
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_command_prints_the_completion_script(
+    shell: str, rig: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("click.shell_completion.BashComplete._check_version", lambda *_: None)
+    assert f"_RIG_COMPLETE={shell}_complete" in rig("completion", shell).out
+
+
+def test_runs_sensors_and_files_are_completed(
+    monkeypatch: pytest.MonkeyPatch, capsysbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    with Record() as record:
+        constants = {"sensor": "QA-7"}
+        run = record.begin("sweep", {}, bench={}, identities={}, configuration="", source="a test", constants=constants)
+    monkeypatch.setenv("_RIG_COMPLETE", "bash_complete")
+    wanted = {"fit 2": ["file,2", f"plain,{run}"], "show la": ["plain,last"], "history Q": ["plain,QA-7"]}
+    for line, offered in wanted.items():
+        monkeypatch.setenv("COMP_WORDS", f"rig {line}")
+        monkeypatch.setenv("COMP_CWORD", "2")
+        assert completed(capsysbinary).split() == offered
 
 
 def test_commands_and_procedures_are_completed(

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 import rig as application
-from rig.errors import UnknownRun
+from rig.errors import RecordError, UnknownRun
 from rig.record import Record
+from rig.record.measured import Measured
 from tests.rig.conftest import Ended
 
 
@@ -27,6 +28,39 @@ def test_the_last_run_and_the_last_of_a_procedure() -> None:
             record.run("last soaks")
         with pytest.raises(UnknownRun, match=r"3 runs in .* write more of the id"):
             record.run(sweep[:4])
+
+
+def of_sensor(record: Record, procedure: str, name: str, serial: str = "") -> str:
+    constants = {"sensor": name, "serial": serial}
+    return record.begin(procedure, {}, bench={}, identities={}, configuration="", source="a test", constants=constants)
+
+
+def test_a_sensor_names_its_only_run_and_last_names_the_newest_of_several() -> None:
+    with Record() as record:
+        only = of_sensor(record, "soak", "B2", "S-17")
+        old, soak = of_sensor(record, "sweep", "A1"), of_sensor(record, "soak", "A1")
+        names = {"B2": only, "S-17": only, "last A1": soak, "last sweep A1": old, "last soak B2": only}
+        assert {name: record.run(name).run for name in names} == names
+        with pytest.raises(
+            UnknownRun, match=f"2 runs in .* of the sensor 'A1': {soak}, {old}; .* 'last A1' for the newest"
+        ):
+            record.run("A1")
+        for odd in ("A", "last A", "last sweep B2", "sweep A1"):
+            with pytest.raises(UnknownRun, match="no run"):
+                record.run(odd)
+
+
+def test_the_name_of_a_sensor_of_a_batch_chooses_it_in_its_run() -> None:
+    bench = {"sensors": {"a": {"name": "ADXL", "serial": "17"}, "b": {"name": "ADXL", "serial": "18"}}}
+    with Record() as record:
+        run = record.begin("sweep", {}, bench=bench, identities={}, configuration="", source="a test", constants={})
+        chosen = {
+            name: Measured.named(record, name).name for name in ("b", "18", "last b", "last sweep 17", f"{run}/a")
+        }
+        assert list(chosen.values()) == [f"{run}/b", f"{run}/b", f"{run}/b", f"{run}/a", f"{run}/a"]
+        for both in (run[:-1], "ADXL"):
+            with pytest.raises(RecordError, match="choose one"):
+                Measured.named(record, both)
 
 
 def test_an_empty_record_has_no_last_run() -> None:

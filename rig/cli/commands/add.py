@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rig.cli.terminal.complete import complete_effect
 from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import emit, note, notes
 
@@ -20,7 +21,7 @@ NAME = re.compile(r"[A-Za-z0-9_-]+")  # no useful expression looks like this
 
 
 @click.command("add")
-@click.argument("effect")
+@click.argument("effect", shell_complete=complete_effect)
 @click.option("--name", help="Name of an effect given as an expression.")
 @click.option("--model", required=True, help="A shipped model by name, or a model file.")
 @click.option("--data", required=True, help="A file or a run.")

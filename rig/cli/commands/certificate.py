@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.output import bench_option, emit, json_option, note
 from rig.errors import OutputError
 
@@ -17,7 +18,7 @@ FORMS = (".html", ".pdf", ".xml")
 
 
 @click.command("certificate")
-@click.argument("data")
+@click.argument("data", shell_complete=complete_data)
 @click.option("--model", required=True, help="The certificate states the parameters of this model, fitted to DATA.")
 @click.option(
     "--out",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import check_option, emit, model_option, note, notes
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @click.command("compare")
-@click.argument("data")
+@click.argument("data", shell_complete=complete_data)
 @model_option
 @check_option
 @request_options

@@ -9,13 +9,14 @@ import click
 
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
 from calibrations.text import columns
+from rig.cli.terminal.complete import complete_sensor
 from rig.cli.terminal.output import emit, json_option
 from rig.record import Record
 from rig.services.control import HEAD, OUT, Controlled, controlled, row, signals, worst
 
 
 @click.command("control")
-@click.argument("sensor", required=False)
+@click.argument("sensor", shell_complete=complete_sensor, required=False)
 @click.option(
     "--baseline",
     type=click.IntRange(min=FEWEST_RUNS),

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import check_option, emit, model_option, note, notes
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command("diagnose")
-@click.argument("data")
+@click.argument("data", shell_complete=complete_data)
 @model_option
 @check_option
 @request_options

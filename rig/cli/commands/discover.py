@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import check_option, emit, model_option, note, notes, watch_options
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @click.command("discover")
-@click.argument("data", nargs=-1)
+@click.argument("data", nargs=-1, shell_complete=complete_data)
 @model_option
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the final model to this file.")
 @click.option("--without", multiple=True, metavar="PLACE", help="A place to leave out of the search; may be repeated.")

@@ -7,11 +7,12 @@ from pathlib import Path
 import click
 
 from calibrations.text import columns
+from rig.cli.terminal.complete import complete_effect
 from rig.cli.terminal.output import bench_option, emit, json_option
 
 
 @click.command("effects")
-@click.argument("effect", required=False)
+@click.argument("effect", shell_complete=complete_effect, required=False)
 @bench_option
 @json_option
 def command(effect: str | None, bench_file: Path | None, as_json: bool) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import click
 
+from rig.cli.terminal.complete import complete_run
 from rig.cli.terminal.output import emit, json_option
 
 
 @click.command("exclude")
-@click.argument("run")
+@click.argument("run", shell_complete=complete_run)
 @click.argument("pose", type=click.IntRange(min=0))
 @click.option("--reason", metavar="TEXT", help="The reason; the record stores it.")
 @click.option("--include", is_flag=True, help="Include the pose again.")

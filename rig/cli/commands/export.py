@@ -6,12 +6,13 @@ from pathlib import Path
 
 import click
 
+from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.output import emit, json_option, note
 from rig.services.export import FORMATS, export
 
 
 @click.command("export")
-@click.argument("data")
+@click.argument("data", shell_complete=complete_data)
 @click.option("--format", "kind", type=click.Choice(FORMATS), default="csv", show_default=True)
 @click.option("--out", "path", type=click.Path(path_type=Path), required=True, help="The file to write.")
 @json_option

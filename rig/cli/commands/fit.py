@@ -17,6 +17,7 @@ from calibrations.fitting.matrices import CalibrationMatrices, calibration_matri
 from calibrations.geometry.faces import Faces, estimate_faces
 from calibrations.table import Array, Table
 from calibrations.text import columns, concise
+from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import check_option, emit, model_option, note, notes
 
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @click.command("fit")
-@click.argument("data")
+@click.argument("data", shell_complete=complete_data)
 @model_option
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the fitted model to this file.")
 @check_option

@@ -10,6 +10,7 @@ import click
 import numpy as np
 
 from calibrations.noise.analysis import NoiseAnalysis
+from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.output import Positive, emit, json_option, note, notes
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @click.command("noise")
-@click.argument("data")
+@click.argument("data", shell_complete=complete_data)
 @click.option("--channel", help="Of several channels: vx, vy ... Default: all axes of the first sensor.")
 @click.option("--rate", "rate_hz", type=Positive(), help="Samples a second, for an array.")
 @click.option(

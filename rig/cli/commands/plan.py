@@ -22,9 +22,10 @@ from procedures.errors import SafetyLimit
 from procedures.pose_list import format_poses
 from procedures.settings import parse
 from rig.bench import Bench, read_bench
+from rig.cli.terminal.complete import complete_procedure
 from rig.cli.terminal.options import PASS_ON, read_settings, settings_arguments
 from rig.cli.terminal.output import bench_option, emit, json_option, model_option
-from rig.cli.terminal.settings_help import ProcedureCommand, complete_procedure
+from rig.cli.terminal.settings_help import ProcedureCommand
 from rig.errors import BeyondLimits
 from rig.planning.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, relative
 from rig.planning.plan import Plan, Stretch, plan, stretches

@@ -9,12 +9,13 @@ import click
 
 from procedures.catalogue import Procedure, find, paths
 from rig.bench import read_bench
+from rig.cli.terminal.complete import complete_procedure
 from rig.cli.terminal.output import bench_option, emit, json_option
 from rig.cli.terminal.settings_help import procedure_text
 
 
 @click.command("procedures")
-@click.argument("procedure", required=False)
+@click.argument("procedure", required=False, shell_complete=complete_procedure)
 @bench_option
 @json_option
 def command(procedure: str | None, bench_file: Path | None, as_json: bool) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import emit, model_option, note
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command("report")
-@click.argument("data")
+@click.argument("data", shell_complete=complete_data)
 @model_option
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the page to this HTML file.")
 @click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Write all pictures here.")

@@ -8,6 +8,7 @@ import click
 
 from procedures.catalogue import find
 from rig.bench import Bench, read_bench
+from rig.cli.terminal.complete import complete_run
 from rig.cli.terminal.output import bench_option, json_option, note, notes, watch_options
 from rig.cli.terminal.watch import print_end, trace_option, watching
 from rig.record import Record
@@ -17,7 +18,7 @@ from rig.runs.runner import Outcome, resume
 
 
 @click.command("resume")
-@click.argument("run")
+@click.argument("run", shell_complete=complete_run)
 @watch_options
 @trace_option
 @bench_option

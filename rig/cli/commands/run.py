@@ -9,9 +9,10 @@ import click
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import read_bench
+from rig.cli.terminal.complete import complete_procedure
 from rig.cli.terminal.options import PASS_ON, read_settings, settings_arguments
 from rig.cli.terminal.output import bench_option, json_option, note, watch_options
-from rig.cli.terminal.settings_help import ProcedureCommand, complete_procedure
+from rig.cli.terminal.settings_help import ProcedureCommand
 from rig.cli.terminal.watch import print_end, trace_option, watching
 from rig.record import Record
 from rig.record.push import push_after

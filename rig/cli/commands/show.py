@@ -11,6 +11,7 @@ from calibrations.errors import CalibrationError
 from calibrations.tables import MEANS
 from calibrations.text import columns, duration
 from rig.bench.certificates import EXPIRED
+from rig.cli.terminal.complete import complete_run
 from rig.cli.terminal.output import emit, json_option
 from rig.errors import RecordError
 from rig.record import Event, Kept, Line, Record, Run
@@ -24,7 +25,7 @@ Ranges = Mapping[str, tuple[float, float]]
 
 
 @click.command("show")
-@click.argument("run")
+@click.argument("run", shell_complete=complete_run)
 @click.option("--poses", is_flag=True, help="List every pose with its number, and the reason if it is excluded.")
 @click.option("--log", "wants_log", is_flag=True, help="List the log: every step with its time.")
 @json_option

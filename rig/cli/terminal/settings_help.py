@@ -29,11 +29,6 @@ class ProcedureCommand(click.Command):
         return super().parse_args(ctx, args)
 
 
-def complete_procedure(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[str]:
-    """The shipped procedures whose names begin so, for the completion of a shell."""
-    return [name for name in paths(None) if name.startswith(begun)]
-
-
 def _folder(args: list[str]) -> Any:
     """The folder of own procedures of the bench file among the words of a command."""
     bench = next((args[k + 1] for k, word in enumerate(args[:-1]) if word == "--bench"), None)
