@@ -1,0 +1,27 @@
+"""Sensors without any cause, on every layout of poses and in slow noise of any size up to that of the white noise."""
+
+import pytest
+
+from calibrations.loop import discover
+from calibrations.model.file import read_model
+from tests.benchmark.discovery.cases import measured
+from tests.benchmark.discovery.layouts import LAYOUTS
+from tests.benchmark.discovery.rig import Run
+
+
+def check_nothing_is_missing(layout: str, seed: int, slow: float) -> None:
+    table, _ = measured(Run(layout, seed), {}, 1.0, slow)
+    found = discover(table, read_model("linear"))
+    assert found.verdict == "adequate", (seed, layout, found.judgement.text)
+    assert not found.causes
+
+
+def test_slow_noise_that_looks_like_an_oscillation_is_no_cause() -> None:
+    check_nothing_is_missing("upright", 10_034, 1.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("slow", [0.0, 0.5, 1.0])
+def test_of_a_sensor_without_a_cause_nothing_is_missing(slow: float) -> None:
+    for seed, layout in enumerate(LAYOUTS, 10_012):
+        check_nothing_is_missing(layout, seed, slow)
