@@ -23,7 +23,7 @@ from drivers.handheld.triad import noise_v, steady_v
 from drivers.handheld.world import INPUTS, Handheld, HandheldWorld
 from drivers.world.config import WorldConfig
 from procedures.hand_positions import hand_positions
-from procedures.session import Samples
+from procedures.instruments import Samples
 from rig.instruments.by_hand import HandAnalysis
 from rig.record.values import Block
 from tests.procedures.bench import Adc, session

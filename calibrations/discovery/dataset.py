@@ -15,6 +15,7 @@ from calibrations.model import Model
 
 if TYPE_CHECKING:
     from calibrations.discovery.enough import Enough
+    from calibrations.model.correlations import Correlations
     from calibrations.presentation.chart import Chart, Picture
 
 Cells = tuple[Sequence[str], Sequence[Sequence[str]]]  # head and rows of a table of text
@@ -133,6 +134,10 @@ class Dataset(ABC, Generic[F]):
     def covered(self, found: F) -> dict[str, tuple[float, float]]:  # noqa: ARG002
         """Lowest and highest value of each influence over which a fit is valid; {} where none was measured."""
         return {}
+
+    def correlations(self, found: F) -> Correlations | None:  # noqa: ARG002
+        """How the parameters of a fit go together; None where it is not known."""
+        return None
 
     def undetermined(self, found: F) -> str | None:  # noqa: ARG002
         """Why the data do not determine a model, in words."""

@@ -50,6 +50,7 @@ from calibrations.text import quantity, rounded
 if TYPE_CHECKING:
     from calibrations.discovery.enough import Enough
     from calibrations.discovery.structural import StructuralSearch
+    from calibrations.model.correlations import Correlations
     from calibrations.presentation.chart import Chart, Picture
 
 INFLUENCES = ("temperature_c", "supply_v", "t_s")  # that a product may know
@@ -357,6 +358,19 @@ class Rows(Dataset[Fit]):
         own = {name for term in found.model.terms for name in term.effect.needs if name not in NUMBERS}
         there = [name for name in (*INFLUENCES, *sorted(own)) if name in table and table.n]
         return {name: (float(table.column(name).min()), float(table.column(name).max())) for name in there}
+
+    def correlations(self, found: Fit) -> Correlations | None:
+        """Those of the identified parameters, by the noise; of a large free form, without its coefficients."""
+        from calibrations.model.correlations import MOST, Correlations  # only what writes a model needs them
+
+        known = {key: e for key, e in found.params.items() if e.identified and e.std}
+        if len(known) > MOST:
+            whole = [e for term in found.model.terms for e in term.quantities]
+            known = {key: e for key, e in known.items() if any(e is each for each in whole)}
+        if not 1 < len(known) <= MOST:
+            return None
+        places = [k for k, key in enumerate(found.params) if key in known]
+        return Correlations.of(list(known), found.correlation[np.ix_(places, places)])
 
     def addition(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> Findings[Fit]:
         """One effect, with what the data cannot separate from it."""

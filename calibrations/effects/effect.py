@@ -57,6 +57,7 @@ class Parameter:
     of the effect that is 0 where it does not (for one axis, with the axis behind it: `turned_x`), and `scale` a
     constant that `typical` is a multiple of, where only data can tell. `prior` holds the standard deviation of a
     Gaussian prior of mean 0 by axis ("" for one value of all axes); an axis without one does not have the parameter.
+    `assumed` is the value in model files that do not give one, as they were written before there was the parameter.
     An effect's class sets `name`.
     """
 
@@ -71,6 +72,7 @@ class Parameter:
     where: str = ""
     scale: str = ""
     prior: Mapping[str, float] | None = None
+    assumed: float | None = None
     doc: str = ""
     name: str = ""
 

@@ -20,18 +20,19 @@ def _moved(held: Array, last: float, here: float, limits: Array, pressed: float)
 
 
 @njit(cache=True, nogil=True)
-def slip_elements(a: Array, on_the_way: Array, pressed: Array, limits: Array) -> Array:
+def slip_elements(a: Array, on_the_way: Array, pressed: Array, limits: Array, begun: Array) -> Array:
     """Force held by elements of equal stiffness that stick and slip, at each row, shape (n, elements, 3), g.
 
     a            (n, 3) specific force, g
     on_the_way   (n, turns, 3) points where it turned round before each row
     pressed      (n, 3) factor on the limits
     limits       (elements,) g; an element follows the force and slips at its limit; rows in order of time
+    begun        (3,) share of its limit that each element holds before the first row, from -1 to 1
     """
     n, axes = a.shape
     state = np.zeros((n, len(limits), axes))
     for k in range(axes):
-        held = np.zeros(len(limits))
+        held = begun[k] * limits
         last = 0.0
         for i in range(n):
             for j in range(on_the_way.shape[1] + 1):
@@ -43,13 +44,13 @@ def slip_elements(a: Array, on_the_way: Array, pressed: Array, limits: Array) ->
 
 
 @njit(cache=True, nogil=True)
-def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array) -> Array:
+def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array, begun: Array) -> Array:
     """Force held by all elements of `slip_elements`, shape (n, 3), 1 where all slip."""
     n, axes = a.shape
     total = limits.sum()
     found = np.empty((n, axes))
     for k in range(axes):
-        held = np.zeros(len(limits))
+        held = begun[k] * limits
         last = 0.0
         for i in range(n):
             for j in range(on_the_way.shape[1] + 1):

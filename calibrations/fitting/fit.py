@@ -38,6 +38,7 @@ ROUNDS = 2
 NEWTON_STEPS = 20
 DAMPINGS = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # of each column's squares
 BOUND_ROUNDS = 3
+LARGEST_FACTOR = 2.0  # by which one step changes a parameter that is positive by its meaning
 STRAIGHT = 1e-6  # of what is left: a step that foretells it better is a linear model's
 SMALL_GAIN = 3e-3  # of the mean square of what is left, or of the noise: it moves a parameter by 0.05 uncertainties
 
@@ -347,7 +348,7 @@ def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, fl
     stairs = False
     for _ in range(NEWTON_STEPS):
         J = np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), rows]) * typical
-        low, high = ((bound - theta) / typical for bound in problem.layout.bounds)
+        low, high = ((bound - theta) / typical for bound in _reach(problem, theta))
         # a rotation of the rows changes no step, and leaves as many rows as columns for every damping
         rotated = qr(np.column_stack([J, left]), mode="r", overwrite_a=True, check_finite=False)[0]
         R: Array = np.asarray(rotated[: J.shape[1] + 1], dtype=np.float64)
@@ -364,6 +365,19 @@ def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, fl
                 break
             stairs = True
     return theta, float(left @ left) / 2
+
+
+def _reach(problem: Problem, theta: Array) -> tuple[Array, Array]:
+    """The least and greatest values that one step may give.
+
+    What is positive by its meaning, such as a time constant, changes by a factor. Derivatives hold within a small one.
+    """
+    low, high = problem.layout.bounds
+    positive = (low > 0) & (theta > 0)
+    return (
+        np.where(positive, np.maximum(low, theta / LARGEST_FACTOR), low),
+        np.where(positive, np.minimum(high, theta * LARGEST_FACTOR), high),
+    )
 
 
 def _step(J: Array, left: Array, damping: float, low: Array, high: Array) -> Array:
@@ -402,7 +416,16 @@ def _wider(cautious: Fit) -> Array:
     layout = cautious.problem.layout
     wider, free = np.ones(len(cautious.theta)), ~np.isfinite(layout.prior)
     jacobian = _free(cautious.problem, cautious.jacobian)
-    wider[free] = widening(cautious.noise, cautious.residual, jacobian, layout.typical[free])
+    problem, typical = cautious.problem, layout.typical[free]
+    if problem.table.type.magnitude:
+        from calibrations.fitting.slow_outputs import widening_of_magnitudes  # positions alone need it
+
+        axes = problem.table.outputs.shape[1]
+        each = np.broadcast_to(np.eye(axes), (problem.table.n, axes, axes))
+        by_output = problem.of_output(cautious.theta, each)
+        wider[free] = widening_of_magnitudes(cautious.noise, cautious.residual, jacobian, by_output, typical)
+    else:
+        wider[free] = widening(cautious.noise, cautious.residual, jacobian, typical)
     return wider
 
 

@@ -60,7 +60,7 @@ def estimates(model: Model, layout: Layout, theta: Array, jacobian: Array, wider
             Estimate(slot.parameter.name, slot.axis, float(theta[k]), uncertainty, unit, why is None, why)
         )
     terms = tuple(replace(term, estimates=tuple(e)) for term, e in zip(model.terms, found, strict=True))
-    return replace(model, terms=terms)
+    return replace(model, terms=terms, correlations=None)  # those of earlier values
 
 
 def _why_not(k: int, layout: Layout, std: Array, free: Array) -> str | None:

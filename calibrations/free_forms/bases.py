@@ -130,15 +130,19 @@ class Line:
 
 @dataclass(frozen=True)
 class Play:
-    """Slip elements that follow x and slip at their widths, over the widths: hysteresis of any shape."""
+    """Slip elements that follow x and slip at their widths, over the widths: hysteresis of any shape.
+
+    With `memory` each has another column: what is left of its state before the first pose, 1 where it is whole.
+    """
 
     widths: tuple[float, ...]
+    memory: bool = False
     kind: Literal["play"] = "play"
 
     @property
     def count(self) -> int:
-        """Number of elements."""
-        return len(self.widths)
+        """Number of columns."""
+        return len(self.widths) * (2 if self.memory else 1)
 
 
 @dataclass(frozen=True)

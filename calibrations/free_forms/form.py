@@ -16,6 +16,7 @@ factor        what f is multiplied by
 force         specific force along the own axis, g
 side          side of beta's last move, +-1
 load          magnitude of the force along the other axis, g
+pressed       not multiplied: limits of slip elements grow by that magnitude
 """
 
 from __future__ import annotations
@@ -31,10 +32,10 @@ from calibrations.effects.kernels import play, slip_elements
 from calibrations.effects.thermometer import leading_temperature
 from calibrations.free_forms.bases import Basis, Play, Products
 from calibrations.free_forms.poses import side, way
-from calibrations.geometry.orientation import nominal_pose, out_of_plane, specific_force
+from calibrations.geometry.orientation import nominal_pose, other_in_plane, out_of_plane, specific_force
 from calibrations.table import Array, Table
 
-Factor = Literal["", "force", "side", "load"]
+Factor = Literal["", "force", "side", "load", "pressed"]
 CROSS = (1, 0, 0)  # of x, y, z: the other axis in the plane
 ANGLES = ("alpha", "beta")
 OF_FORCE = ("own", "cross", "out-of-plane", "force", "way")  # drivers of what the sensor makes of the force
@@ -105,12 +106,14 @@ class Form:
             out = np.column_stack([x**i * y**j * z**m for i, j, m in basis.powers])
         elif isinstance(basis, Play):
             lagging = _lagging(table, basis, self.lead_s) if self.driver == "temperature" else None
-            out = np.asarray(_slipping(table, basis, self.approach_deg)[k]) if lagging is None else lagging
+            pressed = self.factor == "pressed"
+            out = np.asarray(_slipping(table, basis, self.approach_deg, pressed)[k]) if lagging is None else lagging
         elif self.driver in MODELLED:
             out = basis(self.drive(table, force, response, k))[:, :kept]
         else:
             out = _of_table(self, table, k)[:, :kept]
-        return np.asarray(out * self._factor(table, force, k)[:, None]) if self.factor else out
+        multiplied = self.factor not in ("", "pressed")
+        return np.asarray(out * self._factor(table, force, k)[:, None]) if multiplied else out
 
     def drive(self, table: Table, force: Array, response: Array, k: int) -> Array:
         """What drives the function of axis k, shape (n,)."""
@@ -157,9 +160,15 @@ def _lagging(table: Table, basis: Play, lead_s: float) -> Array:
 
 
 @lru_cache(maxsize=32)
-def _slipping(table: Table, basis: Play, approach_deg: float) -> Array:
-    """Forces of the slip elements over their widths, shape (3, n, widths)."""
+def _slipping(table: Table, basis: Play, approach_deg: float, pressed: bool) -> Array:
+    """Forces of the slip elements over their widths, and what is left of their first state, shape (3, n, columns)."""
     widths = np.array(basis.widths)
     driver = specific_force(nominal_pose(table))
-    held = slip_elements(driver, way(table, approach_deg), np.ones_like(driver), widths)
-    return np.ascontiguousarray(np.moveaxis(held, 2, 0) / widths)
+    path, even = way(table, approach_deg), np.ones_like(driver)
+    by_load = even + np.abs(other_in_plane(driver)) if pressed else even
+    held = slip_elements(driver, path, by_load, widths, np.zeros(3))
+    columns = np.moveaxis(held, 2, 0) / widths
+    if basis.memory:
+        first = np.moveaxis(slip_elements(driver, path, by_load, widths, np.ones(3)), 2, 0) / widths
+        columns = np.concatenate([columns, first - columns], axis=2)
+    return np.ascontiguousarray(columns)

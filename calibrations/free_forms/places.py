@@ -254,7 +254,7 @@ def _history(data: PoseData, first: State) -> list[Component]:
         return []
     stated = "approach_deg" in data.table.constants
     begin = (AS_STATED if stated else LOGGED_DEG,)
-    found = [_slipping(first, "slip", "", stated)(begin), _slipping(first, "pressed-slip", "load", stated)(begin)]
+    found = [_slipping(first, "slip", "", stated)(begin), _slipping(first, "pressed-slip", "pressed", stated)(begin)]
     cross, own = first.force[:, list(CROSS)], first.force
     for approach, turn in data.sides.items():
         if np.ptp(turn) == 0:
@@ -272,7 +272,7 @@ def _slipping(first: State, name: str, factor: Factor, stated: bool) -> Make:
     """Slip elements by how many degrees before a pose its approach begins."""
 
     def at(shape: tuple[float, ...]) -> Component:
-        widths = Play(WIDTHS_G[::2] if factor else WIDTHS_G)
+        widths = Play(WIDTHS_G, memory=not factor and first.data.timed)
         approach = AS_STATED if stated else abs(shape[0])
         form = Form("history", name, "way", (widths,), factor, approach_deg=approach)
         return free(form, first, "hysteresis", PRODUCT if factor else 0.0, shape=shape, step=(2.0,),

@@ -108,7 +108,8 @@ class Layout:
 
     def known(self) -> Array | None:
         """The model's own values, or None where one is missing."""
-        values = self._known()
+        assumed = {k: slot.parameter.assumed for k, slot in enumerate(self.slots)}
+        values = {k: value for k, value in assumed.items() if value is not None} | self._known()
         return np.array([values[k] for k in range(len(self.slots))]) if len(values) == len(self.slots) else None
 
     def steps(self, theta: Array) -> list[Step]:

@@ -225,9 +225,9 @@ class NoiseAnalysis(Result):
         return tuple(name for name in identified if name in SPOILT.get(disturbance.kind, ()))
 
 
-def analyse(still: Still, effects: Mapping[str, Effect] | None = None) -> NoiseAnalysis:
+def analyse(still: Still) -> NoiseAnalysis:
     """The noise of every channel of a still record."""
-    return NoiseAnalysis(still, search(still, read_model(MODEL), catalogue() if effects is None else effects))
+    return NoiseAnalysis(still, search(still, read_model(MODEL), catalogue()))
 
 
 def _channels(record: Still, found: Search) -> dict[str, ChannelNoise]:

@@ -28,7 +28,8 @@ def test_what_is_0_without_a_value_is_taken_at_its_usual_size() -> None:
     found = assume_sensor(model, POSES, CONSTANTS)
     heights = found.theta[of_parameter(found, "height")]
     assert np.all(heights > 0)
-    assert np.all(np.linalg.norm(found.jacobian, axis=(0, 1)) > 0)  # each parameter does something
+    forgotten = of_parameter(found, "begin")  # all elements slip on the way to the first of these poses
+    assert np.all((np.linalg.norm(found.jacobian, axis=(0, 1)) > 0) | forgotten)  # each parameter does something
 
 
 def test_a_fitted_model_keeps_its_values() -> None:

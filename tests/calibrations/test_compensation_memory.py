@@ -39,7 +39,7 @@ def test_what_an_effect_remembers_is_what_its_kernel_does() -> None:
         found.append(part[0])
     limits = p["reach"] * (1 + p["spread"] * (np.arange(6) + 0.5 - 3) / 3)
     pressed = 1 + p["pressing"] * np.abs(a[:, [1, 0, 0]])
-    direct = slip(a, np.empty((len(a), 0, 3)), pressed, limits) * p["height"]
+    direct = slip(a, np.empty((len(a), 0, 3)), pressed, limits, np.zeros(3)) * p["height"]
     assert np.abs(np.array(found) - direct).max() < 1e-15
 
 

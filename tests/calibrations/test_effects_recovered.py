@@ -255,7 +255,7 @@ def test_parameters_come_back(name: str) -> None:
     found = fit(model if model.holds(name) else model.with_effect(catalogue()[name]), table)
     assert found.pooled_excess == pytest.approx(1.0, abs=0.1)
     estimates = {(e.name, e.axis): e for term in found.model.terms if term.name == name for e in term.estimates}
-    assert set(estimates) == set(MADE[name].truth)
+    assert {key for key in estimates if key[0] != "begin"} == set(MADE[name].truth)  # tests of `begin` are its own
     for key, value in MADE[name].truth.items():
         assert estimates[key].identified, key
         assert abs(estimates[key].value - value) < 4 * estimates[key].std, key

@@ -15,9 +15,10 @@ class Hysteresis(Effect):
 
         V += h s      s: force held by elements of equal stiffness that follow the specific force and slip at their
                       limits (Jenkins, Iwan), spread evenly over r (1 - w) .. r (1 + w), times 1 + c |a_p|;
-                      s = 1 where all elements slip
+                      s = 1 where all elements slip, and b before the first pose
 
-        h in {out}, per axis; r in g; w from 0 (one element) to 1; c in 1/g: load of the other in-plane axis
+        h in {out}, b from -1 to 1, per axis; r in g; w from 0 (one element) to 1; c in 1/g: load of the other in-plane
+        axis. b is a parameter, as the way to the first pose, such as the search for home, is not recorded.
 
     Symptom   clockwise and anticlockwise turns give two branches, with opposite signs of the residual.
     Excited by  every angle, approached from both sides.
@@ -40,6 +41,9 @@ class Hysteresis(Effect):
     pressing = Parameter(
         "1/g", typical=0.5, per_axis=False, low=-0.9, high=5.0, doc="growth of the limits with the other axis's load"
     )
+    begin = Parameter(
+        "1", typical=1.0, low=-1.0, high=1.0, assumed=0.0, doc="share of the slip force held before the first pose"
+    )
 
     approach_deg = Constant(lambda _: AS_STATED)  # from where beta comes; a search may find it
 
@@ -47,7 +51,7 @@ class Hysteresis(Effect):
         path = turning_points(approached(table, float(p.approach_deg)))
         from calibrations.effects.kernels import slip  # numba is slow to import
 
-        return slip(a, path, _pressed(a, p), _limits(p)) * p.height
+        return slip(a, path, _pressed(a, p), _limits(p), p.begin) * p.height
 
     def follow(self, a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[Array, list[Array]]:
         """`before` and after: the specific force at which each element would be at rest, g."""
