@@ -2,20 +2,24 @@
 
 A fault is a mechanism of the simulation that the bench file sets. Its size is the rms change of the output without the
 mechanism, at the same poses and without noise. The size of an effect is the rms change of the model's output without
-the effect. Bias and scale factor are free in both, because every calibration fits them. An effect belongs to a fault if
-their curves and sizes agree: nothing compares the name of an effect with that of a mechanism.
+the effect. Bias and scale factor are free in both, because every calibration fits them.
+
+Nothing compares the name of an effect with that of a mechanism. A fault belongs to the fewest effects whose values, if
+changed, would make its curve. Faults that share an effect cannot be told apart in this data: they are one group, and
+its faults together must agree in curve and size with its effects together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.identifiability import covariance
+from calibrations.free_forms.place_names import PREFIX, place_of_effect
 from calibrations.means.noise import rms
 from calibrations.model.chain import forward
 from calibrations.table import Array, Table
@@ -24,10 +28,15 @@ from drivers.world.config import WorldConfig
 from drivers.world.world import World
 from rig.bench import Bench
 
-ALIKE = 0.9  # correlation of two curves of one cause
+ALIKE = 0.9  # correlation of a group's faults with its effects
 OF_A_SIZE = 3.0  # their sizes differ by this factor at most
+LEFT, WHOLE = (
+    0.3,
+    0.1,
+)  # of a fault's curve: what its effects cannot make of it at most, and what needs no further effect
 MATERIAL = 0.3  # times the noise floor: a smaller fault cannot be seen
 STEP_STD = 0.1  # of a parameter, for the derivative of a size
+STEP = 1e-3  # of a typical value, for the derivative of a curve
 AXES = ("x", "y")
 QUIET_S = 0.5  # between samples: without noise they are alike, and few are enough
 
@@ -65,11 +74,14 @@ MECHANISMS: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Curve:
-    """A change of the output, (n, channels), free of bias and scale factor. `std`: standard uncertainty of its rms."""
+    """A change of the output, (n, channels), free of bias and scale factor.
+
+    `span`: of an effect, what a change of its values would add to the output, (n, channels, values).
+    """
 
     name: str
     curve: Array
-    std: float | None = None
+    span: Array | None = None
 
     @property
     def size(self) -> float:
@@ -78,63 +90,83 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Match:
-    """A hidden fault, and the effect that follows its curve at about its size; None if it was not found."""
+class Group:
+    """Faults that the data cannot tell apart, and the effects that they were found as; none if they were not found.
 
-    fault: Curve
-    effect: Curve | None
+    `std`: standard uncertainty of the size of the effects together.
+    """
+
+    faults: tuple[Curve, ...]
+    effects: tuple[Curve, ...] = ()
+    std: float | None = None
+
+    @property
+    def hidden(self) -> float:
+        """Size of all faults together."""
+        return _together(self.faults).size
+
+    @property
+    def found(self) -> float | None:
+        """Size of all effects together."""
+        return _together(self.effects).size if self.effects else None
 
 
 @dataclass(frozen=True)
 class Faults:
-    """All faults beside all effects. `extra`: effects that follow no fault of their own. Sizes in `unit`."""
+    """All groups of faults, the largest first. `extra`: effects that belong to no fault. Sizes in `unit`."""
 
-    matches: tuple[Match, ...]
+    groups: tuple[Group, ...]
     extra: tuple[Curve, ...]
     floor: float
     unit: str
 
     @property
-    def material(self) -> tuple[Match, ...]:
-        """Faults that are large enough to be seen."""
-        return tuple(m for m in self.matches if m.fault.size >= MATERIAL * self.floor)
+    def material(self) -> tuple[Group, ...]:
+        """Groups with a fault that is large enough to be seen."""
+        return tuple(g for g in self.groups if max(f.size for f in g.faults) >= MATERIAL * self.floor)
 
     def text(self) -> str:
         """The table hidden / found / uncertainty, and a line for the rest."""
-        total = sum(m.fault.size**2 for m in self.matches) or 1.0
-        rows = [self._row(m, total) for m in self.material]
+        total = sum(f.size**2 for g in self.groups for f in g.faults) or 1.0
+        rows = [row for group in self.material for row in self._rows(group, total)]
         lines = [columns(("hidden fault", "hidden", "share", "found as", "found", "uncertainty"), rows)]
-        if small := [m.fault.name for m in self.matches if m.fault.size < MATERIAL * self.floor]:
+        if small := [f.name for g in self.groups if g not in self.material for f in g.faults]:
             lines.append(f"Too small to be seen, below {MATERIAL:g} noise floors: {', '.join(small)}.")
         if self.extra:
-            found = ", ".join(f"{e.name} ({self._size(e)})" for e in self.extra)
-            lines.append(f"Found, and not the curve of a single hidden fault: {found}.")
+            found = ", ".join(f"{e.name} ({self._quantity(e.size)})" for e in self.extra)
+            lines.append(f"Found, and not the curve of a hidden fault: {found}.")
         return "\n".join(lines)
 
     def document(self) -> list[dict[str, Any]]:
-        """The rows for JSON."""
+        """The rows for JSON: one for each fault, with what its group was found as."""
         return [
             {
-                "fault": m.fault.name,
-                "size": m.fault.size,
+                "fault": fault.name,
+                "size": fault.size,
                 "unit": self.unit,
-                "size_over_floor": m.fault.size / self.floor,
-                "effect": m.effect.name if m.effect else None,
-                "found": m.effect.size if m.effect else None,
-                "std": m.effect.std if m.effect else None,
+                "size_over_floor": fault.size / self.floor,
+                "effect": group.effects[0].name if len(group.effects) == 1 else None,
+                "effects": [e.name for e in group.effects],
+                "together_with": [f.name for f in group.faults if f is not fault],
+                "hidden": group.hidden,
+                "found": group.found,
+                "std": group.std,
             }
-            for m in self.matches
+            for group in self.groups
+            for fault in group.faults
         ]
 
-    def _row(self, m: Match, total: float) -> tuple[str, ...]:
-        head = (m.fault.name, self._size(m.fault), f"{100 * m.fault.size**2 / total:.2g} %")
-        if m.effect is None:
-            return (*head, "not found", "-", "-")
-        std = quantity(m.effect.std, self.unit) if m.effect.std is not None else "-"
-        return (*head, m.effect.name, self._size(m.effect), std)
+    def _rows(self, group: Group, total: float) -> list[tuple[str, ...]]:
+        """A row for each fault, and one for several together."""
+        heads = [(f.name, self._quantity(f.size), f"{100 * f.size**2 / total:.2g} %") for f in group.faults]
+        names = ", ".join(e.name for e in group.effects) or "not found"
+        found = (names, self._quantity(group.found), self._quantity(group.std))
+        if len(heads) == 1:
+            return [(*heads[0], *found)]
+        return [*((*head, "", "", "") for head in heads), ("  together", self._quantity(group.hidden), "", *found)]
 
-    def _size(self, curve: Curve) -> str:
-        return quantity(curve.size, self.unit)
+    def _quantity(self, value: float | None) -> str:
+        return quantity(value, self.unit) if value is not None else "-"
 
 
 def hidden_faults(bench: Bench, found: Fit, start: Fit) -> Faults:
@@ -148,20 +180,69 @@ def hidden_faults(bench: Bench, found: Fit, start: Fit) -> Faults:
     known = {term.name for term in start.model.terms}
     effects = [_effect(term.name, found, poses) for term in found.model.terms if term.name not in known]
     floor = float(rms(found.noise.floor))
-    hidden = sorted((f for f in faults if f is not None and f.size > 0), key=lambda f: -f.size)
-    return matched(hidden, effects, floor, poses.unit)
+    hidden = [f for f in faults if f is not None and f.size > 0]
+    groups, extra = grouped(hidden, effects, floor)
+    sized = tuple(replace(g, std=_uncertainty([e.name for e in g.effects], found, poses)) for g in groups)
+    return Faults(sized, extra, floor, poses.unit)
 
 
-def matched(faults: Sequence[Curve], effects: Sequence[Curve], floor: float, unit: str) -> Faults:
-    """Faults and effects in pairs, those with the most similar curves first; an effect belongs to one fault."""
-    pairs = [(_correlation(f, e), f, e) for f in faults for e in effects if _alike(f, e)]
-    found: dict[str, Curve] = {}
-    for _, fault, effect in sorted(pairs, key=lambda pair: -pair[0]):
-        if fault.name not in found and effect.name not in {e.name for e in found.values()}:
-            found[fault.name] = effect
-    used = {effect.name for effect in found.values()}
-    matches = tuple(Match(fault, found.get(fault.name)) for fault in faults)
-    return Faults(matches, tuple(e for e in effects if e.name not in used), floor, unit)
+def grouped(
+    faults: Sequence[Curve], effects: Sequence[Curve], floor: float
+) -> tuple[tuple[Group, ...], tuple[Curve, ...]]:
+    """The groups, the largest first, and the effects of none. Free forms join the effects at their place."""
+    of_catalogue = [e for e in effects if e.span is not None]
+    made_by = {f.name: _makers(f, of_catalogue, floor) for f in faults}
+    groups: list[Group] = []
+    for fault in sorted(faults, key=lambda f: -f.size):
+        makers = made_by[fault.name]
+        shared = [g for g in groups if any(e in makers for e in g.effects)]
+        members = (*(f for g in shared for f in g.faults), fault)
+        joined = dict.fromkeys([e.name for g in shared for e in g.effects] + [e.name for e in makers])
+        groups = [g for g in groups if g not in shared]
+        groups.append(Group(members, tuple(e for e in of_catalogue if e.name in joined)))
+    judged = [part for group in groups for part in _judged(group, effects)]
+    used = {e.name for group in judged for e in group.effects}
+    found = tuple(sorted(judged, key=lambda g: -max(f.size for f in g.faults)))
+    return found, tuple(e for e in effects if e.name not in used)
+
+
+def _makers(fault: Curve, effects: Sequence[Curve], floor: float) -> list[Curve]:
+    """The fewest effects whose values, if changed, make the curve of a fault; none where no effects do."""
+    chosen: list[Curve] = []
+    left, unseen = fault.size, MATERIAL * floor
+    while left > max(WHOLE * fault.size, unseen):
+        others = [e for e in effects if e not in chosen]
+        rests = [_left(fault, [*chosen, e]) for e in others]
+        if min(rests, default=left) > ALIKE * left:
+            break
+        left = min(rests)
+        chosen.append(others[int(np.argmin(rests))])
+    return chosen if left <= max(LEFT * fault.size, unseen) else []
+
+
+def _left(fault: Curve, effects: Sequence[Curve]) -> float:
+    """Rms of what the effects cannot make of a fault's curve."""
+    spans = [e.span.reshape(fault.curve.size, -1) for e in effects if e.span is not None]
+    columns_ = np.hstack(spans)
+    length = np.linalg.norm(columns_, axis=0)
+    columns_ = columns_[:, length > 0] / length[length > 0]
+    curve = fault.curve.ravel()
+    return float(rms(curve - columns_ @ np.linalg.lstsq(columns_, curve, rcond=None)[0]))
+
+
+def _judged(group: Group, effects: Sequence[Curve]) -> list[Group]:
+    """The group with the free forms of its effects, if what was found agrees with what was hidden; else its faults."""
+    places = {place_of_effect(e.name) for e in group.effects}
+    of_place = [e for e in effects if e.span is None and place_of_effect(e.name) in places]
+    whole = replace(group, effects=(*group.effects, *of_place))
+    for each in (whole, group):
+        if each.effects and _alike(_together(each.faults), _together(each.effects)):
+            return [each]
+    return [Group((fault,)) for fault in group.faults]
+
+
+def _together(curves: Sequence[Curve]) -> Curve:
+    return Curve(", ".join(c.name for c in curves), np.sum([c.curve for c in curves], axis=0))
 
 
 def _alike(fault: Curve, effect: Curve) -> bool:
@@ -215,24 +296,46 @@ def _nested(path: str, value: float) -> dict[str, Any]:
 
 
 def _effect(name: str, found: Fit, poses: Table) -> Curve:
-    """An effect's curve in the fitted model, and the uncertainty of its size from the fit's covariance."""
+    """An effect's curve in the fitted model; with its span, if it is no free form."""
+    curve = _contribution([name], found, poses)
+    if name.startswith(PREFIX):
+        return Curve(name, curve(found.theta))
+    span = []
+    for k in np.flatnonzero(found.problem.layout.of_effect(name)):
+        ahead = found.theta.copy()
+        ahead[k] += STEP * found.problem.layout.typical[k]
+        span.append(curve(ahead) - curve(found.theta))
+    return Curve(name, curve(found.theta), np.stack(span, axis=2))
+
+
+def _contribution(names: Sequence[str], found: Fit, poses: Table) -> Callable[[Array], Array]:
+    """What effects add to the outputs, (n, channels), as a function of the values of all parameters."""
     layout = found.problem.layout
 
     def curve(theta: Array) -> Array:
         steps = layout.steps(theta)
-        return _free(poses, forward(poses, steps) - forward(poses, [s for s in steps if s[0].name != name]))
+        return _free(poses, forward(poses, steps) - forward(poses, [s for s in steps if s[0].name not in names]))
 
-    cov, _ = covariance(found.noise.whiten(found.jacobian), layout.typical)
+    return curve
+
+
+def _uncertainty(names: Sequence[str], found: Fit, poses: Table) -> float | None:
+    """Standard uncertainty of the size of effects together, from the fit's covariance."""
+    if not names:
+        return None
+    curve = _contribution(names, found, poses)
+    cov, _ = covariance(found.information, found.problem.layout.typical)
     std = np.sqrt(np.maximum(np.diag(cov), 0.0))
     size = rms(curve(found.theta).ravel())
     slope = np.zeros(len(found.theta))
-    for k in np.flatnonzero(np.isfinite(std) & (std > 0)):
+    own = np.any([found.problem.layout.of_effect(name) for name in names], axis=0)
+    for k in np.flatnonzero(own & np.isfinite(std) & (std > 0)):
         step = np.zeros_like(found.theta)
         step[k] = STEP_STD * std[k]
         slope[k] = (rms(curve(found.theta + step).ravel()) - size) / step[k]
     used = np.flatnonzero(slope)
     variance = float(slope[used] @ cov[np.ix_(used, used)] @ slope[used])
-    return Curve(name, curve(found.theta), float(np.sqrt(max(variance, 0.0))))
+    return float(np.sqrt(max(variance, 0.0)))
 
 
 def _free(poses: Table, change: Array) -> Array:
