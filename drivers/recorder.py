@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Generator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TypeVar
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Generic, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,10 @@ Input = TypeVar("Input", int, str)  # a number, or the name of a record
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """A record: `volts` of shape (n, channels), the first scan at `start_s` of the clock."""
+    """A record: `volts` of shape (n, channels), the first scan at `start_s` of the clock.
+
+    Of a sensor that sends its own values, `volts` are in the unit of its settings.
+    """
 
     volts: NDArray[np.float64]
     channels: tuple[str, ...]
@@ -26,8 +30,88 @@ class Samples:
     start_s: float
 
 
-class Recorder:
+@dataclass(frozen=True)
+class Inputs(Generic[Input]):
+    """The inputs of a converter, as its settings name them: {name: input}.
+
+    Those `on_request` are wired too, and are measured only for who asks for them. Both are fields of the settings of
+    each converter, with its own defaults.
+    """
+
+    channels: Mapping[str, Input]
+    on_request: Mapping[str, Input]
+
+    @property
+    def wired(self) -> Mapping[str, Input]:
+        """All inputs by name: the channels, and those on request."""
+        return {**self.channels, **self.on_request}
+
+    def only(self, name: str, outputs: Sequence[str]) -> Self:
+        """Settings of a converter `name` whose channels are these; of a batch `a1.mx`, `a2.mx` are both `mx`.
+
+        Raises LimitError for an output that no input is wired to.
+        """
+        if missing := [each for each in outputs if each not in {key.rpartition(".")[2] for key in self.wired}]:
+            raise LimitError(
+                f"{name}: no input is wired to {', '.join(missing)}; there are {', '.join(self.wired)}",
+                "Name the inputs in the bench file, under channels or on_request of the converter's settings",
+            )
+        chosen = {each: k for each, k in self.wired.items() if each.rpartition(".")[2] in outputs}
+        return replace(self, channels=chosen, on_request={})
+
+    def require_different_names(self) -> None:
+        """Raises ValueError for a name that is both a channel and on request."""
+        if twice := self.channels.keys() & self.on_request.keys():
+            raise ValueError(f"{', '.join(sorted(twice))} is a channel already; remove it from on_request")
+
+
+class NoDigitalLines:
+    """Settings of a converter without digital lines."""
+
+    @property
+    def power_dio(self) -> None:
+        """No line switches the sensor's power."""
+
+    @property
+    def interlocks(self) -> Mapping[str, int]:
+        """It has no contacts."""
+        return {}
+
+
+class Selectable(Protocol):
+    """Settings with a rate, from which channels can be chosen."""
+
+    @property
+    def rate_hz(self) -> float: ...
+
+    def only(self, name: str, outputs: Sequence[str]) -> Self: ...
+
+
+Settings = TypeVar("Settings", bound=Selectable)
+
+
+class Recorder(Generic[Settings]):
     """A converter whose driver has `stream`: a record without a gap, in blocks."""
+
+    name: str
+    settings: Settings
+
+    def close(self) -> None:
+        """Nothing to release: the wire belongs to the bench."""
+
+    def power(self, on: bool) -> None:  # noqa: ARG002
+        """Raises LimitError: no line of it switches the sensor."""
+        raise LimitError(f"{self.name}: no line switches the power", "Switch the sensor by hand, or use a LabJack T7")
+
+    def only(self, *outputs: str) -> Self:
+        """The same device with these channels and no others. Raises LimitError for one that is not there."""
+        chosen = copy(self)
+        chosen.settings = self.settings.only(self.name, outputs)
+        return chosen
+
+    def scans(self, duration_s: float) -> int:
+        """The number of whole scans in a time, at least 1."""
+        return max(1, round(duration_s * self.settings.rate_hz))
 
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         """Record all channels for `duration_s` and hand it out in blocks of `block_s`."""
@@ -54,19 +138,6 @@ class Recorder:
                 watch()
                 blocks.append(block)
         return _joined(blocks)
-
-
-def chosen_inputs(name: str, wired: Mapping[str, Input], outputs: Sequence[str]) -> dict[str, Input]:
-    """The inputs of these outputs, of those that are `wired` to a converter `name`; of a batch `a1.mx` is `mx`.
-
-    Raises LimitError for an output that no input is wired to.
-    """
-    if missing := [each for each in outputs if each not in {key.rpartition(".")[2] for key in wired}]:
-        raise LimitError(
-            f"{name}: no input is wired to {', '.join(missing)}; there are {', '.join(wired)}",
-            "Name the inputs in the bench file, under channels or on_request of the converter's settings",
-        )
-    return {each: k for each, k in wired.items() if each.rpartition(".")[2] in outputs}
 
 
 def _joined(blocks: Sequence[Samples]) -> Samples:

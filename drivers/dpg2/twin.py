@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from drivers.dpg2.driver import ONE_READING, STOP, VERSION, Settings
 from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
-from drivers.transport.server import Connection, Port, Server
+from drivers.transport.server import Connection, Port, Server, Twin
 
 LISTEN = "pty:?baud=9600"
 FAULTS = {
@@ -36,7 +36,7 @@ class World(Protocol):
     def level_deg(self) -> tuple[float, float]: ...
 
 
-class Inclinometer:
+class Inclinometer(Twin):
     """One level on a line of its own. It sends from power-on; bytes into an open or a full line are lost."""
 
     def __init__(self, world: World, settings: Settings, port: Port) -> None:

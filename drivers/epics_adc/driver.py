@@ -11,8 +11,7 @@ Source: EPICS Channel Access protocol specification; EPICS record reference manu
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
-from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 
 from drivers.errors import LimitError, SensorFault, StreamError
 from drivers.instrument import Check, Identity, require_positive
-from drivers.recorder import Recorder, Samples, chosen_inputs
+from drivers.recorder import Inputs, NoDigitalLines, Recorder, Samples
 from drivers.transport import Address, Links
 from drivers.transport.channel_access import Reading, Records
 
@@ -31,7 +30,7 @@ MOST_REPEATED = 0.05  # of the readings of a record: two clocks that differ a li
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Inputs[str], NoDigitalLines):
     """Channels as {name: record}, the record's name behind the beginning in the url.
 
     Those `on_request` are there too, and are measured only for who asks for them. `volts_per_unit` converts the
@@ -50,33 +49,14 @@ class Settings:
         require_positive(self, "rate_hz", "timeout_s")
         if not self.channels or not all(self.wired.values()):
             raise ValueError("channels must name records of the IOC, such as {vx: ai1}")
-        if twice := self.channels.keys() & self.on_request.keys():
-            raise ValueError(f"{', '.join(sorted(twice))} is a channel already; remove it from on_request")
-
-    @property
-    def wired(self) -> Mapping[str, str]:
-        """All records by name: the channels, and those on request."""
-        return {**self.channels, **self.on_request}
-
-    @property
-    def power_dio(self) -> None:
-        """No line switches the sensor's power."""
-
-    @property
-    def interlocks(self) -> Mapping[str, int]:
-        """It has no contacts."""
-        return {}
-
-    def only(self, name: str, outputs: Sequence[str]) -> Settings:
-        """Settings of a converter `name` whose channels are these. Raises LimitError for one that is not there."""
-        return replace(self, channels=chosen_inputs(name, self.wired, outputs), on_request={})
+        self.require_different_names()
 
     def lag_s(self, channel: str) -> float:  # noqa: ARG002
         """All channels are read at once."""
         return 0.0
 
 
-class AnalogRecords(Recorder):
+class AnalogRecords(Recorder[Settings]):
     """The records, read at the rate of the bench file."""
 
     def __init__(self, records: Records, links: Links, settings: Settings, name: str) -> None:
@@ -99,26 +79,13 @@ class AnalogRecords(Recorder):
             checks.append(Check(channel, ok, shown if ok else f"{shown}, alarm {reading.alarm}"))
         return checks
 
-    def close(self) -> None:
-        """Nothing to release: the wire belongs to the bench."""
-
-    def power(self, on: bool) -> None:  # noqa: ARG002
-        """Raises LimitError: no line of it switches the sensor."""
-        raise LimitError(f"{self.name}: no line switches the power", "Switch the sensor by hand, or use a LabJack T7")
-
-    def only(self, *outputs: str) -> AnalogRecords:
-        """The same converter with these channels and no others. Raises LimitError for one that is not there."""
-        chosen = copy(self)
-        chosen.settings = self.settings.only(self.name, outputs)
-        return chosen
-
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         """Record all channels for `duration_s` without a gap, and hand it out in blocks of `block_s`.
 
         Raises StreamError when readings are late or repeated, SensorFault for a record with an alarm or without a
         number, LinkTimeout, LinkRefused, Refused, BadFrame.
         """
-        scans, block = self._scans(duration_s), self._scans(block_s)
+        scans, block = self.scans(duration_s), self.scans(block_s)
         channels, rate_hz = tuple(self.settings.channels), self.settings.rate_hz
         start_s, fresh = self._clock.now(), Freshness(channels)
         for first in range(0, scans, block):
@@ -126,9 +93,6 @@ class AnalogRecords(Recorder):
             volts = np.array([self._taken(scan, start_s, fresh) for scan in range(first, last)])
             self._require_fresh(fresh, last)
             yield Samples(volts, channels, rate_hz, start_s + first / rate_hz)
-
-    def _scans(self, duration_s: float) -> int:
-        return max(1, round(duration_s * self.settings.rate_hz))
 
     def _scan(self) -> dict[str, Reading]:
         """One reading of every channel."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from drivers.epics_adc.driver import Settings
 from drivers.transport.address import Address
 from drivers.transport.channel_access_server import Field, records_port
 from drivers.transport.faults import Faults, Kind
-from drivers.transport.server import Server
+from drivers.transport.server import Server, Twin
 
 __all__ = ["FAULTS", "LISTEN", "serve"]
 
@@ -34,7 +34,7 @@ class World(Protocol):
     def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]: ...
 
 
-class Ioc:
+class Ioc(Twin):
     """The records, by name; all are processed together."""
 
     def __init__(self, world: World, settings: Settings) -> None:
@@ -43,20 +43,6 @@ class Ioc:
         self._wiring = {f"{BEGINNING}{record}": name for name, record in settings.wired.items()}
         self._volts: dict[str, float] = {}
         self._stamp_s = -math.inf
-
-    def advance(self, now_s: float) -> None:
-        """Nothing happens between requests."""
-
-    def due_s(self) -> float:
-        """Never: it says nothing unasked."""
-        return math.inf
-
-    def state(self) -> dict[str, Any]:
-        """Nothing: the next reading processes the records."""
-        return {}
-
-    def restore(self, state: Mapping[str, Any]) -> None:
-        """See `state`."""
 
     def has(self, name: str) -> bool:
         return name in self._wiring

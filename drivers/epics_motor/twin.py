@@ -12,7 +12,7 @@ from drivers.epics_motor.driver import Settings
 from drivers.transport.address import Address
 from drivers.transport.channel_access_server import Field, records_port
 from drivers.transport.faults import Faults, Kind
-from drivers.transport.server import Server
+from drivers.transport.server import Server, Twin
 from drivers.world.stage import Trajectory, at_rest
 
 __all__ = ["FAULTS", "LISTEN", "serve"]
@@ -42,7 +42,7 @@ class World(Protocol):
     def move_stage(self, axis: str, trajectory: Trajectory) -> None: ...
 
 
-class Motor:
+class Motor(Twin):
     """A motor record that turns the world's `axis`; its units are deg."""
 
     def __init__(self, world: World, axis: str, settings: Settings) -> None:
@@ -65,10 +65,6 @@ class Motor:
         for what in BRAKES:
             if strike := self.faults.once(what, now_s):
                 self._brake(max(strike.at_s, self._plan.start_s))
-
-    def due_s(self) -> float:
-        """Never: it says nothing unasked."""
-        return math.inf
 
     def state(self) -> dict[str, Any]:
         """The plan of the motion, and what has been written."""

@@ -9,11 +9,9 @@ with more than `most_lost` of its samples lost is refused, as is one with an axi
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable, Generator, Mapping, Sequence
-from copy import copy
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, TypeVar
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +19,10 @@ from numpy.typing import NDArray
 from drivers.errors import BadFrame, DriverError, LimitError, LinkTimeout, OverRange, SensorFault, StreamError
 from drivers.imu_lines.lines import Assembly
 from drivers.instrument import Check, Identity, require_positive
+from drivers.recorder import NoDigitalLines, Recorder, Samples
 from drivers.transport import Address, Links
 from drivers.transport.link import Link
 
-Read = TypeVar("Read")
 OUTPUTS = ("ax", "ay", "az")
 TIME = "time"
 QUIET_S = 2.0  # silence that ends a record; at least ten samples
@@ -36,7 +34,7 @@ SHOWN = 3  # damaged lines before a share of them can be judged
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(NoDigitalLines):
     """The line: `columns` are {ax: 1, ay: 2, az: 3}, by number from 1, or by name for `named` and `teleplot`.
 
     A column `time` is the sensor's own time, in units of `time_unit_s`. `range` is the end of the range each way, in
@@ -70,15 +68,6 @@ class Settings:
 
     wired = channels
 
-    @property
-    def power_dio(self) -> None:
-        """It has no line for the sensor's power."""
-
-    @property
-    def interlocks(self) -> Mapping[str, int]:
-        """It has no digital lines."""
-        return {}
-
     def only(self, name: str, outputs: Sequence[str]) -> Settings:
         """Settings with these outputs. Raises LimitError for one that is not in the lines."""
         if missing := [each for each in outputs if each not in self.channels]:
@@ -89,17 +78,7 @@ class Settings:
         return replace(self, columns={k: c for k, c in self.columns.items() if k in outputs or k == TIME})
 
 
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """A record: `volts` of shape (n, channels), in the sensor's unit; the first at `start_s` of the clock."""
-
-    volts: NDArray[np.float64]
-    channels: tuple[str, ...]
-    rate_hz: float
-    start_s: float
-
-
-class LineSensor:
+class LineSensor(Recorder[Settings]):
     """The sensor at the other end of the wire."""
 
     def __init__(self, link: Link, settings: Settings, name: str) -> None:
@@ -135,40 +114,9 @@ class LineSensor:
             checks.append(Check("time", abs(drift) < RATE_OFF, said))
         return checks
 
-    def close(self) -> None:
-        """Nothing to release: the wire belongs to the bench."""
-
     def power(self, on: bool) -> None:  # noqa: ARG002 - as the converter's
         """Raises LimitError: no line switches its power."""
         raise LimitError(f"{self.name}: no line switches the power of a sensor that sends lines", "Switch it by hand")
-
-    def only(self, *outputs: str) -> LineSensor:
-        """The same sensor with these outputs. Raises LimitError for one that its lines have not."""
-        chosen = copy(self)
-        chosen.settings = self.settings.only(self.name, outputs)
-        return chosen
-
-    def acquire(self, duration_s: float) -> Samples:
-        """Record for `duration_s`, rounded to whole samples; raises as `stream`."""
-        (samples,) = self.stream(duration_s, duration_s)
-        return samples
-
-    def acquire_with(self, duration_s: float, reading: Callable[[], Read]) -> tuple[Samples, Read]:
-        """The same, and what `reading` gives in the middle of it."""
-        with contextlib.closing(self.stream(duration_s, duration_s / 2)) as stream:
-            blocks = [next(stream)]
-            read = reading()
-            blocks += stream
-        return _joined(blocks), read
-
-    def acquire_watched(self, duration_s: float, watch: Callable[[], object], every_s: float) -> Samples:
-        """The same as `acquire`; `watch` is called about every `every_s`, and at the end."""
-        blocks = []
-        with contextlib.closing(self.stream(duration_s, every_s)) as stream:
-            for block in stream:
-                watch()
-                blocks.append(block)
-        return _joined(blocks)
 
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         """Record for `duration_s` without a gap, in blocks of `block_s`, both rounded to whole samples.
@@ -177,7 +125,7 @@ class LineSensor:
         another rate, OverRange, SensorFault for a stuck axis.
         """
         rate_hz, names = self.settings.rate_hz, tuple(self.settings.channels)
-        total, block = max(1, round(duration_s * rate_hz)), max(1, round(block_s * rate_hz))
+        total, block = self.scans(duration_s), self.scans(block_s)
         self._link.discard()
         heard, given = Heard(self._assembly()), 0
         while given < total:
@@ -297,11 +245,6 @@ class Heard:
         host_s = np.array(self.at_s)
         gain = float(np.polyfit(host_s - host_s[0], sensor_s - sensor_s[0], 1)[0]) if self.length_s else 1.0
         return float(sensor_s[0] - host_s[0]), gain - 1
-
-
-def _joined(blocks: Sequence[Samples]) -> Samples:
-    first = blocks[0]
-    return replace(first, volts=np.concatenate([block.volts for block in blocks]))
 
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> LineSensor:

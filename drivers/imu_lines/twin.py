@@ -12,7 +12,7 @@ from drivers.imu_lines.driver import TIME, Settings
 from drivers.imu_lines.lines import checksum
 from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
-from drivers.transport.server import Port, Server
+from drivers.transport.server import Port, Server, Twin
 
 LISTEN = "pty:?baud=115200"
 FAULTS = {
@@ -32,7 +32,7 @@ class World(Protocol):
     def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]: ...
 
 
-class Talker:
+class Talker(Twin):
     """One sensor on a line of its own. It sends from power-on; what finds no listener is lost."""
 
     def __init__(self, world: World, settings: Settings, port: Port) -> None:

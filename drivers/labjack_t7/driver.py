@@ -8,9 +8,8 @@ Source: T-series datasheet; see labjack_t7_table and labjack_t7_stream.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Generator, Mapping, Sequence
-from copy import copy
-from dataclasses import dataclass, field, replace
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, field
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -20,14 +19,14 @@ from drivers.errors import DriverError, Interlocked, LimitError, OverRange, Refu
 from drivers.instrument import Check, Identity
 from drivers.labjack_t7 import registers as t7
 from drivers.labjack_t7.stream import Calibration, Reception
-from drivers.recorder import Recorder, Samples, chosen_inputs
+from drivers.recorder import Inputs, Recorder, Samples
 from drivers.transport import Address, Links
 from drivers.transport.link import Link
 from drivers.transport.modbus import Register, Unit
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Inputs[int]):
     """Channels as {name: AIN number}, in the order of the scan; one range for all.
 
     Those `on_request` are wired too, and are sampled only for who asks for them, see `T7.only`.
@@ -48,8 +47,7 @@ class Settings:
     def __post_init__(self) -> None:
         if not self.channels or not set(self.wired.values()) <= set(range(t7.INPUTS)):
             raise ValueError(f"channels must name analog inputs, 0 to {t7.INPUTS - 1}, and at least one")
-        if twice := self.channels.keys() & self.on_request.keys():
-            raise ValueError(f"{', '.join(sorted(twice))} is a channel already; remove it from on_request")
+        self.require_different_names()
         if not 0 < self.rate_hz * len(self.channels) <= t7.MOST_SAMPLES_PER_S:
             raise ValueError(f"rate_hz must give at most {t7.MOST_SAMPLES_PER_S} samples a second in all")
         if self.range_v not in t7.RANGES_V:
@@ -62,25 +60,12 @@ class Settings:
         if not self.interchannel_s >= 0:
             raise ValueError("interchannel_s must be a time of 0 s or more")
 
-    @property
-    def wired(self) -> Mapping[str, int]:
-        """All inputs by name: the channels, and those on request."""
-        return {**self.channels, **self.on_request}
-
-    def only(self, name: str, outputs: Sequence[str]) -> Settings:
-        """Settings of a converter `name` whose channels are these; of a batch `a1.mx`, `a2.mx` are both `mx`.
-
-        Raises LimitError for an output that no input is wired to.
-        """
-        chosen = chosen_inputs(name, self.wired, outputs)
-        return replace(self, channels=chosen, on_request={})
-
     def lag_s(self, channel: str) -> float:
         """How long after the beginning of a scan this channel is sampled."""
         return list(self.channels).index(channel) * self.interchannel_s
 
 
-class T7(Recorder):
+class T7(Recorder[Settings]):
     """The converter. Its calibration is read once, when it is connected."""
 
     def __init__(self, unit: Unit, stream: Link, settings: Settings) -> None:
@@ -109,9 +94,6 @@ class T7(Recorder):
             *([] if contacts is None else [Check("interlocks", not contacts, told)]),
         ]
 
-    def close(self) -> None:
-        """Nothing to release: the wires belong to the bench."""
-
     def read_volts(self, name: str) -> float:
         """One reading of one channel, in V."""
         return self._unit.read(t7.ain(self._input(name)))
@@ -135,12 +117,6 @@ class T7(Recorder):
         state = int(self._unit.read(t7.LINES_STATE))
         return [name for name, line in self.settings.interlocks.items() if state >> line & 1]
 
-    def only(self, *outputs: str) -> T7:
-        """The same device with these channels and no others. Raises LimitError for one that is not wired."""
-        chosen = copy(self)
-        chosen.settings = self.settings.only(self.name, outputs)
-        return chosen
-
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         """Record all channels for `duration_s` without a gap, and hand it out in blocks of `block_s`.
 
@@ -151,7 +127,7 @@ class T7(Recorder):
         Raises StreamError when scans were lost, OverRange when a channel was at an end of its range, LinkTimeout,
         Refused when the device declines the settings.
         """
-        channels, scans, block = tuple(self.settings.channels), self._scans(duration_s), self._scans(block_s)
+        channels, scans, block = tuple(self.settings.channels), self.scans(duration_s), self.scans(block_s)
         per_packet = _scans_per_packet(scans, len(channels))
         self._configure(per_packet * len(channels))
         self._stream.discard()
@@ -181,9 +157,6 @@ class T7(Recorder):
             f"{self.settings.range_v:g} V in {clipped} of {len(codes)} samples",
             "Check the sensor's supply and wiring, or set a wider range_v in the bench file",
         )
-
-    def _scans(self, duration_s: float) -> int:
-        return max(1, round(duration_s * self.settings.rate_hz))
 
     def _configure(self, samples_per_packet: int) -> None:
         inputs = list(self.settings.channels.values())

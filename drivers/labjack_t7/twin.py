@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from drivers.transport.modbus_server import (
     Refusal,
     modbus_port,
 )
-from drivers.transport.server import Port, Server
+from drivers.transport.server import Port, Server, Twin
 from drivers.world.kernel import kernel
 
 # What can be wrong with the simulated T7's stream.
@@ -194,7 +194,7 @@ class Stream:
         return packets.tobytes()
 
 
-class Converter:
+class Converter(Twin):
     """The device behind its registers."""
 
     functions = frozenset({3, 4, 6, 16})
@@ -219,13 +219,6 @@ class Converter:
 
     def due_s(self) -> float:
         return self._stream.due_s() if self._stream else math.inf
-
-    def state(self) -> dict[str, Any]:
-        """Nothing: a driver that connects sets all that it relies on."""
-        return {}
-
-    def restore(self, state: Mapping[str, Any]) -> None:
-        """See `state`."""
 
     def read_words(self, address: int, count: int, now_s: float) -> Sequence[int]:
         if address < 2 * t7.INPUTS:

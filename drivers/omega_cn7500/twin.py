@@ -10,7 +10,7 @@ from drivers.omega_cn7500.driver import CONTROL_METHOD, PROCESS_VALUE, RUN_BIT, 
 from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
 from drivers.transport.modbus_server import ILLEGAL_ADDRESS, MODBUS_FAULTS, Refusal, modbus_port
-from drivers.transport.server import Server
+from drivers.transport.server import Server, Twin
 
 LISTEN = "pty:?baud=9600"
 FAULTS = {
@@ -36,7 +36,7 @@ class World(Protocol):
     def thermometer_c(self) -> float: ...
 
 
-class Controller:
+class Controller(Twin):
     """One unit. Wakes stopped, with a set point of 25 C."""
 
     functions = frozenset({2, 3, 5, 6})
@@ -53,9 +53,6 @@ class Controller:
             self._set_point_c, self._running = AT_POWER_ON
         if self.faults:
             self._world.oven_set(self._goal_c(now_s), self._running)
-
-    def due_s(self) -> float:
-        return math.inf
 
     def state(self) -> dict[str, Any]:
         return {"set_point_c": self._set_point_c, "running": self._running}

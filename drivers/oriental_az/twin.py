@@ -13,7 +13,7 @@ from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
 from drivers.transport.modbus import Register
 from drivers.transport.modbus_server import MODBUS_FAULTS, modbus_port
-from drivers.transport.server import Server
+from drivers.transport.server import Server, Twin
 from drivers.world.stage import Trajectory, at_rest
 
 LISTEN = "pty:"
@@ -44,7 +44,7 @@ class World(Protocol):
     def move_stage(self, axis: str, trajectory: Trajectory) -> None: ...
 
 
-class Drive:
+class Drive(Twin):
     """One unit of the bus, turning the world's `axis`. Wakes without coordinates: it must be homed."""
 
     functions = frozenset({3, 6, 16, 23})
@@ -79,9 +79,6 @@ class Drive:
             self._fail(0, strike.at_s)
             self._referenced = self._homing = False
             self._words.clear()
-
-    def due_s(self) -> float:
-        return math.inf
 
     def state(self) -> dict[str, Any]:
         return {

@@ -13,7 +13,7 @@ from drivers.pi_e727.twin_waves import Recorder, Waves
 from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
 from drivers.transport.gcs_server import OUT_OF_RANGE, UNKNOWN_COMMAND, Refusal, gcs_port, groups, lines, one_of, whole
-from drivers.transport.server import Server
+from drivers.transport.server import Server, Twin
 
 LISTEN = "tcp://127.0.0.1:0"
 FAULTS = {
@@ -31,7 +31,7 @@ PARAMETERS = {  # identifier: (value, type, name), the same for every axis
 }
 
 
-class Controller:
+class Controller(Twin):
     """One controller. It stores one error and clears it when it is read."""
 
     def __init__(self, world: World, settings: Settings) -> None:
@@ -83,9 +83,6 @@ class Controller:
             self._axes.restart(strike.at_s)
             self._power_on()
         self._recorder.advance(now_s)
-
-    def due_s(self) -> float:
-        return math.inf
 
     def state(self) -> dict[str, Any]:
         return {

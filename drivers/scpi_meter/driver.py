@@ -15,16 +15,15 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Generator, Mapping, Sequence
-from copy import copy
-from dataclasses import dataclass, field, replace
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.errors import BadFrame, DriverError, LimitError, OverRange, Refused, StreamError
+from drivers.errors import BadFrame, DriverError, OverRange, Refused, StreamError
 from drivers.instrument import Check, Identity, require_positive
-from drivers.recorder import Recorder, Samples, chosen_inputs
+from drivers.recorder import Inputs, NoDigitalLines, Recorder, Samples
 from drivers.transport import Address, Links
 from drivers.transport.lines import TextLines
 
@@ -44,7 +43,7 @@ HINT = "Look the error up in the instrument's manual, and change the settings in
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Inputs[int], NoDigitalLines):
     """Channels as {name: input}, such as 101 of a scanner; of an instrument with one input, 0.
 
     Those `on_request` are wired too, and are measured only for who asks for them. `nplc` is the time of one reading in
@@ -70,8 +69,7 @@ class Settings:
         inputs = list(self.wired.values())
         if not self.channels or (min(inputs) < 1 and inputs != [0]):
             raise ValueError("channels must name inputs of the scanner, such as 101; 0 is the only input of a meter")
-        if twice := self.channels.keys() & self.on_request.keys():
-            raise ValueError(f"{', '.join(sorted(twice))} is a channel already; remove it from on_request")
+        self.require_different_names()
         if not self.interchannel_s >= 0:
             raise ValueError("interchannel_s must be a time of 0 s or more")
         if (scan_s := len(self.channels) * self.nplc / self.mains_hz) * self.rate_hz > 1:
@@ -79,24 +77,6 @@ class Settings:
                 f"rate_hz must be at most {1 / scan_s:.3g}: {len(self.channels)} readings of nplc {self.nplc:g} take "
                 f"{scan_s:g} s; a shorter nplc gives a higher rate and more noise"
             )
-
-    @property
-    def wired(self) -> Mapping[str, int]:
-        """All inputs by name: the channels, and those on request."""
-        return {**self.channels, **self.on_request}
-
-    @property
-    def power_dio(self) -> None:
-        """No line switches the sensor's power."""
-
-    @property
-    def interlocks(self) -> Mapping[str, int]:
-        """It has no contacts."""
-        return {}
-
-    def only(self, name: str, outputs: Sequence[str]) -> Settings:
-        """Settings of a converter `name` whose channels are these. Raises LimitError for one that is not wired."""
-        return replace(self, channels=chosen_inputs(name, self.wired, outputs), on_request={})
 
     def lag_s(self, channel: str) -> float:
         """How long after the beginning of a scan this channel is measured."""
@@ -119,7 +99,7 @@ class Settings:
         return ["TRIG:SOUR IMM", "TRIG:COUN 1", *sample]
 
 
-class Meter(Recorder):
+class Meter(Recorder[Settings]):
     """The multimeter or scanner; reset when it is connected."""
 
     def __init__(self, lines: TextLines, links: Links, settings: Settings, name: str) -> None:
@@ -150,26 +130,13 @@ class Meter(Recorder):
             return [Check("settings", False, refused.what)]
         return [Check("settings", True, asked)]
 
-    def close(self) -> None:
-        """Nothing to release: the wire belongs to the bench."""
-
-    def power(self, on: bool) -> None:  # noqa: ARG002
-        """Raises LimitError: no line of it switches the sensor."""
-        raise LimitError(f"{self.name}: no line switches the power", "Switch the sensor by hand, or use a LabJack T7")
-
-    def only(self, *outputs: str) -> Meter:
-        """The same instrument with these channels and no others. Raises LimitError for one that is not wired."""
-        chosen = copy(self)
-        chosen.settings = self.settings.only(self.name, outputs)
-        return chosen
-
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         """Record all channels for `duration_s` without a gap, and hand it out in blocks of `block_s`.
 
         Raises StreamError when readings are missing or late, OverRange for an overload, Refused for an error that the
         instrument reports, LinkTimeout, LinkRefused, BadFrame.
         """
-        scans, block = self._scans(duration_s), self._scans(block_s)
+        scans, block = self.scans(duration_s), self.scans(block_s)
         channels, rate_hz = tuple(self.settings.channels), self.settings.rate_hz
         self._configure(scans)
         try:
@@ -185,9 +152,6 @@ class Meter(Recorder):
                 self._lines.write("ABOR")
             raise
         self._require_no_error("while it measured")
-
-    def _scans(self, duration_s: float) -> int:
-        return max(1, round(duration_s * self.settings.rate_hz))
 
     def _configure(self, scans: int) -> None:
         """Prepare a record. Raises Refused for an error that the instrument reports."""
@@ -235,6 +199,11 @@ class Meter(Recorder):
 
     def _points(self) -> int:
         (count,) = self._values("DATA:POIN?", 1)
+        if not np.isfinite(count):
+            raise BadFrame(
+                f"{self.name}: the answer to 'DATA:POIN?' is {count:g}, not a number of readings",
+                "Switch the instrument off and on, and keep other programs from it",
+            )
         return int(count)
 
     def _read_each(self, scans: range, start_s: float) -> list[float]:

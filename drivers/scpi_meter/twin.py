@@ -6,7 +6,7 @@ import math
 import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from drivers.scpi_meter.driver import Settings
 from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
-from drivers.transport.server import Connection, Port, Server
+from drivers.transport.server import Connection, Port, Server, Twin
 
 __all__ = ["FAULTS", "LISTEN", "serve"]
 
@@ -42,7 +42,7 @@ class World(Protocol):
     def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]: ...
 
 
-class Scanner:
+class Scanner(Twin):
     """The instrument behind its line. An input that is wired to nothing reads 0 V."""
 
     def __init__(self, world: World, settings: Settings) -> None:
@@ -63,17 +63,6 @@ class Scanner:
             start_s = self._start_s + self._taken / self._rate_hz
             self._memory.extend(self._scans(start_s, 1 / self._rate_hz, new, now_s).ravel())
             self._taken, self._left = self._taken + new, self._left - new
-
-    def due_s(self) -> float:
-        """Never: it says nothing unasked."""
-        return math.inf
-
-    def state(self) -> dict[str, Any]:
-        """Nothing: a driver that connects sets all that it relies on."""
-        return {}
-
-    def restore(self, state: Mapping[str, Any]) -> None:
-        """See `state`."""
 
     def answer(self, command: str, now_s: float) -> str | None:
         """Obey a line; the answer to a question."""

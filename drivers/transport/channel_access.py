@@ -11,11 +11,11 @@ from __future__ import annotations
 import getpass
 import socket
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from drivers.errors import BadFrame, LinkRefused, LinkTimeout, Refused
+from drivers.errors import BadFrame, DriverError, LinkRefused, LinkTimeout, Refused
 from drivers.transport.link import Link
 
 __all__ = ["SEVERITIES", "Circuit", "Reading", "Records", "channel_access", "found_server"]
@@ -58,7 +58,8 @@ class Reading:
     def alarm(self) -> str:
         """The alarm as EPICS writes it, such as INVALID (COMM)."""
         ca = channel_access("")
-        return f"{ca.AlarmSeverity(self.severity).name.removesuffix('_ALARM')} ({ca.AlarmStatus(self.status).name})"
+        severity = _name(ca.AlarmSeverity, self.severity).removesuffix("_ALARM")
+        return f"{severity} ({_name(ca.AlarmStatus, self.status)})"
 
 
 class Circuit:
@@ -90,22 +91,22 @@ class Circuit:
     def read(self, names: Sequence[str], who: str, timeout_s: float) -> list[Reading]:
         """The values of these fields, all asked for at once. Raises LinkTimeout, LinkRefused, Refused, BadFrame."""
         kind = self._ca.ChannelType.TIME_DOUBLE
-        return [_reading(answer) for answer in self._asked(names, kind, who, timeout_s)]
+        return [self._decoded(_reading, answer, who) for answer in self._asked(names, kind, who, timeout_s)]
 
     def units(self, name: str, who: str, timeout_s: float) -> str:
         """The engineering units of a record (EGU)."""
         (answer,) = self._asked([name], self._ca.ChannelType.GR_DOUBLE, who, timeout_s)
-        return bytes(answer.metadata.units).split(b"\0")[0].decode("latin-1").strip()
+        return str(self._decoded(_units, answer, who))
 
     def write(self, name: str, value: float, who: str, timeout_s: float) -> None:
         """Write a field and do not wait until its record is processed: a motor's is so at the end of its move."""
         self.open([name], who, timeout_s)
         channel = self._channels[name]
-        if not channel.access_rights & WRITE:
+        if not (channel.access_rights or 0) & WRITE:
             raise Refused(
                 f"{who}: the IOC does not let this computer and user write {name}",
                 ACCESS,
-                int(channel.access_rights),
+                int(channel.access_rights or 0),
             )
         self._send(channel.write([value], notify=False, data_type=self._ca.ChannelType.DOUBLE))
 
@@ -123,7 +124,7 @@ class Circuit:
         self._until(complete, names[0], who, timeout_s)
         answers = [heard[request.ioid] for request in asked]
         for name, answer in zip(names, answers, strict=True):
-            if not (status := _status(answer)).success:
+            if not (status := self._decoded(_status, answer, who)).success:
                 code = int(status.code_with_severity)
                 raise Refused(f"{who}: the IOC does not let this program read {name} ({status.name})", ACCESS, code)
         return answers
@@ -168,15 +169,28 @@ class Circuit:
             commands, _ = self._circuit.recv(data)
             for command in commands:
                 self._circuit.process_command(command)
+            for command in commands:
+                self._require_no_error(command, who)
+            return any(complete(command) for command in commands)
+        except DriverError:
+            raise
         except Exception as error:  # caproto has many, and those of struct and ctypes
-            self._forget()
-            raise BadFrame(
-                f"{who}: {len(data)} bytes from {self.link.url} are not Channel Access ({error})",
-                "Check that the address is that of an EPICS server",
-            ) from error
-        for command in commands:
-            self._require_no_error(command, who)
-        return any(complete(command) for command in commands)
+            raise self._not_ours(f"{len(data)} bytes", who, error) from error
+
+    def _decoded(self, take: Callable[[Any], Any], answer: Any, who: str) -> Any:
+        """What `take` finds in a message; caproto unpacks it only now. Raises BadFrame."""
+        try:
+            return take(answer)
+        except Exception as error:
+            raise self._not_ours("a message", who, error) from error
+
+    def _not_ours(self, what: str, who: str, error: Exception) -> BadFrame:
+        self._forget()
+        said = str(error) or type(error).__name__
+        return BadFrame(
+            f"{who}: {what} from {self.link.url} cannot be read as Channel Access ({said})",
+            "Check that the address is that of an EPICS server",
+        )
 
     def _require_no_error(self, command: Any, who: str) -> None:
         if isinstance(command, self._ca.ErrorResponse):
@@ -268,6 +282,15 @@ def _answer(udp: socket.socket, broadcaster: Any, number: int, deadline: float) 
 def _reading(answer: Any) -> Reading:
     alarm = answer.metadata
     return Reading(float(answer.data[0]), int(alarm.severity), int(alarm.status), float(alarm.timestamp))
+
+
+def _units(answer: Any) -> str:
+    return bytes(answer.metadata.units).split(b"\0")[0].decode("latin-1").strip()
+
+
+def _name(codes: Any, code: int) -> str:
+    """The name of a code, or its number where the protocol has no such code."""
+    return str(codes(code).name) if code in list(codes) else str(code)
 
 
 def _status(command: Any) -> Any:

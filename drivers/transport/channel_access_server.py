@@ -14,7 +14,7 @@ from weakref import WeakKeyDictionary
 from drivers.transport.channel_access import READ, WRITE, channel_access
 from drivers.transport.server import Connection, Port
 
-__all__ = ["Field", "RecordHost", "records_port"]
+__all__ = ["Field", "RecordHost", "Session", "records_port"]
 
 THINKING_S = 0.001
 EPOCH_S = 1.7e9  # of the simulated clock's zero, s since 1970
@@ -48,21 +48,26 @@ class RecordHost(Protocol):
 def records_port(listen: str, hosts: Sequence[RecordHost]) -> Port:
     """A port that answers for the records of `hosts`."""
     port = Port(listen)
-    circuits: WeakKeyDictionary[Connection, _Session] = WeakKeyDictionary()
+    circuits: WeakKeyDictionary[Connection, Session] = WeakKeyDictionary()
 
     def answer(connection: Connection, now_s: float) -> None:
         session = circuits.get(connection)
         if session is None:
-            session = circuits[connection] = _Session(hosts)
+            session = circuits[connection] = Session(hosts)
         data, connection.inbox[:] = bytes(connection.inbox), b""
-        if said := session.answers(data, now_s):
+        try:
+            said = session.answers(data, now_s)
+        except ValueError:
+            connection.ended = True  # as a server does with a stranger
+            return
+        if said:
             connection.send(said, now_s + THINKING_S + port.timing.line_s(len(said)))
 
     port.answer = answer
     return port
 
 
-class _Session:
+class Session:
     """One client: its circuit, and its channels by the server's number."""
 
     def __init__(self, hosts: Sequence[RecordHost]) -> None:
@@ -72,14 +77,17 @@ class _Session:
         self._numbers = itertools.count(1)
 
     def answers(self, data: bytes, now_s: float) -> bytes:
-        """What the server says to these bytes of its client."""
-        commands, _ = self._circuit.recv(data)
-        said = bytearray()
-        for command in commands:
-            self._circuit.process_command(command)
-            for answer in self._answers(command, now_s):
-                said += b"".join(bytes(part) for part in self._circuit.send(answer))
-        return bytes(said)
+        """What the server says to these bytes of its client. Raises ValueError for what is not Channel Access."""
+        try:
+            commands, _ = self._circuit.recv(data)
+            said = bytearray()
+            for command in commands:
+                self._circuit.process_command(command)
+                for answer in self._answers(command, now_s):
+                    said += b"".join(bytes(part) for part in self._circuit.send(answer))
+            return bytes(said)
+        except Exception as error:  # caproto has many, and those of struct and ctypes
+            raise ValueError(f"not Channel Access: {error}") from error
 
     def _answers(self, command: Any, now_s: float) -> list[Any]:
         ca = self._ca

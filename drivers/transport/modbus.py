@@ -15,7 +15,7 @@ from typing import Literal
 from pymodbus.exceptions import ModbusException
 from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.pdu import DecodePDU, ModbusPDU
-from pymodbus.pdu.bit_message import ReadCoilsRequest, ReadDiscreteInputsRequest, WriteSingleCoilRequest
+from pymodbus.pdu.bit_message import ReadDiscreteInputsRequest, WriteSingleCoilRequest
 from pymodbus.pdu.register_message import (
     ReadHoldingRegistersRequest,
     WriteMultipleRegistersRequest,
@@ -220,9 +220,9 @@ class Unit:
         request = WriteMultipleRegistersRequest(address=address, registers=words)
         self._bus.ask(request, self._unit, f"{self.name}: writing {doc}", retries)
 
-    def read_bit(self, address: int, doc: str, coil: bool = False) -> bool:
-        """One discrete input (function 02), or one coil (01)."""
-        request = (ReadCoilsRequest if coil else ReadDiscreteInputsRequest)(address=address, count=1)
+    def read_bit(self, address: int, doc: str) -> bool:
+        """One discrete input (function 02)."""
+        request = ReadDiscreteInputsRequest(address=address, count=1)
         return bool(self._bus.ask(request, self._unit, f"{self.name}: reading bit 0x{address:04X} ({doc})").bits[0])
 
     def write_bit(self, address: int, on: bool, doc: str) -> None:
@@ -237,7 +237,7 @@ def _fits(request: ModbusPDU, answer: ModbusPDU) -> bool:
         return False
     if isinstance(request, ReadHoldingRegistersRequest):
         return len(answer.registers) == request.count
-    return isinstance(request, ReadCoilsRequest) or answer.address == request.address
+    return isinstance(request, ReadDiscreteInputsRequest) or answer.address == request.address
 
 
 def _refused(what: str, code: int) -> Refused:

@@ -16,7 +16,7 @@ import pty
 import socket
 import tty
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from drivers.transport.address import Address, Url
 from drivers.transport.faults import END, Faults, Said, Wire, disturbed
@@ -27,17 +27,19 @@ FAULTS_OF = "faults of"
 SILENCE_S = 0.05  # ends an RTU frame: generous, since a computer sends a frame in pieces
 
 
-class Twin(Protocol):
-    """The interface of a simulated instrument for its server, except its answers."""
+class Twin:
+    """A simulated instrument, as its server sees it, except its answers: one that acts only when it is asked."""
 
     def advance(self, now_s: float) -> None:
-        """Compute what happened up to `now_s`."""
+        """Compute what happened up to `now_s`; nothing unless the instrument says what."""
 
     def due_s(self) -> float:
         """When it next sends by itself, s; infinity for never."""
+        return math.inf
 
     def state(self) -> dict[str, Any]:
-        """What a resumed run needs, JSON-able."""
+        """What a resumed run needs, JSON-able; nothing where a driver that connects sets all that it relies on."""
+        return {}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from `state`."""

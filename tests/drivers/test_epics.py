@@ -28,10 +28,12 @@ from drivers.errors import (
 )
 from drivers.transport import Address, Links
 from drivers.transport.address import Url
+from drivers.transport.channel_access import Reading
 from drivers.transport.channel_access_server import Field, records_port
 from drivers.transport.faults import Fault, faults_of
 from drivers.transport.server import Port, Server
 from tests.epics_ioc import serving
+from tests.fuzz.labs import SAID, ca_answer
 
 CHANNELS = {"time": "ai1", "supply": "ai2"}
 
@@ -411,3 +413,16 @@ def test_a_record_that_nobody_has_is_not_found(ioc: None) -> None:
         LinkRefused, match=r"alpha: no EPICS server has nobody:m1 \(asked 127\.0\.0\.1:\d+.*CA_ADDR_LIST"
     ):
         motor_driver.connect(Address("ca:nobody:m1"), Links(WallClock()), settings, "alpha")
+
+
+def test_a_status_that_the_protocol_does_not_have_is_a_bad_frame() -> None:
+    """Of the answer to a reading: a header of 16 bytes, whose third number is the status."""
+    answer = SAID[2]
+    assert answer[:2] == b"\0\x0f"
+    with pytest.raises(BadFrame, match="cannot be read as Channel Access"):
+        ca_answer(b"".join([*SAID[:2], answer[:8] + b"\0\0\xff\xff" + answer[12:], *SAID[3:]]))
+
+
+def test_an_alarm_without_a_name_is_its_number() -> None:
+    assert Reading(2.5, 3, 9, 0.0).alarm == "INVALID (COMM)"
+    assert Reading(2.5, 77, 9, 0.0).alarm == "77 (COMM)"

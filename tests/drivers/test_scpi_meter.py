@@ -16,6 +16,7 @@ from drivers.scpi_meter import driver, twin
 from drivers.transport import Address, Links
 from drivers.transport.address import Url
 from drivers.transport.faults import Fault, faults_of
+from tests.fuzz.labs import SCPI, scpi_answers
 
 CHANNELS = {"supply": 102, "time": 101}
 SIMULATED = """
@@ -221,3 +222,9 @@ def test_an_address_of_visa_names_its_line() -> None:
 def test_another_driver_does_not_open_a_visa_resource() -> None:
     with pytest.raises(LinkRefused, match="only the driver scpi_meter"):
         Links(WallClock()).link("visa:GPIB0::22::INSTR", "alpha")
+
+
+def test_a_count_of_readings_that_is_no_number_is_a_bad_frame() -> None:
+    """Found by fuzzing: -1e9990 is minus infinity."""
+    with pytest.raises(BadFrame, match="not a number of readings"):
+        scpi_answers(timer=True)(SCPI.replace(b"\n0\n4\n", b"\n-1e9990\n4\n"))
