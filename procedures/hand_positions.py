@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from procedures.errors import NoAnswer, SettingError
-from procedures.session import Guidance, HandAnalysis, HandCourse, NoiseAtRest, Pose, Samples, Session
+from procedures.instruments import Samples
+from procedures.session import Guidance, HandAnalysis, HandCourse, NoiseAtRest, Pose, Session
 
 KIND = "positions"
 ADAPTIVE = True

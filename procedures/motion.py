@@ -16,8 +16,9 @@ from contextlib import contextmanager
 from itertools import chain
 
 from procedures.errors import ProcedureError, SettingError
+from procedures.instruments import Stage
 from procedures.level_check import prepare
-from procedures.session import Pose, Session, Stage, bounded
+from procedures.session import Pose, Session, bounded
 from procedures.sweep import turn
 
 KIND = "motion"
@@ -44,7 +45,8 @@ def motion(
 ) -> None:
     """Sweep, then record the sensor still for `still_s` and in motion for `duration_s`. The records have no gaps.
 
-    Several frequencies, one after the other, separate a corner of the output filter from a delay. The first frequency
+    The positioner moves the sensor along x by `peak_to_peak_um` about `centre_um` of its range, as a sine of each
+    `frequency_hz` in turn. Several frequencies separate a corner of the output filter from a delay. The first frequency
     is the one for the comparison of the models.
     """
     positive = (peak_to_peak_um, *frequency_hz, duration_s, still_s, block_s, dwell_s)

@@ -34,8 +34,9 @@ def rate_turn(
     rest_s: float = 10.0,
     settle_s: float = 0.5,
 ) -> None:
-    """Turn beta by `turn_deg` at each rate in both directions, and rest, with the axis up and down, on `mounts` edges.
+    """Turn beta by `turn_deg` at each of `rates_deg_s` both ways, with the axis up and down, on `mounts` edges.
 
+    Before the turns the table rests for `rest_s` at each of two headings, which gives the bias.
     One mount (z up) gives turns about z only. Give a `turn_deg` below 360 if the stage's limits do not allow a full
     turn. The limits must leave room for acceleration and braking.
     """

@@ -30,6 +30,7 @@ def repeat(
 ) -> None:
     """Tumble the sensor `times` times without a change, `times` times after a power cycle, `times` after a remount.
 
+    Without `power` there are no power cycles. Without `mount` the sensor stays where it is mounted.
     A power cycle is `off_s` without power, then `warm_s` with power. The bench's power line switches it, or a person.
     """
     if times < 2 or min(off_s, warm_s, settle_s) < 0 or dwell_s <= 0:

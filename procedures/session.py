@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import Protocol, TypeVar
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from procedures.errors import Declined, SafetyLimit, SettingError
+from procedures.instruments import Adc, Clock, Level, Oven, Positioner, Samples, Stage
 from procedures.questions import EDGES, Confirm, Mounting, Number, Question
 
 Read = TypeVar("Read")
@@ -92,104 +92,6 @@ class Reading:
     value: float
     unit: str
     std: float | None = None
-
-
-class Samples(Protocol):
-    """A block of samples: `volts`, shape (n, channels); `start_s` is the clock's time of the first sample."""
-
-    @property
-    def volts(self) -> NDArray[np.float64]: ...
-    @property
-    def channels(self) -> Sequence[str]: ...
-    @property
-    def rate_hz(self) -> float: ...
-    @property
-    def start_s(self) -> float: ...
-
-
-class Turn(Protocol):
-    """A turn at a constant rate, in progress. `require` must be called every `beat_s`; it raises if the turn stops."""
-
-    @property
-    def rate_deg_s(self) -> float: ...
-    @property
-    def beat_s(self) -> float: ...
-    @property
-    def require(self) -> Callable[[], None]: ...
-
-
-class Stage(Protocol):
-    """One rotary stage."""
-
-    def move_to(self, deg: float) -> None: ...
-    def angle_deg(self) -> float: ...
-    def home(self) -> None: ...
-    def referenced(self) -> bool: ...
-    def stop(self) -> None: ...
-    def rate_deg_s(self, wanted_deg_s: float) -> float:
-        """The nearest rate that the stage can turn at."""
-
-    def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> AbstractContextManager[Turn]:
-        """A turn from one angle to another. The stage has the rate when the body begins, and is at rest after it."""
-
-
-class Adc(Protocol):
-    """The converter of the sensor's outputs."""
-
-    def acquire(self, duration_s: float) -> Samples: ...
-    def acquire_with(self, duration_s: float, reading: Callable[[], Read]) -> tuple[Samples, Read]:
-        """The samples, and the value of `reading` in the middle of the dwell."""
-
-    def acquire_watched(self, duration_s: float, watch: Callable[[], object], every_s: float) -> Samples:
-        """The samples; `watch` is called every `every_s`, and at the end."""
-
-    def only(self, *outputs: str) -> Adc:
-        """The converter with the channels of these outputs only. Raises if the bench has no such channel."""
-
-    def stream(self, duration_s: float, block_s: float) -> Iterator[Samples]:
-        """The samples in blocks of `block_s`, without a gap between them."""
-
-    def power(self, on: bool) -> None:
-        """Switch the sensor's supply."""
-
-
-class Oven(Protocol):
-    """Oven and thermometer."""
-
-    def temperature_c(self) -> float | None:
-        """Temperature of the sensor, C; None on a bench without a thermometer."""
-
-    def set_temperature(self, c: float) -> None: ...
-    def run(self, on: bool) -> None: ...
-
-
-class Tilt(Protocol):
-    """A reading of the level, deg."""
-
-    @property
-    def x_deg(self) -> float: ...
-    @property
-    def y_deg(self) -> float: ...
-    @property
-    def std_deg(self) -> float: ...
-
-
-class Level(Protocol):
-    """The digital level on the table of beta."""
-
-    def read(self) -> Tilt: ...
-
-
-class Positioner(Protocol):
-    """The nano-positioner that shakes the sensor along its x axis."""
-
-    def servo(self, on: bool) -> None: ...
-    def move_to(self, axis: str, um: float) -> None: ...
-    def position_um(self, axis: str) -> float: ...
-    def oscillate(self, axis: str, *, peak_to_peak_um: float, frequency_hz: float, centre_um: float) -> float:
-        """Begin a sine motion. Returns its actual frequency, Hz."""
-
-    def stop(self) -> None: ...
 
 
 class NoiseAtRest(Protocol):
@@ -268,13 +170,6 @@ class Guidance:
     up: tuple[float, float, float]
     taken: tuple[tuple[float, ...], ...] = ()
     moves: bool = True
-
-
-class Clock(Protocol):
-    """The only way to wait."""
-
-    def now(self) -> float: ...
-    def sleep(self, seconds: float) -> None: ...
 
 
 class Host(Protocol):

@@ -38,6 +38,7 @@ def sweep(
 ) -> None:
     """Record `dwell_s` seconds at every angle of the grid, with beta rising, then falling.
 
+    The grid has every `step_deg` of a full turn of beta, at each angle alpha of `inclinations_deg`.
     `paths="ang"` adds the negative of every inclination, and half turns to each side at 90 deg. `reference_every` is
     the number of poses between two reference poses, which separate drift from the other effects; 0: none.
     `face="both"`: a person turns the sensor over half way, which separates errors of the sensor from errors of the

@@ -28,6 +28,7 @@ def temperature_cycle(
 ) -> None:
     """Step through `temperatures_c` in rising, then falling order. At each wait `soak_s`, then tumble the sensor.
 
+    All of this is done `cycles` times: two cycles or more tell whether the sensor comes back to where it was.
     The oven cannot cool: the lowest temperature must be above the temperature of the powered sensor in the room. The
     oven is switched off at the end, and when a run fails.
     """

@@ -14,8 +14,9 @@ from calibrations.table import Table
 from drivers.handheld.world import HandheldWorld
 from drivers.world.stage import Trajectory
 from drivers.world.world import World
+from procedures.instruments import Samples
 from procedures.questions import Mounting, Question
-from procedures.session import Dwell, Guidance, Limits, Pose, Reading, Samples, Session
+from procedures.session import Dwell, Guidance, Limits, Pose, Reading, Session
 from rig.planning.planned import PlannedTurn
 from rig.record.values import Block, Kept
 

@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from procedures.errors import Declined, SafetyLimit
+from procedures.instruments import Samples
 from procedures.questions import Question
-from procedures.session import Dwell, Limits, Pose, Reading, Samples, Session
+from procedures.session import Dwell, Limits, Pose, Reading, Session
 from procedures.sweep import grid
 
 POSES = st.builds(Pose, st.sampled_from([30.0, 90.0]), st.sampled_from([0.0, 10.0]), st.sampled_from([-1, 1]))

@@ -14,7 +14,8 @@ from drivers.errors import LimitError
 from drivers.world.config import WorldConfig
 from drivers.world.world import World
 from procedures.errors import SafetyLimit, SettingError
-from procedures.session import Dwell, Limits, Samples
+from procedures.instruments import Samples
+from procedures.session import Dwell, Limits
 from procedures.soak import POWER_ON, schedule, soak
 from tests.procedures.bench import Adc, Book, Oven, session
 
