@@ -54,10 +54,10 @@ class Uncertainty:
 def result_uncertainty(
     model: Model, forward: Forward, table: Table, a: Array, beside: Mapping[str, Span], reach: float
 ) -> Uncertainty | None:
-    """By the standard uncertainties of the parameters, taken as independent; None where there are none.
+    """By the standard uncertainties of the parameters and their correlations; None where there are none.
 
     Over the specific force `a` (n, 3) of the rows of `table`, and that as far as `reach` goes on an axis; `beside` has
-    the stated range of each input besides the outputs. Source  GUM 5.1.2.
+    the stated range of each input besides the outputs. Source  GUM 5.2.2.
     """
     if not any(e.std and e.identified for e in model.params.values()):
         return None
@@ -102,7 +102,10 @@ def _largest(stds: Stds, spans: Mapping[str, Span]) -> tuple[Inputs, float]:
 
 
 def _stds(model: Model, forward: Forward, table: Table, a: Array, at: Inputs) -> Array:
-    """Standard uncertainties (n, axes) of what is sensed: u^2 = sum of (J^-1 dG/dp u(p))^2, with J = dG/da."""
+    """Standard uncertainties (n, axes) of what is sensed: u^2 = d^T R d, with d = J^-1 dG/dp u(p) and J = dG/da.
+
+    R are the correlations of the parameters, 1 on the diagonal and 0 elsewhere where the model has none.
+    """
     here = replace(table, columns={**table.columns, **{name: np.full(table.n, value) for name, value in at.items()}})
     k = ["xyz".index(axis) for axis in forward.axes]
 
@@ -112,15 +115,15 @@ def _stds(model: Model, forward: Forward, table: Table, a: Array, at: Inputs) ->
 
     h = 1e-5
     J = np.stack([(output(model, a + h * e) - output(model, a - h * e)) / (2 * h) for e in np.eye(3)[k]], axis=2)
-    inverse, variance = np.linalg.inv(J), np.zeros((table.n, len(k)))
-    for up, down in _moved(model):
-        moved = (output(up, a) - output(down, a)) / (2 * PARAMETER_STEP)
-        variance += np.einsum("nij,nj->ni", inverse, moved) ** 2
-    return np.asarray(np.sqrt(variance))
+    inverse, known = np.linalg.inv(J), {key: e for key, e in model.params.items() if e.std and e.identified}
+    sides = [(output(up, a), output(down, a)) for up, down in _moved(model)]
+    moved = np.stack([np.einsum("nij,nj->ni", inverse, up - down) for up, down in sides]) / (2 * PARAMETER_STEP)
+    mixed = moved if model.correlations is None else np.tensordot(model.correlations.among(list(known)), moved, 1)
+    return np.asarray(np.sqrt(np.maximum(np.sum(moved * mixed, axis=0), 0.0)))
 
 
 def _moved(model: Model) -> Sequence[tuple[Model, Model]]:
-    """The model with each known parameter moved a little, up and down."""
+    """The model with each known parameter moved a little, up and down; in the order of `params`."""
     return [
         (_with(model, i, j, PARAMETER_STEP * e.std), _with(model, i, j, -PARAMETER_STEP * e.std))
         for i, term in enumerate(model.terms)

@@ -28,6 +28,7 @@ from calibrations.compensation.program import Line
 from calibrations.documents import parameters_document
 from calibrations.effects.thermometer import RATE
 from calibrations.model import Estimate
+from calibrations.model.correlations import Correlations
 from calibrations.table import Array
 from calibrations.text import as_written
 
@@ -208,11 +209,15 @@ def uncertainty_text(made: Compensation) -> str:
     where = ", ".join(f"{name} {_span(name, span, made)}" for name, span in found.within.items())
     at = ", ".join(f"{name} {value:.6g}" for name, value in found.at.items())
     rms, most, largest = (error_text(value, made.unit) for value in (found.rms, found.most, found.largest))
+    how = (
+        "with their correlations"
+        if made.model.correlations is not None
+        else "taken as independent, because the model file does not give their correlations"
+    )
     return (
-        "Standard uncertainty of the result from the parameters, taken as independent (a model file has no "
-        f"correlations): {rms} rms, {most} at most over the sphere of directions{f' with {where}' if where else ''}; "
-        f"{largest} at most over the whole stated range{f', at {at}' if at else ''}. "
-        "Noise and errors of the model are not included."
+        f"Standard uncertainty of the result from the parameters, {how}: {rms} rms, {most} at most over the sphere of "
+        f"directions{f' with {where}' if where else ''}; {largest} at most over the whole stated range"
+        f"{f', at {at}' if at else ''}. Noise and errors of the model are not included."
     )
 
 
@@ -233,6 +238,16 @@ def _parameters(made: Compensation) -> Iterator[str]:
             yield f"  {term.name} {f'{e.name} {e.axis}'.strip()} = {_value(e)} {e.unit}".rstrip()
         for axis, count in term.coefficients.items():
             yield f"  {term.name} {f'curve {axis}'.strip()}: {count} coefficient{'s' if count > 1 else ''}"
+    if (known := _correlations(made)) is not None:
+        yield "Correlation coefficients of the parameters, each with those above it in this list:"
+        for name, row in zip(known.names, known.lower, strict=True):
+            yield f"  {name}{': ' if row else ''}{' '.join(f'{r:.3f}' for r in row)}"
+
+
+def _correlations(made: Compensation) -> Correlations | None:
+    """Those of the parameters, where the model has them."""
+    known = made.model.correlations
+    return known.only(made.model.params) if known is not None else None
 
 
 def _value(e: Estimate) -> str:
@@ -314,7 +329,7 @@ def files(made: Compensation, origin: Origin, checks: ReferenceVectors) -> dict[
 
 def summary(made: Compensation, origin: Origin) -> dict[str, Any]:
     """The document without the program."""
-    program, bound, beside = made.program, made.bound, made.beside
+    program, bound, beside, known = made.program, made.bound, made.beside, _correlations(made)
     return {
         "schema": "rig.compensation/1",
         "name": origin.name,
@@ -341,6 +356,7 @@ def summary(made: Compensation, origin: Origin) -> dict[str, Any]:
         "uncertainty": None if made.costs.parameters is None else asdict(made.costs.parameters),
         "covered": {name: list(span) for name, span in made.model.covered.items()},
         "parameters": parameters_document(made.model),
+        "correlations": None if known is None else {"of": list(known.names), "matrix": known.matrix.tolist()},
     }
 
 

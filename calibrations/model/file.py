@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -15,7 +15,11 @@ from calibrations.effects.expression_effect import own_effect
 from calibrations.errors import ModelError, UnknownName, nearest
 from calibrations.files import load_yaml
 from calibrations.model import Estimate, Model, Term
+from calibrations.model.model import Parameters
 from calibrations.table import NUMBERS
+
+if TYPE_CHECKING:
+    from calibrations.model.correlations import Correlations
 
 SHIPPED = Path(__file__).parents[1] / "models"
 SCHEMA = "rig.model/1"
@@ -45,6 +49,11 @@ class _Effect(_Strict):
     parameters: list[_Parameter] = []
 
 
+class _Correlations(_Strict):
+    parameters: list[str]
+    lower: list[str]  # a row a parameter: its coefficients with those above it, with blanks between them
+
+
 class _File(_Strict):
     schema_: Literal["rig.model/1"] = Field(alias="schema")
     name: str
@@ -52,6 +61,7 @@ class _File(_Strict):
     effects: list[_Effect] = Field(min_length=1)
     provenance: dict[str, str | float] = {}
     covered: dict[str, tuple[float, float]] = {}
+    correlations: _Correlations | None = None
 
 
 def shipped_names() -> tuple[str, ...]:
@@ -98,7 +108,20 @@ def parse_model(text: str, source: str, effects: Mapping[str, Effect] | None = N
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise ModelError(f'{source}: the effect "{twice}" occurs twice in the model')
-    return Model(content.name, terms, content.unit, content.provenance, content.covered)
+    correlations = _correlations(content.correlations, Parameters(terms), f"{source}, key correlations")
+    return Model(content.name, terms, content.unit, content.provenance, content.covered, correlations)
+
+
+def _correlations(given: _Correlations | None, params: Parameters, where: str) -> Correlations | None:
+    if given is None:
+        return None
+    from calibrations.model.correlations import Correlations, check_correlations  # few models have them
+
+    try:
+        rows = tuple(tuple(map(float, row.split())) for row in given.lower)
+    except ValueError as error:
+        raise ModelError(f"{where}: a row has numbers with blanks between them: {error}") from None
+    return check_correlations(Correlations(tuple(given.parameters), rows), params, where)
 
 
 def _fault(error: Any) -> str:
@@ -106,6 +129,8 @@ def _fault(error: Any) -> str:
         return "is missing; `rig models` lists models, and `rig fit --out FILE` writes a complete file"
     if error["type"] != "extra_forbidden":
         return f"{error['msg']}, is {error['input']!r}"
+    if error["loc"][0] == "correlations":
+        return f"no such key{nearest(str(error['loc'][-1]), _Correlations.model_fields)}"
     places: Mapping[int, type[BaseModel]] = {1: _File, 3: _Effect}  # such as effects, 0, parameters, 1, axis
     place = places.get(len(error["loc"]), _Parameter)
     return f"no such key{nearest(str(error['loc'][-1]), [field.strip('_') for field in place.model_fields])}"
@@ -218,6 +243,9 @@ def dump_model(model: Model) -> str:
     }
     if model.covered:
         content["covered"] = {name: list(span) for name, span in model.covered.items()}
+    if model.correlations is not None and (known := model.correlations.only(model.params)) is not None:
+        rows = [" ".join(f"{r:.9g}" for r in row) for row in known.lower]
+        content["correlations"] = {"parameters": list(known.names), "lower": rows}
     return yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=100)
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from calibrations.effects import Effect
 from calibrations.errors import UnknownParameter, nearest
@@ -18,6 +18,9 @@ from calibrations.frames import data_frame, html_table
 from calibrations.result import Shown
 from calibrations.table import Table
 from calibrations.text import columns, concise, minus, rounded, unit, value_text
+
+if TYPE_CHECKING:
+    from calibrations.model.correlations import Correlations
 
 NOT_FITTED = 'the model has no value for "{}"; fit it to data first'
 
@@ -81,6 +84,7 @@ class Parameters(Mapping[str, Estimate]):
     def __init__(self, terms: tuple[Term, ...]) -> None:
         self._by_key: dict[str, Estimate] = {}
         self._whole: dict[str, str] = {}
+        self._terms = terms
         for term in terms:
             for e in term.estimates:
                 key = _key(term.name, e.name if len(term.effect.parameters) > 1 else "", e.axis)
@@ -105,10 +109,23 @@ class Parameters(Mapping[str, Estimate]):
         return len(self._by_key)
 
     def __repr__(self) -> str:
-        return columns(("parameter", "value"), [(key, e.text) for key, e in self.items()])
+        return columns(("parameter", "value"), [(row[0], row[1].text) for row in self._shown()] + self._curves())
 
     def _repr_html_(self) -> str:
-        return html_table(("parameter", "value", "standard uncertainty", "unit"), map(_cells, self.items()))
+        curves = [(key, count, "", "") for key, count in self._curves()]
+        return html_table(
+            ("parameter", "value", "standard uncertainty", "unit"), [*map(_cells, self._shown()), *curves]
+        )
+
+    def _shown(self) -> list[tuple[str, Estimate]]:
+        """The parameters that mean something one by one; the coefficients of free forms do not."""
+        curves = tuple(f"{term.name}." for term in self._terms if term.coefficients)
+        return [(key, e) for key, e in self.items() if not key.startswith(curves)]
+
+    def _curves(self) -> list[tuple[str, str]]:
+        """Key and number of coefficients of each free form of an axis."""
+        counts = [(term.name, axis, n) for term in self._terms for axis, n in term.coefficients.items()]
+        return [(_key(name, "curve", axis), f"{n} coefficients") for name, axis, n in counts]
 
     def to_dataframe(self) -> Any:
         """A row a parameter as a pandas.DataFrame. Raises CalibrationError where pandas is not installed."""
@@ -141,6 +158,7 @@ class Model(Shown):
     """An ordered list of effects. `unit` is that of the output, "" before the first fit.
 
     `covered`: lowest and highest value of each influence in the data that the values come from, as far as it is known.
+    `correlations` of the parameters, None where they are not known.
     """
 
     name: str
@@ -148,6 +166,7 @@ class Model(Shown):
     unit: str = ""
     provenance: Mapping[str, str | float] = field(default_factory=dict)
     covered: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    correlations: Correlations | None = None
 
     @cached_property
     def params(self) -> Parameters:

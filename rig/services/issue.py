@@ -13,7 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
+from calibrations.criteria import COVERAGE_FACTOR
 from calibrations.fitting.fit import Fit
+from calibrations.geometry.earth import normal_gravity
 from calibrations.model.file import dump_model
 from calibrations.presentation.certificate.content import (
     UNSTATED,
@@ -37,6 +39,8 @@ from rig.services.provenance import today
 
 # condition's column -> name and unit
 CONDITIONS = {"temperature_c": ("temperature", "C"), "supply_v": ("supply voltage", "V")}
+GRAVITY_ANOMALY_M_S2 = 5e-4  # standard deviation of gravity about the normal one: 50 mGal
+UNKNOWN_HEIGHT_M_S2 = 2e-3  # of a laboratory between the sea and 2000 m
 PLACES = ("alpha_deg", "beta_deg", "direction", "path")
 
 
@@ -104,7 +108,8 @@ def _issued(
         data=data if run is not None else Path(data).name,
         data_sha256=table.digest,
         model_sha256=hashlib.sha256(text.encode()).hexdigest(),
-        remarks=tuple(_remarks(run, lab is not None and lab.name != UNSTATED)),
+        remarks=(*_remarks(run, lab is not None and lab.name != UNSTATED), *_gravity_remarks(table)),
+        reference=_reference(table),
         simulated=bool(_simulated(run)),
     )
 
@@ -160,6 +165,33 @@ def _shown(value: object) -> str:
     if isinstance(value, list | tuple):
         return ", ".join(str(each) for each in value)
     return "" if value is None or isinstance(value, Mapping) else str(value)
+
+
+def _reference(table: Table) -> str:
+    """What the sensor was compared with."""
+    if table.type.field:
+        return "the local magnetic field, constant in place and time; its strength is not known"
+    if table.type.turning:
+        return "angular rate of the rate table, deg/s, about the stated axes"
+    across = "its direction from the stage angles" if table.type.stage_angles else "its magnitude alone"
+    return f"local gravity, {table.gravity_m_s2:.6g} m/s²; {across}"
+
+
+def _gravity_remarks(table: Table) -> Iterator[str]:
+    """Whether the stated gravity can be that of the stated place; nothing where the latitude is not stated."""
+    if table.input_unit != "g" or "latitude_deg" not in table.constants:
+        return
+    height_m = table.number("height_m", 0.0)
+    expected = normal_gravity(table.number("latitude_deg", 0.0), height_m)
+    off, std = table.gravity_m_s2 - expected, np.hypot(table.number("gravity_std_m_s2", 0.0), GRAVITY_ANOMALY_M_S2)
+    if "height_m" not in table.constants:
+        std = np.hypot(std, UNKNOWN_HEIGHT_M_S2)
+    if abs(off) > COVERAGE_FACTOR * std:
+        yield (
+            f"Check: the stated local gravity of {table.gravity_m_s2:.6g} m/s² differs by {off:+.2g} m/s² from "
+            f"{expected:.6g} m/s² at the stated latitude and {height_m:g} m (uncertainty "
+            f"{COVERAGE_FACTOR * std:.2g} m/s²). Correct gravity_m_s2, latitude_deg or height_m in the bench file."
+        )
 
 
 def _conditions(table: Table) -> Iterator[Condition]:

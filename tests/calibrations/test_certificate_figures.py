@@ -12,6 +12,7 @@ from calibrations.errors import DataError, ModelError
 from calibrations.fitting.budget import Budget, Line, make_budget, parameter_correlation
 from calibrations.fitting.fit import fit
 from calibrations.fitting.inputs import input_contributions
+from calibrations.geometry.earth import normal_gravity
 from calibrations.model.file import read_model
 from calibrations.presentation.certificate.content import decide
 from calibrations.presentation.certificate.results import _why_further, figures, interval, simulate, verdict
@@ -178,5 +179,29 @@ def test_what_cannot_be_certified_is_refused() -> None:
         in_si("furlong", 9.81)
     shaken = fit(read_model("linear"), table())
     object.__setattr__(shaken.problem.table, "kind", "motion")
-    with pytest.raises(ModelError, match=r"needs poses, positions or rates.*this is motion"):
+    with pytest.raises(ModelError, match=r"needs poses, positions, rates or fields.*this is motion"):
         figures(shaken, None, {})
+
+
+def test_a_magnetometer_is_certified_in_its_own_unit() -> None:
+    """Offset 12 uT: 1.2e-5 T; no scale factor, because nothing gives the strength of the field."""
+    found = fit(read_model("magnetometer"), turned.magnetometer(turned.in_iron(60, seed=1)))
+    made = figures(found, None, {}, trials=200)
+    offset = next(o for o in made.outcomes if o.name == "hard-iron-x")
+    assert abs(offset.value - 12.0) < offset.expanded
+    assert in_si(offset.unit, 9.81) == (1e-6, "\\tesla")
+    assert any("no scale factor is certified" in remark for remark in made.remarks)
+
+
+def test_the_bias_of_a_gyroscope_without_a_latitude_holds_the_earth() -> None:
+    found = fit(read_model("gyroscope"), turned.gyroscope(3))
+    assert any("0.0042 deg/s" in remark for remark in figures(found, None, {}, trials=100).remarks)
+    assert in_si("deg/s/(deg/s)", 9.81)[1] == "\\one"
+
+
+def test_normal_gravity_is_that_of_the_reference_system() -> None:
+    """Moritz: 9.7803267715 at the equator, 9.8321863685 at the pole, 9.806199203 at 45 deg; less 3.086 um/s^2 a m."""
+    assert normal_gravity(0) == pytest.approx(9.7803267715, abs=1e-9)
+    assert normal_gravity(90) == pytest.approx(9.8321863685, abs=1e-7)
+    assert normal_gravity(-45) == pytest.approx(9.806199203, abs=1e-7)
+    assert normal_gravity(45) - normal_gravity(45, 100) == pytest.approx(3.086e-4, rel=1e-3)

@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pypdf
 import pytest
 import xmlschema
@@ -84,6 +85,23 @@ def test_correlations_are_in_every_form(pydcc: Any, tmp_path: Path) -> None:
     assert "Correlation coefficients" in page
     assert f">{c.figures.correlations[1][0]:.2f}</td>" in page
     assert document(c)["correlations"] == [list(row) for row in c.figures.correlations]
+
+
+def test_the_covariance_matrix_is_where_the_standard_has_it() -> None:
+    """Its diagonal has the squares of u, which are U / k, in the units of the results squared."""
+    c = certificate()
+    root = ET.fromstring(dcc(c))  # noqa: S314 we wrote it
+    space = {"si": "https://ptb.de/si"}
+    (values,) = root.iterfind(".//si:realList", space)
+    assert [e.text for e in values.iterfind("si:real/si:label", space)] == [o.name for o in c.figures.outcomes]
+    columns = list(values.iterfind(".//si:column", space))
+    matrix = np.array([[float(e.text or "") for e in column.iterfind(".//si:value", space)] for column in columns])
+    std = np.array([o.std / (9.81 if o.unit == "V/g" else 1.0) for o in c.figures.outcomes])
+    assert matrix == pytest.approx(np.array(c.figures.correlations) * np.outer(std, std))
+    units = [e.text for e in columns[0].iterfind(".//si:unit", space)]
+    assert units[0] == r"\volt\tothe{2}"
+    assert units[2] == r"\volt\tothe{2}\metre\tothe{-1}\second\tothe{2}"
+    assert values.findtext(".//si:coverageFactor", "", space) == "3.0802"  # of four results: the root of 9.488
 
 
 def test_it_is_valid_by_the_schema_of_ptb() -> None:

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from calibrations.compensation.document import coverage_text, uncertainty_text
+from calibrations.compensation.document import Origin, coverage_text, header_lines, summary, uncertainty_text
 from calibrations.compensation.forward import INVERTED, LEFT_OUT, NOISE, OF_THE_RIG, steps_of, trace_model
 from calibrations.compensation.inverse import Compensation, Range, invert_model
 from calibrations.effects import Effect
@@ -21,10 +21,12 @@ from calibrations.effects.expression_effect import own_effect
 from calibrations.errors import ModelError
 from calibrations.model import Model
 from calibrations.model.chain import respond, sensed
+from calibrations.model.correlations import Correlations
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations.fitted import LINEAR, PHYSICAL, model
 
+ORIGIN = Origin("made", "made.yaml", "0" * 64, "inertial-rig", "2026-01-01")
 THERMAL = {"temperature-bias": {"slope": (0.001, -0.002)}, "temperature-scale": {"slope": (3e-4, -2e-4)}}
 EVERYTHING = {
     **PHYSICAL,
@@ -36,6 +38,25 @@ EVERYTHING = {
     "warm-up-bias": {"amplitude": (0.01, 0.02), "time_constant": 600.0},
     "supply-sensitivity": {"share": (0.9, 1.1)},
 }
+
+
+def test_correlations_decide_how_certain_the_result_is() -> None:
+    """Of a = (v - b) / K at a = 1 g: u^2 = (u_b^2 + u_K^2 + 2 r u_b u_K) / K^2, and at -1 g with -r."""
+    values = {"bias": {"bias": (2.5, 2.5)}, "scale-factor": {"scale": (1.0, 1.0)}}
+    alone = model(values, std=1e-3)
+    keys = ["bias.x", "scale-factor.x"]
+    for r in (0.0, 0.6, 0.999):
+        given = Correlations.of(keys, np.array([[1.0, r], [r, 1.0]]))
+        made = invert_model(replace(alone, correlations=given), Range.for_model(alone, 1.0))
+        assert made.costs.parameters is not None
+        assert made.costs.parameters.most == pytest.approx(1e-3 * np.sqrt(2 + 2 * r), rel=1e-2)
+        assert "with their correlations" in uncertainty_text(made)
+        head = header_lines(made, ORIGIN)
+        assert head[-2:] == ["  bias.x", f"  scale-factor.x: {r:.3f}"]
+        assert summary(made, ORIGIN)["correlations"] == {"of": keys, "matrix": [[1.0, r], [r, 1.0]]}
+    made = invert_model(alone, Range.for_model(alone, 1.0))
+    assert "the model file does not give their correlations" in uncertainty_text(made)
+    assert summary(made, ORIGIN)["correlations"] is None
 
 
 def drawn(made: Compensation, n: int, seed: int) -> tuple[Table, Array]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,12 +14,18 @@ from hypothesis import strategies as st
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import CalibrationError, ModelError, UnknownName
 from calibrations.model import Estimate, Model, Term
+from calibrations.model.correlations import Correlations
 from calibrations.model.file import SHIPPED, dump_model, parse_model, read_model, shipped_names
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 words = st.text(st.characters(exclude_categories=("C", "Zl", "Zp")), max_size=20)
 TWICE = "{name: bias, value: 1}"
 HEAD = "schema: rig.model/1\nname: mine\n"
+ONE = "parameters: [{{name: {}, axis: x, value: 1}}]"
+TOGETHER = (
+    f"{HEAD}effects: [{{effect: bias, {ONE.format('bias')}}}, {{effect: scale-factor, {ONE.format('scale')}}}, "
+    f"{{effect: bias-drift, {ONE.format('slope')}}}]\ncorrelations: "
+)
 
 
 @st.composite
@@ -42,7 +50,13 @@ def models(draw: st.DrawFn) -> Model:
     provenance = draw(st.dictionaries(st.from_regex(r"[a-z]{3,8}", fullmatch=True), words | numbers, max_size=2))
     covered = draw(st.dictionaries(st.just("temperature_c"), st.tuples(numbers, numbers)))
     unit = draw(words.filter(bool))
-    return Model(draw(words), tuple(draw(terms(name, unit)) for name in names), unit, provenance, covered)
+    made = Model(draw(words), tuple(draw(terms(name, unit)) for name in names), unit, provenance, covered)
+    keys = list(made.params)
+    if len(keys) < 2 or not draw(st.booleans()):
+        return made
+    size = 1 / len(keys)  # a matrix of such elements is one of correlations
+    r = draw(st.lists(st.floats(-size, size), min_size=len(keys) ** 2, max_size=len(keys) ** 2))
+    return replace(made, correlations=Correlations.of(keys, np.reshape(r, (len(keys), -1))))
 
 
 @given(models())
@@ -103,6 +117,22 @@ def test_shipped_models_have_no_values_yet(name: str) -> None:
             "bias: bias is given twice",
         ),
         (f"{HEAD}effects: [{{effect: hysteresis, constants: {{x: 1}}}}]", 'hysteresis has no constant "x"'),
+        (f"{TOGETHER}{{parameters: [bias.x, bias.y], lower: ['', '0.5']}}", 'no parameter "bias.y" with a value'),
+        (
+            f"{TOGETHER}{{parameters: [bias.x, scale-factor.x], lower: ['', '0.5 1']}}",
+            "has 2 coefficients, and needs 1",
+        ),
+        (f"{TOGETHER}{{parameters: [bias.x, scale-factor.x], lower: ['', '1.5']}}", "is from -1 to 1, not 1.5"),
+        (f"{TOGETHER}{{parameters: [bias.x, scale-factor.x], lower: ['', nan]}}", "is from -1 to 1, not nan"),
+        (f"{TOGETHER}{{parameters: [bias.x, bias.x], lower: ['', '0.5']}}", '"bias.x" is given twice'),
+        (f"{TOGETHER}{{parameters: [bias.x, scale-factor.x], lower: ['']}}", "need 2 rows, not 1"),
+        (f"{TOGETHER}{{parameters: [bias.x], lower: [0,5]}}", "correlations.lower.0"),
+        (f"{TOGETHER}{{parameters: [bias.x], lowr: ['']}}", 'no such key; did you mean "lower"'),
+        (f"{TOGETHER}{{parameters: [bias.x, scale-factor.x], lower: ['', '0,5']}}", "with blanks between them"),
+        (
+            f"{TOGETHER}{{parameters: [bias.x, scale-factor.x, bias-drift.slope.x], lower: ['', '0.9', '0.9 -0.9']}}",
+            "these coefficients contradict each other",
+        ),
         ("schema: [2001-99-99]", "bad.yaml: is not YAML: month must be in"),
         ("[" * 5000, "bad.yaml: is not YAML"),
         (f"{HEAD}effects: [{{effect: bias}}, {{effect: bias}}]", 'the effect "bias" occurs twice in the model'),

@@ -100,3 +100,15 @@ def test_the_laboratory_is_no_part_of_what_a_run_depends_on() -> None:
     bench: dict[str, Any] = {"instruments": {}}
     one, other = (Bench.model_validate(bench | {"laboratory": {"name": name}}) for name in ("A", "B"))
     assert one.configuration("sweep", {}) == other.configuration("sweep", {})
+
+
+def test_a_gravity_that_the_place_cannot_have_is_remarked(rig: Rig, work: Path) -> None:
+    """Standard gravity is that of 45 deg at the sea; at the equator it is off by 0.026 m/s^2."""
+    table = (work / "good.csv").read_text()
+    said = []
+    for latitude_deg in (45, 0):
+        (work / "placed.csv").write_text(f"# latitude_deg: {latitude_deg}\n# height_m: 0\n{table}")
+        said.append(rig("certificate", "placed.csv", "--model", "linear", "--out", "placed.html").out)
+    assert "Check: the stated local gravity" not in said[0]
+    assert "differs by +0.026 m/s² from 9.78033 m/s²" in said[1]
+    assert "local gravity, 9.80665 m/s²; its direction from the stage angles" in (work / "placed.html").read_text()

@@ -217,6 +217,7 @@ class Certificate:
     model_sha256: str
     remarks: tuple[str, ...]
     simulated: bool = False
+    reference: str = ""
 
     @property
     def headline(self) -> str:

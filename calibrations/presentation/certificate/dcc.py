@@ -1,8 +1,9 @@
 """The certificate as PTB's Digital Calibration Certificate, DCC 3.2.0: for machines, values in SI units.
 
 Results as found and as left are lists of quantities, each with its expanded uncertainty, its budget and its statement
-of conformity as metadata. The whole certificate as JSON, with the digest and weight of every row, is the attached
-document.
+of conformity as metadata. A list of correlation coefficients for each result follows, for programs that read lists, and
+all results as one vector with their covariance matrix, as D-SI has it. The whole certificate as JSON, with the digest
+and weight of every row, is the attached document.
 
 Source  https://ptb.de/dcc/v3.2.0/; D-SI 2.1.0, https://ptb.de/si.
 """
@@ -14,6 +15,9 @@ import json
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
+import numpy as np
+from scipy.special import chdtri
+
 from calibrations.presentation.certificate.content import (
     RULE,
     UNSTATED,
@@ -23,12 +27,13 @@ from calibrations.presentation.certificate.content import (
     Outcome,
     document,
 )
-from calibrations.presentation.certificate.terms import in_si
+from calibrations.presentation.certificate.terms import in_si, product_in_si
 
 VERSION = "3.2.0"
 DCC, SI, XSI = "https://ptb.de/dcc", "https://ptb.de/si", "http://www.w3.org/2001/XMLSchema-instance"
 LANGUAGE = "en"
 PROBABILITY = "0.95"
+LEVEL = float(PROBABILITY)
 SCHEMA = f"{DCC} {DCC}/v{VERSION}/dcc.xsd"
 
 
@@ -95,6 +100,8 @@ def _measurement(c: Certificate) -> ET.Element:
     )
     trials = f"checked by the propagation of distributions, {c.figures.trials} trials"
     _method(methods, "uncertainty", ["GUM budget with effective degrees of freedom", trials], ["JCGM 100", "JCGM 101"])
+    if c.reference:
+        _method(methods, "reference", [c.reference], [])
     _method(methods, "decision rule", [RULE], ["JCGM 106", "ISO/IEC 17025"])
     result.append(_software("usedSoftware", c.program))
     if c.instruments:
@@ -111,6 +118,7 @@ def _measurement(c: Certificate) -> ET.Element:
         results.append(_as_found(found, c))
     if len(c.figures.outcomes) > 1:
         results.append(_correlations(c))
+        results.append(_covariances(c))
     return result
 
 
@@ -125,6 +133,32 @@ def _correlations(c: Certificate) -> ET.Element:
         _si_in(values, "labelXMLList", labels)
         _si_in(values, "valueXMLList", " ".join(f"{r:.6f}" for r in row))
         _si_in(values, "unitXMLList", "\\one")
+    return result
+
+
+def _covariances(c: Certificate) -> ET.Element:
+    """All results as one vector, with the covariance matrix as its ellipsoidal region of 95 %, in SI units."""
+    result, data = _result("Results with their covariance matrix")
+    quantity = _in(data, "quantity")
+    _text(quantity, "name", "results")
+    values = ET.SubElement(ET.SubElement(quantity, _si("list")), _si("realList"))
+    in_si_each = [in_si(o.unit, c.gravity_m_s2) for o in c.figures.outcomes]
+    for o, (factor, unit) in zip(c.figures.outcomes, in_si_each, strict=True):
+        real = ET.SubElement(values, _si("real"))
+        _si_in(real, "label", o.name)
+        _si_in(real, "value", repr(factor * o.value))
+        _si_in(real, "unit", unit)
+    region = ET.SubElement(values, _si("ellipsoidalRegion"))
+    matrix = ET.SubElement(region, _si("covarianceMatrix"))
+    stds = [factor * o.std for o, (factor, _) in zip(c.figures.outcomes, in_si_each, strict=True)]
+    for j, second in enumerate(c.figures.outcomes):
+        column = ET.SubElement(matrix, _si("column"))
+        for i, first in enumerate(c.figures.outcomes):
+            covariance = ET.SubElement(column, _si("covariance"))
+            _si_in(covariance, "value", repr(c.figures.correlations[i][j] * stds[i] * stds[j]))
+            _si_in(covariance, "unit", product_in_si(first.unit, second.unit))
+    _si_in(region, "coverageFactor", f"{np.sqrt(chdtri(len(stds), 1 - LEVEL)):.4f}")
+    _si_in(region, "coverageProbability", PROBABILITY)
     return result
 
 

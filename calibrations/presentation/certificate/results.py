@@ -30,6 +30,7 @@ from calibrations.fitting.budget import SLOW_NOISE, Budget, Line, make_budget, p
 from calibrations.fitting.fit import Fit, cautiously, evaluate
 from calibrations.fitting.inputs import Contribution, input_contributions
 from calibrations.fitting.sensed import in_milli, milli_unit
+from calibrations.geometry.rate_table import EARTH_DEG_S
 from calibrations.means.noise import Noise, rms
 from calibrations.model import Estimate, Model, Term
 from calibrations.presentation.certificate.content import Error, Figures, Limit, Outcome, Simulated, Source, decide
@@ -45,9 +46,9 @@ LEVEL = 0.95
 CONFIRMED, CONSERVATIVE, WIDENED = "confirmed", "conservative", "widened"
 
 
-def simulate(found: Fit, inputs: Sequence[Contribution], trials: int = TRIALS, seed: int = SEED) -> Array:
+def simulate(found: Fit, inputs: Sequence[Contribution], trials: int = TRIALS) -> Array:
     """Parameters of each trial, shape (trials, p). The same fit gives the same trials."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(SEED)
     cautious = cautiously(found)
     G = row_gains(cautious)
     disturbed = cautious.birge * _noise(cautious.noise, trials, rng)
@@ -111,7 +112,7 @@ CERTAIN_K = 2.0  # coverage factor, where the degrees of freedom ask for no more
 
 
 def figures(found: Fit, before: Model | None, limits: Mapping[str, Limit], trials: int = TRIALS) -> Figures:
-    """All figures of a fit to poses, positions or rates; `before` is the model in use until now, with values.
+    """All figures of a fit to poses, positions, rates or fields; `before` is the model in use until now, with values.
 
     Raises ModelError for another kind of table, and where nothing is determined; UnusableData.
     """
@@ -149,8 +150,8 @@ def require_reference(source: str, kind: str) -> None:
     """Raises ModelError for a kind of data whose parameters could be traced to nothing: no reference is known."""
     if kind not in MEANS:
         raise ModelError(
-            f"{source}: a certificate needs poses, positions or rates, whose reference is known; this is {kind}. "
-            "Certify a sweep of the sensor (`rig run sweep`); `rig report` shows the results of this data"
+            f"{source}: a certificate needs poses, positions, rates or fields, whose reference is known; this is "
+            f"{kind}. Certify a sweep of the sensor (`rig run sweep`); `rig report` shows the results of this data"
         )
 
 
@@ -252,5 +253,15 @@ def _remarks(found: Fit) -> Iterator[str]:
         if not e.identified:
             what = f"{each.name} {f'{e.name} {e.axis}'.strip()}"
             yield f"Not determined by these data and not certified: {what} ({e.why})."
+    if found.table.type.field:
+        yield (
+            "No reference for the strength of the field: the offset and the strength are in the sensor's own unit, and "
+            "no scale factor is certified. The relative results need no reference: the field was the same in all rows."
+        )
+    if found.table.type.turning and "latitude_deg" not in found.table.constants:
+        yield (
+            f"The latitude is not stated: up to {EARTH_DEG_S:.4f} deg/s of the earth's rotation is in the bias and not "
+            "in its uncertainty. Give latitude_deg."
+        )
     if not found.noise.known:
         yield "The noise of single means is not known; their scatter is used instead."

@@ -132,7 +132,8 @@ def _environment(c: Certificate) -> Section:
     )
     head = ("influence", "lowest", "mean", "highest", "unit")
     tables = (Table("During the measurement", head, rows, (1, 2, 3)),) if rows else ()
-    return Section("Environment", (), (("local gravity", f"{c.gravity_m_s2:.6g} m/s²"),), tables)
+    facts = (("reference", c.reference), ("local gravity", f"{c.gravity_m_s2:.6g} m/s²"))
+    return Section("Environment", (), facts, tables)
 
 
 def results_table(c: Certificate) -> Table:

@@ -12,6 +12,7 @@ Source  D-SI metadata model (SmartCom), BIPM SI Brochure (names).
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 
 from calibrations.effects import Effect, Parameter
@@ -27,6 +28,14 @@ SI: Mapping[str, tuple[float, Mapping[str, int]]] = {
     "Hz": (1.0, {"hertz": 1}),
     "deg": (1.0, {"degree": 1}),
     "deg/s": (1.0, {"degree": 1, "second": -1}),
+    "rad": (1.0, {"radian": 1}),
+    "s2": (1.0, {"second": 2}),
+    "T": (1.0, {"tesla": 1}),
+    "mT": (1e-3, {"tesla": 1}),
+    "uT": (1e-6, {"tesla": 1}),
+    "nT": (1e-9, {"tesla": 1}),
+    "gauss": (1e-4, {"tesla": 1}),
+    "mgauss": (1e-7, {"tesla": 1}),
     "m": (1.0, {"metre": 1}),
     "mg": (1e-3, {"metre": 1, "second": -2}),
     "g": (1.0, {"metre": 1, "second": -2}),
@@ -41,17 +50,36 @@ OF_GRAVITY = ("g", "mg")
 
 def in_si(unit: str, gravity_m_s2: float) -> tuple[float, str]:
     """The factor by which a value in `unit` is multiplied, and its D-SI unit. Raises DataError for an unknown one."""
+    factor, powers = _in_si(unit, gravity_m_s2)
+    return factor, _named(powers)
+
+
+def product_in_si(first: str, second: str) -> str:
+    """The D-SI unit of the product of values in two units, as `in_si` has them. Raises DataError for an unknown one."""
+    powers = Counter(_in_si(first, 1.0)[1])
+    for name, power in _in_si(second, 1.0)[1].items():
+        powers[name] += power
+    return _named(powers)
+
+
+def _named(powers: Mapping[str, int]) -> str:
+    return "".join(f"\\{n}" + (f"\\tothe{{{p}}}" if p != 1 else "") for n, p in powers.items() if p) or "\\one"
+
+
+def _in_si(unit: str, gravity_m_s2: float) -> tuple[float, dict[str, int]]:
+    """The factor, and the powers of the SI units."""
     factor, powers = 1.0, dict[str, int]()
     for place, part in enumerate(re.findall(PART, unit or "1")):
         word, _, exponent = part.strip("()").partition("^")
         if word not in SI:
-            raise DataError(f'the unit "{unit}" has no SI form here; convert the data to V, m/s^2, K, s or counts')
+            units = "V, m/s^2, deg/s, uT, K, s or counts"
+            raise DataError(f'the unit "{unit}" has no SI form here; convert the data to {units}')
         sign = (int(exponent) if exponent else 1) * (-1 if place else 1)
         scale, names = SI[word]
         factor *= (scale * (gravity_m_s2 if word in OF_GRAVITY else 1.0)) ** sign
         for name, power in names.items():
             powers[name] = powers.get(name, 0) + sign * power
-    return factor, "".join(f"\\{n}" + (f"\\tothe{{{p}}}" if p != 1 else "") for n, p in powers.items() if p) or "\\one"
+    return factor, powers
 
 
 TERMS: Mapping[str, str] = {
@@ -76,6 +104,9 @@ TERMS: Mapping[str, str] = {
     "gyro-scale-factor": "scale factor (sensitivity)",
     "gyro-misalignment": "input axis misalignment",
     "gyro-g-sensitivity": "acceleration-sensitive drift",
+    "field-strength": "indicated strength of the local field",
+    "hard-iron": "offset (zero-field output, with hard iron)",
+    "soft-iron": "relative distortion of the field (soft iron)",
 }
 
 

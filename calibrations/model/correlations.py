@@ -1,0 +1,88 @@
+"""Correlation coefficients of parameters that were fitted together, as a model file keeps them.
+
+Standard uncertainties alone make a quantity that follows from several parameters too certain or too uncertain: this
+needs the correlations too (GUM 5.2.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibrations.errors import ModelError, nearest
+from calibrations.table import Array
+
+DIGITS = 9  # of a coefficient: a sum and a difference of nearly equal parameters stay right
+MOST = 60  # parameters; a free form of hundreds of coefficients would fill a file with numbers
+ROUNDING = 1e-6  # of the least eigenvalue: digits of a file
+
+
+@dataclass(frozen=True)
+class Correlations:
+    """The lower triangle of a correlation matrix: `lower[i]` has the i coefficients of `names[i]` with those above it.
+
+    `names` are keys of `Model.params`, such as "bias.x". A parameter without an entry is independent of the others.
+    """
+
+    names: tuple[str, ...]
+    lower: tuple[tuple[float, ...], ...]
+
+    @classmethod
+    def of(cls, names: Sequence[str], matrix: Array) -> Correlations:
+        """Those of a symmetric matrix, shape (p, p)."""
+        rows = [tuple(round(float(r), DIGITS) + 0.0 for r in row[:i]) for i, row in enumerate(matrix)]
+        return cls(tuple(names), tuple(rows))
+
+    @property
+    def matrix(self) -> Array:
+        """The whole matrix, shape (p, p), with the diagonal 1."""
+        whole = np.eye(len(self.names))
+        for i, row in enumerate(self.lower):
+            whole[i, :i] = whole[:i, i] = row
+        return whole
+
+    def only(self, keys: Container[str]) -> Correlations | None:
+        """Those of `keys`; None where there are fewer than two."""
+        at = [i for i, name in enumerate(self.names) if name in keys]
+        if len(at) < 2:
+            return None
+        names = [self.names[i] for i in at]
+        return Correlations.of(names, self.matrix[np.ix_(at, at)])
+
+    def among(self, keys: Sequence[str]) -> Array:
+        """The matrix for `keys`, in their order; 0 where nothing is known."""
+        place = {name: i for i, name in enumerate(self.names)}
+        known = [k for k, key in enumerate(keys) if key in place]
+        at = [place[keys[k]] for k in known]
+        found = np.eye(len(keys))
+        found[np.ix_(known, known)] = self.matrix[np.ix_(at, at)]
+        return found
+
+
+def check_correlations(given: Correlations, keys: Iterable[str], where: str) -> Correlations:
+    """`given`, if it is a correlation matrix of parameters among `keys`.
+
+    Raises ModelError with `where` and the fault.
+    """
+    known = list(keys)
+    for i, (name, row) in enumerate(zip(given.names, given.lower, strict=False)):
+        if name not in known:
+            raise ModelError(f'{where}: the model has no parameter "{name}" with a value{nearest(name, known)}')
+        if name in given.names[:i]:
+            raise ModelError(f'{where}: "{name}" is given twice')
+        if len(row) != i:
+            raise ModelError(
+                f"{where}: {name} has {len(row)} coefficients, and needs {i}: one with each parameter above it"
+            )
+        if any(not abs(r) <= 1 for r in row):
+            raise ModelError(f"{where}: {name}: a correlation coefficient is from -1 to 1, not {max(row, key=abs):g}")
+    if len(given.lower) != len(given.names):
+        raise ModelError(f"{where}: {len(given.names)} parameters need {len(given.names)} rows, not {len(given.lower)}")
+    if given.names and np.linalg.eigvalsh(given.matrix)[0] < -ROUNDING:
+        raise ModelError(
+            f"{where}: these coefficients contradict each other: no parameters can have them all; "
+            "fit the model again, or remove the key correlations"
+        )
+    return given
