@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from calibrations.importing.topics import Topic
 
 MATLAB_HEADER_BYTES = 128
+SMALL_BYTES = 1 << 26  # of a file whose values are never too many for memory
 BAG = ("bags", "bag_topics")
 HDF5_MARK = b"\x89HDF\r\n\x1a\n"
 READERS: Mapping[bytes, tuple[str, str]] = {  # first bytes: the reader's module, imported when needed, and name
@@ -49,12 +51,8 @@ def open_sheet(path: Path, topic: str | None = None) -> Sheet:
         return sheet
     from calibrations.importing.topics import topic_sheet
 
-    try:
+    with _unreadable_as_data_error(path):
         return topic_sheet(path, topics, topic)
-    except (DataError, MemoryError):
-        raise
-    except Exception as error:  # of a library, for damaged content
-        raise _damaged(path, error) from None
 
 
 def _topics(path: Path) -> list[Topic] | None:
@@ -83,22 +81,36 @@ def _topics(path: Path) -> list[Topic] | None:
 def _read(reader: tuple[str, str], path: Path) -> list[Topic]:
     module, name = reader
     read: Callable[[Path], list[Topic]] = getattr(import_module(f"calibrations.importing.{module}"), name)
-    try:
+    with _unreadable_as_data_error(path):
         return read(path)
-    except (DataError, MemoryError):
+
+
+@contextmanager
+def _unreadable_as_data_error(path: Path) -> Iterator[None]:
+    """Any error of a library is a DataError: the content is damaged."""
+    try:
+        yield
+    except DataError:
         raise
-    except Exception as error:  # of a library, for damaged content
+    except MemoryError as error:
+        if path.is_dir() or path.stat().st_size > SMALL_BYTES:
+            raise
+        raise _damaged(path, error) from None  # a wrong length in so small a file
+    except Exception as error:
         raise _damaged(path, error) from None
 
 
 def _zip_reader(path: Path) -> str:
     """The reader for a zip archive. Raises DataError."""
-    from zipfile import ZipFile, is_zipfile
+    from zipfile import BadZipFile, ZipFile, is_zipfile
 
     if not is_zipfile(path):
         raise DataError(f"{path}: is a cut zip archive (Excel or NumPy .npz); copy it again")
-    with ZipFile(path) as archive:
-        names = archive.namelist()
+    try:
+        with ZipFile(path) as archive:
+            names = archive.namelist()
+    except (BadZipFile, OSError, ValueError, NotImplementedError) as error:
+        raise _damaged(path, error) from None
     if "xl/workbook.xml" in names:
         return "excel_topics"
     if names and all(name.endswith(".npy") for name in names):

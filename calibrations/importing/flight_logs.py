@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from calibrations.errors import DataError
 from calibrations.importing.topics import Cells, Topic, library, require_size
 from calibrations.table import Array, Constant
 
@@ -109,6 +110,8 @@ DATAFLASH_FIELDS: Mapping[str, str] = {
     "T": "temperature_c",
 }
 DATAFLASH_MESSAGES = re.compile(r"(ACC|GYR|IMU|MAG)\d?$")
+# a format (FMT) of records that are shorter than their own head of 3 bytes: its type, length, and 20 letters or zeros
+TOO_SHORT = re.compile(rb"\xa3\x95\x80[\s\S][\x00-\x02][\x00\x20-\x7e]{20}")
 CORRECTIONS = re.compile(r"(INS\d?_(ACC|GYR)\w*(OFFS|SCAL)|COMPASS_(OFS|DIA|ODI|MOT))\w*$")
 
 
@@ -116,12 +119,22 @@ def dataflash_topics(path: Path) -> list[Topic]:
     """The messages of an ArduPilot log; those of inertial sensors by instance. Raises DataError."""
     reader = library("pymavlink.DFReader", "robotics", path, "an ArduPilot DataFlash log")
     require_size(path, path.stat().st_size)
+    _require_lengths(path)
     with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
         log = reader.DFReader_binary(str(path))
         try:
             return _dataflash_topics(path, log)
         finally:
             log.close()
+
+
+def _require_lengths(path: Path) -> None:
+    """Raises DataError for records of less than 3 bytes: pymavlink would read the same bytes for ever."""
+    if (found := TOO_SHORT.search(path.read_bytes())) is not None:
+        raise DataError(
+            f"{path}: is damaged: the format at byte {found.start()} has records of {found[0][4]} bytes, which cannot "
+            "be; copy it again from the vehicle"
+        )
 
 
 def _dataflash_topics(path: Path, log: Any) -> list[Topic]:

@@ -7,8 +7,6 @@ this accepts texts and quoted decimal commas, and names a cell that is wrong.
 from __future__ import annotations
 
 import csv
-import io
-import json
 import re
 from array import array
 from collections import Counter
@@ -16,95 +14,20 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from math import isfinite
-from typing import Any
 
 import numpy as np
 
 from calibrations.errors import DataError
-from calibrations.files import Source, text_source
+from calibrations.files import Source
 from calibrations.importing.units import parse_unit, split_unit
 from calibrations.table import Array, Constant
 
-# A JSON file of measurements as the lines of a table: named arrays of equal length, or a list of named values.
-#
-#     {"mag": [[-17.2, -2.1, 47.0], ...], "t_s": [0.0, ...], "unit": "uT"}      mag_x, mag_y, mag_z, t_s; # unit: uT
-#     [{"mx": -17.2, "my": -2.1, "mz": 47.0}, ...]
-#
-# An array of triples is three columns, by axis; of other lists, columns by number from 1. What is no array is a
-# constant.
-
-LONGEST_JSON = 1 << 26  # characters: a whole document is held in memory
-AXES = ("x", "y", "z")
 EMPTY = "the file is empty: a header line with column names is missing; export the measurements again"
-JSON_FORM = 'give arrays of equal length, {"mag": [[1, 2, 3], ...]}, or [{"mx": 1, ...}, ...]'
-
-
-def json_as_lines(source: Source) -> Source:
-    """The source itself, or its JSON document as comma-separated lines. Raises DataError."""
-    with source.lines() as lines:
-        first = next((line for line in lines if line.strip()), "").lstrip()
-        if not first.startswith(("{", "[")):
-            return source
-    with source.lines() as lines:
-        whole = "".join(_bounded(lines, source.name))
-    try:
-        document = json.loads(whole)
-    except (ValueError, RecursionError):
-        if source.name.endswith(".json"):
-            raise DataError(f"{source.name}: is not valid JSON; {JSON_FORM}") from None
-        return source
-    return text_source(_written(document, source.name), source.name)
-
-
-def _bounded(lines: Iterator[str], name: str) -> Iterator[str]:
-    size = 0
-    for line in lines:
-        size += len(line)
-        if size > LONGEST_JSON:
-            raise DataError(f"{name}: has more than {LONGEST_JSON >> 20} million characters of JSON; save it as CSV")
-        yield line
-
-
-def _written(document: Any, name: str) -> str:
-    if isinstance(document, list) and document and all(isinstance(row, dict) for row in document):
-        document = {key: [row.get(key) for row in document] for key in document[0]}
-    arrays = {k: v for k, v in document.items() if isinstance(v, list) and v} if isinstance(document, dict) else {}
-    if not arrays:
-        raise DataError(f"{name}: has no arrays of measurements; {JSON_FORM}")
-    lengths = {key: len(values) for key, values in arrays.items()}
-    if len(set(lengths.values())) > 1:
-        raise DataError(f"{name}: arrays of different length: {lengths}")
-    columns = dict(chain.from_iterable(_columns(key, values, name) for key, values in arrays.items()))
-    out = io.StringIO()
-    out.writelines(
-        f"# {key}: {value}\n" for key, value in document.items() if isinstance(value, (str, int, float)) and value != ""
-    )
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*columns.values(), strict=True))
-    return out.getvalue()
-
-
-def _columns(key: str, values: list[Any], name: str) -> Iterator[tuple[str, list[Any]]]:
-    """The columns of one array. Raises DataError for rows of different length."""
-    if not isinstance(values[0], list):
-        yield key, values
-        return
-    width = len(values[0])
-    bad = next((k for k, row in enumerate(values) if not isinstance(row, list) or len(row) != width), None)
-    if bad is not None:
-        raise DataError(
-            f'{name}: row {bad + 1} of "{key}" does not have {width} numbers like the first row; {JSON_FORM}'
-        )
-    names = AXES if width == len(AXES) else [str(k + 1) for k in range(width)]
-    for place, end in enumerate(names):
-        yield f"{key}_{end}", [row[place] for row in values]
-
 
 # How a separated text is laid out, as its first lines show: separator, header, units, constants above the header.
 #
 # Any separator, or JSON (`json_arrays.py`); a header or none, units in the header's names or in a row below it,
-# decimal commas. The rows themselves are read by `calibrations/importing/cells.py`.
+# decimal commas.
 
 HEAD_LINES = 200  # lines that the layout is taken from
 BLANK = " \t\r\n\x1a"
@@ -116,13 +39,11 @@ Row = tuple[int, list[str]]  # the number of a line, from 1, and its cells
 
 @dataclass(frozen=True)
 class Sheet:
-    """Layout of a text. `header` and `units` have one entry per column; `line` is the header's line, `first` the first
-    line of
-    data.
+    """Layout of a text. `header` and `units` have one entry per column; `line` is the header's line, `first` the
+    first line of data.
 
     Without a header (`named` is false) columns are called "1", "2", ... `width` counts the cells of a row; it
-    exceeds the
-    number of columns where a spreadsheet appended empty cells. `sample` holds the first rows.
+    exceeds the number of columns where a spreadsheet appended empty cells. `sample` holds the first rows.
 
     A binary file has its columns in `cells`, and no text; `topic` names the table in a file that has several.
     """
@@ -173,7 +94,7 @@ class Sheet:
 
 def read_sheet(source: Source) -> Sheet:
     """The layout of `source`. Raises DataError with file and line."""
-    source = json_as_lines(source)
+    source = as_lines(source)
     constants, start, head = _head(source)
     separator = _separator(head)
     rows = list(split_rows(head, separator, source.name, start + 1))
@@ -200,6 +121,17 @@ def read_sheet(source: Source) -> Sheet:
     return Sheet(
         source, separator, tuple(header[:columns]), tuple(units), named, width, line, below[0][0], sample, constants
     )
+
+
+def as_lines(source: Source) -> Source:
+    """The source itself, or its JSON document as comma-separated lines. Raises DataError."""
+    with source.lines() as lines:
+        first = next((line for line in lines if line.strip()), "").lstrip()
+    if not first.startswith(("{", "[")):
+        return source
+    from calibrations.importing.json_arrays import json_as_lines
+
+    return json_as_lines(source)
 
 
 def split_rows(lines: Iterable[str], separator: str | None, name: str, first: int) -> Iterator[Row]:

@@ -244,3 +244,12 @@ def test_the_csv_of_betaflight_decodes_to_an_import_of_the_accelerometer(tmp_pat
         read_foreign(path, None)
     for axis, place in zip("xyz", range(3), strict=True):
         assert f"a{axis}=accSmooth[{place}]" in str(error.value)
+
+
+def test_a_damaged_list_of_a_workbook_is_told(tmp_path: Path) -> None:
+    """Of the files in the archive, at its end."""
+    path = tmp_path / "a.xlsx"
+    excel(path)
+    path.write_bytes(path.read_bytes().replace(b"PK\x01\x02", b"PK\x01\x03", 1))
+    with pytest.raises(DataError, match="is damaged or cut short"):
+        open_sheet(path)

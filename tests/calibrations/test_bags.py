@@ -60,6 +60,16 @@ def write(folder: Path, storage: str, *topics: str) -> Path:
     return path
 
 
+def test_a_length_beyond_memory_is_damage(tmp_path: Path) -> None:
+    """The length of MCAP's header record, after the mark of 8 bytes and the record's kind."""
+    (path,) = write(tmp_path, "mcap", "/imu").glob("*.mcap")
+    whole = bytearray(path.read_bytes())
+    whole[9:17] = b"\xff" * 7 + b"\x3f"
+    path.write_bytes(whole)
+    with pytest.raises(DataError, match="is damaged or cut short"):
+        open_sheet(path)
+
+
 @pytest.mark.parametrize("storage", ["ros1", "sqlite3", "mcap"])
 def test_an_imu_is_read_with_its_units_and_the_time_of_its_header(storage: str, tmp_path: Path) -> None:
     path = write(tmp_path, storage, "/words", "/imu", "/mag")

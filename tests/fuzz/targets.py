@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from tests.fuzz.files import FILES
+from tests.fuzz.labs import LABS
+from tests.fuzz.logs import LOGS
 from tests.fuzz.target import Target
 from tests.fuzz.wires import WIRES
 
-TARGETS: dict[str, Target] = WIRES | FILES
+TARGETS: dict[str, Target] = WIRES | LABS | FILES | LOGS
