@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 import yaml
 
+from calibrations.effects.catalogue import catalogue
+from calibrations.fitting.fit import fit
 from calibrations.importing.foreign import read_csv, write_csv
 from calibrations.model.file import read_model
 from calibrations.table import Table
@@ -77,6 +79,11 @@ def test_add_writes_a_new_model_and_leaves_the_old_one(rig: Rig, data: str, tmp_
     assert said["program"].startswith("inertial-rig 0.")
     assert (said["rows"], said["parent"]) == (130, "linear")
     assert written["covered"] == {"t_s": [read_csv(data).column("t_s").min(), read_csv(data).column("t_s").max()]}
+    together = read_model(str(new)).correlations
+    found = fit(read_model(str(old)).with_effect(catalogue()["z-axis-bias"]), read_csv(data))
+    assert together is not None
+    assert list(together.names) == list(found.params)
+    assert together.matrix == pytest.approx(found.correlation, abs=1e-3)
 
 
 def test_a_fitted_model_is_evaluated_as_it_is(rig: Rig, data: str, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 from calibrations.errors import DataError
 from calibrations.files import text_source
 from calibrations.importing.foreign import read_foreign
-from calibrations.importing.sheet import json_as_lines
+from calibrations.importing.sheet import as_lines
 from tests.calibrations.turned import DATA
 
 Rig = Callable[..., Any]
@@ -81,7 +81,7 @@ def test_a_device_that_writes_json_is_calibrated(rig: Rig, tmp_path: Path, devic
 
 
 def read(content: str) -> str:
-    with json_as_lines(text_source(content, "some.json")).lines() as lines:
+    with as_lines(text_source(content, "some.json")).lines() as lines:
         return "".join(lines)
 
 

@@ -90,8 +90,8 @@ def test_the_session_and_the_model_go_the_same_way(poses: list[Pose]) -> None:
     }
     table = Table.from_columns("poses", columns, read_bench().constants)
     path, places = gone(poses)
-    felt = slip(path, path[:, None], np.ones_like(path), LIMITS)[places]
+    felt = slip(path, path[:, None], np.ones_like(path), LIMITS, np.zeros(3))[places]
     a = path[places]
-    remembered = slip(a, turning_points(table), np.ones_like(a), LIMITS)
+    remembered = slip(a, turning_points(table), np.ones_like(a), LIMITS, np.zeros(3))
     np.testing.assert_allclose(remembered, felt, atol=2e-4)  # the way is sampled every quarter degree
     assert SHORTEST_APPROACH_DEG == SESSION_DEG
