@@ -13,7 +13,8 @@ A library of its own: tables in, frozen results out, no instrument needed.
     noise            noise of a still sensor
     compensate       outputs back to specific force
     add              a model with one effect more
-    Effect, Parameter  what a class of your own needs to be an effect
+    Effect, Parameter, Constant, Values  what a class of your own needs to be an effect
+    Table            what `read` and `table` give
 
 The functions are in `calibrations.face`, and load what they need when they are called.
 """
@@ -22,9 +23,20 @@ from __future__ import annotations
 
 import calibrations.noise
 import calibrations.table  # noqa: F401 both are bound before the functions of the same names, which replace them
-from calibrations.effects import Effect, Parameter
+from calibrations.effects import Constant, Effect, Parameter, Values
 from calibrations.face import add, compare, compensate, diagnose, discover, fit, noise, read, table
+from calibrations.table import Table
 
 __all__ = [
-    "Effect", "Parameter", "add", "compare", "compensate", "diagnose", "discover", "fit", "noise", "read", "table",
+    "Constant", "Effect", "Parameter", "Table", "Values",
+    "add", "compare", "compensate", "diagnose", "discover", "fit", "noise", "read", "table",
 ]  # fmt: skip
+
+
+def __getattr__(name: str) -> str:
+    """`__version__`, read when it is asked for. Raises AttributeError."""
+    if name == "__version__":
+        from importlib.metadata import version  # the import of the library stays short
+
+        return version("inertial-rig")
+    raise AttributeError(f"module 'calibrations' has no attribute {name!r}")

@@ -120,9 +120,9 @@ def delay(by_s: float) -> Response:
     return lambda f: np.asarray(np.exp(-2j * np.pi * f * by_s))
 
 
-def butterworth(rate_hz: float, corner_hz: float = PAPER_CORNER_HZ, order: int = 2) -> Response:
-    """A digital Butterworth low-pass, Ang V."""
-    b, a = scipy.signal.butter(order, corner_hz, fs=rate_hz)
+def butterworth(rate_hz: float) -> Response:
+    """The digital Butterworth low-pass of Ang V, of second order."""
+    b, a = scipy.signal.butter(2, PAPER_CORNER_HZ, fs=rate_hz)
     return lambda f: np.asarray(scipy.signal.freqz(b, a, f, fs=rate_hz)[1])
 
 

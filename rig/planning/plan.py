@@ -19,8 +19,9 @@ from typing import Any
 from calibrations.errors import DataError
 from calibrations.geometry.error_table import ErrorTable
 from procedures.catalogue import Procedure
+from procedures.instruments import Samples
 from procedures.questions import Dial, Question
-from procedures.session import Dwell, Guidance, Pose, Samples, Session
+from procedures.session import Dwell, Guidance, Pose, Session
 from rig.bench import ROLES, SIMULATED, TURNING, Bench
 from rig.errors import BenchError
 from rig.instruments.instruments import Rig, absent, connected

@@ -18,7 +18,7 @@ from calibrations.geometry.error_table import ErrorTable
 from calibrations.means.noise import measured_inflation
 from calibrations.table import Array, Table
 from calibrations.tables import KINDS
-from procedures.session import Samples
+from procedures.instruments import Samples
 from rig.bench import D63, TURNING, Bench, Instrument
 from rig.errors import RecordError
 from rig.record.values import Kept, Run

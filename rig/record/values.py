@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.text import as_written
-from procedures.session import Dwell, Pose, Samples
+from procedures.instruments import Samples
+from procedures.session import Dwell, Pose
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
+from procedures.instruments import Samples
 from procedures.questions import Question
-from procedures.session import Dwell, Guidance, Pose, Reading, Samples
+from procedures.session import Dwell, Guidance, Pose, Reading
 from rig.errors import RunMismatch
 from rig.instruments.instruments import Rig
 from rig.instruments.person import answer, follow

@@ -41,6 +41,7 @@ def with_provenance(kind: Dataset[F], found: F, parent: Model) -> Model:
             "excess": round(found.pooled_excess, 4),
         },
         covered=kind.covered(found),
+        correlations=kind.correlations(found),
     )
 
 

@@ -15,6 +15,11 @@ from procedures.settings import choices
 from rig.bench import read_bench
 
 UNITS = {"deg_s": "deg/s", "m_s2": "m/s^2", "deg": "deg", "hz": "Hz", "um": "um", "c": "C", "s": "s"}  # ends of names
+SHARED = {
+    "dwell_s": "How long samples are averaged at each pose.",
+    "settle_s": "How long the stages stand still before samples are taken.",
+    "block_s": "A record is saved in blocks of this length, which is what a fault costs at most.",
+}  # settings that mean the same in every procedure
 HELP = ("-h", "--help")
 WIDTH = 100
 
@@ -53,10 +58,11 @@ def settings_lines(procedure: Procedure) -> Iterator[str]:
 
 
 def meaning(procedure: Procedure, name: str) -> str:
-    """The sentences of the procedure's docstring that name the setting."""
+    """The sentences of the procedure's docstring that name the setting; else what it means in every procedure."""
     doc = " ".join(inspect.cleandoc(procedure.function.__doc__ or "").split())
     sentences = re.split(r"(?<=[.:])\s+(?=[A-Z`])", doc)
-    return " ".join(each for each in sentences if re.search(rf"`{name}[`=]", each)).replace("`", "")
+    own = " ".join(each for each in sentences if re.search(rf"`{name}[`=]", each)).replace("`", "")
+    return own or SHARED.get(name, "")
 
 
 def written(value: Any) -> str:
