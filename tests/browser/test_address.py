@@ -8,11 +8,12 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import quote
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import BrowserContext, Page, expect
 
 from rig.web.address import ModelState, numbers, parse_state, ranges
 from tests.browser.conftest import TABLET, Workbench
@@ -79,14 +80,16 @@ def test_the_address_holds_data_effects_and_selection(workbench: Workbench, tmp_
 
 
 @pytest.mark.slow
-def test_added_effects_are_kept_over_a_restart_of_the_server(browser: Browser, tmp_path: Path) -> None:
+def test_added_effects_are_kept_over_a_restart_of_the_server(
+    visitor: Callable[[], BrowserContext], tmp_path: Path
+) -> None:
     data, home = two_faults(tmp_path), {**os.environ, "RIG_HOME": str(tmp_path / "home")}
     words = [sys.executable, "-m", "rig", "web", "--no-open", "--json"]
     for begun in (True, False):
         with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=home) as server:
             try:
                 assert server.stdout is not None
-                page = browser.new_context().new_page()
+                page = visitor().new_page()
                 page.goto(f"{json.loads(server.stdout.readline())['url']}&data={quote(data)}&model=linear")
                 if begun:
                     own_effect(page)

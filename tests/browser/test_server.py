@@ -9,13 +9,14 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
+from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import quote
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import BrowserContext, expect
 
-from tests.browser.conftest import Workbench
+from tests.browser.conftest import Watch, Workbench
 from tests.browser.held import held_up
 from tests.browser.measured import thousand
 
@@ -51,16 +52,19 @@ def test_another_host_is_warned_of_and_has_a_token_as_well() -> None:
         assert "Listening at 127.0.0.2: other machines can reach the workbench" in server.stderr.read()
 
 
-def test_a_wrong_token_is_refused_in_the_browser(browser: Browser, workbench: Workbench) -> None:
-    page = browser.new_context().new_page()
+def test_a_wrong_token_is_refused_in_the_browser(
+    visitor: Callable[[], BrowserContext], watch: Watch, workbench: Workbench
+) -> None:
+    page = visitor().new_page()
     answer = page.goto(f"{workbench.origin}/?token=wrong")
     assert answer is not None
     assert answer.status == 401
     assert "Open the address that `rig web` printed" in page.inner_text("body")
-    page.context.close()
+    watch.expects("a refused request")
+    watch.expects("status of 401")
 
 
-def test_a_server_that_is_to_end_waits_for_no_search(browser: Browser, tmp_path: Path) -> None:
+def test_a_server_that_is_to_end_waits_for_no_search(visitor: Callable[[], BrowserContext], tmp_path: Path) -> None:
     words, home = (
         [*WEB, "--json", "--bench", str(held_up(tmp_path))],
         {**os.environ, "RIG_HOME": str(tmp_path / "home")},
@@ -68,7 +72,7 @@ def test_a_server_that_is_to_end_waits_for_no_search(browser: Browser, tmp_path:
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=home) as server:
         try:
             assert server.stdout is not None
-            page = browser.new_context().new_page()
+            page = visitor().new_page()
             page.goto(f"{json.loads(server.stdout.readline())['url']}&data={quote(thousand(tmp_path))}")
             expect(page.get_by_role("button", name="Cancel")).to_be_visible()
             page.context.close()

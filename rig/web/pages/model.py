@@ -81,6 +81,7 @@ class Workbench:
             self.analysis = div("analysis")
         self.keys = keys
         self._lay_out("rows")
+        ui.context.client.on_delete(self.left)
         ui.timer(0.0, self.open, once=True)
 
     def _lay_out(self, form: str) -> None:
@@ -231,11 +232,15 @@ class Workbench:
             self.parameters.diagnosed(self.diagnoses[key])
             await self.missing.show(self.diagnoses[key])
 
-    def cancel(self) -> None:
-        """Cancel the search for missing effects."""
+    def left(self) -> None:
+        """End the search for missing effects: the page is closed, and nobody waits for the result."""
         self.discovering = False
         self.turn += 1
         self.search.cancelled = True
+
+    def cancel(self) -> None:
+        """Cancel the search for missing effects."""
+        self.left()
         self.verdict.cancelled()
         self.missing.cancelled()
 

@@ -1,0 +1,48 @@
+"""A model page that is closed ends its search for missing effects."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from pathlib import Path
+from urllib.parse import quote
+
+import pytest
+from nicegui import Client
+from nicegui.testing import user_simulation
+
+from rig.web.desk import Desk
+from rig.web.pages import register
+from tests.browser.held import held_up
+from tests.browser.measured import two_faults
+
+SEARCH = "diagnosed"  # the thread of a search has the name of what it computes
+
+
+def searches() -> list[threading.Thread]:
+    return [thread for thread in threading.enumerate() if thread.name == SEARCH]
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_closed_page_ends_its_search(closed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RIG_HOME", str(tmp_path / "home"))
+    data, desk = two_faults(tmp_path), Desk(held_up(tmp_path))
+
+    async def simulated() -> None:
+        async with user_simulation() as user:
+            register(desk)
+            try:
+                client = await user.open(f"/?data={quote(data)}&model=linear")
+                await user.should_see("Cancel", retries=200)
+                [search] = searches()
+                if closed:
+                    client.delete()
+                (tmp_path / "go").touch()
+                await asyncio.to_thread(search.join)
+            finally:  # NiceGUI would take the modules of these pages from Python, and all that they lie in
+                Client.page_routes.clear()
+
+    asyncio.run(simulated())
+    assert not searches()
+    (session,) = desk.sessions.values()
+    assert bool(session.plans) is not closed
