@@ -31,6 +31,12 @@ def rig_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return home
 
 
+@pytest.fixture(autouse=True)
+def no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands called in this process say no progress, however slow the machine."""
+    monkeypatch.setattr("rig.cli.terminal.progress.EVERY_S", 3600.0)
+
+
 def pytest_sessionfinish(session: pytest.Session) -> None:
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")
     if os.environ.get("RIG_NO_SKIP") and reporter and reporter.stats.get("skipped") and not session.exitstatus:

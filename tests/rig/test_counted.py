@@ -9,8 +9,8 @@ import pytest
 
 from calibrations.effects.catalogue import catalogue
 from rig.services.request import Request
+from rig.services.search import Cancelled, Counted
 from rig.services.session import model_session
-from rig.web.parts import Cancelled, Counted
 from tests.browser.measured import hidden
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +20,6 @@ from drivers.world.world import World
 from procedures.sweep import grid
 from rig.bench import read_bench
 from rig.bench.file import DEMO
-from rig.cli.terminal import progress
 from rig.services.hidden_faults import MATERIAL, MECHANISMS, Curve, Faults, grouped, hidden_faults
 
 SAME = {
@@ -102,32 +100,6 @@ def _exists(path: str) -> bool:
     for name in path.split("."):
         value = getattr(value, name)
     return isinstance(value, float)
-
-
-@pytest.mark.parametrize(("terminal", "lines"), [(False, 2), (True, 0)])
-def test_long_work_shows_its_progress(terminal: bool, lines: int) -> None:
-    class Stream(io.StringIO):
-        def isatty(self) -> bool:
-            return terminal
-
-    stream = Stream()
-    waits = iter([False, False, True])
-
-    class Ended:
-        def wait(self, timeout: float) -> bool:
-            assert timeout == progress.EVERY_S
-            return next(waits)
-
-    progress._show(progress.Progress("searching", 0.5), stream, terminal, Ended())  # type: ignore[arg-type]
-    assert stream.getvalue().count("searching") == 2
-    assert stream.getvalue().count("\n") == lines
-    assert stream.getvalue().endswith(progress.ERASE) == terminal
-
-
-def test_short_work_shows_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    with progress.working("searching"):
-        pass
-    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.slow

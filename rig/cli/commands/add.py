@@ -11,6 +11,7 @@ import click
 from rig.cli.terminal.complete import complete_effect
 from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import emit, note, notes
+from rig.cli.terminal.progress import working
 
 if TYPE_CHECKING:
     from calibrations.effects import Effect
@@ -42,11 +43,13 @@ def command(request: Request, effect: str, name: str | None, out: Path, as_json:
     from rig.services.load import loaded
     from rig.services.provenance import write_model
 
-    question = loaded(request, note, out)
-    added = _find_effect(effect, name, question)
-    searched = question.effects if effect.startswith("free:") else {**question.effects, added.name: added}
-    result = question.data.add(added, question.model, searched)
-    result = planned(result, request, question.effects)
+    with working("fitting both models") as progress:
+        question = loaded(request, note, out)
+        added = _find_effect(effect, name, question)
+        effects = question.effects if effect.startswith("free:") else {**question.effects, added.name: added}
+        result = question.data.add(added, question.model, progress.searched(effects))
+        progress.text = "planning the next experiment"
+        result = planned(result, request, question.effects)
     path = write_model(question.data, result.end, question.model, out, note)
     if as_json:
         emit(discovery_document(result, str(path) if path else None))

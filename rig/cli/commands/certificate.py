@@ -9,6 +9,7 @@ import click
 
 from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.output import bench_option, emit, json_option, note
+from rig.cli.terminal.progress import working
 from rig.errors import OutputError
 
 if TYPE_CHECKING:
@@ -58,12 +59,15 @@ def command(
     paths = _paths(out)
     if is_still(data):
         require_reference(data, "still")
-    table, given, effects = loaded_table(Request(data, model, bench_file), note)
-    require_reference(table.source, table.kind)
-    bench = read_bench(bench_file) if bench_file is not None else None
-    certificate = certified(Certified(data, table, given, Path(model).name, effects, bench, before), number, customer)
-    for path in paths:
-        _write(path, certificate)
+    with working("fitting the model") as progress:
+        table, given, effects = loaded_table(Request(data, model, bench_file), note)
+        require_reference(table.source, table.kind)
+        bench = read_bench(bench_file) if bench_file is not None else None
+        asked = Certified(data, table, given, Path(model).name, effects, bench, before)
+        certificate = certified(asked, number, customer)
+        for path in paths:
+            progress.text = f"writing {path}"
+            _write(path, certificate)
     if as_json:
         emit(document(certificate) | {"files": [str(path) for path in paths]})
     else:

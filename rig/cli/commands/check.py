@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,6 +16,7 @@ from rig.bench import DEFAULT, read_bench
 from rig.bench.certificates import EXPIRED, certificates, expired
 from rig.bench.file import HAND
 from rig.cli.terminal.output import bench_option, emit, json_option, notes
+from rig.cli.terminal.progress import working
 from rig.instruments.instruments import checked
 from rig.instruments.wiring import on_a_network
 
@@ -42,7 +44,9 @@ def command(bench_file: Path | None, example: bool, example_hand: bool, reset: b
     if reset and as_json:
         raise click.UsageError("--reset asks a person; leave out --json")
     bench = read_bench(bench_file)
-    found, due = checked(bench, _reset if reset else None), certificates(bench)
+    with nullcontext() if reset else working("testing the instruments"):  # a reset asks a person
+        found = checked(bench, _reset if reset else None)
+    due = certificates(bench)
     late = expired(bench, datetime.now(UTC).date())
     if as_json:
         papers = {

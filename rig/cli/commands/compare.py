@@ -9,6 +9,7 @@ import click
 from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import check_option, emit, model_option, note, notes
+from rig.cli.terminal.progress import working
 
 if TYPE_CHECKING:
     from rig.services.request import Request
@@ -26,9 +27,10 @@ def command(request: Request, check: bool, as_json: bool) -> int:
     from rig.cli.terminal.words import warning
     from rig.services.load import loaded
 
-    question = loaded(request, note)
-    result = question.data.compare(question.model, question.effects)
-    name, cautions = request.model or question.model.name, question.data.cautions(result.fit)
+    with working("fitting the model"):
+        question = loaded(request, note)
+        result = question.data.compare(question.model, question.effects)
+        name, cautions = request.model or question.model.name, question.data.cautions(result.fit)
     if as_json:
         emit(comparison_document(result, name))
         notes(warning(cautions))

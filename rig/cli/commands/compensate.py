@@ -10,6 +10,7 @@ import click
 
 from rig.cli.terminal.options import input_range
 from rig.cli.terminal.output import bench_option, emit, json_option, note
+from rig.cli.terminal.progress import working
 
 if TYPE_CHECKING:
     from calibrations.compensation.inverse import Range
@@ -68,16 +69,18 @@ def command(
         raise click.UsageError("--picture shows the test of --data: also give --data DATA")
     effects = effects_of(bench_file)
     found = read_model(model, effects)
-    made = invert_model(found, _range(found, reach, given), without, precision)
-    origin = origin_of(model, name, dump_model(found))
-    files = source_files(made, language, origin)
-    beside = None
-    if data is not None:
-        from rig.services.tables import load
+    with working("inverting the model") as progress:
+        made = invert_model(found, _range(found, reach, given), without, precision)
+        origin = origin_of(model, name, dump_model(found))
+        files = source_files(made, language, origin)
+        beside = None
+        if data is not None:
+            from rig.services.tables import load
 
-        table = load(data, tell=note)
-        check_unit(found, table.unit, table.source)
-        beside = compensated_residual(made, table)
+            progress.text = f"testing the compensation on {data}"
+            table = load(data, tell=note)
+            check_unit(found, table.unit, table.source)
+            beside = compensated_residual(made, table)
     make_folder(out)
     for file, text in files.items():
         write_whole(out / file, text)

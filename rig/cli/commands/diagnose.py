@@ -9,6 +9,7 @@ import click
 from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import check_option, emit, model_option, note, notes
+from rig.cli.terminal.progress import working
 
 if TYPE_CHECKING:
     from calibrations.discovery.results import Diagnosis
@@ -27,9 +28,11 @@ def command(request: Request, check: bool, as_json: bool) -> int:
     from rig.cli.terminal.words import own_effect, pattern_advice, planned, warning
     from rig.services.load import loaded
 
-    question = loaded(request, note)
-    result = question.data.diagnose(question.model, question.effects)
-    result = planned(result, request, question.effects)
+    with working("fitting the model") as progress:
+        question = loaded(request, note)
+        result = question.data.diagnose(question.model, progress.searched(question.effects))
+        progress.text = "planning the next experiment"
+        result = planned(result, request, question.effects)
     if (untestable := question.data.untestable(result.fit, question.effects)) is not None:
         note(untestable)
     if result.verdict is not Verdict.NO_RESPONSE:

@@ -10,6 +10,7 @@ import click
 from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import check_option, emit, model_option, note, notes, watch_options
+from rig.cli.terminal.progress import working
 
 if TYPE_CHECKING:
     from calibrations.discovery.dataset import Dataset
@@ -84,10 +85,13 @@ def _discover(
     from rig.services.provenance import write_model
 
     small = parse_enough(enough) if enough else None
-    question = loaded(request, note, out)
-    data = question.data if len(several) == 1 else _together(several, request, question)
-    data = data.without(without)
-    result = planned(data.discover(question.model, question.effects, small), request, question.effects)
+    with working("fitting the model") as progress:
+        question = loaded(request, note, out)
+        data = question.data if len(several) == 1 else _together(several, request, question)
+        data = data.without(without)
+        found = data.discover(question.model, progress.searched(question.effects), small)
+        progress.text = "planning the next experiment"
+        result = planned(found, request, question.effects)
     path = write_model(data, result.end, question.model, out, note)
     reached = str(path) if path else request.model or question.model.name
     own = (result.pattern if len(several) == 1 else None, reached, request)

@@ -8,6 +8,7 @@ import click
 
 from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.output import emit, json_option, note
+from rig.cli.terminal.progress import working
 from rig.services.export import FORMATS, export
 
 
@@ -18,7 +19,8 @@ from rig.services.export import FORMATS, export
 @json_option
 def command(data: str, kind: str, path: Path, as_json: bool) -> None:
     """Write DATA, a run or a file, to --out."""
-    rows = export(data, kind, path)
+    with working(f"writing {path}"):
+        rows = export(data, kind, path)
     if as_json:
         emit({"schema": "rig.export/1", "data": data, "format": kind, "rows": rows, "path": str(path)})
     else:

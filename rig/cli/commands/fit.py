@@ -20,6 +20,7 @@ from calibrations.text import columns, concise
 from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import check_option, emit, model_option, note, notes
+from rig.cli.terminal.progress import working
 
 if TYPE_CHECKING:
     from calibrations.discovery.dataset import Dataset
@@ -41,13 +42,14 @@ def command(request: Request, out: Path | None, check: bool, as_json: bool) -> i
     from rig.services.load import loaded
     from rig.services.provenance import write_model
 
-    question = loaded(request, note, out)
-    data = question.data
-    found = data.fit(question.model)
-    path, reason = write_model(data, found, question.model, out, note), data.rejection(found)
-    if (untestable := data.untestable(found, question.effects)) is not None:
-        note(untestable)
-    cautions, further = data.cautions(found), _further(data, question.model, found)
+    with working("fitting the model"):
+        question = loaded(request, note, out)
+        data = question.data
+        found = data.fit(question.model)
+        path, reason = write_model(data, found, question.model, out, note), data.rejection(found)
+        if (untestable := data.untestable(found, question.effects)) is not None:
+            note(untestable)
+        cautions, further = data.cautions(found), _further(data, question.model, found)
     if as_json:
         emit(fit_document(data, found, str(path) if path else None) | further.document)
         notes(warning(cautions))

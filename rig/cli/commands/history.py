@@ -15,6 +15,7 @@ from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
 from calibrations.text import columns, concise
 from rig.cli.terminal.complete import complete_sensor
 from rig.cli.terminal.output import bench_option, emit, json_option, note
+from rig.cli.terminal.progress import working
 from rig.record import Record
 from rig.services.history import (
     Calibration,
@@ -91,7 +92,7 @@ def command(
 
     read = read_model(model, effects_of(bench_file))
     limits = changes(given)
-    with Record.to_read() as record:
+    with working("fitting the calibrations"), Record.to_read() as record:
         found = _only(history(record, sensor, read, limits_of(bench_file) | limits, baseline), chosen, limits)
         last = latest(record, beside, read) if beside is not None else None
     compared = [] if beside is None or last is None else [compare_sensors(found, beside, last)]

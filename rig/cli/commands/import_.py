@@ -25,6 +25,7 @@ from calibrations.importing.sheet import Sheet
 from calibrations.importing.units import ColumnMapping, parse_unit
 from calibrations.table import NUMBERS
 from rig.cli.terminal.output import emit, json_option, note
+from rig.cli.terminal.progress import working
 
 LEAVE = "-"
 
@@ -63,7 +64,8 @@ def command(
 
     asked = sys.stdin.isatty() and sys.stderr.isatty()
     try:
-        sheet = opened(file, topic)
+        with working(f"reading {file}"):
+            sheet = opened(file, topic)
     except SeveralTopics as several:
         if not asked:
             raise
@@ -73,7 +75,8 @@ def command(
     columns, constants = [ColumnMapping.parse(text) for text in mapped], _constants(given)
     if asked and needs_mapping(sheet, kind, columns):
         kind, columns = ask_mapping(sheet, kind, columns, given)
-    run, table = stored(sheet, kind, columns, constants, note)
+    with working(f"storing {file}"):
+        run, table = stored(sheet, kind, columns, constants, note)
     if table.content == "positions" and {"ax", "mx"} <= set(table.columns):
         note("The run has the accelerometer; with --constant triad=m it has the magnetometer.")
     if as_json:

@@ -12,6 +12,7 @@ import numpy as np
 from calibrations.noise.analysis import NoiseAnalysis
 from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.output import Positive, emit, json_option, note, notes
+from rig.cli.terminal.progress import working
 
 if TYPE_CHECKING:
     from calibrations.noise.record import Still
@@ -49,7 +50,10 @@ def command(
     from calibrations.noise.analysis import analyse, noise_document
     from calibrations.presentation.noise_text import remarks
 
-    analysis = analyse(_record(data, channel, rate_hz, tau_s))
+    with working("reading the record") as progress:
+        still = _record(data, channel, rate_hz, tau_s)
+        progress.text = "estimating the noise coefficients"
+        analysis = analyse(still)
     notes(remarks(analysis))
     notes(rounded_times(tau_s, analysis))
     if as_json:
@@ -60,7 +64,8 @@ def command(
         from calibrations.presentation.charts.noise import noise_album
         from calibrations.presentation.static import save_all
 
-        written = save_all({picture.name: picture.chart for picture in noise_album(analysis)}, folder, form)
+        with working("drawing the pictures"):
+            written = save_all({picture.name: picture.chart for picture in noise_album(analysis)}, folder, form)
         notes(f"written: {path}" for path in written)
 
 

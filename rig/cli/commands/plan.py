@@ -25,6 +25,7 @@ from rig.bench import Bench, read_bench
 from rig.cli.terminal.complete import complete_procedure
 from rig.cli.terminal.options import PASS_ON, read_settings, settings_arguments
 from rig.cli.terminal.output import bench_option, emit, json_option, model_option
+from rig.cli.terminal.progress import working
 from rig.cli.terminal.settings_help import ProcedureCommand
 from rig.errors import BeyondLimits
 from rig.planning.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, relative
@@ -90,7 +91,8 @@ def command(
         return
     if model or poses or criterion:
         raise click.UsageError("--model, --poses and --criterion go with --optimal")
-    planned = plan(bench, found, settings)
+    with working("planning"):
+        planned = plan(bench, found, settings)
     if out is not None:
         _write_poses(out, planned)
     if as_json:
@@ -121,7 +123,8 @@ def _optimal(bench: Bench, procedure: Procedure, settings: Mapping[str, Any], op
     if procedure.name != "sweep" or settings["pose_list"]:
         raise click.UsageError("--optimal is for a sweep over a grid, without --pose-list")
     model = read_model(options.model or "linear", catalogue(bench.folders.effects))
-    found = chosen(bench, procedure, settings, model, options.poses, options.criterion or "I")
+    with working("choosing the poses"):
+        found = chosen(bench, procedure, settings, model, options.poses, options.criterion or "I")
     if options.out is not None:
         _write_poses(options.out, found.equal.plan)
     if options.as_json:

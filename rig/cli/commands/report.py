@@ -10,6 +10,7 @@ import click
 from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import emit, model_option, note
+from rig.cli.terminal.progress import working
 
 if TYPE_CHECKING:
     from rig.services.request import Request
@@ -36,10 +37,12 @@ def command(request: Request, out: Path | None, folder: Path | None, form: str, 
     from rig.services.report import reported
 
     require_output(request, out)
-    pictures, page = reported(request, note)
-    if out is not None:
-        write_whole(out, page())
-    written = save_all({picture.name: picture.chart for picture in pictures}, folder, form) if folder else []
+    with working("fitting the model and searching for missing effects") as progress:
+        pictures, page = reported(request, note)
+        progress.text = "drawing the pictures"
+        if out is not None:
+            write_whole(out, page())
+        written = save_all({picture.name: picture.chart for picture in pictures}, folder, form) if folder else []
     if as_json:
         emit({"schema": "rig.report/1", "out": str(out) if out else None, "pictures": [str(p) for p in written]})
     else:

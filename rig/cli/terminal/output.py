@@ -10,6 +10,8 @@ from typing import Any
 
 import click
 
+from rig.cli.terminal.progress import erase
+
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on standard output.")
 check_option = click.option("--check", is_flag=True, help="Exit with 1 unless the model is adequate.")
 model_option = click.option(
@@ -52,6 +54,7 @@ def emit(document: dict[str, Any]) -> None:
 
 def note(text: str) -> None:
     """Print progress or a remark to standard error; standard output is for results."""
+    erase()
     click.echo(text, err=True)
 
 

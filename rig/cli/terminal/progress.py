@@ -8,10 +8,13 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from calibrations.effects import Effect
 
 EVERY_S = 1.0
 WIDTH = 30  # characters of a bar
@@ -22,17 +25,26 @@ ERASE = "\r\x1b[K"
 class Progress:
     """What is being done, and how much of it is done (0 to 1; None: not known). Assign to both at any time."""
 
-    text: str
+    text: str | Callable[[], str]
     share: float | None = None
     began_s: float = field(default_factory=time.monotonic)
 
     def line(self) -> str:
         """The present state in one line."""
         seconds = f"{time.monotonic() - self.began_s:.0f} s"
+        text = self.text if isinstance(self.text, str) else self.text()
         if self.share is None:
-            return f"{self.text}: {seconds}"
+            return f"{text}: {seconds}"
         full = round(WIDTH * min(max(self.share, 0.0), 1.0))
-        return f"[{'#' * full}{'.' * (WIDTH - full)}] {100 * self.share:3.0f} %  {self.text}, {seconds}"
+        return f"[{'#' * full}{'.' * (WIDTH - full)}] {100 * self.share:3.0f} %  {text}, {seconds}"
+
+    def searched(self, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
+        """The effects for a search, whose progress is shown from now on."""
+        from rig.services.search import Counted
+
+        counted = Counted(effects)
+        self.text = lambda: f"searching for missing effects. {counted.text}"
+        return counted
 
 
 @contextmanager
@@ -46,14 +58,23 @@ def working(text: str, share: float | None = None) -> Iterator[Progress]:
     finally:
         ended.set()
         thread.join()
+        erase()
+
+
+def erase() -> None:
+    """Remove the line of the progress from the terminal, before something else is written there."""
+    if _DRAWN.is_set():
+        _DRAWN.clear()
+        sys.stderr.write(ERASE)
+        sys.stderr.flush()
+
+
+_DRAWN = threading.Event()  # a line of progress is on the terminal
 
 
 def _show(shown: Progress, stream: TextIO, terminal: bool, ended: threading.Event) -> None:
-    drawn = False
     while not ended.wait(EVERY_S):
         stream.write(f"{ERASE}{shown.line()}" if terminal else f"{shown.line()}\n")
         stream.flush()
-        drawn = True
-    if drawn and terminal:
-        stream.write(ERASE)
-        stream.flush()
+        if terminal:
+            _DRAWN.set()

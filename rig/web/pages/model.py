@@ -17,6 +17,7 @@ from rig.errors import RecordError
 from rig.services.content import Content, content_of
 from rig.services.exclusion import numbered_run
 from rig.services.page_words import IMPORT, address
+from rig.services.search import Cancelled, Counted
 from rig.web.address import ModelState, parse_state
 from rig.web.desk import Desk, runs
 from rig.web.frame import Key, frame
@@ -26,7 +27,7 @@ from rig.web.pages.model_missing import Missing
 from rig.web.pages.model_noise import NoisePictures
 from rig.web.pages.model_parameters import ParametersBox
 from rig.web.pages.model_pictures import Pictures
-from rig.web.parts import Cancelled, Counted, box, div, failed, for_page, message, noted, off_loop, state, words
+from rig.web.parts import box, div, failed, for_page, message, noted, off_loop, state, words
 
 if TYPE_CHECKING:
     from calibrations.discovery.results import Comparison, Diagnosis, Place, Step

@@ -18,9 +18,9 @@ from rig.web.parts import box, div, facts, failed, message, off_loop, waiting, w
 if TYPE_CHECKING:
     from calibrations.discovery.patterns import Pattern
     from calibrations.discovery.results import Candidate, Diagnosis, Step
+    from rig.services.search import Counted
     from rig.services.session import ModelSession
     from rig.web.pages.model import Workbench
-    from rig.web.parts import Counted
 
 
 FIRST = 6  # cards without unfolding the rest

@@ -1,0 +1,94 @@
+"""Work that takes longer than a second shows its progress on standard error, and nothing of it elsewhere."""
+
+from __future__ import annotations
+
+import io
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rig.cli.terminal import progress
+from rig.cli.terminal.output import note
+from tests.rig.conftest import Ended
+
+Rig = Callable[..., Ended]
+
+
+class Stream(io.StringIO):
+    """Standard error, a terminal or a pipe."""
+
+    def __init__(self, terminal: bool) -> None:
+        super().__init__()
+        self.terminal = terminal
+
+    def isatty(self) -> bool:
+        return self.terminal
+
+
+class Seconds:
+    """An end of work that comes after some seconds."""
+
+    def __init__(self, count: int) -> None:
+        self.left = count
+
+    def wait(self, timeout: float) -> bool:
+        assert timeout == progress.EVERY_S
+        self.left -= 1
+        return self.left < 0
+
+
+def shown(terminal: bool, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Standard error after two seconds of work and a remark."""
+    stream = Stream(terminal)
+    monkeypatch.setattr(sys, "stderr", stream)
+    progress._show(progress.Progress("searching", 0.5), stream, terminal, Seconds(2))  # type: ignore[arg-type]
+    note("a remark")
+    return stream.getvalue()
+
+
+def test_a_pipe_receives_plain_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = shown(False, monkeypatch).splitlines()
+    assert [("searching" in line) for line in lines] == [True, True, False]
+    assert not any(sign in "".join(lines) for sign in "\r\x1b")
+
+
+def test_a_terminal_shows_one_line_that_a_remark_replaces(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = shown(True, monkeypatch)
+    assert text.count("searching") == 2
+    assert text.count("\n") == 1
+    assert text.endswith(f"{progress.ERASE}a remark\n")
+    assert not text.partition("a remark")[2].strip()
+
+
+def test_short_work_shows_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress.working("searching"):
+        pass
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("compare", "good.csv"), "fitting the model: "),
+        (("fit", "good.csv"), "fitting the model: "),
+        (("diagnose", "good.csv"), "searching for missing effects. Round 1, effect "),
+        (("discover", "good.csv"), "searching for missing effects. Round 1, effect "),
+        (("add", "quadratic", "--model", "linear", "--data", "good.csv", "--out", "q.yaml"), "fitting both models: "),
+        (("report", "good.csv", "--out", "r.html"), "fitting the model and searching for missing effects: "),
+        (("certificate", "good.csv", "--model", "linear", "--out", "c.pdf"), "fitting the model: "),
+        (("plan", "sweep", "--optimal"), "choosing the poses: "),
+        (("import", "good.csv"), "storing good.csv: "),
+    ],
+)
+def test_a_command_says_what_it_does(
+    words: tuple[str, ...], says: str, rig: Rig, work: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    quiet = rig(*words)
+    (work / "q.yaml").unlink(missing_ok=True)
+    monkeypatch.setattr(progress, "EVERY_S", 1e-3)
+    ended = rig(*words, *(("--json",) if words[0] == "compare" else ()))
+    assert ended.status == quiet.status
+    assert says not in quiet.err + ended.out
+    assert any(line.startswith(says) for line in ended.err.splitlines()), ended.err
