@@ -75,7 +75,10 @@ def test_short_work_shows_nothing(capsys: pytest.CaptureFixture[str]) -> None:
         (("fit", "good.csv"), "fitting the model: "),
         (("diagnose", "good.csv"), "searching for missing effects. Round 1, effect "),
         (("discover", "good.csv"), "searching for missing effects. Round 1, effect "),
-        (("add", "quadratic-nonlinearity", "--model", "linear", "--data", "good.csv", "--out", "q.yaml"), "fitting both models: "),
+        (
+            tuple("add quadratic-nonlinearity --model linear --data good.csv --out q.yaml".split()),
+            "fitting both models: ",
+        ),
         (("report", "good.csv", "--out", "r.html"), "fitting the model and searching for missing effects: "),
         (("certificate", "good.csv", "--model", "linear", "--out", "c.pdf"), "fitting the model: "),
         (("plan", "sweep", "--optimal"), "choosing the poses: "),
