@@ -76,7 +76,7 @@ def test_short_work_shows_nothing(capsys: pytest.CaptureFixture[str]) -> None:
         (("diagnose", "good.csv"), "searching for missing effects. Round 1, effect "),
         (("discover", "good.csv"), "searching for missing effects. Round 1, effect "),
         (
-            tuple("add quadratic-nonlinearity --model linear --data good.csv --out q.yaml".split()),
+            ("add", "quadratic-nonlinearity", "--model", "linear", "--data", "good.csv", "--out", "q.yaml"),
             "fitting both models: ",
         ),
         (("report", "good.csv", "--out", "r.html"), "fitting the model and searching for missing effects: "),
