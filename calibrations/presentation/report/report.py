@@ -23,6 +23,7 @@ from calibrations.model import Estimate, Model, Term
 from calibrations.motion.reference import Bias
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.discovery import album, error_text
+from calibrations.presentation.formula import formula_html
 from calibrations.presentation.report import parameters
 from calibrations.presentation.report.page import figure, page
 from calibrations.text import capital, estimate_text, joined, minus, probability, rounded, unbroken, unit
@@ -181,7 +182,7 @@ def _candidate(c: Candidate, rank: int, out: str) -> dict[str, Any]:
         "name": c.name,
         "explained": rank == 0 or (rank < EXPLAINED and c.p_value < SIGNIFICANT),
         "summary": capital(c.effect.summary),
-        "formula": c.effect.formula.replace("{out}", out),
+        "formula": formula_html(c.effect.formula, out),
         "symptom": capital(c.effect.symptom),
         "seen": rounded(c.excess_after),
         "unseen": rounded(c.held_out_after),

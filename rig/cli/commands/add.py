@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.terminal.complete import complete_effect
+from rig.cli.terminal.complete import complete_data, complete_effect, complete_model
 from rig.cli.terminal.options import request_options
 from rig.cli.terminal.output import emit, note, notes
 from rig.cli.terminal.progress import working
@@ -24,8 +24,8 @@ NAME = re.compile(r"[A-Za-z0-9_-]+")  # no useful expression looks like this
 @click.command("add")
 @click.argument("effect", shell_complete=complete_effect)
 @click.option("--name", help="Name of an effect given as an expression.")
-@click.option("--model", required=True, help="A shipped model by name, or a model file.")
-@click.option("--data", required=True, help="A file or a run.")
+@click.option("--model", required=True, shell_complete=complete_model, help="A shipped model by name, or a model file.")
+@click.option("--data", required=True, shell_complete=complete_data, help="A file or a run.")
 @click.option("--out", required=True, type=click.Path(dir_okay=False, path_type=Path), help="The new model file.")
 @request_options
 def command(request: Request, effect: str, name: str | None, out: Path, as_json: bool) -> int:

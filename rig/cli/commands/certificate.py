@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.terminal.complete import complete_data
+from rig.cli.terminal.complete import complete_data, complete_model
 from rig.cli.terminal.output import bench_option, emit, json_option, note
 from rig.cli.terminal.progress import working
 from rig.errors import OutputError
@@ -20,7 +20,12 @@ FORMS = (".html", ".pdf", ".xml")
 
 @click.command("certificate")
 @click.argument("data", shell_complete=complete_data)
-@click.option("--model", required=True, help="The certificate states the parameters of this model, fitted to DATA.")
+@click.option(
+    "--model",
+    required=True,
+    shell_complete=complete_model,
+    help="The certificate states the parameters of this model, fitted to DATA.",
+)
 @click.option(
     "--out",
     type=click.Path(dir_okay=False, path_type=Path),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rig.cli.terminal.complete import complete_data, complete_model
 from rig.cli.terminal.options import input_range
 from rig.cli.terminal.output import bench_option, emit, json_option, note
 from rig.cli.terminal.progress import working
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @click.command("compensate")
-@click.argument("model")
+@click.argument("model", shell_complete=complete_model)
 @click.option("--language", type=click.Choice(["c", "python", "json"]), required=True)
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), required=True, help="Write into this folder.")
 @click.option("--name", help="Name of files and functions. Default: the name of the model file.")
@@ -32,7 +33,11 @@ if TYPE_CHECKING:
     help="Range of another input, such as temperature_c=0:60.",
 )
 @click.option("--leave-out", "without", multiple=True, metavar="EFFECT", help="Leave an effect out.")
-@click.option("--data", help="Test the compensation on these poses, compared with a linear model fitted to them.")
+@click.option(
+    "--data",
+    shell_complete=complete_data,
+    help="Test the compensation on these poses, compared with a linear model fitted to them.",
+)
 @click.option(
     "--picture", type=click.Path(dir_okay=False, path_type=Path), help="Write a picture of the test to this file."
 )

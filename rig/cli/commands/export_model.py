@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from rig.cli.terminal.complete import complete_model
 from rig.cli.terminal.options import input_range
 from rig.cli.terminal.output import Positive, bench_option, emit, json_option
 
@@ -14,7 +15,7 @@ FORMATS = ("px4", "ardupilot", "imu_calib", "imu_tk", "imucal", "kalibr", "openv
 
 
 @click.command("export-model")
-@click.argument("models", metavar="MODEL...", nargs=-1, required=True)
+@click.argument("models", metavar="MODEL...", nargs=-1, required=True, shell_complete=complete_model)
 @click.option("--for", "form", type=click.Choice(FORMATS), required=True, help="The program that reads the file.")
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="The file.")
 @click.option("--slot", type=click.IntRange(1, 3), default=1, show_default=True, help="Number of the sensor there.")

@@ -13,6 +13,7 @@ import click
 
 from calibrations.fleet.batch import BatchEffect, Population, SensorVerdict
 from calibrations.text import columns, concise, joined, percent
+from rig.cli.terminal.complete import complete_model
 from rig.cli.terminal.output import bench_option, emit, json_option, note
 from rig.fleet.calibrate import Calibrated, Calibration
 
@@ -60,7 +61,7 @@ def _fleet_options(model: str, out: str) -> Callable[[Callable[[Request], None]]
         click.option("--report", type=FILE, help="Write a report on the fleet to this HTML file."),
         bench_option,
         json_option,
-        click.option("--model", default="linear", show_default=True, help=model),
+        click.option("--model", default="linear", shell_complete=complete_model, show_default=True, help=model),
         click.option("--out", type=FOLDER, help=out),
     )
 

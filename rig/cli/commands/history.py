@@ -13,7 +13,7 @@ import click
 from calibrations.analyses.stability import YEAR_DAYS, Agreement
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
 from calibrations.text import columns, concise
-from rig.cli.terminal.complete import complete_sensor
+from rig.cli.terminal.complete import complete_model, complete_sensor
 from rig.cli.terminal.output import bench_option, emit, json_option, note
 from rig.cli.terminal.progress import working
 from rig.record import Record
@@ -42,7 +42,13 @@ DAY = click.DateTime(["%Y-%m-%d"])
 
 @click.command("history")
 @click.argument("sensor", shell_complete=complete_sensor)
-@click.option("--model", default="linear", show_default=True, help="Model for the calibration of every run.")
+@click.option(
+    "--model",
+    default="linear",
+    shell_complete=complete_model,
+    show_default=True,
+    help="Model for the calibration of every run.",
+)
 @click.option("--quantity", "chosen", multiple=True, metavar="NAME", help="Only this quantity; repeatable.")
 @click.option(
     "--limit",

@@ -13,6 +13,7 @@ from calibrations.text import columns, duration
 from rig.bench.certificates import EXPIRED
 from rig.cli.terminal.complete import complete_run
 from rig.cli.terminal.output import emit, json_option
+from rig.cli.terminal.progress import working
 from rig.errors import RecordError
 from rig.record import Event, Kept, Line, Record, Run
 from rig.record.codec import digest_of
@@ -31,7 +32,7 @@ Ranges = Mapping[str, tuple[float, float]]
 @json_option
 def command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
     """Show the settings, events and results of RUN, and the range of each column."""
-    with Record.to_find(run) as record:
+    with working(f"reading {run}"), Record.to_find(run) as record:
         found = record.run(run)
         run = found.run
         left_out = record.excluded(run)

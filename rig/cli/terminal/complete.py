@@ -46,6 +46,18 @@ def complete_effect() -> Iterable[str]:
 
 
 @_offer
+def _shipped_models() -> Iterable[str]:
+    from calibrations.model.file import shipped_names
+
+    return shipped_names()
+
+
+def complete_model(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Files and the shipped models. The item for files comes first: bash forgets what is before it."""
+    return [CompletionItem(begun, type="file"), *_shipped_models(context, parameter, begun)]
+
+
+@_offer
 def complete_run() -> Iterable[str]:
     """The newest runs by id, their sensors, and `last`."""
     from rig.record import Record

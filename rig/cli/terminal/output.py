@@ -10,12 +10,16 @@ from typing import Any
 
 import click
 
+from rig.cli.terminal.complete import complete_model
 from rig.cli.terminal.progress import erase
 
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on standard output.")
 check_option = click.option("--check", is_flag=True, help="Exit with 1 unless the model is adequate.")
 model_option = click.option(
-    "--model", default=None, help="A shipped model by name, or a model file. Default: by kind of data."
+    "--model",
+    default=None,
+    shell_complete=complete_model,
+    help="A shipped model by name, or a model file. Default: by kind of data.",
 )
 bench_option = click.option(
     "--bench",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from functools import partial
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
@@ -11,6 +10,7 @@ from nicegui import ui
 
 from calibrations.criteria import SIGNIFICANT
 from calibrations.discovery.verdict import Verdict
+from calibrations.presentation.formula import formula_html
 from calibrations.presentation.report.report import next_takes, next_words
 from calibrations.text import capital, probability, rounded
 from rig.web.parts import box, div, facts, failed, message, off_loop, waiting, words
@@ -218,7 +218,7 @@ class Card:
     def _describe(self, result: Diagnosis[Any]) -> None:
         c = self.c
         words(capital(c.effect.summary))
-        words(formula(c.effect.formula, self.side.unit), "formula")
+        ui.html(formula_html(c.effect.formula, self.side.unit), sanitize=False).classes("formula")  # it escapes
         with div("chance"):
             div("").style(f"width: {100 * c.probability:.1f}%")
         rivals = ", ".join(c.indistinguishable_from)
@@ -263,11 +263,6 @@ def share(probability: float) -> str:
         if probability > limit:
             return text
     return "below 0.1 %" if probability < 1e-3 else f"{100 * probability:.2g} %"
-
-
-def formula(text: str, unit: str) -> str:
-    """A formula with the unit of the data; a remark gets its own line, because the card is narrow."""
-    return re.sub(r" {3,}", "\n", text.replace("{out}", unit)).replace("\n\n", "\n")
 
 
 # An effect of your own: an expression, tested as you type, with its errors.

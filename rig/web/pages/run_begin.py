@@ -61,7 +61,8 @@ def plan_facts(plan: Plan, bench: Bench) -> dict[str, str]:
         "Stores": f"{plan.poses} poses, {size(plan.bytes)}; {size(free_bytes(home()))} are free on the disk",
     }
     for role, ((low, high), (least, most)) in plan.reach.items():
-        rows[f"Turns {role}"] = f"from {low:g} to {high:g} deg; the limits are {least:g} to {most:g} deg"
+        reach = f"from {low:g} to {high:g} deg; the limits are {least:g} to {most:g} deg"
+        rows[f"Turns {role}"] = for_page(reach)
     rows["Stops"] = for_page("; ".join(stops(bench)))
     return rows
 

@@ -47,7 +47,8 @@ class Live:
                 self.phase = words("", "chip big-state")
                 self.big = words("", "big-share number")
                 self.to_record = ui.link("", "/record").classes("small grow")
-                self.buttons()
+                with div("row-of actions"):
+                    self.buttons()
             self.now = words("", "now")
             self.bar = ui.linear_progress(0.0, show_value=False).props("aria-label=progress instant-feedback")
             self.count = words("", "small number")
