@@ -13,6 +13,7 @@ from calibrations.errors import ModelError
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.sensed import in_milli
 from calibrations.free_forms.place_names import PREFIX
+from calibrations.geometry.orientation import one_orientation
 from calibrations.table import Array
 from calibrations.text import joined, prefixed, rounded, unit
 
@@ -45,6 +46,11 @@ class Enough:
         if self.of == "floors":
             return self.value
         measures, base, factor = UNITS[self.of]
+        if measures == SENSED and one_orientation(found.table):
+            raise ModelError(
+                f"an error of {self.text} cannot be asked of data at one orientation, which do not show the scale "
+                f"factor; give it in {unit(found.table.unit)} or floors"
+            )
         has = found.table.unit if measures == OUTPUT else found.table.input_unit
         if base != has:
             other = found.table.input_unit if measures == OUTPUT else found.table.unit

@@ -16,10 +16,10 @@ from scipy.special import chdtrc
 from calibrations.criteria import MATERIAL, MOST_SLOW_NOISE, ONE_SIDED, SIGNIFICANT, STANDS_OUT
 from calibrations.discovery.results import Place
 from calibrations.fitting.fit import Fit
-from calibrations.fitting.sensed import axis_of, scales
+from calibrations.fitting.sensed import axis_of, milli_unit, scales
 from calibrations.means.noise import rms
 from calibrations.model.chain import backward
-from calibrations.table import MILLI, Array, Table
+from calibrations.table import Array, Table
 from calibrations.text import interval
 
 MOST_PLACES = 8
@@ -69,7 +69,7 @@ class _Stretch:
             )  # fmt: skip
         mg = 1e3 * self.mean / self.scale
         own = f"{1e3 * self.mean:+.3g} mV" if self.unit == "V" else f"{self.mean:+.3g} {self.unit}"
-        sensed = self.unit in ("g", "field")
+        sensed = self.unit in ("g", "field") or self.milli == f"m{self.unit}"
         value = f"{mg:+.3g} {self.milli}" if sensed else f"{own} ({mg:+.3g} {self.milli})"
         return f"{place}: {self.channel} is off by {value} on average, rms {self.excess:.3g} x the noise floor"
 
@@ -92,7 +92,7 @@ def _fails(found: Fit) -> list[_Stretch]:
     tried: list[_Stretch] = []
     chances: list[float] = []
     scale = scales(found)
-    unit, milli = found.problem.unit, MILLI[found.table.input_unit]
+    unit, milli = found.problem.unit, milli_unit(found)
     floor = found.noise.floor
     by_noise = _by_noise(found)
     for where, low, high, rows in (*_parts(found.table), *_sides(found)):

@@ -184,7 +184,8 @@ def _of_parts(columns: Array, outputs: Array, k: int) -> tuple[float, float]:
         answers.append(answer)
         ranks.append(int(rank))
     change = 0.0
-    if ranks[0] == ranks[1] == np.linalg.matrix_rank(columns, tol=EXCITED_G * np.linalg.norm(columns, 2)):
+    directions = int(np.linalg.matrix_rank(columns, tol=EXCITED_G * np.linalg.norm(columns, 2)))
+    if ranks[0] == ranks[1] == directions > 1:  # at one orientation no slope is known
         excited = np.minimum(columns[:k, 1:].std(axis=0), columns[k:, 1:].std(axis=0))[:, None]
         slopes = [excited * answer[1:] for answer in answers]
         change = float(np.linalg.norm(slopes[1] - slopes[0]) / np.linalg.norm(slopes[0]))

@@ -41,11 +41,12 @@ from calibrations.errors import ModelError, nearest
 from calibrations.fitting.determined import blind_to, undetermined
 from calibrations.fitting.fit import Fit, evaluate, fit, refit
 from calibrations.fitting.sensed import axis_of, milli_unit, pooled_milli
-from calibrations.free_forms.place_names import PREFIX, place_of_effect
+from calibrations.free_forms.place_names import PREFIX, place_of_effect, shown_at_rest
+from calibrations.geometry.orientation import one_orientation
 from calibrations.means.noise import correlation_known, rms
 from calibrations.model import Model
 from calibrations.table import NUMBERS, Array, Table
-from calibrations.text import quantity, rounded
+from calibrations.text import quantity, rounded, sentence
 
 if TYPE_CHECKING:
     from calibrations.discovery.enough import Enough
@@ -53,6 +54,10 @@ if TYPE_CHECKING:
     from calibrations.model.correlations import Correlations
     from calibrations.presentation.chart import Chart, Picture
 
+ONE_ORIENTATION = (
+    "all rows have one orientation, which shows the bias, and not the scale factor, the geometry or any other response "
+    "to the specific force; to calibrate these, measure at several inclinations and turns, as `rig run sweep` does"
+)
 INFLUENCES = ("temperature_c", "supply_v", "t_s")  # that a product may know
 
 
@@ -131,10 +136,15 @@ class Rows(Dataset[Fit]):
         return Rows(replace(self.table, left_out=chosen))
 
     def _searchable(self, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
-        """The effects that act at none of the places that are left out."""
-        if not self.left_out:
-            return effects
+        """The effects that act at none of the places that are left out; at one orientation those that it can show."""
+        if self.at_rest:
+            effects = {name: effect for name, effect in effects.items() if shown_at_rest(name)}
         return {name: effect for name, effect in effects.items() if place_of_effect(name) not in self.left_out}
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether all poses have one orientation."""
+        return one_orientation(self.table)
 
     def fit(self, model: Model) -> Fit:
         """Least squares. Raises what `fit` raises."""
@@ -168,10 +178,9 @@ class Rows(Dataset[Fit]):
     ) -> Findings[Fit]:
         effects = self._searchable(effects)
         found = self._searched_among(start, outliers, origin, effects)
-        if not self.left_out:
-            return found
-        said = f"Places left out of the search: {', '.join(self.left_out)}."
-        return replace(found, remarks=(*found.remarks, said))
+        remarks = [f"Places left out of the search: {', '.join(self.left_out)}."] if self.left_out else []
+        remarks += [sentence(ONE_ORIENTATION)] if self.at_rest else []
+        return replace(found, remarks=(*found.remarks, *remarks))
 
     def _searched_among(
         self, start: Fit, outliers: tuple[int, ...], origin: Fit, effects: Mapping[str, Effect]
@@ -230,6 +239,8 @@ class Rows(Dataset[Fit]):
         hidden = blind_to(found, effects)
         if not hidden:
             return None
+        if self.at_rest:
+            return None  # the verdict and the cautions say it for all effects of the force
         angles = found.table.column("alpha_deg") if found.table.type.stage_angles else np.arange(2.0)
         one = f" The data has only one inclination, alpha = {angles[0]:g} deg; measure at other inclinations."
         return (
@@ -505,7 +516,8 @@ class Rows(Dataset[Fit]):
 
     def cautions(self, found: Fit) -> list[str]:
         """Why a fit of all rows may mislead: a model that the data do not determine, rows that stand out."""
-        return [*filter(None, (undetermined(found), kept(found))), *self.doubts(found)]
+        one = ONE_ORIENTATION if self.at_rest else None
+        return [*filter(None, (one, undetermined(found), kept(found))), *self.doubts(found)]
 
     def doubts(self, found: Fit) -> list[str]:
         """Noise that is stated wrongly, and parameters that no sensor has."""

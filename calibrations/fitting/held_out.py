@@ -1,6 +1,7 @@
 """Error on poses that a fit has not seen: cross-validation over poses, to first order about the full fit.
 
-All rows of one pose (both directions, repeats) are left out together, so that a left-out pose is truly unseen.
+All rows of one pose (both directions, repeats) are left out together, so that a left-out pose is truly unseen. Where
+all rows are one pose, each row is by itself.
 """
 
 from __future__ import annotations
@@ -8,17 +9,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrations.geometry.orientation import one_orientation
 from calibrations.means.noise import Noise, rms
 from calibrations.table import Array, Table
 
-FOLDS = 10
+FOLDS, MOST_FOLDS = 10, 60  # of poses, and of rows
 
 
 def folds(table: Table) -> NDArray[np.intp]:
     """Fold number of each row, shape (n,); rows at the same angles share one. The same table gives the same folds."""
     names = [name for name in table.type.same_pose if name in table]
-    if not names:
-        return np.random.default_rng(0).permutation(table.n) % min(table.n, 60)
+    if not names or one_orientation(table):
+        return np.random.default_rng(0).permutation(table.n) % min(table.n, MOST_FOLDS)
     keys = np.column_stack([np.round(table.column(name), 6) for name in names])
     _, group = np.unique(keys, axis=0, return_inverse=True)
     groups = int(group.max()) + 1

@@ -1,17 +1,23 @@
-"""Residuals in what is sensed: mg, thousandths of the field, or mdeg/s."""
+"""Residuals in what is sensed: mg, thousandths of the field, or mdeg/s.
+
+At one orientation the scale factor is not known: there they are in mV.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from calibrations.fitting.fit import Fit
+from calibrations.geometry.orientation import one_orientation
 from calibrations.table import MILLI, Array
 
 
 def scales(found: Fit) -> Array:
-    """Output per g, or deg/s, of each channel; 1 for a residual in what is sensed."""
+    """Output per g, or deg/s, of each channel; 1 for a residual in what is sensed, or where that is not known."""
     if found.table.type.magnitude:
         return np.ones(1)
+    if one_orientation(found.table):
+        return np.ones(len(found.channels))
     effect = "gyro-scale-factor" if found.table.type.turning else "scale-factor"
     axes, nominal = [axis_of(channel) for channel in found.channels], found.problem.layout.nominal
     return np.abs([found.model.value(f"{effect}.{axis}", nominal) for axis in axes])
@@ -24,7 +30,7 @@ def axis_of(channel: str) -> str:
 
 def milli_unit(fit: Fit) -> str:
     """The unit of `in_milli`."""
-    return MILLI[fit.table.input_unit]
+    return f"m{fit.problem.unit}" if one_orientation(fit.table) else MILLI[fit.table.input_unit]
 
 
 def in_milli(values: Array, fit: Fit) -> Array:

@@ -75,11 +75,14 @@ def own_base_size(data: PoseData) -> int:
 
 
 def start(data: PoseData, given: Given) -> Coefficients:
-    """The base fitted to the nominal poses by ordinary least squares."""
+    """The base fitted to the nominal poses by ordinary least squares; at one orientation a bias alone."""
+    rest = np.zeros(2 + int(data.remounted) + given.columns.shape[2])
+    if data.at_rest:
+        bias = np.mean(data.outputs - given.contribution, axis=1)
+        return Coefficients(np.concatenate([bias, np.zeros(3 * data.channels), rest]), {})
     a = specific_force(Pose(data.alpha, data.beta, data.mount, data.flip, UP))
     X = np.column_stack([np.ones(data.n), a])
     answer = np.linalg.lstsq(X, (data.outputs - given.contribution).T, rcond=1e-9)[0]  # (4, channels)
-    rest = np.zeros(2 + int(data.remounted) + given.columns.shape[2])
     return Coefficients(np.concatenate([answer[0], answer[1:].T.ravel(), rest]), {})
 
 
@@ -106,7 +109,7 @@ def state_at(data: PoseData, given: Given, values: Coefficients, components: Seq
     by_alpha = rows @ (at(alpha + SMALL, beta, tilt) - at(alpha - SMALL, beta, tilt)).T / (2 * SMALL)
     by_beta = rows @ (at(alpha, beta + SMALL, tilt) - at(alpha, beta - SMALL, tilt)).T / (2 * SMALL)
     by_tilt = rows @ (at(alpha, beta, tilt + SMALL) - at(alpha, beta, tilt - SMALL)).T / (2 * SMALL)
-    force = a @ _sensing(rows).T
+    force = a if data.at_rest else a @ _sensing(rows).T
     ones = np.ones_like(linear)
     bare = State(data, force, a, by_alpha, by_beta, by_tilt, linear, linear, ones)
     response, of_force = linear.copy(), np.zeros_like(linear)
@@ -115,13 +118,12 @@ def state_at(data: PoseData, given: Given, values: Coefficients, components: Seq
             part = comp.jacobian(bare) @ values.of[comp.name]
             response += part
             of_force += part if comp.of_force else 0.0
-    # a drift of the sensitivity multiplies all that the sensor makes of the force
-    whole = force.copy()
-    whole[:, :c] += (of_force / np.linalg.norm(rows, axis=1)[:, None]).T
-    drifting = replace(bare, force=whole)
-    for comp in active:
-        if comp.stage == "response" and comp.scales:
-            response += comp.jacobian(drifting) @ values.of[comp.name]
+    if drifts := [comp for comp in active if comp.stage == "response" and comp.scales]:
+        # a drift of the sensitivity multiplies all that the sensor makes of the force
+        whole = force.copy()
+        whole[:, :c] += (of_force / np.linalg.norm(rows, axis=1)[:, None]).T
+        drifting = replace(bare, force=whole)
+        response += sum(comp.jacobian(drifting) @ values.of[comp.name] for comp in drifts)
 
     def output(response: Array) -> Array:
         before = State(data, force, a, by_alpha, by_beta, by_tilt, response, response, ones)
@@ -140,7 +142,8 @@ def base_jacobian(state: State, given: Given) -> Array:
     out = np.zeros((c, n, base_size(data, given)))
     for k in range(c):
         out[k, :, k] = 1.0
-        out[k, :, c + 3 * k : c + 3 * k + 3] = state.reference
+        if not data.at_rest:
+            out[k, :, c + 3 * k : c + 3 * k + 3] = state.reference
     out[:, :, 4 * c] = state.by_alpha
     out[:, :, 4 * c + 1] = state.by_tilt
     if data.remounted:

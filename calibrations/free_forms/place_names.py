@@ -20,6 +20,7 @@ PLACES = {
     "output": "output of all axes over the output itself: the converter",
 }  # and column:NAME, a logged column
 GEOMETRY_PLACE = "geometry"  # a matrix and two angles: no free form, but a search can leave it out
+AT_REST = ("temperature-bias", "time-bias")  # and column:NAME: what one orientation shows
 EFFECTS_AT = {
     "stage-angle-alpha": (),
     "stage-angle-beta": ("stage-eccentricity", "stage-backlash"),
@@ -42,8 +43,19 @@ EFFECTS_AT = {
 }  # the catalogue effects of each place  # fmt: skip
 
 
+def acts_at_rest(place: str) -> bool:
+    """Whether data at one orientation can show what acts at a place: no force drives it, nor multiplies it."""
+    return place in AT_REST or place.startswith("column:")
+
+
 def place_of_effect(name: str) -> str:
     """The place at which an effect of a model acts; "" for bias, scale factor and effects of one's own."""
     if name.startswith(PREFIX):
         return name.removeprefix(PREFIX)
     return next((place for place, effects in EFFECTS_AT.items() if name in effects), "")
+
+
+def shown_at_rest(name: str) -> bool:
+    """Whether data at one orientation can show a catalogue effect, or may show an effect of one's own."""
+    place = place_of_effect(name)
+    return acts_at_rest(place) or name == "quantisation" or (not place and name != "scale-factor")

@@ -18,6 +18,7 @@ from calibrations.free_forms.bases import Harmonics, Line, Play, Products, Ramp,
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import Basis, Columns, Component, Starts, free, per_axis
 from calibrations.free_forms.form import CROSS, Factor, Form
+from calibrations.free_forms.place_names import acts_at_rest
 from calibrations.free_forms.poses import LOGGED_DEG, SIDES, PoseData
 from calibrations.geometry.orientation import out_of_plane
 from calibrations.geometry.stage_path import AS_STATED
@@ -42,7 +43,10 @@ Make = Callable[[tuple[float, ...]], Component]
 
 
 def components(data: PoseData, first: State) -> list[Component]:
-    """Every component that this table can show, but those at places that the search leaves out."""
+    """Every component that this table can show, but those at places that the search leaves out.
+
+    At one orientation nothing over the force can be known, nor a scale factor over anything else.
+    """
     every = [
         *_slow_noise(data),
         *_stages(data, first),
@@ -55,6 +59,8 @@ def components(data: PoseData, first: State) -> list[Component]:
         *_columns(data, first),
         *_general(first),
     ]
+    if data.at_rest:
+        every = [c for c in every if c.noise or (acts_at_rest(c.place) and not c.scales)]
     return [c for c in every if c.place not in data.table.left_out]
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from calibrations.geometry.orientation import one_orientation
 from calibrations.geometry.stage_path import AS_STATED, approached, last_turn, turning_points
 from calibrations.table import Array, Table
 
@@ -68,6 +69,11 @@ class PoseData:
     def channels(self) -> int:
         """Number of measured axes."""
         return len(self.axes)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether all poses have one orientation: no function of the force can be known."""
+        return one_orientation(self.table)
 
     @property
     def timed(self) -> bool:

@@ -15,6 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from calibrations.criteria import SAME_G
 from calibrations.table import Array, Table
 
 UPRIGHT_DEG = {"x": (0.0, 180.0), "y": (90.0, 270.0)}  # beta at +1 g and at -1 g, with alpha at 90 deg
@@ -41,6 +42,12 @@ def nominal_pose(table: Table) -> Pose:
         table.optional("flip", 0.0),
         np.array([0.0, 0.0, 1.0]),
     )
+
+
+@lru_cache(maxsize=8)
+def one_orientation(table: Table) -> bool:
+    """Whether the specific force is the same in all rows of a table with stage angles: a sensor at rest."""
+    return table.type.stage_angles and bool(np.all(np.ptp(specific_force(nominal_pose(table)), axis=0) < SAME_G))
 
 
 def specific_force(pose: Pose) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.effects import Parameter, Values
+from calibrations.geometry.orientation import one_orientation
 from calibrations.geometry.rate_table import rate_scales
 from calibrations.geometry.sphere import sphere_radius
 from calibrations.model import Model, Term
@@ -156,12 +157,12 @@ def _from_data(model: Model, table: Table) -> dict[tuple[int, str, str], tuple[f
 
 @lru_cache(maxsize=8)
 def _nominal(table: Table) -> float:
-    """Output per unit of what is sensed, as the range of outputs has it."""
+    """Output per unit of what is sensed, as the range of outputs has it; 1 where no orientation changes the output."""
     if table.type.turning:
         return float(np.max(np.abs(rate_scales(table)))) or 1.0
     if table.type.field:
         return sphere_radius(table)
-    spread = float(np.median(np.ptp(table.outputs, axis=0))) / 2
+    spread = 0.0 if one_orientation(table) else float(np.median(np.ptp(table.outputs, axis=0))) / 2
     return abs(table.number("output_per_g", spread or 1.0))
 
 
