@@ -39,6 +39,8 @@ MILLI = {"g": "mg", "field": "‰ of the field", "deg/s": "mdeg/s"}  # thousandt
 STANDARD_GRAVITY = 9.80665
 GRAVITY_M_S2 = (9.76, 9.84)  # local gravity on Earth: from the highest mountain near the equator to the poles
 FIRST, LAST = 5, 3  # rows of a long table that a terminal and a notebook show
+LENGTHS = ((7200.0, 3600.0, "h"), (180.0, 60.0, "min"), (-1.0, 1.0, "s"))  # of a time axis: longer than, unit, its name
+HOLD = "hold "  # the paths of a soak, which switches the sensor on
 LARGEST = 1e30  # in any unit: what is measured is smaller, and its fourth power must still be a number
 
 
@@ -215,6 +217,23 @@ class Table:
     def numbered(self, rows: NDArray[np.intp]) -> NDArray[np.intp]:
         """The numbers by which a person knows these rows: those of a run's poses, or of a file's rows, from 0."""
         return rows if self.numbers is None else self.numbers[rows]
+
+
+def time_origin(table: Table) -> tuple[float, str]:
+    """(zero of a time axis on the clock of the table in s, its name): power-on of a soak, else the run's first row.
+
+    The times of a file are taken as they are.
+    """
+    if table.numbers is None:
+        return 0.0, ""
+    if any(path.startswith(HOLD) for path in table.labels.get("path", ())):
+        return 0.0, " since power-on"
+    return float(table.time_s[0]), " since the first pose"
+
+
+def in_time(length_s: float) -> tuple[float, str]:
+    """(unit in s, its name) for a time axis of this length."""
+    return next((size, unit) for limit, size, unit in LENGTHS if length_s > limit)
 
 
 def _check(table: Table) -> None:

@@ -19,7 +19,7 @@ from calibrations.fitting.fit import Fit
 from calibrations.fitting.sensed import axis_of, milli_unit, scales
 from calibrations.means.noise import rms
 from calibrations.model.chain import backward
-from calibrations.table import Array, Table
+from calibrations.table import Array, Table, in_time, time_origin
 from calibrations.text import interval
 
 MOST_PLACES = 8
@@ -49,6 +49,7 @@ class _Stretch:
     unit: str
     scale: float  # output per g, field or deg/s of that channel; 1 for a residual in those
     milli: str  # a thousandth of the sensed unit
+    named: str  # the stretch in words
 
     @property
     def place(self) -> Place:
@@ -58,20 +59,11 @@ class _Stretch:
     @property
     def _text(self) -> str:
         """The place in words, with the mean residual there in the output's unit and in the sensed unit."""
-        if self.where == "side":
-            place = f"side {SIDES[round(self.low)]}"
-        elif self.where == "direction":
-            place = {1: "turning clockwise", -1: "turning anticlockwise", 0: "direction unknown"}[round(self.low)]
-        else:
-            unit = WORDS[self.where][1]
-            place = f"{self.where} {self.low:g} {unit}" if self.low == self.high else (
-                f"{self.where} {interval(self.low, self.high)} {unit}"
-            )  # fmt: skip
         mg = 1e3 * self.mean / self.scale
         own = f"{1e3 * self.mean:+.3g} mV" if self.unit == "V" else f"{self.mean:+.3g} {self.unit}"
         sensed = self.unit in ("g", "field") or self.milli == f"m{self.unit}"
         value = f"{mg:+.3g} {self.milli}" if sensed else f"{own} ({mg:+.3g} {self.milli})"
-        return f"{place}: {self.channel} is off by {value} on average, rms {self.excess:.3g} x the noise floor"
+        return f"{self.named}: {self.channel} is off by {value} on average, rms {self.excess:.3g} x the noise floor"
 
 
 def places(found: Fit) -> tuple[Place, ...]:
@@ -99,7 +91,9 @@ def _fails(found: Fit) -> list[_Stretch]:
         for c, channel in enumerate(found.channels):
             r = found.residual[c, rows]
             excess = float(rms(r) / floor[c])
-            tried.append(_Stretch(where, low, high, channel, excess, float(r.mean()), unit, float(scale[c]), milli))
+            named = _named(found.table, where, low, high)
+            mean, size = float(r.mean()), float(scale[c])
+            tried.append(_Stretch(where, low, high, channel, excess, mean, unit, size, milli, named))
             chances.append(float(chdtrc(len(r), np.sum(by_noise[c, rows] ** 2))))
     if not tried:
         return []
@@ -110,6 +104,20 @@ def _fails(found: Fit) -> list[_Stretch]:
     bad.sort(key=lambda k: tried[k].excess, reverse=True)
     first = {(tried[k].where, tried[k].channel): k for k in reversed(bad)}
     return [tried[k] for k in bad if first[tried[k].where, tried[k].channel] == k]
+
+
+def _named(table: Table, where: str, low: float, high: float) -> str:
+    """A stretch in words; times of a run as its pictures show them."""
+    if where == "side":
+        return f"side {SIDES[round(low)]}"
+    if where == "direction":
+        return {1: "turning clockwise", -1: "turning anticlockwise", 0: "direction unknown"}[round(low)]
+    unit, since = WORDS[where][1], ""
+    if where == "time":
+        size, unit = in_time(float(np.ptp(table.time_s)))
+        zero_s, since = time_origin(table)
+        low, high = (low - zero_s) / size, (high - zero_s) / size
+    return f"{where} {f'{low:g}' if low == high else interval(low, high)} {unit}{since}"
 
 
 def _by_noise(found: Fit) -> Array:

@@ -15,13 +15,11 @@ from calibrations.fitting.sensed import milli_unit, scales
 from calibrations.geometry.orientation import other_in_plane, out_of_plane
 from calibrations.means.noise import rms
 from calibrations.model.chain import backward, force
-from calibrations.table import AXES, MILLI, Array, Table
+from calibrations.table import AXES, MILLI, Array, Table, in_time, time_origin
 from calibrations.text import minus, rounded
 
-LENGTHS = ((7200.0, 3600.0, "h"), (180.0, 60.0, "min"), (-1.0, 1.0, "s"))  # longer than, unit, its name
 RESOLUTION_C = 0.01  # a smaller range of temperatures is that of a constant one
 LABELS = {"temperature_c": "temperature (°C)", "supply_v": "supply voltage (V)"}
-HOLD = "hold "  # the paths of a soak, which switches the sensor on
 SHOWN_OTHERWISE = ("direction", "alpha_deg", "beta_deg")
 NAMES = {
     "alpha_deg": "α (deg)",
@@ -114,23 +112,6 @@ def _time(table: Table, n: int) -> Column:
     size, unit = in_time(float(np.ptp(table.time_s)))
     zero_s, since = time_origin(table)
     return _same("time", f"time{since} ({unit})", (table.time_s - zero_s) / size, n)
-
-
-def time_origin(table: Table) -> tuple[float, str]:
-    """(zero of a time axis on the clock of the table in s, its name): power-on of a soak, else the run's first row.
-
-    The times of a file are taken as they are.
-    """
-    if table.numbers is None:
-        return 0.0, ""
-    if any(path.startswith(HOLD) for path in table.labels.get("path", ())):
-        return 0.0, " since power-on"
-    return float(table.time_s[0]), " since the first pose"
-
-
-def in_time(length_s: float) -> tuple[float, str]:
-    """(unit in s, its name) for a time axis of this length."""
-    return next((size, unit) for limit, size, unit in LENGTHS if length_s > limit)
 
 
 def _same(name: str, label: str, values: Array, n: int) -> Column:

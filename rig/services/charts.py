@@ -26,7 +26,8 @@ from calibrations.presentation.chart import (
 )
 from calibrations.presentation.charts.history import Life
 from calibrations.presentation.charts.noise import TIME, Scaled, measured_points
-from calibrations.presentation.residual import Column, Shown, in_time
+from calibrations.presentation.residual import Column, Shown
+from calibrations.table import in_time
 from calibrations.text import estimate_text, labelled, minus, prefixed, unit
 from procedures.session import Dwell
 from rig.record import Record, Run

@@ -166,7 +166,8 @@ def frame(desk: Desk, here: str) -> Iterator[dict[str, Key]]:
     ui.add_head_html(f'<link rel="stylesheet" href="/static/workbench.css">{TELL}')
     ui.colors(primary="#0067a3", negative="#b3261e")
     with ui.element("header").classes("bar"):
-        ui.label("rig workbench").classes("name")
+        with ui.element("h1").classes("name"):
+            ui.label(TITLE)
         with ui.element("nav").classes("ways"):
             for to, title in PAGES.items():
                 ui.link(title, to).classes("here" if to == here else "")

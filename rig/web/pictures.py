@@ -17,6 +17,15 @@ from rig.web.parts import message, off_loop, redraw
 _CHARTS: WeakKeyDictionary[ui.plotly, Chart] = WeakKeyDictionary()
 
 
+EMPTY = {"data": [], "layout": {"xaxis": {"visible": False}, "yaxis": {"visible": False},
+                                "paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)"}}  # fmt: skip
+
+
+def empty_plot(title: str, classes: str = "plot") -> ui.plotly:
+    """A plot without axes, until `draw` draws a chart in it."""
+    return ui.plotly(EMPTY).classes(classes).props(f'role=group aria-label="{title}"')
+
+
 def draw(plot: ui.plotly, chart: Chart, keep: str, drag: Literal["select", "zoom", False] = "zoom") -> None:
     """Draw a chart in a plot; `keep` names what keeps its zoom."""
     remember(plot, chart)

@@ -52,6 +52,7 @@ def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[
         app,
         title=TITLE,
         dark=None,
+        language="en-US",
         tailwind=False,
         show_welcome_message=False,
         reconnect_timeout=10.0,

@@ -35,12 +35,12 @@ def runs(workbench: Workbench, tmp_path: Path) -> Iterator[list[str]]:
 @pytest.mark.slow
 def test_runs_are_searched_and_one_is_opened_and_noted(workbench: Workbench, runs: list[str]) -> None:
     page = workbench.visit("/record")
-    expect(page.get_by_role("cell", name=runs[0])).to_be_visible()
+    expect(page.get_by_role("cell", name=runs[0], exact=True)).to_be_visible()
     workbench.shot(page, "record")
     workbench.fits(page)
     page.get_by_label("Search").fill(runs[2])
     expect(page.get_by_role("row")).to_have_count(2)
-    page.get_by_role("cell", name=runs[2]).click()
+    page.get_by_role("cell", name=runs[2], exact=True).click()
     expect(page.get_by_text("its process was killed").first).to_be_visible()
     expect(page.locator("[aria-label='the run over time'] .points path")).to_have_count(1)
     page.get_by_label("Note").fill("the door was open")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -35,6 +36,17 @@ def test_names_the_inclinations() -> None:
     assert (place.axis, place.low) == ("x", 90.0)
     assert place.text.startswith("alpha 90 deg: x is off by -1.5")  # mV: the bias takes the mean of cos^2 alpha, 0.4
     assert "mg) on average, rms" in place.text
+
+
+def test_times_of_a_run_begin_at_its_first_pose() -> None:
+    step = 0.02 * (np.arange(len(A_X)) > len(A_X) * 0.8)
+    given = table(step)
+    at = 40_000.0 + 10.0 * np.arange(given.n)
+    timed = replace(given, columns={**given.columns, "t_s": at}, numbers=np.arange(given.n))
+    (place,) = (p for p in compare(timed, read_model("linear")).fails if (p.where, p.axis) == ("time", "x"))
+    assert place.low > 40_000.0
+    first, last = (at[(at >= place.low) & (at <= place.high)][[0, -1]] - 40_000.0) / 60.0
+    assert place.text.startswith(f"time {first:.1f} to {last:.1f} min since the first pose: x is off by")
 
 
 def test_counts_in_mg_of_its_axis() -> None:

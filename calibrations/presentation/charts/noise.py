@@ -41,9 +41,8 @@ from calibrations.presentation.chart import (
     one,
 )
 from calibrations.presentation.charts.discovery import Level, Measure, waterfall
-from calibrations.presentation.residual import in_time
 from calibrations.spectrum import GAUSS_MARKOV
-from calibrations.table import MILLI, Array
+from calibrations.table import MILLI, Array, in_time
 from calibrations.text import rounded
 
 POINTS = 160

@@ -14,7 +14,7 @@ from rig.services.control import HEAD, OUT, PROCEDURE, controlled, row, signals,
 from rig.services.history import when
 from rig.web.pages.history_results import CLICKED, bare
 from rig.web.parts import box, div, failed, for_page, table, words
-from rig.web.pictures import downloads, draw
+from rig.web.pictures import downloads, draw, empty_plot
 
 LOOKS = {OUT: "bad", "in control": "good", "baseline": "plain"}
 
@@ -55,8 +55,7 @@ class CheckStandards:
                         with div("title"):
                             words(title, "grow")
                             downloads(partial(self.plots.get, title), title)
-                        plot = ui.plotly({"data": [], "layout": {}}).classes("live-plot")
-                        plot.props(f'aria-label="Check standard: {title}"')
+                        plot = empty_plot(f"Check standard: {title}", "live-plot")
                         self.plots[title] = plot.on("plotly_click", _clicked, js_handler=CLICKED)
         self.draw()
 

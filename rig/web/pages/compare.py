@@ -25,7 +25,7 @@ from rig.services.two_runs import Pair, again, both, parameters_of, results_of
 from rig.web.desk import Desk, models
 from rig.web.frame import Key, frame
 from rig.web.parts import box, div, failed, noted, off_loop, table, waiting, words
-from rig.web.pictures import downloads, draw, remember
+from rig.web.pictures import downloads, draw, empty_plot, remember
 
 # Pictures of one axis: for two tables, or for two still records.
 
@@ -64,8 +64,7 @@ class Pictures:
                     with div("title"):
                         words(title, "grow")
                         downloads(partial(self.plots.__getitem__, len(self.plots)), title)
-                    plot = ui.plotly({"data": [], "layout": {}}).classes("tall-plot").props(f'aria-label="{title}"')
-                    self.plots.append(plot)
+                    self.plots.append(empty_plot(title, "tall-plot"))
         self.draw()
 
     def draw(self) -> None:
@@ -186,7 +185,8 @@ def _results(first: str, second: str) -> None:
         failed("Cannot compare the results", error)
         return
     if pairs:
-        table(HEAD, [_row(pair) for pair in pairs])
+        with div("wide-table"):
+            table(HEAD, [_row(pair) for pair in pairs])
     else:
         words("These runs have no results in common.", "quiet")
 
@@ -206,7 +206,8 @@ def _parameters(model: str, pairs: list[Pair]) -> None:
             words("Second minus first, with ± two standard uncertainties; ◆ differs by more.", "quiet small")
         with box("stack"):
             words(f"Parameters of {model}", "title")
-            table(HEAD, [_row(pair) for pair in pairs])
+            with div("wide-table"):
+                table(HEAD, [_row(pair) for pair in pairs])
 
 
 def _row(pair: Pair) -> tuple[str, ...]:

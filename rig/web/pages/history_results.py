@@ -34,7 +34,7 @@ from rig.services.history import (
 from rig.services.history_words import agreements, but_stale, chart_verdict, near, next_due, significance, summary
 from rig.services.provenance import today
 from rig.web.parts import Link, box, div, failed, for_page, off_loop, table, words
-from rig.web.pictures import downloads, draw
+from rig.web.pictures import downloads, draw, empty_plot
 
 MODEL = "linear"
 
@@ -230,7 +230,7 @@ class HistoryPictures:
                 draw(self.charts[title], bare(panel), f"{title} {q.name}")
 
     def _plot(self, title: str) -> ui.plotly:
-        plot = ui.plotly({"data": [], "layout": {}}).classes("plot").props(f'aria-label="{title}"')
+        plot = empty_plot(title)
         plot.on("plotly_click", self._clicked, js_handler=CLICKED)
         return plot
 

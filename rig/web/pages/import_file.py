@@ -19,7 +19,7 @@ from rig.services.page_words import IMPORT, address
 from rig.web.desk import FILES, Desk
 from rig.web.frame import frame
 from rig.web.parts import box, div, facts, failed, message, noted, off_loop, waiting, words
-from rig.web.pictures import downloads, draw
+from rig.web.pictures import downloads, draw, empty_plot
 
 MOST_BYTES = 200_000_000
 UNUSED = ""
@@ -93,7 +93,11 @@ def upload(done: Callable[[Path], Awaitable[None]]) -> None:
             return
         await done(path)
 
-    ui.upload(on_upload=received, auto_upload=True, max_file_size=MOST_BYTES).props("flat bordered")
+    field = ui.upload(on_upload=received, auto_upload=True, max_file_size=MOST_BYTES)
+    field.props("flat bordered").classes("upload")
+    with field.add_slot("list"), div("stack"):
+        ui.button("Choose a file", icon="upload_file", on_click=lambda: field.run_method("pickFiles"))
+        words("or drop it here", "quiet small")
 
 
 class Column:
@@ -184,8 +188,7 @@ class ImportPage:
                     with div("title"):
                         words(PICTURE, "grow")
                         downloads(lambda: self.plot, PICTURE)
-                    self.plot = ui.plotly({"data": [], "layout": {}}).classes("tall-plot")
-                    self.plot.props(f'aria-label="{PICTURE}"')
+                    self.plot = empty_plot(PICTURE, "tall-plot")
                 self.result = box("stack")
         self._offer()
 

@@ -22,7 +22,7 @@ from calibrations.presentation.charts.noise import (
     units,
 )
 from rig.web.parts import box, div, words
-from rig.web.pictures import downloads, draw
+from rig.web.pictures import downloads, draw, empty_plot
 
 if TYPE_CHECKING:
     from calibrations.discovery.results import Comparison, Place, Step
@@ -58,8 +58,7 @@ class NoisePictures:
                     with div("title"):
                         words(title, "grow")
                         downloads(partial(self.plots.get, name), title.partition(";")[0])
-                    plot = ui.plotly({"data": [], "layout": {}}).classes("plot")
-                    self.plots[name] = plot.props(f'aria-label="{title}"')
+                    self.plots[name] = empty_plot(title)
 
     def show(self, compared: Comparison[NoiseFit], session: ModelSession[NoiseFit]) -> None:
         """Show a new fit."""

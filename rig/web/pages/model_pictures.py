@@ -19,7 +19,7 @@ from calibrations.presentation.charts.fit import failure, is_function, measureme
 from calibrations.presentation.interactive import figure
 from calibrations.presentation.residual import Column, Shown, choices, first_choices, residual_units
 from rig.web.parts import box, div, redraw, words
-from rig.web.pictures import downloads, draw, remember
+from rig.web.pictures import downloads, draw, empty_plot, remember
 
 if TYPE_CHECKING:
     from calibrations.discovery.results import Comparison, Place, Step
@@ -89,8 +89,7 @@ class Pictures:
                     self.considered.set_visibility(False)
                 downloads(partial(self.plots.get, name), TITLES[name])
             self.legends[name] = words("", "legend quiet")
-            plot = ui.plotly({"data": [], "layout": {}}).classes("plot").props(f'aria-label="{TITLES[name]}"')
-            self.plots[name] = plot
+            plot = self.plots[name] = empty_plot(TITLES[name])
         if name in LINKED:
             plot.on("plotly_selected", self._brushed, js_handler=POINTS)
             plot.on("plotly_deselect", lambda: self.select([]), js_handler="() => emit()")

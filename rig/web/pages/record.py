@@ -25,6 +25,8 @@ COLUMNS: list[dict[str, object]] = [
     {"name": "source", "label": "bench or file", "field": "source", "align": "left", "sortable": True},
 ]
 PAGE = 25
+MARK_ALL = '<q-checkbox v-model="props.selected" dense aria-label="Select all runs" />'
+MARK = '<q-checkbox v-model="props.selected" dense :aria-label="`Select ${props.row.name}`" />'
 
 
 def register(desk: Desk) -> None:
@@ -68,6 +70,8 @@ class Runs:
                 on_select=self._marked,
             ).props("flat dense wrap-cells").classes("runs").on("rowClick", self._open)  # fmt: skip
             self.table.add_slot("body-cell-sensor", LINKED)
+            self.table.add_slot("header-selection", MARK_ALL)
+            self.table.add_slot("body-selection", MARK)
             self.table.bind_filter_from(search, "value")
         self.compare.disable()
 

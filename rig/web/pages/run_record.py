@@ -40,7 +40,7 @@ from rig.web.parts import (
     table,
     words,
 )
-from rig.web.pictures import downloads, remember
+from rig.web.pictures import downloads, empty_plot, remember
 
 MOST_NAMED = 8
 
@@ -175,8 +175,7 @@ class OverTime:
         """The plot; made at the first call, so that the browser loads Plotly early."""
         if self.plot is None:
             with self.place:
-                self.plot = ui.plotly({"data": [], "layout": {}}).classes("live-plot")
-                self.plot.props('aria-label="the run over time"')
+                self.plot = empty_plot("the run over time", "live-plot")
         return self.plot
 
 

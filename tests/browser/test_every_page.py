@@ -1,0 +1,69 @@
+"""Every page: it fits a phone, a tablet and a desk, and people who use a screen reader can use it, light and dark."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, expect
+
+from tests.browser.conftest import PATIENCE_MS, TABLET, Watch
+from tests.recorded import record
+
+pytestmark = pytest.mark.slow
+axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+
+WHOLE = {"width": 1024, "height": 3000}  # axe-core cannot judge colours in what is scrolled away or sticky
+PHONE = {"width": 390, "height": 844}
+SETTLED = """() => Promise.all(document.getAnimations()
+  .filter(each => each.effect.getComputedTiming().endTime !== Infinity).map(each => each.finished))"""
+GRAVE = ("serious", "critical")
+SWEEP, NOISE = "20260101-120000-sweep-000", "20260131-120000-noise-floor-000"
+PAGES = {  # address: what it shows when it is complete
+    f"/?data={SWEEP}": ".card",
+    f"/?data={NOISE}": "[aria-label='The record'] .lines",
+    "/run": "text=Turns alpha",
+    "/record": "text=soak",
+    f"/record/{SWEEP}": ".report iframe",
+    "/history": "text=Check standards",
+    "/history?sensor=simulated": "[aria-label^='Quantit'] .points, .three .points",
+    f"/compare?first={SWEEP}&second={SWEEP}": "[aria-label='Residuals of both'] .points",
+    "/import": "text=Choose a file",
+}
+
+
+@pytest.fixture(scope="module")
+def laboratory(served: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The address of a workbench whose record holds a run of every sort."""
+    said, home = served()
+    shutil.copytree(record(tmp_path_factory, "laboratory"), home, dirs_exist_ok=True)
+    return str(said["url"])
+
+
+@pytest.fixture(scope="module", params=["light", "dark"])
+def visitor_of(
+    request: pytest.FixtureRequest, browser: Browser, watch: Watch, laboratory: str
+) -> Iterator[tuple[BrowserContext, str]]:
+    """A browser with the token, and the origin of the workbench."""
+    context = watch.over(browser.new_context(viewport=WHOLE, color_scheme=request.param))
+    context.set_default_timeout(PATIENCE_MS)
+    context.request.get(laboratory)
+    yield context, laboratory.partition("/?")[0]
+    context.close()
+
+
+@pytest.mark.parametrize(("path", "shown"), PAGES.items())
+def test_every_page_fits_and_is_accessible(visitor_of: tuple[BrowserContext, str], path: str, shown: str) -> None:
+    context, origin = visitor_of
+    page = context.new_page()
+    page.goto(origin + path)
+    expect(page.locator(shown).first).to_be_attached()
+    page.evaluate(SETTLED)
+    found = [each for each in axe.Axe().run(page).response["violations"] if each["impact"] in GRAVE]
+    assert [(each["id"], each["nodes"][0]["html"], each["nodes"][0]["failureSummary"]) for each in found] == []
+    for size in (TABLET, PHONE):
+        page.set_viewport_size(size)
+        page.wait_for_function("document.documentElement.scrollWidth <= innerWidth")
+    page.close()
