@@ -153,12 +153,35 @@ class Table:
     @property
     def output_names(self) -> tuple[str, ...]:
         """The columns of outputs that an axis each was measured in."""
-        return tuple(name for name in self.type.outputs if name in self)
+        return tuple(name for name in self._sensing if name in self)
 
     @cached_property
     def axes(self) -> tuple[str, ...]:
         """The sensing axes that were measured, of "x", "y", "z"."""
-        return tuple(axis for axis, name in zip(AXES, self.type.outputs, strict=False) if name in self)
+        return tuple(axis for axis, name in zip(AXES, self._sensing, strict=False) if name in self)
+
+    @property
+    def digital(self) -> bool:
+        """Whether the outputs are not in V, in a kind whose outputs usually are."""
+        return bool(self.type.digital) and self.type.outputs[0] not in self
+
+    @property
+    def _sensing(self) -> tuple[str, ...]:
+        """The columns that outputs of this table can have, in the order of the axes."""
+        return self.type.digital if self.digital else self.type.outputs
+
+    @property
+    def std_names(self) -> tuple[str, ...]:
+        """The columns that hold the standard deviation of the samples of each output; a table may lack them."""
+        return tuple(std_column(name) for name in self.output_names)
+
+    def output_name(self, axis: str) -> str:
+        """The column of the output of one axis."""
+        return self._sensing[AXES.index(axis)]
+
+    def output(self, axis: str) -> Array:
+        """The measured output of one axis, shape (n,). Raises MissingColumn."""
+        return self.column(self.output_name(axis))
 
     @cached_property
     def outputs(self) -> Array:
@@ -173,7 +196,7 @@ class Table:
     @property
     def unit(self) -> str:
         """Unit of the outputs."""
-        return self.type.unit or str(self.constants.get("unit", "count"))
+        return ("" if self.digital else self.type.unit) or str(self.constants.get("unit", "count"))
 
     @property
     def gravity_m_s2(self) -> float:
@@ -290,6 +313,11 @@ def _check_numbers(table: Table) -> None:
         raise DataError(f'{table.source}: the constant "gravity_m_s2" is {fault}')
 
 
+def std_column(output: str) -> str:
+    """`vx_v` -> `vx_std_v`, `ax` -> `ax_std`: the column of the standard deviation of an output's samples."""
+    return output.replace("_v", "_std_v") if output.endswith("_v") else f"{output}_std"
+
+
 def gravity_fault(value: Constant) -> str | None:
     """Why `value` is no local gravity on Earth, m/s^2, with the likely mistake; None where it is one."""
     low, high = GRAVITY_M_S2
@@ -345,5 +373,5 @@ def guess_kind(names: Iterable[str]) -> str:
         raise MissingColumn(f'the column "{missing[0]}" is missing: {there}')
     raise MissingColumn(
         f"columns {', '.join(names)} do not fit any kind of table; "
-        "poses need alpha_deg, beta_deg, vx_v; positions need ax, ay, az"
+        "poses need alpha_deg, beta_deg and vx_v or ax; positions need ax, ay, az"
     )

@@ -16,6 +16,7 @@ class Kind:
     file: str  # kind of data file that holds it
     columns: tuple[tuple[str, ...], ...]  # sets of columns, of which one must be complete
     outputs: tuple[str, ...] = ()  # columns of the outputs, in the order of the axes x, y, z
+    digital: tuple[str, ...] = ()  # the same of a sensor whose outputs are not in V: the table states their unit
     unit: str = ""  # of the outputs; "" where each table gives its own
     input_unit: str = "g"  # of the sensed quantity
     default_model: str = "linear"
@@ -53,8 +54,9 @@ class Poses(Kind):
     """Poses of a rig with stages: gravity along each axis is known."""
 
     name = file = rows = size_in = "poses"
-    columns = (("alpha_deg", "beta_deg", "vx_v"),)
+    columns = (("alpha_deg", "beta_deg", "vx_v"), ("alpha_deg", "beta_deg", "ax"))
     outputs = ("vx_v", "vy_v", "vz_v")
+    digital = ("ax", "ay", "az")
     unit = "V"
     taken = "the means of {} poses"
     means = budget = known_input = stage_angles = True
@@ -126,8 +128,9 @@ class Motion(Kind):
     """A record of motion. A model is fitted to what each stretch of it holds of the motion."""
 
     name = file = "motion"
-    columns = (("t_s", "vx_v", "displacement_m"),)
+    columns = (("t_s", "vx_v", "displacement_m"), ("t_s", "ax", "displacement_m"))
     outputs = ("vx_v", "vy_v")
+    digital = ("ax", "ay")
     unit = "V"
     rows = "stretches"
     size_in = "samples"

@@ -119,6 +119,11 @@ def quantity(value: float, of: str) -> str:
     return f"{value * factor:.3g} {prefix.replace('µ', 'u')}{of}"
 
 
+def in_milli(of: str) -> tuple[float, str]:
+    """Factor and unit that make small outputs readable: mV, mg and mm/s^2; other units stay as they are."""
+    return (1e3, f"m{of}") if of.partition("/")[0] in ("V", "g", "m") else (1.0, of)
+
+
 def as_written(value: str | float) -> str:
     """A constant as a person wrote it: `17` for 17.0, such as a serial number that a file's header holds."""
     return f"{value:.15g}" if isinstance(value, float) else str(value)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import AbstractContextManager
 from typing import Protocol, TypeVar
 
@@ -13,7 +13,10 @@ Read = TypeVar("Read")
 
 
 class Samples(Protocol):
-    """A block of samples: `volts`, shape (n, channels); `start_s` is the clock's time of the first sample."""
+    """A block of samples: `volts`, shape (n, channels); `start_s` is the clock's time of the first sample.
+
+    Of a digital sensor, `volts` are in the unit of the sensor.
+    """
 
     @property
     def volts(self) -> NDArray[np.float64]: ...
@@ -23,6 +26,14 @@ class Samples(Protocol):
     def rate_hz(self) -> float: ...
     @property
     def start_s(self) -> float: ...
+
+
+OUTPUTS = (("vx", "vy", "vz"), ("ax", "ay", "az"))  # of an analog accelerometer, and of a digital one
+
+
+def output_channel(axis: str, channels: Collection[str]) -> str | None:
+    """The channel of the accelerometer's output along "x", "y" or "z"; None if the sensor does not have this axis."""
+    return next((names["xyz".index(axis)] for names in OUTPUTS if names["xyz".index(axis)] in channels), None)
 
 
 class Turn(Protocol):

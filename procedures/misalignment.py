@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from procedures.errors import ProcedureError, SettingError
+from procedures.instruments import output_channel
 from procedures.level_check import prepare
 from procedures.session import Dwell, Pose, Session
 
@@ -96,11 +97,12 @@ def extremes(dwells: Sequence[Dwell]) -> NDArray[np.float64]:
     angles = []
     for axis, axis_deg in AXES.items():
         rows = [d for d in dwells if d.pose.path.split()[0] in (COARSE, TURN, axis)]
-        if any(f"v{axis}" not in d.means for d in rows):
+        channel = output_channel(axis, rows[0].means)
+        if channel is None:
             raise ProcedureError(f"misalignment: the adc has no channel v{axis}; add it to channels in the bench file")
         a, b = np.radians([(d.pose.alpha_deg, d.pose.beta_deg) for d in rows]).T
         loads = np.column_stack([np.ones(len(rows)), np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a)])
-        _, x, y, z = np.linalg.lstsq(loads, [d.means[f"v{axis}"] for d in rows], rcond=None)[0]
+        _, x, y, z = np.linalg.lstsq(loads, [d.means[channel] for d in rows], rcond=None)[0]
         beta_deg, sag_deg = np.degrees([np.arctan2(y, x), -np.arctan2(z, np.hypot(x, y))])
         angles.append((_wrap(beta_deg - axis_deg), sag_deg))
     return np.array(angles)

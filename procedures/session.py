@@ -74,7 +74,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Dwell:
-    """The measurement at a pose: mean and standard deviation of `n` samples for every channel, in V."""
+    """The measurement at a pose: mean and standard deviation of `n` samples for every channel, in its unit."""
 
     pose: Pose
     t_s: float

@@ -154,7 +154,7 @@ class SoakForecast:
         if before is None:
             return {}
         n, white = part.column("n"), white_std(part)
-        t_s, value = float(np.average(part.time_s, weights=n)), float(np.average(part.column(f"v{axis}_v"), weights=n))
+        t_s, value = float(np.average(part.time_s, weights=n)), float(np.average(part.output(axis), weights=n))
         std = 0.0 if white is None else float(1 / np.sqrt(np.sum(white[:, part.axes.index(axis)] ** -2)))
         return {name: before.after(t_s, value, std, offset=True)}
 

@@ -189,7 +189,7 @@ def _bracket(table: Table, axis: str, rounds: list[RowMask]) -> _Bracket:
         centre_deg,
         len(rounds),
         _columns(table, rows, centre_deg),
-        table.column(f"v{axis}_v")[rows],
+        table.output(axis)[rows],
         None if white is None else white[rows, table.axes.index(axis)],
         np.diff(t_s, prepend=t_s[0]),
     )

@@ -87,7 +87,7 @@ def measured_acceleration(part: Table, record: Record, model: Model, band: Respo
     columns = dict(part.columns)
     for k, axis in enumerate(part.axes):
         response = inverse_response(part, model, k, band)
-        columns[f"v{axis}_v"] = apply_response(part.outputs[:, k], record.rate_hz, response)
+        columns[part.output_name(axis)] = apply_response(part.outputs[:, k], record.rate_hz, response)
     return 1e3 * acceleration(Table(part.kind, columns, part.constants, part.source), model)
 
 
@@ -218,7 +218,7 @@ def _noise_limit(
     """Rms that the sensor's noise alone leaves in the band, mm/s^2."""
     source = part if still is None else still
     where = record if still is None else max(find_records(still), key=lambda r: r.end - r.first)
-    x = source.column("vx_v")[where.rows]
+    x = source.output("x")[where.rows]
     if still is None:
         x = x - _motion_part(x, record, found)
     f, density = periodogram(x, where.rate_hz)
@@ -256,9 +256,12 @@ def _motion_part(x: Array, record: Record, found: Reference) -> Array:
 def linear_from_turns(sweep: Table) -> Model:
     """Ang (1)-(3). Raises DataError where an axis was not held at both +1 g and -1 g."""
     ends = {axis: [_mean(sweep, axis, beta_deg) for beta_deg in UPRIGHT_DEG[axis]] for axis in sweep.axes}
+    unit = sweep.unit
     values = {
-        "bias": [Estimate("bias", axis, (up + down) / 2, None, "V") for axis, (up, down) in ends.items()],
-        "scale-factor": [Estimate("scale", axis, (up - down) / 2, None, "V/g") for axis, (up, down) in ends.items()],
+        "bias": [Estimate("bias", axis, (up + down) / 2, None, unit) for axis, (up, down) in ends.items()],
+        "scale-factor": [
+            Estimate("scale", axis, (up - down) / 2, None, f"{unit}/g") for axis, (up, down) in ends.items()
+        ],
     }
     model = read_model("linear")
     terms = tuple(replace(term, estimates=tuple(values[term.name])) for term in model.terms)
@@ -273,8 +276,8 @@ def fit_physical(sweep: Table) -> Model:
 
 
 def _mean(sweep: Table, axis: str, beta_deg: float) -> float:
-    """Mean output of an axis at alpha = 90 deg and this beta, V."""
+    """Mean output of an axis at alpha = 90 deg and this beta."""
     at: Array = (sweep.column("alpha_deg") == 90) & (np.mod(sweep.column("beta_deg"), 360) == beta_deg)
     if not at.any():
         raise DataError(f"{sweep.source}: no pose at alpha = 90, beta = {beta_deg:g} deg, which axis {axis} needs")
-    return float(sweep.column(f"v{axis}_v")[at].mean())
+    return float(sweep.output(axis)[at].mean())

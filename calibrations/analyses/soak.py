@@ -34,7 +34,7 @@ from calibrations.criteria import (
 from calibrations.errors import TooFewRows
 from calibrations.means.noise import rms
 from calibrations.noise.deviations import deviations
-from calibrations.table import Array, Table
+from calibrations.table import Array, Table, std_column
 
 # Steady state after switching on: when it is reached, how far the output drifts until then, and how fast.
 #
@@ -287,7 +287,7 @@ class Soak:
         """(middles of hours, s; rms noise of single samples within blocks, V)."""
         hour = (self.holds.time_s // HOUR_S).astype(int)
         hours = np.unique(hour)
-        stds = self.holds.column(f"v{axis}_std_v")
+        stds = self.holds.column(std_column(self.holds.output_name(axis)))
         return (hours + 0.5) * HOUR_S, np.array([rms(stds[hour == h]) for h in hours])
 
     def allan(self, axis: str) -> tuple[Array, Array]:
@@ -297,7 +297,7 @@ class Soak:
         new = (paths[1:] != paths[:-1]) | (
             np.abs(np.diff(starts) - step[:-1]) > LONGEST_HOLD_GAP / _rate_hz(self.table)
         )
-        means = np.split(self.holds.column(f"v{axis}_v"), np.flatnonzero(new) + 1)
+        means = np.split(self.holds.output(axis), np.flatnonzero(new) + 1)
         return _pooled(means, float(np.median(step)))
 
 

@@ -195,7 +195,7 @@ class Stepwise:
     @cached_property
     def acceleration(self) -> Array:
         """Acceleration from the measured outputs, g, a_z taken from the stage angle. Ang (14), (16)."""
-        v_x, v_y, a_z = self.table.column("vx_v"), self.table.column("vy_v"), self.force[:, 2]
+        v_x, v_y, a_z = self.table.output("x"), self.table.output("y"), self.force[:, 2]
         return np.column_stack([self.x.acceleration(v_x, v_y, a_z), self.y.acceleration(v_y, v_x, a_z)])
 
     @cached_property
@@ -231,7 +231,7 @@ def estimate_stepwise(table: Table) -> Stepwise:
     Raises MissingColumn without both outputs, DataError where the poses that an equation needs are not there.
     """
     require_kind(table, "poses")
-    v = np.column_stack([table.column("vx_v"), table.column("vy_v")])
+    v = np.column_stack([table.output("x"), table.output("y")])
     a = specific_force(nominal_pose(table))
     turn = in_vertical_plane(a)
     x, y = (

@@ -76,7 +76,7 @@ def _missing(table: Table, rows: Rows) -> str:
 
 
 def _tumble(table: Table, axis: str, path: str, rows: Rows) -> Tumble:
-    volts, beta = table.column(f"v{axis}_v")[rows], np.radians(table.column("beta_deg")[rows])
+    volts, beta = table.output(axis)[rows], np.radians(table.column("beta_deg")[rows])
     columns = np.column_stack([np.cos(beta), np.sin(beta), np.ones(len(beta))])
     white = white_std(table)
     noise = 0.0 if white is None else float(rms(white[rows, table.axes.index(axis)]))

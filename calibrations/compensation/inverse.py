@@ -216,7 +216,7 @@ def _input(name: str, table: Table) -> Array:
     """An input of a program in the rows of a table."""
     if name == RATE:
         return temperature_rate_c_s(table)
-    return table.column(f"{name}_v" if name[0] == "v" else name)
+    return table.output(name[1]) if name[0] == "v" else table.column(name)
 
 
 def _compensated(made: Compensation, table: Table, a: Array) -> dict[str, Array]:

@@ -30,7 +30,6 @@ from calibrations.model import Model
 from calibrations.model.chain import forward
 from calibrations.model.parameters import Layout
 from calibrations.table import AXES, Array, Constant, Table
-from calibrations.tables import KINDS
 
 ROUNDS, CLOSE_GAIN = 12, 1e-2  # evaluations, and the relative change of lambda at which they end
 
@@ -199,7 +198,7 @@ def predict_data(like: Fit, columns: Mapping[str, Array]) -> Table:
     data = like.table
     if not data.type.stage_angles:
         raise DataError(f"{data.source}: a fit to {data.kind} cannot predict poses; fit the model to poses")
-    names = KINDS["poses"].outputs[: len(data.axes)]
+    names = data.output_names
     given = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items() if name != "dwell_s"}
     rows = len(given["alpha_deg"])
     held = {name: np.full(rows, np.mean(data.column(name))) for name in _needed(like) if name not in given}
@@ -237,4 +236,4 @@ def _noise(like: Fit, columns: Mapping[str, Array], rows: int) -> dict[str, Arra
 
 
 def _std_names(data: Table) -> list[str]:
-    return [name for axis in data.axes if (name := f"v{axis}_std_v") in data]
+    return [name for name in data.std_names if name in data]

@@ -236,7 +236,7 @@ def _proposed(curve: PlaceCurve, axis: str, x: Array, value: Array, std: Array) 
         return None
     if curve.unit == "deg":
         return f"{curve.driver} += {best[1]}"
-    target = "v" if not line and curve.unit == "V" else f"v{axis}"
+    target = "v" if not line and not curve.unit.endswith("/g") else f"v{axis}"
     return f"{target} += {f'a{axis}*(' if curve.unit.endswith('/g') else ''}{best[1]}{')' * curve.unit.endswith('/g')}"
 
 

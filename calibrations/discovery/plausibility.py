@@ -416,7 +416,8 @@ def _astray(table: Table, found: Response, rows: list[int]) -> str:
     swapped = len(rows) == 2 and rows == [0, 1] and np.argmax(np.abs(found.slope[:2]), axis=1).tolist() == [1, 0]
     same = swapped and found.slope[0, 1] * found.slope[1, 0] > 0
     remedy = (
-        "the channels are exchanged: exchange the columns vx_v and vy_v, or the channels in the bench file"
+        f"the channels are exchanged: exchange the columns {' and '.join(table.output_names[:2])}, or the channels in "
+        "the bench file"
         if same
         else "check how the sensor is mounted on the stage (mount_deg) and the assignment of the channels"
     )

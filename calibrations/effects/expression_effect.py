@@ -57,6 +57,8 @@ def effect_for(name: str, text: str, table: Table) -> Effect:
             word = next((short for short, needed in COLUMNS.items() if needed == column), column)
             at = expression.names.get(word, 0)
             raise expression.fault(at, f"needs the column {column}; {table.source} has: {', '.join(table.columns)}")
+    if why := effect.lacks(table):
+        raise expression.fault(0, f"{why}; {table.source} has: {', '.join(table.output_names)}")
     return effect
 
 
@@ -138,6 +140,10 @@ class _OnAngle(_FromExpression):
 class _OnOutput(_FromExpression):
     """Adds to the outputs, shape (n, 3)."""
 
+    def lacks(self, table: Table) -> str | None:
+        target = self._expression.target
+        return f"needs the output of axis {target[1]}" if target != "v" and target[1] not in table.axes else None
+
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
         columns = variables(self._expression.names, table) | forces(a)
         values = {name: column[:, None] for name, column in columns.items()}
@@ -158,7 +164,7 @@ def _needs(expression: Expression, parameters: tuple[str, ...]) -> tuple[str, ..
     """Columns without which it has no value."""
     words = [word for word in expression.names if word not in {*FORCES, *parameters}]
     target = expression.target
-    of_target = [] if target == "v" else [target if _on_angle(expression) else f"{target}_v"]
+    of_target = [target] if _on_angle(expression) else []
     return tuple(dict.fromkeys([COLUMNS.get(word, word) for word in words] + of_target))
 
 

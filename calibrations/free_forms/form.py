@@ -132,7 +132,7 @@ class Form:
         if self.driver == "output":
             return response
         if self.driver == "variance":
-            return table.column(f"v{table.axes[k]}_std_v") ** 2
+            return table.column(table.std_names[k]) ** 2
         return table.column(self.driver.removeprefix("column:"))
 
     def _factor(self, table: Table, force: Array, k: int) -> Array:

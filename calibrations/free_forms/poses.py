@@ -40,7 +40,7 @@ class PoseData:
     @staticmethod
     def of(table: Table) -> PoseData:
         """The data of a table in order of time."""
-        spreads = [name.replace("_v", "_std_v") for name in table.output_names]
+        spreads = table.std_names
         known = {f"{name}_of_mean" for name in spreads}
         other = set(table.columns) - USED - set(table.output_names) - set(spreads) - known
         return PoseData(

@@ -138,7 +138,7 @@ def _short_column(name: str, table: Table) -> str | None:
     if name in KNOWN_AS:
         return f"has a place of its own; use {PREFIX}{KNOWN_AS[name]}"
     if name == "std":
-        names = [f"{output.removesuffix('_v')}_std_v" for output in table.output_names]
+        names = table.std_names
         missing = [n for n in names if n not in table]
         if missing:
             return f"needs the standard deviations of the samples, column {', '.join(missing)}"

@@ -48,7 +48,7 @@ def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
 
     A sweep's own regular angles gather outputs as well: the linear model has the same angles and no stairs.
     """
-    noise = float(np.median(table.optional(f"{table.output_names[0].removesuffix('_v')}_std_v", 0.0)))
+    noise = float(np.median(table.optional(table.std_names[0], 0.0)))
     values, span = table.outputs.T.ravel(), float(np.ptp(table.outputs)) or 1.0
     highest = min(1 / (FINEST * noise) if noise > 0 else np.inf, MOST / POINTS / span)
     f = np.arange(FEWEST_STEPS / span, highest, 1 / (POINTS * span))

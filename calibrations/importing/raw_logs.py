@@ -27,7 +27,7 @@ from calibrations.errors import DataError, MissingConstant
 from calibrations.geometry.sphere import sphere_centre
 from calibrations.importing.sessions import average_sections, is_section_log
 from calibrations.means.noise import measured_inflation
-from calibrations.table import Array, Constant, Table
+from calibrations.table import Array, Constant, Table, std_column
 
 # Still intervals of a raw log: a table of positions from samples of a sensor that was put down again and again.
 #
@@ -163,7 +163,6 @@ def thin_by_direction(log: Table) -> Table:
 
 SETTLE_S = 0.2  # dropped at each end of a dwell where the log shows the stages moving
 MOST_BLOCKS = 256  # stretches for the noise: limits time and memory
-OUTPUTS = ("vx_v", "vy_v", "vz_v")
 MOUNTING = ("direction", "mount_deg", "flip")
 
 
@@ -173,7 +172,7 @@ def is_pose_log(table: Table) -> bool:
         not table.type.stage_angles
         or table.n < 2 * FEWEST_ROWS_AT_REST
         or "n" in table
-        or any(_std(v) in table for v in OUTPUTS)
+        or any(name in table for name in table.std_names)
     ):
         return False
     still = _windows(table, FEWEST_ROWS_AT_REST)
@@ -195,10 +194,10 @@ def average_dwells(log: Table) -> Table:
             f"{log.source}: no dwell: alpha and beta never rest for {FEWEST_ROWS_AT_REST} successive rows; "
             "record longer dwells"
         )
-    axes = [name for name in OUTPUTS if name in log]
+    axes = list(log.output_names)
     columns = {name: _means(values, bounds) for name, values in log.columns.items()}
     for name in axes:
-        columns[_std(name)] = np.array([log.columns[name][a:b].std(ddof=1) for a, b in bounds])
+        columns[std_column(name)] = np.array([log.columns[name][a:b].std(ddof=1) for a, b in bounds])
     columns["n"] = np.array([float(b - a) for a, b in bounds])
     for name in ("alpha_deg", "beta_deg"):
         columns[name] = np.round(columns[name], 3)  # a jittering encoder's mean too is that of the same pose again
@@ -317,11 +316,6 @@ def _inflations(log: Table, axes: list[str], bounds: list[tuple[int, int]]) -> d
         for name, factor, std in found
         if std < MOST_UNCERTAIN_INFLATION * factor
     }
-
-
-def _std(output: str) -> str:
-    """`vx_v` -> `vx_std_v`."""
-    return output.replace("_v", "_std_v")
 
 
 # A raw log as the table of what it holds: means of dwells, of rests and turns, or of still positions.

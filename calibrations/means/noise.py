@@ -25,7 +25,7 @@ import numpy as np
 
 from calibrations.criteria import NO_SCATTER
 from calibrations.means.whitening import whiten
-from calibrations.table import Array, Table
+from calibrations.table import Array, Table, std_column
 
 Processes = tuple[tuple[float, float], ...]  # (standard deviation, time constant in s) of Gauss-Markov processes
 
@@ -169,7 +169,7 @@ def white_std(table: Table) -> Array | None:
     """
     if all(_noise_name(name) in table for name in table.output_names):
         return np.column_stack([table.column(_noise_name(name)) for name in table.output_names])
-    names = [_std_name(name) for name in table.output_names]
+    names = list(table.std_names)
     if "n" not in table or not all(name in table for name in names):
         return None
     std = np.column_stack([table.column(name) for name in names])
@@ -258,9 +258,4 @@ def _summed(covariance: Array, n: int) -> tuple[float, int]:
 
 
 def _noise_name(output: str) -> str:
-    return f"{_std_name(output)}_of_mean"
-
-
-def _std_name(output: str) -> str:
-    """`vx_v` -> `vx_std_v`, `ax` -> `ax_std`."""
-    return output.replace("_v", "_std_v") if output.endswith("_v") else f"{output}_std"
+    return f"{std_column(output)}_of_mean"

@@ -7,19 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from drivers.handheld.hand import Hand, Script
-from drivers.handheld.triad import Triad, individual, noise_v, steady_v
+from drivers.handheld.triad import Mass, Triad, individual, noise_v, steady_v
 from drivers.world.config import WorldConfig, changed
+from drivers.world.digital import TRIMS, Trim
 from drivers.world.errors import BadSetting
 from drivers.world.kernel import Floats
 from drivers.world.world import World
 
 INPUTS = ("ax", "ay", "az")
 KEYS = ("hand", "triad")
+OWN_TRIMS = MappingProxyType({**TRIMS, **{name: Trim(name, Mass.zero_v, Mass.volts_per_g) for name in INPUTS}})
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,8 @@ def handheld(settings: Mapping[str, Any]) -> tuple[dict[str, Any], Handheld | No
 
 class HandheldWorld(World):
     """A world with a hand. The sensor lies on its -z side at first."""
+
+    trims = OWN_TRIMS
 
     def __init__(self, config: WorldConfig, seed: int, held: Handheld) -> None:
         super().__init__(config, seed)

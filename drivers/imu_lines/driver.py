@@ -23,7 +23,9 @@ from drivers.recorder import NoDigitalLines, Recorder, Samples
 from drivers.transport import Address, Links
 from drivers.transport.link import Link
 
-OUTPUTS = ("ax", "ay", "az")
+FORCES, RATES, FIELDS = ("ax", "ay", "az"), ("gx", "gy", "gz"), ("mx", "my", "mz")
+OUTPUTS = (*FORCES, *RATES, *FIELDS)
+VOLTAGES = ("supply", "d63")  # of the board's own converter, in V, sampled with the sensor
 TIME = "time"
 QUIET_S = 2.0  # silence that ends a record; at least ten samples
 STUCK = 100  # equal samples of one axis, while another changes
@@ -37,13 +39,17 @@ SHOWN = 3  # damaged lines before a share of them can be judged
 class Settings(NoDigitalLines):
     """The line: `columns` are {ax: 1, ay: 2, az: 3}, by number from 1, or by name for `named` and `teleplot`.
 
-    A column `time` is the sensor's own time, in units of `time_unit_s`. `range` is the end of the range each way, in
-    the sensor's `unit`. Raises ValueError for what cannot be.
+    Columns of a gyroscope (gx, gy, gz) and a magnetometer (mx, my, mz) are recorded for procedures that ask for them.
+    The columns supply and d63 are voltages of the board's converter. A column `time` is the sensor's own time, in units
+    of `time_unit_s`. `range` is the end of the accelerometer's range each way, in `unit`. Raises ValueError for what
+    cannot be.
     """
 
     columns: Mapping[str, int | str] = field(default_factory=lambda: {"ax": 1, "ay": 2, "az": 3})
     format: Literal["csv", "named", "teleplot", "nmea"] = "csv"
     unit: Literal["g", "m/s^2", "count"] = "g"
+    gyro_unit: Literal["deg/s", "rad/s", "count"] = "deg/s"
+    field_unit: Literal["uT", "gauss", "count"] = "uT"
     rate_hz: float = 100.0
     range: float | None = None
     time_unit_s: float = 1e-6
@@ -51,8 +57,9 @@ class Settings(NoDigitalLines):
 
     def __post_init__(self) -> None:
         require_positive(self, "rate_hz", "time_unit_s", *([] if self.range is None else ["range"]))
-        if not set(self.columns) - {TIME} or not set(self.columns) <= {*OUTPUTS, TIME}:
-            raise ValueError(f"columns must name outputs of {', '.join(OUTPUTS)}, and may name {TIME}")
+        if not set(self.columns) & {*OUTPUTS} or not set(self.columns) <= {*OUTPUTS, *VOLTAGES, TIME}:
+            others = f"{', '.join(VOLTAGES)} and {TIME}"
+            raise ValueError(f"columns must name outputs of {', '.join(OUTPUTS)}, and may name {others}")
         if len(set(self.columns.values())) < len(self.columns):
             raise ValueError("columns must be different; two names have the same column")
         numbered = self.format in ("csv", "nmea")
@@ -62,17 +69,31 @@ class Settings(NoDigitalLines):
             raise ValueError("most_lost must be a share of 0 or more, and less than 1")
 
     @property
-    def channels(self) -> Mapping[str, int | str]:
-        """The outputs, by name."""
+    def wired(self) -> Mapping[str, int | str]:
+        """All columns but the time, by name."""
         return {name: column for name, column in self.columns.items() if name != TIME}
 
-    wired = channels
+    @property
+    def channels(self) -> Mapping[str, int | str]:
+        """What is recorded unless a procedure asks for other outputs: those of one sensor, and the voltages."""
+        first = next(names for names in (FORCES, RATES, FIELDS) if set(names) & set(self.columns))
+        return {name: column for name, column in self.wired.items() if name in (*first, *VOLTAGES)}
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """The unit of each output."""
+        kinds: Mapping[Sequence[str], str] = {FORCES: self.unit, RATES: self.gyro_unit, FIELDS: self.field_unit}
+        return {name: unit for names, unit in kinds.items() for name in names if name in self.columns}
+
+    def lag_s(self, channel: str) -> float:  # noqa: ARG002 - as the converter's
+        """All columns of a line are sampled at once."""
+        return 0.0
 
     def only(self, name: str, outputs: Sequence[str]) -> Settings:
         """Settings with these outputs. Raises LimitError for one that is not in the lines."""
-        if missing := [each for each in outputs if each not in self.channels]:
+        if missing := [each for each in outputs if each not in self.wired]:
             raise LimitError(
-                f"{name}: the lines have no {', '.join(missing)}; there are {', '.join(self.channels)}",
+                f"{name}: the lines have no {', '.join(missing)}; there are {', '.join(self.wired)}",
                 "Name the columns in the bench file, under columns of the sensor's settings",
             )
         return replace(self, columns={k: c for k, c in self.columns.items() if k in outputs or k == TIME})
@@ -188,10 +209,10 @@ class LineSensor(Recorder[Settings]):
             )
 
     def _require_alive(self, values: NDArray[np.float64], names: Sequence[str]) -> None:
-        if self.settings.range is not None and (most := np.abs(values).max(axis=0)).max() >= self.settings.range:
-            name = names[int(np.argmax(most))]
+        end = self.settings.range
+        if end is not None and (over := [n for k, n in enumerate(names) if n in FORCES and _most(values[:, k]) >= end]):
             raise OverRange(
-                f"{self.name}: {name} reached the end of its range, {self.settings.range:g} {self.settings.unit}",
+                f"{self.name}: {over[0]} reached the end of its range, {end:g} {self.settings.unit}",
                 "Keep the sensor still, set a wider range in it, or correct `range` in the bench file",
             )
         still = np.ptp(values, axis=0) == 0
@@ -201,6 +222,10 @@ class LineSensor(Recorder[Settings]):
                 f"{self.name}: {name} gave the same value {len(values)} times while others changed: it is stuck",
                 "Switch the sensor off and on; check that the column is the right one",
             )
+
+
+def _most(values: NDArray[np.float64]) -> float:
+    return float(np.abs(values).max())
 
 
 class Heard:

@@ -1,18 +1,20 @@
-"""The simulated digital sensor: the analog sensor of the world, read and divided by its nominal gain inside it."""
+"""The simulated digital sensor: the outputs of the world's sensor as lines of text."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.imu_lines.driver import TIME, Settings
+from drivers.imu_lines.driver import FIELDS, FORCES, RATES, TIME, VOLTAGES, Settings
 from drivers.imu_lines.lines import checksum
 from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
 from drivers.transport.server import Port, Server, Twin
+from drivers.world.digital import Trim, trims
 
 LISTEN = "pty:?baud=115200"
 FAULTS = {
@@ -21,15 +23,19 @@ FAULTS = {
     "wrong-baud": Kind("sends bytes as of another baud rate"),
     "stuck-axis": Kind("repeats the value of its first axis"),
 }
-ZERO_V, V_PER_G = 1.65, 0.8  # nominal, of the analog part
-PER_G = {"g": 1.0, "m/s^2": 9.80665, "count": 16384.0}  # the output at 1 g
-DIGITS = {"g": 6, "m/s^2": 5, "count": 0}
+# unit -> (factor from g, deg/s or uT; decimals)
+FORCE = {"g": (1.0, 6), "m/s^2": (9.80665, 5), "count": (16384.0, 0)}
+RATE = {"deg/s": (1.0, 5), "rad/s": (math.radians(1.0), 7), "count": (131.0, 0)}
+FIELD = {"uT": (1.0, 4), "gauss": (1e-2, 6), "count": (10.0, 0)}
+VOLTAGE = (1.0, 6)
 
 
 class World(Protocol):
     """What a sensor knows of physics."""
 
-    def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]: ...
+    trims: Mapping[str, Trim]
+
+    def sensed(self, outputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]: ...
 
 
 class Talker(Twin):
@@ -49,9 +55,9 @@ class Talker(Twin):
         start_s, first = self._count / rate_hz, self._count
         self._count += due
         if listeners := [c for c in self._port.connections.values() if not c.is_behind(now_s)]:
-            names = [name for name in self._settings.columns if name != TIME]
-            volts = self._world.adc_volts(names, start_s, 1 / rate_hz, due)
-            for k, row in enumerate((volts - ZERO_V) / V_PER_G * PER_G[self._settings.unit]):
+            names = list(self._settings.wired)
+            factors = [formats(self._settings)[name][0] for name in names]
+            for k, row in enumerate(self._world.sensed(names, start_s, 1 / rate_hz, due) * factors):
                 at_s = (first + k) / rate_hz
                 data = self._spoilt(dict(zip(names, row.tolist(), strict=True)), at_s)
                 for connection in listeners:
@@ -82,13 +88,16 @@ class Talker(Twin):
         return 2 * line if self.faults.size("doubled-line", at_s) is not None else line
 
 
+def formats(settings: Settings) -> dict[str, tuple[float, int]]:
+    """For each output the factor from g, deg/s, uT or V to its unit, and the decimals in the line."""
+    of = dict.fromkeys(VOLTAGES, VOLTAGE) | dict.fromkeys(FORCES, FORCE[settings.unit])
+    return of | dict.fromkeys(RATES, RATE[settings.gyro_unit]) | dict.fromkeys(FIELDS, FIELD[settings.field_unit])
+
+
 def line_of(values: Mapping[str, float], settings: Settings) -> bytes:
     """The text of one sample."""
-    digits = DIGITS[settings.unit]
-    shown = {
-        column: f"{values[name]:.0f}" if name == TIME else f"{values[name]:.{digits}f}"
-        for name, column in settings.columns.items()
-    }
+    digits = {name: decimals for name, (_, decimals) in formats(settings).items()} | {TIME: 0}
+    shown = {column: f"{values[name]:.{digits[name]}f}" for name, column in settings.columns.items()}
     if settings.format == "named":
         return (" ".join(f"{name}:{text}" for name, text in shown.items()) + "\r\n").encode()
     if settings.format == "teleplot":
@@ -102,7 +111,12 @@ def line_of(values: Mapping[str, float], settings: Settings) -> bytes:
 
 
 def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
-    """A line with a sensor for each role: role -> (unit id, which such a sensor has not, settings)."""
+    """A line with a sensor for each role: role -> (unit id, which such a sensor has not, settings).
+
+    Raises UnknownInput for a column that the simulated sensor does not have.
+    """
+    for _, settings in roles.values():
+        trims(list(settings.wired), world.trims)
     ports = {role: Port(listen) for role in roles}
     twins = {role: Talker(world, roles[role][1], port) for role, port in ports.items()}
     return Server(list(ports.values()), twins, {role: Address(port.url) for role, port in ports.items()})

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from drivers.errors import did_you_mean
-from drivers.world import gravity, mechanics, positioner, sampling, stage, state, visit
+from drivers.world import digital, gravity, mechanics, positioner, sampling, stage, state, visit
 from drivers.world.config import WorldConfig
 from drivers.world.errors import TimeReversal, UnknownInput
 from drivers.world.initial_state import beginning, individual
@@ -26,6 +26,8 @@ class World:
 
     Worlds of one seed and different `place` are sensors on one table: the same rig, room and supply.
     """
+
+    trims = digital.TRIMS  # of a digital sensor's outputs
 
     def __init__(self, config: WorldConfig, seed: int, place: int = 0) -> None:
         self.config = individual(config, seed, place)
@@ -136,6 +138,15 @@ class World:
         volts, chance = np.empty((n, len(channels))), (self._room, self._slow, self._fast)
         sampling.sample(self._world, self._numbers, channels, late_ns, times_ns, *chance, volts)
         return volts
+
+    def sensed(self, outputs: Sequence[str], start_s: float, interval_s: float, n: int) -> Floats:
+        """Outputs of a digital sensor in g, deg/s, uT and V, shape (n, len(outputs)), all sampled at once.
+
+        Outputs: those of `trims`. The accelerometer has no axis z. Raises as `adc_volts`.
+        """
+        of = digital.trims(outputs, self.trims)
+        volts = self.adc_volts([trim.analog for trim in of], start_s, interval_s, n, [0] * len(of))
+        return digital.trimmed(volts, of)
 
     def dwell_mean(
         self,

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from procedures.instruments import output_channel
 from procedures.session import Limits
 from rig.bench.parts import Certificate, Displacement, Folders, Instrument, Lab, Laboratory, Sensor, Strict, Uncertainty
 
@@ -54,11 +55,17 @@ class Bench(Strict):
         adc = self.instruments.get("adc")
         return adc.typed_settings().wired if adc else {}
 
+    def unit_of(self, channel: str) -> str:
+        """Unit of the samples of a channel: V, or that of a digital sensor."""
+        adc = self.instruments.get("adc")
+        units: Mapping[str, str] = getattr(adc.typed_settings(), "units", {}) if adc else {}
+        return units.get(channel, "V")
+
     @property
     def unit(self) -> str:
-        """Unit of the samples: V, or that of a digital sensor."""
-        adc = self.instruments.get("adc")
-        return str(getattr(adc.typed_settings(), "unit", "V")) if adc else "V"
+        """Unit of the accelerometer's outputs."""
+        channel = output_channel("x", self.channels)
+        return self.unit_of(channel) if channel else "V"
 
     @property
     def constants(self) -> dict[str, str | float]:

@@ -118,7 +118,6 @@ def _simulated(bench: Bench) -> Bench:
     return bench.model_copy(update={"instruments": twins})
 
 
-ANY_UNIT = ("hand-positions",)  # procedures whose tables and results have the unit of the sensor
 BYTES_PER_SAMPLE = 0.4  # in the record, measured on a sweep; an estimate for other noise
 BYTES_PER_POSE = 512  # the rest of a pose in the record
 PLANNED = {
@@ -163,7 +162,6 @@ def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Pla
 
     Raises BenchError for a pose outside the error table of a stage.
     """
-    _require_volts(bench, procedure)
     ledger = Ledger()
     parts = _parts(bench, ledger)
     dry = rehearsing if procedure.adaptive else _counting
@@ -189,15 +187,6 @@ def _counting(bench: Bench, parts: Mapping[str, Any], ledger: Ledger) -> Iterato
     """A session on planned instruments."""
     limits = replace(bench.limits, temperature_c=(-math.inf, math.inf))  # the temperature is not known yet
     yield Session(**parts, clock=ledger, host=PlanHost(ledger), limits=limits)
-
-
-def _require_volts(bench: Bench, procedure: Procedure) -> None:
-    """Raises BenchError for a sensor that does not give volts, in a procedure whose tables and results are in volts."""
-    if bench.unit != "V" and procedure.name not in ANY_UNIT:
-        raise BenchError(
-            f"{procedure.name} needs outputs in V, and the sensor at instruments.adc gives {bench.unit}; "
-            f"calibrate it with {', '.join(ANY_UNIT)}"
-        )
 
 
 def _require_known_angles(bench: Bench, poses: Sequence[Pose]) -> None:

@@ -19,6 +19,7 @@ from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.model import Model
 from calibrations.table import AXES, Array, Table
 from procedures.catalogue import Procedure
+from procedures.instruments import output_channel
 from procedures.session import Pose
 from rig.bench import Bench
 from rig.planning.plan import Plan, plan
@@ -121,7 +122,7 @@ class Range:
     def axes(self) -> tuple[str, ...]:
         """Measured on the bench; those of any sensor of a batch."""
         names = {name.rpartition(".")[2] for name in self.bench.channels}
-        return tuple(axis for axis in AXES if f"v{axis}" in names) or AXES[:2]
+        return tuple(axis for axis in AXES if output_channel(axis, names)) or AXES[:2]
 
     @cached_property
     def candidates(self) -> list[Pose]:

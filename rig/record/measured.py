@@ -21,7 +21,7 @@ from rig.bench import Sensor
 from rig.errors import RecordError, UnknownRun
 from rig.record import tables
 from rig.record.store import Record
-from rig.record.tables import MOST_BLOCKS, inflations, poses_table, samples_table
+from rig.record.tables import MOST_BLOCKS, inflations, poses_table, samples_table, stated_unit, units_of
 from rig.record.values import CHANGED, Block, Kept, Run
 
 # The table of a magnetometer or a gyroscope.
@@ -91,7 +91,8 @@ def _table(run: Run, kept: Sequence[Kept], outputs: Sequence[str], more: Mapping
     columns |= {"n": np.array([float(row.n) for row in rows])}
     blocks = [each.samples for each in kept[:: 1 + len(kept) // MOST_BLOCKS]]
     known = {name: value for name, value in run.constants.items() if name not in NOT_OF_THESE}
-    constants = {"unit": "V", **known, "sample_rate_hz": blocks[0].rate_hz, **inflations(blocks, outputs)}
+    unit = stated_unit(units_of(run, outputs)) or {"unit": "V"}
+    constants = {**known, **unit, "sample_rate_hz": blocks[0].rate_hz, **inflations(blocks, outputs)}
     labels = {"path": tuple(each.pose.path for each in kept)}
     table = Table.from_columns(run.kind, columns, constants, run.run, labels)
     return replace(table, numbers=np.array([each.number for each in kept]))

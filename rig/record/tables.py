@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from math import sqrt
 from typing import Any
 
@@ -16,9 +17,9 @@ import numpy as np
 
 from calibrations.geometry.error_table import ErrorTable
 from calibrations.means.noise import measured_inflation
-from calibrations.table import Array, Table
+from calibrations.table import Array, Table, std_column
 from calibrations.tables import KINDS
-from procedures.instruments import Samples
+from procedures.instruments import OUTPUTS, Samples
 from rig.bench import D63, TURNING, Bench, Instrument
 from rig.errors import RecordError
 from rig.record.values import Kept, Run
@@ -60,7 +61,26 @@ def _resolution_deg(part: Mapping[str, Any]) -> float:
 # towards the sensor's +x. The converter samples the channels of a scan in turn; the constants have the delays.
 
 UM = 1e-6
-AXES = ("vx", "vy", "vz")  # outputs of the sensor; other channels are regressors
+DIGITAL = {f"{sensor}{axis}" for sensor in "agm" for axis in "xyz"}  # channels that may have another unit than V
+AXES = tuple(chain(*OUTPUTS))  # outputs of the sensor; other channels are regressors
+
+
+def units_of(run: Run, channels: Iterable[str]) -> dict[str, str]:
+    """The unit of those of `channels` that are not in V, as a digital sensor's."""
+    if not (possible := [channel for channel in channels if channel in DIGITAL]):
+        return {}
+    bench = Bench.model_validate(run.bench)
+    return {channel: unit for channel in possible if (unit := bench.unit_of(channel)) != "V"}
+
+
+def column_of(channel: str, units: Mapping[str, str]) -> str:
+    """The column of a channel: `vx` -> `vx_v`; that of a digital sensor's output has no unit in its name."""
+    return channel if channel in units else f"{channel}_v"
+
+
+def stated_unit(units: Mapping[str, str]) -> dict[str, str]:
+    """The unit of outputs whose columns do not name it, as a constant of the table."""
+    return {"unit": next(iter(units.values()))} if units else {}
 
 
 def displacement_m(run: Run, volts: Array) -> Array:
@@ -95,13 +115,14 @@ def samples_table(run: Run, poses: Iterable[Kept]) -> Table:
     if not stretches:
         raise RecordError(f"run {run.run} has no samples of kind {run.kind} yet; `rig resume` continues it")
     names = stretches[0].samples.channels
+    units = units_of(run, names)
     volts = np.concatenate([kept.samples.volts for kept in stretches])
     columns = {"t_s": np.concatenate([_times_s(kept) for kept in stretches])}
-    columns |= {f"{name}_v": volts[:, k] for k, name in enumerate(names)}
+    columns |= {column_of(name, units): volts[:, k] for k, name in enumerate(names)}
     if KINDS[run.kind].moving:
         columns |= _attitude(stretches) | {"displacement_m": displacement_m(run, columns.pop(f"{D63}_v"))}
     columns, angle_stds = correct_angles(run, columns)
-    constants = {**run.constants, **angle_stds, "sample_rate_hz": stretches[0].samples.rate_hz}
+    constants = {**run.constants, **stated_unit(units), **angle_stds, "sample_rate_hz": stretches[0].samples.rate_hz}
     return Table.from_columns(run.kind, columns, constants, run.run)
 
 
@@ -138,8 +159,10 @@ def poses_table(run: Run, poses: Iterable[Kept]) -> Table:
     numbers: list[int] = []
     blocks: list[Samples] = []
     stride = 1 + run.rows // MOST_BLOCKS
+    units: Mapping[str, str] | None = None
     for number, kept in enumerate(poses):
-        rows.append(_row(kept))
+        units = units_of(run, kept.samples.channels) if units is None else units
+        rows.append(_row(kept, units))
         paths.append(kept.pose.path)
         numbers.append(kept.number)
         if number % stride == 0:
@@ -150,12 +173,13 @@ def poses_table(run: Run, poses: Iterable[Kept]) -> Table:
     columns = {name: np.array([row[name] for row in rows]) for name in names}
     labels = {"path": tuple(paths)} if any(paths) else {}
     columns, angle_stds = correct_angles(run, columns)
-    constants = {**run.constants, **angle_stds, "sample_rate_hz": blocks[0].rate_hz, **inflations(blocks)}
+    constants = {**run.constants, **stated_unit(units or {}), **angle_stds, "sample_rate_hz": blocks[0].rate_hz}
+    constants |= inflations(blocks)
     table = Table.from_columns(run.kind, _useful(columns), constants, run.run, labels)
     return replace(table, numbers=np.array(numbers))
 
 
-def _row(kept: Kept) -> dict[str, float]:
+def _row(kept: Kept, units: Mapping[str, str]) -> dict[str, float]:
     """The numbers of one pose by column."""
     pose, samples = kept.pose, kept.samples
     row: dict[str, float] = {"alpha_deg": pose.alpha_deg, "beta_deg": pose.beta_deg, "direction": pose.direction}
@@ -163,10 +187,12 @@ def _row(kept: Kept) -> dict[str, float]:
     optional = {name: getattr(kept, name) for name in ("temperature_c", "alpha_read_deg", "beta_read_deg")}
     row |= {name: value for name, value in optional.items() if value is not None}
     means = samples.volts.mean(axis=0)
-    row |= {f"{name}_v": float(m) for name, m in zip(samples.channels, means, strict=True) if name != D63}
+    names = [column_of(name, units) for name in samples.channels]
+    row |= {name: float(m) for name, m in zip(names, means, strict=True) if name != f"{D63}_v"}
     if len(samples.volts) > 1:
         stds = samples.volts.std(axis=0, ddof=1)
-        row |= {f"{name}_std_v": float(s) for name, s in zip(samples.channels, stds, strict=True) if name in AXES}
+        named = zip(samples.channels, names, stds, strict=True)
+        row |= {std_column(name): float(s) for channel, name, s in named if channel in AXES}
     return row | {"n": len(samples.volts)}
 
 

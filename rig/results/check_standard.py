@@ -11,10 +11,14 @@ NAMES = ("bias-{axis}", "scale-{axis}")
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:
-    """bias-x in V and scale-x in V/g, the same of y; uncertainties by white noise alone. Raises DataError."""
+    """bias-x in the unit of the outputs and scale-x per g, the same of y; uncertainties by white noise alone.
+
+    Raises DataError.
+    """
     table, results = measured.table(), {}
     for axis in (axis for axis in table.axes if axis in AXES):
         (tumble,) = estimate_tumbles(table, axis)
-        results[f"bias-{axis}"] = Result(tumble.bias_v, "V", tumble.bias_std_v)
-        results[f"scale-{axis}"] = Result(tumble.scale_v_per_g, "V/g", tumble.scale_std * abs(tumble.scale_v_per_g))
+        results[f"bias-{axis}"] = Result(tumble.bias_v, table.unit, tumble.bias_std_v)
+        std = tumble.scale_std * abs(tumble.scale_v_per_g)
+        results[f"scale-{axis}"] = Result(tumble.scale_v_per_g, f"{table.unit}/g", std)
     return results

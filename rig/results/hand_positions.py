@@ -15,8 +15,8 @@ NAMES = ("bias-{axis}", "scale-{axis}", *(f"nonorthogonality-{pair}" for pair in
 def evaluate(measured: Measured) -> dict[str, Result | Missing]:
     """From all positions together, by the magnitude of gravity:
 
-    bias                 V, output without specific force
-    scale                V/g
+    bias                 output without specific force, in the unit of the outputs
+    scale                that unit per g
     nonorthogonality-xy  deg, departure of the angle between two sensing axes from 90 deg
     uncertainty          g, the largest standard uncertainty of these as an error at 1 g
 

@@ -40,17 +40,17 @@ NAMES = (
 def evaluate(measured: Measured) -> dict[str, Result | Missing]:
     """By an ellipsoid fit to all directions (equations of Book 17):
 
-    hard-iron                V, of each axis
+    hard-iron                of each axis, in the unit of the outputs
     soft-iron                relative, as in the effect soft-iron
     left-by-ellipsoid        rms residual of the magnitude, per mille of the field
-    field-total, -horizontal F and H, V                 (17.6)
+    field-total, -horizontal F and H, in that unit    (17.6)
     field-azimuth            deg from the x axis of the base, clockwise from above
     field-declination        D, deg from true north, if the bench has the `heading_deg` of the base    (17.9)
     field-inclination        I, deg below the horizontal    (17.10)
 
     and by hand, from the extremes of each turn, (17.11)-(17.15):
 
-    hard-iron-by-hand        V
+    hard-iron-by-hand        in the unit of the outputs
     soft-iron-by-hand        smallest over largest radius of the turn about z
     soft-iron-angle-by-hand  deg from x to its major axis, from -90 to 90
     left-by-hand             variation of the corrected magnitude, per mille
@@ -69,8 +69,8 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
             f"run {measured.name} has no pose of the turn about z: all are excluded; take them in again with rig "
             "exclude --include"
         )
-    names, std_v = [p.path for p in poses], _std_v(table)
-    extremes = iron_by_extremes(table.outputs, [p.up for p in poses], names, std_v)
+    names, std = [p.path for p in poses], _std(table)
+    extremes = iron_by_extremes(table.outputs, [p.up for p in poses], names, std)
     why = magnetometer_coverage_warning(table)
     ellipsoid = _all_missing(why) if why else _by_ellipsoid(table, poses)
     level = [k for k, pose in enumerate(poses) if pose.path == poses[0].path]  # the turn about z, upward, is first
@@ -79,12 +79,12 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
     std_deg = azimuth.std if isinstance(azimuth, Result) else None
     turn_std_deg = None if std_deg is None else std_deg * len(set(names)) ** 0.5
     return ellipsoid | _by_extremes(
-        extremes, level_elements_by_extremes(table.outputs[level], attitudes, turn_std_deg), std_v
+        extremes, level_elements_by_extremes(table.outputs[level], attitudes, turn_std_deg), std, table.unit
     )
 
 
-def _std_v(table: Table) -> float:
-    """Standard deviation of the mean at one position, V; 0 for single samples."""
+def _std(table: Table) -> float:
+    """Standard deviation of the mean at one position, in the unit of the outputs; 0 for single samples."""
     white = white_std(table)
     return 0.0 if white is None else float(np.sqrt(np.mean(white**2)))
 
@@ -110,11 +110,11 @@ def _elements(fit: Fit, table: Table, poses: list[Pose]) -> dict[str, Result | M
     (strength,) = fit.model.estimates("field-strength")
     attitudes: Array = np.array([sensor_from_base(pose) for pose in poses])
     turned = field_elements(strength.value * calibration(table.outputs), attitudes, [p.path for p in poses])
-    units = {"F": "V", "H": "V", "D": "deg", "I": "deg"}
+    units = {"F": table.unit, "H": table.unit, "D": "deg", "I": "deg"}
     results: dict[str, Result | Missing] = {}
     for name, value in turned.value.items():
         std = turned.std[name]
-        of_strength = (strength.std or 0.0) * value / strength.value if units[name] == "V" else 0.0
+        of_strength = (strength.std or 0.0) * value / strength.value if name in "FH" else 0.0
         results[ELEMENTS[name]] = Result(value, units[name], None if std is None else hypot(std, of_strength))
         if name == "D" and HEADING in table.constants:
             from_north = (value + table.number(HEADING, 0.0) + 180) % 360 - 180
@@ -122,20 +122,20 @@ def _elements(fit: Fit, table: Table, poses: list[Pose]) -> dict[str, Result | M
     return results
 
 
-def _by_extremes(extremes: ExtremesEstimate, level: Elements, noise_v: float) -> dict[str, Result | Missing]:
+def _by_extremes(extremes: ExtremesEstimate, level: Elements, noise: float, unit: str) -> dict[str, Result | Missing]:
     results: dict[str, Result | Missing] = {}
-    for name, unit in (("H", "V"), ("D", "deg")):
-        results[f"{ELEMENTS[name]}-by-hand"] = Result(level.value[name], unit, level.std[name])
+    for name, own in (("H", unit), ("D", "deg")):
+        results[f"{ELEMENTS[name]}-by-hand"] = Result(level.value[name], own, level.std[name])
     for k, axis in enumerate(AXES):
         value, std = float(extremes.hard_iron[k]), float(extremes.hard_iron_std[k])
         results[f"hard-iron-by-hand-{axis}"] = (
-            Result(value, "V", std)
+            Result(value, unit, std)
             if np.isfinite(value)
             else Missing(f"{axis} was vertical in every turn; use more mounts")
         )
     soft = extremes.soft_iron
-    ratio, noise = soft.least / soft.greatest, noise_v * hypot(1 / soft.least, 1 / soft.greatest)
-    results["soft-iron-by-hand"] = Result(ratio, "", hypot(soft.ratio_std, ratio * noise))
+    ratio, ratio_std = soft.least / soft.greatest, noise * hypot(1 / soft.least, 1 / soft.greatest)
+    results["soft-iron-by-hand"] = Result(ratio, "", hypot(soft.ratio_std, ratio * ratio_std))
     angle_deg = (np.degrees(soft.angle_rad) + 90) % 180 - 90  # an axis has no direction
-    results["soft-iron-angle-by-hand"] = Result(float(angle_deg), "deg", soft.angle_std_deg(noise_v))
+    results["soft-iron-angle-by-hand"] = Result(float(angle_deg), "deg", soft.angle_std_deg(noise))
     return results | {"left-by-hand": Result(extremes.left_per_mille, "per mille")}

@@ -7,9 +7,11 @@ import numpy as np
 from calibrations.analyses.noise_floor import hidden_inclination_deg, noise_rms
 from calibrations.errors import DataError
 from calibrations.geometry.orientation import UPRIGHT_DEG
+from procedures.instruments import output_channel
 from procedures.noise_floor import STILL
 from rig.record import Kept
 from rig.record.measured import Measured
+from rig.record.tables import units_of
 from rig.results.result import Missing, Result
 
 PEAK_TO_PEAK = 4  # x rms: Ang V
@@ -17,7 +19,7 @@ NAMES = ("noise-rms-{axis}", "noise-pp-{axis}", "inclination-{axis}")
 
 
 def evaluate(measured: Measured) -> dict[str, Result | Missing]:
-    """Noise in V, inclination in deg. The inclination needs the poses at +1 g and -1 g.
+    """Noise in the unit of the outputs, inclination in deg. The inclination needs the poses at +1 g and -1 g.
 
     Raises DataError without a still record.
     """
@@ -29,23 +31,23 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
         raise DataError(f"run {measured.run.run} has no still record yet; `rig resume` continues it")
     first, results = still[0].samples, dict[str, Result | Missing]()
     for axis in UPRIGHT_DEG:
-        if (channel := f"v{axis}") not in first.channels:
+        if (channel := output_channel(axis, first.channels)) is None:
             continue
-        k = first.channels.index(channel)
+        k, unit = first.channels.index(channel), units_of(measured.run, [channel]).get(channel, "V")
         value, std = noise_rms([kept.samples.volts[:, k] for kept in still])
-        results[f"noise-rms-{axis}"] = Result(value, "V", std)
-        results[f"noise-pp-{axis}"] = Result(PEAK_TO_PEAK * value, "V", PEAK_TO_PEAK * std)
-        results[f"inclination-{axis}"] = _inclination(upright, axis, value, std)
+        results[f"noise-rms-{axis}"] = Result(value, unit, std)
+        results[f"noise-pp-{axis}"] = Result(PEAK_TO_PEAK * value, unit, PEAK_TO_PEAK * std)
+        results[f"inclination-{axis}"] = _inclination(upright, axis, channel, value, std)
     return results
 
 
-def _inclination(upright: list[Kept], axis: str, rms_v: float, std_v: float) -> Result | Missing:
-    outputs_v = []
+def _inclination(upright: list[Kept], axis: str, channel: str, rms: float, std: float) -> Result | Missing:
+    outputs = []
     for beta_deg in UPRIGHT_DEG[axis]:
-        at_pose_v = [kept.dwell.means[f"v{axis}"] for kept in upright if kept.pose.beta_deg == beta_deg]
-        if not at_pose_v:
+        at_pose = [kept.dwell.means[channel] for kept in upright if kept.pose.beta_deg == beta_deg]
+        if not at_pose:
             return Missing(f"there is no pose at alpha 90, beta {beta_deg:g} deg; `rig show RUN --poses` lists all")
-        outputs_v.append(float(np.mean(at_pose_v)))
-    plus, minus = outputs_v
-    inclination = hidden_inclination_deg(PEAK_TO_PEAK * rms_v, (plus - minus) / 2)
-    return Result(inclination, "deg", inclination * std_v / rms_v if rms_v else None)
+        outputs.append(float(np.mean(at_pose)))
+    plus, minus = outputs
+    inclination = hidden_inclination_deg(PEAK_TO_PEAK * rms, (plus - minus) / 2)
+    return Result(inclination, "deg", inclination * std / rms if rms else None)

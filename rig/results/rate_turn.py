@@ -21,8 +21,8 @@ NAMES = (
 def evaluate(measured: Measured) -> dict[str, Result | Missing]:
     """For each axis:
 
-    gyro-bias                V, output at rest without specific force
-    gyro-scale               V/(deg/s)
+    gyro-bias                output at rest without specific force, in the unit of the outputs
+    gyro-scale               that unit per deg/s
     gyro-misalignment-xy     deg, response of x to a turn about y, as an arc sine
     gyro-g-sensitivity-xy    (deg/s)/g, sensitivity of x to a specific force along y
     rate-residual            deg/s, rms residual of the four over all turns and rests

@@ -12,7 +12,10 @@ NAMES = tuple(f"{quantity}-{kind}-{{axis}}" for quantity in ("bias", "scale") fo
 
 
 def evaluate(measured: Measured) -> dict[str, Result | Missing]:
-    """bias-as-is-x in V, scale-power-y as a fraction, and so on. Raises DataError for fewer than two repetitions."""
+    """bias-as-is-x in the unit of the outputs, scale-power-y as a fraction, and so on.
+
+    Raises DataError for fewer than two repetitions.
+    """
     table, results = measured.table(), dict[str, Result | Missing]()
     for axis in (axis for axis in table.axes if axis in AXES):
         tumbles = estimate_tumbles(table, axis)
@@ -21,7 +24,7 @@ def evaluate(measured: Measured) -> dict[str, Result | Missing]:
             bias = repeatability([t.bias_v for t in of_kind], [t.bias_std_v for t in of_kind])
             mean = sum(t.scale_v_per_g for t in of_kind) / len(of_kind)
             scale = repeatability([t.scale_v_per_g / mean for t in of_kind], [t.scale_std for t in of_kind])
-            results[f"bias-{kind}-{axis}"] = _result(bias, "V")
+            results[f"bias-{kind}-{axis}"] = _result(bias, table.unit)
             results[f"scale-{kind}-{axis}"] = _result(scale, "")
     return results
 

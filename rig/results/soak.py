@@ -11,12 +11,14 @@ from calibrations.analyses.forecast import ForecastHistory, forecast_history, st
 from calibrations.analyses.soak import AXES, HOUR_S, Course, Soak, SteadyState
 from calibrations.analyses.soak import analyse_soak as soak_of
 from calibrations.criteria import COVERAGE_FACTOR, FEWEST_APPROACH_VALUES
-from calibrations.table import Table
+from calibrations.table import Table, std_column
+from procedures.instruments import OUTPUTS, output_channel
 from procedures.session import Dwell
 from procedures.soak import REVERSAL
 from rig.record.measured import Measured
 from rig.results.result import Result
 
+ENDS = {names["xyz".index(axis)] for names in OUTPUTS for axis in AXES}
 FEWEST_STEADY = 3  # reversals after the steady state before it ends a soak
 NAMES = (
     *("steady-state", "steady-state-time", "steady-state-{axis}", "steady-state-time-{axis}"),
@@ -36,16 +38,16 @@ def evaluate(measured: Measured) -> dict[str, Result]:
     steady-state-earliest  h, if it is not reached: lower bound (97.5 %) of the forecast
     steady-state-latest    h, upper bound (97.5 %) of the forecast, if it is within two days
     steady-state-expected  h, median of the forecast, if there is an upper bound
-    bias-drift             V, fitted bias at the last reversal minus that at the first
+    bias-drift             unit of the outputs, fitted bias at the last reversal minus that at the first
     scale-drift            the same of the scale factor, relative to its final value
     time-constant          h, slowest exponential of the bias, if there is one
     scale-time-constant    the same of the scale factor
-    bias-tolerance         V, half-width of the band in which a bias is steady
+    bias-tolerance         unit of the outputs, half-width of the band in which a bias is steady
     scale-tolerance        the same of the scale factor, relative to its final value
     temperature-wander     K, peak to peak, after removing the warm-up of the sensor
     gap                    s, total time without samples
-    bias-final             V, final value of the bias by the Kalman filter, if it is known
-    scale-final            V/g, the same of the scale factor
+    bias-final             unit of the outputs, final value of the bias by the Kalman filter, if it is known
+    scale-final            that unit per g, the same of the scale factor
     bias-foreseen          h, time from which the filter knew the final bias
     scale-foreseen         the same of the scale factor
 
@@ -57,10 +59,10 @@ def evaluate(measured: Measured) -> dict[str, Result]:
         results |= _steady(soak, forecasts, axis)
     for course in soak.courses.values():
         if course.state is not None:
-            results |= _drift(course, course.state)
+            results |= _drift(course, course.state, soak.table.unit)
     if (wander_k := soak.temperature_wander_k) is not None:
         results["temperature-wander"] = Result(wander_k, "K")
-    results |= _foreseen(forecasts)
+    results |= _foreseen(forecasts, soak.table.unit)
     return results | {"gap": Result(sum(gap.length_s for gap in soak.gaps), "s")}
 
 
@@ -82,7 +84,7 @@ def steady(dwells: Sequence[Dwell], oven_c: float) -> bool:
     reversals = [dwell for dwell in dwells if dwell.pose.path.startswith(REVERSAL)]
     if len(list(groupby(reversals, lambda dwell: dwell.pose.path))) < FEWEST_APPROACH_VALUES:
         return False
-    sensors = dict.fromkeys(name.rpartition(".")[0] for name in dwells[0].means if name[-2:] in ("vx", "vy"))
+    sensors = dict.fromkeys(name.rpartition(".")[0] for name in dwells[0].means if name[-2:] in ENDS)
     return all(_at_rest(soak_of(table_of(reversals, sensor), oven_c)) for sensor in sensors)
 
 
@@ -115,10 +117,11 @@ def table_of(
     temperatures_c = [dwell.temperature_c for dwell in dwells if dwell.temperature_c is not None]
     if len(temperatures_c) == len(dwells):
         columns["temperature_c"] = temperatures_c
-    for axis in AXES:
-        if (channel := f"{prefix}v{axis}") in dwells[0].means:
-            columns[f"v{axis}_v"] = [dwell.means[channel] for dwell in dwells]
-            columns[f"v{axis}_std_v"] = [dwell.stds[channel] for dwell in dwells]
+    names = [name.removeprefix(prefix) for name in dwells[0].means if name.startswith(prefix)]
+    for name in (name for axis in AXES if (name := output_channel(axis, names)) is not None):
+        column = f"{name}_v" if name.startswith("v") else name
+        columns[column] = [dwell.means[f"{prefix}{name}"] for dwell in dwells]
+        columns[std_column(column)] = [dwell.stds[f"{prefix}{name}"] for dwell in dwells]
     labels = {"path": tuple(dwell.pose.path for dwell in dwells)}
     return Table.from_columns("poses", columns, constants or {}, "the run", labels)
 
@@ -136,21 +139,21 @@ def _steady(soak: Soak, forecasts: Mapping[str, ForecastHistory], axis: str) -> 
     return results | {f"steady-state-{name}{end}": Result(s / HOUR_S, "h") for name, s in shown.items()}
 
 
-def _foreseen(forecasts: Mapping[str, ForecastHistory]) -> dict[str, Result]:
+def _foreseen(forecasts: Mapping[str, ForecastHistory], of: str) -> dict[str, Result]:
     """The final values at the end of the soak, and the times from which they were known."""
     results: dict[str, Result] = {}
     for name, course in forecasts.items():
         quantity, _, axis = name.partition("-")
         if course.known_s is not None:
             final = course.last.final
-            unit = "V" if quantity == "bias" else "V/g"
+            unit = of if quantity == "bias" else f"{of}/g"
             results[f"{quantity}-final-{axis}"] = Result(final.value, unit, final.half / COVERAGE_FACTOR)
             results[f"{quantity}-foreseen-{axis}"] = Result(course.known_s / HOUR_S, "h")
     return results
 
 
-def _drift(course: Course, state: SteadyState) -> dict[str, Result]:
-    unit, whole = ("V", 1.0) if course.quantity == "bias" else ("", abs(state.final[0]))
+def _drift(course: Course, state: SteadyState, of: str) -> dict[str, Result]:
+    unit, whole = (of, 1.0) if course.quantity == "bias" else ("", abs(state.final[0]))
     value, std = state.drift
     results = {"drift": Result(value / whole, unit, std / whole), "tolerance": Result(state.tolerance / whole, unit)}
     named = {f"{course.quantity}-{name}-{course.axis}": result for name, result in results.items()}

@@ -14,12 +14,13 @@ NAMES = (
 
 
 def evaluate(measured: Measured) -> dict[str, Result]:
-    """Slopes in V/K and 1/K; hysteresis (up minus down) in V and as a fraction. Raises DataError for too few steps."""
+    """Slopes of the bias per K, in the unit of the outputs, and of the scale factor in 1/K; hysteresis (up minus down)
+    in the unit of the outputs and as a fraction. Raises DataError for too few steps."""
     table, results = measured.table(), {}
     for axis in (axis for axis in table.axes if axis in AXES):
         steps = estimate_tumbles(table, axis)
         for name, unit, coefficients in (
-            ("bias", "V", bias_coefficients(steps)),
+            ("bias", table.unit, bias_coefficients(steps)),
             ("scale", "", scale_coefficients(steps)),
         ):
             slope, slope_std = coefficients.slope

@@ -8,14 +8,15 @@ from __future__ import annotations
 import statistics
 import time
 from collections import defaultdict, deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
 import numpy as np
 
 from calibrations.analyses.forecast import Forecast
-from calibrations.text import duration
+from calibrations.text import duration, in_milli
+from procedures.instruments import output_channel
 from procedures.level_check import reversal
 from procedures.questions import Question
 from procedures.session import Guidance, Limits, Reading
@@ -34,20 +35,21 @@ NEAR = 0.1  # of the span: distance from a limit below which a value is marked
 class RunView:
     """The view of a run at one moment.
 
-    `usual_v`: usual scatter of dwells of this kind, by channel. `tilt`: readings of the level by name, deg. `foreseen`:
-    forecast of bias and scale factor in a soak. `so_far`: estimates from the poses so far, in other runs. `range_v`:
-    range of the converter. `simulated`: the rig's time is simulated. `guidance`: what a person with the sensor in the
-    hand does next.
+    `usual`: usual scatter of dwells of this kind, by channel. `tilt`: readings of the level by name, deg. `foreseen`:
+    forecast of bias and scale factor in a soak. `so_far`: estimates from the poses so far, in other runs. `range`:
+    range of the converter, or of the digital sensor. `simulated`: the rig's time is simulated. `guidance`: what a
+    person with the sensor in the hand does next.
     """
 
     title: str
     limits: Limits
-    range_v: float | None
+    range: float | None
     simulated: bool
+    unit_of: Callable[[str], str]  # of a channel
     now: str = "connecting"
     progress: Progress = field(default_factory=Progress)
     kept: Kept | None = None
-    usual_v: Mapping[str, float] = field(default_factory=dict)
+    usual: Mapping[str, float] = field(default_factory=dict)
     tilt: Mapping[str, float] = field(default_factory=dict)
     foreseen: Mapping[str, Forecast] = field(default_factory=dict)
     so_far: Mapping[str, str] = field(default_factory=dict)
@@ -89,8 +91,9 @@ class RunViewer:
 
     def __init__(self, title: str, bench: Bench) -> None:
         adc = bench.instruments.get("adc")
-        range_v = getattr(adc.typed_settings(), "range_v", None) if adc else None
-        self.view = RunView(title, bench.limits, range_v, bench.simulated)
+        settings = adc.typed_settings() if adc else None
+        end = getattr(settings, "range_v", None) or getattr(settings, "range", None)
+        self.view = RunView(title, bench.limits, end, bench.simulated, bench.unit_of)
         self._soak, self._so_far = soak_forecaster(title), RunningEstimates()
         self._scatter: dict[tuple[str, str], deque[float]] = defaultdict(lambda: deque(maxlen=REMEMBERED))
 
@@ -128,7 +131,7 @@ class RunViewer:
             before_it.append(std)
         foreseen = (self._soak.kept(kept) if self._soak else {}) or self.view.foreseen
         progress, so_far = self.view.progress.step(time.monotonic()), self._so_far.kept(kept)
-        self.view = replace(self.view, kept=kept, usual_v=usual, foreseen=foreseen, so_far=so_far, progress=progress)
+        self.view = replace(self.view, kept=kept, usual=usual, foreseen=foreseen, so_far=so_far, progress=progress)
 
     def read(self, reading: Reading) -> None:
         self.view = replace(self.view, tilt={**self.view.tilt, reading.name: reading.value})
@@ -157,19 +160,22 @@ def values(view: RunView) -> Iterator[Value]:
             farthest = float(column[np.argmax(np.abs(column))])
             yield _channel(name, dwell.means[name], dwell.stds[name], farthest, view)
     for name, each in view.foreseen.items():
-        yield Value(name, present(name, each), outlook(name, each))
+        unit = view.unit_of(output_channel("x", kept.samples.channels) or "") if kept is not None else "V"
+        yield Value(name, present(name, each, unit), outlook(name, each, unit))
     for name, shown in view.so_far.items():
         yield Value(name, shown, "from the poses so far")
 
 
 def _channel(name: str, mean: float, std: float, farthest: float, view: RunView) -> Value:
-    """A channel in V. Its largest sample is compared with the range of the converter."""
-    scatter = f"rms {1e3 * std:.3f} mV"
-    if usual_v := view.usual_v.get(name):
-        ratio = std / usual_v
+    """A channel. Its largest sample is compared with the range."""
+    unit = view.unit_of(name)
+    factor, small = in_milli(unit)
+    scatter = f"rms {factor * std:.3f} {small}"
+    if usual := view.usual.get(name):
+        ratio = std / usual
         scatter += f", {ratio:.2g} times the usual value" if not 1 / UNUSUAL <= ratio <= UNUSUAL else ", as usual"
-    limits = None if view.range_v is None else (-view.range_v, view.range_v)
-    return Value(name, f"{mean:.5f} V", scatter, farthest, limits)
+    limits = None if view.range is None else (-view.range, view.range)
+    return Value(name, f"{mean:.5f} {unit}", scatter, farthest, limits)
 
 
 def _tilt(read: Mapping[str, float], axis: str) -> float | None:

@@ -2,8 +2,8 @@
 
 The estimates are recursive least squares, updated with each pose:
 
-    poses          V = bias + s . f              specific force along the sensor's edges: its own is the scale factor
-    rates          V = bias + s . w + g . f      rate w and specific force f
+    poses          v = bias + s . f              specific force along the sensor's edges: its own is the scale factor
+    rates          v = bias + s . w + g . f      rate w and specific force f
     positions      mx^2 + my^2 = 2 c . m + k     a turn with z vertical, and so on: c is the hard iron, k of the turn
 
 The uncertainties follow from the scatter about this formula, so they include all effects that it omits. The results at
@@ -12,18 +12,21 @@ the end of the run come from the whole model.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
 
 from calibrations.estimators.least_squares import Recursive
 from calibrations.table import Array
 from calibrations.text import estimate_text
+from procedures.instruments import OUTPUTS
 from procedures.questions import EDGES
 from procedures.session import Dwell, Pose
+from rig.bench import Bench
 from rig.record import Kept, Record
-from rig.record.measured import sensor_from_table, specific_force_g
+from rig.record.measured import FIELD, RATE, sensor_from_table, specific_force_g
 
 AXES = "xyz"
 Row = tuple[str, Array, float]  # name of the least squares, and one measurement
@@ -31,7 +34,10 @@ Row = tuple[str, Array, float]  # name of the least squares, and one measurement
 
 @dataclass(frozen=True)
 class Law:
-    """The formula of a kind of table: the rows of a dwell, and the parameters with their place and unit."""
+    """The formula of a kind of table: the rows of a dwell, and the parameters with their place and unit.
+
+    In a unit, `{out}` is that of the outputs.
+    """
 
     rows: Callable[[Dwell], Iterator[Row]]
     parameters: Callable[[str], Mapping[str, tuple[int, str]]]
@@ -44,11 +50,14 @@ class RunningEstimates:
     law: Law | None = None
     known: dict[str, Recursive] = field(default_factory=dict)
     path: str = ""
+    bench: Bench | None = None
 
     def begun(self, run: str) -> None:
         """The run begins or continues: take the poses in the record."""
         with Record() as record:
-            self.law, self.known = LAWS.get(record.run(run).kind), {}
+            found = record.run(run)
+            self.law, self.known = LAWS.get(found.kind), {}
+            self.bench = Bench.model_validate(found.bench) if self.law else None
             for _, dwell in record.dwells(run) if self.law else ():
                 self._take(dwell)
 
@@ -73,16 +82,16 @@ class RunningEstimates:
 
     def _estimates(self, law: Law) -> Iterator[tuple[str, str]]:
         for name, known in self.known.items():
-            estimate, sensor = known.estimate(), name.rpartition(".")[0]
+            estimate, (sensor, _, channel) = known.estimate(), name.rpartition(".")
+            out = self.bench.unit_of(channel) if self.bench else "V"
             for parameter, (place, unit) in law.parameters(name).items():
                 value, std = float(estimate.values[place]), float(estimate.scattered[place])
                 if np.isfinite(std):
-                    yield f"{sensor} {parameter}".strip(), f"{estimate_text(value, std)} {unit}"
+                    yield f"{sensor} {parameter}".strip(), f"{estimate_text(value, std)} {unit.replace('{out}', out)}"
 
 
-def _loaded(letter: str, load: Callable[[Pose], Array]) -> Callable[[Dwell], Iterator[Row]]:
-    """Rows of outputs that are linear in loads: channels vx, vy, vz for the letter v."""
-    outputs = [f"{letter}{axis}" for axis in AXES]
+def _loaded(outputs: Collection[str], load: Callable[[Pose], Array]) -> Callable[[Dwell], Iterator[Row]]:
+    """Rows of outputs that are linear in loads."""
 
     def rows(dwell: Dwell) -> Iterator[Row]:
         row = np.append(1.0, load(dwell.pose))
@@ -102,27 +111,27 @@ def _levelled(dwell: Dwell) -> Iterator[Row]:
 
     Positions by hand have no such turns, and no rows.
     """
-    if "mx" not in dwell.means:
+    if FIELD[0] not in dwell.means:
         return
-    pose, m = dwell.pose, np.array([dwell.means[f"m{axis}"] for axis in AXES])
+    pose, m = dwell.pose, np.array([dwell.means[name] for name in FIELD])
     level = np.array([axis != pose.up for axis in AXES], dtype=float)
     turns = np.zeros(2 * len(EDGES))
     turns[2 * EDGES.index(pose.up) + (pose.alpha_deg > 0)] = 1.0
-    yield "m", np.concatenate([2 * level * m, turns]), float(np.sum(level * m**2))
+    yield FIELD[0], np.concatenate([2 * level * m, turns]), float(np.sum(level * m**2))
 
 
 def _line(prefix: str, unit: str) -> Callable[[str], Mapping[str, tuple[int, str]]]:
     def parameters(output: str) -> Mapping[str, tuple[int, str]]:
         axis = output[-1]
-        return {f"{prefix}bias-{axis}": (0, "V"), f"{prefix}scale-{axis}": (1 + AXES.index(axis), unit)}
+        return {f"{prefix}bias-{axis}": (0, "{out}"), f"{prefix}scale-{axis}": (1 + AXES.index(axis), unit)}
 
     return parameters
 
 
 LAWS = {
-    "poses": Law(_loaded("v", specific_force_g), _line("", "V/g")),
-    "rates": Law(_loaded("g", _rate_and_force), _line("gyro-", "V/(deg/s)")),
-    "positions": Law(_levelled, lambda _: {f"hard-iron-{axis}": (k, "V") for k, axis in enumerate(AXES)}),
+    "poses": Law(_loaded([*chain(*OUTPUTS)], specific_force_g), _line("", "{out}/g")),
+    "rates": Law(_loaded(RATE, _rate_and_force), _line("gyro-", "{out}/(deg/s)")),
+    "positions": Law(_levelled, lambda _: {f"hard-iron-{axis}": (k, "{out}") for k, axis in enumerate(AXES)}),
 }
 
 

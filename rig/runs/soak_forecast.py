@@ -60,6 +60,7 @@ class SoakForecaster:
     run: str = ""
     followers: list[Follower] = field(default_factory=list)
     on_s: float | None = None
+    unit: str = "V"  # of the outputs
 
     def begun(self, run: str) -> None:
         """The run begins or continues: take the poses in the record."""
@@ -68,6 +69,7 @@ class SoakForecaster:
             named = [Measured(record, found, name) for name in sensors_of(found)]
             self.followers = [Follower.of(each) for each in named or [Measured(record, found)]]
         self.run, self.on_s = run, None
+        self.unit = str(found.constants.get("unit", "V"))
 
     def kept(self, kept: Kept) -> dict[str, Forecast]:
         """The forecast of each quantity by name, if this pose completes a reversal."""
@@ -85,7 +87,7 @@ class SoakForecaster:
 
     def told(self, kept: Kept) -> str:
         """The forecasts in lines; empty if this pose does not complete a reversal."""
-        return lines(forecasts) if (forecasts := self.kept(kept)) else ""
+        return lines(forecasts, self.unit) if (forecasts := self.kept(kept)) else ""
 
 
 def soak_forecaster(procedure: str) -> SoakForecaster | None:
@@ -93,23 +95,29 @@ def soak_forecaster(procedure: str) -> SoakForecaster | None:
     return SoakForecaster() if procedure == "soak" else None
 
 
-def present(name: str, forecast: Forecast) -> str:
-    """The present value with its unit: 2.49928 V."""
-    return f"{forecast.present.value:.5f} {'V/g' if 'scale' in name else 'V'}"
+def present(name: str, forecast: Forecast, of: str) -> str:
+    """The present value with its unit: 2.49928 V. `of` is the unit of the outputs."""
+    return f"{forecast.present.value:.5f} {_unit(name, of)}"
 
 
-def outlook(name: str, forecast: Forecast) -> str:
+def outlook(name: str, forecast: Forecast, of: str) -> str:
     """The final value and the time of the steady state, with bounds of 95 %."""
     if forecast.surprised:
         return "the drift does not look like a warm-up, so there is no forecast"
-    return f"{_final(name, forecast)}; {_when(forecast)}"
+    return f"{_final(forecast, _unit(name, of))}; {_when(forecast)}"
 
 
-def _final(name: str, forecast: Forecast) -> str:
+def _unit(name: str, of: str) -> str:
+    """The unit of a bias or a scale factor."""
+    return f"{of}/g" if "scale" in name else of
+
+
+def _final(forecast: Forecast, unit: str) -> str:
     """The final value."""
-    unit, final = ("V/g" if "scale" in name else "V"), forecast.final
+    final = forecast.final
     if forecast.known:
-        return f"final value {final.value:.5f} +- {rounded(1e6 * final.half, 2)} u{unit} (95 %)"
+        factor, small = (1e6, f"u{unit}") if unit.startswith(("V", "g")) else (1.0, unit)
+        return f"final value {final.value:.5f} +- {rounded(factor * final.half, 2)} {small} (95 %)"
     return f"final value not yet known: {final.low:.4f} to {final.high:.4f} {unit} (95 %)"
 
 
@@ -128,8 +136,9 @@ def _span(seconds: float) -> str:
     return f"{rounded(seconds / HOUR_S, 2)} h" if seconds >= HOUR_S else f"{seconds / 60:.0f} min"
 
 
-def lines(forecasts: Mapping[str, Forecast]) -> str:
-    """The forecasts of all quantities in lines, with the time since power-on."""
+def lines(forecasts: Mapping[str, Forecast], of: str) -> str:
+    """The forecasts of all quantities in lines, with the time since power-on; `of` is the unit of the outputs."""
     hours = max(each.t_s for each in forecasts.values()) / HOUR_S
-    words = [f"  {name:<9} {present(name, each)} now; {outlook(name, each)}" for name, each in forecasts.items()]
+    shown = {name: f"{present(name, each, of)} now; {outlook(name, each, of)}" for name, each in forecasts.items()}
+    words = [f"  {name:<9} {text}" for name, text in shown.items()]
     return "\n".join([f"{rounded(hours)} h after power-on", *words])

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime, timedelta
+from types import MappingProxyType
 
 import numpy as np
 
@@ -111,6 +112,7 @@ def kind_of(dwell: Dwell) -> str:
 
 
 DAY_S = 86400.0
+VOLTS: Mapping[str, str] = MappingProxyType({})  # no channel has another unit than V
 FEW = 400  # parts: as many can be told apart as dots
 ROW, AXIS = 0.27, 0.6  # inches of a difference, and of the axis of a group
 
@@ -145,8 +147,11 @@ class RunTime:
         return f"{self.begun + timedelta(seconds=t_s - self.first_s):%Y-%m-%d %H:%M:%S} UTC"
 
 
-def course_chart(course: Course, name: str, time: RunTime = RunTime()) -> Chart:
-    """One quantity, V or °C, over the time of the run: means of several dwells, with the range of the dwells."""
+def course_chart(course: Course, name: str, time: RunTime = RunTime(), units: Mapping[str, str] = VOLTS) -> Chart:
+    """One quantity over the time of the run: means of several dwells, with the range of the dwells.
+
+    `units` has those of the channels that are not in V.
+    """
     run_s, mean, low, high = course.line(name)
     t_s = [each - time.zero_s for each in run_s]
     size, unit_s = in_time(t_s[-1] - t_s[0] if t_s else 0.0)
@@ -155,8 +160,8 @@ def course_chart(course: Course, name: str, time: RunTime = RunTime()) -> Chart:
     hover = f"%{{y:.6g}} at %{{x:.4g}} {unit_s}<br>%{{text}}"
     clock = [time.clock(each) for each in run_s]
     line = Line(at, np.array(mean), colour=colour, hover=hover, markers=len(at) < FEW, texts=clock)
-    label = "temperature (°C)" if name == "temperature" else f"{name} (V)"
-    return one(Panel((*band, line), Axis(f"time{time.since} ({unit_s})"), Axis(label)))
+    of = "°C" if name == "temperature" else units.get(name.removeprefix("rms "), "V")
+    return one(Panel((*band, line), Axis(f"time{time.since} ({unit_s})"), Axis(f"{name} ({of})")))
 
 
 # A sensor's life

@@ -76,7 +76,7 @@ def documents(run: Run, table: Table) -> Iterator[tuple[str, dict[str, Any]]]:
             "constants": dict(run.constants),
         },
     )
-    keys = {name: _key(name, run) for name in table.columns}
+    keys = {name: _key(name, run, table) for name in table.columns}
     yield "descriptor", {"uid": descriptor, "run_start": start, "time": began, "name": "primary", "data_keys": keys}
     times = table.time_s - table.time_s[0] + began
     for number, time in enumerate(times):
@@ -96,9 +96,10 @@ def documents(run: Run, table: Table) -> Iterator[tuple[str, dict[str, Any]]]:
     yield "stop", {**end, "reason": run.message or "", "num_events": {"primary": table.n}}
 
 
-def _key(name: str, run: Run) -> dict[str, Any]:
+def _key(name: str, run: Run, table: Table) -> dict[str, Any]:
     key: dict[str, Any] = {"source": run.source, "dtype": "number", "shape": []}
-    unit = UNITS.get(name.rpartition("_")[2])
+    own = name in (*table.output_names, *table.std_names) and not name.endswith("_v")
+    unit = table.unit if own else UNITS.get(name.rpartition("_")[2])
     return {**key, "units": unit} if unit else key
 
 

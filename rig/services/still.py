@@ -6,6 +6,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +17,17 @@ from calibrations.errors import DataError, nearest
 from calibrations.noise.record import Sensed
 from calibrations.noise.samples import hidden_step
 from calibrations.table import AXES, STANDARD_GRAVITY, Array, Table
+from procedures.instruments import OUTPUTS
 from procedures.noise_floor import STILL
 from procedures.soak import HOLD
 from rig.errors import RecordError
 from rig.record.measured import Measured
 from rig.record.store import Record
+from rig.record.tables import units_of
 from rig.record.values import Kept
 from rig.services.tables import BESIDE, FOLLOWED, load
 
+SENSOR = tuple(chain(*OUTPUTS))  # channels of the accelerometer's outputs
 LATE = 0.5  # sampling intervals by which a sample may be off before that is a gap
 DISAGREE = 0.01  # of two rates
 AXIS = re.compile(r"(v|a|g|m|)([xyz])(|_v)")  # of a channel, by its name
@@ -48,7 +52,7 @@ class Stream:
     others: tuple[str, ...] = ()
     closed: list[tuple[float, float]] = field(default_factory=list)  # gaps: where each begins and how long it is, s
     uneven_s: float = 0.0  # by how much the times are off the even row that is taken for them
-    upright_v: dict[int, float] = field(default_factory=dict)  # output along gravity, +1 and -1 g
+    upright: dict[int, float] = field(default_factory=dict)  # output along gravity, +1 and -1 g
     constants: Mapping[str, str | float] = field(default_factory=dict)
     logged: dict[str, list[Array]] = field(default_factory=dict)  # what was read beside the samples, in their blocks
     coarse: dict[str, float] = field(default_factory=dict)  # of that, what was read with less noise than these steps
@@ -59,16 +63,16 @@ class Stream:
         the data state it (`output_per_g`, `output_per_deg_s`, `output_per_field`)."""
         if self.unit in SENSED:
             return SENSED[self.unit]
-        if self.unit == "V" and (scale := self.scale_v_per_g):
+        if scale := self.scale_per_g:
             return Sensed(1 / scale, "g")
         stated = ((_number(self.constants.get(name)), unit) for name, unit in STATED.items())
         return next((Sensed(1 / abs(scale), unit) for scale, unit in stated if scale), None)
 
     @property
-    def scale_v_per_g(self) -> float | None:
+    def scale_per_g(self) -> float | None:
         """From poses of the same run at +1 and -1 g; None where it has none."""
-        if {1, -1} <= self.upright_v.keys() and self.upright_v[1] != self.upright_v[-1]:
-            return abs(self.upright_v[1] - self.upright_v[-1]) / 2
+        if {1, -1} <= self.upright.keys() and self.upright[1] != self.upright[-1]:
+            return abs(self.upright[1] - self.upright[-1]) / 2
         return None
 
 
@@ -242,10 +246,9 @@ def of_run(measured: Measured, channel: str | None, rate_hz: float | None) -> St
     chosen = channel_of(tuple(names), (channel or "").removesuffix("_v") or None, f"run {measured.name}")
     rate = agreed(first.samples.rate_hz, rate_hz or 0.0, f"run {measured.name}")
     corner = float(measured.constants.get("filter_corner_hz", np.inf))
-    outputs = tuple(name for name in names if name in ("vx", "vy", "vz") and name != chosen)
-    found = Stream(
-        measured.name, chosen, rate, "V", iter(()), corner if chosen in ("vx", "vy", "vz") else np.inf, outputs
-    )
+    outputs = tuple(name for name in names if name in SENSOR and name != chosen)
+    unit = units_of(measured.run, [chosen]).get(chosen, "V")
+    found = Stream(measured.name, chosen, rate, unit, iter(()), corner if chosen in SENSOR else np.inf, outputs)
     found.blocks, found.constants = _still_blocks(measured, found), measured.constants
     return found
 
@@ -299,10 +302,10 @@ def coarse(kept: Kept) -> dict[str, float]:
 def _note_upright(kept: Kept, volts: Array, into: Stream) -> None:
     """The mean output of the channel's axis along gravity."""
     alpha, beta = np.radians(kept.pose.alpha_deg), np.radians(kept.pose.beta_deg)
-    along: Mapping[str, float] = {"vx": np.sin(alpha) * np.cos(beta), "vy": np.sin(alpha) * np.sin(beta)}
-    g = along.get(into.channel, 0.0)
+    along: Mapping[str, float] = {"x": np.sin(alpha) * np.cos(beta), "y": np.sin(alpha) * np.sin(beta)}
+    g = along.get(into.channel[-1], 0.0) if into.channel in SENSOR else 0.0
     if abs(g) > UPRIGHT and kept.pose.flip == 0 and kept.pose.mount_deg == 0:
-        into.upright_v.setdefault(round(g), float(volts.mean()))
+        into.upright.setdefault(round(g), float(volts.mean()))
 
 
 # The stream of DATA: a table, an array in a file, or a run.

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from drivers import clock as clock_module
 from drivers.clock import SimulatedClock
+from drivers.handheld.world import HandheldWorld
 from drivers.instrument import Check, Identity
 from drivers.transport import Links
 
@@ -25,13 +26,17 @@ WIRES = [(name, None) for name in NAMES] + [(name, listen) for name in SERIAL fo
 
 
 class Steady:
-    """A world whose inputs are all at 2 V."""
+    """A world whose inputs are all at 2 V, and whose digital outputs are all 2."""
+
+    trims = HandheldWorld.trims
 
     def advance(self, t_s: float) -> None:
         """Nothing changes."""
 
     def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:
         return np.full((n, len(inputs)), 2.0)
+
+    sensed = adc_volts
 
 
 @pytest.fixture(params=WIRES, ids=lambda wire: f"{wire[0]}-{wire[1] or 'usual'}")

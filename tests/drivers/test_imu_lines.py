@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from drivers.clock import SimulatedClock
 from drivers.errors import BadFrame, LimitError, LinkTimeout, OverRange, SensorFault, StreamError
+from drivers.handheld.world import HandheldWorld
 from drivers.imu_lines import driver as imu_lines
 from drivers.imu_lines import twin
 from drivers.imu_lines.lines import Assembly, checksum, fields
@@ -25,10 +26,12 @@ NAMED = {"time": "t", "ax": "x", "ay": "y", "az": "z"}
 class Ramp:
     """Outputs of 0.1 g, -0.2 g and 1 g, with a small ramp in time."""
 
-    def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:
+    trims = HandheldWorld.trims
+
+    def sensed(self, outputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:
         t_s = start_s + interval_s * np.arange(n)
         force_g = {"ax": 0.1, "ay": -0.2, "az": 1.0}
-        return np.column_stack([1.65 + 0.8 * (force_g[name] + 1e-3 * t_s) for name in inputs])
+        return np.column_stack([force_g[name] + 1e-3 * t_s for name in outputs])
 
 
 Connect = Callable[..., imu_lines.LineSensor]

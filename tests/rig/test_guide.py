@@ -171,7 +171,7 @@ def test_it_shows_what_happens_progress_readings_and_time(run: str) -> None:
 
 
 def seen(**changes: Any) -> RunView:
-    return replace(RunView("sweep", Limits(level_deg=0.3), 10.0, False), **changes)
+    return replace(RunView("sweep", Limits(level_deg=0.3), 10.0, False, lambda _: "V"), **changes)
 
 
 def test_values_stand_between_their_limits_and_are_marked_near_them() -> None:
@@ -186,7 +186,7 @@ def test_values_stand_between_their_limits_and_are_marked_near_them() -> None:
 
 def test_it_fits_a_terminal_of_80_columns() -> None:
     console = Console(file=io.StringIO(), width=80)
-    console.print(screen(seen(kept=kept(1), usual_v={"vx": 0.14, "vy": 0.1}), 0.0))
+    console.print(screen(seen(kept=kept(1), usual={"vx": 0.14, "vy": 0.1}), 0.0))
     (line,) = [line for line in console.file.getvalue().splitlines() if "vx" in line]  # type: ignore[attr-defined]
     assert line.rstrip(" │").endswith("rms 141.421 mV, as usual")
 

@@ -188,7 +188,7 @@ def test_no_block_of_a_run_is_read_twice(run: str) -> None:
         ("temperature_c", "supply_v"), 60_000
     )
     assert {len(block) for block in still.logged["supply_v"]} == {1000}
-    assert still.scale_v_per_g == pytest.approx(1.0, rel=0.05)
+    assert still.scale_per_g == pytest.approx(1.0, rel=0.05)
     assert still.closed == []
 
 

@@ -112,9 +112,9 @@ def test_bounds_are_told_however_wide(steady_h: tuple[float, float, float], half
     final = Bounds(2.5 - half_v, 2.5, 2.5 + half_v)
     steady_s = Bounds(*(3600.0 * h for h in steady_h))
     forecast = Forecast(7200.0, Bounds(2.49, 2.491, 2.492), final, steady_s, 1e-4, 9e-3, 1.0)
-    assert outlook("bias-x", forecast).endswith(said)
+    assert outlook("bias-x", forecast, "V").endswith(said)
     step = replace(forecast, surprise=9.0)
-    assert outlook("bias-x", step) == "the drift does not look like a warm-up, so there is no forecast"
+    assert outlook("bias-x", step, "V") == "the drift does not look like a warm-up, so there is no forecast"
 
 
 @pytest.mark.slow

@@ -77,7 +77,7 @@ class Quantisation(Effect):
 def _frequencies(table: Table) -> Array:
     """Codes per {out} that could show: from three in the range up to where the samples' noise hides them."""
     span = float(np.max(np.ptp(table.outputs, axis=0))) or 1.0
-    noise = float(np.median(table.optional("vx_std_v", 0.0)))
+    noise = float(np.median(table.optional(table.std_names[0], 0.0)))
     most = min(VISIBLE / noise if noise > 0 else np.inf, MOST / FINEST / span)
     return np.arange(3 / span, most, 1 / (FINEST * span))
 
@@ -101,7 +101,7 @@ def _saw(table: Table) -> tuple[float, float, float]:
     f = float(frequencies[best])
     # - q / pi sin(2 pi f (V - o)): its transform is + i times a phase of -2 pi f o
     offset = -np.angle(turned[best] / 1j) / (2 * np.pi * f)
-    return 1 / f, float(offset), float(np.median(table.optional("vx_std_v", 0.0))) / 2
+    return 1 / f, float(offset), float(np.median(table.optional(table.std_names[0], 0.0))) / 2
 
 
 def _transform(values: Array, at: Array, frequencies: Array) -> NDArray[np.complex128]:

@@ -37,7 +37,7 @@ class VibrationRectification(Effect):
     def lacks(self, table: Table) -> str | None:
         if table.kind != "poses":
             return None
-        columns = [f"v{axis}_std_v" for axis in table.axes]
+        columns = table.std_names
         if any(name not in table for name in columns):
             return f"needs the columns {', '.join(columns)}"
         same = all(np.ptp(table.column(name)) == 0 for name in columns)
@@ -52,8 +52,8 @@ class VibrationRectification(Effect):
 def _mean_squares_g2(table: Table, output_per_g: float) -> Array:
     """Mean square of the samples of each axis about their mean, less the least of all rows, g^2, shape (n, 3)."""
     out = np.zeros((table.n, 3))
-    for k, axis in enumerate(table.axes):
-        squares = (table.column(f"v{axis}_std_v") / output_per_g) ** 2
+    for k, name in enumerate(table.std_names):
+        squares = (table.column(name) / output_per_g) ** 2
         out[:, k] = squares - squares.min()
     return out
 

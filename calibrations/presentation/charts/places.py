@@ -39,7 +39,7 @@ from calibrations.presentation.chart import (
     one,
 )
 from calibrations.table import Array, Table
-from calibrations.text import rounded
+from calibrations.text import in_milli, rounded
 
 MOST_PLACES, MOST_FORMS = 6, 3  # that are drawn: places, and catalogue forms through the curve of one
 MOST_ROWS = 130  # to which a form is fitted
@@ -140,7 +140,7 @@ def curve_chart(curve: PlaceCurve, forms: Sequence[Through] = ()) -> Chart:
 
 def curve_panel(curve: PlaceCurve, axis: str, forms: Sequence[Through] = ()) -> Panel:
     """The curve of one axis."""
-    scale, unit = _scaled(curve.unit)
+    scale, unit = in_milli(curve.unit)
     at, value, band = curve.at[axis], scale * curve.value[axis], COVERAGE * scale * curve.std[axis]
     series: list[Series] = [
         Rule(0.0, width=0.7),
@@ -215,11 +215,6 @@ def _size(curve: PlaceCurve, end: Fit) -> float:
     """Size of a curve: its rms; that of a stage angle in the output that the angle changes."""
     rms = max(float(np.std(value)) for value in curve.value.values())
     return rms * (np.radians(1.0) * float(np.ptp(end.table.outputs)) / 2 if curve.unit == "deg" else 1.0)
-
-
-def _scaled(unit: str) -> tuple[float, str]:
-    """Factor and unit that make small numbers readable."""
-    return (1e3, f"m{unit}") if unit.startswith("V") else (1.0, unit)
 
 
 def _picture(curve: PlaceCurve, forms: Sequence[Through]) -> Picture:

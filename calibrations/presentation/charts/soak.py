@@ -32,7 +32,7 @@ from calibrations.presentation.chart import (
     stacked,
 )
 from calibrations.table import Array
-from calibrations.text import rounded, time_text
+from calibrations.text import in_milli, prefixed, rounded, time_text
 
 COLOURS = {"x": BLUE, "y": VERMILION}
 TIME = "time since power-on (h)"
@@ -75,8 +75,10 @@ def soak_album(found: Soak, foreseen: Mapping[str, ForecastHistory] = MappingPro
 def drift(found: Soak) -> Chart:
     """A column for each axis: bias above, scale factor below, as change from the final value."""
     above, below = [], []
+    factor, unit = in_milli(found.table.unit)
     for axis in found.axes:
-        above.append(_course(found, found.courses[f"bias-{axis}"], 1e3, "bias − final value (mV)", f"axis {axis}"))
+        bias = found.courses[f"bias-{axis}"]
+        above.append(_course(found, bias, factor, f"bias − final value ({unit})", f"axis {axis}"))
         scale = found.courses[f"scale-{axis}"]
         below.append(_course(found, scale, 1e6 / _final(scale), "scale factor − final value (ppm)"))
     return Chart((tuple(above), tuple(below)), 2.9, share_x=True)
@@ -85,7 +87,8 @@ def drift(found: Soak) -> Chart:
 def forecasts(found: Soak, foreseen: Mapping[str, ForecastHistory]) -> Chart:
     """A column for each axis: forecasts of the final bias and scale factor, less the last forecast."""
     rows = []
-    for quantity, name, factor, unit in (("bias", "bias", 1e3, "mV"), ("scale", "scale factor", 1e6, "ppm")):
+    scales = (("bias", "bias", *in_milli(found.table.unit)), ("scale", "scale factor", 1e6, "ppm"))
+    for quantity, name, factor, unit in scales:
         panels = []
         for axis in found.axes:
             course = foreseen.get(f"{quantity}-{axis}")
@@ -127,23 +130,23 @@ def surroundings(found: Soak) -> Chart:
         if name in holds:
             line = Line(*_thinned(holds.time_s / HOUR_S, holds.column(name)), colour=colour)
             panels.append(Panel((*_gaps(found), line), begin, Axis(label)))
-    lines = []
+    lines, (factor, unit) = [], in_milli(found.table.unit)
     for axis in found.axes:
         times_s, rms = found.noise_of_hours(axis)
-        lines.append(Line(times_s / HOUR_S, 1e3 * rms, f"axis {axis}", COLOURS[axis], markers=True))
-    panels.append(Panel((*_gaps(found), *lines), begin, Axis("noise, rms (mV)"), legend="best"))
+        lines.append(Line(times_s / HOUR_S, factor * rms, f"axis {axis}", COLOURS[axis], markers=True))
+    panels.append(Panel((*_gaps(found), *lines), begin, Axis(f"noise, rms ({unit})"), legend="best"))
     return stacked(panels, 1.7)
 
 
 def allan(found: Soak) -> Chart:
     """Allan deviation of each axis on logarithmic axes, and the slope of white noise."""
-    lines = []
+    lines, (factor, unit) = [], prefixed(found.table.unit, max(found.allan(axis)[1].max() for axis in found.axes))
     for axis in found.axes:
         times_s, deviations = found.allan(axis)
-        lines.append(Line(times_s, 1e6 * deviations, f"axis {axis}", COLOURS[axis], markers=True))
-    slope = 1e6 * deviations[0] * np.sqrt(times_s[0] / times_s)
+        lines.append(Line(times_s, factor * deviations, f"axis {axis}", COLOURS[axis], markers=True))
+    slope = factor * deviations[0] * np.sqrt(times_s[0] / times_s)
     lines.append(Line(times_s, slope, "white noise", QUIET, dash="dot"))
-    return one(Panel(tuple(lines), Axis("averaging time (s)", log=True), Axis("Allan deviation (µV)", log=True),
+    return one(Panel(tuple(lines), Axis("averaging time (s)", log=True), Axis(f"Allan deviation ({unit})", log=True),
                      legend="best"), 3.0)  # fmt: skip
 
 
@@ -206,7 +209,7 @@ def _final(course: Course) -> float:
 
 def _still(found: Soak, course: Course) -> tuple[Array, Array]:
     """The still record at 0 g, shifted onto the bias: what differs there is load along z."""
-    t_s, volts = _thinned(found.holds.time_s, found.holds.column(f"v{course.axis}_v"))
+    t_s, volts = _thinned(found.holds.time_s, found.holds.output(course.axis))
     return t_s, volts - np.median(volts - np.interp(t_s, course.t_s, course.values))
 
 

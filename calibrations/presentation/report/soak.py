@@ -13,7 +13,7 @@ from calibrations.analyses.soak import HOUR_S, Course, RecordGap, Soak
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.soak import soak_album
 from calibrations.presentation.report.page import figure, page
-from calibrations.text import bound, estimate_text, joined, minus, rounded, time_text
+from calibrations.text import bound, estimate_text, in_milli, joined, minus, rounded, time_text
 
 WANDERED_K = 1.0  # peak to peak; ambient that changes by more is not constant
 
@@ -39,8 +39,8 @@ def soak_report(
         summary=_summary(found),
         figures=_figures(found),
         pictures=[figure(picture) for picture in shown],
-        courses=[_course(course) for course in found.courses.values()],
-        foreseen=[_outlook(name, course) for name, course in foreseen.items()],
+        courses=[_course(course, found.table.unit) for course in found.courses.values()],
+        foreseen=[_outlook(name, course, found.table.unit) for name, course in foreseen.items()],
         verdicts=[_verdict(name, result) for name, result in results.items() if result["limit"] is not None],
         gaps=[_gap(gap) for gap in found.gaps],
         provenance=facts,
@@ -93,7 +93,8 @@ def _figures(found: Soak) -> list[tuple[str, str, str]]:
     for axis in found.axes:
         time, bias = found.time_s(axis), found.courses[f"bias-{axis}"]
         if bias.state is not None:
-            change = f"{_signed(1e3 * bias.state.drift[0])} mV"
+            factor, unit = in_milli(found.table.unit)
+            change = f"{_signed(factor * bias.state.drift[0])} {unit}"
             drift = f"bias drifts by {change}" if bias.state.terms else "no drift of the bias beyond the noise"
             reached = "from the start" if found.from_start(axis) else f"{_hours(time)} h" if time else "not reached"
             shown.append((f"steady state, axis {axis}", reached, drift))
@@ -105,13 +106,13 @@ def _figures(found: Soak) -> list[tuple[str, str, str]]:
     return shown
 
 
-def _course(course: Course) -> dict[str, Any]:
-    """One row of the table: a bias in mV, a scale factor in mV/g."""
-    state, unit = course.state, "mV" if course.quantity == "bias" else "mV/g"
+def _course(course: Course, of: str) -> dict[str, Any]:
+    """One row of the table; `of` is the unit of the outputs: a bias in mV, a scale factor in mV/g."""
+    state, (factor, unit) = course.state, in_milli(of if course.quantity == "bias" else f"{of}/g")
     row = {"name": course.quantity.replace("scale", "scale factor"), "axis": course.axis, "unit": unit}
     if state is None:
         return row | {
-            "final": rounded(1e3 * course.values[-1], 6),
+            "final": rounded(factor * course.values[-1], 6),
             "drift": "–",
             "tolerance": "–",
             "tau": "–",
@@ -119,24 +120,25 @@ def _course(course: Course) -> dict[str, Any]:
         }
     taus = [estimate_text(*(each / HOUR_S for each in term.tau_s)) for term in state.terms]
     return row | {
-        "final": estimate_text(*(1e3 * each for each in state.final)),
-        "drift": estimate_text(*(1e3 * each for each in state.drift)) if state.terms else "none beyond the noise",
-        "tolerance": rounded(1e3 * state.tolerance, 2),
+        "final": estimate_text(*(factor * each for each in state.final)),
+        "drift": estimate_text(*(factor * each for each in state.drift)) if state.terms else "none beyond the noise",
+        "tolerance": rounded(factor * state.tolerance, 2),
         "tau": joined(taus) if taus else "–",
         "time": "first reversal" if state.from_start else _hours(course.time_s) if course.time_s else "not reached",
     }
 
 
-def _outlook(name: str, course: ForecastHistory) -> dict[str, str]:
+def _outlook(name: str, course: ForecastHistory, of: str) -> dict[str, str]:
     """One row of the forecasts: the last forecast with its 95 % bounds, and when it became known."""
     quantity, _, axis = name.partition("-")
     final, known_s = course.last.final, course.known_s
-    bounds = f"not known: {rounded(1e3 * final.low, 6)} to {rounded(1e3 * final.high, 6)}"
+    factor, unit = in_milli(of if quantity == "bias" else f"{of}/g")
+    bounds = f"not known: {rounded(factor * final.low, 6)} to {rounded(factor * final.high, 6)}"
     return {
         "name": quantity.replace("scale", "scale factor"),
         "axis": axis,
-        "unit": "mV" if quantity == "bias" else "mV/g",
-        "final": f"{rounded(1e3 * final.value, 7)} ± {rounded(1e3 * final.half, 2)}"
+        "unit": unit,
+        "final": f"{rounded(factor * final.value, 7)} ± {rounded(factor * final.half, 2)}"
         if known_s is not None
         else ("not a warm-up: no forecast" if course.last.surprised else bounds),
         "known": "–" if known_s is None else rounded(known_s / HOUR_S),

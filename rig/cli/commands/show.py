@@ -18,6 +18,7 @@ from rig.errors import RecordError
 from rig.record import Event, Kept, Line, Record, Run
 from rig.record.codec import digest_of
 from rig.record.measured import Measured, sensors_of
+from rig.record.tables import units_of
 from rig.services.history import lives
 from rig.services.next_steps import next_steps, results_table
 
@@ -73,7 +74,7 @@ def _poses(record: Record, run: Run) -> list[dict[str, Any]]:
     """Every pose as JSON, or every row of an imported table, with the reason if it is excluded."""
     table = Measured(record, run).imported() if not run.bench and run.kind in MEANS else None
     if table is None:
-        return [_pose(number, kept) for number, kept in enumerate(record.kept(run.run))]
+        return list(_measured(record, run))
     reasons = record.excluded(run.run)
     cells = {**table.labels, **{name: values.tolist() for name, values in table.columns.items()}}
     return [
@@ -82,13 +83,26 @@ def _poses(record: Record, run: Run) -> list[dict[str, Any]]:
     ]
 
 
-def _pose(number: int, kept: Kept) -> dict[str, Any]:
-    """One pose as JSON; outputs are means in V."""
+def _measured(record: Record, run: Run) -> Iterator[dict[str, Any]]:
+    """Every measured pose as JSON."""
+    units: Mapping[str, str] | None = None
+    for number, kept in enumerate(record.kept(run.run)):
+        units = units_of(run, kept.samples.channels) if units is None else units
+        yield _pose(number, kept, units)
+
+
+def _pose(number: int, kept: Kept, units: Mapping[str, str]) -> dict[str, Any]:
+    """One pose as JSON: means in V, and those of channels in other `units`."""
     names = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip", "up", "rate_deg_s")
     angles = {name: getattr(kept.pose, name) for name in names}
     about = {"t_s": kept.t_s, "temperature_c": kept.temperature_c, "excluded": kept.excluded}
-    means = {"means_v": dict(kept.dwell.means), "sha256": digest_of(kept.samples)}
-    return {"pose": number, "path": kept.pose.path, **angles, **about, **means}
+    means = kept.dwell.means
+    values: dict[str, Any] = {"means_v": {name: v for name, v in means.items() if name not in units}}
+    if units:
+        values |= {"means": {name: means[name] for name in units if name in means}, "units": dict(units)}
+    return {
+        "pose": number, "path": kept.pose.path, **angles, **about, **values, "sha256": digest_of(kept.samples)
+    }  # fmt: skip
 
 
 def _head(run: Run) -> list[str]:
@@ -134,7 +148,8 @@ def _listed(poses: Sequence[Mapping[str, Any]]) -> list[str]:
         return []
     if "means_v" not in poses[0]:
         return _rows(poses)
-    channels = list(poses[0]["means_v"])
+    units, means = poses[0].get("units", {}), [pose["means_v"] | pose.get("means", {}) for pose in poses]
+    channels = list(means[0])
     rows = [
         (
             pose["pose"],
@@ -142,13 +157,14 @@ def _listed(poses: Sequence[Mapping[str, Any]]) -> list[str]:
             f"{pose['beta_deg']:g}",
             pose["path"],
             duration(pose["t_s"]),
-            *(f"{pose['means_v'][name]:.5f}" if name in pose["means_v"] else "" for name in channels),
+            *(f"{mean[name]:.5f}" if name in mean else "" for name in channels),
             "" if pose["temperature_c"] is None else f"{pose['temperature_c']:.1f}",
             pose["excluded"] or "",
         )
-        for pose in poses
+        for pose, mean in zip(poses, means, strict=True)
     ]
-    head = ("pose", "alpha", "beta", "path", "t", *(f"{name} V" for name in channels), "C", "excluded because")
+    named = [f"{name} {units.get(name, 'V')}" for name in channels]
+    head = ("pose", "alpha", "beta", "path", "t", *named, "C", "excluded because")
     return columns(head, rows).splitlines()
 
 

@@ -99,8 +99,9 @@ def paper(table: Table) -> str:
         result = estimate_stepwise(table)
     except DataError as error:
         return f"No stepwise estimate (Ang): {error}"
+    unit = table.unit
     rows = [
-        (axis, quantity(result.linear_rmse_v[k], "V"), quantity(result.rmse_v[k], "V"), f"{tilt.twice_mg:.3g} mg")
+        (axis, quantity(result.linear_rmse_v[k], unit), quantity(result.rmse_v[k], unit), f"{tilt.twice_mg:.3g} mg")
         for k, (axis, tilt) in enumerate(zip("xy", result.tilts, strict=True))
     ]
     head = ("axis", "manufacturer (1)-(3)", "paper (4)-(17)", "tilt corrected twice by (20)-(21)")

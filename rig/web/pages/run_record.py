@@ -15,6 +15,7 @@ from calibrations.presentation.interactive import figure
 from calibrations.text import joined
 from rig.errors import RecordError
 from rig.record import Event, Record, Run
+from rig.record.tables import units_of
 from rig.services.charts import Course, RunTime, course_chart, kind_of
 from rig.services.exclusion import exclude, numbered_run
 from rig.services.export import export
@@ -124,6 +125,7 @@ class OverTime:
             select.style("min-width: 150px").set_visibility(False)
         self.place = div("")
         self.time = RunTime()
+        self.units: dict[str, str] = {}
         self.plot: ui.plotly | None = None
 
     async def follow(self, run: str) -> None:
@@ -135,10 +137,10 @@ class OverTime:
             self.name.set_visibility(False)
         if not run:
             return
-        new, time = await off_loop(_new, run, self.last)
+        new, time, units = await off_loop(_new, run, self.last)
         if not new or run != self.run:
             return
-        self.time = time
+        self.time, self.units = time, units
         for number, dwell in new:
             self.courses.setdefault(kind_of(dwell), Course()).add(dwell)
             self.last = number
@@ -167,7 +169,7 @@ class OverTime:
         if course is None or self.name.value not in course.names:
             return
         name = str(self.name.value)
-        chart = course_chart(course, name, self.time)
+        chart = course_chart(course, name, self.time, self.units)
         remember(self.lay_out(), chart)
         self.lay_out().update_figure(figure(chart, name))
 
@@ -179,10 +181,14 @@ class OverTime:
         return self.plot
 
 
-def _new(run: str, after: int) -> tuple[list[tuple[int, Any]], RunTime]:
+def _new(run: str, after: int) -> tuple[list[tuple[int, Any]], RunTime, dict[str, str]]:
+    """New dwells with their numbers, the time axis, and the units of channels that are not in V."""
     with Record.to_read() as record:
         found = record.dwells(run, after)
-        return found, RunTime.of(record, record.run(run)) if found else RunTime()
+        if not found:
+            return found, RunTime(), {}
+        begun = record.run(run)
+        return found, RunTime.of(record, begun), units_of(begun, found[0][1].means)
 
 
 # The page of one run: settings, results, notes, export and report.
