@@ -218,7 +218,7 @@ def _noise_limit(
     """Rms that the sensor's noise alone leaves in the band, mm/s^2."""
     source = part if still is None else still
     where = record if still is None else max(find_records(still), key=lambda r: r.end - r.first)
-    x = source.output("x")[where.rows]
+    x = source.column(part.output_name("x"))[where.rows]
     if still is None:
         x = x - _motion_part(x, record, found)
     f, density = periodogram(x, where.rate_hz)

@@ -139,13 +139,6 @@ def test_a_digital_sensor_is_calibrated_in_its_own_unit(rig: Rig, rig_home: Path
     assert " V" not in fitted.out
 
 
-def test_a_digital_sensor_is_refused_where_results_are_in_volts(digital_bench: Path) -> None:
-    bench, procedure = read_bench(digital_bench), find("noise-floor")
-    assert bench.constants["unit"] == "g"
-    with pytest.raises(BenchError, match=r"noise-floor needs outputs in V.* gives g; calibrate it with hand-positions"):
-        plan(bench, procedure, parse(procedure, {}))
-
-
 def test_a_hand_is_set_in_the_bench_file(bench_with: Callable[..., Path]) -> None:
     world = world_of(read_bench(bench_with(hand={"slips": 1.0})))
     assert isinstance(world, HandheldWorld)

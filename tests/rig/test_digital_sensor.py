@@ -1,0 +1,125 @@
+"""A digital sensor in every procedure: results, table, model and report have the unit of the sensor."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from procedures.catalogue import paths
+from rig.bench.file import DEFAULT
+
+Rig = Callable[..., Any]
+OUTPUTS = "time ax ay gx gy gz mx my mz supply d63"
+COLUMNS = {name: k for k, name in enumerate(OUTPUTS.split(), 1)}
+PER_G = {"g": 1.0, "m/s^2": 9.80665, "count": 16384.0}
+VOLTS = re.compile(r"\b[munµ]?V\b(?!/min)")
+SHORT = {  # settings that make a procedure short
+    "sweep": ("--inclinations-deg", "90,30,150", "--step-deg", "90", "--dwell-s", "1", "--reference-every", "4"),
+    "misalignment": ("--dwell-s", "1", "--target-deg", "0.05"),
+    "soak": ("--duration-s", "2400", "--interval-s", "300", "--dwell-s", "1", "--off-s", "0"),
+    "motion": ("--duration-s", "4", "--still-s", "2", "--block-s", "2", "--dwell-s", "0.5"),
+    "noise-floor": ("--duration-s", "4", "--block-s", "2", "--dwell-s", "0.5"),
+    "temperature-cycle": ("--temperatures-c", "30,35", "--dwell-s", "0.5", "--soak-s", "60"),
+    "repeat": ("--times", "2", "--power", "false", "--mount", "false", "--dwell-s", "0.5"),
+    "check-standard": ("--dwell-s", "0.5",),
+    "magnetometer-turn": ("--step-deg", "45", "--dwell-s", "0.5"),
+    "rate-turn": ("--rates-deg-s", "40", "--rest-s", "2"),
+    "level-check": (),
+}
+
+
+@pytest.fixture
+def digital(tmp_path: Path) -> Callable[..., str]:
+    """The bench file of the simulated rig with a sensor that sends lines in a unit."""
+
+    def write(unit: str) -> str:
+        document = yaml.safe_load(DEFAULT.read_text(encoding="utf-8"))
+        settings = {"columns": COLUMNS, "unit": unit, "gyro_unit": "rad/s", "field_unit": "gauss", "rate_hz": 100}
+        document["instruments"]["adc"] = {"driver": "imu_lines", "url": "simulated", "settings": settings}
+        path = tmp_path / "digital.yaml"
+        path.write_text(yaml.safe_dump(document), encoding="utf-8")
+        return str(path)
+
+    return write
+
+
+def unit_expected(name: str, unit: str) -> set[str]:
+    """The units that a result can have that depends on the unit of the outputs."""
+    if name.startswith(("gyro-bias-x", "gyro-bias-y", "gyro-bias-z")):
+        return {"rad/s"}
+    if name.startswith("gyro-scale"):
+        return {"rad/s/(deg/s)"}
+    if name.startswith(("hard-iron", "field-total", "field-horizontal")):
+        return {"gauss"}
+    if re.fullmatch(r"noise-(rms|pp)-.|bias(-drift|-tolerance|-final|-as-is|-temperature-hysteresis)?-.", name):
+        return {unit}
+    if re.fullmatch(r"scale(-final)?-.", name):
+        return {f"{unit}/g"}
+    return {f"{unit}/K"} if name.startswith("bias-temperature-") else set()
+
+
+@pytest.mark.slow
+@pytest.mark.sockets
+@pytest.mark.parametrize(
+    ("procedure", "unit"),
+    [*((name, "count") for name in sorted(SHORT)), ("check-standard", "m/s^2"), ("noise-floor", "m/s^2")],
+)
+def test_a_procedure_gives_its_results_in_the_unit_of_the_sensor(
+    rig: Rig, rig_home: Path, digital: Callable[..., str], procedure: str, unit: str
+) -> None:
+    bench = digital(unit)
+    ended = rig("run", procedure, "--bench", bench, "--unattended", "--json", *SHORT[procedure])
+    assert ended.status in (0, 1), ended.err
+    results = json.loads(ended.out)["results"]
+    for name, result in results.items():
+        assert result["unit"] not in ("V", "V/g", "V/K", "V/h"), name
+        assert not (expected := unit_expected(name, unit)) or result["unit"] in expected, name
+    assert not VOLTS.search(ended.err)
+    for axis in "xy":
+        if (scale := results.get(f"scale-{axis}")) is not None:
+            assert scale["value"] == pytest.approx(PER_G[unit], rel=0.1)
+
+
+def test_every_procedure_is_tried() -> None:
+    assert {*SHORT, "hand-positions"} == set(paths())  # hand-positions: tests/rig/test_hand_run.py
+
+
+@pytest.mark.slow
+@pytest.mark.sockets
+def test_table_model_and_noise_have_the_unit_of_the_sensor(
+    rig: Rig, rig_home: Path, digital: Callable[..., str], tmp_path: Path
+) -> None:
+    settings = ("--inclinations-deg", "90,30,150", "--step-deg", "90", "--dwell-s", "0.5")
+    assert rig("run", "sweep", "--bench", digital("count"), "--unattended", *settings).status == 0
+    file, model = tmp_path / "sweep.csv", tmp_path / "model.yaml"
+    assert rig("export", "last", "--format", "csv", "--out", str(file)).status == 0
+    text = file.read_text(encoding="utf-8")
+    assert "# unit: count\n" in text
+    assert ",ax,ay," in text
+    assert ",ax_std,ay_std," in text
+    fitted = rig("fit", str(file), "--model", "linear", "--out", str(model))
+    assert re.search(r"scale +x +1[67]\d{3}\(\d+\) count/g", fitted.out)
+    assert not VOLTS.search(fitted.out)
+    assert yaml.safe_load(model.read_text(encoding="utf-8"))["unit"] == "count"
+    assert " count " in rig("compare", "last", "--model", str(model)).out
+    poses = json.loads(rig("show", "last", "--poses", "--json").out)["kept"]
+    assert set(poses[0]["means_v"]) == {"supply", "d63"}
+    assert set(poses[0]["means"]) == {"ax", "ay"}
+    assert poses[0]["units"] == {"ax": "count", "ay": "count"}
+
+
+@pytest.mark.sockets
+def test_an_output_that_the_simulated_sensor_lacks_is_refused(
+    rig: Rig, rig_home: Path, digital: Callable[..., str]
+) -> None:
+    path = Path(digital("g"))
+    path.write_text(path.read_text(encoding="utf-8").replace("ay: 3", "az: 3"), encoding="utf-8")
+    ended = rig("plan", "misalignment", "--bench", str(path))
+    assert ended.status not in (0, 70)
+    assert "the simulated sensor has no output 'az'" in ended.err
