@@ -12,7 +12,7 @@ the end of the run come from the whole model.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 
@@ -24,11 +24,12 @@ from calibrations.text import estimate_text
 from procedures.instruments import OUTPUTS
 from procedures.questions import EDGES
 from procedures.session import Dwell, Pose
-from rig.bench import Bench
 from rig.record import Kept, Record
 from rig.record.measured import FIELD, RATE, sensor_from_table, specific_force_g
+from rig.record.tables import units_of
 
 AXES = "xyz"
+FORCES = tuple(chain(*OUTPUTS))
 Row = tuple[str, Array, float]  # name of the least squares, and one measurement
 
 
@@ -39,6 +40,7 @@ class Law:
     In a unit, `{out}` is that of the outputs.
     """
 
+    channels: Sequence[str]
     rows: Callable[[Dwell], Iterator[Row]]
     parameters: Callable[[str], Mapping[str, tuple[int, str]]]
 
@@ -50,14 +52,14 @@ class RunningEstimates:
     law: Law | None = None
     known: dict[str, Recursive] = field(default_factory=dict)
     path: str = ""
-    bench: Bench | None = None
+    units: Mapping[str, str] = field(default_factory=dict)  # of the channels that are not in V
 
     def begun(self, run: str) -> None:
         """The run begins or continues: take the poses in the record."""
         with Record() as record:
             found = record.run(run)
             self.law, self.known = LAWS.get(found.kind), {}
-            self.bench = Bench.model_validate(found.bench) if self.law else None
+            self.units = units_of(found, self.law.channels) if self.law and found.bench else {}
             for _, dwell in record.dwells(run) if self.law else ():
                 self._take(dwell)
 
@@ -83,7 +85,7 @@ class RunningEstimates:
     def _estimates(self, law: Law) -> Iterator[tuple[str, str]]:
         for name, known in self.known.items():
             estimate, (sensor, _, channel) = known.estimate(), name.rpartition(".")
-            out = self.bench.unit_of(channel) if self.bench else "V"
+            out = self.units.get(channel, "V")
             for parameter, (place, unit) in law.parameters(name).items():
                 value, std = float(estimate.values[place]), float(estimate.scattered[place])
                 if np.isfinite(std):
@@ -129,9 +131,9 @@ def _line(prefix: str, unit: str) -> Callable[[str], Mapping[str, tuple[int, str
 
 
 LAWS = {
-    "poses": Law(_loaded([*chain(*OUTPUTS)], specific_force_g), _line("", "{out}/g")),
-    "rates": Law(_loaded(RATE, _rate_and_force), _line("gyro-", "{out}/(deg/s)")),
-    "positions": Law(_levelled, lambda _: {f"hard-iron-{axis}": (k, "{out}") for k, axis in enumerate(AXES)}),
+    "poses": Law(FORCES, _loaded(FORCES, specific_force_g), _line("", "{out}/g")),
+    "rates": Law(RATE, _loaded(RATE, _rate_and_force), _line("gyro-", "{out}/(deg/s)")),
+    "positions": Law(FIELD, _levelled, lambda _: {f"hard-iron-{axis}": (k, "{out}") for k, axis in enumerate(AXES)}),
 }
 
 

@@ -27,7 +27,10 @@ SHORT = {  # settings that make a procedure short
     "noise-floor": ("--duration-s", "4", "--block-s", "2", "--dwell-s", "0.5"),
     "temperature-cycle": ("--temperatures-c", "30,35", "--dwell-s", "0.5", "--soak-s", "60"),
     "repeat": ("--times", "2", "--power", "false", "--mount", "false", "--dwell-s", "0.5"),
-    "check-standard": ("--dwell-s", "0.5",),
+    "check-standard": (
+        "--dwell-s",
+        "0.5",
+    ),
     "magnetometer-turn": ("--step-deg", "45", "--dwell-s", "0.5"),
     "rate-turn": ("--rates-deg-s", "40", "--rest-s", "2"),
     "level-check": (),
