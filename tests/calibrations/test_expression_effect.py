@@ -120,7 +120,7 @@ def test_a_model_file_with_a_bad_expression_is_refused(content: dict[str, object
         ("beta_deg += a*ax", "column 15: ax follows from the stage angles"),
         ("a*temperature", "column 3: needs the column temperature_c; made has: alpha_deg"),
         ("a*humidty", 'column 3: "humidty" is no column; did you mean "humidity"?'),
-        ("vz += a*t", "needs the column vz_v"),
+        ("vz += a*t", "needs the output of axis z; made has: vx_v, vy_v"),
         ("+".join(f"p{k}*t**{k}" for k in range(13)), "more than 12 parameters"),
     ],
 )
