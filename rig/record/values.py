@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -83,7 +84,7 @@ class Kept:
     beta_read_deg: float | None = None
     number: int = 0  # in the run, from 0; excluded poses count
 
-    @property
+    @cached_property
     def dwell(self) -> Dwell:
         """Mean and standard deviation of every channel."""
         volts, names = self.samples.volts, self.samples.channels

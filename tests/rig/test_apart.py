@@ -20,6 +20,7 @@ from rig.files import home
 from rig.lease import lease
 from rig.record import Kept, Record
 from rig.runs.background import control, process
+from rig.runs.background import status as status_file
 from rig.runs.background.control import PublishingObserver
 from rig.runs.background.status import KEPT, Asked, Order, Seat, Status, file, folder, keys, lock, read, tidy
 from rig.runs.runner import Outcome, start
@@ -28,6 +29,12 @@ from tests.rig.rigging import POSES, SMALL
 POLL_S = 0.002
 PATIENCE_S = 60.0
 KEY = "20261121-093012"
+
+
+@pytest.fixture(autouse=True)
+def every_event(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every event of a simulated run is published, so that a test can act between two poses."""
+    monkeypatch.setattr(status_file, "EVERY_S", 0.0)
 
 
 def carried_out(procedure: str, settings: dict[str, str], steer: Callable[[], None], attended: bool = False) -> Status:
@@ -206,6 +213,17 @@ def test_a_run_of_a_terminal_is_told_as_well() -> None:
     assert (ended.phase, ended.state, ended.error) == ("ended", "complete", "")
     with pytest.raises(RigError, match="so it cannot pause"):
         control.pause(last)
+
+
+def test_quick_events_of_a_simulated_run_do_not_each_write_the_status(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(status_file, "EVERY_S", 3600.0)
+    onlooker = Onlooker()
+    in_a_terminal(onlooker, "nobody")
+    assert {status.done for status in onlooker.seen if status} == {0}
+    ended = control.latest()
+    assert ended is not None
+    assert (ended.phase, ended.state, ended.done) == ("ended", "complete", POSES)
+    assert {value["name"] for value in ended.values} >= {"temperature", "vx", "vy"}
 
 
 def test_a_run_of_a_terminal_is_stopped_from_elsewhere() -> None:

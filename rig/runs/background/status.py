@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import secrets
 import time
@@ -76,6 +77,8 @@ def file(key: str, ending: str) -> Path:
 # The status of a background run, as one small file.
 
 KEPT = 20
+EVERY_S = 0.5  # real time between two statuses of a simulated run
+ATTITUDE = ("alpha_deg", "beta_deg", "mount_deg", "flip")
 Phase = Literal["starting", "running", "asking", "paused", "ended"]
 Seat = Literal["page", "terminal", "nobody"]
 
@@ -185,18 +188,33 @@ def _last_words(key: str, run: str) -> str:
 
 
 class StatusWriter:
-    """Publishes the events of a run in its status file. `seat`: where a person answers."""
+    """Publishes the events of a run in its status file. `seat`: where a person answers.
+
+    A simulated night has thousands of poses in a minute, so its events are written at most every EVERY_S. The begin,
+    questions, interruptions and the end are always written.
+    """
 
     def __init__(self, key: str, procedure: str, bench: Bench, seat: Seat = "page") -> None:
         self._viewer = RunViewer(procedure, bench)
         self._status = Status(key, os.getpid(), procedure, bench.name, seat=seat)
+        self._every_s = EVERY_S if bench.simulated else 0.0
+        self._written_s = -math.inf
 
     def publish(self, **changes: Any) -> None:
         """Write the present status."""
-        view = self._viewer.view
-        progress, left = view.progress, view.left(time.monotonic())
+        view, self._written_s = self._viewer.view, time.monotonic()
+        progress, left = view.progress, view.left(self._written_s)
+        values_now = [{**asdict(value), "near": value.near} for value in values(view)]
+        attitude = {name: getattr(view.kept.pose, name) for name in ATTITUDE} if view.kept else {}
         self._status = replace(
-            self._status, now=view.now, done=progress.done, total=progress.total, left=left, **changes
+            self._status,
+            now=view.now,
+            done=progress.done,
+            total=progress.total,
+            left=left,
+            values=values_now,
+            attitude=attitude,
+            **changes,
         )
         self._status.write()
 
@@ -209,27 +227,27 @@ class StatusWriter:
 
     def doing(self, text: str) -> None:
         self._viewer.doing(text)
-        self.publish()
+        self._publish_seldom()
 
     def guide(self, guidance: Guidance) -> None:
         self._viewer.guide(guidance)
-        self.publish()
+        self._publish_seldom()
 
     def expect(self, total: int, done: int) -> None:
         self._viewer.expect(total, done)
-        self.publish()
+        self._publish_seldom()
 
     def kept(self, kept: Kept) -> None:
         self._viewer.kept(kept)
-        stands = ("alpha_deg", "beta_deg", "mount_deg", "flip")
-        self.publish(values=self._values(), attitude={name: getattr(kept.pose, name) for name in stands})
+        self._publish_seldom()
 
     def read(self, reading: Reading) -> None:
         self._viewer.read(reading)
-        self.publish(values=self._values())
+        self._publish_seldom()
 
-    def _values(self) -> list[dict[str, Any]]:
-        return [{**asdict(value), "near": value.near} for value in values(self._viewer.view)]
+    def _publish_seldom(self) -> None:
+        if time.monotonic() - self._written_s >= self._every_s:
+            self.publish()
 
 
 def open_question(question: Question, proposed: str) -> Asked:
