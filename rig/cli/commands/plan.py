@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,12 +27,10 @@ from rig.cli.terminal.output import bench_option, emit, json_option, model_optio
 from rig.cli.terminal.progress import working
 from rig.cli.terminal.settings_help import ProcedureCommand
 from rig.errors import BeyondLimits
-from rig.planning.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, relative
+from rig.planning.optimal import Optimal, relative
 from rig.planning.plan import Plan, Stretch, plan, stretches
 from rig.planning.sweep_range import Judged
-
-PLANS = ("", "standard sweep", "chosen, same dwell", "chosen, same error")
-
+from rig.services.optimal_words import PLANS, plan_rows, purpose, savings
 
 FEW_STEPS = 120  # longer plans are summarised
 FIRST, LAST = 14, 4  # stretches of a long plan that are shown at its beginning and its end
@@ -195,14 +192,11 @@ def optimal_lines(found: Optimal, out: str | None, bench: str | None = None) -> 
     model, count = found.over.fit.model.name, len(found.over.fit.theta)
     yield f"{model}, {count} parameters: {found.criterion}-optimal poses in the range of the standard sweep"
     yield ""
-    yield columns(PLANS, _rows(found, (found.standard, found.short, found.equal)))
+    yield columns(PLANS, plan_rows(found))
     yield ""
-    yield f"{found.times_less:.1f} times less rig time for the same worst standard error ({_worst(found)})."
-    yield f"{_times(found.times_less_for_all)} if no parameter may be less certain: {_longest(found)}."
-    if lost := [found.over.name(k) for k, known in enumerate(found.standard.told) if not known]:
-        yield f"The standard sweep cannot determine {', '.join(lost)}; the comparison ignores them."
+    yield from savings(found)
     yield ""
-    yield from map(wrap_text, _about(found))
+    yield from map(wrap_text, purpose(found))
     yield ""
     yield from _how_to_run(found, out, bench)
 
@@ -225,46 +219,6 @@ def optimal_document(found: Optimal) -> dict[str, Any]:
             for p in found.equal.poses
         ],
     }
-
-
-def _percent(ratio: float) -> str:
-    return f"{100 * ratio:.0f} %"
-
-
-def _rows(found: Optimal, plans: Sequence[Judged]) -> list[tuple[str, ...]]:
-    return [
-        ("poses", *(str(candidate.plan.poses) for candidate in plans)),
-        ("dwell", *(f"{candidate.dwell_s:g} s" for candidate in plans)),
-        ("rig time", *(duration(candidate.plan.duration_s) for candidate in plans)),
-        ("worst standard error", *(_percent(relative(found.standard, candidate)) for candidate in plans)),
-        ("candidate error, at most", *(_percent(most_relative(found.standard, candidate)) for candidate in plans)),
-    ]
-
-
-def _worst(found: Optimal) -> str:
-    before, after = (found.over.name(found.worst(candidate)) for candidate in (found.standard, found.equal))
-    return before if before == after else f"{before} before, {after} now"
-
-
-def _times(ratio: float) -> str:
-    return f"{ratio:.1f} times less" if ratio >= 1 else f"{1 / ratio:.1f} times more"
-
-
-def _longest(found: Optimal) -> str:
-    return f"{found.all_equal.dwell_s:g} s a pose, {duration(found.all_equal.plan.duration_s)}"
-
-
-def _about(found: Optimal) -> Iterator[str]:
-    """Purpose of the poses, and the effect of their order on a drift."""
-    paths = Counter(pose.path for pose in found.equal.poses)
-    yield (
-        f"{paths[DESIGN]} poses are for the model. {paths[AGAIN]} of them are measured twice, which shows the noise. "
-        f"{paths[CHECK]} more poses check the model; the errors above do not use them."
-    )
-    yield (
-        f"In this order height and time have a correlation of {found.height_correlation:.2f}. A drift fitted with the "
-        f"model would add at most {100 * found.drift_loss:.1f} % to the variance of a parameter."
-    )
 
 
 def _how_to_run(found: Optimal, out: str | None, bench: str | None) -> Iterator[str]:

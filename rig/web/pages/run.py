@@ -23,6 +23,7 @@ from rig.web.desk import Desk, lab_read
 from rig.web.frame import Key, frame
 from rig.web.pages.run_begin import BeginDialog, before_start, plan_facts
 from rig.web.pages.run_live import Live
+from rig.web.pages.run_optimal import OptimalDialog
 from rig.web.parts import box, div, facts, failed, off_loop, setting_label, setting_text, table, waiting, words
 
 MOST_STRETCHES = 12
@@ -117,6 +118,8 @@ class Planning:
             self.attended.set_visibility(bench.simulated)
             with div("row-of"):
                 self.button = ui.button("Start", icon="play_arrow", on_click=self.start)
+                self.optimal = ui.button("Choose poses for a model", icon="auto_fix_high", on_click=self._optimal)
+                self.optimal.props("outline")
 
     def lay_out_plan(self) -> None:
         """Place the box of the plan on the page."""
@@ -136,6 +139,7 @@ class Planning:
         self.about.set_text(" ".join(procedure.doc.partition("\n\n")[2].split("Source")[0].split()))
         self.meaning.set_text(_meaning(procedure))
         self.meant.set_visibility(bool(procedure.defaults))
+        self.optimal.set_visibility(procedure.name == "sweep")
         self.fields.clear()
         few = choices(procedure)
         self.inputs: dict[str, Any] = {}
@@ -144,6 +148,15 @@ class Planning:
                 field = _field(name, self.given.get(name, setting_text(default)), few.get(name, ()))
                 self.inputs[name] = field.on_value_change(self.replan)
         ui.timer(0.0, self.replan, once=True)
+
+    def _optimal(self) -> None:
+        """Ask for a model; poses that are chosen for it replace the grid."""
+        grid = {name: text for name, text in self.settings().items() if name != "pose_list"}
+        OptimalDialog(self.bench, self.procedure, grid, self._used)
+
+    def _used(self, settings: Mapping[str, str]) -> None:
+        for name, text in settings.items():
+            self.inputs[name].set_value(text)
 
     def settings(self) -> dict[str, str]:
         """The settings that differ from their defaults, as texts."""

@@ -1,0 +1,107 @@
+"""Poses of a sweep chosen for a model, beside the standard sweep; a click makes them the settings of the run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from nicegui import ui
+
+from calibrations.effects.catalogue import catalogue
+from calibrations.model.file import read_model
+from procedures.catalogue import Procedure
+from procedures.pose_list import format_poses
+from procedures.settings import parse
+from rig.bench import Bench
+from rig.files import home, write_whole
+from rig.planning.optimal import Optimal, optimal
+from rig.services.optimal_words import PLANS, plan_rows, purpose, savings
+from rig.web.desk import FILES, models
+from rig.web.parts import div, failed, off_loop, setting_text, table, waiting, words
+
+CRITERIA = {"I": "I: error of the prediction", "D": "D: joint uncertainty of the parameters"}
+Use = Callable[[Mapping[str, str]], None]
+
+
+class OptimalDialog:
+    """Asks for a model and the number of poses, and shows the plan. `use` receives the settings of the chosen poses."""
+
+    def __init__(self, bench: Bench, sweep: Procedure, settings: Mapping[str, str], use: Use) -> None:
+        self.bench, self.sweep, self.settings, self.use = bench, sweep, settings, use
+        with ui.dialog().props("persistent") as self.dialog, ui.card().classes("optimal"):
+            words("Choose poses for a model", "title")
+            words(
+                "The standard sweep has the present settings. The chosen poses stay in its range and give the same "
+                "uncertainty in less time.",
+                "quiet small",
+            )
+            with div("row-of"):
+                known = {name: label for name, label in models("linear").items() if name}
+                self.model = ui.select(known, label="Model", value="linear").props("dense options-dense")
+                self.poses = ui.number("Poses (empty: a quarter)", min=1, max=60, precision=0).props("dense")
+                self.criterion = ui.select(CRITERIA, label="Smallest", value="I").props("dense options-dense")
+                for field in (self.model, self.poses, self.criterion):
+                    field.classes("grow")
+            self.place = div("stack")
+            with div("row-of"):
+                self.choose = ui.button("Choose", icon="auto_fix_high", on_click=self.find)
+                ui.button("Cancel", on_click=self.close).props("flat")
+        self.dialog.open()
+
+    async def find(self) -> None:
+        """Choose the poses, and compare them with the standard sweep."""
+        self.choose.disable()
+        self.place.clear()
+        with self.place:
+            waiting("Choosing the poses; nothing moves. This takes up to some minutes.")
+        try:
+            found = await off_loop(self._optimal)
+        except Exception as error:
+            self.place.clear()
+            with self.place:
+                failed("No poses can be chosen", error)
+        else:
+            self.place.clear()
+            with self.place:
+                self._show(found)
+        self.choose.enable()
+
+    def _optimal(self) -> Optimal:
+        model = read_model(str(self.model.value), catalogue(self.bench.folders.effects))
+        count = int(self.poses.value) if self.poses.value else None
+        settings = parse(self.sweep, self.settings)
+        return optimal(self.bench, self.sweep, settings, model, count, str(self.criterion.value))
+
+    def _show(self, found: Optimal) -> None:
+        with div("wide-table"):
+            table(PLANS, plan_rows(found))
+        for line in (*savings(found), *purpose(found)):
+            words(line, "small")
+        ui.button("Use these poses", icon="done", on_click=lambda: self._used(found))
+
+    async def _used(self, found: Optimal) -> None:
+        """Write the poses into a file, and hand over the settings of a run with them."""
+        try:
+            path = await off_loop(_written, found)
+        except OSError as error:  # for example a full disk
+            with self.place:
+                failed("The poses cannot be stored", error)
+            return
+        settings: Mapping[str, Any] = found.equal.plan.settings
+        kept = {name: setting_text(settings[name]) for name in ("dwell_s", "settle_s")}
+        self.close()
+        self.use({"pose_list": path, **kept})
+
+    def close(self) -> None:
+        """Close the dialog and forget it."""
+        self.dialog.close()
+        self.dialog.delete()
+
+
+def _written(found: Optimal) -> str:
+    """The file with the chosen poses."""
+    folder = home() / FILES
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"poses-{found.over.fit.model.name}-{found.equal.plan.poses}.csv"
+    write_whole(path, "\n".join([*format_poses(held.pose for held in found.equal.plan.held), ""]))
+    return str(path)
