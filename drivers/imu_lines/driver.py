@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from drivers.errors import BadFrame, DriverError, LimitError, LinkTimeout, OverRange, SensorFault, StreamError
 from drivers.imu_lines.lines import Assembly
+from drivers.imu_lines.reception import TIME, Heard, Tally
 from drivers.instrument import Check, Identity, require_positive
 from drivers.recorder import NoDigitalLines, Recorder, Samples
 from drivers.transport import Address, Links
@@ -26,7 +27,6 @@ from drivers.transport.link import Link
 FORCES, RATES, FIELDS = ("ax", "ay", "az"), ("gx", "gy", "gz"), ("mx", "my", "mz")
 OUTPUTS = (*FORCES, *RATES, *FIELDS)
 VOLTAGES = ("supply", "d63")  # of the board's own converter, in V, sampled with the sensor
-TIME = "time"
 QUIET_S = 2.0  # silence that ends a record; at least ten samples
 STUCK = 100  # equal samples of one axis, while another changes
 RATE_OFF = 0.05  # of the stated rate
@@ -105,6 +105,7 @@ class LineSensor(Recorder[Settings]):
     def __init__(self, link: Link, settings: Settings, name: str) -> None:
         self.name, self.settings = name, settings
         self._link, self._clock = link, link.clock
+        self._tally = Tally(settings.time_unit_s)
 
     def identify(self) -> Identity:
         """Only what is known: such lines have no name."""
@@ -112,7 +113,7 @@ class LineSensor(Recorder[Settings]):
 
     def self_test(self) -> list[Check]:
         """The columns, the rate, and the sensor's time against the host's, in two seconds of lines."""
-        heard = Heard(self._assembly())
+        heard, tally = self._heard(), Tally(self.settings.time_unit_s)
         try:
             self._link.discard()
             deadline = self._clock.now() + TEST_S
@@ -123,17 +124,23 @@ class LineSensor(Recorder[Settings]):
         except DriverError as fault:
             return [Check("lines", False, f"{fault}")]
         columns = f"the lines have the columns {', '.join(map(str, heard.assembly.seen))}"
-        rate_hz = heard.rate_hz
+        tally.add(heard)
+        rate_hz = heard.measured_rate_hz
         fits = abs(rate_hz / self.settings.rate_hz - 1) < RATE_OFF
         told = f"{rate_hz:.4g} samples a second; rate_hz is {self.settings.rate_hz:g}"
-        lost, doubled = heard.lost(self.settings.time_unit_s, self.settings.rate_hz)
-        state = f"{heard.assembly.damaged} damaged, {lost} samples lost, {doubled} doubled"
+        state = f"{heard.assembly.damaged} damaged, {heard.lost} samples lost, {heard.doubled} doubled"
         checks = [Check("lines", True, f"{columns}; {state}"), Check("rate", fits, told)]
-        if TIME in self.settings.columns:
-            offset_s, drift = heard.against_host(self.settings.time_unit_s)
-            said = f"the sensor's time is {offset_s:+.3f} s from the host's and gains {1e6 * drift:+.0f} ppm"
-            checks.append(Check("time", abs(drift) < RATE_OFF, said))
+        if (gain := tally.gain) is not None:
+            said = f"the sensor's time is {tally.offset_s:+.3f} s from the host's and gains {1e6 * gain:+.0f} ppm"
+            checks.append(Check("time", abs(gain) < RATE_OFF, said))
         return checks
+
+    def tally(self) -> dict[str, tuple[float, str]]:
+        """Counts of lost, doubled and damaged samples since the connection, and the gain of the sensor's clock.
+
+        Each is a value with its unit, by name.
+        """
+        return self._tally.values()
 
     def power(self, on: bool) -> None:  # noqa: ARG002 - as the converter's
         """Raises LimitError: no line switches its power."""
@@ -148,19 +155,23 @@ class LineSensor(Recorder[Settings]):
         rate_hz, names = self.settings.rate_hz, tuple(self.settings.channels)
         total, block = self.scans(duration_s), self.scans(block_s)
         self._link.discard()
-        heard, given = Heard(self._assembly()), 0
-        while given < total:
-            wanted = min(block, total - given)
-            while len(heard.kept) < given + wanted:
-                heard.take(self._listen(heard.assembly, max(QUIET_S, 10 / rate_hz)), self._clock.now())
-            self._require_complete(heard)
-            values = np.array([[row[name] for name in names] for row in heard.kept[given : given + wanted]])
-            self._require_alive(values, names)
-            yield Samples(values, names, rate_hz, heard.at_s[0] + given / rate_hz)
-            given += wanted
+        heard, given = self._heard(), 0
+        try:
+            while given < total:
+                wanted = min(block, total - given)
+                while len(heard.kept) < given + wanted:
+                    heard.take(self._listen(heard.assembly, max(QUIET_S, 10 / rate_hz)), self._clock.now())
+                self._require_complete(heard)
+                values = np.array([[row[name] for name in names] for row in heard.kept[given : given + wanted]])
+                self._require_alive(values, names)
+                yield Samples(values, names, rate_hz, heard.at_s[0] + given / rate_hz)
+                given += wanted
+        finally:
+            self._tally.add(heard)
 
-    def _assembly(self) -> Assembly:
-        return Assembly(self.settings.format, self.settings.columns)
+    def _heard(self) -> Heard:
+        settings = self.settings
+        return Heard(Assembly(settings.format, settings.columns), settings.time_unit_s, settings.rate_hz)
 
     def _listen(self, assembly: Assembly, timeout_s: float) -> list[dict[str, float]]:
         """The samples of the next bytes. Raises LinkTimeout, BadFrame."""
@@ -194,17 +205,22 @@ class LineSensor(Recorder[Settings]):
 
     def _require_complete(self, heard: Heard) -> None:
         """Raises StreamError where too many samples were lost, or the rate is another."""
-        lost, doubled = heard.lost(self.settings.time_unit_s, self.settings.rate_hz)
-        lost += heard.assembly.damaged if TIME not in self.settings.columns else 0
+        if heard.back:
+            raise StreamError(
+                f"{self.name}: the sensor's time went back: the sensor began anew during the record",
+                "Check its supply and its cable; opening its port restarts some boards",
+            )
+        lost = heard.lost + (heard.assembly.damaged if TIME not in self.settings.columns else 0)
         if lost > self.settings.most_lost * (len(heard.kept) + lost) and lost > 1:
             raise StreamError(
                 f"{self.name}: {lost} of {len(heard.kept) + lost} samples were lost ({heard.assembly.damaged} damaged "
-                f"lines, {doubled} doubled samples)",
+                f"lines, {heard.doubled} doubled samples)",
                 "Lower the sensor's rate or raise the baud rate, and check the cable; or correct rate_hz",
             )
-        if heard.length_s > 1.0 and abs(heard.rate_hz / self.settings.rate_hz - 1) > RATE_OFF:
+        rate_hz = heard.measured_rate_hz if heard.length_s > 1.0 else self.settings.rate_hz
+        if abs(rate_hz / self.settings.rate_hz - 1) > RATE_OFF:
             raise StreamError(
-                f"{self.name}: {heard.rate_hz:.4g} samples a second come, and rate_hz is {self.settings.rate_hz:g}",
+                f"{self.name}: {rate_hz:.4g} samples a second come, and rate_hz is {self.settings.rate_hz:g}",
                 "Correct rate_hz in the sensor's settings",
             )
 
@@ -226,50 +242,6 @@ class LineSensor(Recorder[Settings]):
 
 def _most(values: NDArray[np.float64]) -> float:
     return float(np.abs(values).max())
-
-
-class Heard:
-    """The samples of a record, with the host's time of each."""
-
-    def __init__(self, assembly: Assembly) -> None:
-        self.assembly = assembly
-        self.kept: list[dict[str, float]] = []
-        self.at_s: list[float] = []
-        self._doubled = 0
-
-    def take(self, samples: Sequence[dict[str, float]], now_s: float) -> None:
-        """Add samples that came by `now_s`; one with the time of the sample before it is dropped."""
-        for sample in samples:
-            if self.kept and TIME in sample and sample[TIME] == self.kept[-1][TIME]:
-                self._doubled += 1
-                continue
-            self.kept.append(sample)
-            self.at_s.append(now_s)
-
-    @property
-    def length_s(self) -> float:
-        """From the first arrival to the last."""
-        return self.at_s[-1] - self.at_s[0] if self.at_s else 0.0
-
-    @property
-    def rate_hz(self) -> float:
-        """Samples a second, by the host's clock."""
-        first = sum(at_s == self.at_s[0] for at_s in self.at_s)
-        return (len(self.at_s) - first) / self.length_s if self.length_s else 0.0
-
-    def lost(self, time_unit_s: float, rate_hz: float) -> tuple[int, int]:
-        """Samples that are missing by the sensor's time, and those that came twice."""
-        if len(self.kept) < 2 or TIME not in self.kept[0]:
-            return 0, self._doubled
-        steps = np.diff([sample[TIME] for sample in self.kept]) * time_unit_s * rate_hz
-        return int(np.maximum(np.rint(steps) - 1, 0).sum()), self._doubled
-
-    def against_host(self, time_unit_s: float) -> tuple[float, float]:
-        """Sensor's time minus the host's at the first sample, s, and its relative gain."""
-        sensor_s = time_unit_s * np.array([sample[TIME] for sample in self.kept])
-        host_s = np.array(self.at_s)
-        gain = float(np.polyfit(host_s - host_s[0], sensor_s - sensor_s[0], 1)[0]) if self.length_s else 1.0
-        return float(sensor_s[0] - host_s[0]), gain - 1
 
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> LineSensor:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.imu_lines.driver import FIELDS, FORCES, RATES, TIME, VOLTAGES, Settings
+from drivers.imu_lines.driver import FIELDS, FORCES, RATES, VOLTAGES, Settings
 from drivers.imu_lines.lines import checksum
+from drivers.imu_lines.reception import TIME, WRAP
 from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
 from drivers.transport.server import Port, Server, Twin
@@ -22,6 +24,7 @@ FAULTS = {
     "doubled-line": Kind("sends every line twice"),
     "wrong-baud": Kind("sends bytes as of another baud rate"),
     "stuck-axis": Kind("repeats the value of its first axis"),
+    "clock-drift": Kind("its clock gains on the true time", 50.0, "ppm", -1e5),
 }
 # unit -> (factor from g, deg/s or uT; decimals)
 FORCE = {"g": (1.0, 6), "m/s^2": (9.80665, 5), "count": (16384.0, 0)}
@@ -44,41 +47,47 @@ class Talker(Twin):
     def __init__(self, world: World, settings: Settings, port: Port) -> None:
         self.faults = Faults()
         self._world, self._settings, self._port, self._count = world, settings, port, 1
+        self._clock = Clock(1 / settings.rate_hz)
         self._held: float | None = None
 
     def advance(self, now_s: float) -> None:
         """Take all samples that are due by `now_s`, and send them."""
-        rate_hz = self._settings.rate_hz
-        due = int(np.floor(now_s * rate_hz + 1e-6)) + 1 - self._count
+        self._clock.run(1e-6 * (self.faults.size("clock-drift", now_s) or 0.0) if self.faults else 0.0, self._count)
+        due = self._clock.ticks(now_s) + 1 - self._count
         if due <= 0:
             return
-        start_s, first = self._count / rate_hz, self._count
+        start_s, interval_s, first = self._clock.true_s(self._count), self._clock.interval_s, self._count
         self._count += due
         if listeners := [c for c in self._port.connections.values() if not c.is_behind(now_s)]:
             names = list(self._settings.wired)
             factors = [formats(self._settings)[name][0] for name in names]
-            for k, row in enumerate(self._world.sensed(names, start_s, 1 / rate_hz, due) * factors):
-                at_s = (first + k) / rate_hz
-                data = self._spoilt(dict(zip(names, row.tolist(), strict=True)), at_s)
+            for k, row in enumerate(self._world.sensed(names, start_s, interval_s, due) * factors):
+                at_s = start_s + k * interval_s
+                data = self._spoilt(dict(zip(names, row.tolist(), strict=True)), first + k, at_s)
                 for connection in listeners:
                     connection.send(data, at_s)
 
     def due_s(self) -> float:
-        return self._count / self._settings.rate_hz
+        return self._clock.true_s(self._count)
+
+    def _time(self, count: int) -> float:
+        """The sensor's time of a sample, which counts to 2^32 and begins again."""
+        return round(count / self._settings.rate_hz / self._settings.time_unit_s) % WRAP
 
     def state(self) -> dict[str, Any]:
-        return {"count": self._count}
+        return {"count": self._count, "clock": asdict(self._clock)}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         self._count = state["count"]
+        self._clock = Clock(**state["clock"])
 
-    def _spoilt(self, values: dict[str, float], at_s: float) -> bytes:
-        """The line of a sample, with the faults of the moment."""
+    def _spoilt(self, values: dict[str, float], count: int, at_s: float) -> bytes:
+        """The line of a sample, with the faults of the moment; `count` is its number by the sensor's clock."""
         if self.faults and self.faults.size("stuck-axis", at_s) is not None:
             name = next(iter(values))
             self._held = values[name] if self._held is None else self._held
             values[name] = self._held
-        line = line_of(values | {TIME: round(at_s / self._settings.time_unit_s)}, self._settings)
+        line = line_of(values | {TIME: self._time(count)}, self._settings)
         if not self.faults:
             return line
         if self.faults.size("lost-line", at_s) is not None:
@@ -86,6 +95,34 @@ class Talker(Twin):
         if self.faults.size("wrong-baud", at_s) is not None:
             return bytes(byte ^ 0xF8 for byte in line[:-1]) + b"\n"
         return 2 * line if self.faults.size("doubled-line", at_s) is not None else line
+
+
+@dataclass
+class Clock:
+    """The sensor's clock: its tick `tick` is at `tick_s` of the true time, and it gains `gain` from there on."""
+
+    period_s: float  # of a tick, nominal
+    tick: int = 0
+    tick_s: float = 0.0
+    gain: float = 0.0
+
+    def run(self, gain: float, tick: int) -> None:
+        """Gain this much from `tick` on."""
+        if gain != self.gain:
+            self.tick, self.tick_s, self.gain = tick, self.true_s(tick), gain
+
+    @property
+    def interval_s(self) -> float:
+        """True time from tick to tick."""
+        return self.period_s / (1 + self.gain)
+
+    def true_s(self, tick: int) -> float:
+        """The true time of a tick."""
+        return self.tick_s + (tick - self.tick) * self.interval_s
+
+    def ticks(self, now_s: float) -> int:
+        """The number of the last tick by then."""
+        return self.tick + int(np.floor((now_s - self.tick_s) / self.interval_s + 1e-6))
 
 
 def formats(settings: Settings) -> dict[str, tuple[float, int]]:

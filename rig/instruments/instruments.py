@@ -126,6 +126,11 @@ class Rig:
             server.restore(kept)
         clock.restore(state["clock_s"])
 
+    def tally(self) -> dict[str, tuple[float, str]]:
+        """What a digital sensor's driver has counted since the connection, by name: a value with its unit."""
+        adc = self.drivers.get("adc")
+        return getattr(adc, "tally", dict)()
+
     def require_steady(self) -> None:
         """Raises the error of a stage that has left its position, or of an oscillation that has ended."""
         for driver in self._moving():

@@ -32,6 +32,15 @@ def leave_as(rig: Rig, record: Record, run: str) -> None:
         rig.world.mount_sensor()
 
 
+SENSOR = "digital sensor"  # event: samples of a digital sensor were lost, doubled or damaged
+LOSSES = {  # counts of a digital sensor, in words
+    "samples-lost": "lost",
+    "samples-doubled": "doubled",
+    "lines-damaged": "damaged",
+    "sensor-restarts": "restarts",
+}
+
+
 class RunHost:
     """The host of a session that records the measurements."""
 
@@ -43,6 +52,8 @@ class RunHost:
         self._dwells: list[Dwell] | None = None  # read from the record if the procedure needs them
         self._answers = {e.what: e.text for e in record.events(run.run) if e.what.startswith("answer ")}
         self._zero_s = state["zero_s"] if state else _zero_s(rig, run)
+        self._counted: dict[str, tuple[float, str]] = {}
+        self._before = {reading.name: reading.value for reading in record.readings(run.run)}
         if state is None:  # a restored clock is right
             _require_rising_time(rig.clock.now() - self._zero_s, record, run)
 
@@ -72,7 +83,7 @@ class RunHost:
             beta_read_deg=dials.get("beta"),
         )
         state = self._state()
-        self._log("kept", f"pose {self._next}: {len(samples.volts)} samples")
+        self._log("kept", f"pose {self._next}: {len(samples.volts)} samples{self._losses()}")
         self._record.keep(self._run, self._next, kept, state)
         self._next += 1
         self._poses.append(pose)
@@ -86,6 +97,26 @@ class RunHost:
         self._record.keep_readings(self._run, readings, self._state())
         for reading in readings:
             self._observer.read(reading)
+
+    def _losses(self) -> str:
+        """What a digital sensor has lost, doubled or damaged since the last pose, in words."""
+        before, self._counted = self._counted, self._rig.tally()
+        nothing = (0.0, "")
+        new = {name: self._counted.get(name, nothing)[0] - before.get(name, nothing)[0] for name in LOSSES}
+        return "".join(f", {LOSSES[name]} {count:.0f}" for name, count in new.items() if count)
+
+    def keep_tally(self) -> None:
+        """Record what a digital sensor has counted, at the end of a run or of a part of it."""
+        tally = self._rig.tally()
+        if not tally:
+            return
+        counted = [name for name, (_, unit) in tally.items() if not unit]
+        total = {name: tally[name][0] + self._before.get(name, 0.0) for name in counted}
+        readings = [Reading(name, total.get(name, value), unit) for name, (value, unit) in tally.items()]
+        self._record.keep_readings(self._run, readings, None)
+        if any(total[name] for name in LOSSES):
+            lost = ", ".join(f"{words} {total[name]:.0f}" for name, words in LOSSES.items())
+            self._record.note(self._run, SENSOR, f"of {total['samples']:.0f} samples: {lost}")
 
     def keep_state(self) -> None:
         """Record the state of the bench before the first measurement."""

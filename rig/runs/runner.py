@@ -247,13 +247,19 @@ def _perform(
         record.log(run.run, rig.clock.now(), "run", "doing", released)
     if state is not None:
         rig.restore(state["rig"])
-    with rig.guarded(session):
-        if state is None:
-            if asked is not None:
-                session.request(asked)
-            session.reference()
-            host.keep_state()
-        results = procedure.function(session, **settings) or {}
+    try:
+        with rig.guarded(session):
+            if state is None:
+                if asked is not None:
+                    session.request(asked)
+                session.reference()
+                host.keep_state()
+            results = procedure.function(session, **settings) or {}
+    except BaseException:
+        with suppress(RecordError):  # the record itself may have failed
+            host.keep_tally()
+        raise
+    host.keep_tally()
     return {name: returned(name, result) for name, result in results.items()}
 
 

@@ -16,6 +16,7 @@ from drivers.handheld.world import HandheldWorld
 from drivers.imu_lines import driver as imu_lines
 from drivers.imu_lines import twin
 from drivers.imu_lines.lines import Assembly, checksum, fields
+from drivers.imu_lines.reception import WRAP, Heard, Tally
 from drivers.transport import Links
 from drivers.transport.faults import Fault, faults_of
 
@@ -41,11 +42,11 @@ Connect = Callable[..., imu_lines.LineSensor]
 def connect() -> Iterator[Connect]:
     opened: list[Any] = []
 
-    def make(fault: Fault | None = None, sends: imu_lines.Settings | None = None, **keys: Any) -> imu_lines.LineSensor:
+    def make(*faults: Fault | None, sends: imu_lines.Settings | None = None, **keys: Any) -> imu_lines.LineSensor:
         settings = imu_lines.Settings(**({"columns": NUMBERED} | keys))
         server = twin.serve(Ramp(), {"adc": (1, sends or settings)})
-        if fault:
-            server.afflict("adc", faults_of("imu_lines", [fault]))
+        if given := [fault for fault in faults if fault is not None]:
+            server.afflict("adc", faults_of("imu_lines", given))
         clock = SimulatedClock()
         clock.attach(server)
         links = Links(clock)
@@ -150,3 +151,49 @@ def test_only_outputs_of_the_lines_can_be_asked_for(connect: Connect) -> None:
 def test_settings_that_cannot_be_are_refused(keys: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         imu_lines.Settings(**keys)
+
+
+def test_lost_and_doubled_samples_are_counted(connect: Connect) -> None:
+    sensor = connect(
+        Fault("lost-line", probability=0.02, seed=3), Fault("doubled-line", probability=0.01), most_lost=0.1
+    )
+    samples = sensor.acquire(40.0)
+    counts = {name: value for name, (value, _) in sensor.tally().items()}
+    true = np.diff(samples.volts[:, 0]) / 1e-3 * 100  # the ramp shows how many samples there are from each to the next
+    assert counts["samples-lost"] == pytest.approx(np.rint(true).sum() - len(true), abs=2)  # or after the last
+    assert 40 < counts["samples-lost"] < 160
+    assert 10 < counts["samples-doubled"] < 80
+    assert counts["samples"] == 4000
+    assert counts["lines-damaged"] == 0
+
+
+@pytest.mark.parametrize("ppm", [-300.0, 0.0, 80.0])
+def test_the_gain_of_the_clock_is_measured_over_all_records(connect: Connect, ppm: float) -> None:
+    sensor = connect(*([Fault("clock-drift", size=ppm)] if ppm else []))
+    for _ in range(3):
+        sensor.acquire(2.0)
+        sensor._clock.sleep(3000.0)  # beyond the wrap of the sensor's time, after 4295 s
+    sensor.acquire(2.0)
+    gain, unit = sensor.tally()["sensor-clock-gain"]
+    assert gain == pytest.approx(ppm, abs=2.0)
+    assert unit == "ppm"
+    assert sensor.tally()["sensor-restarts"] == (0.0, "")
+
+
+def test_a_sensor_that_begins_anew_is_noticed() -> None:
+    between = Tally(1e-6)
+    for start_s, host_s in ((100.0, 1000.0), (110.0, 1010.0), (0.5, 1020.0)):
+        heard = Heard(Assembly("csv", {}), 1e-6, 100.0)
+        for k in range(10):
+            heard.take([{"time": round(1e6 * (start_s + k / 100))}], host_s + k / 100)
+        between.add(heard)
+    assert between.restarts == 1
+    inside = Heard(Assembly("csv", {}), 1e-6, 100.0)
+    inside.take([{"time": 5e6}, {"time": 5.01e6}, {"time": 0.0}], 0.0)
+    assert inside.back
+
+
+def test_the_wrap_of_the_time_is_no_loss_and_no_restart() -> None:
+    heard = Heard(Assembly("csv", {}), 1e-6, 100.0)
+    heard.take([{"time": (WRAP - 25_000 + k * 10_000) % WRAP} for k in range(6)], 0.0)
+    assert (heard.lost, heard.doubled, heard.back) == (0, 0, False)

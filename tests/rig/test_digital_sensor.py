@@ -13,6 +13,7 @@ import yaml
 
 from procedures.catalogue import paths
 from rig.bench.file import DEFAULT
+from rig.record import Record
 
 Rig = Callable[..., Any]
 OUTPUTS = "time ax ay gx gy gz mx my mz supply d63"
@@ -115,6 +116,35 @@ def test_table_model_and_noise_have_the_unit_of_the_sensor(
     assert set(poses[0]["means_v"]) == {"supply", "d63"}
     assert set(poses[0]["means"]) == {"ax", "ay"}
     assert poses[0]["units"] == {"ax": "count", "ay": "count"}
+
+
+@pytest.mark.sockets
+def test_lost_and_doubled_samples_and_the_clock_are_in_the_record(
+    rig: Rig, rig_home: Path, digital: Callable[..., str]
+) -> None:
+    path = Path(digital("g"))
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["instruments"]["adc"]["faults"] = [
+        {"what": "lost-line", "probability": 0.004},
+        {"what": "doubled-line", "probability": 0.01},
+        {"what": "clock-drift", "size": 120},
+    ]
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    ended = rig("run", "check-standard", "--bench", str(path), "--unattended", "--dwell-s", "4")
+    assert ended.status == 0, ended.err
+    with Record() as record:
+        run = record.run("last").run
+        counted = {reading.name: reading for reading in record.readings(run)}
+        log = " ".join(line.text for line in record.lines(run, ["kept"]))
+    lost, doubled = (counted[f"samples-{name}"].value for name in ("lost", "doubled"))
+    assert counted["samples"].value == 8 * 400
+    assert 3 <= lost <= 30
+    assert 10 <= doubled <= 70
+    assert counted["sensor-clock-gain"].value == pytest.approx(120, abs=30)
+    assert sum(map(int, re.findall(r"lost (\d+)", log))) == lost
+    assert sum(map(int, re.findall(r"doubled (\d+)", log))) == doubled
+    assert f"lost {lost:.0f}, doubled {doubled:.0f}, damaged 0" in ended.err
+    assert "digital sensor" in rig("show", "last").out
 
 
 @pytest.mark.sockets

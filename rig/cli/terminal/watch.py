@@ -20,6 +20,7 @@ from rig.cli.terminal.output import emit, note, notes
 from rig.planning.plan import Plan
 from rig.record import Kept, Record
 from rig.runs.background.control import PublishingObserver
+from rig.runs.host import SENSOR
 from rig.runs.progress import RunningEstimates
 from rig.runs.runner import Decision, Observer, Outcome
 from rig.runs.soak_forecast import SoakForecaster, soak_forecaster
@@ -117,6 +118,7 @@ def print_end(record: Record, outcome: Outcome, as_json: bool) -> int:
     if outcome.error is not None:
         notes(outcome.moving)
         raise outcome.error
+    notes(f"adc: {event.text}" for event in record.events(run.run) if event.what == SENSOR)
     if run.message:
         note(run.message)
     return int(bool(run.message) or any(result["verdict"] == "fail" for result in run.results.values()))
