@@ -18,7 +18,7 @@ from calibrations.compensation.graph import Node, apply_operation, number, power
 from calibrations.compensation.trace import NotTraced, RunTime, Traced, as_nodes, as_traced
 from calibrations.effects import Values
 from calibrations.effects.thermometer import sensor_temperature_c
-from calibrations.free_forms.bases import Line, Products, Ramp, Spline
+from calibrations.free_forms.bases import Clips, Line, Products, Ramp, Spline
 from calibrations.free_forms.effect import FreeForm, coefficients_of
 from calibrations.free_forms.form import CROSS, Form
 from calibrations.table import Array
@@ -125,6 +125,8 @@ def _part(form: Form, u: Array, a: Any, v: Node, table: RunTime, k: int) -> Node
         elif isinstance(basis, Ramp):
             columns = [number(1.0), apply_operation("abs", x), x]
             f = _total([_times(float(c), column) for c, column in zip(u, columns, strict=False)])
+        elif isinstance(basis, Clips):
+            f = _total([_times(float(c) / w, _clipped(x, w)) for c, w in zip(u, basis.widths, strict=False)])
         else:
             raise NotTraced(f"a product cannot follow its {basis.kind}")
     if form.factor == "force":
@@ -149,6 +151,10 @@ def _driver(form: Form, a: Any, v: Node, table: RunTime, k: int) -> Node:
     if form.driver.startswith("column:"):
         return table.column(form.driver.removeprefix("column:")).nodes[0]  # type: ignore[no-any-return]
     raise NotTraced(f"a product does not know the {form.driver}")
+
+
+def _clipped(x: Node, width: float) -> Node:
+    return apply_operation("min", apply_operation("max", x, number(-width)), number(width))
 
 
 def _times(factor: float, x: Node) -> Node:

@@ -97,13 +97,29 @@ def _scaled(table: Table, limit: float) -> str | None:
         return (
             f"the zero of {a.column} is {a.zero_deg:+.3g} deg off; check the zero of the stage and add it to the column"
         )
-    if scales and not plain:
+    if scales and not plain and min(scales)[0] < _by_sensor(table):
         a = min(scales)[1]
         return (
             f"{a.column} is multiplied by {a.scale:.4g}; check the steps for a turn, the gear ratio and the unit of "
             "this stage"
         )
     return None
+
+
+def _by_sensor(table: Table) -> float:
+    """The least share of variance that a nonlinear response of one mechanism leaves at the stated poses.
+
+    A scale factor that changes with the third axis resembles an angle that is off by half a percent.
+    """
+    a = specific_force(nominal_pose(table))
+    own, other, z = a[:, 0], a[:, 1], a[:, 2]
+    mechanisms: list[list[Array]] = [
+        [own**2, own**3, other**2, other**3, np.abs(own), np.abs(other)],
+        [z**2, z**3],
+        [own * z, own * z**2, other * z, other * z**2],
+        [own * other, own * other**2, other * own**2],
+    ]
+    return min(float(np.max(_left(np.column_stack([a, *more]), table.outputs))) for more in mechanisms)
 
 
 def _best_zero(column: str, scale: float, table: Table) -> _Angle:

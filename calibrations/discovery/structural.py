@@ -23,7 +23,7 @@ from calibrations.fitting.problem import Problem
 from calibrations.free_forms.chain import Given
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.geometry import GEOMETRY
-from calibrations.free_forms.place_names import PREFIX
+from calibrations.free_forms.place_names import PREFIX, place_of_effect
 from calibrations.free_forms.stairs import before_stairs, find_stairs, fitted_stairs
 from calibrations.free_forms.structure import FloorSource, Structure, find_structure, with_stairs
 from calibrations.means.noise import Noise, white_only, with_white
@@ -36,6 +36,7 @@ BASE = (*BASIC, *GEOMETRY)
 BASE_STEPS = 2  # of Gauss and Newton's: hardly anything of the base is not linear
 STAIRS = "quantisation"
 NEARLY = 1.5  # noise floors: with more the stairs were not the right ones
+SMALL = 0.1  # of the value of a cause that led the fit astray
 NO_WORSE = 1.02  # of the error before: a parameter more costs a degree of freedom, a fit gone astray more
 
 
@@ -143,7 +144,30 @@ def _named_and_fitted(base: Fit, found: Structure, effects: Mapping[str, Effect]
         other = together(base, [*_at(end, causes), *others])
         if other.held_out_excess < end.held_out_excess:
             causes, forms, end = _at(end, causes), others, other
+    if end.held_out_excess > MATERIAL and (small := _small_beside_forms(_at(end, causes), forms)):
+        other = together(base, [*small, *forms])
+        if other.held_out_excess < end.held_out_excess:
+            causes, end = small, other
     return _Named(found, causes, forms, end)
+
+
+def _small_beside_forms(causes: list[Addition], forms: list[Addition]) -> list[Addition]:
+    """The causes with those small at whose place a free form acts; none where there is no such place.
+
+    The form can hold what the cause describes. A cause that begins large, at a wrong value of what is not linear, keeps
+    both from the best fit.
+    """
+    places = {a.effect.name.removeprefix(PREFIX) for a in forms}
+    if not any(place_of_effect(a.effect.name) in places for a in causes):
+        return []
+    return [_small(a) if place_of_effect(a.effect.name) in places else a for a in causes]
+
+
+def _small(cause: Addition) -> Addition:
+    """The cause with those parameters small that it is linear in: of either sign, and 0 where nothing is known."""
+    linear = {p.name for p in cause.effect.parameters if p.low == -np.inf and p.starts == (0.0,) and p.guess is None}
+    estimates = [replace(e, value=SMALL * e.value) if e.name in linear else e for e in cause.estimates]
+    return replace(cause, estimates=tuple(estimates))
 
 
 def _behind_stairs(base: Fit, effects: Mapping[str, Effect]) -> _Named | None:

@@ -1,4 +1,8 @@
-"""The temperature of the sensor from that of the thermometer, which follows it late or early."""
+"""The temperature of the sensor from that of the thermometer: one of the two follows the other.
+
+Heat flows in proportion to a difference of temperature, so that each follows as a first-order lag: the faster one is
+T + tau dT/dt of the slower one.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +10,17 @@ from functools import lru_cache
 
 import numpy as np
 
+from calibrations.estimators.scatter import without_scatter
 from calibrations.table import Array, Table
 
 RATE = "temperature_rate_c_s"  # input of a product: how fast its thermometer's reading changes, C/s
-SMOOTHED_ROWS, FEWEST_SMOOTHED = 11, 5  # of a thermometer, whose noise would hide its lag
 
 
 def sensor_temperature_c(table: Table, lead_s: float) -> Array:
-    """The temperature that the thermometer shows `lead_s` later, deg C, shape (n,).
+    """The temperature of the sensor, which the thermometer follows with a time constant of `lead_s`, deg C, shape (n,).
 
-    As logged where that is 0. A single row has no later reading: there the column `temperature_rate_c_s` tells it,
-    and without this column it is as logged.
+    A negative one is that of the sensor, which follows the thermometer. As logged where it is 0. A single row has no
+    neighbours: there the column `temperature_rate_c_s` tells the rate, and without this column it is as logged.
     """
     if lead_s and table.n > 1:
         return leading_temperature(table, lead_s)
@@ -34,18 +38,32 @@ def temperature_rate_c_s(table: Table) -> Array:
 
 @lru_cache(maxsize=64)
 def leading_temperature(table: Table, lead_s: float) -> Array:
-    """The same without the noise of the thermometer: a local line over some rows; as logged where no time changes."""
+    """The same from the readings without their scatter; as logged where no time changes."""
     shown = table.column("temperature_c")
     if "t_s" not in table or not np.ptp(table.time_s) > 0:
         return shown
-    return np.interp(table.time_s + lead_s, table.time_s, _smooth(shown, min(SMOOTHED_ROWS, 2 * (table.n // 4) + 1)))
+    level, t = _level(table), table.time_s
+    return level + lead_s * np.gradient(level, t) if lead_s >= 0 else _lagging(level, t, -lead_s)
 
 
-def _smooth(x: Array, width: int) -> Array:
-    """A straight line fitted to `width` rows about each row, an odd number; at the ends to the first and the last."""
-    if width < FEWEST_SMOOTHED:
-        return x
-    half, rows = width // 2, np.arange(width)
-    first, last = np.polyfit(rows, x[:width], 1), np.polyfit(rows, x[-width:], 1)
-    inside = np.convolve(x, np.full(width, 1 / width), "valid")
-    return np.concatenate([np.polyval(first, rows[:half]), inside, np.polyval(last, rows[half + 1 :])])
+@lru_cache(maxsize=16)
+def _level(table: Table) -> Array:
+    """The temperature without the scatter of its readings, (n,), rows in order.
+
+    The straight line is taken off first: the cosine transform continues a record as its mirror image, and the line
+    would have a corner there.
+    """
+    shown, rows = table.column("temperature_c"), np.arange(table.n)
+    line = np.polyval(np.polyfit(rows, shown, 1), rows)
+    readings = 1 + int(np.count_nonzero(np.diff(shown)))
+    return np.asarray(line + without_scatter(shown - line, readings)[0])
+
+
+def _lagging(x: Array, t: Array, time_constant_s: float) -> Array:
+    """x behind a first-order lag, (n,), settled at the first row."""
+    kept = np.exp(-np.diff(t) / time_constant_s)
+    out = np.empty_like(x)
+    out[0] = x[0]
+    for i, share in enumerate(kept):
+        out[i + 1] = x[i + 1] + share * (out[i] - x[i + 1])
+    return out

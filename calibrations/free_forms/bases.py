@@ -129,6 +129,51 @@ class Line:
 
 
 @dataclass(frozen=True)
+class Settling:
+    """A spline over log(1 + (x - begin) / shortest), constant after `begin + span`: many time constants at once.
+
+    A spline over time itself is as rough at the end of a record as at its beginning, where things settle.
+    """
+
+    begin: float
+    span: float
+    shortest: float
+    intervals: int
+    kind: Literal["settling"] = "settling"
+
+    @property
+    def count(self) -> int:
+        """Number of columns."""
+        return self._over_age.count
+
+    @property
+    def _over_age(self) -> Spline:
+        return Spline(0.0, float(np.log1p(self.span / self.shortest)), self.intervals, order=1)
+
+    def __call__(self, x: Array) -> Array:
+        """Columns at x (n,), shape (n, count)."""
+        return self._over_age(np.log1p(np.maximum(x - self.begin, 0.0) / self.shortest))
+
+
+@dataclass(frozen=True)
+class Clips:
+    """x clipped at each width, over the width: a sum of dead zones of many widths."""
+
+    widths: tuple[float, ...]
+    kind: Literal["clips"] = "clips"
+
+    @property
+    def count(self) -> int:
+        """Number of columns."""
+        return len(self.widths)
+
+    def __call__(self, x: Array) -> Array:
+        """Columns at x (n,), shape (n, count)."""
+        widths = np.array(self.widths)
+        return np.asarray(np.clip(x[:, None], -widths, widths) / widths)
+
+
+@dataclass(frozen=True)
 class Play:
     """Slip elements that follow x and slip at their widths, over the widths: hysteresis of any shape.
 
@@ -186,4 +231,4 @@ class Ramp:
         return np.column_stack([np.ones(len(x)), np.abs(x), x])
 
 
-Basis = Spline | Harmonics | Waves | Line | Play | Products | Ramp
+Basis = Spline | Harmonics | Waves | Line | Settling | Clips | Play | Products | Ramp

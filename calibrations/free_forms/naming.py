@@ -106,7 +106,7 @@ def _named(
     jumps = any(_jumps(result, name) for name in names if "/walk-" in name)
     for comp in result.components:
         if comp.place == place and comp.cause and (comp.name in names or not _shaped_out(comp, result, names)):
-            if (comp.cause == "bias-drift" and jumps) or (comp.cause == "quantisation" and comp.name not in names):
+            if (comp.cause == "bias-drift" and jumps) or (_follows_many(comp) and comp.name not in names):
                 continue
             forms.setdefault(comp.cause, []).append(comp)
     columns = {cause: _columns(result, comps, names, Q, b) for cause, comps in forms.items()}
@@ -174,6 +174,11 @@ def _needed(columns: Mapping[str, Array], curve: Array, total: float) -> tuple[t
     needs = {cause: lost(cause) for cause in columns}
     least = min(LEAST_NEEDED, max(needs.values()))
     return tuple(c for c in sorted(needs, key=lambda c: -needs[c]) if needs[c] >= least), share
+
+
+def _follows_many(comp: Component) -> bool:
+    """Whether a cause's columns are of many widths, so that they take up a part of most curves."""
+    return comp.cause == "quantisation" or (comp.form is not None and comp.form.basis(0).kind in ("clips", "play"))
 
 
 def _jumps(result: SearchResult, name: str) -> bool:

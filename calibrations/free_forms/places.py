@@ -14,7 +14,7 @@ import numpy as np
 
 from calibrations.effects.kernels import play
 from calibrations.effects.thermometer import leading_temperature
-from calibrations.free_forms.bases import Harmonics, Line, Play, Products, Ramp, Waves, spline
+from calibrations.free_forms.bases import Clips, Harmonics, Line, Play, Products, Ramp, Settling, Waves, spline
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import Basis, Columns, Component, Starts, free, per_axis
 from calibrations.free_forms.form import CROSS, Factor, Form
@@ -27,8 +27,10 @@ from calibrations.table import Array
 PRODUCT, GENERAL = 2.0, 8.0  # prices: simple before product before general force
 WIDTHS_G = tuple(np.geomspace(0.01, 1.8, 14).tolist())  # of slip elements
 DEAD_G = (0.003, 0.012, 0.05)
+THRESHOLDS_G = tuple(np.geomspace(0.002, 0.2, 8).tolist())  # of dead zones that are not all of one width
 ENDS = (0.75, 0.9, 0.97, 0.99)  # of an axis's range, where saturation begins
 WARMING = (0.04, 0.15, 0.6)  # of the record: time constants
+AGES = 8  # intervals of the logarithm of the time since the record's beginning
 SHORTEST_PART = 1e-3  # the same: shorter ones are over before the second pose
 LEADS_S = (0.0, -90.0, 90.0)  # by which the sensor is ahead of the thermometer
 WAVES, WALK_WAVES = 24, 160  # of slow noise, and of a random walk, whose roughness is never small
@@ -147,6 +149,7 @@ def _own(data: PoseData, first: State) -> list[Component]:
         )  # fmt: skip
 
     found += [dead(f"{place}/dead-zone@{width:.4f}")((width,) * data.channels) for width in DEAD_G]
+    found.append(free(Form(place, "thresholds", "own", (Clips(THRESHOLDS_G),)), first, "dead-zone", PRODUCT))
     return found + _saturations(data, first)
 
 
@@ -387,6 +390,8 @@ def _time(data: PoseData, first: State) -> list[Component]:
         line = Form(place, "line", "time", (Line(begin, begin + span),), factor)
         found.append(free(line, first, drift, price))
         found.append(free(Form(place, "curve", "time", (spline(t, 12),), factor), first, price=price))
+        settling = Settling(begin, span, span / data.n, AGES)
+        found.append(free(Form(place, "settling", "time", (settling,), factor), first, price=price))
         if drift:
             walk = Waves(begin, span, min(WALK_WAVES, data.n // 3), 2.0)
             for k, axis in enumerate(data.axes):

@@ -29,7 +29,7 @@ NO_NOISE = 1e-3  # of the noise of all rows: all samples of a mean are one code 
 LEAST_WHITE = 0.1  # the same: the noise that such a mean is given, though its samples show none
 OUTLYING = 4.0  # times the usual residual: more counts as so much
 SEEN_FORM = 0.9  # of a place's variance: the form of the catalogue itself, not one near it
-FIRST_POSES = 0.06  # of a record
+FIRST_POSES, OVER_SOON = 0.06, 0.8  # of a record, and of the variance of what decays within them
 KEPT = 0.1  # noise floors: rough columns that together add less are left out of a form
 LINEAR = {"cross-response": "cross", "z-response": "out-of-plane"}  # places with a linear part, and their drivers
 
@@ -94,8 +94,16 @@ class Structure:
     @property
     def _short_lived(self) -> tuple[str, ...]:
         """Causes that decay within the first poses, as the memory of what came before them does."""
-        acting = [self.result.component(name) for place in self.places for name in place.components]
-        return tuple(c.cause for c in acting if c.cause.startswith("warm-up") and c.shape[0] < FIRST_POSES)
+        if not self.result.data.timed:
+            return ()
+        beginning = self.result.data.since < FIRST_POSES
+        found: list[str] = []
+        for place in self.places:
+            curve = max(place.curve, key=np.ptp)
+            squares = (curve - np.median(curve)) ** 2
+            if squares[beginning].sum() > OVER_SOON * squares.sum():
+                found += [c for c in place.causes if c.startswith("warm-up")]
+        return tuple(found)
 
     def others(self, place: ActingPlace | None) -> Array:
         """What all places but one add to the output through the chain, (channels, n), in its unit; None: all places."""
@@ -160,7 +168,7 @@ class Structure:
         for k in range(channels):
             count = form.count(k)
             rest = np.cumsum(added[at : at + count][::-1])[::-1] / self.result.data.n  # from each column on
-            whole = form.basis(k).kind in ("play", "products", "ramp")
+            whole = form.basis(k).kind in ("clips", "play", "products", "ramp")
             sizes.append(size if count else 0.0)
             kept.append(count if whole else max(min(count, 1), int(np.sum(rest > KEPT**2))))
             at += count

@@ -1,12 +1,8 @@
 """A still record, reduced in one pass and in constant memory to what the likelihood of a noise model needs.
 
-A column that is logged with the sensor (temperature, supply) is kept as read and without its reader's own scatter. The
-sensor does not feel that scatter, and a regression on the readings underestimates the slope (attenuation). The true
-level is modelled as a power-law process, read with white scatter; its best estimate (Wiener filter) is diagonal in the
-cosine transform, and a regression on it is not attenuated. If the sensor feels the scatter too, the readings fit
-better, and the likelihood decides. The uncertain amount of scatter adds to the uncertainty of a slope (`doubt`).
-
-Source  Carroll et al., Measurement Error in Nonlinear Models, chapter 4: regression calibration.
+A column that is logged with the sensor (temperature, supply) is kept as read and without its reader's own scatter
+(`estimators.scatter`). If the sensor feels the scatter too, the readings fit better, and the likelihood decides. The
+uncertain amount of scatter adds to the uncertainty of a slope (`doubt`).
 """
 
 from __future__ import annotations
@@ -17,22 +13,16 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.fft import dct, idct
-from scipy.optimize import minimize_scalar
 
-from calibrations.criteria import FEWEST_ORDINATES, FEWEST_SAMPLES
+from calibrations.criteria import FEWEST_SAMPLES
 from calibrations.errors import DataError, TooFewRows
+from calibrations.estimators.scatter import without_scatter
 from calibrations.noise.deviations import OCTAVE_KINDS, OVERLAPPING, Curve, Octaves
 from calibrations.noise.samples import Ends, Oddity, Outliers, Steps, Stuck, hidden_in, oddities
 from calibrations.spectrum import Means, Sampling, Segments, Welch
 from calibrations.table import Array
 
 HOUR_S = 3600.0
-LOG_RATIOS = (-12.0, 16.0)  # of the variances of scatter and of a level's steps, that are looked through
-SLOPES = (0.5, 1.0, 1.5, 2.0)  # of a level's spectrum in powers of the frequency: 1 flickers, 2 walks
-NODES = ((-(3**0.5), 1 / 6), (0.0, 2 / 3), (3**0.5, 1 / 6))  # of a normal distribution, and weights (Gauss, Hermite)
-CURVATURE_STEP = 0.1  # of the logarithm of a ratio: a step in which the likelihood is a parabola
-FLAT = 2.0  # least curvature: a ratio is known to a factor of e, or its likelihood is no parabola
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,68 +53,6 @@ def logged_column(blocks: Sequence[Array], n: int) -> Logged | None:
     if sum(map(len, blocks)) != n or np.ptp(read) == 0:
         return None
     return Logged(read, *without_scatter(read, readings))
-
-
-def without_scatter(read: Array, readings: int) -> tuple[Array, float]:
-    """The level beneath the scatter of a column's means (m,), of which each of so many `readings` holds until the next.
-
-    Also the doubt of a slope on it. Frequencies above those of the readings say nothing of their scatter, and are left
-    out.
-    """
-    m = len(read)
-    k = np.arange(1, min(m, readings))
-    if len(k) < FEWEST_ORDINATES:
-        return read, 0.0
-    seen = dct(read, type=2, norm="ortho")[k]
-    held, turn = max(1.0, m / readings), np.pi * k / (2 * m)
-    power = (seen * held * np.sin(turn) / np.sin(held * turn)) ** 2  # as if none had been held
-    share, doubt = _level_share(power, 2 * np.sin(turn), seen**2)
-    kept = np.zeros(m)
-    kept[k] = seen * share
-    return np.asarray(idct(kept, type=2, norm="ortho")), doubt
-
-
-def _level_share(power: Array, frequency: Array, weight: Array) -> tuple[Array, float]:
-    """The level's share of each ordinate (k,), the mean over spectra by how likely they are.
-
-    Also by how much the slope of what follows the level would be off where another spectrum is true, relative and rms.
-    """
-    spectra = [_Spectrum.of(power, frequency**-slope) for slope in SLOPES]
-    likeliest = min(each.unlikely for each in spectra)
-    odds = [each.std * float(np.exp((likeliest - each.unlikely) / 2)) for each in spectra]  # by Laplace
-    chances = np.outer(odds, [chance for _, chance in NODES]).ravel()
-    shares = np.array([each.share(stds) for each in spectra for stds, _ in NODES])
-    share = np.average(shares, axis=0, weights=chances)
-    off = shares @ (share * weight) / (share**2 @ weight) - 1
-    return np.asarray(share), float(np.sqrt(np.average(off**2, weights=chances)))
-
-
-@dataclass(frozen=True, eq=False)
-class _Spectrum:
-    """A level's spectrum (k,) with scatter beside it, at their likeliest ratio."""
-
-    level: Array
-    log_ratio: float  # of the variance of the scatter to that of the level's steps
-    std: float  # of the logarithm
-    unlikely: float  # twice the negative log-likelihood
-
-    @classmethod
-    def of(cls, power: Array, level: Array) -> _Spectrum:
-        """By the power that was seen (k,). Where nothing scatters the likelihood is flat, and so is the share."""
-        found = minimize_scalar(_deviance_of_ratio, bounds=LOG_RATIOS, args=(power, level), method="bounded")
-        beside = sum(_deviance_of_ratio(found.x + step, power, level) for step in (-CURVATURE_STEP, CURVATURE_STEP))
-        curvature = (beside - 2 * found.fun) / CURVATURE_STEP**2
-        return cls(level, float(found.x), float(np.sqrt(2 / max(curvature, FLAT))), float(found.fun))
-
-    def share(self, stds: float) -> Array:
-        """The level's share of each ordinate (k,), where the ratio is so many standard deviations higher."""
-        return np.asarray(self.level / (self.level + np.exp(self.log_ratio + stds * self.std)))
-
-
-def _deviance_of_ratio(log_ratio: float, power: Array, level: Array) -> float:
-    """Twice the negative log-likelihood of a level with scatter, at its best scale."""
-    both = level + np.exp(log_ratio)
-    return float(len(power) * np.log(np.mean(power / both)) + np.sum(np.log(both)))
 
 
 # A still record of any length, reduced in one pass to all that its noise is told from.

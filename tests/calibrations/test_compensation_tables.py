@@ -16,7 +16,7 @@ from calibrations.compensation.forward import INVERTED, LEFT_OUT, steps_of, trac
 from calibrations.compensation.inverse import Range, compensated_residual, invert_model
 from calibrations.compensation.tables import CubicTable, spline_table
 from calibrations.effects.thermometer import RATE
-from calibrations.free_forms.bases import Basis, Line, Play, Products, Ramp, Spline, Waves
+from calibrations.free_forms.bases import Basis, Clips, Line, Play, Products, Ramp, Spline, Waves
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.form import Form
 from calibrations.model import Estimate, Model, Term
@@ -41,6 +41,8 @@ FORMS = {
     "output": Form("output", "curve", "output", (Spline(1.0, 4.0, 10),), sizes=(2e-4,), shared=True),
     "column:supply_v": Form("column:supply_v", "curve", "column:supply_v", (Spline(4.8, 5.2, 4),), sizes=(1e-3, 1e-3)),
 }  # fmt: skip
+
+THRESHOLDS = Form("own-response", "thresholds", "own", (Clips((0.01, 0.1)),), sizes=(1e-3, 1e-3))
 
 
 def with_forms(*forms: Form, seed: int = 1, std: float | None = None) -> Model:
@@ -84,9 +86,9 @@ def test_bounds_of_a_table_hold_every_value_and_slope(seed: int) -> None:
     assert np.median((most - least)[wide]) < 2 * np.median(np.ptp(value, axis=0)[wide])
 
 
-@pytest.mark.parametrize("place", FORMS)
-def test_a_form_is_inverted(place: str) -> None:
-    fitted = with_forms(FORMS[place])
+@pytest.mark.parametrize("form", [*FORMS.values(), THRESHOLDS], ids=lambda form: f"{form.place}/{form.name}")
+def test_a_form_is_inverted(form: Form) -> None:
+    fitted = with_forms(form)
     made = invert_model(fitted)
     assert made.forward.fates[-1].how == INVERTED, made.forward.fates[-1].why
     assert error(made, fitted) < 1e-9

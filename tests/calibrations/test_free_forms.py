@@ -18,7 +18,18 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.errors import ModelError
 from calibrations.fitting.fit import Fit, evaluate, fit, refit
 from calibrations.free_forms import bases
-from calibrations.free_forms.bases import DEGREE, Harmonics, Line, Play, Products, Spline, Waves, spline
+from calibrations.free_forms.bases import (
+    DEGREE,
+    Clips,
+    Harmonics,
+    Line,
+    Play,
+    Products,
+    Settling,
+    Spline,
+    Waves,
+    spline,
+)
 from calibrations.free_forms.effect import FreeForm, free_form, place_of
 from calibrations.free_forms.form import Form
 from calibrations.free_forms.places import _steps
@@ -73,6 +84,22 @@ def test_columns_of_a_spline_have_unit_roughness_and_are_independent() -> None:
 @pytest.mark.parametrize("basis", [Spline(0.0, 1.0, 5), Harmonics(2, 4), Waves(0.0, 1.0, 6, 2.0), Line(0.0, 1.0)])
 def test_a_basis_has_as_many_columns_as_it_counts(basis: Spline | Harmonics | Waves | Line) -> None:
     assert basis(np.linspace(0.0, 1.0, 30)).shape == (30, basis.count)
+
+
+def test_settling_follows_exponentials_of_very_different_time_constants() -> None:
+    t = 20.0 + 8.0 * np.arange(500)
+    begun = 0.6 * np.exp(-(t - 20) / 60) + 0.4 * np.exp(-(t - 20) / 2500)
+    basis = Settling(20.0, 4000.0, 8.0, 8)
+    columns = np.column_stack([np.ones(500), basis(t)])
+    assert columns.shape[1] == basis.count + 1
+    left = begun - columns @ np.linalg.lstsq(columns, begun, rcond=None)[0]
+    assert np.abs(left).max() < 5e-3
+    assert basis(np.array([4020.0])) == pytest.approx(basis(np.array([9000.0])))
+
+
+def test_clips_are_sums_of_dead_zones() -> None:
+    x = np.linspace(-1, 1, 9)
+    assert Clips((0.5, 2.0))(x) == pytest.approx(np.column_stack([np.clip(x, -0.5, 0.5) / 0.5, x / 2]))
 
 
 def test_products_and_slip_elements_count_their_columns() -> None:

@@ -9,10 +9,11 @@ import pytest
 from scipy.fft import idct
 
 from calibrations.discovery.results import Discovery
+from calibrations.estimators.scatter import without_scatter
 from calibrations.loop import diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.noise.patterns import FOLLOWS, STEP, Pattern
-from calibrations.noise.record import Samples, Still, reduce_record, without_scatter
+from calibrations.noise.record import Samples, Still, reduce_record
 from calibrations.table import Array
 from tests.calibrations.hidden_noise import FOLLOWING, RATE_HZ, SAMPLES, room, white
 
