@@ -1,0 +1,41 @@
+"""Sensors of a simulator whose forms nobody here fitted anything to: names and errors in the end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.benchmark.foreign.causes import CATALOGUE, UNKNOWN, Cause
+from tests.benchmark.foreign.sensor import table
+from tests.benchmark.hidden import Score, score, shipped
+
+SEED = 2028
+
+
+def searched(folder: Path, number: int, causes: list[Cause], floors: float) -> Score:
+    random = np.random.default_rng([SEED, number])
+    path = folder / f"{number}.csv"
+    path.write_text(table(random, causes, [floors] * len(causes), slow=0.3))
+    return score(path.stem, [c.name for c in causes], shipped(path), 0.0)
+
+
+@pytest.mark.slow
+def test_one_cause_of_each_form_is_named_and_removed(tmp_path: Path) -> None:
+    found = [searched(tmp_path, number, [cause], 10.0) for number, cause in enumerate(CATALOGUE)]
+    errors = [s.answer.held_out or np.inf for s in found]
+    assert np.mean([s.exact for s in found]) >= 0.85, [(s.truth, s.answer) for s in found if not s.exact]
+    assert np.mean(np.array(errors) <= 1.25) >= 0.9, [(s.truth, s.answer) for s in found if s.answer.held_out > 1.25]
+
+
+@pytest.mark.slow
+def test_a_sensor_without_a_cause_gets_no_name(tmp_path: Path) -> None:
+    found = [searched(tmp_path, 100 + number, [], 0.0) for number in range(12)]
+    assert not any(s.answer.causes for s in found)
+
+
+@pytest.mark.slow
+def test_what_no_catalogue_holds_gets_no_name(tmp_path: Path) -> None:
+    found = [searched(tmp_path, 200 + number, [cause], 10.0) for number, cause in enumerate(UNKNOWN)]
+    assert sum(bool(s.answer.causes) for s in found) <= 1, [s.answer for s in found]
