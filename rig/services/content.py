@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rig.record import Record
+from rig.services.tables import AND, names_of
 
 
 @dataclass(frozen=True)
@@ -23,11 +24,15 @@ class Content:
 
 
 def content_of(data: str, model: str | None) -> Content:
-    """The present content of `data` (a file, a run, a sensor of a run) and `model`.
+    """The present content of `data` (a file, a run, a sensor of a run, several of these) and `model`.
 
     Reads no samples. Raises UnknownRun, RecordError, OSError.
     """
     of_model = _of_file(Path(model)) if model and Path(model).is_file() else model or ""
+    if len(names := names_of(data)) > 1:
+        parts = [content_of(name, model) for name in names]
+        extent = AND.join(part.extent or "a file" for part in parts)
+        return Content(_key(*(part.key for part in parts)), extent, any(part.growing for part in parts))
     if Path(data).is_file():
         return Content(_key("file", _of_file(Path(data)), of_model))
     name, _, sensor = data.partition("/")
@@ -36,8 +41,8 @@ def content_of(data: str, model: str | None) -> Content:
         excluded = sorted(record.excluded(run.run).items())
         read = [(reading.name, reading.value) for reading in record.readings(run.run)]
         count = record.next_number(run.run)
-    parts = (run.run, run.uid, run.rows, count, excluded, read, dict(run.constants), sensor, of_model)
-    return Content(_key(*parts), run.extent, run.state == "running")
+    of_run = (run.run, run.uid, run.rows, count, excluded, read, dict(run.constants), sensor, of_model)
+    return Content(_key(*of_run), run.extent, run.state == "running")
 
 
 def _key(*parts: object) -> str:

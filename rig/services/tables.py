@@ -58,10 +58,12 @@ def _included(table: Table, tell: Callable[[str], None]) -> Table:
 
 
 def load(data: str, kind: str | None = None, tell: Callable[[str], None] = lambda _: None) -> Table:
-    """The table of `data`: a file, else a run. `tell` receives remarks.
+    """The table of `data`: a file, else a run, or several joined by AND. `tell` receives remarks.
 
     Raises DataError naming file, line and column; UnknownRun naming the nearest run.
     """
+    if len(names := names_of(data)) > 1:
+        return load_all(names, tell)
     if Path(data).is_dir():
         raise DataError(f"{data}: this is a folder; give a file in it, or a run (`rig runs` lists them)")
     if Path(data).is_file():
@@ -84,6 +86,13 @@ def _of_run(data: str) -> Table:
 
 
 # Several runs or files of one sensor as one table.
+
+AND = " + "  # between their names, where one text names all
+
+
+def names_of(data: str) -> list[str]:
+    """The runs and files that a text names: `A + B` names two."""
+    return [data] if Path(data).exists() else [name.strip() for name in data.split(AND)]
 
 
 def load_all(names: Sequence[str], tell: Callable[[str], None] = lambda _: None) -> Table:

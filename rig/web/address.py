@@ -14,18 +14,22 @@ MOST_SELECTED = 100_000
 
 @dataclass(frozen=True)
 class ModelState:
-    """`added`: None if the address does not say. `selected`: the selected points, in order."""
+    """`added`: None if the address does not say. `selected`: the selected points, in order.
+
+    `noise`: the file of a noise model of the sensor, "" for the noise of the data's own samples.
+    """
 
     data: str = ""
     model: str = ""
     added: tuple[str, ...] | None = None
     selected: tuple[int, ...] = ()
+    noise: str = ""
 
     @property
     def address(self) -> str:
         """The address, without what is empty. No added effect at all is an empty `add`."""
         added = list(self.added) or [""] if self.added is not None else []
-        given = [("data", self.data), ("model", self.model), ("select", ranges(self.selected))]
+        given = [("data", self.data), ("model", self.model), ("select", ranges(self.selected)), ("noise", self.noise)]
         query = urlencode([*((name, value) for name, value in given if value), *(("add", text) for text in added)])
         return f"/?{query}" if query else "/"
 
@@ -33,7 +37,8 @@ class ModelState:
 def parse_state(query: QueryParams) -> ModelState:
     """The state of an address. A selection that cannot be read is none."""
     added = tuple(text for text in query.getlist("add") if text) if "add" in query else None
-    return ModelState(query.get("data", ""), query.get("model", ""), added, numbers(query.get("select", "")))
+    selected = numbers(query.get("select", ""))
+    return ModelState(query.get("data", ""), query.get("model", ""), added, selected, query.get("noise", ""))
 
 
 def ranges(selected: Sequence[int]) -> str:

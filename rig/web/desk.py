@@ -26,43 +26,44 @@ FILES = "files"  # folder of uploaded files
 
 @dataclass
 class Desk:
-    """`dark`: None follows the browser. `sessions`: the open model sessions by data and model, in the order of use.
-    `reports`: HTML by the content of the data."""
+    """`dark`: None follows the browser. `sessions`: the open model sessions by data, model and noise model, in order of
+    use. `reports`: HTML by the content of the data."""
 
     bench_file: Path | None
     dark: bool | None = None
-    sessions: OrderedDict[tuple[str, str], ModelSession[Any]] = field(default_factory=OrderedDict)
+    sessions: OrderedDict[tuple[str, str, str], ModelSession[Any]] = field(default_factory=OrderedDict)
     reports: OrderedDict[str, str] = field(default_factory=OrderedDict)
 
-    def open(self, data: str, model: str, added: Sequence[str] | None = None) -> ModelSession[Any]:
+    def open(self, data: str, model: str, added: Sequence[str] | None = None, noise: str = "") -> ModelSession[Any]:
         """The open session if its data and model are still the same, else a new one with the same added effects.
 
-        `model` "" is the default model. `added`: exactly these effects; None for those of the open session, or of the
-        one that an earlier server kept. Raises the errors of `model_session`.
+        `model` "" is the default model, `noise` "" the noise of the data's own samples. `added`: exactly these effects;
+        None for those of the open session, or of the one that an earlier server kept. Raises the errors of
+        `model_session`.
         """
         from rig.services.content import content_of
         from rig.services.request import Request
         from rig.services.session import brought_up_to_date, model_session
 
-        found = self.sessions.get((data, model))
+        found = self.sessions.get((data, model, noise))
         if found is None:
-            found = model_session(Request(data, model or None, self.bench_file))
+            found = model_session(Request(data, model or None, self.bench_file, noise or None))
             if added is None:
-                found = found.with_added(kept_effects(data, model))
+                found = found.with_added(kept_effects(data, model, noise))
         elif found.content.key != content_of(data, model or None).key:
             found = brought_up_to_date(found)
         if added is not None:
             found = found.with_added(added)
-        self.keep(data, model, found)
+        self.keep(data, model, found, noise)
         return found
 
-    def keep(self, data: str, model: str, session: ModelSession[Any]) -> None:
+    def keep(self, data: str, model: str, session: ModelSession[Any], noise: str = "") -> None:
         """Store the present state of a session."""
-        self.sessions[data, model] = session
-        self.sessions.move_to_end((data, model))
+        self.sessions[data, model, noise] = session
+        self.sessions.move_to_end((data, model, noise))
         while len(self.sessions) > MOST_OPEN:
             self.sessions.popitem(last=False)
-        keep_effects(data, model, session.added)
+        keep_effects(data, model, session.added, noise)
 
     def keep_report(self, key: str, text: str) -> None:
         """Store a report by the content that it is of."""
@@ -79,25 +80,26 @@ class Desk:
 # The added effects of the last sessions, in a file: a server that starts again opens them as they were.
 
 
-def kept_effects(data: str, model: str) -> list[str]:
+def kept_effects(data: str, model: str, noise: str = "") -> list[str]:
     """The added effects of an earlier server's session; empty without one."""
-    return _kept().get(_name(data, model), [])
+    return _kept().get(_name(data, model, noise), [])
 
 
-def keep_effects(data: str, model: str, added: Sequence[str]) -> None:
+def keep_effects(data: str, model: str, added: Sequence[str], noise: str = "") -> None:
     """Store the added effects of a session. Where this is not possible, a restart forgets them."""
     kept = _kept()
-    if kept.get(_name(data, model), []) == list(added):
+    name = _name(data, model, noise)
+    if kept.get(name, []) == list(added):
         return
-    kept.pop(_name(data, model), None)
+    kept.pop(name, None)
     if added:
-        kept[_name(data, model)] = list(added)
+        kept[name] = list(added)
     with suppress(OSError):
         write_whole(home() / SESSIONS, json.dumps(dict(list(kept.items())[-MOST_KEPT:]), indent=1))
 
 
-def _name(data: str, model: str) -> str:
-    return f"{data} {model}"
+def _name(data: str, model: str, noise: str) -> str:
+    return f"{data} {model} noise={noise}" if noise else f"{data} {model}"
 
 
 def _kept() -> dict[str, list[str]]:
@@ -131,6 +133,20 @@ def models(chosen: str = "", default: str = "by kind of data") -> dict[str, str]
 
     found = {"": default, **{name: name for name in shipped_names()}, **saved_models()}
     return found if chosen in found else {**found, chosen: chosen}
+
+
+def noise_models() -> dict[str, str]:
+    """The saved models of noise, with their labels. A file that cannot be read is left out."""
+    from calibrations.errors import CalibrationError
+    from calibrations.model.file import read_model
+    from rig.services.load import is_noise
+
+    found = {}
+    for path, label in saved_models().items():
+        with suppress(CalibrationError, OSError):
+            if is_noise(read_model(path)):
+                found[path] = label
+    return found
 
 
 def saved_models() -> dict[str, str]:

@@ -52,6 +52,17 @@ def test_runs_are_searched_and_one_is_opened_and_noted(workbench: Workbench, run
 
 
 @pytest.mark.slow
+def test_runs_of_one_sensor_are_modelled_together(workbench: Workbench, runs: list[str]) -> None:
+    page = workbench.visit("/record")
+    for run in runs[:2]:
+        page.get_by_role("row", name=run).get_by_role("checkbox").click()
+    page.get_by_role("button", name="One model").click()
+    expect(page.get_by_label("Data:")).to_have_value(f"{runs[0]} + {runs[1]}")
+    expect(page.get_by_text("linear on 1036 poses")).to_be_visible()
+    expect(page.get_by_role("alert")).to_have_count(0)
+
+
+@pytest.mark.slow
 def test_two_runs_are_compared(workbench: Workbench, runs: list[str]) -> None:
     page = workbench.visit("/record")
     for run in runs[:2]:

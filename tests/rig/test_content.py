@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from calibrations.errors import DataError
 from rig.record import Record
 from rig.services.content import content_of
 from rig.services.exclusion import exclude
+from rig.services.export import export
 from rig.web.desk import Desk
 from tests import recorded
 
@@ -59,3 +61,30 @@ def test_effects_are_restored_from_texts_also_by_another_server(run: str) -> Non
     assert own.with_added([]).with_added(own.added).added == own.added
     assert Desk(None).open(run, "linear", own.added).added == own.added
     assert Desk(None).open(run, "linear").added == own.added
+
+
+def test_several_data_are_one_table_whose_content_follows_each(run: str, tmp_path: Path) -> None:
+    exported = tmp_path / "same.csv"
+    export(run, "csv", exported)
+    both = f"{run} + {exported}"
+    session = Desk(None).open(both, "linear")
+    assert session.data.table.n == 2 * Desk(None).open(run, "linear").data.table.n
+    assert content_of(both, "linear").extent == "114 poses + a file"
+    key = content_of(both, "linear").key
+    exported.write_text(exported.read_text().replace("90", "90.5", 1))
+    assert content_of(both, "linear").key != key
+    with pytest.raises(DataError, match="given twice"):
+        Desk(None).open(f"{run} + last", "linear")
+
+
+def test_a_session_with_a_noise_model_is_another_one(run: str, tmp_path: Path) -> None:
+    noise = tmp_path / "noise.yaml"
+    values = "".join(f"  - {{name: coefficient, axis: {axis}, value: 1.0e-5, unit: V/sqrt(Hz)}}\n" for axis in "xy")
+    head = "schema: rig.model/1\nname: noise\nunit: V\neffects:\n- effect: white-noise\n  parameters:\n"
+    noise.write_text(head + values)
+    desk = Desk(None)
+    own, known = desk.open(run, "linear"), desk.open(run, "linear", noise=str(noise))
+    assert not own.start.noise.given
+    assert known.start.noise.given
+    assert desk.open(run, "linear") is own
+    assert desk.open(run, "linear", noise=str(noise)) is known

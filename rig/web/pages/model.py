@@ -51,7 +51,7 @@ class Workbench:
 
     def __init__(self, desk: Desk, given: ModelState) -> None:
         self.desk, self.given = desk, given
-        self.data, self.model = given.data, given.model
+        self.data, self.model, self.noise = given.data, given.model, given.noise
         self.address = ""
         self.session: ModelSession[Any] | None = None
         self.search = Counted({})
@@ -117,18 +117,18 @@ class Workbench:
     def afresh(self) -> None:
         """Read the changed data again."""
         self.desk.forget(self.data)
-        self.go(self.data, self.model)
+        self.go(self.data, self.model, self.noise)
 
-    def go(self, data: str, model: str) -> None:
-        """Go to the address of data and model."""
-        ui.navigate.to(ModelState(data, model).address)
+    def go(self, data: str, model: str, noise: str = "") -> None:
+        """Go to the address of data, model and noise model."""
+        ui.navigate.to(ModelState(data, model, noise=noise).address)
 
     def tell_address(self) -> None:
         """Write the present state into the address, so that it can be passed on, and survives a reload."""
         if self.session is None:
             return
         selected = tuple(self.pictures.selected) if isinstance(self.pictures, Pictures) else ()
-        address = ModelState(self.data, self.model, self.session.added, selected).address
+        address = ModelState(self.data, self.model, self.session.added, selected, self.noise).address
         if address != self.address and len(address) < LONGEST_ADDRESS:
             self.address = address
             ui.navigate.history.replace(address)
@@ -137,7 +137,7 @@ class Workbench:
         """Read the data, fit the model, and show the session."""
         self.verdict.wait(f"Reading {self.data} and fitting the model")
         try:
-            session = await off_loop(self.desk.open, self.data, self.model, self.given.added)
+            session = await off_loop(self.desk.open, self.data, self.model, self.given.added, self.noise)
         except Exception as error:
             self.body.clear()
             with self.body:
@@ -194,14 +194,15 @@ class Workbench:
         with self.newer, box("note row-of").props("role=status"):
             words(f"{what}: {have}this page analyses {held.extent or 'the earlier content'}.", "grow")
             if changed:
-                ui.button("Update", icon="refresh", on_click=lambda: self.go(self.data, self.model)).props("dense")
+                again = partial(self.go, self.data, self.model, self.noise)
+                ui.button("Update", icon="refresh", on_click=again).props("dense")
 
     async def show(self, session: ModelSession[Any]) -> None:
         """Show pictures and error of the present model, then its missing effects."""
         self.turn += 1
         turn = self.turn
         self.session = session
-        self.desk.keep(self.data, self.model, session)
+        self.desk.keep(self.data, self.model, session, self.noise)
         compared = await off_loop(session.compared)
         if turn != self.turn:
             return

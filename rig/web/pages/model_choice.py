@@ -12,7 +12,7 @@ from rig.errors import RigError
 from rig.files import home
 from rig.services.importing import asks, opened
 from rig.services.page_words import IMPORT, address
-from rig.web.desk import MODELS, models, runs, saved_models
+from rig.web.desk import MODELS, models, noise_models, runs, saved_models
 from rig.web.pages.import_file import upload
 from rig.web.parts import box, message, off_loop, words
 
@@ -27,7 +27,11 @@ class Choice:
     def __init__(self, page: Workbench) -> None:
         self.page = page
         with box("chosen"):
-            self.data = ui.input("Data: a run, or the path of a file", value=page.data).classes("data").props("dense")
+            self.data = (
+                ui.input("Data: a run, the path of a file, or several: A + B", value=page.data)
+                .classes("data")
+                .props("dense")
+            )
             self.data.on("keydown.enter", lambda: self._open(str(self.data.value).strip(), page.model))
             with self.data.add_slot("append"):
                 ui.button(icon="arrow_drop_down").props("flat dense round aria-label='Runs of the record'")
@@ -38,7 +42,7 @@ class Choice:
                 models(page.model),
                 label="Model",
                 value=page.model,
-                on_change=lambda e: self._open(page.data, e.value),
+                on_change=lambda e: self._open(page.data, e.value, page.noise),
             ).props("dense options-dense")
             ui.button(icon="upload_file", on_click=self._ask_file).props("flat dense aria-label='Open a file'").tooltip(
                 "Open a file from this computer"
@@ -46,6 +50,7 @@ class Choice:
             ui.button(icon="refresh", on_click=page.afresh).props("flat dense aria-label='Read again'").tooltip(
                 "Read the data again"
             )
+            self._noise()
             ui.button("Parameters", icon="tune", on_click=page.see_parameters).props("outline dense")
             self.undo = ui.button("Undo", icon="undo", on_click=page.undo).props("outline dense")
             self.save = ui.button("Save model", icon="save", on_click=self._ask_name).props("outline dense")
@@ -53,9 +58,22 @@ class Choice:
         for button in (self.undo, self.save, self.report):
             button.disable()
 
-    def _open(self, data: str | None, model: str | None) -> None:
-        if (data or "", model or "") != (self.page.data, self.page.model):
-            self.page.go(data or "", model or "")
+    def _open(self, data: str | None, model: str | None, noise: str = "") -> None:
+        if (data or "", model or "", noise) != (self.page.data, self.page.model, self.page.noise):
+            self.page.go(data or "", model or "", noise)
+
+    def _noise(self) -> None:
+        """The menu of noise models, once a model of a still record is saved."""
+        page = self.page
+        if not (known := noise_models()) and not page.noise:
+            return
+        with ui.button(icon="graphic_eq").props("flat dense aria-label='Noise of the sensor'") as button:
+            if page.noise:
+                button.props("color=positive")
+            ui.tooltip(f"Noise of the sensor: {Path(page.noise).stem or 'from the samples of the data'}")
+            with ui.menu():
+                for path, label in {"": "from the samples of the data", **known}.items():
+                    ui.menu_item(label, on_click=lambda path=path: self._open(page.data, page.model, path))
 
     def opened(self, session: ModelSession[Any]) -> None:
         """Show the names of the open data and model, also if the address has none."""
@@ -145,7 +163,10 @@ class Choice:
         try:
             notes: list[str] = []
             _, made = await off_loop(
-                reported, Request(page.data, page.model or None, page.desk.bench_file), notes.append, held
+                reported,
+                Request(page.data, page.model or None, page.desk.bench_file, page.noise or None),
+                notes.append,
+                held,
             )
             text = await off_loop(made)
             ui.download.content(text, f"{Path(page.data).stem}-{session.model.name if session else 'model'}.html")

@@ -10,6 +10,7 @@ from nicegui import events, ui
 
 from rig.record import Run
 from rig.services.history import calibrating, members
+from rig.services.tables import AND
 from rig.web.desk import Desk, runs
 from rig.web.frame import frame
 from rig.web.pages.history_results import HistoryRequest
@@ -58,10 +59,11 @@ class Runs:
         with box("stack"):
             with div("row-of"):
                 search = ui.input("Search: run, procedure, sensor, file").props("dense clearable").classes("grow")
-                self.hint = words("Select two to compare them.", "quiet small")
+                self.hint = words("Select two to compare them, or several of one sensor for one model.", "quiet small")
                 ui.button("Import a file", icon="upload_file", on_click=partial(ui.navigate.to, "/import")).props(
                     "outline"
                 )
+                self.together = ui.button("One model", icon="insights", on_click=self._model).props("outline")
                 self.compare = ui.button("Compare", icon="compare_arrows", on_click=self._compare)
             known = calibrating(found)
             rows = [row for run in found for row in _rows(run, known)]
@@ -74,14 +76,24 @@ class Runs:
             self.table.add_slot("body-selection", MARK)
             self.table.bind_filter_from(search, "value")
         self.compare.disable()
+        self.together.disable()
 
     def _marked(self) -> None:
         self.compare.set_enabled(len(self.table.selected) == 2)
+        self.together.set_enabled(len(self.table.selected) > 1)
+
+    def _marked_names(self) -> list[str]:
+        """The selected runs, oldest first."""
+        names = {row["name"] for row in self.table.selected}
+        return [row["name"] for row in reversed(self.table.rows) if row["name"] in names]
+
+    def _model(self) -> None:
+        """Open the model page for the selected runs as one table."""
+        ui.navigate.to(f"/?{urlencode({'data': AND.join(self._marked_names())})}")
 
     def _compare(self) -> None:
         """Compare the selected runs; the older one is the first."""
-        newest_first = [row["name"] for row in self.table.rows]
-        second, first = sorted((row["name"] for row in self.table.selected), key=newest_first.index)
+        first, second = self._marked_names()
         ui.navigate.to(f"/compare?{urlencode({'first': first, 'second': second})}")
 
     def _open(self, event: events.GenericEventArguments) -> None:
