@@ -527,10 +527,11 @@ class Rows(Dataset[Fit]):
 def _explained(path: Path) -> bool:
     """Whether the effects of a path leave no more and no less than the noise of the samples, and no pattern.
 
-    Where the samples of a mean may be correlated, more than their noise may be left.
+    Where the samples of a mean may be correlated, more than their noise may be left. Not at one orientation: a lag of
+    the temperature looks like a hysteresis in slow noise.
     """
     end = path.end
-    most = NO_MORE_THAN_NOISE if correlation_known(end.table) else np.inf
+    most = NO_MORE_THAN_NOISE if correlation_known(end.table) or one_orientation(end.table) else np.inf
     as_noise = end.noise.known and LEAST_NOISE < end.pooled_excess < most
     return as_noise and structure_of(end) is None and is_complete(path)
 

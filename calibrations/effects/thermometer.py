@@ -60,10 +60,12 @@ def _level(table: Table) -> Array:
 
 
 def _lagging(x: Array, t: Array, time_constant_s: float) -> Array:
-    """x behind a first-order lag, (n,), settled at the first row."""
-    kept = np.exp(-np.diff(t) / time_constant_s)
+    """x behind a first-order lag, (n,), settled at the first row; straight between the rows."""
+    step = np.diff(t)
+    kept = np.exp(-step / time_constant_s)
+    behind = time_constant_s * np.diff(x) / np.where(step > 0, step, np.inf)
     out = np.empty_like(x)
     out[0] = x[0]
-    for i, share in enumerate(kept):
-        out[i + 1] = x[i + 1] + share * (out[i] - x[i + 1])
+    for i, (share, ramp) in enumerate(zip(kept, behind, strict=True)):
+        out[i + 1] = x[i + 1] - ramp + share * (out[i] - x[i] + ramp)
     return out

@@ -33,6 +33,7 @@ WARMING = (0.04, 0.15, 0.6)  # of the record: time constants
 AGES = 8  # intervals of the logarithm of the time since the record's beginning
 SHORTEST_PART = 1e-3  # the same: shorter ones are over before the second pose
 LEADS_S = (0.0, -90.0, 90.0)  # by which the sensor is ahead of the thermometer
+LONG_LEADS_S = (-300.0, 300.0)  # the same at rest, where an oven warms a whole fixture
 WAVES, WALK_WAVES = 24, 160  # of slow noise, and of a random walk, whose roughness is never small
 DEGREE = 4  # of a general function of the force's direction
 PLAYS = (0.05, 0.15, 0.35)  # of the range of temperatures
@@ -296,6 +297,8 @@ def _temperature(data: PoseData, first: State) -> list[Component]:
         return []
     found: list[Component] = []
     leads = LEADS_S if data.timed else (0.0,)
+    if data.timed and data.at_rest:
+        leads = (*leads, *LONG_LEADS_S)
     chosen = 2 * np.log(len(leads))
     factors: tuple[tuple[str, Factor, float], ...] = (
         ("temperature-bias", "", 0.0),
