@@ -34,6 +34,7 @@ from calibrations.noise.fit import NoiseFit, noise_terms, without_effects
 from calibrations.noise.likelihood import ChannelFit, Values, effect_lines, effect_spectrum
 from calibrations.noise.lines import Line, means_without
 from calibrations.noise.record import Channel, Still
+from calibrations.noise.signal import signal_terms, without_signal
 from calibrations.spectrum import Bands, Sampling
 from calibrations.table import Array
 
@@ -212,8 +213,10 @@ def places(found: NoiseFit) -> tuple[Place, ...]:
 def evaluate(model: Model, still: Still) -> NoiseFit | None:
     """The model with the values that it has; None where it has none. Raises DataError for a channel that it has not."""
     terms = noise_terms(model)
-    if not model.params:
+    signal = signal_terms(model)
+    if not model.params or not all(term.estimates for term in signal):
         return None
+    still = without_signal(still, signal)
     known = {(term.name, e.axis, e.name): e.value for term in terms for e in term.estimates}
     axes = {axis for _, axis, _ in known}
     if missing := [channel.axis for channel in still.channels if channel.axis not in axes]:

@@ -18,6 +18,7 @@ from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import ModelError
 from calibrations.model import Model
+from calibrations.noise.calibration import calibrated
 from calibrations.noise.comparison import compare_deviations, evaluate, places
 from calibrations.noise.doubts import (
     alternatives,
@@ -33,7 +34,8 @@ from calibrations.noise.doubts import (
 )
 from calibrations.noise.fit import NoiseFit, fit
 from calibrations.noise.record import Still, of_record
-from calibrations.noise.search import Search, candidates, search
+from calibrations.noise.search import Search, candidates, search, without_patterns
+from calibrations.noise.signal import TEMPERATURE, acts_on_record, fit_signal
 from calibrations.text import quantity, rounded, sentence
 
 if TYPE_CHECKING:
@@ -97,8 +99,8 @@ class StillRecord(Dataset[NoiseFit]):
         return of_record(self.still)
 
     def fit(self, model: Model) -> NoiseFit:
-        """Whittle's likelihood. Raises ModelError for a model without noise."""
-        return fit(model, self.still)
+        """Whittle's likelihood of the record less the model's signal. Raises ModelError for a model without noise."""
+        return fit(fit_signal(model, self.still, catalogue()), self.still)
 
     def evaluate(self, model: Model) -> NoiseFit | None:
         """The model with its values. Raises DataError for a channel without values."""
@@ -109,19 +111,20 @@ class StillRecord(Dataset[NoiseFit]):
         return places(found)
 
     def search(self, model: Model, effects: Mapping[str, Effect]) -> NoiseFindings:
-        """Lines, disturbances and every mixture of processes."""
-        return self._found(fit(model, self.still), effects)
+        """What the temperature does, then lines, disturbances and every mixture of processes."""
+        return self._found(self.fit(model), effects)
 
     def search_on(self, start: NoiseFit, origin: NoiseFit, effects: Mapping[str, Effect]) -> NoiseFindings:
         """The same from a fitted model."""
-        return self._found(fit(start.model, self.still), effects, origin)
+        return self._found(fit(start.model, start.still), effects, origin)
 
     def candidates(
         self, before: NoiseFit, plan: Findings[NoiseFit], effects: Mapping[str, Effect]
     ) -> tuple[Candidate, ...]:
         """Every process alone, the next one of the plan first."""
         found = candidates(search(before.still, before.model, effects), before, plan.alternatives)
-        return tuple(sorted(found, key=lambda c: c.name not in plan.names[:1]))
+        planned = tuple(c for c in plan.candidates if not c.effect.is_noise and c.name in plan.names[:1])
+        return (*planned, *sorted(found, key=lambda c: c.name not in plan.names[:1]))
 
     def figures(self, found: NoiseFit) -> dict[str, str]:
         """Mismatch of the spectrum, also on the other half, and of the Allan deviation."""
@@ -141,27 +144,37 @@ class StillRecord(Dataset[NoiseFit]):
         }
 
     def _found(self, start: NoiseFit, effects: Mapping[str, Effect], origin: NoiseFit | None = None) -> NoiseFindings:
-        found = search(self.still, start.model, effects)
-        baseline = fit(start.model, found.still) if found.patterns else start
+        found = search(start.still, start.model, effects)
+        calibration = calibrated(found, start, effects)
+        found = calibration.after if calibration else found
+        baseline = fit(start.model, without_patterns(start.still, found.patterns)) if found.patterns else start
+        signal = calibration.steps(baseline, found.patterns) if calibration else ()
+        present = signal[-1].after if signal else baseline
         structure = structure_of(found)
         names = () if found.still.hidden else tuple(found.gains)
-        doubts = alternatives(found, names)
+        doubts = alternatives(found, names) | (calibration.alternatives if calibration else {})
+        of_noise = {name: rivals for name, rivals in doubts.items() if name in names}
         spoilt = structure is not None and (found.still.hidden or disturbed(found))
         result = NoiseFindings(
             data=self,
             start=start,
             origin=origin or start,
             baseline=baseline,
-            steps=tuple(_steps(baseline, found, names)),
-            candidates=candidates(found, baseline, alternatives(found, tuple(found.gains))),
-            causes=names,
+            steps=(*signal, *_steps(present, found, names)),
+            candidates=(
+                *(calibration.candidates(signal) if calibration else ()),
+                *candidates(found, present, alternatives(found, tuple(found.gains))),
+            ),
+            causes=(*(calibration.signal.causes if calibration else ()), *names),
             alternatives=doubts,
             left=structure,
             spoilt=spoilt,
             reason=reason_of(found, doubts, structure),
             disturbances=tuple(disturbance_document(each) for each in disturbances(found)),
-            further=next_of(found, {} if spoilt else doubts, structure),
+            separations=calibration.separations if calibration else {},
+            further=next_of(found, {} if spoilt else of_noise, structure),
             remarks=(
+                *(calibration.signal.lags if calibration else ()),
                 *(
                     sentence(filter_text(name, corner))
                     for name in doubts
@@ -171,16 +184,16 @@ class StillRecord(Dataset[NoiseFit]):
             ),
             search=found,
         )
-        if names and not spoilt and result.given.verdict is Verdict.UNEXPLAINED:
+        if names and not (signal or spoilt) and result.given.verdict is Verdict.UNEXPLAINED:
             return result.without_steps()
         return result
 
     def addition(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> NoiseFindings:
         """One process, with what the record cannot separate from it, and what is missing beside it."""
-        before = fit(model, self.still)
+        before = self.fit(model)
         step = self.step(effect, before)
-        first = search(self.still, before.model, effects)
-        more = search(self.still, step.after.model, {**effects, effect.name: effect})
+        first = search(before.still, before.model, effects)
+        more = search(step.after.still, step.after.model, {**effects, effect.name: effect})
         doubts = alternatives(first, (effect.name,)) if effect.name in first.gains else {}
         structure = structure_of(more)
         missing = f"{' and '.join(more.gains)} would explain more" if more.gains else None
@@ -201,16 +214,21 @@ class StillRecord(Dataset[NoiseFit]):
 
     def step(self, effect: Effect, before: NoiseFit) -> Step[NoiseFit]:
         """The effect added."""
-        after = fit(before.model.with_effect(effect), before.still)
+        larger = before.model.with_effect(effect)
+        after = fit(larger, before.still) if effect.is_noise else self.fit(larger)
         return Step(effect.name, before, after, after.log_likelihood - before.log_likelihood)
 
     def require_allowed(self, effect: Effect) -> None:
-        """Raises ModelError for an effect that is not noise."""
-        if "still" not in effect.kinds:
-            known = ", ".join(sorted(name for name, each in catalogue().items() if each.is_noise))
-            raise ModelError(
-                f"{effect.name} is not noise, and a still record shows noise alone; effects of noise: {known}"
-            )
+        """Raises ModelError for an effect that is neither noise nor one of a logged temperature."""
+        if "still" in effect.kinds:
+            return
+        if acts_on_record(effect) and all(TEMPERATURE in channel.logged for channel in self.still.channels):
+            return
+        known = ", ".join(sorted(name for name, each in catalogue().items() if each.is_noise))
+        raise ModelError(
+            f"{effect.name} is not noise, and a still record shows only noise, and what a logged temperature does to "
+            f"the bias; effects of noise: {known}"
+        )
 
     def errors_document(self, found: NoiseFit) -> dict[str, Any]:
         """Mismatch of the spectrum by axis, and of the Allan deviation."""

@@ -39,6 +39,7 @@ from calibrations.noise.likelihood import (
 from calibrations.noise.lines import Line, bands, strongest_line
 from calibrations.noise.record import Channel, Still
 from calibrations.noise.samples import hidden_in
+from calibrations.noise.signal import signal_terms, without_signal
 from calibrations.table import Array
 
 DERIVATIVE_STEP = 1e-3  # of a value, for the derivative
@@ -187,7 +188,9 @@ class NoiseFit:
                 term.effect,
                 estimates=tuple(e for each in every for e in estimates(each[0], term.effect, self.still.unit, each[1])),
             )
-            for term in noise_terms(self.stated)
+            if term.effect.is_noise
+            else term
+            for term in self.stated.terms
         )
         return replace(self.stated, terms=terms, unit=self.still.unit)
 
@@ -239,8 +242,12 @@ def noise_terms(model: Model) -> tuple[Term, ...]:
 
 
 def fit(model: Model, still: Still) -> NoiseFit:
-    """The model with its coefficients estimated from the record. Raises ModelError for one without noise."""
+    """The model with its coefficients estimated from the record, less its signal terms as they are.
+
+    Raises ModelError for one without noise.
+    """
     effects = tuple(term.effect for term in noise_terms(model))
+    still = without_signal(still, signal_terms(model))
     return NoiseFit(still, model, tuple(fit_channel(channel, effects) for channel in still.channels))
 
 

@@ -57,6 +57,7 @@ class Pattern:
     cause: str = ""
     doubt: float = 0.0
     rivals: tuple[Pattern, ...] = ()
+    lag_s: float = 0.0  # behind the column
     further: bool = False  # a curvature or a branch beside a straight line over the same column
 
     @cached_property
@@ -233,7 +234,8 @@ def _followed(channel: Channel, by: _Ordinates, unit: str, removed: Iterable[Pat
             behind = f", with a lag of {share * channel.length_s:.2g} s" if share else ""
             text = f"{channel.axis} follows {name} by {{}} {unit}/{PER.get(name, name)}{behind}"
             make = partial(_lagged, values, share)
-            yield Pattern(FOLLOWS, channel.axis, text, make, *by.matched(make()), price, name, doubt)
+            lag_s = share * channel.length_s
+            yield Pattern(FOLLOWS, channel.axis, text, make, *by.matched(make()), price, name, doubt, lag_s=lag_s)
 
 
 def _lagged(values: Array, share: float) -> Array:

@@ -17,6 +17,7 @@ import numpy as np
 from calibrations.criteria import FEWEST_SAMPLES
 from calibrations.errors import DataError, TooFewRows
 from calibrations.estimators.scatter import without_scatter
+from calibrations.model import Term
 from calibrations.noise.deviations import OCTAVE_KINDS, OVERLAPPING, Curve, Octaves
 from calibrations.noise.samples import Ends, Oddity, Outliers, Steps, Stuck, hidden_in, oddities
 from calibrations.spectrum import Means, Sampling, Segments, Welch
@@ -27,7 +28,7 @@ HOUR_S = 3600.0
 
 @dataclass(frozen=True, eq=False)
 class Logged:
-    """Means (m,) of a column, over as many samples as the channel's, less their mean. `level`: without scatter.
+    """Means (m,) of a column, over as many samples as the channel's, less their `mean`. `level`: without scatter.
 
     `doubt`: relative standard uncertainty of a slope on the level, as the amount of scatter is uncertain.
     """
@@ -35,11 +36,12 @@ class Logged:
     read: Array
     level: Array
     doubt: float
+    mean: float = 0.0
 
     def part(self, which: slice) -> Logged:
         """Some of the record, which is a record of its own."""
         read, level = (values[which] - values[which].mean() for values in (self.read, self.level))
-        return Logged(read, level, self.doubt)
+        return Logged(read, level, self.doubt, self.mean + float(self.read[which].mean()))
 
 
 def logged_column(blocks: Sequence[Array], n: int) -> Logged | None:
@@ -52,7 +54,8 @@ def logged_column(blocks: Sequence[Array], n: int) -> Logged | None:
     read = means.values()
     if sum(map(len, blocks)) != n or np.ptp(read) == 0:
         return None
-    return Logged(read, *without_scatter(read, readings))
+    whole = sum(float(np.sum(block)) for block in blocks) / n
+    return Logged(read, *without_scatter(read, readings), whole)
 
 
 # A still record of any length, reduced in one pass to all that its noise is told from.
@@ -199,6 +202,7 @@ class Still:
     constants: Mapping[str, str | float] = field(default_factory=dict)  # what is known of the sensor
     sensed: Mapping[str, Sensed] = field(default_factory=dict)
     deviations: Mapping[str, Mapping[str, Curve]] = field(default_factory=dict)  # by axis and kind
+    signal: tuple[Term, ...] = ()  # of a model, taken off the means
 
     @property
     def n(self) -> int:

@@ -20,7 +20,6 @@ from calibrations.criteria import AT_LONGEST_TIME, IDENTIFIED, INSEPARABLE, MOST
 from calibrations.discovery.results import Candidate
 from calibrations.effects import Effect
 from calibrations.model import Model
-from calibrations.noise.deviations import Curve, octaves
 from calibrations.noise.fit import (
     NoiseFit,
     find_lines,
@@ -35,7 +34,8 @@ from calibrations.noise.likelihood import ChannelFit
 from calibrations.noise.lines import Lines
 from calibrations.noise.mixtures import Mixture, Mixtures, chance, likelihood, tube
 from calibrations.noise.patterns import FOLLOWS, Pattern, pattern_of, refitted
-from calibrations.noise.record import Channel, Still
+from calibrations.noise.record import Still
+from calibrations.noise.signal import with_cleaned_curves
 from calibrations.noise.telegraph import Telegraph, telegraph_of
 
 
@@ -162,7 +162,7 @@ def _with_common_amounts(whole: Still, found: Search, given: tuple[Effect, ...])
     beside = found.mixture.channels
     patterns = _with_amounts(whole, found.patterns, beside)
     patterns = _with_amounts(whole, tuple(each for each in patterns if not each.needless), beside)
-    cleaned = with_cleaned_curves(without_patterns(whole, patterns), patterns)
+    cleaned = with_cleaned_curves(without_patterns(whole, patterns), {each.axis for each in patterns})
     left = _search_once(cleaned, found.model, found.effects, given)
     return replace(left, patterns=patterns, telegraphs=found.telegraphs)
 
@@ -214,22 +214,6 @@ def without_patterns(still: Still, patterns: tuple[Pattern, ...]) -> Still:
     for pattern in patterns:
         channels = tuple(pattern.taken_off(channel) for channel in channels)
     return replace(still, channels=channels)
-
-
-def with_cleaned_curves(still: Still, patterns: tuple[Pattern, ...]) -> Still:
-    """The record with Allan deviations less the patterns, from a mean's length on, where they show."""
-    changed = {pattern.axis for pattern in patterns}
-    curves = {c.axis: _cleaned_curve(still.allan[c.axis], c) for c in still.channels if c.axis in changed}
-    return replace(still, allan={**still.allan, **curves})
-
-
-def _cleaned_curve(curve: Curve, channel: Channel) -> Curve:
-    """The curve of a channel whose means have changed."""
-    slow = octaves([channel.means], 1 / channel.sampling.interval_s)
-    fast = np.arange(len(curve.tau_s)) < len(curve.tau_s) - len(slow.tau_s)
-    parts = ((getattr(curve, name)[fast], getattr(slow, name)) for name in ("tau_s", "deviation", "low", "high", "edf"))
-    tau_s, deviation, low, high, edf = map(np.concatenate, parts)
-    return Curve(curve.kind, tau_s, deviation, low, high, (*np.array(curve.alpha)[fast].tolist(), *slow.alpha), edf)
 
 
 def _worth(found: Search) -> float:

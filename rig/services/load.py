@@ -189,16 +189,24 @@ def is_still(data: str) -> bool:
 
 
 def is_noise(model: Model | None) -> bool:
-    """Whether a model is one of noise. Raises ModelError for one of noise and of effects on samples."""
+    """Whether a model is one of a still record: of noise, and of the bias over temperature beside it.
+
+    Raises ModelError for one of noise and of other effects on samples.
+    """
     if model is None:
         return False
     noise = [term.name for term in model.terms if term.effect.is_noise]
-    if noise and len(noise) < len(model.terms):
+    if not noise:
+        return False
+    from calibrations.noise.signal import acts_on_record  # a table needs no noise engine
+
+    others = [t.name for t in model.terms if not (t.effect.is_noise or acts_on_record(t.effect))]
+    if others:
         raise ModelError(
-            f"{model.name}: {', '.join(noise)} is a noise effect, and the model has other effects too; "
-            "put noise effects and other effects into separate models"
+            f"{model.name}: {', '.join(noise)} is a noise effect, and the model has other effects too: "
+            f"{', '.join(others)}; put them into separate models"
         )
-    return bool(noise)
+    return True
 
 
 def _has_channels_alone(path: Path) -> bool:

@@ -1,0 +1,111 @@
+"""A still record calibrated for temperature: the terms that the search at one orientation finds, as steps of the loop.
+
+Whether an output follows the temperature at all is decided beside the noise of the record (`patterns`): where both
+wander, chance alone makes them alike. What it does is then found by the search for poses at one orientation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from calibrations.design.experiment import Experiment
+from calibrations.discovery.results import Candidate, Step
+from calibrations.effects import Effect
+from calibrations.model import Model, Term
+from calibrations.noise.doubts import CAUSES, experiment_for_pattern
+from calibrations.noise.fit import NoiseFit, fit
+from calibrations.noise.patterns import FOLLOWS, Pattern
+from calibrations.noise.record import Still
+from calibrations.noise.search import Search, search, without_patterns
+from calibrations.noise.signal import TEMPERATURE, SignalSearch, search_signal, signal_terms
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What the temperature does to a record: the search for it, and the search for noise `after` it is taken off."""
+
+    start: NoiseFit
+    signal: SignalSearch
+    patterns: tuple[Pattern, ...]  # that follow the temperature, beside the noise
+    after: Search
+    containing: Mapping[str, tuple[str, ...]]  # by effect, those that it contains
+
+    def steps(self, baseline: NoiseFit, others: tuple[Pattern, ...]) -> tuple[Step[NoiseFit], ...]:
+        """A step for each term, on the record without the `others`, patterns that the temperature does not make."""
+        whole = without_patterns(self.start.still, others)
+        fits = [baseline, *(fit(with_terms(self.start.model, terms), whole) for terms in self.signal.steps)]
+        return tuple(Step(name, *pair) for name, pair in zip(self.signal.names, pairwise(fits), strict=True))
+
+    def candidates(self, steps: tuple[Step[NoiseFit], ...]) -> tuple[Candidate, ...]:
+        """The effects of the steps, each on top of those before it."""
+        chance = float(np.exp(-max(each.worth for each in self.patterns) / 2))
+        return tuple(
+            Candidate(
+                effect=step.effect,
+                gain=2 * (step.after.log_likelihood - step.before.log_likelihood),
+                p_value=min(1.0, chance),
+                probability=1.0,
+                excess_after=step.after.pooled_excess,
+                held_out_after=step.after.held_out_excess,
+                indistinguishable_from=self.alternatives.get(step.name, ()),
+            )
+            for step in steps
+        )
+
+    @property
+    def alternatives(self) -> dict[str, tuple[str, ...]]:
+        """By cause, what the record cannot separate from it."""
+        names = self.signal.names
+        rivals = {CAUSES.get((r.kind, r.cause)) for each in self.patterns for r in each.rivals}
+        given = self.signal.found.alternatives
+        found = {  # a wider effect whose further shape vanishes is no other cause
+            name: tuple(r for r in given.get(name, ()) if name not in self.containing.get(r, ()))
+            for name in self.signal.causes
+        }
+        first = self.signal.causes[0]
+        found[first] = tuple(dict.fromkeys([*found[first], *sorted(filter(None, rivals - set(names)))]))
+        return {name: others for name, others in found.items() if others}
+
+    @property
+    def separations(self) -> Mapping[str, Experiment]:
+        """By cause in doubt, the experiment that separates it from what it may be."""
+        doubtful = next((each for each in self.patterns if each.rivals), None)
+        experiment = experiment_for_pattern(doubtful, self.start.still.length_s) if doubtful else None
+        return {self.signal.causes[0]: experiment} if experiment and self.alternatives else {}
+
+
+def calibrated(found: Search, start: NoiseFit, effects: Mapping[str, Effect]) -> Calibration | None:
+    """The record of `found` without what the temperature does; None where it does nothing, or the model has it."""
+    warm = tuple(each for each in found.patterns if each.kind == FOLLOWS and each.cause == TEMPERATURE)
+    if not warm or signal_terms(start.model):
+        return None
+    others = tuple(each for each in found.patterns if each not in warm)
+    whole = without_patterns(start.still, others)
+    lag_s = max(warm, key=lambda each: each.gain).lag_s
+    signal = _needed(search_signal(whole, effects, lag_s), start.model, whole, effects)
+    model = with_terms(start.model, signal.steps[-1])
+    after = search(fit(model, start.still).still, model, effects)
+    return Calibration(start, signal, warm, after, {name: effect.contains for name, effect in effects.items()})
+
+
+def _needed(signal: SignalSearch, model: Model, still: Still, effects: Mapping[str, Effect]) -> SignalSearch:
+    """Without a curve beside the causes that gains no more likelihood than its coefficients cost (Akaike)."""
+    for name in signal.names:
+        if name in signal.causes:
+            continue
+        smaller = signal.without(name, effects, still)
+        count = sum(len(term.estimates) for term in signal.steps[-1] if term.name == name)
+        gained = [fit(with_terms(model, each.steps[-1]), still).log_likelihood for each in (smaller, signal)]
+        if gained[1] - gained[0] < count:
+            signal = smaller
+    return signal
+
+
+def with_terms(model: Model, terms: tuple[Term, ...]) -> Model:
+    """The model with further terms as they are."""
+    name = "+".join([model.name, *(term.name for term in terms)])
+    return replace(model, name=name, terms=(*model.terms, *terms))

@@ -1,0 +1,228 @@
+"""What temperature does to a sensor at rest: terms of a model that are taken off a record before its noise is fitted.
+
+The means of a record in blocks are poses at one orientation, and are searched as such: bias over temperature as a line,
+as a curve, with the lag of the sensor and with branches. What acts over time stays in the record: it is noise, or a
+pattern that no noise makes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibrations.discovery.results import Findings
+from calibrations.effects import Effect, Values
+from calibrations.errors import DataError
+from calibrations.fitting.fit import Fit
+from calibrations.fitting.fit import fit as fit_rows
+from calibrations.free_forms.place_names import place_of_effect
+from calibrations.means.noise import with_white
+from calibrations.model import Estimate, Model, Term
+from calibrations.noise.deviations import Curve, octaves
+from calibrations.noise.record import Channel, Still
+from calibrations.table import AXES, Array, Table
+
+TEMPERATURE, PLACE = "temperature_c", "temperature-bias"
+MOST_ROWS = 400  # of the table of means: enough for any curve, and quick to search
+LEAST_STD = 1e-6  # of the range of the means: their noise where none shows
+
+
+def acts_on_record(effect: Effect) -> bool:
+    """Whether an effect that is not noise can be taken off a still record: a bias over temperature."""
+    return place_of_effect(effect.name) == PLACE
+
+
+def signal_terms(model: Model) -> tuple[Term, ...]:
+    """The terms of a model that are not noise."""
+    return tuple(term for term in model.terms if not term.effect.is_noise)
+
+
+def without_signal(still: Still, terms: tuple[Term, ...]) -> Still:
+    """The record less what these terms add, in place of those that were taken off before. Raises DataError."""
+    if terms == still.signal:
+        return still
+    channels = tuple(
+        replace(c, means=c.means + _added(still.signal, c, still.source) - _added(terms, c, still.source))
+        for c in still.channels
+    )
+    return replace(with_cleaned_curves(replace(still, channels=channels), set(still.axes)), signal=terms)
+
+
+def _added(terms: tuple[Term, ...], channel: Channel, source: str) -> Array:
+    """What terms add to the means of a channel, less its mean, shape (m,). Raises DataError."""
+    if not terms:
+        return np.zeros(len(channel.means))
+    names = AXES[: AXES.index(channel.axis) + 1]
+    table = _table(channel, {name: np.zeros(len(channel.means)) for name in names}, source)
+    nothing = np.zeros((table.n, 3))
+    parts = (term.effect.transduction(nothing, table, _values(term)) for term in terms)
+    added = sum(parts, nothing)[:, AXES.index(channel.axis)]
+    return np.asarray(added - added.mean())
+
+
+def _values(term: Term) -> Values:
+    """The values of a term by name; 0 for an axis without one."""
+    named = {p.name: np.zeros(3 if p.per_axis else ()) for p in term.effect.parameters}
+    for e in term.estimates:
+        named[e.name] = np.where(np.array(AXES) == e.axis, e.value, named[e.name]) if e.axis else np.asarray(e.value)
+    return Values.of({**term.constants, **named})
+
+
+def _table(channel: Channel, outputs: Mapping[str, Array], source: str) -> Table:
+    """Means of outputs by axis with their times and temperature, as poses of any one orientation. Raises DataError."""
+    if TEMPERATURE not in channel.logged:
+        raise DataError(
+            f"{source}: the model has an effect of temperature, and the record has no {TEMPERATURE} that changes; use "
+            "a model without it, or a record with the temperature"
+        )
+    warm, n = channel.logged[TEMPERATURE], len(channel.means)
+    columns = {
+        "alpha_deg": np.zeros(n),
+        "beta_deg": np.zeros(n),
+        "t_s": (np.arange(n) + 0.5) * channel.sampling.interval_s,
+        TEMPERATURE: warm.level + warm.mean,
+        **{f"v{axis}_v": values for axis, values in outputs.items()},
+    }
+    return Table.from_columns("poses", columns, None, source)
+
+
+def table_of_means(still: Still) -> Table:
+    """The record as at most `MOST_ROWS` poses at one orientation, with the noise that neighbouring means show."""
+    first = still.channels[0]
+    size = -(-len(first.means) // MOST_ROWS)
+    whole = _table(first, dict(zip(AXES, (c.means for c in still.channels), strict=False)), still.source)
+    n = whole.n // size
+    columns = {name: x[: n * size].reshape(n, size).mean(axis=1) for name, x in whole.columns.items()}
+    table = replace(whole, columns=columns)
+    second = np.median(np.abs(np.diff(table.outputs, 2, axis=0)), axis=0) / 0.6745 / np.sqrt(6)
+    white = np.maximum(second, LEAST_STD * np.ptp(table.outputs, axis=0))
+    return with_white(table, np.tile(white[:, None], (1, n)))
+
+
+@dataclass(frozen=True)
+class SignalSearch:
+    """The signal terms that a record shows, after each step that adds one, and the findings that they come from."""
+
+    steps: tuple[tuple[Term, ...], ...]
+    found: Findings[Fit]
+    table: Table
+
+    @property
+    def lags(self) -> tuple[str, ...]:
+        """How far the sensor is behind or ahead of the thermometer, in words."""
+        leads = {term.constants.get("lead_s", 0.0) for term in (self.steps[-1] if self.steps else ())}
+        long = sorted(lead for lead in leads if abs(lead) > self._shortest_s)
+        return tuple(
+            f"The bias is {'ahead of' if lead > 0 else 'behind'} the thermometer, with a lag of {abs(lead):.3g} s."
+            for lead in long
+        )
+
+    @property
+    def _shortest_s(self) -> float:
+        """A lag that the means can show."""
+        return float(np.median(np.diff(self.table.time_s)))
+
+    def without(self, name: str, effects: Mapping[str, Effect], still: Still) -> SignalSearch:
+        """The same without one effect, the others fitted anew."""
+        at = self.names.index(name)
+        rest = [tuple(term for term in terms if term.name != name) for terms in self.steps]
+        found = fit_rows(_biased(_relabelled(rest[-1], still.axes, AXES), effects), self.table)
+        rest[-1] = _terms(found, {term.name for term in rest[-1]}, still)
+        return replace(
+            self, steps=tuple(terms for k, terms in enumerate(rest) if k != (at if at < len(rest) - 1 else at - 1))
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effects in the order in which they are added."""
+        known: list[str] = []
+        for terms in self.steps:
+            known += [term.name for term in terms if term.name not in known]
+        return tuple(known)
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Those that are causes; a curve alone is its own."""
+        return tuple(name for name in self.names if name in self.found.causes) or self.names[:1]
+
+
+def search_signal(still: Still, effects: Mapping[str, Effect], lag_s: float) -> SignalSearch:
+    """What the temperature does to outputs that follow it, by the search for poses at one orientation.
+
+    Beside slow noise that search may see nothing: then a straight line, with the lag that was found beside that noise.
+    """
+    from calibrations.discovery.rows import Rows  # noise alone needs no search in rows
+
+    table = table_of_means(still)
+    found = Rows(table).search(_biased((), effects), effects)
+    steps: list[tuple[Term, ...]] = []
+    for step in found.steps:
+        if place_of_effect(step.name) == PLACE:
+            chosen = {*(term.name for term in (steps[-1] if steps else ())), step.name}
+            steps.append(_terms(step.after, chosen, still))
+    end = found.end
+    if not steps:
+        line = Term(effects[PLACE], constants={"lead_s": -lag_s})
+        end = fit_rows(_biased((line,), effects), table)
+        steps.append(())
+    steps[-1] = _terms(end, {PLACE} if not steps[-1] else {term.name for term in steps[-1]}, still)
+    return SignalSearch(tuple(steps), found, table)
+
+
+def fit_signal(model: Model, still: Still, effects: Mapping[str, Effect]) -> Model:
+    """The model with its signal terms estimated from the record; noise as it is."""
+    terms = signal_terms(model)
+    if not terms:
+        return model
+    found = fit_rows(_biased(_relabelled(terms, still.axes, AXES), effects), table_of_means(without_signal(still, ())))
+    fitted = {term.name: term for term in _terms(found, {term.name for term in terms}, still)}
+    return replace(model, terms=tuple(fitted.get(term.name, term) for term in model.terms))
+
+
+def _biased(terms: tuple[Term, ...], effects: Mapping[str, Effect]) -> Model:
+    return Model("at rest", (Term(effects["bias"]), *terms))
+
+
+def _terms(found: Fit, names: set[str], still: Still) -> tuple[Term, ...]:
+    """Terms of a fit to the table of means, for the axes and the unit of the record.
+
+    The scatter of the thermometer is taken off as far as it is known: its doubt adds to that of a slope.
+    """
+    chosen = tuple(term for term in found.model.terms if term.name in names)
+    doubts = {channel.axis: channel.logged[TEMPERATURE].doubt for channel in still.channels}
+
+    def stated(e: Estimate) -> Estimate:
+        unit = e.unit.replace(found.table.unit, still.unit)
+        doubt = doubts.get(e.axis, 0.0) * e.value if e.name == "slope" else 0.0
+        return replace(e, unit=unit, std=None if e.std is None else float(np.hypot(e.std, doubt)))
+
+    return tuple(
+        replace(term, estimates=tuple(map(stated, term.estimates))) for term in _relabelled(chosen, AXES, still.axes)
+    )
+
+
+def _relabelled(terms: tuple[Term, ...], before: Sequence[str], after: Sequence[str]) -> tuple[Term, ...]:
+    """Terms with other names of their axes."""
+    names = dict(zip(before, after, strict=False))
+
+    def renamed(e: Estimate) -> Estimate:
+        return replace(e, axis=names.get(e.axis, e.axis))
+
+    return tuple(replace(term, estimates=tuple(map(renamed, term.estimates))) for term in terms)
+
+
+def with_cleaned_curves(still: Still, axes: set[str]) -> Still:
+    """The record with Allan deviations of these axes' means as they are now, from a mean's length on."""
+    curves = {c.axis: _cleaned_curve(still.allan[c.axis], c) for c in still.channels if c.axis in axes}
+    return replace(still, allan={**still.allan, **curves})
+
+
+def _cleaned_curve(curve: Curve, channel: Channel) -> Curve:
+    """The curve of a channel whose means have changed."""
+    slow = octaves([channel.means], 1 / channel.sampling.interval_s)
+    fast = np.arange(len(curve.tau_s)) < len(curve.tau_s) - len(slow.tau_s)
+    parts = ((getattr(curve, name)[fast], getattr(slow, name)) for name in ("tau_s", "deviation", "low", "high", "edf"))
+    tau_s, deviation, low, high, edf = map(np.concatenate, parts)
+    return Curve(curve.kind, tau_s, deviation, low, high, (*np.array(curve.alpha)[fast].tolist(), *slow.alpha), edf)
