@@ -137,11 +137,11 @@ def lagged(values: Array, steps: float) -> Array:
 
 
 Logged = Callable[[Random], tuple[Array, Array]]
-FOLLOWING: Mapping[str, tuple[Logged, str | None]] = {  # (samples, a logged temperature), and what is to be told
-    "follows": (lambda r: _beside(r, lambda c, n: n + 0.5 * c), "x follows temperature_c by +0."),
-    "follows behind": (lambda r: _beside(r, lambda c, n: n - 0.8 * lagged(c, 600)), "x follows temperature_c by -0."),
+FOLLOWING: Mapping[str, tuple[Logged, float | None]] = {  # (samples, a logged temperature), and the slope over it
+    "follows": (lambda r: _beside(r, lambda c, n: n + 0.5 * c), 0.5),
+    "follows behind": (lambda r: _beside(r, lambda c, n: n - 0.8 * lagged(c, 600)), -0.8),
     "follows beside flicker": (
-        lambda r: _beside(r, lambda c, n: n + 0.3 * traps(r) + 1.0 * c), "x follows temperature_c by +"
+        lambda r: _beside(r, lambda c, n: n + 0.3 * traps(r) + 1.0 * c), 1.0
     ),
     "wanders by itself": (lambda r: _beside(r, lambda c, n: n + 0.005 * walk(r)), None),
     "flickers by itself": (lambda r: _beside(r, lambda c, n: n + 0.4 * traps(r)), None),

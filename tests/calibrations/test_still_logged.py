@@ -11,8 +11,9 @@ from scipy.fft import idct
 from calibrations.discovery.results import Discovery
 from calibrations.estimators.scatter import without_scatter
 from calibrations.loop import diagnose, discover
+from calibrations.model import Estimate
 from calibrations.model.file import read_model
-from calibrations.noise.patterns import FOLLOWS, STEP, Pattern
+from calibrations.noise.patterns import STEP
 from calibrations.noise.record import Samples, Still, reduce_record
 from calibrations.table import Array
 from tests.calibrations.hidden_noise import FOLLOWING, RATE_HZ, SAMPLES, room, white
@@ -35,18 +36,22 @@ def test_what_follows_a_logged_temperature_is_told_and_nothing_else(name: str) -
     if told is None:
         assert result.verdict in ("adequate", "ambiguous")
         return
-    assert result.verdict == "unexplained"
-    assert told in str(result.residual_structure)
-    assert "rate-random-walk" not in result.causes
+    assert result.verdict == "adequate"
+    assert result.causes[0] == "temperature-bias"
+    assert set(result.causes[1:]) <= {"flicker-noise"}
+    slope = result.model.params["temperature-bias.x"]
+    assert slope.value == pytest.approx(told, abs=4 * slope.std)
     assert ("flicker" in name) == ("flicker-noise" in result.causes)
 
 
 def test_slope_and_lag_are_those_of_the_sensor() -> None:
     x, warm = FOLLOWING["follows behind"][0](np.random.default_rng(2))
-    (pattern,) = diagnose(beside(x, temperature_c=warm), read_model("still")).findings.search.patterns
-    assert pattern.size == pytest.approx(-0.8, abs=5 * pattern.std)
-    assert pattern.std < 0.05
-    assert float(pattern.plain.split("with a lag of ")[1].split(" s")[0]) == pytest.approx(60, rel=0.4)
+    result = found(x, temperature_c=warm)
+    slope = result.model.params["temperature-bias.x"]
+    assert slope.value == pytest.approx(-0.8, abs=3 * slope.std)
+    assert slope.std < 0.05
+    (term,) = (term for term in result.model.terms if term.name == "temperature-bias")
+    assert term.constants["lead_s"] == pytest.approx(-60, rel=0.4)
 
 
 def test_a_drift_that_the_temperature_shares_is_told_with_its_rival() -> None:
@@ -62,13 +67,13 @@ def test_a_temperature_and_a_step_are_two_things() -> None:
     random = np.random.default_rng(1)
     warm = room(random)
     result = found(white(random) + 0.5 * warm + 0.5 * (np.arange(SAMPLES) > 9000), temperature_c=warm)
-    (follows, step) = result.findings.search.patterns
-    assert (follows.kind, step.kind) == (FOLLOWS, STEP)
-    for pattern in (follows, step):
-        assert pattern.size == pytest.approx(0.5, abs=3 * pattern.std)
-        assert pattern.std < 0.05
-    assert str(result.residual_structure).count("; ") == 1
-    assert result.causes == ()
+    (step,) = result.findings.search.patterns
+    assert step.kind == STEP
+    assert step.size == pytest.approx(0.5, abs=3 * step.std)
+    slope = result.model.params["temperature-bias.x"]
+    assert slope.value == pytest.approx(0.5, abs=3 * slope.std)
+    assert "a step of" in str(result.residual_structure)
+    assert (result.verdict, result.causes) == ("unexplained", ("temperature-bias",))
 
 
 def test_a_column_that_is_constant_or_too_short_is_left_out() -> None:
@@ -77,11 +82,11 @@ def test_a_column_that_is_constant_or_too_short_is_left_out() -> None:
     assert channel.logged == {}
 
 
-def followed(x: Array, **logged: Array) -> Pattern:
-    """What x is told to do: to follow the column by 0.8, as it does."""
-    (pattern,) = diagnose(beside(x, **logged), read_model("still")).findings.search.patterns
-    assert pattern.size == pytest.approx(0.8, abs=3 * pattern.std)
-    return pattern
+def followed(x: Array, **logged: Array) -> Estimate:
+    """The slope over the temperature, which is 0.8."""
+    slope = found(x, **logged).model.params["temperature-bias.x"]
+    assert slope.value == pytest.approx(0.8, abs=3 * slope.std)
+    return slope
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.3, 1.0])
@@ -89,15 +94,15 @@ def test_scatter_of_the_thermometer_does_not_hide_how_much_the_sensor_follows(sc
     random = np.random.default_rng(4)
     warm = room(random)
     read = warm + scatter * random.standard_normal(SAMPLES)
-    pattern = followed(white(random) + 0.8 * warm, temperature_c=read)
-    assert pattern.std < 0.05
-    assert "lag" not in pattern.plain
+    assert followed(white(random) + 0.8 * warm, temperature_c=read).std < 0.05
 
 
 def test_a_jitter_that_the_sensor_feels_is_no_scatter() -> None:
     random = np.random.default_rng(5)
     supply = room(random) + 0.3 * random.standard_normal(SAMPLES)
-    pattern = followed(white(random) + 0.8 * supply, supply_v=supply)
+    still = beside(white(random) + 0.8 * supply, supply_v=supply)
+    (pattern,) = diagnose(still, read_model("still")).findings.search.patterns
+    assert pattern.size == pytest.approx(0.8, abs=3 * pattern.std)
     assert pattern.std < 0.02
 
 
@@ -105,8 +110,7 @@ def test_scatter_of_readings_that_are_held_is_taken_off_as_well() -> None:
     random = np.random.default_rng(7)
     warm = room(random)
     read = np.repeat(warm[10::20] + 0.3 * random.standard_normal(SAMPLES // 20), 20)
-    pattern = followed(white(random) + 0.8 * warm, temperature_c=read)
-    assert pattern.std < 0.05
+    assert followed(white(random) + 0.8 * warm, temperature_c=read).std < 0.05
 
 
 def test_a_diagnosis_counts_the_doubt() -> None:
@@ -115,10 +119,9 @@ def test_a_diagnosis_counts_the_doubt() -> None:
     still = beside(white(random) + 0.8 * warm, temperature_c=warm + random.standard_normal(SAMPLES))
     (channel,) = still.channels
     doubted = {name: replace(column, doubt=0.5) for name, column in channel.logged.items()}
-    (pattern,) = diagnose(
-        replace(still, channels=(replace(channel, logged=doubted),)), read_model("still")
-    ).findings.search.patterns
-    assert pattern.std == pytest.approx(0.5 * pattern.size, rel=0.01)
+    doubtful = replace(still, channels=(replace(channel, logged=doubted),))
+    slope = discover(doubtful, read_model("still")).model.params["temperature-bias.x"]
+    assert slope.std == pytest.approx(0.5 * slope.value, rel=0.02)
 
 
 @pytest.mark.parametrize("scatter", [0.3, 1.0, 3.0])
