@@ -22,6 +22,7 @@ from calibrations.noise.calibration import calibrated
 from calibrations.noise.comparison import compare_deviations, evaluate, places
 from calibrations.noise.doubts import (
     alternatives,
+    as_disturbance,
     disturbance_document,
     disturbances,
     disturbed,
@@ -170,7 +171,10 @@ class StillRecord(Dataset[NoiseFit]):
             left=structure,
             spoilt=spoilt,
             reason=reason_of(found, doubts, structure),
-            disturbances=tuple(disturbance_document(each) for each in disturbances(found)),
+            disturbances=tuple(
+                disturbance_document(each)
+                for each in (*map(as_disturbance, calibration.patterns if calibration else ()), *disturbances(found))
+            ),
             separations=calibration.separations if calibration else {},
             further=next_of(found, {} if spoilt else of_noise, structure),
             remarks=(

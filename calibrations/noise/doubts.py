@@ -65,7 +65,7 @@ class Disturbance:
 
 def disturbances(search: Search) -> tuple[Disturbance, ...]:
     """All disturbances: removed patterns, two levels, odd samples; a misfit only where none of these matters."""
-    patterns = [Disturbance(each.kind, each.axis, each.text, True, each) for each in search.patterns]
+    patterns = list(map(as_disturbance, search.patterns))
     two_levels = [Disturbance(TWO_LEVELS, each.axis, each.text, False) for each in search.telegraphs]
     odd = [
         Disturbance(each.kind, channel.axis, f"of {channel.axis}, {each.text}", each.matters)
@@ -77,6 +77,11 @@ def disturbances(search: Search) -> tuple[Disturbance, ...]:
         return known
     misfit = misfit_of(search.end.channels)
     return known if misfit is None else (*known, misfit)
+
+
+def as_disturbance(pattern: Pattern) -> Disturbance:
+    """A pattern that was removed from the record."""
+    return Disturbance(pattern.kind, pattern.axis, pattern.text, True, pattern)
 
 
 def misfit_of(channels: tuple[ChannelFit, ...]) -> Disturbance | None:

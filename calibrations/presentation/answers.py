@@ -51,12 +51,16 @@ def diagnosis_text(result: Diagnosis[Any], model: str = "") -> str:
 def discovery_text(result: Discovery[Any], experiment: Iterable[str] = ()) -> str:
     """The error after each step and the verdict. `experiment`: lines on the next one."""
     data = result.findings.data
-    lines = [result.judgement.text, *data.remarks(result.end), *experiment]
-    lines += [f"But {result.caution}."] if result.caution else []
-    parts = [columns(*data.step_table(result)), "\n".join(lines)]
+    parts = [columns(*data.step_table(result)), discovery_verdict(result, experiment)]
     if data.form == "rows" and (summary := _summary(result)):
         parts[1:1] = filter(None, [summary, unknown_text(result)])
     return "\n\n".join(parts)
+
+
+def discovery_verdict(result: Discovery[Any], experiment: Iterable[str] = ()) -> str:
+    """The verdict, remarks on it, and lines on the next experiment."""
+    lines = [result.judgement.text, *result.findings.data.remarks(result.end), *experiment]
+    return "\n".join([*lines, f"But {result.caution}."] if result.caution else lines)
 
 
 def unknown_text(result: Discovery[Any]) -> str:

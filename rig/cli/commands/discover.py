@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the final model to this file.")
 @click.option("--without", multiple=True, metavar="PLACE", help="A place to leave out of the search; may be repeated.")
 @click.option("--enough", metavar="ERROR", help="Stop at this error on unseen data: 0.5mg, 2mV or 1.5floors.")
+@click.option("--all", "every", is_flag=True, help="Of a still record, also each step's error and every parameter.")
 @click.option("--live", is_flag=True, help="Measure on the bench, and choose the next experiment.")
 @click.option("--time", "minutes", type=click.FloatRange(min=0, min_open=True), help="Rig time for --live, minutes.")
 @watch_options
@@ -35,6 +36,7 @@ def command(
     out: Path | None,
     without: tuple[str, ...],
     enough: str | None,
+    every: bool,
     live: bool,
     minutes: float | None,
     unattended: bool,
@@ -65,7 +67,7 @@ def command(
         return discover_live(request, out, minutes, unattended, answers, check, as_json)
     if not several:
         raise click.UsageError("give DATA (a file or a run), or --live to measure")
-    return _discover(request, several, out, without, enough, check, as_json)
+    return _discover(request, several, out, without, enough, every, check, as_json)
 
 
 def _discover(
@@ -74,13 +76,22 @@ def _discover(
     out: Path | None,
     without: tuple[str, ...],
     enough: str | None,
+    every: bool,
     check: bool,
     as_json: bool,
 ) -> int:
     from calibrations.discovery.enough import parse_enough
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import discovery_document
-    from rig.cli.terminal.words import discovery, own_effect, parameters, pattern_advice, planned, warning
+    from rig.cli.terminal.words import (
+        discovery,
+        own_effect,
+        parameters,
+        pattern_advice,
+        planned,
+        short_discovery,
+        warning,
+    )
     from rig.services.load import loaded
     from rig.services.provenance import write_model
 
@@ -99,8 +110,11 @@ def _discover(
         emit(discovery_document(result, str(path) if path else None) | {"own_effect": own_effect(*own)})
         notes(warning([result.caution]))
     else:
-        lines = "\n".join([discovery(result), *pattern_advice(*own)])
-        click.echo(f"{data.description}\n\n{lines}\n\n{parameters(result.end.model)}")
+        if data.form == "rows" or every:
+            lines = "\n".join([discovery(result), *pattern_advice(*own)])
+            click.echo(f"{data.description}\n\n{lines}\n\n{parameters(result.end.model)}")
+        else:
+            click.echo(f"{data.description}\n\n{short_discovery(result)}")
         if path is not None:
             click.echo(f"\nwritten: {path}")
     return int(result.verdict is Verdict.NO_RESPONSE or (check and result.verdict is not Verdict.ADEQUATE))

@@ -16,8 +16,8 @@ from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
 from calibrations.effects import Effect
 from calibrations.errors import DataError
-from calibrations.model import Model
-from calibrations.presentation.answers import discovery_text
+from calibrations.model import Model, Term
+from calibrations.presentation.answers import discovery_text, discovery_verdict
 from calibrations.table import Table
 from calibrations.text import columns, duration, quantity
 from rig.cli.terminal.output import note
@@ -38,6 +38,28 @@ def parameters(model: Model) -> str:
     return columns(("effect", "parameter", "axis", "value"), rows)
 
 
+def short_discovery(result: Discovery[Any]) -> str:
+    """The verdict on a still record and a line for each effect; the rest is behind --all."""
+    lines = [discovery_verdict(result, _next(result)), *map(_line, result.end.model.terms)]
+    if result.steps:
+        floor = result.findings.data.floor
+        lines.insert(
+            1, f"Error: {result.start.pooled_excess:.3g} times {floor} before, {result.end.pooled_excess:.3g} after."
+        )
+    return "\n".join([*lines, "The error after each step and every parameter: --all"])
+
+
+def _line(term: Term) -> str:
+    """An effect and its parameters in one line."""
+    several = len(term.effect.parameters) > 1
+    each = [
+        " ".join(filter(None, (e.name if several else "", e.axis, e.text if e.identified else "not identified")))
+        for e in term.quantities
+    ]
+    each += [f"curve {axis} of {n} coefficients" for axis, n in term.coefficients.items()]
+    return f"  {term.name}: {', '.join(each)}"
+
+
 def table(cells: Cells) -> str:
     """A table of text."""
     return columns(*cells)
@@ -50,8 +72,12 @@ def planned(result: Answer, request: Request, effects: Mapping[str, Effect]) -> 
 
 def discovery(result: Discovery[Any]) -> str:
     """The error after each step, the verdict, and the next experiment."""
-    source = result.findings.data.source
-    return discovery_text(result, experiment(result.next_experiment, source) if result.next_experiment else ())
+    return discovery_text(result, _next(result))
+
+
+def _next(result: Discovery[Any]) -> list[str]:
+    """Lines on the next experiment."""
+    return experiment(result.next_experiment, result.findings.data.source) if result.next_experiment else []
 
 
 def addition(result: Discovery[Any], data: str, out: Path) -> str:
