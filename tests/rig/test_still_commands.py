@@ -16,6 +16,7 @@ import yaml
 from calibrations.table import Array
 from tests import recorded
 from tests.calibrations.hidden_noise import RATE_HZ, fractional, traps, white
+from tests.calibrations.ramps import record
 from tests.rig.conftest import Ended
 
 Rig = Callable[..., Ended]
@@ -102,7 +103,7 @@ def test_compare_sets_both_curves_side_by_side(rig: Rig, folder: Path) -> None:
 def test_an_array_and_its_rate(rig: Rig, folder: Path) -> None:
     said = document(rig("fit", "x.npy", "--rate", "10", "--model", "still", "--json"))
     assert said["parameters"][0]["unit"] == "count/sqrt(Hz)"
-    ended = rig("discover", "x.npy", "--rate", "10")
+    ended = rig("discover", "x.npy", "--rate", "10", "--all")
     assert "+ flicker-noise" in ended.out
     assert "misses flicker-noise." in ended.out
     assert "give --rate HZ" in rig("discover", "x.npy").err
@@ -249,3 +250,18 @@ def test_no_legend_names_a_thing_twice(rig: Rig, folder: Path) -> None:
     assert "their sum" not in shown["white-noise", "allan"]
     assert "measured, after removing non-noise signals" in shown["step-report", "allan"]
     assert "measured, after removing non-noise signals" not in shown["white-report", "allan"]
+
+
+def test_a_ramp_at_rest_is_calibrated_in_less_than_ten_lines(rig: Rig, folder: Path) -> None:
+    volts, warm = record(np.random.default_rng(5), line=5e-4, glue=4e-3)
+    rows = np.column_stack([np.arange(len(volts)), volts, warm])
+    np.savetxt(folder / "ramp.csv", rows, delimiter=",", header="t_s,vx_v,temperature_c", comments="", fmt="%.9g")
+    ended = rig("discover", "ramp.csv", "--out", "ramp.yaml")
+    assert len(ended.out.splitlines()) < 10
+    assert "temperature-hysteresis" in ended.out
+    assert "+ temperature-hysteresis" in rig("discover", "ramp.csv", "--all").out
+    said = document(rig("compare", "ramp.csv", "--model", "ramp.yaml", "--json"))
+    assert said["fails"] == []
+    again = document(rig("discover", "ramp.csv", "--model", "ramp.yaml", "--json"))
+    assert (again["verdict"], again["causes"]) == ("adequate", [])
+    assert rig("report", "ramp.csv", "--model", "ramp.yaml", "--out", "ramp.html").status == 0

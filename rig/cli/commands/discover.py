@@ -110,13 +110,14 @@ def _discover(
         emit(discovery_document(result, str(path) if path else None) | {"own_effect": own_effect(*own)})
         notes(warning([result.caution]))
     else:
-        if data.form == "rows" or every:
+        short = data.form == "samples" and not every
+        if short:
+            click.echo(f"{data.description}\n{short_discovery(result)}")
+        else:
             lines = "\n".join([discovery(result), *pattern_advice(*own)])
             click.echo(f"{data.description}\n\n{lines}\n\n{parameters(result.end.model)}")
-        else:
-            click.echo(f"{data.description}\n\n{short_discovery(result)}")
         if path is not None:
-            click.echo(f"\nwritten: {path}")
+            click.echo(f"written: {path}" if short else f"\nwritten: {path}")
     return int(result.verdict is Verdict.NO_RESPONSE or (check and result.verdict is not Verdict.ADEQUATE))
 
 
