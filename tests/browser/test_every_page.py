@@ -28,6 +28,7 @@ PAGES = {  # address: what it shows when it is complete
     "/record": "text=soak",
     f"/record/{SWEEP}": ".report iframe",
     "/history": "text=Check standards",
+    "/fleet": "text=Many sensors at once",
     "/history?sensor=simulated": "[aria-label^='Quantit'] .points, .three .points",
     f"/compare?first={SWEEP}&second={SWEEP}": "[aria-label='Residuals of both'] .points",
     "/import": "text=Choose a file",

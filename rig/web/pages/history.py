@@ -66,7 +66,9 @@ def listed(known: Mapping[str, list[Run]]) -> None:
         ui.navigate.to(HistoryRequest(event.args[1]["sensor"]).address)
 
     with box("stack"):
-        words("Sensors", "title")
+        with div("row-of"):
+            words("Sensors", "title grow")
+            ui.button("Fleet", icon="grid_view", on_click=lambda: ui.navigate.to("/fleet")).props("outline dense")
         search = ui.input("Search: serial number or name").props("dense clearable")
         rows = [_row(sensor, runs) for sensor, runs in known.items()]
         table = ui.table(rows=rows, columns=COLUMNS, row_key="sensor", pagination=PAGE).props("flat dense")

@@ -62,7 +62,7 @@ class RunReport:
             return
         self.place.clear()
         with self.place:
-            ui.html(_framed(f"Report on {data}", text), sanitize=False)
+            ui.html(framed(f"Report on {data}", text), sanitize=False)
         self.headline.clear()
         if found := HEADLINE.search(text):
             with self.headline, box("row-of verdict").props("role=status"):
@@ -82,6 +82,6 @@ class RunReport:
         return self.desk.reports[key]
 
 
-def _framed(title: str, text: str) -> str:
+def framed(title: str, text: str) -> str:
     """A frame that shows an HTML text, as high as it needs."""
     return f'<iframe title="{html.escape(title)}" onload="{FITTED}" srcdoc="{html.escape(text)}"></iframe>'

@@ -1,0 +1,123 @@
+"""Fleet page: the missing effects of many sensors, errors of rigs, and the sensors that a person must inspect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from fastapi import Request
+from nicegui import ui
+
+from calibrations.model.file import dump_model, read_model
+from rig.fleet.members import Member, fleet_of
+from rig.record import Record
+from rig.web.desk import Desk, models
+from rig.web.frame import frame
+from rig.web.pages.run_report import framed
+from rig.web.parts import box, div, failed, off_loop, state, waiting, words
+
+WHY = (
+    "A fleet is the last complete run of every sensor in the record, or the tables of a folder or of an index with the "
+    "columns sensor, batch, rig and file."
+)
+Tell = Callable[[int, int], None]
+
+
+def register(desk: Desk) -> None:
+    """The page at /fleet; its source and model may be part of the address."""
+
+    @ui.page("/fleet")
+    def page(request: Request) -> None:
+        with frame(desk, "/history"):
+            FleetPage(desk, request.query_params.get("source", ""), request.query_params.get("model", "linear"))
+
+
+class FleetPage:
+    """Source and model, and the two analyses of `rig fleet`: their reports appear in the page."""
+
+    def __init__(self, desk: Desk, source: str, model: str) -> None:
+        self.desk = desk
+        self.done = ""
+        with box("chosen"):
+            self.source = ui.input("Folder or index; empty: the record", value=source).classes("data").props("dense")
+            known = {name: label for name, label in models(model).items() if name}
+            self.model = ui.select(known, label="Model", value=model).props("dense options-dense")
+            self.buttons = [
+                ui.button("Find missing effects", icon="search", on_click=partial(self.show, discovered)),
+                ui.button("Calibrate", icon="straighten", on_click=partial(self.show, calibrated)),
+            ]
+            for button in self.buttons:
+                button.props("outline dense")
+        self.place = div("stack")
+        with self.place, state("Many sensors at once", WHY):
+            pass
+
+    async def show(self, analyse: Callable[..., str]) -> None:
+        """Analyse the fleet, and show the report."""
+        for button in self.buttons:
+            button.disable()
+        self.place.clear()
+        with self.place, box("stack"):
+            label = waiting("Reading the sensors")
+            timer = ui.timer(0.5, lambda: label.set_text(self.done or label.text))
+        self.done = ""
+        try:
+            source, model = str(self.source.value or "").strip(), str(self.model.value)
+            text = await off_loop(analyse, [source] if source else [], model, self.desk.bench_file, self._tell)
+        except Exception as error:
+            self._end(timer)
+            with self.place:
+                failed("This fleet cannot be analysed", error)
+            return
+        self._end(timer)
+        with self.place, box("stack report"):
+            with div("row-of"):
+                words("Report", "title grow")
+                ui.button("Download", icon="download", on_click=lambda: ui.download.content(text, "fleet.html")).props(
+                    "outline dense"
+                )
+            ui.html(framed("Report on the fleet", text), sanitize=False)
+
+    def _tell(self, done: int, of: int) -> None:
+        self.done = f"{done} of {of} sensors analysed"
+
+    def _end(self, timer: ui.timer) -> None:
+        timer.cancel()
+        self.place.clear()
+        for button in self.buttons:
+            button.enable()
+
+
+def discovered(sources: list[str], model: str, bench_file: Any, tell: Tell) -> str:
+    """The report of `rig fleet discover`."""
+    from rig.fleet.discover import discover_fleet
+    from rig.fleet.documents import population_page
+    from rig.fleet.worker import Question, effects_of, own_files
+
+    own = own_files(bench_file)
+    start = Question("look", dump_model(read_model(model, effects_of(own))), own=own)
+    return _asked(sources, tell, lambda fleet, members: population_page(discover_fleet(fleet, members, start), model))
+
+
+def calibrated(sources: list[str], model: str, bench_file: Any, tell: Tell) -> str:
+    """The report of `rig fleet calibrate`."""
+    from rig.fleet.calibrate import calibrate_fleet, read_guide
+    from rig.fleet.documents import calibration_page
+    from rig.fleet.worker import own_files
+
+    def page(fleet: Any, members: list[Member]) -> str:
+        guide = read_guide(model, {member.batch for member in members}, own_files(bench_file))
+        return calibration_page(calibrate_fleet(fleet, members, guide), model)
+
+    return _asked(sources, tell, page)
+
+
+def _asked(sources: list[str], tell: Tell, page: Callable[[Any, list[Member]], str]) -> str:
+    """The page that the workers' answers make. Raises RigError, FleetError."""
+    from rig.fleet.crew import crew
+    from rig.fleet.questions import Fleet
+
+    members = fleet_of(sources)
+    with Record() as record, crew(None, None) as client:
+        return page(Fleet(client, record, tell), members)
