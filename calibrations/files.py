@@ -62,14 +62,17 @@ class Source:
 
     name: str
     opened: Callable[[], TextIO]
+    marked: Callable[[], TextIO] | None = None  # the same, with the mark U+FFFD for bytes that are not text
 
     @contextmanager
-    def lines(self) -> Iterator[Iterator[str]]:
-        """Open the text and iterate over its lines. Raises DataError where they cannot be read, also during the
-        iteration.
+    def lines(self, marked: bool = False) -> Iterator[Iterator[str]]:
+        """Open the text and iterate over its lines; bytes that are not text are refused, or `marked`.
+
+        Raises DataError where they cannot be read, also during the iteration.
         """
+        opened = self.marked if marked and self.marked is not None else self.opened
         try:
-            with self.opened() as file:
+            with opened() as file:
                 yield iter(file)
         except UnicodeError:
             raise DataError(f"{self.name}: contains bytes that are not text; save the file as CSV in UTF-8") from None
@@ -94,7 +97,11 @@ def open_text_file(path: Path) -> Source:
         what = "cannot be read as text" if path.suffix == ".gz" else "cannot be read"
         raise DataError(f"{path}: {what}: {_reason(error)}") from None
     encoding = _encoding(head, path)
-    return Source(str(path), lambda: io.TextIOWrapper(_bytes(path), encoding=encoding))
+    return Source(
+        str(path),
+        lambda: io.TextIOWrapper(_bytes(path), encoding=encoding),
+        lambda: io.TextIOWrapper(_bytes(path), encoding=encoding, errors="replace"),
+    )
 
 
 def text_source(content: str, name: str) -> Source:

@@ -37,6 +37,7 @@ class ImportedTable:
     table: Table
     sheet: Sheet
     mapped: tuple[ColumnMapping, ...]
+    notes: tuple[str, ...] = ()  # on damaged lines
 
     @property
     def settings(self) -> dict[str, object]:
@@ -48,6 +49,7 @@ class ImportedTable:
             "separator": names.get(self.sheet.separator, self.sheet.separator),
             "columns": {m.name: m.text.partition("=")[2] for m in self.mapped},
             "constants": dict(self.table.constants),
+            **({"damaged_lines": self.notes[0].partition(": ")[2]} if self.notes else {}),
         }
 
 
@@ -104,7 +106,9 @@ def _import_with(
     first = zip(laid.header, laid.sample[0], strict=True)
     words = [name for name, cell in first if name not in taken and _is_text(name, cell)]
     needed = {*taken - {path}, *NUMBERS}
-    numbers, texts = read_cells(laid, list(dict.fromkeys([*words, path])) if path in laid.header else words, needed)
+    notes: list[str] = []
+    words = list(dict.fromkeys([*words, path])) if path in laid.header else words
+    numbers, texts = read_cells(laid, words, needed, notes.append)
     columns = {m.name: _converted(numbers[m.theirs], m) for m in chosen if m.name != PATH}
     columns |= {name: numbers[name] for name in kept if name in numbers}
     labels = {k: texts[k] for k in kept if k in texts} | ({PATH: texts[path]} if path in texts else {})
@@ -113,7 +117,7 @@ def _import_with(
     table = Table.from_columns(kind, columns, known, laid.name, labels)
     _check_units(table, laid, chosen)
     check_at_rest(table)
-    return ImportedTable(table, laid, tuple(chosen))
+    return ImportedTable(table, laid, tuple(chosen), tuple(notes))
 
 
 def complete_mapping(laid: Sheet, mapped: Sequence[ColumnMapping]) -> list[ColumnMapping]:

@@ -10,15 +10,17 @@ import csv
 import re
 from array import array
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from math import isfinite
+from operator import and_
 
 import numpy as np
 
 from calibrations.errors import DataError
 from calibrations.files import Source
+from calibrations.importing.bad_lines import BadLines
 from calibrations.importing.units import parse_unit, split_unit
 from calibrations.table import Array, Constant
 
@@ -30,6 +32,8 @@ EMPTY = "the file is empty: a header line with column names is missing; export t
 # decimal commas.
 
 HEAD_LINES = 200  # lines that the layout is taken from
+MOST_WORDS = 0.1  # of the rows of a column of numbers
+LONGEST_SHOWN = 20  # characters of a wrong cell
 BLANK = " \t\r\n\x1a"
 _COMMA = re.compile(r",(?=\d+([eE]|$))")
 NAME = re.compile(r"[^\W\d][\w .()\[\]/°%^*+-]{0,39}|")  # of a column: words and a unit, or nothing
@@ -61,6 +65,7 @@ class Sheet:
     cells: Mapping[str, Array | tuple[str, ...]] | None = None
     topic: str = ""
     notes: tuple[str, ...] = ()
+    skipped: float = 0.0  # the most of its lines that are skipped as damaged
 
     def of_topic(self, topic: str, notes: tuple[str, ...]) -> Sheet:
         """The same sheet as a topic of a file that has several, with remarks for the person."""
@@ -83,13 +88,16 @@ class Sheet:
         """The header's names without units."""
         return tuple(split_unit(name)[0] for name in self.header)
 
-    def rows(self) -> Iterator[Row]:
-        """Iterate over the rows of data. Raises DataError for a row of another width."""
-        with self.source.lines() as lines:
+    def rows(self, bad: BadLines) -> Iterator[Row]:
+        """Iterate over the rows of data without those of another width, which `bad` counts or refuses."""
+        with self.source.lines(marked=self.skipped > 0) as lines:
             for number, cells in split_rows(islice(lines, self.first - 1, None), self.separator, self.name, self.first):
-                if len(cells) != self.width:
-                    raise DataError(_another_width(self.name, number, cells, self.header))
-                yield number, cells
+                if len(cells) == self.width:
+                    yield number, cells
+                    continue
+                spans = 1 + sum(cell.count("\n") for cell in cells)  # an open quote swallows lines
+                reason = f"{len(cells)} values for {len(self.header)} columns"
+                bad.add(number, reason, _another_width(self.name, number, cells, self.header), spans)
 
 
 def read_sheet(source: Source) -> Sheet:
@@ -110,7 +118,7 @@ def read_sheet(source: Source) -> Sheet:
     below, units = _units(header, rows[1 if named else 0 :], named)
     if not below:
         raise DataError(f"{source.name}: there are no rows below the header; export the measurements again")
-    sample = tuple(tuple(cells[:columns]) for _, cells in below if len(cells) == width)
+    sample = _whole([tuple(cells[:columns]) for _, cells in below if len(cells) == width])
     if not sample:
         raise DataError(_another_width(source.name, *below[0], header))
     if not any(is_number(cell) for cells in sample for cell in cells):
@@ -121,6 +129,14 @@ def read_sheet(source: Source) -> Sheet:
     return Sheet(
         source, separator, tuple(header[:columns]), tuple(units), named, width, line, below[0][0], sample, constants
     )
+
+
+def _whole(rows: list[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
+    """The rows without damaged ones: those with a word where nearly all others have a number."""
+    wrong = [tuple(not is_number(cell) for cell in row) for row in rows]
+    numeric = [sum(column) <= MOST_WORDS * len(rows) for column in zip(*wrong, strict=True)]
+    fits = [row for row, words in zip(rows, wrong, strict=True) if not any(map(and_, words, numeric))]
+    return tuple(fits or rows)
 
 
 def as_lines(source: Source) -> Source:
@@ -184,9 +200,10 @@ def _head(source: Source) -> tuple[dict[str, Constant], int, list[str]]:
 
 
 def _separator(head: Sequence[str]) -> str | None:
-    """The separator in a line from the middle of the head; None for blanks."""
-    filled = [line for line in head if line.strip(BLANK)]
-    return next((s for s in (";", "\t", ",") if s in filled[len(filled) // 2].strip(" \r\n")), None)
+    """The separator in most lines of the second half of the head, which has no titles; None for blanks."""
+    filled = [line.strip(" \r\n") for line in head if line.strip(BLANK)]
+    half = filled[len(filled) // 2 :]
+    return Counter(next((s for s in (";", "\t", ",") if s in line), None) for line in half).most_common(1)[0][0]
 
 
 def _width(rows: Sequence[Row]) -> int:
@@ -257,18 +274,22 @@ def look_like_names(header: Iterable[str]) -> bool:
 
 
 def read_cells(
-    sheet: Sheet, texts: Collection[str], needed: Collection[str] = ()
+    sheet: Sheet, texts: Collection[str], needed: Collection[str] = (), tell: Callable[[str], None] = lambda _: None
 ) -> tuple[Mapping[str, Array], Mapping[str, tuple[str, ...]]]:
     """Every column by its name in the header: columns of numbers, and the columns in `texts`.
 
-    Of columns in memory, those outside `needed` that are not all finite are left out: a log has many that are unused.
+    `tell` receives a remark on damaged lines that were skipped, if the sheet allows it. Of columns in memory, those
+    outside `needed` that are not all finite are left out: a log has many that are unused.
     Raises DataError with file, line and column.
     """
     if sheet.cells is not None:
         return _in_memory(sheet, sheet.cells, texts, needed)
     if not texts and (numbers := _at_once(sheet)) is not None:
         return dict(zip(sheet.header, numbers.T, strict=True)), {}
-    return _one_by_one(sheet, texts)
+    bad = BadLines(sheet.name, sheet.skipped)
+    found = _one_by_one(sheet, texts, bad)
+    bad.end(tell)
+    return found
 
 
 def _in_memory(
@@ -306,26 +327,43 @@ def _at_once(sheet: Sheet) -> Array | None:
                 chain([first], given), delimiter=sheet.separator, ndmin=2, comments=None, quotechar='"'
             )
         except UnicodeError:
+            if sheet.skipped:
+                return None
             raise
         except ValueError:
             return None
     return numbers if numbers.shape[1] == sheet.width and np.isfinite(numbers).all() else None
 
 
-def _one_by_one(sheet: Sheet, texts: Collection[str]) -> tuple[Mapping[str, Array], Mapping[str, tuple[str, ...]]]:
+def _one_by_one(
+    sheet: Sheet, texts: Collection[str], bad: BadLines
+) -> tuple[Mapping[str, Array], Mapping[str, tuple[str, ...]]]:
     numbers = {name: array("d") for name in sheet.header if name not in texts}
     words: dict[str, list[str]] = {name: [] for name in sheet.header if name in texts}
-    places = list(enumerate(sheet.header))
-    for row in sheet.rows():
-        for k, name in places:
+    wanted = [(k, numbers[name]) for k, name in enumerate(sheet.header) if name in numbers]
+    for row in sheet.rows(bad):
+        try:
+            values = [_number(sheet, row, k) for k, _ in wanted]
+        except DataError as error:
+            again = tuple(row[1][: len(sheet.header)]) == sheet.header
+            bad.add(row[0], "the header again" if again else _wrong(sheet, row), str(error))
+            continue
+        bad.good += 1
+        for (_, column), value in zip(wanted, values, strict=True):
+            column.append(value)
+        for k, name in enumerate(sheet.header):
             if name in words:
                 words[name].append(row[1][k])
-            else:
-                numbers[name].append(_number(sheet, row, k))
     return (
         {name: np.frombuffer(values, dtype=np.float64) for name, values in numbers.items()},
         {name: tuple(values) for name, values in words.items()},
     )
+
+
+def _wrong(sheet: Sheet, row: Row) -> str:
+    """The first cell of a damaged row that is not a number, in words."""
+    k = next((k for k in range(len(sheet.header)) if not is_number(row[1][k])), 0)
+    return f"{sheet.header[k]} is {row[1][k][:LONGEST_SHOWN]!r}"
 
 
 def _number(sheet: Sheet, row: Row, k: int) -> float:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from calibrations.errors import MissingColumn
+from calibrations.importing.bad_lines import SHARES, Policy
 from calibrations.importing.binary import open_sheet
 from calibrations.importing.foreign import import_sheet, needs_mapping
 from calibrations.importing.plausible import Doubt
@@ -48,9 +49,13 @@ class Preview:
     notes: tuple[str, ...]
 
 
-def opened(path: Path, topic: str | None = None) -> Sheet:
-    """The sheet in a file, of the topic `topic` where it has several. Raises DataError, SeveralTopics."""
-    return open_sheet(path, topic)
+def opened(path: Path, topic: str | None = None, bad_lines: Policy = "few") -> Sheet:
+    """The sheet in a file, of the topic `topic` where it has several.
+
+    `bad_lines` says what to do with damaged lines of a text: skip a few, skip them, or refuse them. Raises DataError,
+    SeveralTopics.
+    """
+    return replace(open_sheet(path, topic), skipped=SHARES[bad_lines])
 
 
 def asks(sheet: Sheet) -> bool:
@@ -84,7 +89,9 @@ def lacking(sheet: Sheet, kind: str, columns: Sequence[ColumnMapping]) -> list[s
 def preview(sheet: Sheet, kind: str, columns: Sequence[ColumnMapping], constants: Mapping[str, Constant]) -> Preview:
     """The table of an import that is not stored. Raises DataError."""
     notes = list(sheet.notes)
-    table = averaged(import_sheet(sheet, kind, columns, constants).table, notes.append)
+    imported = import_sheet(sheet, kind, columns, constants)
+    notes += imported.notes
+    table = averaged(imported.table, notes.append)
     return Preview(table, tuple(notes))
 
 
@@ -96,9 +103,9 @@ def stored(
     tell: Callable[[str], None],
 ) -> tuple[str, Table]:
     """Store the sheet in the record: the name of the new run, and its table. Raises DataError, RecordError."""
-    for remark in sheet.notes:
-        tell(remark)
     imported = import_sheet(sheet, kind, columns, constants)
+    for remark in (*sheet.notes, *imported.notes):
+        tell(remark)
     table = averaged(imported.table, tell)
     with Record.to_read() as record:
         return record.add_table(table, imported.settings), table

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -65,7 +66,7 @@ def test_an_import_that_cannot_be(
     [
         ("root:x:0:0:root:/root:/bin/sh\ndaemon:x:1:1:daemon:/:/bin/false\n", "has no numbers in its first 1 rows"),
         ("key = s3cret\nother = 7\n", "line 1: a header line with column names is missing"),
-        ("Its s3cret: a, b\n1\n2\n3,4\n5,6\n", "line 2: 1 values for 4 columns"),
+        ("Its s3cret: a, b\n1\n2\n3,4\n5,6\n", "line 1: a header line with column names is missing"),
         ("daemon\t\t7/s3cret\nx\ty\t8\n", "line 1: a column has no name"),
     ],
 )
@@ -75,3 +76,15 @@ def test_what_is_no_table_is_not_quoted(refused: Callable[..., str], work: Path,
         told = refused(command, "private.txt")
         assert said in told
         assert not any(word in told for word in ("root:x", "daemon", "s3cret"))
+
+
+def test_a_damaged_line_of_a_log_is_skipped_or_refused(
+    refused: Callable[..., str], rig: Callable[..., Any], work: Path
+) -> None:
+    rows = [f"{k / 100:.2f},{0.01 * (k % 7)}" for k in range(500)]
+    (work / "still.csv").write_text("\n".join(["t_s,vx_v", *rows[:300], "3.0,,0.1", *rows[300:]]) + "\n")
+    arguments = ("import", "still.csv", "--kind", "still")
+    assert "still.csv, line 302: 3 values for 2 columns" in refused(*arguments, "--bad-lines", "refuse")
+    ended = rig(*arguments)
+    assert "500 rows of still" in ended.out
+    assert "1 of 501 lines is damaged and was skipped: line 302 (3 values for 2 columns)" in ended.err

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import click
 
@@ -40,6 +41,11 @@ LEAVE = "-"
     "--constant", "given", multiple=True, metavar="KEY=VALUE", help="A constant, such as gravity_m_s2=9.81744."
 )
 @click.option("--topic", metavar="NAME", help="Topic, group or worksheet of a file that has several.")
+@click.option(
+    "--bad-lines",
+    type=click.Choice(["skip", "refuse"]),
+    help="Damaged lines of a text: skip all, or refuse the first. Without it at most 1 % of the lines are skipped.",
+)
 @json_option
 def command(
     file: Path,
@@ -47,6 +53,7 @@ def command(
     mapped: tuple[str, ...],
     given: tuple[str, ...],
     topic: str | None,
+    bad_lines: Literal["skip", "refuse"] | None,
     as_json: bool,
 ) -> None:
     """Store FILE in the record. A raw log is averaged over its still intervals.
@@ -65,13 +72,14 @@ def command(
     asked = sys.stdin.isatty() and sys.stderr.isatty()
     try:
         with working(f"reading {file}"):
-            sheet = opened(file, topic)
+            sheet = opened(file, topic, bad_lines or "few")
     except SeveralTopics as several:
         if not asked:
             raise
         note(str(several))
         choice = click.Choice(several.topics)
-        sheet = opened(file, click.prompt("Topic", default=several.proposed or None, type=choice, err=True))
+        topic = str(click.prompt("Topic", default=several.proposed or None, type=choice, err=True))
+        sheet = opened(file, topic, bad_lines or "few")
     columns, constants = [ColumnMapping.parse(text) for text in mapped], _constants(given)
     if asked and needs_mapping(sheet, kind, columns):
         kind, columns = ask_mapping(sheet, kind, columns, given)

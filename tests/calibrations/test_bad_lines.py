@@ -1,0 +1,98 @@
+"""Damaged lines of a text log: counted, shown and skipped while they are few, else refused with the first of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibrations.errors import DataError
+from calibrations.files import open_text_file
+from calibrations.importing.bad_lines import SHARES, Policy
+from calibrations.importing.foreign import ImportedTable, import_sheet
+from calibrations.importing.sheet import read_sheet
+
+HEADER = "t_s,ax,ay,az"
+N = 4000
+
+
+def lines() -> list[str]:
+    """A log of a still sensor."""
+    noise = np.random.default_rng(1).standard_normal((N, 3)) * 1e-3
+    return [HEADER, *(f"{k / 100:.2f},{x:.5f},{y:.5f},{1 + z:.5f}" for k, (x, y, z) in enumerate(noise))]
+
+
+def imported(tmp_path: Path, given: list[str | bytes], policy: Policy = "few") -> ImportedTable:
+    path = tmp_path / "log.csv"
+    path.write_bytes(b"\n".join(line.encode() if isinstance(line, str) else line for line in given) + b"\n")
+    return import_sheet(replace(read_sheet(open_text_file(path)), skipped=SHARES[policy]), "still")
+
+
+@pytest.mark.parametrize(
+    ("damaged", "shown"),
+    [
+        ("30.01,0.1,0.2", "line 3001 (3 values for 4 columns)"),
+        ("30.01,0.1,0.2,0.9,7", "line 3001 (5 values for 4 columns)"),
+        ("30.01,0.1,0.2x3,0.9", "line 3001 (ay is '0.2x3')"),
+        ("30.01,0.1,nan,0.9", "line 3001 (ay is 'nan')"),
+        (HEADER, "line 3001 (the header again)"),
+        (b"30.01,0.1,\xff\xfe2,0.9", "line 3001 (ay is '\ufffd\ufffd2')"),
+    ],
+)
+def test_a_damaged_line_is_skipped_and_shown(tmp_path: Path, damaged: str | bytes, shown: str) -> None:
+    given: list[str | bytes] = [*lines()]
+    given[3000] = damaged
+    found = imported(tmp_path, given)
+    assert found.table.n == N - 1
+    assert 29.99 not in found.table.column("t_s")
+    assert {29.98, 30.0} <= set(found.table.column("t_s"))
+    (note,) = found.notes
+    assert note.endswith(f"1 of {N} lines is damaged and was skipped: {shown}.")
+    assert "damaged_lines" in found.settings
+
+
+def test_a_log_without_damage_has_no_remark(tmp_path: Path) -> None:
+    found = imported(tmp_path, [*lines()])
+    assert (found.notes, found.table.n) == ((), N)
+
+
+@pytest.mark.parametrize("row", [1, 50])
+def test_a_damaged_line_among_the_first_does_not_hide_its_column(tmp_path: Path, row: int) -> None:
+    given: list[str | bytes] = [*lines()]
+    given[row] = "0.0,?,0.2,0.9"
+    assert imported(tmp_path, given).table.column("ax").shape == (N - 1,)
+
+
+def test_the_strict_policy_refuses_the_first_damaged_line(tmp_path: Path) -> None:
+    given: list[str | bytes] = [*lines()]
+    given[1000] = given[1500] = "10,0.1"
+    with pytest.raises(DataError, match=r"line 1001: 2 values for 4 columns \(t_s, ax, ay, az\); correct this line"):
+        imported(tmp_path, given, "refuse")
+
+
+def test_many_damaged_lines_are_refused_unless_a_person_skips_them(tmp_path: Path) -> None:
+    given: list[str | bytes] = [*lines()]
+    for k in range(100, N, 20):
+        given[k] = "cut"
+    with pytest.raises(DataError, match=r"line 101: .*195 of 4000 lines are damaged, and at most 1 % .*; --bad-lines"):
+        imported(tmp_path, given)
+    found = imported(tmp_path, given, "skip")
+    assert found.table.n == N - 195
+    assert found.notes[0].endswith("line 101 (1 values for 4 columns), line 121 (1 values for 4 columns), "
+                                   "line 141 (1 values for 4 columns) and 192 more.")  # fmt: skip
+
+
+def test_more_than_half_is_refused_in_any_case(tmp_path: Path) -> None:
+    given: list[str | bytes] = [*lines()]
+    given[300:2600] = ["?,?,?,?"] * 2300
+    with pytest.raises(DataError, match=r"2300 of 4000 lines are damaged, and at most 50 % are skipped\)"):
+        imported(tmp_path, given, "skip")
+
+
+def test_an_open_quote_does_not_hide_the_lines_that_it_swallows(tmp_path: Path) -> None:
+    given: list[str | bytes] = [*lines()]
+    given[1000] = '10.0,"0.1,0.2,0.9'
+    with pytest.raises(DataError, match=r"300\d of 400\d lines are damaged"):
+        imported(tmp_path, given)
