@@ -16,12 +16,9 @@ from pydantic import BaseModel, ValidationError
 
 from calibrations.table import gravity_fault
 from drivers.errors import LinkRefused, did_you_mean
-from drivers.handheld.world import handheld
 from drivers.manual_stage.person import PERSON
 from drivers.transport.address import Url
 from drivers.transport.faults import Fault, kinds_of
-from drivers.world.batch import with_own
-from drivers.world.config import WorldConfig
 from drivers.world.errors import SimulationError
 from procedures.session import Limits
 from rig.bench.bench import Bench
@@ -203,6 +200,11 @@ def _check_faults(key: str, instrument: Instrument) -> None:
 
 
 def _check_worlds(bench: Bench, path: Path) -> None:
+    # the simulated world loads slowly, and most commands only read what a bench has measured
+    from drivers.handheld.world import handheld
+    from drivers.world.batch import with_own
+    from drivers.world.config import WorldConfig
+
     key = f"{path}, key world"
     try:
         settings, held = handheld(bench.world)
