@@ -48,6 +48,13 @@ class Spline:
         knots, turn = _turned(self.low, self.high, self.intervals, self.order)
         return np.asarray(scipy.interpolate.BSpline.design_matrix(inside, knots, DEGREE).toarray() @ turn)
 
+    def summed(self, x: Array, coefficients: Array) -> Array:
+        """The sum of the first columns with these coefficients at x (n,), shape (n,): faster than its columns."""
+        inside = np.clip(x, self.low, self.high - 1e-12 * (self.high - self.low))
+        knots, turn = _turned(self.low, self.high, self.intervals, self.order)
+        on_splines = turn[:, : len(coefficients)] @ coefficients
+        return np.asarray(scipy.interpolate.BSpline(knots, on_splines, DEGREE)(inside))
+
 
 @lru_cache(maxsize=256)
 def _turned(low: float, high: float, intervals: int, order: int) -> tuple[Array, Array]:

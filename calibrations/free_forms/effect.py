@@ -164,7 +164,11 @@ class _AtOutput(FreeForm):
     def output(self, v: Array, table: Table, p: Values) -> Array:
         out = v.copy()
         for k in range(len(table.axes)):
-            out[:, k] += self._columns(table, v, v[:, k], k) @ self._coefficients(p, k)
+            coefficients, at = self._coefficients(p, k), 0
+            for form in self.forms:
+                own = coefficients[at : at + form.count(k)]
+                out[:, k] += form.summed(table, v, v[:, k], k, own)
+                at += len(own)
         return out
 
 

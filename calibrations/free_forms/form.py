@@ -30,7 +30,7 @@ from pydantic import Field
 
 from calibrations.effects.kernels import play, slip_elements
 from calibrations.effects.thermometer import leading_temperature
-from calibrations.free_forms.bases import Basis, Play, Products
+from calibrations.free_forms.bases import Basis, Play, Products, Spline
 from calibrations.free_forms.poses import side, way
 from calibrations.geometry.orientation import nominal_pose, other_in_plane, out_of_plane, specific_force
 from calibrations.table import Array, Table
@@ -114,6 +114,13 @@ class Form:
             out = _of_table(self, table, k)[:, :kept]
         multiplied = self.factor not in ("", "pressed")
         return np.asarray(out * self._factor(table, force, k)[:, None]) if multiplied else out
+
+    def summed(self, table: Table, force: Array, response: Array, k: int, coefficients: Array) -> Array:
+        """The sum of the columns of axis k with these coefficients, shape (n,)."""
+        basis = self.basis(k)
+        if isinstance(basis, Spline) and self.driver in MODELLED and not self.factor:
+            return basis.summed(self.drive(table, force, response, k), coefficients)
+        return np.asarray(self.columns(table, force, response, k) @ coefficients)
 
     def drive(self, table: Table, force: Array, response: Array, k: int) -> Array:
         """What drives the function of axis k, shape (n,)."""

@@ -11,7 +11,7 @@ Source  Patterson and Thompson, Biometrika 58 (1971) 545; Wood and Fasiolo, Biom
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,7 +77,8 @@ def whitened(
         parts.append(J)
         blocks[comp.name] = slice(at, at + J.shape[2])
         at += J.shape[2]
-    X = np.concatenate([*parts, target[:, :, None]], axis=2) / white[:, :, None]
+    X = np.concatenate([*parts, target[:, :, None]], axis=2)
+    X /= white[:, :, None]
     return X.reshape(-1, X.shape[2]), blocks, used
 
 
@@ -265,15 +266,20 @@ def gain(M: Array, side: Array) -> tuple[float, float]:
     return max(float(value[k]), 0.0), float(fine[k])
 
 
-def gain_of_columns(g: Gram, fit: Sizes, X: Array, b: int, N: Array) -> tuple[float, float]:
-    """The gain of whitened columns N (rows, m) that are not in g; X are the columns that g was made of."""
+def gain_beside(g: Gram, fit: Sizes, X: Array, b: int) -> Callable[[Array], float]:
+    """The gain of whitened columns (rows, m) that are not in g; X are the columns that g was made of."""
     active = g.indices(fit.variances)
-    with_base = X[:, :b].T @ N
-    by_base = g.base_inverse @ with_base
-    M = N.T @ N - with_base.T @ by_base
-    side = N.T @ X[:, -1] - by_base.T @ g.base_with_data
-    cross = X[:, b + active].T @ N - g.base_products[:, active].T @ by_base
-    return gain(M - cross.T @ fit.inverse @ cross, side - cross.T @ fit.coefficients)
+    beside, by_products = X[:, b + active].T, g.base_products[:, active].T  # of all columns that are tried
+
+    def gained(N: Array) -> float:
+        with_base = X[:, :b].T @ N
+        by_base = g.base_inverse @ with_base
+        M = N.T @ N - with_base.T @ by_base
+        side = N.T @ X[:, -1] - by_base.T @ g.base_with_data
+        cross = beside @ N - by_products @ by_base
+        return gain(M - cross.T @ fit.inverse @ cross, side - cross.T @ fit.coefficients)[0]
+
+    return gained
 
 
 def _part(g: Gram, fit: Sizes, name: str) -> slice:

@@ -18,7 +18,7 @@ from calibrations.free_forms.reml import (
     beside_base,
     coefficients,
     estimate,
-    gain_of_columns,
+    gain_beside,
     gram,
     whitened,
     without,
@@ -219,12 +219,12 @@ def _refined(
     for i, comp in enumerate(components):
         if comp.name not in sizes.variances or comp.reshaped is None:
             continue
-        rest = without(g, sizes, comp.name)
+        gain = gain_beside(g, without(g, sizes, comp.name), X, b)
 
-        def gained(shape: tuple[float, ...], comp: Component = comp, rest: Sizes = rest) -> float:
+        def gained(shape: tuple[float, ...], comp: Component = comp, gain: Callable[[Array], float] = gain) -> float:
             assert comp.reshaped is not None  # noqa: S101 checked above
             J = comp.reshaped(shape).jacobian(state) / scales[comp.name] / white[:, :, None]
-            return gain_of_columns(g, rest, X, b, J.reshape(-1, J.shape[2]))[0]
+            return gain(J.reshape(-1, J.shape[2]))
 
         best = climb(gained, comp.shape, comp.step)
         if best != comp.shape:

@@ -86,6 +86,15 @@ def test_a_basis_has_as_many_columns_as_it_counts(basis: Spline | Harmonics | Wa
     assert basis(np.linspace(0.0, 1.0, 30)).shape == (30, basis.count)
 
 
+def test_the_sum_of_a_spline_is_that_of_its_columns() -> None:
+    x = np.linspace(-1.5, 1.5, 101)
+    found = Spline(-1.0, 1.0, 14)
+    for count in (found.count, 5):
+        coefficients = np.random.default_rng(1).standard_normal(count)
+        expected = found(x)[:, :count] @ coefficients
+        np.testing.assert_allclose(found.summed(x, coefficients), expected, rtol=0, atol=1e-13)
+
+
 def test_settling_follows_exponentials_of_very_different_time_constants() -> None:
     t = 20.0 + 8.0 * np.arange(500)
     begun = 0.6 * np.exp(-(t - 20) / 60) + 0.4 * np.exp(-(t - 20) / 2500)

@@ -1,3 +1,5 @@
+from functools import lru_cache
+
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
@@ -48,8 +50,14 @@ class BiasDrift(Effect):
         since = table.time_s - p.middle_s
         drift = np.outer(since / HOUR_S, p.slope)
         if p.wanders:
-            drift += _waves(since / p.span_s) @ np.array([p[f"wave_{k}"] for k in WAVES])
+            drift += _waves_of(table, float(p.middle_s), float(p.span_s)) @ np.array([p[f"wave_{k}"] for k in WAVES])
         return drift
+
+
+@lru_cache(maxsize=4)
+def _waves_of(table: Table, middle_s: float, span_s: float) -> Array:
+    """The cosines at the rows of `table`."""
+    return _waves((table.time_s - middle_s) / span_s)
 
 
 def _waves(u: Array) -> Array:
