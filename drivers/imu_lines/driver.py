@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from drivers.errors import BadFrame, DriverError, LimitError, LinkTimeout, OverRange, SensorFault, StreamError
 from drivers.imu_lines.lines import Assembly
+from drivers.imu_lines.proposal import proposed_settings
 from drivers.imu_lines.reception import TIME, Heard, Tally
 from drivers.instrument import Check, Identity, require_positive
 from drivers.recorder import NoDigitalLines, Recorder, Samples
@@ -113,16 +114,16 @@ class LineSensor(Recorder[Settings]):
 
     def self_test(self) -> list[Check]:
         """The columns, the rate, and the sensor's time against the host's, in two seconds of lines."""
-        heard, tally = self._heard(), Tally(self.settings.time_unit_s)
+        heard, tally, begun_s = self._heard(), Tally(self.settings.time_unit_s), self._clock.now()
         try:
             self._link.discard()
-            deadline = self._clock.now() + TEST_S
-            while (left_s := deadline - self._clock.now()) > 0:
+            begun_s = self._clock.now()
+            while (left_s := begun_s + TEST_S - self._clock.now()) > 0:
                 heard.take(self._listen(heard.assembly, left_s), self._clock.now())
             if not heard.assembly.good:
                 raise self._unreadable(heard.assembly)
         except DriverError as fault:
-            return [Check("lines", False, f"{fault}")]
+            return [Check("lines", False, f"{fault}"), *self._proposal(heard.assembly, begun_s)]
         columns = f"the lines have the columns {', '.join(map(str, heard.assembly.seen))}"
         tally.add(heard)
         rate_hz = heard.measured_rate_hz
@@ -134,6 +135,18 @@ class LineSensor(Recorder[Settings]):
             said = f"the sensor's time is {tally.offset_s:+.3f} s from the host's and gains {1e6 * gain:+.0f} ppm"
             checks.append(Check("time", abs(gain) < RATE_OFF, said))
         return checks
+
+    def _proposal(self, assembly: Assembly, begun_s: float) -> list[Check]:
+        """Settings that fit the lines since `begun_s`, as far as the test goes; nothing where none do."""
+        while (left_s := begun_s + TEST_S - self._clock.now()) > 0 and (data := self._link.read(left_s)):
+            assembly.take(data)
+        found = proposed_settings(assembly.shown, max(self._clock.now() - begun_s, 1 / self.settings.rate_hz))
+        if found is None:
+            return []
+        columns = ", ".join(f"{name}: {column}" for name, column in found["columns"].items())
+        others = ", ".join(f"{name}: {value}" for name, value in found.items() if name != "columns")
+        text = f"the lines fit {{columns: {{{columns}}}, {others}}} in the sensor's settings, if it is at rest"
+        return [Check("proposal", False, text)]
 
     def tally(self) -> dict[str, tuple[float, str]]:
         """Counts of lost, doubled and damaged samples since the connection, and the gain of the sensor's clock.

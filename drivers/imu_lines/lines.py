@@ -20,6 +20,7 @@ from operator import xor
 
 FORMATS = ("csv", "named", "teleplot", "nmea")
 PAIR = re.compile(r"([A-Za-z_][\w.]*)\s*[:=]\s*([-+]?[\d.][\d.eE+-]*)")
+MOST_SHOWN = 10_000  # lines that an assembly keeps for a proposal
 Column = int | str
 
 
@@ -65,6 +66,7 @@ class Assembly:
     """Makes samples of bytes as they come. The first line may be cut, so it is dropped without being counted.
 
     `damaged`: lines that could not be read. `unread`: the first of them. `seen`: the columns of the last good line.
+    `shown`: the first whole lines.
     """
 
     style: str
@@ -73,6 +75,7 @@ class Assembly:
     good: int = 0
     unread: str = ""
     seen: tuple[Column, ...] = ()
+    shown: list[str] = field(default_factory=list)
     rest: bytes = b""
     _cut: bool = True
     _pending: dict[Column, float] = field(default_factory=dict)
@@ -88,6 +91,8 @@ class Assembly:
         line = raw.decode("utf-8", "replace").strip()
         if not line or line.startswith("#"):
             return None
+        if len(self.shown) < MOST_SHOWN:
+            self.shown.append(line)
         try:
             found = fields(line, self.style)
         except ValueError:

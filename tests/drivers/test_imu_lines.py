@@ -16,6 +16,7 @@ from drivers.handheld.world import HandheldWorld
 from drivers.imu_lines import driver as imu_lines
 from drivers.imu_lines import twin
 from drivers.imu_lines.lines import Assembly, checksum, fields
+from drivers.imu_lines.proposal import proposed_settings
 from drivers.imu_lines.reception import WRAP, Heard, Tally
 from drivers.transport import Links
 from drivers.transport.faults import Fault, faults_of
@@ -197,3 +198,37 @@ def test_the_wrap_of_the_time_is_no_loss_and_no_restart() -> None:
     heard = Heard(Assembly("csv", {}), 1e-6, 100.0)
     heard.take([{"time": (WRAP - 25_000 + k * 10_000) % WRAP} for k in range(6)], 0.0)
     assert (heard.lost, heard.doubled, heard.back) == (0, 0, False)
+
+
+@pytest.mark.parametrize("unit", ["g", "m/s^2", "count"])
+@pytest.mark.parametrize(
+    ("style", "columns"), [("csv", NUMBERED), ("nmea", NUMBERED), ("named", NAMED), ("teleplot", NAMED)]
+)
+def test_the_self_test_proposes_settings_for_lines_that_do_not_fit(
+    connect: Connect, style: Any, columns: dict[str, Any], unit: Any
+) -> None:
+    named = {"time": "t", "ax": "acc_x", "ay": "acc_y", "az": "acc_z"}
+    sends = imu_lines.Settings(named if columns is NAMED else columns, style, unit, time_unit_s=1e-3)
+    other: dict[str, Any] = {"format": "csv", "columns": {"ax": 7}}
+    lines, proposal = connect(sends=sends, **other).self_test()
+    assert not lines.ok
+    expected = ", ".join(f"{name}: {column}" for name, column in sends.columns.items())
+    rest = f"format: {style}, unit: {unit}, rate_hz: 100.0, time_unit_s: 0.001"
+    assert f"{{columns: {{{expected}}}, {rest}}}" in proposal.detail
+
+
+def test_six_axes_are_proposed_in_the_usual_order() -> None:
+    random = np.random.default_rng(4)
+    values = random.standard_normal((50, 6)) * 3 + [310, -120, 4050, -20, 14, 7]
+    found = proposed_settings([",".join(f"{v:.0f}" for v in row) for row in values], 0.5)
+    assert found == {
+        "format": "csv",
+        "columns": {"ax": 1, "ay": 2, "az": 3, "gx": 4, "gy": 5, "gz": 6},
+        "unit": "count",
+        "rate_hz": 100.0,
+    }
+
+
+@pytest.mark.parametrize("lines", [[], ["boot"] * 20, ["1,2"] * 20, ["5.5,0.1,0.2"] * 20])
+def test_nothing_is_proposed_where_no_accelerometer_is_seen(lines: list[str]) -> None:
+    assert proposed_settings(lines, 1.0) is None
