@@ -42,18 +42,18 @@ class Calibration:
 
     def candidates(self, steps: tuple[Step[NoiseFit], ...]) -> tuple[Candidate, ...]:
         """The effects of the steps, each on top of those before it."""
-        chance = float(np.exp(-max(each.worth for each in self.patterns) / 2))
+        gains = [2 * (step.after.log_likelihood - step.before.log_likelihood) for step in steps]
         return tuple(
             Candidate(
                 effect=step.effect,
-                gain=2 * (step.after.log_likelihood - step.before.log_likelihood),
-                p_value=min(1.0, chance),
+                gain=gain,
+                p_value=float(np.exp(-max(gain, 0.0) / 2)),
                 probability=1.0,
                 excess_after=step.after.pooled_excess,
                 held_out_after=step.after.held_out_excess,
                 indistinguishable_from=self.alternatives.get(step.name, ()),
             )
-            for step in steps
+            for step, gain in zip(steps, gains, strict=True)
         )
 
     @property
@@ -79,14 +79,18 @@ class Calibration:
 
 
 def calibrated(found: Search, start: NoiseFit, effects: Mapping[str, Effect]) -> Calibration | None:
-    """The record of `found` without what the temperature does; None where it does nothing, or the model has it."""
+    """The record of `found` without what the temperature does; None where it does nothing beyond the model."""
+    given = signal_terms(start.model)
     warm = tuple(each for each in found.patterns if each.kind == FOLLOWS and each.cause == TEMPERATURE)
-    if not warm or signal_terms(start.model):
+    if not (warm or given):
         return None
-    others = tuple(each for each in found.patterns if each not in warm)
+    others = () if given else tuple(each for each in found.patterns if each not in warm)
     whole = without_patterns(start.still, others)
-    lag_s = max(warm, key=lambda each: each.gain).lag_s
-    signal = _needed(search_signal(whole, effects, lag_s), start.model, whole, effects)
+    lag_s = max(warm, key=lambda each: each.gain).lag_s if warm else 0.0
+    signal = search_signal(whole, effects, lag_s, given)
+    signal = _needed(signal, start.model, whole, effects) if signal.steps else signal
+    if not signal.names:
+        return None
     model = with_terms(start.model, signal.steps[-1])
     after = search(fit(model, start.still).still, model, effects)
     return Calibration(start, signal, warm, after, {name: effect.contains for name, effect in effects.items()})
@@ -106,6 +110,8 @@ def _needed(signal: SignalSearch, model: Model, still: Still, effects: Mapping[s
 
 
 def with_terms(model: Model, terms: tuple[Term, ...]) -> Model:
-    """The model with further terms as they are."""
-    name = "+".join([model.name, *(term.name for term in terms)])
-    return replace(model, name=name, terms=(*model.terms, *terms))
+    """The model with these terms as they are, in place of its own of the same names, or behind them."""
+    named = {term.name: term for term in terms}
+    new = [term for term in terms if term.name not in model.effects]
+    own = tuple(named.get(term.name, term) for term in model.terms)
+    return replace(model, name="+".join([model.name, *(term.name for term in new)]), terms=(*own, *new))

@@ -124,7 +124,7 @@ class StillRecord(Dataset[NoiseFit]):
     ) -> tuple[Candidate, ...]:
         """Every process alone, the next one of the plan first."""
         found = candidates(search(before.still, before.model, effects), before, plan.alternatives)
-        planned = tuple(c for c in plan.candidates if not c.effect.is_noise and c.name in plan.names[:1])
+        planned = tuple(c for c in plan.candidates if not c.effect.is_noise and c.name in plan.names)
         return (*planned, *sorted(found, key=lambda c: c.name not in plan.names[:1]))
 
     def figures(self, found: NoiseFit) -> dict[str, str]:

@@ -108,6 +108,7 @@ class SignalSearch:
     steps: tuple[tuple[Term, ...], ...]
     found: Findings[Fit]
     table: Table
+    given: tuple[str, ...] = ()
 
     @property
     def lags(self) -> tuple[str, ...]:
@@ -136,11 +137,11 @@ class SignalSearch:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The effects in the order in which they are added."""
-        known: list[str] = []
+        """The effects in the order in which they are added to those that are given."""
+        known = list(self.given)
         for terms in self.steps:
             known += [term.name for term in terms if term.name not in known]
-        return tuple(known)
+        return tuple(known[len(self.given) :])
 
     @property
     def causes(self) -> tuple[str, ...]:
@@ -148,27 +149,29 @@ class SignalSearch:
         return tuple(name for name in self.names if name in self.found.causes) or self.names[:1]
 
 
-def search_signal(still: Still, effects: Mapping[str, Effect], lag_s: float) -> SignalSearch:
-    """What the temperature does to outputs that follow it, by the search for poses at one orientation.
+def search_signal(
+    still: Still, effects: Mapping[str, Effect], lag_s: float, given: tuple[Term, ...] = ()
+) -> SignalSearch:
+    """What the temperature does to outputs that follow it beyond the `given` terms, by the search at one orientation.
 
     Beside slow noise that search may see nothing: then a straight line, with the lag that was found beside that noise.
     """
     from calibrations.discovery.rows import Rows  # noise alone needs no search in rows
 
-    table = table_of_means(still)
-    found = Rows(table).search(_biased((), effects), effects)
+    table = table_of_means(without_signal(still, ()))
+    found = Rows(table).search(_biased(_relabelled(given, still.axes, AXES), effects), effects)
+    known = {term.name for term in given}
     steps: list[tuple[Term, ...]] = []
     for step in found.steps:
         if place_of_effect(step.name) == PLACE:
-            chosen = {*(term.name for term in (steps[-1] if steps else ())), step.name}
-            steps.append(_terms(step.after, chosen, still))
-    end = found.end
-    if not steps:
+            known |= {step.name}
+            steps.append(_terms(step.after, known, still))
+    if steps:
+        steps[-1] = _terms(found.end, known, still)
+    elif not given:
         line = Term(effects[PLACE], constants={"lead_s": -lag_s})
-        end = fit_rows(_biased((line,), effects), table)
-        steps.append(())
-    steps[-1] = _terms(end, {PLACE} if not steps[-1] else {term.name for term in steps[-1]}, still)
-    return SignalSearch(tuple(steps), found, table)
+        steps.append(_terms(fit_rows(_biased((line,), effects), table), {PLACE}, still))
+    return SignalSearch(tuple(steps), found, table, tuple(term.name for term in given))
 
 
 def fit_signal(model: Model, still: Still, effects: Mapping[str, Effect]) -> Model:

@@ -105,6 +105,14 @@ def test_a_calibrated_model_fits_its_record_and_another_one_of_the_sensor(tmp_pa
     assert again.value == pytest.approx(6e-4, abs=3 * again.std)
 
 
+def test_a_model_with_a_line_misses_the_curve() -> None:
+    still = ramp(line=5e-4, bow=4e-3)
+    straight = add(catalogue()[BIAS], read_model("still"), still).model
+    result = discover(still, straight)
+    assert (result.verdict, [step.name for step in result.steps]) == ("adequate", [CURVE])
+    assert result.end.pooled_excess < 1.15
+
+
 def test_an_effect_of_temperature_is_added_to_a_noise_model() -> None:
     added = add(catalogue()[BIAS], read_model("still"), ramp(line=5e-4))
     assert added.model.params[f"{BIAS}.x"].value == pytest.approx(5e-4, rel=0.02)
