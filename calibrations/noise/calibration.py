@@ -97,14 +97,14 @@ def calibrated(found: Search, start: NoiseFit, effects: Mapping[str, Effect]) ->
 
 
 def _needed(signal: SignalSearch, model: Model, still: Still, effects: Mapping[str, Effect]) -> SignalSearch:
-    """Without a curve beside the causes that gains no more likelihood than its coefficients cost (Akaike)."""
+    """Without a curve beside the causes that gains no more likelihood than its coefficients cost (Schwarz)."""
     for name in signal.names:
         if name in signal.causes:
             continue
         smaller = signal.without(name, effects, still)
         count = sum(len(term.estimates) for term in signal.steps[-1] if term.name == name)
         gained = [fit(with_terms(model, each.steps[-1]), still).log_likelihood for each in (smaller, signal)]
-        if gained[1] - gained[0] < count:
+        if gained[1] - gained[0] < count * np.log(signal.table.n) / 2:
             signal = smaller
     return signal
 

@@ -94,6 +94,13 @@ def test_diagnosis_and_discovery_name_the_same() -> None:
     assert asked.candidates[0].name == BIAS
 
 
+def test_the_rest_of_a_search_proposes_its_next_effect() -> None:
+    data = dataset(ramp(line=5e-4, bow=4e-3))
+    plan = data.search(read_model("still"), catalogue())
+    rest = data.followed(plan, 1, catalogue())
+    assert rest.candidates[0].name == rest.names[0] == CURVE
+
+
 def test_a_calibrated_model_fits_its_record_and_another_one_of_the_sensor(tmp_path: Path) -> None:
     result = found(ramp(line=5e-4, bow=4e-3))
     model = parse_model(dump_model(result.model), "made.yaml", catalogue())
