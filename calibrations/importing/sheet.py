@@ -64,6 +64,7 @@ class Sheet:
     constants: dict[str, Constant]
     cells: Mapping[str, Array | tuple[str, ...]] | None = None
     topic: str = ""
+    topics: tuple[str, ...] = ()  # all that the file has
     notes: tuple[str, ...] = ()
     skipped: float = 0.0  # the most of its lines that are skipped as damaged
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -26,11 +26,13 @@ MOST_LISTED = 12
 
 
 class SeveralTopics(DataError):
-    """A file has several topics that can be meant; `topics` names them, `proposed` is the likely one, "" without."""
+    """A file has several topics that can be meant: `topics` has a description of each by its name, `proposed` is the
+    likely one, "" without.
+    """
 
-    def __init__(self, message: str, topics: Sequence[str], proposed: str) -> None:
+    def __init__(self, message: str, topics: Mapping[str, str], proposed: str) -> None:
         super().__init__(message)
-        self.topics, self.proposed = tuple(topics), proposed
+        self.topics, self.proposed = dict(topics), proposed
 
 
 @dataclass(frozen=True)
@@ -86,10 +88,12 @@ def topic_sheet(path: Path, topics: Sequence[Topic], wanted: str | None) -> Shee
         )
     chosen = topic.name if others else ""
     if topic.text is not None:
-        return read_sheet(text_source(topic.text(), str(path))).of_topic(chosen, notes)
+        sheet = read_sheet(text_source(topic.text(), str(path))).of_topic(chosen, notes)
+        return replace(sheet, topics=tuple(t.name for t in topics))
     if topic.cells is None or topic.rows < 1:
         raise DataError(f"{path}, topic {topic.name}: has no rows; record the measurements again")
-    return column_sheet(str(path), topic.cells(), topic.constants, chosen, notes)
+    sheet = column_sheet(str(path), topic.cells(), topic.constants, chosen, notes)
+    return replace(sheet, topics=tuple(t.name for t in topics))
 
 
 def column_sheet(
@@ -156,7 +160,7 @@ def _chosen(path: Path, topics: Sequence[Topic], wanted: str | None) -> Topic:
     command = shlex.join(["rig", "import", str(path), "--topic", proposed or names[0]])
     raise SeveralTopics(
         f"{path}: has {len(topics)} topics; choose one with --topic:{lines}{more}\nSuch as\n\n    {command}\n",
-        names,
+        {t.name: t.described for t in topics},
         proposed,
     )
 

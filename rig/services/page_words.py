@@ -27,6 +27,8 @@ OPTION_WORDS = (  # options of `rig import` in messages, as the fields of its pa
     (re.compile(r"import it with(?= \(the page)"), "import it"),
     (re.compile(r"with --column, (?:by its number, )?such as \S+"), "on the page Import"),
     (re.compile(r"--column (\w+)=[^\s:]*:([\w/]+)"), r"\2 as the unit of \1"),
+    (re.compile(r"with --topic(?=:)"), "at Table of the file"),
+    (re.compile(r"; --bad-lines skip skips them"), ""),
     (re.compile(r"--constant (\w+)=([^\s);,]+)"), r"the constant \1 = \2"),
 )
 

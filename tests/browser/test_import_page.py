@@ -106,3 +106,22 @@ def test_a_file_that_cannot_be_read_says_why(workbench: Workbench, tmp_path: Pat
     expect(page.get_by_text("Import a file")).to_be_visible()
     page.goto(f"{workbench.origin}/import?file=nothing.csv")
     expect(page.get_by_role("alert")).to_contain_text("nothing.csv")
+
+
+def test_a_file_with_several_tables_asks_for_one(workbench: Workbench, tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "two.h5"
+    random = np.random.default_rng(2)
+    with h5py.File(path, "w") as file:
+        for name, rows in (("front", 300), ("rear", 200)):
+            for k, axis in enumerate("xyz"):
+                file[f"{name}/a{axis}"] = (k == 2) + 1e-3 * random.standard_normal(rows)
+    page = workbench.visit(f"/import?file={quote(str(path))}")
+    expect(page.get_by_text("two.h5 has 2 tables")).to_be_visible()
+    expect(page.get_by_role("button", name="front (300 rows: ax, ay, az)")).to_be_visible()
+    page.get_by_role("button", name="rear (200 rows: ax, ay, az)").click()
+    expect(page.get_by_label("Table of the file")).to_have_value("rear")
+    expect(page.get_by_label("meaning of ax", exact=True)).to_have_value("ax")
+    choose(page, "Table of the file", "front")
+    expect(page.get_by_label("Table of the file")).to_have_value("front")
+    expect(page.get_by_label("meaning of ax", exact=True)).to_have_value("ax")

@@ -33,7 +33,7 @@ def imported(name: str, data: bytes) -> object:
         try:
             return import_sheet(open_sheet(path), None).table.n
         except SeveralTopics as several:
-            return [import_sheet(open_sheet(path, topic), None).table.n for topic in several.topics[:3]]
+            return [import_sheet(open_sheet(path, topic), None).table.n for topic in [*several.topics][:3]]
 
 
 def written(name: str, write: Callable[[Path], object]) -> bytes:

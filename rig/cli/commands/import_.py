@@ -77,7 +77,7 @@ def command(
         if not asked:
             raise
         note(str(several))
-        choice = click.Choice(several.topics)
+        choice = click.Choice(list(several.topics))
         topic = str(click.prompt("Topic", default=several.proposed or None, type=choice, err=True))
         sheet = opened(file, topic, bad_lines or "few")
     columns, constants = [ColumnMapping.parse(text) for text in mapped], _constants(given)

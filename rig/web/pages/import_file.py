@@ -11,6 +11,7 @@ from nicegui import events, ui
 
 from calibrations.importing.proposal import column_names, sample_values
 from calibrations.importing.sheet import Sheet
+from calibrations.importing.topics import SeveralTopics
 from calibrations.importing.units import ColumnMapping, column_unit
 from calibrations.table import Constant
 from rig.files import home
@@ -47,7 +48,7 @@ def register(desk: Desk) -> None:
     """The page at /import; the file may be part of the address."""
 
     @ui.page("/import", title="Import a file")
-    async def page(file: str = "") -> None:
+    async def page(file: str = "", topic: str = "") -> None:
         with frame(desk, "/record"):
             if not file:
                 _choose()
@@ -57,7 +58,12 @@ def register(desk: Desk) -> None:
             with body:
                 waiting(f"Reading {Path(file).name}")
             try:
-                sheet = await off_loop(opened, Path(file))
+                sheet = await off_loop(opened, Path(file), topic or None)
+            except SeveralTopics as several:
+                body.clear()
+                with body:
+                    _choose_topic(Path(file), several)
+                return
             except Exception as error:
                 body.clear()
                 with body:
@@ -73,6 +79,20 @@ def _choose() -> None:
         words("Import a file", "title")
         words("A table of numbers: CSV, any separator, with or without a header; or JSON with named arrays.", "quiet")
         upload(_go)
+
+
+def _choose_topic(path: Path, several: SeveralTopics) -> None:
+    """A button for each table of a file in which a person has to choose one."""
+    with box("stack"):
+        words(f"{path.name} has {len(several.topics)} tables", "title")
+        words("Choose the one to import.", "quiet")
+        for name, described in several.topics.items():
+            button = ui.button(described, on_click=partial(_go_to, path, name)).props("no-caps align=left")
+            button.props("" if name == several.proposed else "outline")
+
+
+def _go_to(path: Path, topic: str) -> None:
+    ui.navigate.to(f"/import?{urlencode({'file': str(path), 'topic': topic})}")
 
 
 async def _go(path: Path) -> None:
@@ -166,6 +186,9 @@ class ImportPage:
         proposed = proposal(sheet)
         with box("row-of"):
             words(f"Import {path.name}", "title grow")
+            if len(sheet.topics) > 1:
+                tables = ui.select(list(sheet.topics), label="Table of the file", value=sheet.topic)
+                tables.props("dense options-dense").on_value_change(lambda event: _go_to(path, event.value))
             self.kind = ui.select(KINDS, label="Kind of table", value=proposed.kind, on_change=self._other_kind)
             self.kind.props("dense options-dense").style("min-width: 300px")
             self.button = ui.button("Import", icon="download_done", on_click=self._import)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 
 from calibrations.errors import CalibrationError
+from calibrations.importing.topics import SeveralTopics
 from rig.errors import RigError
 from rig.files import home
 from rig.services.importing import asks, opened
@@ -101,6 +102,8 @@ class Choice:
         self.page.desk.forget(str(path))
         try:
             unknown = await off_loop(lambda: asks(opened(path)))
+        except SeveralTopics:
+            unknown = True
         except CalibrationError:  # the page says what is wrong
             unknown = False
         if unknown:
