@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -19,6 +20,9 @@ WHOLE = {"width": 1024, "height": 3000}  # axe-core cannot judge colours in what
 PHONE = {"width": 390, "height": 844}
 SETTLED = """() => Promise.all(document.getAnimations()
   .filter(each => each.effect.getComputedTiming().endTime !== Infinity).map(each => each.finished))"""
+HYPHEN = re.compile(r".{0,20}(?<![\w.)\]:/-])-\d.{0,20}")  # before a number, in place of a minus sign
+TEXTS = """() => [document.body.innerText, ...Array.from(document.querySelectorAll('svg text, iframe'),
+  each => each.contentDocument ? each.contentDocument.body.innerText : each.textContent)].join("\\n")"""
 GRAVE = ("serious", "critical")
 SWEEP, NOISE = "20260101-120000-sweep-000", "20260131-120000-noise-floor-000"
 PAGES = {  # address: what it shows when it is complete
@@ -64,6 +68,7 @@ def test_every_page_fits_and_is_accessible(visitor_of: tuple[BrowserContext, str
     page.evaluate(SETTLED)
     found = [each for each in axe.Axe().run(page).response["violations"] if each["impact"] in GRAVE]
     assert [(each["id"], each["nodes"][0]["html"], each["nodes"][0]["failureSummary"]) for each in found] == []
+    assert HYPHEN.findall(page.evaluate(TEXTS)) == []
     for size in (TABLET, PHONE):
         page.set_viewport_size(size)
         page.wait_for_function("document.documentElement.scrollWidth <= innerWidth")
