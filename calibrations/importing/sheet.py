@@ -64,9 +64,9 @@ class Sheet:
     constants: dict[str, Constant]
     cells: Mapping[str, Array | tuple[str, ...]] | None = None
     topic: str = ""
-    topics: tuple[str, ...] = ()  # all that the file has
     notes: tuple[str, ...] = ()
     skipped: float = 0.0  # the most of its lines that are skipped as damaged
+    topics: tuple[str, ...] = ()  # all that the file has
 
     def of_topic(self, topic: str, notes: tuple[str, ...]) -> Sheet:
         """The same sheet as a topic of a file that has several, with remarks for the person."""

@@ -125,3 +125,17 @@ def test_a_file_with_several_tables_asks_for_one(workbench: Workbench, tmp_path:
     choose(page, "Table of the file", "front")
     expect(page.get_by_label("Table of the file")).to_have_value("front")
     expect(page.get_by_label("meaning of ax", exact=True)).to_have_value("ax")
+
+
+def test_a_table_that_was_taken_by_itself_says_how_to_take_another(workbench: Workbench, tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "one.h5"
+    random = np.random.default_rng(2)
+    with h5py.File(path, "w") as file:
+        for k, axis in enumerate("xyz"):
+            file[f"imu/a{axis}"] = (k == 2) + 1e-3 * random.standard_normal(300)
+        file["battery/voltage"] = np.linspace(12.0, 11.0, 20)
+    page = workbench.visit(f"/import?file={quote(str(path))}")
+    expect(page.get_by_label("Table of the file")).to_have_value("imu")
+    choose(page, "Kind of table", "Still record: single samples at rest")
+    expect(page.locator("body")).not_to_contain_text("--topic")

@@ -162,7 +162,7 @@ def test_two_sensors_in_one_file_have_to_be_chosen(tmp_path: Path) -> None:
         file["imu0/acc"], file["imu1/acc"] = ACC, -ACC
     with pytest.raises(SeveralTopics, match="has 2 topics; choose one with --topic:") as error:
         open_sheet(tmp_path / "a.h5")
-    assert (error.value.topics, error.value.proposed) == (("imu0", "imu1"), "imu0")
+    assert (list(error.value.topics), error.value.proposed) == (["imu0", "imu1"], "imu0")
     np.testing.assert_array_equal(read_foreign(tmp_path / "a.h5", None, MAPPED, topic="imu1").outputs, -ACC)
 
 
