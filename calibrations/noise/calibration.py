@@ -21,7 +21,7 @@ from calibrations.noise.fit import NoiseFit, fit
 from calibrations.noise.patterns import FOLLOWS, Pattern
 from calibrations.noise.record import Still
 from calibrations.noise.search import Search, search, without_patterns
-from calibrations.noise.signal import TEMPERATURE, SignalSearch, search_signal, signal_terms
+from calibrations.noise.signal import PLACE, TEMPERATURE, SignalSearch, search_signal, signal_terms
 
 
 @dataclass(frozen=True)
@@ -101,12 +101,18 @@ def _needed(signal: SignalSearch, model: Model, still: Still, effects: Mapping[s
     for name in signal.names:
         if name in signal.causes:
             continue
-        smaller = signal.without(name, effects, still)
-        count = sum(len(term.estimates) for term in signal.steps[-1] if term.name == name)
-        gained = [fit(with_terms(model, each.steps[-1]), still).log_likelihood for each in (smaller, signal)]
-        if gained[1] - gained[0] < count * np.log(signal.table.n) / 2:
-            signal = smaller
+        smaller = [signal.without(name, effects, still)]
+        if PLACE not in (*signal.names, *signal.given):  # branches of any form may hold a straight line
+            smaller.append(signal.with_line(name, effects, still))
+        signal = max((signal, *smaller), key=lambda each: _worth(each, model, still))
     return signal
+
+
+def _worth(signal: SignalSearch, model: Model, still: Still) -> float:
+    """Log-likelihood of the record less these terms, less what their parameters cost."""
+    terms = signal.steps[-1]
+    count = sum(len(term.estimates) for term in terms)
+    return fit(with_terms(model, terms), still).log_likelihood - count * float(np.log(signal.table.n)) / 2
 
 
 def with_terms(model: Model, terms: tuple[Term, ...]) -> Model:

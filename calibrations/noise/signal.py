@@ -125,6 +125,19 @@ class SignalSearch:
         """A lag that the means can show."""
         return float(np.median(np.diff(self.table.time_s)))
 
+    def with_line(self, name: str, effects: Mapping[str, Effect], still: Still) -> SignalSearch:
+        """The same with a straight line in the place of one effect, the others fitted anew from their own starts."""
+        line = Term(effects[PLACE])
+        last = tuple(line if term.name == name else replace(term, estimates=()) for term in self.steps[-1])
+        found = fit_rows(_biased(last, effects), self.table)
+        terms = _terms(found, {term.name for term in last}, still)
+        steps = []
+        for before in self.steps:
+            names = {PLACE if term.name == name else term.name for term in before}
+            changed = tuple(term for term in terms if term.name in names)
+            steps.append(changed if PLACE in names or before is self.steps[-1] else before)
+        return replace(self, steps=tuple(steps))
+
     def without(self, name: str, effects: Mapping[str, Effect], still: Still) -> SignalSearch:
         """The same without one effect, the others fitted anew."""
         at = self.names.index(name)

@@ -63,9 +63,13 @@ def test_a_lag_is_that_of_the_sensor() -> None:
     assert "behind the thermometer" in result.judgement.text
 
 
-def test_branches_have_their_width() -> None:
-    play = found(ramp(line=5e-4, glue=4e-3)).model.params[f"{HYSTERESIS}.play"]
-    assert play.value == pytest.approx(2.0, abs=0.2)
+@pytest.mark.parametrize("seed", [0, 5])
+def test_branches_have_their_width(seed: int) -> None:
+    result = found(ramp(seed, line=5e-4, glue=4e-3))
+    assert result.refinements == (BIAS,)
+    assert result.model.params[f"{HYSTERESIS}.play"].value == pytest.approx(2.0, abs=0.2)
+    errors = [result.start.pooled_excess, *(step.after.pooled_excess for step in result.steps)]
+    assert errors == sorted(errors, reverse=True)
 
 
 def test_a_constant_temperature_is_no_cause() -> None:
