@@ -10,7 +10,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from calibrations.estimators.scatter import without_scatter
 from calibrations.table import Array, Table
 
 RATE = "temperature_rate_c_s"  # input of a product: how fast its thermometer's reading changes, C/s
@@ -53,6 +52,8 @@ def _level(table: Table) -> Array:
     The straight line is taken off first: the cosine transform continues a record as its mirror image, and the line
     would have a corner there.
     """
+    from calibrations.estimators.scatter import without_scatter  # scipy is slow to import, and a list needs none
+
     shown, rows = table.column("temperature_c"), np.arange(table.n)
     line = np.polyval(np.polyfit(rows, shown, 1), rows)
     readings = 1 + int(np.count_nonzero(np.diff(shown)))
