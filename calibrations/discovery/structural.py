@@ -136,6 +136,10 @@ def _named_and_fitted(base: Fit, found: Structure, effects: Mapping[str, Effect]
         other = together(base, [*smooth, *forms])
         if other.pooled_excess < NO_WORSE * end.pooled_excess:  # as well without
             causes, end = smooth, other
+    if end.pooled_excess > base.pooled_excess:  # all at once went astray
+        taken, fits = gradually(base, [*causes, *forms])
+        causes, forms = ([a for a in taken if a.effect.name.startswith(PREFIX) is free] for free in (False, True))
+        end = fits[-1]
     if end.held_out_excess > MATERIAL and not end.problem.rounds:
         # forms are found again beside the causes as the catalogue has them, so that they hold what these leave
         beside = structure(causes_alone(end, forms), effects)

@@ -39,3 +39,15 @@ def test_a_sensor_without_a_cause_gets_no_name(tmp_path: Path) -> None:
 def test_what_no_catalogue_holds_gets_no_name(tmp_path: Path) -> None:
     found = [searched(tmp_path, 200 + number, [cause], 10.0) for number, cause in enumerate(UNKNOWN)]
     assert sum(bool(s.answer.causes) for s in found) <= 1, [s.answer for s in found]
+
+
+@pytest.mark.slow
+def test_where_all_effects_at_once_lead_the_fit_astray_they_are_added_one_by_one(tmp_path: Path) -> None:
+    causes, floors = [CATALOGUE[k] for k in [11, 13, 23, 31, 17]], [3.3, 54.6, 53.0, 211.6, 4.7]
+    random = np.random.default_rng([23, 200])
+    path = tmp_path / "astray.csv"
+    path.write_text(table(random, causes, floors, slow=float(random.uniform(0.0, 0.6))))
+    answer = shipped(path)
+    assert answer.held_out is not None
+    assert answer.held_out < 10
+    assert {"supply-sensitivity", "saturation", "scale-factor-asymmetry"} <= set(answer.causes)
