@@ -29,6 +29,7 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright
 from procedures.session import Pose
 from rig.record import Block, Kept, Record
 from tests.browser.measured import hidden, hundred_thousand, thousand
+from tests.browser.test_run_page import begin
 
 TARGETS = {"first_page_s": 1.0, "add_s": 1.5, "night_s": 1.0, "alive_s": 0.5, "memory_growth_mb": 16.0}
 BLOCKS, IN_A_BLOCK, RATE_HZ = 4320, 10_000, 1000.0
@@ -137,7 +138,7 @@ def _memory(page: Page, origin: str, server: subprocess.Popen[str]) -> dict[str,
     """Memory in MB when a tenth of the hour is measured, and at its end."""
     page.goto(f"{origin}/run?procedure=soak&duration_s=3600&off_s=0")
     expect(page.get_by_text("Takes", exact=True)).to_be_visible()
-    page.get_by_role("button", name="Start").click()
+    begin(page)
     page.locator(CURVE).first.wait_for()
     before = _used_mb(page, server.pid)
     expect(page.locator(".chip").first).to_have_text("complete")

@@ -24,6 +24,7 @@ from rig.runs.background import status as status_file
 from rig.runs.background.control import PublishingObserver
 from rig.runs.background.status import KEPT, Asked, Order, Seat, Status, file, folder, keys, lock, read, tidy
 from rig.runs.runner import Outcome, start
+from rig.web.pages.run_live import stop_words
 from tests.rig.rigging import POSES, SMALL
 
 POLL_S = 0.002
@@ -279,3 +280,5 @@ def test_a_process_that_ended_before_its_run_began_has_no_run_to_resume() -> Non
     ended = read(KEY)
     assert ended is not None
     assert ended.error.endswith("it was stopped before the run began")
+    assert stop_words(ended) == "Stopped before the run began."
+    assert stop_words(replace(ended, error="its process ended: a fault")) == ""

@@ -130,6 +130,9 @@ class Status:
         write_whole(file(self.key, "json"), json.dumps(asdict(self)))
 
 
+NOT_BEGUN = "it was stopped before the run began"
+
+
 def read(key: str) -> Status | None:
     """The status of the process `key`; None before its first status. A killed process has ended."""
     try:
@@ -184,7 +187,7 @@ def _last_words(key: str, run: str) -> str:
     log = path.read_text(encoding="utf-8", errors="replace").strip() if path.exists() else ""
     if log:
         return log.splitlines()[-1]
-    return "it was killed; `rig resume` continues its run" if run else "it was stopped before the run began"
+    return "it was killed; `rig resume` continues its run" if run else NOT_BEGUN
 
 
 class StatusWriter:

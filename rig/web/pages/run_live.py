@@ -14,7 +14,7 @@ from nicegui import ui
 
 from rig.drawings import Attitude, page
 from rig.runs.background import control
-from rig.runs.background.status import Asked, Status
+from rig.runs.background.status import NOT_BEGUN, Asked, Status
 from rig.web.frame import control_run
 from rig.web.pages.run_begin import BeginDialog, before_resume
 from rig.web.pages.run_record import OverTime
@@ -33,6 +33,7 @@ SEATS = {
     "nobody": "This run is unattended and cannot pause. Stop ends it; you can resume it later.",
 }
 STOPPED = "Stopped by a person. Resume continues at the same pose."
+STOPPED_EARLY = "Stopped before the run began."
 ENDS = {"complete": "good", "stopped": "doubt", "failed": "bad"}
 
 
@@ -155,8 +156,8 @@ class Live:
         with self.alarm:
             if status.moving:
                 failed("Not at rest", "\n".join(status.moving))
-            if _stopped_by_a_person(status):
-                words(STOPPED, "quiet")
+            if stopped := stop_words(status):
+                words(stopped, "quiet")
             elif status.error:
                 failed("Reason for the pause" if status.phase == "paused" else "Reason for the end", status.error)
 
@@ -219,9 +220,13 @@ def _tile(value: Mapping[str, Any]) -> None:
         words(value["near"] or for_page(value["remark"]), "small")
 
 
-def _stopped_by_a_person(status: Status) -> bool:
-    """Whether the run has ended because a person stopped it, which is no error."""
-    return status.state == "stopped" and status.error.startswith("stopped by SIG")
+def stop_words(status: Status) -> str:
+    """What to say of a run that a person stopped, which is no error; "" for another run."""
+    if status.state != "stopped":
+        return ""
+    if not status.run and status.error.endswith(NOT_BEGUN):
+        return STOPPED_EARLY
+    return STOPPED if status.error.startswith("stopped by SIG") else ""
 
 
 def _limits(value: Mapping[str, Any]) -> str:
