@@ -51,10 +51,14 @@ def step_shares(found: Discovery[Fit]) -> list[float | None]:
 
     None where the given model leaves no more than noise.
     """
-    whole = found.start.held_out_excess**2 - 1
+
+    def beyond(excess: float) -> float:
+        return max(float(excess) ** 2 - 1, 0.0)
+
+    whole = beyond(found.start.held_out_excess)
     if whole < NO_VARIANCE:
         return [None for _ in found.steps]
-    return [float((s.held_out_before**2 - s.held_out_after**2) / whole) for s in found.steps]
+    return [(beyond(s.held_out_before) - beyond(s.held_out_after)) / whole for s in found.steps]
 
 
 def summary_lines(found: Discovery[Fit]) -> list[Line]:
