@@ -32,7 +32,7 @@ def temperature_rate_c_s(table: Table) -> Array:
     """How fast the thermometer's reading changes, C/s, shape (n,): as logged, else from the reading; rows in order."""
     if RATE in table:
         return table.column(RATE)
-    return np.asarray(np.gradient(leading_temperature(table, 0.0), table.time_s))
+    return _rate(leading_temperature(table, 0.0), table.time_s)
 
 
 @lru_cache(maxsize=64)
@@ -42,7 +42,16 @@ def leading_temperature(table: Table, lead_s: float) -> Array:
     if "t_s" not in table or not np.ptp(table.time_s) > 0:
         return shown
     level, t = _level(table), table.time_s
-    return level + lead_s * np.gradient(level, t) if lead_s >= 0 else _lagging(level, t, -lead_s)
+    return level + lead_s * _rate(level, t) if lead_s >= 0 else _lagging(level, t, -lead_s)
+
+
+def _rate(x: Array, t: Array) -> Array:
+    """dx/dt, (n,), by the mean of the rows that have one time; 0 where all have."""
+    times, row = np.unique(t, return_inverse=True)
+    if len(times) < 2:
+        return np.zeros_like(x)
+    mean = np.bincount(row, x) / np.bincount(row)
+    return np.asarray(np.gradient(mean, times)[row])
 
 
 @lru_cache(maxsize=16)

@@ -56,6 +56,13 @@ def test_without_a_lead_the_readings_are_as_logged() -> None:
     assert sensor_temperature_c(table(shown), 0.0) == pytest.approx(shown, abs=0)
 
 
+@pytest.mark.parametrize("lead_s", [-90.0, 90.0])
+def test_rows_of_one_time_have_one_temperature_of_the_sensor(lead_s: float) -> None:
+    twice = table(np.repeat(wandering(4), 2), np.repeat(T_S, 2))
+    once = leading_temperature(table(wandering(4)), lead_s)
+    assert rms(leading_temperature(twice, lead_s)[::2] - once) < 0.1
+
+
 @pytest.mark.parametrize("lead_s", [-90.0, 0.0, 90.0])
 def test_a_constant_temperature_and_one_without_times_are_as_logged(lead_s: float) -> None:
     still = np.full(len(T_S), 21.5)
