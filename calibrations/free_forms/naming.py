@@ -106,7 +106,8 @@ def _named(
     jumps = any(_jumps(result, name) for name in names if "/walk-" in name)
     for comp in result.components:
         if comp.place == place and comp.cause and (comp.name in names or not _shaped_out(comp, result, names)):
-            if (comp.cause == "bias-drift" and jumps) or (_follows_many(comp) and comp.name not in names):
+            smooth = comp.cause == "bias-drift" or (comp.cause == "warm-up-bias" and comp.name not in names)
+            if (smooth and jumps) or (_follows_many(comp) and comp.name not in names):
                 continue
             forms.setdefault(comp.cause, []).append(comp)
     columns = {cause: _columns(result, comps, names, Q, b) for cause, comps in forms.items()}
