@@ -35,7 +35,7 @@ from rig.record.values import CHANGED
 from rig.results import Result, documents, judged, returned
 from rig.runs.host import RunHost, leave_as
 from rig.runs.observer import Decision, Observer, Outcome
-from rig.runs.signals import Trace, stoppable
+from rig.runs.signals import Trace, stoppable, who_stopped
 
 __all__ = ["REPEATED", "Decision", "Observer", "Outcome", "RunHost", "resume", "start"]
 
@@ -227,7 +227,7 @@ def _error_of(failure: BaseException, run: Run) -> Exception:
         return failure
     if isinstance(failure, KeyboardInterrupt):
         by = str(failure) or "SIGINT"
-        return Stopped(f"stopped by {by}; `rig resume {run.run}` continues the run", by)
+        return Stopped(f"{who_stopped(by)}; `rig resume {run.run}` continues the run", by)
     return RuntimeError(f"{type(failure).__name__}: {failure}")
 
 

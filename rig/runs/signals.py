@@ -12,9 +12,19 @@ from typing import Literal
 from rig.record import Record
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+STOPPED_BY = {
+    "SIGINT": "stopped by a person (SIGINT)",
+    "SIGTERM": "stopped by another program (SIGTERM)",
+    "SIGHUP": "stopped because its terminal was closed (SIGHUP)",
+}
 COMPILED = "drivers.world"  # its compiled code calls Python generators; an exception there would break it
 SCREEN = "rich"  # an exception while its console writes would block the console
 AGAIN_S = 0.001
+
+
+def who_stopped(name: str) -> str:
+    """Who stopped a run, by the name of the signal; a person where it has none."""
+    return STOPPED_BY[name or "SIGINT"]
 
 
 @contextmanager

@@ -97,7 +97,7 @@ def test_paused_and_gone_on_and_stopped() -> None:
 
     status = carried_out("soak", {"duration_s": "43200"}, person)
     assert (status.phase, status.state) == ("ended", "stopped")
-    assert "stopped by SIG" in status.error
+    assert "stopped by " in status.error
 
 
 def test_a_second_pause_changes_nothing() -> None:
@@ -109,7 +109,7 @@ def test_a_second_pause_changes_nothing() -> None:
 
     status = carried_out("soak", {"duration_s": "43200"}, person)
     # which signal is named depends on whether the run has begun again when the stop comes
-    assert "stopped by SIG" in status.error
+    assert "stopped by " in status.error
 
 
 def test_stopped_while_it_is_paused() -> None:
@@ -232,7 +232,7 @@ def test_a_run_of_a_terminal_is_stopped_from_elsewhere() -> None:
     ended = control.latest()
     assert ended is not None
     assert (ended.phase, ended.state) == ("ended", "stopped")
-    assert "stopped by SIGTERM" in ended.error
+    assert "stopped by another program (SIGTERM)" in ended.error
 
 
 def test_what_a_terminal_asks_is_answered_there() -> None:

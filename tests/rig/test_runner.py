@@ -107,7 +107,7 @@ def test_a_signal_stops_and_resume_makes_the_same_run(number: signal.Signals) ->
         broken = run_small(record, watch=Interrupting(7, lambda: signal.raise_signal(number)))
         assert broken.run.state == "stopped"
         assert broken.run.rows == 7
-        assert f"stopped by {number.name}" in str(broken.error)
+        assert f"({number.name})" in str(broken.error)
         watch = Onlooker()
         done = resume(record, broken.run.run, watch)
         assert (done.run.state, watch.expected) == ("complete", [(POSES, 7)])

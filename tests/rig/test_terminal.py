@@ -41,7 +41,7 @@ def begun(*settings: str) -> pexpect.spawn[str]:
 
 def press_ctrl_c(terminal: pexpect.spawn[str]) -> None:
     terminal.sendintr()
-    terminal.expect("stopped by SIGINT")
+    terminal.expect("stopped by a person")
 
 
 def only_run() -> tuple[Run, list[str | None]]:
@@ -129,7 +129,7 @@ def test_sigterm_ends_a_guided_run_without_a_menu() -> None:
     with begun(*LONG) as terminal:
         terminal.expect(UNDER_WAY)
         terminal.kill(signal.SIGTERM)
-        terminal.expect("stopped by SIGTERM")
+        terminal.expect("stopped by another program")
         terminal.expect(pexpect.EOF)
         assert "Continue?" not in (terminal.before or "")
     assert terminal.exitstatus == 4

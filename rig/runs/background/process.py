@@ -24,6 +24,7 @@ from rig.record import Record
 from rig.record.push import push_after
 from rig.runs.background.status import Order, StatusWriter, file, lock, open_question
 from rig.runs.runner import Decision, Outcome, resume, start
+from rig.runs.signals import who_stopped
 
 PAUSE = signal.SIGINT  # by which a page pauses a run
 LONGEST = 4096  # bytes of an answer, which a pipe hands over in one piece
@@ -99,7 +100,7 @@ def main(text: str) -> None:
         try:
             outcome = _carried_out(order, record, writer)
         except KeyboardInterrupt as stop:  # before the run began, or between its parts
-            writer.publish(phase="ended", state="stopped", asked=None, error=f"stopped by {stop}")
+            writer.publish(phase="ended", state="stopped", asked=None, error=who_stopped(str(stop)))
             return
         except Exception as error:
             writer.publish(phase="ended", state="failed", asked=None, error=str(error))

@@ -15,6 +15,7 @@ from nicegui import ui
 from rig.drawings import Attitude, page
 from rig.runs.background import control
 from rig.runs.background.status import NOT_BEGUN, Asked, Status
+from rig.runs.signals import STOPPED_BY
 from rig.web.frame import control_run
 from rig.web.pages.run_begin import BeginDialog, before_resume
 from rig.web.pages.run_record import OverTime
@@ -226,7 +227,7 @@ def stop_words(status: Status) -> str:
         return ""
     if not status.run and status.error.endswith(NOT_BEGUN):
         return STOPPED_EARLY
-    return STOPPED if status.error.startswith("stopped by SIG") else ""
+    return STOPPED if status.error.startswith(tuple(STOPPED_BY.values())) else ""
 
 
 def _limits(value: Mapping[str, Any]) -> str:
