@@ -17,8 +17,8 @@ from typing import Any, TypeVar
 from calibrations.criteria import CERTAIN_PROBABILITY
 from calibrations.design.expected import Expected, distance_alone, expected_gain, pairs_separated, predict_data
 from calibrations.design.experiment import MENU, Experiment
+from calibrations.discovery.additions import without_forms
 from calibrations.discovery.results import Diagnosis, Discovery
-from calibrations.discovery.structural import without_forms
 from calibrations.effects import Effect
 from calibrations.errors import CalibrationError
 from calibrations.fitting.fit import Fit, refit

@@ -1,0 +1,210 @@
+"""Effects and free forms that a structure adds to a model, and the fits of a model with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from calibrations.effects import Effect
+from calibrations.fitting.fit import Fit, evaluate, fit, refit
+from calibrations.fitting.problem import Problem
+from calibrations.free_forms.effect import free_form
+from calibrations.free_forms.geometry import GEOMETRY
+from calibrations.free_forms.place_names import PREFIX, place_of_effect
+from calibrations.free_forms.structure import Structure
+from calibrations.means.noise import Noise, white_only
+from calibrations.model import Estimate, Model, Term
+from calibrations.model.chain import forward
+from calibrations.table import Array, Table
+
+BASIC = ("bias", "scale-factor")
+BASE_STEPS = 2  # of Gauss and Newton's: hardly anything of the base is not linear
+SMALL = 0.1  # of the value of a cause that led the fit astray
+NO_WORSE = 1.02  # of the error before: a parameter more costs a degree of freedom, a fit gone astray more
+
+
+@dataclass(frozen=True)
+class Addition:
+    """An effect that the structure adds to a model, with constants and values to start from that are known from it."""
+
+    effect: Effect
+    constants: Mapping[str, float] = field(default_factory=dict)
+    estimates: tuple[Estimate, ...] = ()
+
+    def to(self, model: Model) -> Model:
+        """The model with the effect, its parameters at the values to start from."""
+        larger = model.with_effect(self.effect)
+        return replace(larger, terms=tuple(self._begun(t) if t.name == self.effect.name else t for t in larger.terms))
+
+    def _begun(self, term: Term) -> Term:
+        known = {name: value for name, value in self.constants.items() if name in term.effect.constants}
+        return replace(term, constants={**term.constants, **known}, estimates=self.estimates)
+
+
+def additions(found: Structure, model: Model, effects: Mapping[str, Effect]) -> list[Addition]:
+    """The catalogue effects that the structure adds to a model: the largest place first, then geometry."""
+    causes = [cause for place in found.places for cause in (*place.causes, *found.refinements(place))]
+    names = dict.fromkeys([*causes, *found.geometry.causes, *found.geometry.refinements])
+    starts = {c: tuple(Estimate(name, axis, value, None, "") for name, axis, value in found.starts(c)) for c in names}
+    possible = [c for c in names if c in effects and effects[c].excluded(found.result.data.table) is None]
+    return [Addition(effects[c], found.constants(c), starts[c]) for c in possible if not model.holds(c)]
+
+
+def free_additions(found: Structure, model: Model) -> list[Addition]:
+    """The free forms that the structure adds to a model, the largest place first."""
+    free = [Addition(free_form(forms)) for forms in found.free_forms]
+    return [a for a in free if not model.holds(a.effect.name)]
+
+
+def separately(base: Fit, found: Structure, added: list[Addition]) -> list[Addition]:
+    """The additions with values to start from: each place's causes fitted to what the other places leave.
+
+    Beside other effects that are missing, the search for a nonlinear parameter goes astray.
+    """
+    names = {a.effect.name: a for a in added}
+    model = _with(base.model, [a for name, a in names.items() if name in GEOMETRY])
+    linear = fit(model, _less(base.table, found.others(None))) if model is not base.model else base
+    known: dict[str, tuple[Estimate, ...]] = {term.name: term.estimates for term in linear.model.terms}
+    for place in found.places:
+        own = [names[cause] for cause in (*place.causes, *found.refinements(place)) if cause in names]
+        if own:
+            alone = fit(_with(linear.model, own), _less(base.table, found.others(place)))
+            known |= {a.effect.name: alone.model.estimates(a.effect.name) for a in own}
+    return [replace(a, estimates=known.get(name, a.estimates)) for name, a in names.items()]
+
+
+def together(base: Fit, added: list[Addition]) -> Fit:
+    """All additions fitted at once, in white noise first.
+
+    The noise of `base` has taken up what the additions explain, and free forms give way to a noise that is so large.
+    """
+    if not added:
+        return base
+    problem = base.problem
+    white = white_only(problem.white, problem.gap_s, len(problem.channels), problem.given)
+    model = _with(base.model, added)
+    return refit(replace(base, noise=white), model, _begun(base, model, white))
+
+
+def _begun(base: Fit, model: Model, noise: Noise) -> Array:
+    """The values of a model to start from, those of its base fitted beside the others.
+
+    Each addition was fitted alone, and took its own bias and scale factor with it.
+    """
+    problem = Problem.of(model, base.table)
+    theta = problem.layout.starts()[0]
+    own = np.any([problem.layout.of_effect(term.name) for term in base.model.terms], axis=0)
+    for _ in range(BASE_STEPS):
+        white = noise.whiten(np.dstack([problem.residual(theta)[:, :, None], problem.jacobian(theta, of=own)]))
+        theta[own] -= np.linalg.lstsq(white[:, 1:], white[:, 0], rcond=1e-12)[0]
+    return theta
+
+
+def fitted(base: Fit, end: Fit, added: list[Addition]) -> list[Fit]:
+    """The fits with the first, the first two ... additions; the last is `end`."""
+    fits: list[Fit] = []
+    present = base
+    for addition in added[:-1]:
+        present = refit(present, addition.to(present.model))
+        fits.append(present)
+    return [*fits, end] if added else []
+
+
+def gradually(base: Fit, added: list[Addition]) -> tuple[list[Addition], list[Fit]]:
+    """The additions that make the error no larger, each beside those before it, and the fits, the first of them `base`.
+
+    An effect far from the truth can lead the fit of all to a place from which no way leads back. One that does not help
+    yet, such as a quantiser beside a drift that is missing, is tried again beside the others.
+    """
+    taken: list[Addition] = []
+    fits = [base]
+    waiting = added
+    while waiting:
+        postponed: list[Addition] = []
+        for addition in waiting:
+            larger = refit(fits[-1], addition.to(fits[-1].model))
+            if larger.pooled_excess <= NO_WORSE * fits[-1].pooled_excess:
+                taken.append(addition)
+                fits.append(larger)
+            else:
+                postponed.append(addition)
+        waiting = postponed if len(postponed) < len(waiting) else []
+    return taken, fits
+
+
+def causes_alone(end: Fit, forms: list[Addition]) -> Fit:
+    """The model without the free forms, at the values that it has beside them."""
+    model = end.model
+    for form in forms:
+        model = model.without(form.effect.name)
+    alone = evaluate(model, end.table)
+    assert alone is not None  # noqa: S101 every parameter has been fitted
+    return alone
+
+
+def without_forms(end: Fit) -> Fit:
+    """The causes fitted to the data less what the free forms of the model add; `end` itself where it has none."""
+    forms = [term.name for term in end.model.terms if term.name.startswith(PREFIX)]
+    if not forms:
+        return end
+    model = end.model
+    for name in forms:
+        model = model.without(name)
+    alone = evaluate(model, end.table)
+    assert alone is not None  # noqa: S101 every parameter has been fitted
+    steps = (fit_.problem.layout.steps(fit_.theta) for fit_ in (end, alone))
+    whole, rest = (forward(end.table, each).T for each in steps)
+    return fit(model, _less(end.table, whole - rest))
+
+
+def at_values_of(end: Fit, added: list[Addition]) -> list[Addition]:
+    """The additions, starting from the values of `end`."""
+    return [replace(a, estimates=end.model.estimates(a.effect.name) or a.estimates) for a in added]
+
+
+def small_beside_forms(causes: list[Addition], forms: list[Addition]) -> list[Addition]:
+    """The causes with those small at whose place a free form acts; none where there is no such place.
+
+    The form can hold what the cause describes. A cause that begins large, at a wrong value of what is not linear, keeps
+    both from the best fit.
+    """
+    places = {a.effect.name.removeprefix(PREFIX) for a in forms}
+    if not any(place_of_effect(a.effect.name) in places for a in causes):
+        return []
+    return [_small(a) if place_of_effect(a.effect.name) in places else a for a in causes]
+
+
+def _small(cause: Addition) -> Addition:
+    """The cause with those parameters small that it is linear in: of either sign, and 0 where nothing is known."""
+    linear = {p.name for p in cause.effect.parameters if p.low == -np.inf and p.starts == (0.0,) and p.guess is None}
+    estimates = [replace(e, value=SMALL * e.value) if e.name in linear else e for e in cause.estimates]
+    return replace(cause, estimates=tuple(estimates))
+
+
+def largest_first(added: list[Addition], end: Fit, found: Structure) -> list[Addition]:
+    """The additions by the size of their place; those of the geometry by what they contribute to the outputs."""
+    sizes = {c: place.size for place in found.places for c in (*place.causes, *found.refinements(place))}
+    for name in (a.effect.name for a in added if a.effect.name not in sizes):
+        mask = end.problem.layout.of_effect(name)
+        contribution = end.jacobian[:, :, mask] @ end.theta[mask]
+        basic = np.any([end.problem.layout.of_effect(own) for own in BASIC], axis=0)
+        sizes[name] = float(np.sqrt(np.mean((_beside(contribution, end.jacobian[:, :, basic]) / found.white) ** 2)))
+    return sorted(added, key=lambda a: -sizes[a.effect.name])
+
+
+def _beside(values: Array, columns: Array) -> Array:
+    """Values (channels, n) without what columns (channels, n, k) explain of each channel."""
+    return np.stack([v - c @ np.linalg.lstsq(c, v, rcond=None)[0] for v, c in zip(values, columns, strict=True)])
+
+
+def _with(model: Model, added: list[Addition]) -> Model:
+    for addition in added:
+        model = addition.to(model)
+    return model
+
+
+def _less(table: Table, part: Array | float) -> Table:
+    """The table with a part (channels, n) taken off its outputs."""
+    return table.with_outputs(table.outputs - np.broadcast_to(part, (len(table.axes), table.n)).T)
