@@ -18,7 +18,6 @@ from calibrations.errors import DataError, MissingColumn, nearest
 from calibrations.files import text_source
 from calibrations.importing.binary import open_sheet
 from calibrations.importing.plausible import check_at_rest, find_unit_doubts
-from calibrations.importing.proposal import import_command, missing_columns, suggest_import
 from calibrations.importing.sessions import RATE, is_session, sample_rates
 from calibrations.importing.sheet import Sheet, is_number, look_like_names, read_cells, read_sheet
 from calibrations.importing.units import UNITS, ColumnMapping, column_unit
@@ -76,6 +75,8 @@ def import_sheet(
     try:
         return _import_with(laid, kind, chosen, constants or {})
     except MissingColumn as error:
+        from calibrations.importing.proposal import suggest_import  # a table with its columns needs no proposal
+
         tail = suggest_import(
             laid, kind, chosen, constants or {}, lambda *meant: _import_with(laid, *_completed(laid, *meant)).table
         )
@@ -139,6 +140,8 @@ def needs_mapping(laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping]
     chosen = complete_mapping(laid, mapped)
     names = {m.name for m in chosen} | set(_unmapped_columns(laid, chosen, bool(mapped)))
     if kind == "rates" and PATH in names:
+        from calibrations.importing.proposal import missing_columns  # as above
+
         return bool(missing_columns(kind, laid, chosen))
     kinds = [FILE_KINDS[kind]] if kind else FILE_KINDS.values()
     sets = [wanted for each in kinds for wanted in each.columns if kind or len(wanted) > 1]
@@ -189,6 +192,8 @@ def _check_units(table: Table, laid: Sheet, chosen: Sequence[ColumnMapping]) -> 
     found = find_unit_doubts(table, {m.name for m in chosen if m.unit})
     if not found:
         return
+    from calibrations.importing.proposal import import_command  # as above
+
     name, (what, unit) = next(iter(found.items()))
     by_name = {name: ColumnMapping(name, name) for name in found} | {m.name: m for m in chosen}
     better = [replace(m, unit=found[m.name][1] if m.name in found else m.unit) for m in by_name.values()]

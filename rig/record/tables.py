@@ -67,7 +67,8 @@ AXES = tuple(chain(*OUTPUTS))  # outputs of the sensor; other channels are regre
 
 def units_of(run: Run, channels: Iterable[str]) -> dict[str, str]:
     """The unit of those of `channels` that are not in V, as a digital sensor's."""
-    if not (possible := [channel for channel in channels if channel in DIGITAL]):
+    possible = [channel for channel in channels if channel in DIGITAL]
+    if not possible or not run.bench.get("instruments"):  # of an imported run nobody knows the bench
         return {}
     bench = Bench.model_validate(run.bench)
     return {channel: unit for channel in possible if (unit := bench.unit_of(channel)) != "V"}

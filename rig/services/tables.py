@@ -15,7 +15,6 @@ import numpy as np
 from calibrations.errors import DataError
 from calibrations.importing.foreign import drop_duplicate_rows, read_csv
 from calibrations.importing.raw_logs import average_raw_log
-from calibrations.joined import clock_began_anew, joined
 from calibrations.table import Table
 from rig.errors import RecordError, UnknownRun
 
@@ -110,6 +109,8 @@ def joined_runs(
     tables: Sequence[Table], begun: Sequence[datetime | None], tell: Callable[[str], None] = lambda _: None
 ) -> Table:
     """The tables of runs joined; times count from the beginning of the first, where all say when they were `begun`."""
+    from calibrations.joined import clock_began_anew, joined  # a single table needs it not
+
     known = [at for at in begun if at is not None]
     if len(known) == len(tables):
         tables = [_later(t, (at - known[0]).total_seconds()) for t, at in zip(tables, known, strict=True)]

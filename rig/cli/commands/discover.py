@@ -93,7 +93,6 @@ def _discover(
         warning,
     )
     from rig.services.load import loaded
-    from rig.services.provenance import write_model
 
     small = parse_enough(enough) if enough else None
     with working("fitting the model") as progress:
@@ -103,7 +102,11 @@ def _discover(
         found = data.discover(question.model, progress.searched(question.effects), small)
         progress.text = "planning the next experiment"
         result = planned(found, request, question.effects)
-    path = write_model(data, result.end, question.model, out, note)
+    path = None
+    if out is not None:
+        from rig.services.provenance import write_model
+
+        path = write_model(data, result.end, question.model, out, note)
     reached = str(path) if path else request.model or question.model.name
     own = (result.pattern if len(several) == 1 else None, reached, request)
     if as_json:
