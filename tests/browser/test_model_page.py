@@ -51,7 +51,7 @@ def test_a_hidden_effect_is_found_added_saved_and_undone(workbench: Workbench, t
     page = looked_at(workbench, data, "misses axis-misalignment")
     card = page.locator(".card.first")
     for text in (
-        "a <- R(theta)^T a",
+        "a ← R(θ)",
         "opposite signs",
         "above 99.9 %",
         "Cannot be separated from",
