@@ -81,6 +81,8 @@ def test_every_command_has_a_transcript() -> None:
 
 def test_the_last_digit_and_the_width_of_columns_may_differ_and_nothing_else() -> None:
     assert not difference("a  1.005 V  ###\n", "a 1.006 V #\n")
+    assert not difference("a 1.005(16) V\n", "a 1.006(17) V\n")
     for other in ("a 1.05 V\n", "b 1.005 V\n", "a 1.005 mV\n", "a -1.005 V\n", "a 1.005 V\nmore\n"):
         assert difference("a 1.005 V\n", other), other
+    assert difference("a 1.005(16) V\n", "a 1.005(19) V\n")
     assert difference("114 poses\n", "112 poses\n")

@@ -74,4 +74,5 @@ def _equal(one: str, other: str) -> bool:
 def _near(one: re.Match[str], other: re.Match[str], relative: float) -> bool:
     a, b = float(one[0]), float(other[0])
     last = 10.0 ** (int((one[3] or "e0")[1:]) - max(len(one[2] or ".") - 1, 0))
-    return abs(a - b) <= max(relative * abs(a), LAST_DIGITS * last if one[2] or one[3] else 0.0)
+    uncertainty = one.string.startswith(")", one.end())  # as in 8.04(16)
+    return abs(a - b) <= max(relative * abs(a), LAST_DIGITS * last if one[2] or one[3] or uncertainty else 0.0)
