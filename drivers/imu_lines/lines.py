@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from functools import reduce
 from operator import xor
 
+TIME = "time"  # name of the column of the sensor's own time
 FORMATS = ("csv", "named", "teleplot", "nmea")
 PAIR = re.compile(r"([A-Za-z_][\w.]*)\s*[:=]\s*([-+]?[\d.][\d.eE+-]*)")
 MOST_SHOWN = 10_000  # lines that an assembly keeps for a proposal

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.imu_lines.lines import Column, fields
-from drivers.imu_lines.reception import TIME
+from drivers.imu_lines.lines import TIME, Column, fields
 
 FEWEST = 5  # samples
 NEAR = 0.1  # of 1 g, for the norm at rest

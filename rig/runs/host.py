@@ -37,6 +37,7 @@ LOSSES = {  # counts of a digital sensor, in words
     "samples-lost": "lost",
     "samples-doubled": "doubled",
     "lines-damaged": "damaged",
+    "messages-damaged": "damaged",
     "sensor-restarts": "restarts",
 }
 
@@ -114,8 +115,9 @@ class RunHost:
         total = {name: tally[name][0] + self._before.get(name, 0.0) for name in counted}
         readings = [Reading(name, total.get(name, value), unit) for name, (value, unit) in tally.items()]
         self._record.keep_readings(self._run, readings, None)
-        if any(total[name] for name in LOSSES):
-            lost = ", ".join(f"{words} {total[name]:.0f}" for name, words in LOSSES.items())
+        losses = {words: total[name] for name, words in LOSSES.items() if name in total}
+        if any(losses.values()):
+            lost = ", ".join(f"{words} {count:.0f}" for words, count in losses.items())
             self._record.note(self._run, SENSOR, f"of {total['samples']:.0f} samples: {lost}")
 
     def keep_state(self) -> None:

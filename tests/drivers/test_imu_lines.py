@@ -17,7 +17,6 @@ from drivers.imu_lines import driver as imu_lines
 from drivers.imu_lines import twin
 from drivers.imu_lines.lines import Assembly, checksum, fields
 from drivers.imu_lines.proposal import proposed_settings
-from drivers.imu_lines.reception import WRAP, Heard, Tally
 from drivers.transport import Links
 from drivers.transport.faults import Fault, faults_of
 
@@ -133,7 +132,7 @@ def test_the_self_test_shows_columns_rate_and_time(connect: Connect) -> None:
 def test_only_outputs_of_the_lines_can_be_asked_for(connect: Connect) -> None:
     sensor = connect()
     assert sensor.only("az").acquire(0.1).channels == ("az",)
-    with pytest.raises(LimitError, match="the lines have no mx"):
+    with pytest.raises(LimitError, match="the sensor sends no mx"):
         sensor.only("mx")
 
 
@@ -179,25 +178,6 @@ def test_the_gain_of_the_clock_is_measured_over_all_records(connect: Connect, pp
     assert gain == pytest.approx(ppm, abs=2.0)
     assert unit == "ppm"
     assert sensor.tally()["sensor-restarts"] == (0.0, "")
-
-
-def test_a_sensor_that_begins_anew_is_noticed() -> None:
-    between = Tally(1e-6)
-    for start_s, host_s in ((100.0, 1000.0), (110.0, 1010.0), (0.5, 1020.0)):
-        heard = Heard(Assembly("csv", {}), 1e-6, 100.0)
-        for k in range(10):
-            heard.take([{"time": round(1e6 * (start_s + k / 100))}], host_s + k / 100)
-        between.add(heard)
-    assert between.restarts == 1
-    inside = Heard(Assembly("csv", {}), 1e-6, 100.0)
-    inside.take([{"time": 5e6}, {"time": 5.01e6}, {"time": 0.0}], 0.0)
-    assert inside.back
-
-
-def test_the_wrap_of_the_time_is_no_loss_and_no_restart() -> None:
-    heard = Heard(Assembly("csv", {}), 1e-6, 100.0)
-    heard.take([{"time": (WRAP - 25_000 + k * 10_000) % WRAP} for k in range(6)], 0.0)
-    assert (heard.lost, heard.doubled, heard.back) == (0, 0, False)
 
 
 @pytest.mark.parametrize("unit", ["g", "m/s^2", "count"])

@@ -1,0 +1,224 @@
+"""The samples of a digital sensor as they arrive: lost and doubled samples, and the sensor's clock.
+
+A sample needs some time to arrive, and never arrives early. So of many samples, the one with the smallest delay gives
+the best time of the sensor's clock.
+
+Source  RFC 5905, section 10: of several samples, the clock filter takes the one with the smallest delay.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+RESTARTED_S, RESTARTED = 1.0, 0.05  # the clocks differ by more than this, and this share: the sensor began anew
+FINE = 10  # counts of the sensor's time in a period of the samples: its steps count the samples
+
+
+@dataclass(frozen=True)
+class TimeBase:
+    """The sensor's time: counts of `unit_s`, which begin again after one of `wraps` counts."""
+
+    unit_s: float
+    wraps: tuple[int, ...] = ()
+
+    def steps(self, counts: Floats) -> Floats:
+        """Counts from each to the next, shape (n - 1,); negative where the sensor's time went back."""
+        steps = np.diff(counts)
+        for wrap in self.wraps if (steps < 0).any() else ():
+            wrapped = steps + wrap
+            steps = np.where((steps < 0) & (wrapped > 0) & (2 * wrapped < wrap), wrapped, steps)
+        return steps
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Samples that arrived together.
+
+    values   shape (n, outputs)
+    time     counts of the sensor's time, shape (n,); None if the sensor sends none
+    missing  messages before each sample that did not arrive, by their numbers, shape (n,); -1 for a repeated sample;
+             None if messages have no numbers
+    clipped  the output that the sensor reports at the end of its range; empty for none
+    """
+
+    values: Floats
+    time: Floats | None = None
+    missing: Ints | None = None
+    clipped: str = ""
+
+
+class Moment(NamedTuple):
+    """One moment on both clocks, s."""
+
+    sensor_s: float
+    host_s: float
+
+
+@dataclass
+class Reception:
+    """The samples of a record. `rate_hz` is the nominal rate; `numbered`: every number of a message is a sample."""
+
+    base: TimeBase
+    rate_hz: float
+    numbered: bool = False
+    count: int = 0
+    lost: int = 0
+    unnumbered: int = 0  # messages that did not arrive, by their numbers
+    doubled: int = 0
+    back: bool = False  # the sensor's time went back: it began anew
+    clipped: str = ""
+    start_s: float = 0.0  # the host's time of the first sample
+    end_s: float = 0.0  # and of the last
+    _first: int = 0  # samples in the first batch
+    _waiting: deque[Floats] = field(default_factory=deque)
+    _moments: list[Moment] = field(default_factory=list)  # of the last sample of each batch
+    _last: float | None = None  # the sensor's time of the last sample
+    _sensor: float = 0.0  # the same, counted on over its wraps
+
+    def take(self, batch: Batch, now_s: float) -> None:
+        """Add samples that arrived by `now_s`, without repeated ones."""
+        values = batch.values
+        if not len(values):
+            return
+        self.clipped = self.clipped or batch.clipped
+        repeated, gaps = self._by_number(batch)
+        if batch.time is not None:
+            first = batch.time[:1] if self._last is None else np.array([self._last])
+            steps = self.base.steps(np.concatenate([first, batch.time]))
+            if batch.missing is None:
+                repeated = steps == 0
+                repeated[0] &= self._last is not None
+            self.back = self.back or bool((steps < 0).any())
+            self.lost += self._lost(steps, gaps)
+            self._sensor = (float(first[0]) if self._last is None else self._sensor) + float(steps.sum())
+            self._last = float(batch.time[-1])
+        elif gaps is not None:
+            self.lost += int(gaps.sum())
+        self.doubled += int(repeated.sum())
+        self._keep(values[~repeated], now_s, timed=batch.time is not None)
+
+    def pull(self, n: int) -> Floats:
+        """The next `n` samples, which are not kept any longer, shape (n, outputs)."""
+        taken: list[Floats] = []
+        while n > 0:
+            values = self._waiting.popleft()
+            if len(values) > n:
+                self._waiting.appendleft(values[n:])
+            taken.append(values[:n])
+            n -= len(taken[-1])
+        return np.concatenate(taken)
+
+    @property
+    def length_s(self) -> float:
+        """From the first arrival to the last."""
+        return self.end_s - self.start_s
+
+    @property
+    def measured_rate_hz(self) -> float:
+        """Samples a second, by the host's clock."""
+        return (self.count - self._first) / self.length_s if self.length_s else 0.0
+
+    @property
+    def moments(self) -> list[Moment]:
+        """The sample with the smallest delay of each half; none if the sensor sends no time."""
+        half = len(self._moments) // 2
+        parts = [self._moments[:half], self._moments[half:]]
+        return [min(part, key=lambda moment: moment.host_s - moment.sensor_s) for part in parts if part]
+
+    def _by_number(self, batch: Batch) -> tuple[NDArray[np.bool_], Ints | None]:
+        """Which samples are repeated, and the messages that are missing before each, both by the numbers."""
+        if batch.missing is None:
+            return np.zeros(len(batch.values), dtype=bool), None
+        repeated, gaps = batch.missing < 0, np.maximum(batch.missing, 0)
+        self.unnumbered += int(gaps.sum())
+        return repeated, gaps
+
+    def _lost(self, steps: Floats, gaps: Ints | None) -> int:
+        """Samples lost. A time of low resolution only says that a missing message may be a sample."""
+        if gaps is not None and self.numbered:
+            return int(gaps.sum())
+        late = np.maximum(np.rint(steps * self.base.unit_s * self.rate_hz) - 1, 0).astype(np.int64)
+        fine = FINE * self.base.unit_s * self.rate_hz < 1.001
+        return int((late if gaps is None or fine else np.minimum(late, gaps)).sum())
+
+    def _keep(self, values: Floats, now_s: float, timed: bool) -> None:
+        if not len(values):
+            return
+        if not self.count:
+            self.start_s, self._first = now_s, len(values)
+        self.end_s = now_s
+        self.count += len(values)
+        self._waiting.append(values)
+        if timed:
+            self._moments.append(Moment(self.base.unit_s * self._sensor, now_s))
+
+
+@dataclass
+class Tally:
+    """The counts of all records since the connection, and the sensor's clock against the host's.
+
+    `carrier` is the word for what carries a sample, such as `lines`.
+    """
+
+    base: TimeBase
+    carrier: str
+    samples: int = 0
+    lost: int = 0
+    doubled: int = 0
+    damaged: int = 0
+    restarts: int = 0
+    first: Moment | None = None  # since the sensor began to count
+    last: Moment | None = None
+
+    def add(self, reception: Reception, damaged: int) -> None:
+        """Add a record, at its end."""
+        self.samples += reception.count
+        self.lost += reception.lost
+        self.doubled += reception.doubled
+        self.damaged += damaged
+        for moment in reception.moments:
+            self._note(moment)
+
+    @property
+    def offset_s(self) -> float | None:
+        """The sensor's time minus the host's, at the last moment."""
+        return None if self.last is None else self.last.sensor_s - self.last.host_s
+
+    @property
+    def gain(self) -> float | None:
+        """The relative gain of the sensor's clock; None before it is known."""
+        if self.first is None or self.last is None or self.last.host_s <= self.first.host_s:
+            return None
+        return (self.last.sensor_s - self.first.sensor_s) / (self.last.host_s - self.first.host_s) - 1
+
+    def values(self) -> dict[str, tuple[float, str]]:
+        """The numbers by name, each with its unit."""
+        counts = {"samples": self.samples, "samples-lost": self.lost, "samples-doubled": self.doubled}
+        counts |= {f"{self.carrier}-damaged": self.damaged, "sensor-restarts": self.restarts}
+        clock = {} if self.gain is None else {"sensor-clock-gain": (1e6 * self.gain, "ppm")}
+        return {name: (float(count), "") for name, count in counts.items()} | clock
+
+    def _note(self, moment: Moment) -> None:
+        if self.first is None or self.last is None:
+            self.first = self.last = moment
+            return
+        passed_s = moment.host_s - self.last.host_s
+        expected_s = self.last.sensor_s + passed_s
+        periods_s = [wrap * self.base.unit_s for wrap in self.base.wraps]
+        possible = [
+            moment.sensor_s,
+            *(moment.sensor_s + p * round((expected_s - moment.sensor_s) / p) for p in periods_s),
+        ]
+        sensor_s = min(possible, key=lambda at_s: abs(at_s - expected_s))
+        if abs(sensor_s - expected_s) > RESTARTED_S + RESTARTED * passed_s:
+            self.restarts += 1
+            self.first = self.last = moment
+        else:
+            self.last = Moment(sensor_s, moment.host_s)

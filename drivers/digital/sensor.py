@@ -1,0 +1,237 @@
+"""A digital sensor in the role of the converter: it sends its samples by itself, in its own units.
+
+Old samples in the buffers are discarded before a record. A record is refused if too many of its samples are lost, if
+its rate is wrong, or if an axis is stuck or at the end of its range.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Generator, Sequence
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.digital.reception import Batch, Reception, Tally, TimeBase
+from drivers.digital.settings import FORCES, DigitalSettings
+from drivers.errors import DriverError, LimitError, LinkTimeout, OverRange, SensorFault, StreamError
+from drivers.instrument import Check
+from drivers.recorder import Recorder, Samples
+from drivers.transport.link import Link
+
+Settings = TypeVar("Settings", bound=DigitalSettings)
+QUIET_S = 2.0  # silence that ends a record; at least ten samples
+POLL_S = 0.2  # samples that wait in the buffers of the system are read so often
+STUCK = 100  # equal samples of one axis, while another changes
+RATE_OFF = 0.05  # of the stated rate
+TEST_S = 2.0
+SHOWN = 3  # damaged lines or messages before a share of them can be judged
+
+
+class Decoder(Protocol):
+    """Makes samples of bytes as they arrive. The first line or message may be cut, and is not counted."""
+
+    def take(self, data: bytes) -> Batch:
+        """The samples that `data` completes."""
+
+    @property
+    def good(self) -> int:
+        """Lines or messages that could be read."""
+
+    @property
+    def damaged(self) -> int:
+        """Those that could not."""
+
+    @property
+    def unread(self) -> int:
+        """Bytes without a line or message so far."""
+
+
+Decoding = TypeVar("Decoding", bound=Decoder)
+
+
+class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
+    """A sensor that sends its samples by itself.
+
+    A driver defines the members down to `_advice`. `carrier` is the word for what carries a sample, `longest` the most
+    bytes without one.
+    """
+
+    carrier: str
+    longest: int
+    numbered = False
+
+    def __init__(self, link: Link, settings: Settings, name: str) -> None:
+        self.name, self.settings = name, settings
+        self._link, self._clock = link, link.clock
+        self._tally = self._new_tally()
+
+    @property
+    @abstractmethod
+    def base(self) -> TimeBase:
+        """The sensor's time."""
+
+    @abstractmethod
+    def _decoder(self) -> Decoding:
+        """A new decoder of the outputs in `settings.channels`, in this order."""
+
+    @abstractmethod
+    def _unreadable(self, decoder: Decoding) -> DriverError:
+        """The error for bytes without a sample."""
+
+    @abstractmethod
+    def _silence(self, timeout_s: float) -> DriverError:
+        """The error for a link on which nothing arrives."""
+
+    @abstractmethod
+    def _content(self, decoder: Decoding) -> str:
+        """What the lines or messages contain, for a self-test."""
+
+    def _begin(self) -> None:
+        """Let the sensor send its samples, and discard old ones. Raises DriverError."""
+        self._link.discard()
+
+    def _advice(self, decoder: Decoding, begun_s: float) -> list[Check]:  # noqa: ARG002
+        """Checks after a failed one."""
+        return []
+
+    def self_test(self) -> list[Check]:
+        """The outputs, the rate, and the sensor's time against the host's, in two seconds of samples."""
+        decoder, reception, begun_s = self._decoder(), self._reception(), self._clock.now()
+        try:
+            self._begin()
+            begun_s = self._clock.now()
+            while (left_s := begun_s + TEST_S - self._clock.now()) > 0:
+                reception.take(self._listen(decoder, left_s), self._clock.now())
+            if not reception.count:
+                raise self._unreadable(decoder)
+        except DriverError as fault:
+            return [Check(self.carrier, False, f"{fault}"), *self._advice(decoder, begun_s)]
+        rate_hz = reception.measured_rate_hz
+        fits = abs(rate_hz / self.settings.rate_hz - 1) < RATE_OFF
+        shown = f"{rate_hz:.4g} samples a second; rate_hz is {self.settings.rate_hz:g}"
+        state = f"{decoder.damaged} damaged, {reception.lost} samples lost, {reception.doubled} doubled"
+        checks = [Check(self.carrier, True, f"{self._content(decoder)}; {state}"), Check("rate", fits, shown)]
+        tally = self._new_tally()
+        tally.add(reception, decoder.damaged)
+        if (gain := tally.gain) is not None:
+            drift = f"the sensor's time is {tally.offset_s:+.3f} s from the host's and gains {1e6 * gain:+.0f} ppm"
+            checks.append(Check("time", abs(gain) < RATE_OFF, drift))
+        return checks
+
+    def tally(self) -> dict[str, tuple[float, str]]:
+        """Counts of lost, doubled and damaged samples since the connection, and the gain of the sensor's clock.
+
+        Each is a value with its unit, by name.
+        """
+        return self._tally.values()
+
+    def power(self, on: bool) -> None:  # noqa: ARG002 - as the converter's
+        """Raises LimitError: no line switches its power."""
+        raise LimitError(f"{self.name}: no line switches the power of a digital sensor", "Switch it by hand")
+
+    def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
+        """Record for `duration_s` without a gap, in blocks of `block_s`, both rounded to whole samples.
+
+        Raises LinkTimeout for a silent link, BadFrame for bytes that cannot be read, StreamError for lost samples or
+        another rate, OverRange, SensorFault for a stuck axis.
+        """
+        rate_hz, names = self.settings.rate_hz, tuple(self.settings.channels)
+        total, block = self.scans(duration_s), self.scans(block_s)
+        self._begin()
+        decoder, reception, given = self._decoder(), self._reception(), 0
+        try:
+            while given < total:
+                wanted = min(block, total - given)
+                while reception.count < given + wanted:
+                    self._pause(reception, total)
+                    reception.take(self._listen(decoder, max(QUIET_S, 10 / rate_hz)), self._clock.now())
+                self._require_complete(reception, decoder)
+                values = reception.pull(wanted)
+                self._require_alive(values, names, reception)
+                yield Samples(values, names, rate_hz, reception.start_s + given / rate_hz)
+                given += wanted
+        finally:
+            self._tally.add(reception, decoder.damaged)
+
+    def _pause(self, reception: Reception, total: int) -> None:
+        """Let samples gather. The first sample and the last are read as they arrive, for the time of each."""
+        period_s = 1 / self.settings.rate_hz
+        pause_s = min(POLL_S, (total - reception.count - 2) * period_s)
+        if reception.count and pause_s > 2 * period_s:
+            self._clock.sleep(pause_s)
+
+    def _new_tally(self) -> Tally:
+        return Tally(self.base, self.carrier)
+
+    def _reception(self) -> Reception:
+        return Reception(self.base, self.settings.rate_hz, self.numbered)
+
+    def _listen(self, decoder: Decoding, timeout_s: float) -> Batch:
+        """The samples of the next bytes. Raises LinkTimeout, BadFrame."""
+        if not (data := self._link.read(timeout_s)):
+            if timeout_s < QUIET_S:
+                return Batch(np.empty((0, 0)))
+            raise self._silence(timeout_s)
+        batch = decoder.take(data)
+        if decoder.damaged > SHOWN + decoder.good or (not decoder.good and decoder.unread > self.longest):
+            raise self._unreadable(decoder)
+        return batch
+
+    def _require_complete(self, reception: Reception, decoder: Decoding) -> None:
+        """Raises StreamError where too many samples were lost, or the rate is another."""
+        if reception.back:
+            raise StreamError(
+                f"{self.name}: the sensor's time went back: the sensor began anew during the record",
+                "Check its supply and its cable; opening its port restarts some boards",
+            )
+        lost = self._lost(reception, decoder)
+        if lost > self.settings.most_lost * (reception.count + lost) and lost > 1:
+            raise StreamError(
+                f"{self.name}: {lost} of {reception.count + lost} samples were lost ({decoder.damaged} damaged "
+                f"{self.carrier}, {reception.doubled} doubled samples)",
+                "Lower the sensor's rate or raise the baud rate, and check the cable; or correct rate_hz",
+            )
+        rate_hz = reception.measured_rate_hz if reception.length_s > 1.0 else self.settings.rate_hz
+        if abs(rate_hz / self.settings.rate_hz - 1) > RATE_OFF:
+            raise StreamError(
+                f"{self.name}: {rate_hz:.4g} samples a second come, and rate_hz is {self.settings.rate_hz:g}",
+                "Correct rate_hz in the sensor's settings",
+            )
+
+    def _lost(self, reception: Reception, decoder: Decoding) -> int:  # noqa: ARG002
+        """Samples that the record lacks so far."""
+        return reception.lost
+
+    def _require_alive(self, values: NDArray[np.float64], names: Sequence[str], reception: Reception) -> None:
+        """Raises OverRange for an output at the end of its range, SensorFault for a stuck one."""
+        if reception.clipped:
+            raise OverRange(
+                f"{self.name}: the sensor reports {reception.clipped} at the end of its range",
+                "Keep the sensor still, or set a wider range in it",
+            )
+        end = self.settings.range
+        if end is not None and (over := [n for k, n in enumerate(names) if n in FORCES and _most(values[:, k]) >= end]):
+            raise OverRange(
+                f"{self.name}: {over[0]} reached the end of its range, {end:g} {self.settings.units[over[0]]}",
+                "Keep the sensor still, set a wider range in it, or correct `range` in the bench file",
+            )
+        still = np.ptp(values, axis=0) == 0
+        if len(values) >= STUCK and still.any() and not still.all():
+            name = names[int(np.argmax(still))]
+            raise SensorFault(
+                f"{self.name}: {name} gave the same value {len(values)} times while others changed: it is stuck",
+                "Switch the sensor off and on; check that the output is the right one",
+            )
+
+
+def _most(values: NDArray[np.float64]) -> float:
+    return float(np.abs(values).max())
+
+
+def no_samples(name: str, url: str, timeout_s: float) -> LinkTimeout:
+    """The error for a link on which nothing arrives."""
+    return LinkTimeout(
+        f"{name}: nothing came on {url} within {timeout_s:g} s", "Check power and cable, and that the sensor sends"
+    )

@@ -1,0 +1,155 @@
+"""The base of simulated digital sensors: they send the outputs of the world's sensor at the rate of their own clock."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.digital.settings import FIELDS, FORCES, RATES, VOLTAGES, DigitalSettings
+from drivers.transport.faults import Faults, Kind
+from drivers.transport.server import Connection, Port, Twin
+from drivers.world.digital import Trim
+
+Floats = NDArray[np.float64]
+G_M_S2 = 9.80665
+# unit -> factor from g, deg/s or uT
+FORCE = {"g": 1.0, "m/s^2": G_M_S2, "count": 16384.0}
+RATE = {"deg/s": 1.0, "rad/s": math.radians(1.0), "count": 131.0}
+FIELD = {"uT": 1.0, "gauss": 1e-2, "count": 10.0}
+
+
+def common_faults(carrier: str) -> dict[str, Kind]:
+    """Faults that each such sensor can have; `carrier` is the word for what carries a sample, such as `line`."""
+    return {
+        f"lost-{carrier}": Kind(f"does not send its {carrier}s"),
+        f"doubled-{carrier}": Kind(f"sends every {carrier} twice"),
+        "wrong-baud": Kind("sends bytes as of another baud rate"),
+        "stuck-axis": Kind("repeats the value of its first axis"),
+        "clock-drift": Kind("its clock gains on the true time", 50.0, "ppm", -1e5),
+    }
+
+
+class World(Protocol):
+    """What a sensor knows of physics."""
+
+    trims: Mapping[str, Trim]
+
+    def sensed(self, outputs: Sequence[str], start_s: float, interval_s: float, n: int) -> Floats: ...
+
+
+@dataclass
+class Clock:
+    """The sensor's clock: its tick `tick` is at `tick_s` of the true time, and it gains `gain` from there on."""
+
+    period_s: float  # of a tick, nominal
+    tick: int = 0
+    tick_s: float = 0.0
+    gain: float = 0.0
+
+    def run(self, gain: float, tick: int) -> None:
+        """Gain this much from `tick` on."""
+        if gain != self.gain:
+            self.tick, self.tick_s, self.gain = tick, self.true_s(tick), gain
+
+    @property
+    def interval_s(self) -> float:
+        """True time from tick to tick."""
+        return self.period_s / (1 + self.gain)
+
+    def true_s(self, tick: int) -> float:
+        """The true time of a tick."""
+        return self.tick_s + (tick - self.tick) * self.interval_s
+
+    def ticks(self, now_s: float) -> int:
+        """The number of the last tick by then."""
+        return self.tick + int(np.floor((now_s - self.tick_s) / self.interval_s + 1e-6))
+
+
+class DigitalTwin(Twin):
+    """One sensor on a line of its own. It samples from power-on; what finds no listener is lost.
+
+    `carrier` is the word in the names of its faults.
+    """
+
+    carrier: str
+
+    def __init__(self, world: World, settings: DigitalSettings, port: Port) -> None:
+        self.faults = Faults()
+        self._world, self._port, self._count = world, port, 1
+        self._names = list(settings.wired)
+        self._factors = factors(settings)
+        self._clock = Clock(1 / settings.rate_hz)
+        self._held: float | None = None
+
+    @abstractmethod
+    def _messages(self, values: Floats, ticks: NDArray[np.int64]) -> list[bytes]:
+        """The line or message of each sample: values (n, outputs) in the units of the settings, and their ticks."""
+
+    def advance(self, now_s: float) -> None:
+        """Take all samples that are due by `now_s`, and send them."""
+        self._clock.run(1e-6 * (self.faults.size("clock-drift", now_s) or 0.0) if self.faults else 0.0, self._count)
+        due = self._clock.ticks(now_s) + 1 - self._count
+        if due <= 0:
+            return
+        start_s, interval_s, first = self._clock.true_s(self._count), self._clock.interval_s, self._count
+        self._count += due
+        if listeners := self._listeners(now_s):
+            values = self._world.sensed(self._names, start_s, interval_s, due) * self._factors
+            at_s: Floats = np.minimum(start_s + interval_s * np.arange(due, dtype=np.float64), now_s)
+            ticks = np.arange(first, first + due)
+            self._send(values, ticks, at_s, listeners)
+
+    def due_s(self) -> float:
+        return self._clock.true_s(self._count)
+
+    def state(self) -> dict[str, Any]:
+        return {"count": self._count, "clock": asdict(self._clock)}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        self._count = state["count"]
+        self._clock = Clock(**state["clock"])
+
+    def _listeners(self, now_s: float) -> list[Connection]:
+        """Connections that have read what was sent so far."""
+        return [c for c in self._port.connections.values() if not c.is_behind(now_s)]
+
+    def _send(self, values: Floats, ticks: NDArray[np.int64], at_s: Floats, listeners: Sequence[Connection]) -> None:
+        """Send samples: in one piece, or with faults each by itself."""
+        if not self.faults:
+            pieces = [(float(at_s[-1]), b"".join(self._messages(values, ticks)))]
+        else:
+            for row, now_s in zip(values, at_s.tolist(), strict=True):
+                self._spoil(row, now_s)
+            messages = self._messages(values, ticks)
+            pieces = [(t, self._spoilt(m, t)) for t, m in zip(at_s.tolist(), messages, strict=True)]
+        for connection in listeners:
+            for now_s, data in pieces:
+                connection.send(data, now_s)
+
+    def _spoil(self, row: Floats, now_s: float) -> None:
+        """Change the values of a sample by the faults of the moment."""
+        if self.faults.size("stuck-axis", now_s) is not None:
+            self._held = float(row[0]) if self._held is None else self._held
+            row[0] = self._held
+
+    def _spoilt(self, message: bytes, now_s: float) -> bytes:
+        """A line or message with the faults of the moment."""
+        if self.faults.size(f"lost-{self.carrier}", now_s) is not None:
+            return b""
+        if self.faults.size("wrong-baud", now_s) is not None:
+            return bytes(byte ^ 0xF8 for byte in message)
+        return 2 * message if self.faults.size(f"doubled-{self.carrier}", now_s) is not None else message
+
+
+def factors(settings: DigitalSettings) -> Floats:
+    """The factor from g, deg/s, uT or V to the unit of each output, shape (outputs,)."""
+    force, rate, field = settings.kinds
+    of = dict.fromkeys(VOLTAGES, 1.0) | dict.fromkeys(FORCES, FORCE[force])
+    of |= dict.fromkeys(RATES, RATE[rate]) | dict.fromkeys(FIELDS, FIELD[field])
+    return np.array([of[name] for name in settings.wired])
