@@ -19,6 +19,8 @@ class Address:
         tcp://host:port                             Modbus TCP, GCS
         rtu+tcp://host:port                         Modbus RTU frames through a converter on TCP
         serial:/dev/ttyUSB0?baud=115200&parity=E    a serial line (parity N, E or O): Modbus RTU, GCS, text
+        udpin://0.0.0.0:14550                       datagrams that an instrument sends to this port: MAVLink, text
+        udpout://host:port                          datagrams to and from an instrument at this address
         visa:TCPIP0::10.0.0.7::INSTR                a VISA resource: SCPI; `?library=` another library than pyvisa-py
         ca:13IDC:m1                                 a record of EPICS, which Channel Access finds on the network
         ca://10.0.0.7:5064/13IDC:m1                 the same on a server whose address is known
@@ -33,7 +35,8 @@ class Address:
 
 # The urls of wires, and how long a byte takes on each.
 
-SCHEMES = ("tcp", "rtu+tcp", "serial", "pty", "visa", "ca")
+SCHEMES = ("tcp", "rtu+tcp", "serial", "pty", "visa", "ca", "udpin", "udpout")
+UDP = ("udpin", "udpout")
 CA_PORT = 5064  # of a server of Channel Access
 TCP_LATENCY_S = 150e-6  # one way through a switch and a small embedded stack
 USER = re.compile("//.*@")
@@ -99,15 +102,18 @@ class Url:
         if self.scheme == "ca":
             return f"ca:{self.record}"
         host, port = self.host.rstrip("."), self.port
+        if self.scheme == "udpin":
+            return f"udp port {port}"
         if self.scheme == "visa":
             if not (found := VISA_SOCKET.fullmatch(self.path)):
                 return f"visa:{self.path.upper()}"
             host, port = found[1].rstrip("."), int(found[2])
+        udp = "udp " if self.scheme == "udpout" else ""
         try:
             address = ipaddress.ip_address("127.0.0.1" if host == "localhost" else host)
         except ValueError:  # a name, which is not looked up
-            return f"{host}:{port}"
-        return f"{'127.0.0.1' if address == ipaddress.IPv6Address('::1') else address}:{port}"
+            return f"{udp}{host}:{port}"
+        return f"{udp}{'127.0.0.1' if address == ipaddress.IPv6Address('::1') else address}:{port}"
 
     @property
     def record(self) -> str:
@@ -121,12 +127,14 @@ class Url:
             return self.path.upper().startswith(("TCPIP", "VICP"))
         if self.scheme == "ca":
             return self.host not in ("localhost", "127.0.0.1", "::1")  # an EPICS record is there for all clients
+        if self.scheme in UDP:
+            return self.host != "localhost" and not self.host.startswith("127.")
         return self.scheme in ("tcp", "rtu+tcp") and not self.line.startswith("127.")
 
     @property
     def rtu(self) -> bool:
         """Whether the frames on the wire are those of Modbus RTU."""
-        return self.scheme not in ("tcp", "ca")
+        return self.scheme not in ("tcp", "ca", *UDP)
 
     @property
     def character_s(self) -> float:

@@ -1,8 +1,10 @@
-"""Byte links: TCP and serial, opened by url, read only by way of the clock.
+"""Byte links: TCP, UDP and serial, opened by url, read only by way of the clock.
 
     tcp://host:port                           a socket
     rtu+tcp://host:port                       a socket; the frames on it are RTU's
     serial:/dev/ttyUSB0?baud=115200&parity=E  a serial line, 8 data bits; parity N, E or O; stop=1 or 2
+    udpin://0.0.0.0:14550                     datagrams to this port of the computer, from the first who sends some
+    udpout://host:port                        datagrams to and from this address
 
 A link counts its bytes, so that a simulated clock knows what is still under way.
 """
@@ -18,10 +20,12 @@ import serial
 
 from drivers.clock import Clock, Wire
 from drivers.errors import LinkRefused
-from drivers.transport.address import Url
+from drivers.transport.address import UDP, Url
 
 CONNECT_TIMEOUT_S = 5.0
 DISCARD_S = 1.0
+LARGEST = 1 << 16  # bytes of a datagram
+BUFFER = 1 << 22  # bytes that the kernel may keep of datagrams; it allows less
 Tap = Callable[
     [float, str, Literal["sent", "heard"], bytes], None
 ]  # called with every message: time, instrument, direction, bytes
@@ -35,6 +39,7 @@ class Port(Protocol):
     """
 
     chunk: int
+    lossy: bool  # the kernel drops what finds no room
 
     @property
     def key(self) -> str:
@@ -45,7 +50,8 @@ class Port(Protocol):
     def read(self) -> bytes:
         """What is there now, at least one byte; empty at the end."""
 
-    def write(self, data: bytes) -> None: ...
+    def write(self, data: bytes) -> int:
+        """Send all of `data`; the number of bytes that are on their way to somebody."""
 
     def close(self) -> None: ...
 
@@ -54,7 +60,7 @@ class Connected(Wire):
     """An open connection. `key` names it, the same at both ends."""
 
     def __init__(self, port: Port) -> None:
-        self.port, self.key, self.chunk = port, port.key, port.chunk
+        self.port, self.key, self.chunk, self.lossy = port, port.key, port.chunk, port.lossy
         self.sent = self.received = 0
 
     def fileno(self) -> int:
@@ -79,10 +85,9 @@ class Link:
         """Send all of `data`; raises LinkRefused when the connection is gone."""
         line = self._connected()
         try:
-            line.port.write(data)
+            line.sent += line.port.write(data)
         except LOST as error:
             raise self._lost(error) from error
-        line.sent += len(data)
         if self._tap:
             self._tap(self.clock.now(), self._names, "sent", data)
 
@@ -95,6 +100,8 @@ class Link:
             data = line.port.read()
         except LOST as error:
             raise self._lost(error) from error
+        if not data and line.lossy:  # an empty datagram, or a damaged one
+            return b""
         if not data:
             raise self._lost("the other side closed it")
         line.received += len(data)
@@ -155,7 +162,7 @@ class Link:
 class SocketPort:
     """A connected TCP socket, without Nagle's delay."""
 
-    chunk = 1 << 15
+    chunk, lossy = 1 << 15, False
 
     def __init__(self, host: str, number: int) -> None:
         self._socket = socket.create_connection((host, number), CONNECT_TIMEOUT_S)
@@ -171,8 +178,9 @@ class SocketPort:
     def read(self) -> bytes:
         return self._socket.recv(self.chunk)
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes) -> int:
         self._socket.sendall(data)
+        return len(data)
 
     def close(self) -> None:
         self._socket.close()
@@ -181,7 +189,7 @@ class SocketPort:
 class SerialPort:
     """A serial line, 8 data bits, opened for one program alone."""
 
-    chunk = 4095
+    chunk, lossy = 4095, False
 
     def __init__(self, path: str, baud: int, parity: str, stop_bits: int) -> None:
         self._path = path
@@ -199,11 +207,64 @@ class SerialPort:
     def read(self) -> bytes:
         return bytes(self._serial.read(self.chunk))
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes) -> int:
         self._serial.write(data)
+        return len(data)
 
     def close(self) -> None:
         self._serial.close()
+
+
+class DatagramPort:
+    """A UDP socket: to a `host` and its port, or at a port of this computer for the first who sends something there.
+
+    What is sent before anybody is known goes nowhere.
+    """
+
+    chunk, lossy = 0, True
+
+    def __init__(self, host: str, number: int, listens: bool) -> None:
+        self._listens, self._known = listens, not listens
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
+        self._socket.setblocking(False)
+        try:
+            (self._socket.bind if listens else self._socket.connect)((host, number))
+        except OSError:
+            self._socket.close()
+            raise
+
+    @property
+    def key(self) -> str:
+        own = self._socket.getsockname()
+        return datagram_key(own[1]) if self._listens else connection_key(own, self._socket.getpeername())
+
+    def fileno(self) -> int:
+        return self._socket.fileno()
+
+    def read(self) -> bytes:
+        """All that waits, in one piece."""
+        data = []
+        try:
+            while True:
+                piece, sender = self._socket.recvfrom(LARGEST)
+                if not self._known:
+                    self._socket.connect(sender)
+                    self._known = True
+                data.append(piece)
+        except BlockingIOError:
+            return b"".join(data)
+
+    def write(self, data: bytes) -> int:
+        return self._socket.send(data) if self._known else 0
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def datagram_key(number: int) -> str:
+    """The name of a wire of datagrams to a port, the same seen from both ends."""
+    return f"datagrams > {number}"
 
 
 def connection_key(client: tuple[str, int], server: tuple[str, int]) -> str:
@@ -216,13 +277,15 @@ def open_link(url: str, clock: Clock, name: str = "", tap: Tap | None = None) ->
     return Link(Url.parse(url), clock, name, tap)
 
 
-def _open_port(url: Url) -> SocketPort | SerialPort:
+def _open_port(url: Url) -> SocketPort | SerialPort | DatagramPort:
     if url.scheme == "serial":
         return SerialPort(url.path, url.baud, url.parity, url.stop_bits)
     if url.scheme == "visa":
         raise ValueError("only the driver scpi_meter speaks through VISA")
     if url.scheme == "ca":
         raise ValueError("only the drivers epics_motor and epics_adc speak Channel Access")
+    if url.scheme in UDP:
+        return DatagramPort(url.host, url.port, listens=url.scheme == "udpin")
     return SocketPort(url.host, url.port)
 
 

@@ -18,12 +18,13 @@ import tty
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from drivers.transport.address import Address, Url
+from drivers.transport.address import UDP, Address, Url
 from drivers.transport.faults import END, Faults, Said, Wire, disturbed
-from drivers.transport.link import connection_key
+from drivers.transport.link import LARGEST, connection_key, datagram_key
 
 NO_FAULTS = Faults()
 FAULTS_OF = "faults of"
+MOST = 60_000  # bytes of a datagram that is sent
 SILENCE_S = 0.05  # ends an RTU frame: generous, since a computer sends a frame in pieces
 
 
@@ -107,6 +108,10 @@ class Connection:
         """When it must write next; never while the client does not read."""
         return self._outbox[0][0] if self._outbox and not self._full else math.inf
 
+    def progress(self, key: str) -> tuple[int, int] | None:
+        """Bytes (received, emitted) of the client of that name; None if there is none."""
+        return (self.received, self.emitted) if key == self.key else None
+
     def is_behind(self, now_s: float) -> bool:
         """Whether something that was due by `now_s` has not been written yet."""
         return bool(self._outbox) and self._outbox[0][0] <= now_s
@@ -117,6 +122,51 @@ class Connection:
         except BlockingIOError:
             return 0
         except OSError:  # the client is gone: what it does not read is lost
+            return len(data)
+
+
+class Datagrams(Connection):
+    """A UDP socket: its client is at `to`, or is the last who sent something."""
+
+    def __init__(
+        self, own: socket.socket, to: tuple[str, int] | None, leaving: Callable[[Said], Iterable[Said]]
+    ) -> None:
+        super().__init__(own.fileno(), datagram_key(to[1]) if to else "", own.close, leaving)
+        self._socket, self._fixed, self._client = own, to, to
+        self._earlier: dict[str, tuple[int, int]] = {}  # clients before this one
+
+    def read(self, now_s: float, patience_s: float) -> bool:  # noqa: ARG002 - a datagram is whole
+        """Take in what is there; True, since datagrams have no end."""
+        with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
+            while True:
+                data, sender = self._socket.recvfrom(LARGEST)
+                if not self._fixed and sender != self._client:
+                    self._earlier[self.key] = self.received, self.emitted
+                    self._client, self.key = sender, connection_key(sender, self._socket.getsockname())
+                    self.received, self.emitted = self._earlier.get(self.key, (0, 0))
+                self.inbox += data
+                self.received += len(data)
+        return True
+
+    def is_behind(self, now_s: float) -> bool:
+        """As that of a connection; nobody is there before the first datagram."""
+        return self._client is None or super().is_behind(now_s)
+
+    def progress(self, key: str) -> tuple[int, int] | None:
+        return super().progress(key) or self._earlier.get(key)
+
+    def forget(self) -> None:
+        """Forget the client."""
+        self._client, self.ended = self._fixed, False
+
+    def _write(self, data: bytes) -> int:
+        if self._client is None:
+            return len(data)
+        try:
+            return self._socket.sendto(data[:MOST], self._client)
+        except BlockingIOError:
+            return 0
+        except OSError:  # nobody is there
             return len(data)
 
 
@@ -135,6 +185,8 @@ class Port:
         self._socket: socket.socket | None = None
         if self.timing.scheme == "pty":
             self.url = self._open_pty()
+        elif self.timing.scheme in UDP:
+            self.url = self._open_datagrams()
         else:
             self.url = self._listen()
 
@@ -169,11 +221,17 @@ class Port:
 
     def close(self) -> None:
         self.hang_up()
+        for connection in self.connections.values():  # of datagrams
+            connection.close()
+        self.connections.clear()
         if self._socket:
             self._socket.close()
             self._socket = None
 
     def _drop(self, connection: Connection) -> None:
+        if isinstance(connection, Datagrams):
+            connection.forget()
+            return
         del self.connections[connection.fileno]
         connection.close()
 
@@ -212,6 +270,17 @@ class Port:
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             key = connection_key(peer, client.getsockname())
             self.connections[client.fileno()] = Connection(client.fileno(), key, client.close, self._leaving)
+
+    def _open_datagrams(self) -> str:
+        """A UDP socket, which sends to an address, or listens at one; the url is that of the other end."""
+        own, sends = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), self.timing.scheme == "udpout"
+        own.setblocking(False)
+        place = (self.timing.host, self.timing.port)
+        own.bind(("", 0) if sends else place)
+        self.connections[own.fileno()] = Datagrams(own, place if sends else None, self._leaving)
+        if sends:
+            return f"udpin://{self.timing.host}:{self.timing.port}"
+        return f"udpout://{self.timing.host}:{own.getsockname()[1]}"
 
     def _open_pty(self) -> str:
         """A raw pseudo-terminal; its far end stays open, so that clients can reconnect."""
@@ -272,11 +341,8 @@ class Server:
         return min([c.due_s() for port in self._ports for c in port.connections.values()] + twins, default=math.inf)
 
     def progress(self, key: str) -> tuple[int, int] | None:
-        for port in self._ports:
-            for connection in port.connections.values():
-                if connection.key == key:
-                    return connection.received, connection.emitted
-        return None
+        connections = [connection for port in self._ports for connection in port.connections.values()]
+        return next((found for connection in connections if (found := connection.progress(key))), None)
 
     def state(self) -> dict[str, Any]:
         """The twins' states by role, and those of their faults, JSON-able; taken between exchanges."""

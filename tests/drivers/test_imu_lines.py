@@ -3,36 +3,24 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from drivers.clock import SimulatedClock
 from drivers.errors import BadFrame, LimitError, LinkTimeout, OverRange, SensorFault, StreamError
-from drivers.handheld.world import HandheldWorld
 from drivers.imu_lines import driver as imu_lines
 from drivers.imu_lines import twin
 from drivers.imu_lines.lines import Assembly, checksum, fields
 from drivers.imu_lines.proposal import proposed_settings
 from drivers.transport import Links
 from drivers.transport.faults import Fault, faults_of
+from tests.drivers.sensed import Ramp
 
 NUMBERED = {"time": 1, "ax": 3, "ay": 4, "az": 5}
 NAMED = {"time": "t", "ax": "x", "ay": "y", "az": "z"}
-
-
-class Ramp:
-    """Outputs of 0.1 g, -0.2 g and 1 g, with a small ramp in time."""
-
-    trims = HandheldWorld.trims
-
-    def sensed(self, outputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:
-        t_s = start_s + interval_s * np.arange(n)
-        force_g = {"ax": 0.1, "ay": -0.2, "az": 1.0}
-        return np.column_stack([force_g[name] + 1e-3 * t_s for name in outputs])
 
 
 Connect = Callable[..., imu_lines.LineSensor]

@@ -22,9 +22,18 @@ def test_a_socket_is_taken_apart() -> None:
     assert Url.parse("rtu+tcp://10.0.0.7:4001").rtu
 
 
+def test_datagrams_have_a_place_here_or_there() -> None:
+    here, there = Url.parse("udpin://0.0.0.0:14550"), Url.parse("udpout://10.0.0.7:14550")
+    assert (here.port, here.rtu, there.host, there.rtu) == (14550, False, "10.0.0.7", False)
+    assert here.line == Url.parse("udpin://127.0.0.1:14550").line  # one program has the port
+    assert len({here.line, there.line, Url.parse("tcp://10.0.0.7:14550").line}) == 3
+    assert here.on_a_network
+    assert not Url.parse("udpin://127.0.0.1:14550").on_a_network
+
+
 @pytest.mark.parametrize(
     "text",
-    ["", "10.0.0.7", "tcp://", "http://a:1", "serial:", "serial:/dev/x?parity=Q", "serial:/dev/x?bauds=9600",
+    ["", "10.0.0.7", "tcp://", "udpin:", "http://a:1", "serial:", "serial:/dev/x?parity=Q", "serial:/dev/x?bauds=9600",
      "tcp://a:port", "serial:/dev/x?baud=fast", "serial:/dev/x?baud"],
 )  # fmt: skip
 def test_what_is_no_wire_is_refused_with_the_right_form(text: str) -> None:
