@@ -6,5 +6,5 @@ bound               interval arithmetic over the graph, and the proved contracti
 inverse             the inverse: a fixed number of steps with a proved bound
 program             the inverse as lines of code, and its operations
 cost                errors due to effects left out, and uncertainty due to the parameters
-c99, python_source, document    writers
+sources, document    writers
 """

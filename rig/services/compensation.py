@@ -106,6 +106,6 @@ def export_document(made: Exported, form: str, models: Sequence[str], out: Path)
 
 
 def _writer(language: str) -> Callable[..., dict[str, str]]:
-    from calibrations.compensation import c99, document, python_source
+    from calibrations.compensation import document, sources
 
-    return {"c": c99.files, "python": python_source.files, "json": document.files}[language]
+    return {"c": sources.c_files, "python": sources.python_files, "json": document.files}[language]

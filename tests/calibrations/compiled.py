@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibrations.compensation import c99
+from calibrations.compensation import sources
 from calibrations.compensation.document import Origin, make_vectors
 from calibrations.compensation.inverse import Compensation
 from calibrations.table import Array
@@ -40,7 +40,7 @@ FOLLOWING = DRIVER.replace("sensor_input in;", "sensor_input in;\n    sensor_mem
 
 def written(made: Compensation, folder: Path, origin: Origin = ORIGIN) -> list[Path]:
     """The C files, and what they are made of; the header is among them."""
-    files: Mapping[str, str] = c99.files(made, origin, make_vectors(made))
+    files: Mapping[str, str] = sources.c_files(made, origin, make_vectors(made))
     for name, text in files.items():
         (folder / name).write_text(text)
     return [folder / name for name in files]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibrations.compensation import python_source
+from calibrations.compensation import sources
 from calibrations.compensation.cost import memory_at
 from calibrations.compensation.document import header_lines, make_vectors
 from calibrations.compensation.forward import FORCES, steps_of
@@ -64,19 +64,19 @@ def test_on_the_way_of_the_stages_it_remembers_what_the_model_has() -> None:
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_every_language_follows_the_same_samples(compiler: str, tmp_path: Path) -> None:
     made = invert_model(model(BOTH))
-    sources = written(made, tmp_path)
+    paths = written(made, tmp_path)
     (tmp_path / "driver.c").write_text(FOLLOWING)
     checks = make_vectors(made, 512)
-    found = through(build(compiler, [*sources, tmp_path / "driver.c"], tmp_path / "driver"), checks.inputs, 2)
+    found = through(build(compiler, [*paths, tmp_path / "driver.c"], tmp_path / "driver"), checks.inputs, 2)
     assert np.abs(found - checks.expected).max() < 1e-9
-    (text,) = python_source.files(made, ORIGIN, make_vectors(made)).values()
+    (text,) = sources.python_files(made, ORIGIN, make_vectors(made)).values()
     names: dict[str, Any] = {"__name__": "sensor"}
     exec(compile(text, "sensor.py", "exec"), names)  # noqa: S102 it is what we wrote
     memory = names["begin"]()
     by_python = [names["compensate"](*row, memory) for row in checks.inputs.tolist()]
     assert np.abs(by_python - found).max() < 1e-9
     assert names["self_test"]() == 0
-    program = build(compiler, sources, tmp_path / "test", "-DSENSOR_MAIN")
+    program = build(compiler, paths, tmp_path / "test", "-DSENSOR_MAIN")
     assert subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout.startswith("0 of 16")
 
 
@@ -100,7 +100,7 @@ def test_the_proof_holds_whatever_is_remembered() -> None:
 
 def test_gravity_stands_in_for_an_axis_and_what_is_remembered_is_kept_once() -> None:
     made = invert_model(model({**PHYSICAL, **SLIPS}))
-    (text,) = python_source.files(made, ORIGIN, make_vectors(made)).values()
+    (text,) = sources.python_files(made, ORIGIN, make_vectors(made)).values()
     names: dict[str, Any] = {"__name__": "sensor"}
     exec(compile(text, "sensor.py", "exec"), names)  # noqa: S102
     angle = np.linspace(0, 4 * np.pi, 200)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibrations.compensation import document, python_source
+from calibrations.compensation import document, sources
 from calibrations.compensation.document import Origin, header_lines, make_vectors, round_up
 from calibrations.compensation.graph import OPERATIONS
 from calibrations.compensation.inverse import Compensation, invert_model
@@ -34,7 +34,7 @@ def python() -> Any:
     """Carry out a written Python file; its names."""
 
     def run(made: Compensation) -> dict[str, Any]:
-        (text,) = python_source.files(made, ORIGIN, make_vectors(made)).values()
+        (text,) = sources.python_files(made, ORIGIN, make_vectors(made)).values()
         names: dict[str, Any] = {"__name__": "sensor"}
         exec(compile(text, "sensor.py", "exec"), names)  # noqa: S102 it is what we wrote
         return names

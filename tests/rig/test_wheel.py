@@ -38,7 +38,8 @@ def test_the_wheel_is_small_and_holds_the_types_and_all_data_files(wheel: Path) 
         str(path.relative_to(ROOT))
         for name in PACKAGES
         for path in (ROOT / name).rglob("*")
-        if path.suffix in (".py", ".yaml", ".html", ".css", ".js", ".typed") and "__pycache__" not in path.parts
+        if path.suffix in (".py", ".yaml", ".html", ".css", ".js", ".jinja", ".typed")
+        and "__pycache__" not in path.parts
     }
     assert data <= held
     assert not {name.split("/")[0] for name in held if ".dist-info/" not in name} - set(PACKAGES)
