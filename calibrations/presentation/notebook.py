@@ -8,7 +8,7 @@ from dataclasses import replace
 from html import escape
 
 from calibrations.presentation.chart import Picture
-from calibrations.presentation.report.page import figures_html
+from calibrations.presentation.page import pictures_html
 
 
 def result_html(text: str, pictures: Sequence[Picture]) -> str:
@@ -16,5 +16,5 @@ def result_html(text: str, pictures: Sequence[Picture]) -> str:
     page, and clip paths of the same id in two outputs would be exchanged.
     """
     mark = hashlib.sha256(text.encode()).hexdigest()[:8]
-    drawn = figures_html([replace(each, name=f"{each.name}-{mark}") for each in pictures])
-    return f'<pre>{escape(text)}</pre><div style="max-width: 60em; background: white; color: black">{drawn}</div>'
+    figures = pictures_html([replace(picture, name=f"{picture.name}-{mark}") for picture in pictures])
+    return f'<pre>{escape(text)}</pre><div style="max-width: 60em; background: white; color: black">{figures}</div>'

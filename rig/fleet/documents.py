@@ -10,6 +10,7 @@ import numpy as np
 from calibrations.fleet.batch import Population
 from calibrations.presentation.certificate.terms import name as result_name
 from calibrations.presentation.charts.fleet import Spread
+from calibrations.presentation.document import Section, Table
 from calibrations.presentation.report.fleet import calibration_report, population_report
 from calibrations.text import estimate_text, rounded
 from rig.files import program
@@ -130,14 +131,10 @@ def calibration_page(found: Calibration, model: str) -> str:
     rows = [row for batch in found.batches for row in _rows(batch)]
     head = ("batch", "sensors", "parameter", "mean", "spread", "standard uncertainty / alone", "unlike the rest")
     failed = [f"{member.sensor}: {why}" for member, why in found.faults.items()]
-    tables = {
-        "title": "Batches",
-        "words": [f"Not calibrated: {'; '.join(failed)}"] if failed else [],
-        "pictures": [],
-        "tables": [{"head": head, "rows": rows, "more": "", "batches": found.batches}],
-    }
+    not_calibrated = (f"Not calibrated: {'; '.join(failed)}",) if failed else ()
+    batches = Section("Batches", (*not_calibrated, Table("Batches", head, rows, headed=False)))
     count = sum(len(batch.members) for batch in found.batches)
-    return calibration_report(quantities, tables, f"{count} sensors", _facts(model))
+    return calibration_report(quantities, batches, len(found.batches), f"{count} sensors", _facts(model))
 
 
 def _facts(model: str) -> dict[str, str]:

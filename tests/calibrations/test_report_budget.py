@@ -7,7 +7,7 @@ import json
 from calibrations.fitting.fit import fit
 from calibrations.loop import compare, discover
 from calibrations.model.file import read_model
-from calibrations.presentation.report.parameters import budget, budget_document
+from calibrations.presentation.budget import budget_document, budget_section
 from calibrations.presentation.report.report import report
 from tests.calibrations.test_budget import given, measured
 
@@ -23,13 +23,15 @@ def test_the_report_shows_sources_and_what_is_not_given() -> None:
 
 def test_the_section_says_what_counts_most() -> None:
     table = given(measured(1), gain_std=0.2)
-    found = budget(fit(read_model("linear"), table))
-    assert found is not None
-    assert {row["largest"] for row in found["parameters"]} == {"gain of the converter"}
-    assert [name for name, _ in found["groups"]] == ["bias", "scale-factor"]
-    scale = {row["source"]: row["std"] for row in found["groups"][1][1][0]["rows"]}
-    assert scale["gain of the converter"] == "0.20"
-    assert scale["scatter from row to row"] == "negligible"
+    section = budget_section(fit(read_model("linear"), table))
+    assert section is not None
+    parameters, *sources = section.tables
+    assert {row[-1] for row in parameters.rows} == {"gain of the converter"}
+    assert [of.title for of in sources] == ["Sources of bias", "Sources of scale-factor"]
+    parameter_of_x = next(iter(sources[1].groups))
+    contribution = {row[1]: row[5] for row, _ in parameter_of_x}
+    assert contribution["gain of the converter"] == "0.20"
+    assert contribution["scatter from row to row"] == "negligible"
 
 
 def test_the_document_is_json_and_adds_up() -> None:

@@ -25,6 +25,8 @@ from typing import Any
 
 from scipy.special import ndtr
 
+from calibrations.presentation.budget import Source
+
 RULE = (
     "Decision rule: guarded acceptance (JCGM 106, 8.3.2) with a guard band of the expanded uncertainty U inside each "
     "limit. Pass: inside both limits by U or more. Conditional pass: inside, by less than U. Conditional fail: "
@@ -94,19 +96,6 @@ class Condition:
     low: float
     mean: float
     high: float
-
-
-@dataclass(frozen=True)
-class Source:
-    """One line of a budget: `contribution` in the result's unit, `sensitivity` and `std` None for type A."""
-
-    name: str
-    kind: str
-    unit: str
-    std: float | None
-    sensitivity: float | None
-    contribution: float
-    freedom: float
 
 
 @dataclass(frozen=True)

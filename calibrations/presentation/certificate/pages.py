@@ -11,8 +11,9 @@ from fpdf.enums import TableBordersLayout, TextEmphasis
 from fpdf.fonts import FontFace
 
 from calibrations.presentation.certificate.content import Certificate
-from calibrations.presentation.certificate.sections import Section, Table, sections, verdict
-from calibrations.presentation.report.page import page
+from calibrations.presentation.certificate.sections import sections, verdict
+from calibrations.presentation.document import Facts, Page, Section, Table
+from calibrations.presentation.page import html as page_html
 
 STATES = {"": "found", "pass": "adequate", "conditional pass": "ambiguous"}
 
@@ -20,16 +21,17 @@ STATES = {"": "found", "pass": "adequate", "conditional pass": "ambiguous"}
 def html(c: Certificate) -> str:
     """The page as text; the same certificate gives the same page."""
     conformity = verdict(c)
-    return page(
-        "certificate.html",
-        headline=c.headline,
-        verdict="simulated" if c.simulated else conformity or "calibrated",
-        state="ambiguous" if c.simulated else STATES.get(conformity, "unexplained"),
-        what=f"No. {c.number}, issued {c.issued}",
-        summary=f"{c.sensor}, serial number {c.serial}, calibrated on {c.ended[:10]} by {c.laboratory.name}.",
-        figures=[],
-        sections=sections(c),
-        provenance={"certificate": c.number, "issued": c.issued, "program": c.program},
+    return page_html(
+        Page(
+            headline=c.headline,
+            verdict="simulated" if c.simulated else conformity or "calibrated",
+            state="ambiguous" if c.simulated else STATES.get(conformity, "unexplained"),
+            subject=f"No. {c.number}, issued {c.issued}",
+            summary=f"{c.sensor}, serial number {c.serial}, calibrated on {c.ended[:10]} by {c.laboratory.name}.",
+            figures=[],
+            sections=sections(c),
+            provenance={"certificate": c.number, "issued": c.issued, "program": c.program},
+        )
     )
 
 
@@ -91,21 +93,22 @@ def _section(page: FPDF, section: Section) -> None:
     if page.will_page_break(20):
         page.add_page()
     _write(page, section.title, 12, INK, "B")
-    for text in section.words:
-        _write(page, text, SMALL, INK)
-    if section.facts:
-        _facts(page, section)
-    for table in section.tables:
-        _table(page, table)
+    for block in section.blocks:
+        if isinstance(block, Table):
+            _table(page, block)
+        elif isinstance(block, Facts):
+            _facts(page, block)
+        else:
+            _write(page, str(block), SMALL, INK)
 
 
-def _facts(page: FPDF, section: Section) -> None:
+def _facts(page: FPDF, block: Facts) -> None:
     page.set_font(FONT, size=SMALL)
     with page.table(
         borders_layout=TableBordersLayout.NONE, first_row_as_headings=False, col_widths=(1, 4), line_height=4.2,
         text_align="LEFT",
     ) as cells:  # fmt: skip
-        for name, value in section.facts:
+        for name, value in block.facts:
             row = cells.row()
             row.cell(name, style=FontFace(color=QUIET))
             row.cell(value or "–")
@@ -123,13 +126,13 @@ def _table(page: FPDF, table: Table) -> None:
         padding=(0.4, GAP / 2), text_align=aligned, headings_style=FontFace(emphasis=TextEmphasis.B),
     ) as cells:  # fmt: skip
         for row in (table.head, *table.rows):
-            cells.row(row)
+            cells.row([str(cell) for cell in row])
     page.ln(1.5)
 
 
 def _widths(table: Table) -> tuple[float, ...]:
     """Shares of the width by the longest cell of each column; words are not broken, and long texts of words are."""
-    columns = [[row[k] for row in (table.head, *table.rows)] for k in range(len(table.head))]
+    columns = [[str(row[k]) for row in (table.head, *table.rows)] for k in range(len(table.head))]
     longest = [max(map(len, column)) for column in columns]
     words = [max(len(word) for cell in column for word in cell.split(" ")) for column in columns]
     return tuple(float(max(min(whole, LONGEST), word) + ROOM) for whole, word in zip(longest, words, strict=True))

@@ -26,14 +26,15 @@ import numpy as np
 from calibrations.discovery.plausibility import doubt, rejection
 from calibrations.discovery.structure import unexplained_scatter
 from calibrations.errors import ModelError, UnusableData
-from calibrations.fitting.budget import SLOW_NOISE, Budget, Line, make_budget, parameter_correlation, row_gains
+from calibrations.fitting.budget import SLOW_NOISE, Budget, make_budget, parameter_correlation, row_gains
 from calibrations.fitting.fit import Fit, cautiously, evaluate
 from calibrations.fitting.inputs import Contribution, input_contributions
 from calibrations.fitting.sensed import in_milli, milli_unit
 from calibrations.geometry.rate_table import EARTH_DEG_S
 from calibrations.means.noise import Noise, rms
 from calibrations.model import Estimate, Model, Term
-from calibrations.presentation.certificate.content import Error, Figures, Limit, Outcome, Simulated, Source, decide
+from calibrations.presentation.budget import sources
+from calibrations.presentation.certificate.content import Error, Figures, Limit, Outcome, Simulated, decide
 from calibrations.presentation.certificate.terms import name, term
 from calibrations.table import Array
 from calibrations.tables import MEANS
@@ -196,7 +197,7 @@ def _outcome(
         std=std,
         coverage=coverage,
         freedom=float(drawn.freedom[k]),
-        sources=tuple(_source(line, k) for line in drawn.given),
+        sources=sources(drawn, k),
         simulated=Simulated(float(trial.std()), low, high, said, why),
         found=earlier.get((of.name, e.name, e.axis)),
         decision=None if limit is None else decide(e.value, std, coverage * std, limit),
@@ -212,12 +213,6 @@ def _why_further(k: int, coverage: float, std: float, simulated: float, drawn: B
         "few degrees of freedom" if (coverage - CERTAIN_K) * std > tolerance(std) else "",
     ]
     return ", ".join(filter(None, reasons))
-
-
-def _source(line: Line, k: int) -> Source:
-    sensitivity = None if line.sensitivity is None else float(line.sensitivity[k])
-    part = 0.0 if line.std is None or np.isnan(line.std[k]) else float(line.std[k])
-    return Source(line.source, line.kind, line.unit, line.input_std, sensitivity, part, line.freedom)
 
 
 def _weights(found: Fit) -> Array:

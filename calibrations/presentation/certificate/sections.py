@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
-from calibrations.presentation.certificate.content import RULE, Certificate, Decision, Outcome, Source
+from calibrations.presentation.budget import SOURCE_HEAD
+from calibrations.presentation.certificate.content import RULE, Certificate, Decision, Outcome
 from calibrations.presentation.certificate.results import CONSERVATIVE, WIDENED
-from calibrations.text import contribution_text, expanded_text, freedom_text, minus, rounded, unit, value_text
+from calibrations.presentation.document import Facts, Section, Table
+from calibrations.text import expanded_text, freedom_text, minus, rounded, unit, value_text
 
 END_SCATTER = 2.67  # of a normal's 97.5 % quantile, in its standard deviation, times the root of the trials
 WIDE = 10  # columns of a correlation matrix side by side
@@ -52,27 +53,6 @@ STATEMENTS = {
 }
 
 
-@dataclass(frozen=True)
-class Table:
-    """`numbers` are the columns aligned to the right. `long` tables are folded on pages."""
-
-    title: str
-    head: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    numbers: tuple[int, ...] = ()
-    long: bool = False
-
-
-@dataclass(frozen=True)
-class Section:
-    """A heading, sentences, facts by name, and tables; in this order."""
-
-    title: str
-    words: tuple[str, ...] = ()
-    facts: tuple[tuple[str, str], ...] = ()
-    tables: tuple[Table, ...] = ()
-
-
 def sections(c: Certificate) -> list[Section]:
     """All sections of the certificate, in order."""
     return [
@@ -111,7 +91,7 @@ def _identification(c: Certificate) -> Section:
         ("rig", c.rig),
     )
     tables = (Table("Instruments and their certificates", head, rows),) if rows else ()
-    return Section("Identification", (), facts, tables)
+    return Section("Identification", (Facts(facts), *tables))
 
 
 def _procedure(c: Certificate) -> Section:
@@ -122,7 +102,7 @@ def _procedure(c: Certificate) -> Section:
         ("model", c.figures.model),
         *c.facts.items(),
     )
-    return Section("Procedure", (METHOD,), facts)
+    return Section("Procedure", (METHOD, Facts(facts)))
 
 
 def _environment(c: Certificate) -> Section:
@@ -133,7 +113,7 @@ def _environment(c: Certificate) -> Section:
     head = ("influence", "lowest", "mean", "highest", "unit")
     tables = (Table("During the measurement", head, rows, (1, 2, 3)),) if rows else ()
     facts = (("reference", c.reference), ("local gravity", f"{c.gravity_m_s2:.6g} m/s²"))
-    return Section("Environment", (), facts, tables)
+    return Section("Environment", (Facts(facts), *tables))
 
 
 def results_table(c: Certificate) -> Table:
@@ -155,7 +135,7 @@ def _results(c: Certificate) -> Section:
         *c.figures.remarks,
         *c.remarks,
     )
-    return Section("Results", words, (), (results_table(c),))
+    return Section("Results", (*words, results_table(c)))
 
 
 def _found(c: Certificate) -> Section:
@@ -176,14 +156,17 @@ def _found(c: Certificate) -> Section:
         changed = ("quantity", "as found", "as left", "change", "unit", "change / U")
         tables.insert(0, Table("Change since the previous calibration", changed, changes, (1, 2, 3, 5)))
     words = f"As found: by {c.before}." if c.before else "No values as found: no earlier calibration was given."
-    return Section("As found and as left", (words,), (), tuple(tables))
+    return Section("As found and as left", (words, *tables))
 
 
 def _uncertainty(c: Certificate) -> Section:
-    head = ("source", "type", "standard uncertainty of the source", "sensitivity", "contribution", "ν")
     budgets = tuple(
         Table(
-            f"{_name(o)}, {unit(o.unit) or '1'}", head, tuple(_line(s, o) for s in o.sources), (2, 3, 4, 5), long=True
+            f"{_name(o)}, {unit(o.unit) or '1'}",
+            SOURCE_HEAD,
+            tuple(source.cells(o.std) for source in o.sources),
+            (2, 3, 4, 5),
+            folded=True,
         )
         for o in c.figures.outcomes
     )
@@ -200,8 +183,8 @@ def _uncertainty(c: Certificate) -> Section:
         TRIALS.format(trials=c.figures.trials, scatter=END_SCATTER / math.sqrt(c.figures.trials)),
         *([CORRELATED] if len(c.figures.outcomes) > 1 else []),
     )
-    checked = Table("Check by simulation", check, trials, (1, 2, 3, 4), False)
-    return Section("Uncertainty", words, (), (checked, *_correlations(c), *budgets))
+    checked = Table("Check by simulation", check, trials, (1, 2, 3, 4))
+    return Section("Uncertainty", (*words, checked, *_correlations(c), *budgets))
 
 
 def _correlations(c: Certificate) -> Iterator[Table]:
@@ -237,11 +220,11 @@ def _traceability(c: Certificate) -> Section:
     )
     return Section(
         "Traceability",
-        (ROWS,),
-        facts,
         (
+            ROWS,
+            Facts(facts),
             Table("Rows with the largest weight in each result", ("quantity", "number of the row (its share)"), heavy),
-            Table("Rows", ("row", "t, s", "pose", "mean outputs", "n", "SHA-256"), rows, (0, 1, 4), long=True),
+            Table("Rows", ("row", "t, s", "pose", "mean outputs", "n", "SHA-256"), rows, (0, 1, 4), folded=True),
         ),
     )
 
@@ -267,14 +250,3 @@ def _limits(d: Decision) -> str:
 def _statement(d: Decision) -> str:
     chance = "over 99.9" if d.probability > 0.999 else f"{100 * d.probability:.1f}"
     return f"{STATEMENTS[d.statement]} ({chance} %)"
-
-
-def _line(s: Source, o: Outcome) -> tuple[str, ...]:
-    return (
-        s.name,
-        s.kind,
-        "–" if s.std is None else f"{rounded(s.std, 2)} {unit(s.unit)}".strip(),
-        "–" if s.sensitivity is None else rounded(s.sensitivity, 2),
-        contribution_text(s.contribution, o.std),
-        freedom_text(s.freedom),
-    )

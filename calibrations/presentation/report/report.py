@@ -1,32 +1,33 @@
 """The report: one HTML page that needs no network, with verdict, falling error, candidates, model, noise, provenance.
 
-Every uncertain number has its uncertainty, or states that it is unknown. The template has the layout; this file makes
-its texts and numbers.
+Every uncertain number has its uncertainty, or states that it is unknown.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from pathlib import PurePath, PureWindowsPath
-from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
-from calibrations.analyses.motion import MotionResult, Quantity
+from calibrations.analyses.motion import MotionResult
 from calibrations.criteria import CERTAIN_PROBABILITY, SIGNIFICANT
 from calibrations.design.expected import pairs_separated
 from calibrations.design.experiment import Experiment
-from calibrations.discovery.results import Candidate, Comparison, Discovery, Step
+from calibrations.discovery.results import Candidate, Comparison, Discovery
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.sensed import in_milli, milli_unit, pooled_milli
-from calibrations.model import Estimate, Model, Term
-from calibrations.motion.reference import Bias
+from calibrations.model import Model, Term
+from calibrations.presentation.budget import budget_section
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.discovery import album, error_text
+from calibrations.presentation.document import Block, Code, Items, Page, Remark, Section, Table
 from calibrations.presentation.formula import formula_html
-from calibrations.presentation.report import parameters
-from calibrations.presentation.report.page import figure, page
-from calibrations.text import capital, estimate_text, joined, minus, probability, rounded, unbroken, unit
+from calibrations.presentation.page import html
+from calibrations.presentation.report.motion import motion_page
+from calibrations.presentation.report.parameters import estimate_cells, matrices_section, name_of_file
+from calibrations.table import Array
+from calibrations.text import capital, estimate_text, joined, minus, probability, rounded, unbroken
 
 LONG_MIN = 120  # longer durations are given in hours
 
@@ -99,66 +100,106 @@ def next_takes(e: Experiment) -> str:
 EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
 SHOWS = 1e-3  # share of the noise floor from which on a part of the noise is shown
 SURE = 0.999  # more digits of a probability mean nothing
+NOTICEABLE_BIRGE = 1.05
+HELD_OUT = (
+    "The ratio of error and noise floor is uncertain: for a complete model it is {chance} on this data (the digits in "
+    "brackets are its standard uncertainty). The held-out error is the error on {rows} not used in the fit, from "
+    "cross-validation."
+)
+CANDIDATES = (
+    "Each effect of the catalogue that this data can excite, added alone to the given model and fitted jointly with "
+    "it; best first. The error of the given model is {seen} × the noise floor; its held-out error is {unseen} ×."
+)
+CHANCES = (
+    "p-value: the probability of so large an improvement anywhere in the search if no effect is missing. Probability: "
+    "relative to the other candidates and to no missing effect, which has the prior probability 1/2 (Schwarz "
+    "criterion). Both are approximate."
+)
+NO_CANDIDATE = "No effect can be tested on this data: the model already holds every effect that its columns excite."
+PLACES = "Places where the mean residual is not zero; largest first, at most one for each axis and quantity."
+NO_PLACE = "No angle, direction, time or temperature has a mean residual beyond the noise."
+ESTIMATED = (
+    "Joint least-squares estimate. The digits in brackets are the standard uncertainty of the last digits (GUM 7.2.2)."
+)
+BY_BIRGE = " The residual is larger than the noise, so the uncertainties are multiplied by the Birge ratio {birge:.2f}."
+WHITE_KNOWN = (
+    "The white noise of each mean follows from the scatter of its samples and their correlation by the output filter."
+)
+WHITE_UNKNOWN = (
+    "The data hold no scatter of samples, so the white noise of a mean is not known; the scatter from row to row is "
+    "used instead."
+)
+SLOW = (
+    " Scatter and slow noise are estimated from the residual of the final model. The uncertainties of the parameters "
+    "include all slow noise that is compatible with the data, even where none is found."
+)
+NO_PROPOSAL = "No proposal: no effect of the catalogue explains the residual. Pattern of the residual: {structure}."
+NO_EXPERIMENT = "No further experiment is needed to decide between effects of the catalogue."
 
 
 def report(
-    found: Discovery[Fit],
-    beside: Comparison[Fit],
+    discovery: Discovery[Fit],
+    comparison: Comparison[Fit],
     date: str,
     program: str,
     pictures: Iterable[Picture] | None = None,
     motion: MotionResult | None = None,
 ) -> str:
-    """The page as HTML text. `beside` compares the given model with the data; `pictures` are those of `album`.
+    """The page as HTML text. `comparison` is that of the given model with the data; `pictures` are those of `album`.
 
     `motion` is the comparison with the displacement sensor, for a run of that procedure.
     `date` and `program` (name and version) go into the provenance: the same arguments give the same page.
     """
-    shown = {p.name: figure(p) for p in (album(found, beside, motion) if pictures is None else pictures)}
-    discovery = _head(found, beside.fit.model.name)
-    return page(
-        "report.html",
-        **(motion_head(motion) if motion else discovery),
-        discovery=discovery,
-        kind=found.start.table.type.rows,
-        steps=[_first(found), *(_step(step, found) for step in found.steps)],
-        chance_of_excess=estimate_text(1.0, spread_of_excess(found.end)),
-        fails=[capital(minus(place.text)).replace("x the noise", "× the noise") for place in beside.fails],
-        given=beside.fit.model.name,
-        given_errors=_errors(beside.fit),
-        candidates=[_candidate(c, k, found.start.table.unit) for k, c in enumerate(found.findings.candidates)],
-        before=(rounded(found.start.pooled_excess), rounded(found.start.held_out_excess)),
-        model=found.end.model.name,
-        parameters=_parameters(found.end.model, {s.name for s in found.steps}),
-        general=parameters.matrices(found.end),
-        budget=parameters.budget(found.end),
-        birge=f"{found.end.birge:.2f}" if found.end.birge > 1.05 else "",
-        end_errors=_errors(found.end),
-        known=found.end.noise.known,
-        next=_next(found.next_experiment) if found.next_experiment else None,
-        structure=found.residual_structure,
-        provenance=_provenance(found, date, program),
-        motion=motion_section(motion) if motion else None,
-        pictures=shown,
-        curves=[drawn for name, drawn in shown.items() if name.startswith("effect-")],
-        places=[drawn for name, drawn in shown.items() if name.startswith("place-") or name == "shares"],
+    album_of_all = album(discovery, comparison, motion) if pictures is None else pictures
+    shown = {picture.name: picture for picture in album_of_all}
+    page = Page(
+        headline=discovery.judgement.headline,
+        verdict=discovery.outcome.label,
+        state=discovery.outcome.value,
+        subject=f"Calibration report, model {comparison.fit.model.name}",
+        summary=unbroken(summary(discovery)),
+        figures=key_figures(discovery),
+        sections=list(_sections(discovery, comparison, shown)),
+        provenance=_provenance(discovery, date, program),
     )
+    return html(page if motion is None else motion_page(page, motion, shown["evaluation"]))
 
 
-def _next(e: Experiment) -> dict[str, str]:
-    return {"words": next_words(e), "command": e.command, "takes": next_takes(e)}
+def _sections(
+    discovery: Discovery[Fit], comparison: Comparison[Fit], shown: Mapping[str, Picture]
+) -> Iterable[Section]:
+    end, given = discovery.end, comparison.fit.model.name
+    yield Section("Error by model", (shown["waterfall"], _steps(discovery), _held_out(discovery)))
+    three = [shown[name] for name in ("measurement", "residual", "failure")]
+    yield Section(f"Residuals of the model {given}", (*_places(comparison), _errors(comparison.fit), *three))
+    curves = [picture for name, picture in shown.items() if name.startswith("effect-")]
+    yield Section("Candidates", (*_candidates(discovery), *curves))
+    if places := [picture for name, picture in shown.items() if name.startswith("place-") or name == "shares"]:
+        yield Section("Places of the signal chain", places)
+    yield Section("The model, extended" if discovery.steps else "The model", _model(discovery))
+    for section in (matrices_section(end), budget_section(end)):
+        if section is not None:
+            yield section
+    yield Section("Noise", ((WHITE_KNOWN if end.noise.known else WHITE_UNKNOWN) + SLOW, _noise(end)))
+    yield Section("Next experiment", _next(discovery))
 
 
-def _head(found: Discovery[Fit], model: str) -> dict[str, Any]:
-    """The head of the page, or of its part on models that were fitted to a motion."""
-    return {
-        "headline": found.judgement.headline,
-        "verdict": found.outcome.label,
-        "state": found.outcome.value,
-        "what": f"Calibration report, model {model}",
-        "summary": unbroken(summary(found)),
-        "figures": key_figures(found),
-    }
+def _steps(discovery: Discovery[Fit]) -> Table:
+    start = discovery.start
+    rows = [
+        (start.model.name, error_text(start), rounded(start.pooled_excess), rounded(start.held_out_excess), "as given")
+    ]
+    for step in discovery.steps:
+        part = "cause" if step.name in discovery.causes else "refines the form of a cause"
+        excess, held_out = rounded(step.after.pooled_excess), rounded(step.held_out_after)
+        rows.append((f"+ {step.name}", error_text(step.after), excess, held_out, part))
+    head = ("model", "rms error", "error / floor", "held-out error / floor", "part")
+    return Table("Errors by model", head, rows, (1, 2, 3), headed=False)
+
+
+def _held_out(discovery: Discovery[Fit]) -> Remark:
+    chance = estimate_text(1.0, spread_of_excess(discovery.end))
+    return Remark(HELD_OUT.format(chance=chance, rows=discovery.start.table.type.rows))
 
 
 def spread_of_excess(fit: Fit) -> float:
@@ -166,52 +207,42 @@ def spread_of_excess(fit: Fit) -> float:
     return float(1 / np.sqrt(2 * max(fit.residual.size - len(fit.theta), 1)))
 
 
-def _first(found: Discovery[Fit]) -> dict[str, str]:
-    level = {"seen": rounded(found.start.pooled_excess), "unseen": rounded(found.start.held_out_excess)}
-    return {"name": found.start.model.name, "error": error_text(found.start), "role": "as given", **level}
+def _places(comparison: Comparison[Fit]) -> tuple[Block, ...]:
+    if not comparison.fails:
+        return (NO_PLACE,)
+    texts = [capital(minus(place.text)).replace("x the noise", "× the noise") for place in comparison.fails]
+    return PLACES, Items(texts)
 
 
-def _step(step: Step[Fit], found: Discovery[Fit]) -> dict[str, str]:
-    level = {"seen": rounded(step.after.pooled_excess), "unseen": rounded(step.held_out_after)}
-    role = "cause" if step.name in found.causes else "refines the form of a cause"
-    return {"name": f"+ {step.name}", "error": error_text(step.after), "role": role, **level}
+def _errors(fit: Fit) -> Table:
+    """Error and noise floor of each channel."""
+    floor = "noise floor" if fit.noise.known else "scatter (noise floor not known)"
+    rows = [
+        (channel, _amount(fit.rmse, c, fit), _amount(fit.noise.floor, c, fit), rounded(fit.excess[c]))
+        for c, channel in enumerate(fit.channels)
+    ]
+    head = ("axis", "rms error", floor, "error / floor")
+    return Table("Errors and noise of each axis", head, rows, (1, 2, 3), headed=False)
 
 
-def _candidate(c: Candidate, rank: int, out: str) -> dict[str, Any]:
-    return {
-        "name": c.name,
-        "explained": rank == 0 or (rank < EXPLAINED and c.p_value < SIGNIFICANT),
-        "summary": capital(c.effect.summary),
-        "formula": formula_html(c.effect.formula, out),
-        "symptom": capital(c.effect.symptom),
-        "seen": rounded(c.excess_after),
-        "unseen": rounded(c.held_out_after),
-        "p": probability(c.p_value),
-        "probability": _probability(c.probability),
-        "rivals": ", ".join(c.indistinguishable_from) or "–",
-    }
-
-
-def _probability(p: float) -> str:
-    """A probability is approximate: never certain, never impossible."""
-    return f"above {SURE:g}" if p > SURE else f"below {1 - SURE:g}" if p < 1 - SURE else f"{p:.2g}"
-
-
-def _errors(fit: Fit) -> list[dict[str, str]]:
-    """One row for each channel: error, floor, scatter and slow noise, in the residual's unit and in mg."""
-    posed = fit.table.type.stage_angles
-    noise = {"rmse": fit.rmse, "floor": fit.noise.floor, "scatter": fit.noise.scatter, "slow": fit.noise.slow}
+def _noise(fit: Fit) -> Table:
+    """Noise floor, scatter and slow noise of each channel."""
     rows = []
     for c, channel in enumerate(fit.channels):
-        row = {"channel": channel, "excess": rounded(fit.excess[c]), "tau": _time_constant(fit.noise.taus_s[c])}
-        for name, values in noise.items():
-            volts = f"{rounded(1e3 * values[c])} m{fit.table.unit} = " if posed else ""
-            shows = values[c] > SHOWS * fit.noise.floor[c]
-            row[name] = f"{volts}{rounded(in_milli(values, fit)[c])} {milli_unit(fit)}" if shows else "none found"
-        if row["slow"] == "none found":
-            row["tau"] = "–"
-        rows.append(row)
-    return rows
+        slow = _amount(fit.noise.slow, c, fit)
+        floor = _amount(fit.noise.floor, c, fit) if fit.noise.known else "not known"
+        time = "–" if slow == "none found" else _time_constant(fit.noise.taus_s[c])
+        rows.append((channel, floor, _amount(fit.noise.scatter, c, fit), slow, time))
+    head = ("axis", "noise floor", "further scatter", "slow noise, rms", "time constant of slow noise")
+    return Table("Noise", head, rows, (1, 2, 3, 4), headed=False)
+
+
+def _amount(values: Array, c: int, fit: Fit) -> str:
+    """An error of channel `c` in mg and, of poses, in the output's unit too."""
+    if not values[c] > SHOWS * fit.noise.floor[c]:
+        return "none found"
+    volts = f"{rounded(1e3 * values[c])} m{fit.table.unit} = " if fit.table.type.stage_angles else ""
+    return f"{volts}{rounded(in_milli(values, fit)[c])} {milli_unit(fit)}"
 
 
 def _time_constant(taus_s: tuple[float, ...]) -> str:
@@ -220,132 +251,95 @@ def _time_constant(taus_s: tuple[float, ...]) -> str:
     return f"flicker noise, {rounded(min(taus_s), 2)} to {rounded(max(taus_s), 2)} s"
 
 
-def _parameters(model: Model, added: set[str]) -> list[dict[str, Any]]:
-    return [
-        {
-            "effect": term.name,
-            "added": term.name in added,
-            "tied": term.tied,
-            "rows": [*map(_estimate, term.quantities), *_curves(term)],
-            "constants": {name: rounded(value, 6) for name, value in term.constants.items()},
-        }
-        for term in model.terms
+def _candidates(discovery: Discovery[Fit]) -> tuple[Block, ...]:
+    candidates, start = discovery.findings.candidates, discovery.start
+    if not candidates:
+        return (NO_CANDIDATE,)
+    rows = [
+        (
+            c.name,
+            rounded(c.excess_after),
+            rounded(c.held_out_after),
+            probability(c.p_value),
+            _probability(c.probability),
+            ", ".join(c.indistinguishable_from) or "–",
+        )
+        for c in candidates
     ]
+    explained = {
+        rank: _explanation(c, start.table.unit)
+        for rank, c in enumerate(candidates)
+        if rank == 0 or (rank < EXPLAINED and c.p_value < SIGNIFICANT)
+    }
+    head = ("effect", "error / floor", "held-out error / floor", "p-value", "probability", "inseparable from")
+    text = CANDIDATES.format(seen=rounded(start.pooled_excess), unseen=rounded(start.held_out_excess))
+    return text, Table("Candidates", head, rows, (1, 2, 3, 4), headed=False, details=explained), Remark(CHANCES)
 
 
-def _curves(term: Term) -> list[dict[str, str]]:
-    """A free form: its coefficients have no meaning each."""
-    return [
-        {"name": "curve", "axis": axis or "–", "remark": "", "value": f"{n} coefficients", "unit": ""}
-        for axis, n in term.coefficients.items()
+def _explanation(c: Candidate, output_unit: str) -> tuple[str, ...]:
+    """Summary, formula and symptom."""
+    formula = Markup(formula_html(c.effect.formula, output_unit))  # noqa: S704 it escapes
+    return (
+        capital(c.effect.summary),
+        Markup('<span class="formula">{}</span>').format(formula),
+        Markup("<b>Symptom:</b> {}").format(capital(c.effect.symptom)),
+    )
+
+
+def _probability(p: float) -> str:
+    """A probability is approximate: never certain, never impossible."""
+    return f"above {SURE:g}" if p > SURE else f"below {1 - SURE:g}" if p < 1 - SURE else f"{p:.2g}"
+
+
+def _model(discovery: Discovery[Fit]) -> tuple[Block, ...]:
+    end, added = discovery.end, {step.name for step in discovery.steps}
+    rows = [row for term in end.model.terms for row in _parameters(term, term.name in added)]
+    head = ("effect", "parameter", "axis", "value (standard uncertainty)", "unit")
+    birge = BY_BIRGE.format(birge=end.birge) if end.birge > NOTICEABLE_BIRGE else ""
+    name = Markup('<b class="long">{}</b>').format(end.model.name)
+    table = Table("Parameters", head, rows, headed=False, grouped=True)
+    return name, ESTIMATED + birge, table, _errors(end)
+
+
+def _parameters(term: Term, is_added: bool) -> Iterable[tuple[str, ...]]:
+    """Rows of one effect: its parameters, its free curves, and its constants."""
+    shared = "all" if term.tied else "–"
+    rows = [(e.name, e.axis or shared, *estimate_cells(e, "uncertainty not known")) for e in term.quantities]
+    rows += [("curve", axis or shared, f"{n} coefficients", "") for axis, n in term.coefficients.items()]
+    rows += [
+        (name, "–", f"{rounded(value, 6)} (a reference value, not fitted)", "")
+        for name, value in term.constants.items()
     ]
+    for number, row in enumerate(rows):
+        yield "" if number else f"{term.name}{' (added)' if is_added else ''}", *row
 
 
-def _estimate(e: Estimate) -> dict[str, str]:
-    row = {"name": e.name, "axis": e.axis or "–", "remark": "" if e.std else "uncertainty not known"}
-    if not e.identified:
-        return row | {"value": f"not identified: {e.why}", "unit": "", "remark": ""}
-    return row | {"value": estimate_text(e.value, e.std), "unit": unit(e.unit)}
+def _next(discovery: Discovery[Fit]) -> tuple[Block, ...]:
+    experiment = discovery.next_experiment
+    if experiment is not None:
+        command = (Code(experiment.command), next_takes(experiment)) if experiment.command else ()
+        return next_words(experiment), *command
+    if discovery.outcome.value == "unexplained":
+        return (NO_PROPOSAL.format(structure=discovery.residual_structure),)
+    return (NO_EXPERIMENT,)
 
 
-def _provenance(found: Discovery[Fit], date: str, program: str) -> dict[str, str]:
-    table, model = found.start.table, found.start.model
+def _provenance(discovery: Discovery[Fit], date: str, program: str) -> dict[str, str]:
+    table, model = discovery.start.table, discovery.start.model
     facts: dict[str, object] = {
-        "data": _name(table.source),
+        "data": name_of_file(table.source),
         "kind and size": f"{table.n} {table.type.rows}; columns {', '.join(table.columns)}",
         "SHA-256 of the data": table.digest,
         "local gravity": f"{table.gravity_m_s2:g} m/s²",
         **{f"constant {name}": value for name, value in table.constants.items() if name != "gravity_m_s2"},
-        "model given": model.name,
-        **{f"model given: {name}": value for name, value in _named(model.provenance).items()},
+        **model_facts(model),
         "program": program,
         "date": date,
     }
     return {name: str(value) for name, value in facts.items()}
 
 
-def _named(provenance: Mapping[str, str | float]) -> dict[str, str | float]:
-    return {name: _name(value) if isinstance(value, str) else value for name, value in provenance.items()}
-
-
-def _name(source: str) -> str:
-    """The name of a file without its folder: paths of this machine are private."""
-    if PurePath(source).is_absolute() or PureWindowsPath(source).is_absolute():
-        return PureWindowsPath(source).name
-    return source
-
-
-# A run of the procedure motion
-
-
-NAMES = {
-    "rmse-linear-x": "rms error of the linear model",
-    "rmse-physical-x": "rms error of the physical model",
-    "improvement-x": "reduction of the rms error by the physical model",
-    "noise-limit-x": "error by the sensor's noise alone, in this band",
-    "amplitude": "peak acceleration, from the displacement sensor",
-    "frequency": "frequency, from the displacement sensor",
-}
-LEAST = 1e-8
-
-
-def motion_head(found: MotionResult) -> dict[str, Any]:
-    """The head of the page."""
-    linear, physical, limit = (
-        f"{rounded(q.value)} mm/s²" for q in (found.rmse_linear, found.rmse_physical, found.noise_limit)
-    )
-    return {
-        "headline": f"In motion, the physical model has an rms error of {physical}, the linear model of {linear}.",
-        "verdict": "measured",
-        "state": "found",
-        "what": f"Calibration report, motion at {found.frequency.value:.4g} Hz",
-        "summary": unbroken(_summary(found)),
-        "figures": [
-            ("linear model of the sweep", linear, "rms error against the displacement sensor"),
-            ("physical model of the sweep", physical, f"{rounded(found.excess)} × the noise limit"),
-            ("noise limit", limit, "error by the sensor's noise alone, in this band"),
-        ],
-    }
-
-
-def motion_section(found: MotionResult) -> dict[str, Any]:
-    """The rows of the section on the motion."""
-    return {
-        "quantities": [(NAMES[name], *_written(quantity)) for name, quantity in found.results.items()],
-        "biases": [_bias(bias) for bias in found.biases],
-    }
-
-
-def _summary(found: MotionResult) -> str:
-    before, after, limit = (rounded(q.value) for q in (found.rmse_linear, found.rmse_physical, found.noise_limit))
-    return (
-        f"The motion has a frequency of {found.frequency.value:.4g} Hz and a peak of "
-        f"{rounded(found.amplitude.value, 4)} mm/s². The rms error of the linear model is {before} mm/s², that of the "
-        f"physical model {after} mm/s², {100 * found.improvement.value:.1f} % less. The sensor's noise alone gives "
-        f"{limit} mm/s² in this band: the physical model has {rounded(found.excess)} × that limit. Both models were "
-        "fitted to the sweep of this run, without the motion. Models that are fitted to the motion itself have a "
-        "smaller error, given below, because that fit includes the changes since the sweep."
-    )
-
-
-def _written(q: Quantity) -> tuple[str, str]:
-    if q.unit == "1":
-        return estimate_text(100 * q.value, 100 * q.std), "%"
-    return estimate_text(q.value, q.std), unit(q.unit)
-
-
-def _bias(bias: Bias) -> dict[str, str]:
-    low, high = bias.band_hz
-    return {
-        "name": bias.name,
-        "at": f"{bias.at_hz:.4g} Hz",
-        "amplitude": f"{_small(100 * bias.amplitude)} %",
-        "phase": f"{_small(float(np.degrees(bias.phase_rad)))}°",
-        "band": f"{low:.4g} to {high:.4g} Hz",
-        "edge": f"{bias.edge_s:.2g} s",
-    }
-
-
-def _small(value: float) -> str:
-    """Two digits; 0 for values within the rounding of the computation."""
-    return rounded(value, 2) if abs(value) > LEAST else "0"
+def model_facts(model: Model) -> dict[str, str]:
+    """Name and provenance of the given model; files without their folders."""
+    facts = {f"model given: {name}": name_of_file(str(value)) for name, value in model.provenance.items()}
+    return {"model given": model.name, **facts}

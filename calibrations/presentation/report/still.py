@@ -2,117 +2,152 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Sequence
 
 from calibrations.discovery.results import Comparison, Discovery
-from calibrations.model import Estimate
 from calibrations.noise.dataset import CLEANED, mismatch
 from calibrations.noise.fit import NoiseFit
 from calibrations.noise.record import of_record
 from calibrations.presentation.chart import Picture
-from calibrations.presentation.report.page import figure, page
-from calibrations.text import capital, estimate_text, joined, probability, rounded, unit
+from calibrations.presentation.document import Block, Code, Items, Page, Remark, Section, Table
+from calibrations.presentation.page import html
+from calibrations.presentation.report.parameters import estimate_cells
+from calibrations.presentation.report.report import model_facts
+from calibrations.text import capital, joined, probability, rounded
+
+MISMATCH = (
+    "Mismatch: rms difference between the spectrum and the model, relative to the scatter by chance. Other half: the "
+    "model is fitted to one half of the record and compared with the other. The gain of a step depends on the steps "
+    "above it, and gains add up. The losses without one effect do not add up."
+)
+PLACES = (
+    "Largest first. The p-values of neighbouring averaging times are correlated; the limit holds for any correlation."
+)
+NO_PLACE = "No averaging time and no frequency differs from the model by more than chance."
+ALONE = (
+    "Each effect is added alone to the given model. p-value: the probability of such a gain anywhere in the search if "
+    "no effect is missing."
+)
 
 
 def still_report(
-    found: Discovery[NoiseFit], beside: Comparison[NoiseFit], date: str, program: str, pictures: Iterable[Picture]
+    discovery: Discovery[NoiseFit],
+    comparison: Comparison[NoiseFit],
+    date: str,
+    program: str,
+    pictures: Iterable[Picture],
 ) -> str:
     """The page as HTML text; the same arguments give the same page."""
-    return page(
-        "still.html",
-        headline=found.judgement.headline,
-        verdict=found.outcome.label,
-        state=found.outcome.value,
-        what=f"Noise report, model {found.start.model.name}",
-        summary=_summary(found),
-        figures=_figures(found),
-        pictures=[figure(picture) for picture in pictures],
-        steps=list(_steps(found)),
-        fails=[capital(place.text) for place in beside.fails],
-        given=found.start.model.name,
-        candidates=[
-            {
-                "name": c.name,
-                "gain": rounded(c.gain / 2),
-                "seen": rounded(c.excess_after),
-                "unseen": rounded(c.held_out_after),
-                "p": probability(c.p_value),
-                "rivals": ", ".join(c.indistinguishable_from) or "–",
-            }
-            for c in found.findings.candidates
-        ],
-        model=found.end.model.name,
-        parameters=[(term.name, _estimate(e)) for term in found.end.model.terms for e in term.estimates],
-        next=found.next_experiment,
-        provenance=_provenance(found, date, program),
+    return html(
+        Page(
+            headline=discovery.judgement.headline,
+            verdict=discovery.outcome.label,
+            state=discovery.outcome.value,
+            subject=f"Noise report, model {discovery.start.model.name}",
+            summary=_summary(discovery),
+            figures=_figures(discovery),
+            sections=list(_sections(discovery, comparison, list(pictures))),
+            provenance=_provenance(discovery, date, program),
+        )
     )
 
 
-def _summary(found: Discovery[NoiseFit]) -> str:
-    text = capital(of_record(found.start.still)) + ". "
-    if found.steps:
+def _sections(
+    discovery: Discovery[NoiseFit], comparison: Comparison[NoiseFit], pictures: Sequence[Picture]
+) -> Iterable[Section]:
+    head = (
+        "model", "log-likelihood gained", "lost without this effect", "mismatch / chance", "other half of the record",
+        "mismatch of the Allan deviation",
+    )  # fmt: skip
+    steps = Table("Mismatch by model, values", head, list(_steps(discovery)), range(1, 6), headed=False)
+    yield Section("Mismatch by model", (steps, Remark(MISMATCH)))
+    yield Section("Measurement and model", pictures)
+    fails = [capital(place.text) for place in comparison.fails]
+    given = discovery.start.model.name
+    yield Section(f"Mismatch of the model {given}", (PLACES, Items(fails)) if fails else (NO_PLACE,))
+    if discovery.findings.candidates:
+        yield Section("Candidates", _candidates(discovery))
+    rows = [
+        (term.name, e.name.replace("_", " "), e.axis, *estimate_cells(e))
+        for term in discovery.end.model.terms
+        for e in term.estimates
+    ]
+    coefficients = ("effect", "parameter", "axis", "value (standard uncertainty)", "unit")
+    title = "The model, extended" if discovery.steps else "The model"
+    yield Section(title, (discovery.end.model.name, Table("Coefficients", coefficients, rows, headed=False)))
+    if (experiment := discovery.next_experiment) is not None:
+        yield Section("Next experiment", (f"{capital(experiment.why)}.", Code(experiment.command)))
+
+
+def _candidates(discovery: Discovery[NoiseFit]) -> tuple[Block, ...]:
+    rows = [
+        (
+            c.name,
+            rounded(c.gain / 2),
+            rounded(c.excess_after),
+            rounded(c.held_out_after),
+            probability(c.p_value),
+            ", ".join(c.indistinguishable_from) or "–",
+        )
+        for c in discovery.findings.candidates
+    ]
+    head = (
+        "effect", "log-likelihood", "mismatch / chance", "other half of the record", "p-value", "inseparable from",
+    )  # fmt: skip
+    return Table("Candidates", head, rows, range(1, 5), headed=False), Remark(ALONE)
+
+
+def _summary(discovery: Discovery[NoiseFit]) -> str:
+    text = capital(of_record(discovery.start.still)) + ". "
+    start, end = discovery.start, discovery.end
+    if discovery.steps:
         text += (
-            f"With {joined(found.causes)} the mismatch of the spectrum falls from {rounded(found.start.pooled_excess)} "
-            f"to {rounded(found.end.pooled_excess)} times the scatter by chance, and that of the Allan deviation from "
-            f"{_off(found.start)} to {_off(found.end)}."
+            f"With {joined(discovery.causes)} the mismatch of the spectrum falls from "
+            f"{rounded(start.pooled_excess)} to {rounded(end.pooled_excess)} times the scatter by chance, and that of "
+            f"the Allan deviation from {_off(start)} to {_off(end)}."
         )
     else:
-        text += f"The mismatch of the spectrum is {rounded(found.start.pooled_excess)} times the scatter by chance."
-    return f"{text} {found.judgement.text}"
+        text += f"The mismatch of the spectrum is {rounded(discovery.start.pooled_excess)} times the scatter by chance."
+    return f"{text} {discovery.judgement.text}"
 
 
-def _off(found: NoiseFit) -> str:
-    return joined(f"{rounded(100 * value, 2)} % ({axis})" for axis, value in mismatch(found).items())
+def _off(fit: NoiseFit) -> str:
+    return joined(f"{rounded(100 * value, 2)} % ({axis})" for axis, value in mismatch(fit).items())
 
 
-def _figures(found: Discovery[NoiseFit]) -> list[tuple[str, str, str]]:
+def _figures(discovery: Discovery[NoiseFit]) -> list[tuple[str, str, str]]:
     remark = "mismatch of the spectrum, relative to chance"
-    shown = [("before" if found.steps else "mismatch", rounded(found.start.pooled_excess), remark)]
-    if found.steps:
-        gained = found.end.log_likelihood - found.start.log_likelihood
-        shown.append(("after", rounded(found.end.pooled_excess), remark))
+    shown = [("before" if discovery.steps else "mismatch", rounded(discovery.start.pooled_excess), remark)]
+    if discovery.steps:
+        gained = discovery.end.log_likelihood - discovery.start.log_likelihood
+        shown.append(("after", rounded(discovery.end.pooled_excess), remark))
         shown.append(("log-likelihood", f"+{rounded(gained)}", "gained by the effects added"))
     return shown
 
 
-def _steps(found: Discovery[NoiseFit]) -> Iterable[dict[str, str]]:
+def _steps(discovery: Discovery[NoiseFit]) -> Iterable[tuple[str, ...]]:
     """Rows of the steps: the gains, which add up, and the loss of the whole without each effect alone."""
-    start, baseline = found.start, found.findings.baseline
+    start, baseline = discovery.start, discovery.findings.baseline
     yield _step(start.model.name, start)
     if baseline is not start:
         yield _step(CLEANED, baseline, baseline.log_likelihood - start.log_likelihood)
-    for step in found.steps:
+    for step in discovery.steps:
         yield _step(f"+ {step.name}", step.after, step.after.log_likelihood - step.before.log_likelihood, step.alone)
 
 
-def _step(name: str, fit: NoiseFit, gained: float | None = None, alone: float | None = None) -> dict[str, str]:
-    return {
-        "name": name,
-        "gained": "–" if gained is None else rounded(gained),
-        "alone": "–" if alone is None else rounded(alone),
-        "seen": rounded(fit.pooled_excess),
-        "unseen": rounded(fit.held_out_excess),
-        "allan": _off(fit),
-    }
+def _step(name: str, fit: NoiseFit, gained: float | None = None, alone: float | None = None) -> tuple[str, ...]:
+    likelihoods = ("–" if value is None else rounded(value) for value in (gained, alone))
+    return name, *likelihoods, rounded(fit.pooled_excess), rounded(fit.held_out_excess), _off(fit)
 
 
-def _estimate(e: Estimate) -> dict[str, str]:
-    row = {"name": e.name.replace("_", " "), "axis": e.axis}
-    if not e.identified:
-        return row | {"value": f"not identified: {e.why}", "unit": ""}
-    return row | {"value": estimate_text(e.value, e.std), "unit": unit(e.unit)}
-
-
-def _provenance(found: Discovery[NoiseFit], date: str, program: str) -> dict[str, Any]:
-    still, given = found.start.still, found.start.model
+def _provenance(discovery: Discovery[NoiseFit], date: str, program: str) -> dict[str, str]:
+    still, model = discovery.start.still, discovery.start.model
     return {
         "data": still.source.replace("\\", "/").rpartition("/")[2],
         "kind and size": f"still record, {still.n} samples of {len(still.channels)} channels at {still.rate_hz:.6g} Hz",
         "SHA-256 of the samples": still.digest,
         **{f"constant {name}": str(value) for name, value in still.constants.items()},
-        "model given": given.name,
-        **{f"model given: {name}": str(value) for name, value in given.provenance.items()},
+        **model_facts(model),
         "program": program,
         "date": date,
     }

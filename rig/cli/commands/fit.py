@@ -82,7 +82,7 @@ def _further(data: Dataset[Any], model: Model, found: Any) -> _Further:
     if data.form != "rows":
         return _Further({})
     from calibrations.discovery.check_poses import unseen
-    from calibrations.presentation.report.parameters import budget_document as budget_of
+    from calibrations.presentation.budget import budget_document as budget_of
     from rig.cli.terminal.words import paper
 
     checked = unseen(model, found.table)
