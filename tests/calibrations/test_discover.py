@@ -12,6 +12,7 @@ from calibrations.loop import add, diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations.synthetic import components, poses, turns
+from tests.slow import first_fast
 
 LINEAR = read_model("linear")
 COMMON = read_model("common-scale")
@@ -120,10 +121,12 @@ def test_a_turned_sensor_and_a_turned_stage_are_told_apart_face_down() -> None:
     assert (found.next_experiment.procedure, found.next_experiment.settings) == ("sweep", {"face": "both"})
 
 
-def test_what_no_effect_describes_is_unexplained() -> None:
-    columns = turns()
+@pytest.mark.parametrize("step_deg", first_fast([60.0, 15.0]))
+def test_what_no_effect_describes_is_unexplained(step_deg: float) -> None:
+    """With 42 poses, by effects alone; with 150, after the search for places as well."""
+    columns = turns((90, 30, 150), step_deg)
     x, y, _ = components(columns)
-    step = 0.005 * (columns["t_s"] > 1000)
+    step = 0.005 * (columns["t_s"] > np.median(columns["t_s"]))
     found = discover(poses(columns, 2.5 + x + step, 2.5 + y - step), LINEAR)
     assert found.verdict == "unexplained"
     assert found.residual_structure

@@ -71,6 +71,7 @@ def test_outputs_before_their_rounding_are_within_their_stated_uncertainty() -> 
     assert np.quantile(std, 0.1) < 0.05 * step
 
 
+@pytest.mark.slow
 def test_an_effect_before_a_coarse_converter_is_found_beside_it() -> None:
     found = cal.discover(table(before(0.006), 0.008, 0.0008), "linear")
     assert set(found.causes) == {"quantisation", "scale-factor-asymmetry"}

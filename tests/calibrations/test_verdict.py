@@ -81,6 +81,9 @@ def test_an_error_above_the_floor_without_a_search_is_no_complete_model() -> Non
 
 
 def test_before_nothing_is_as_likely_as_anything() -> None:
-    """Of 12 clean sensors none is likely to miss something, however many effects are tried."""
-    likely = [sum(c.probability for c in clean_of(seed).candidates) for seed in range(12)]
+    """No clean sensor is likely to miss something, however many effects are tried.
+
+    With even odds of each effect every sensor has a sum near 1, so that 4 sensors tell as well as 12.
+    """
+    likely = [sum(c.probability for c in clean_of(seed).candidates) for seed in range(4)]
     assert np.mean(likely) < 0.1

@@ -44,6 +44,11 @@ NAMES = {
     "unsteady supply": {"supply-sensitivity"},
 }
 OUTSIDE = ("charge step", "worm gear", "cable tug", "rocking mount", "popping lid")
+STRUCTURES = {  # what the residual of a defect shows at 10 times the noise
+    "charge step": "step at t =",
+    "worm gear": "5th harmonic of the stage angle beta",
+    "cable tug": "sector of beta around",
+}
 
 
 def table(columns: rigs.Table) -> Table:
@@ -77,26 +82,14 @@ def test_nothing_is_named_on_a_clean_rig(seed: int) -> None:
     assert found.excess_before < 1.15
 
 
-@pytest.mark.parametrize("times_noise", [10, *slow([3, 30])])
-@pytest.mark.parametrize("defect", first_fast(OUTSIDE, 2))
+@pytest.mark.slow
+@pytest.mark.parametrize("times_noise", [3, 10, 30])
+@pytest.mark.parametrize("defect", OUTSIDE)
 def test_what_no_effect_describes_is_called_unexplained(defect: str, times_noise: float) -> None:
     found = diagnose(table(rigs.unexplained_rig(defect, times_noise, seed=4)), linear())
     assert found.verdict == "unexplained"
     assert found.residual_structure
-
-
-STRUCTURES = {
-    "charge step": "step at t =",
-    "worm gear": "5th harmonic of the stage angle beta",
-    "cable tug": "sector of beta around",
-}
-
-
-@pytest.mark.parametrize(("defect", "words"), first_fast(STRUCTURES.items(), 2))
-def test_the_structure_of_the_unexplained_is_described(defect: str, words: str) -> None:
-    structure = diagnose(table(rigs.unexplained_rig(defect, 10, seed=5)), linear()).residual_structure
-    assert structure is not None
-    assert words in structure
+    assert times_noise != 10 or STRUCTURES.get(defect, "") in found.residual_structure
 
 
 def test_a_complete_model_misses_nothing() -> None:

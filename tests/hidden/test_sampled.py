@@ -33,7 +33,7 @@ CAUSES: dict[str, list[dict[str, Any]]] = {
     "temperature-hysteresis": [{"cause": sampled.lagging_stress(slope)} for slope in (2e-4, 1e-3, 5e-3)],
     "dead-zone": [{"cause": sampled.threshold(width)} for width in (3e-4, 2e-3, 2e-2)],
 }
-FAST = ("saturation", "warm-up-scale", "dead-zone")  # the others take as long, on the same way
+FAST = ("warm-up-scale",)  # the others take longer, on the same way
 CASES = [
     case
     for name, causes in CAUSES.items()

@@ -42,12 +42,14 @@ def test_a_pattern_that_holds_the_effect_is_its_form_and_no_other_cause(name: st
     assert found_on(name, 30, seed).causes == (cause,)
 
 
+@pytest.mark.slow
 def test_a_step_in_time_still_is_another_cause_than_a_random_walk_that_follows_it() -> None:
     found = found_on("own/arrived charge", 10, 7001)
     assert (found.verdict, found.causes) == ("unexplained", ())
     assert str(found.residual_structure).startswith("step at t =")
 
 
+@pytest.mark.slow
 def test_a_rival_is_judged_with_its_shape_fitted() -> None:
     """A drift over a short record may be the end of a long warming: no start of that has so long a time constant."""
     assert found_on("own/ageing reference", 30, 6166).alternatives == {"bias-drift": ("warm-up-bias",)}

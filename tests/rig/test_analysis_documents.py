@@ -239,9 +239,9 @@ def test_the_exit_status_is_0_whatever_the_verdict_and_1_with_check(
     failing = bent
     if command == "discover":  # which finds what is missing, unless nothing in the catalogue is
         path = Path(bent).with_name("step.csv")
-        columns = turns()
+        columns = turns((90, 30, 150), 60.0)
         x, y, _ = components(columns)
-        write_csv(poses(columns, 2.5 + x + 0.005 * (columns["t_s"] > 1000), 2.5 + y), path)
+        write_csv(poses(columns, 2.5 + x + 0.005 * (columns["t_s"] > np.median(columns["t_s"])), 2.5 + y), path)
         failing = str(path)
     ended = rig(command, failing, "--model", "linear", "--check", "--json")
     assert ended.status == 1

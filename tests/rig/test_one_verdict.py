@@ -48,9 +48,9 @@ def _clean_poses() -> Table:
     return synthetic.poses(columns, 2.5 + x, 2.5 + y)
 
 
-def _unexplained_poses() -> Table:
+def _unexplained_poses(step_deg: float) -> Table:
     """The fifth harmonic of the stage angle in x, which no effect of the catalogue has."""
-    columns = synthetic.turns((90, 30, 150), step_deg=20.0)
+    columns = synthetic.turns((90, 30), step_deg)
     x, y, _ = synthetic.components(columns)
     return synthetic.poses(columns, 2.5 + x + 2e-3 * np.sin(5 * np.radians(columns["beta_deg"])), 2.5 + y)
 
@@ -67,14 +67,16 @@ def _positions() -> Table:
 TABLES: Mapping[str, Callable[[], Table]] = {
     "poses": _poses,
     "clean poses": _clean_poses,
-    "unexplained poses": _unexplained_poses,
+    "unexplained poses": lambda: _unexplained_poses(36.0),
+    "unexplained poses, by places": lambda: _unexplained_poses(20.0),
     "positions": _positions,
     "positions without stated noise": lambda: test_common_floor.accelerometer(3),
     "fields": test_common_floor.magnetometer,
     "rates": lambda: turned.gyroscope(4, lean_deg=2.0, per_g=0.6),
     "motion": lambda: shaken.record(shaken.TWO, 10.0, 1, turn_deg=(0.0, 1.5, 2.0)),
 }
-SLOW = ("poses", "positions without stated noise", "motion")  # their searches take seconds each
+# their searches take seconds each
+SLOW = ("poses", "unexplained poses, by places", "positions without stated noise", "motion")
 KINDS = [pytest.param(kind, marks=pytest.mark.slow) if kind in SLOW else kind for kind in (*TABLES, "still")]
 
 
