@@ -29,7 +29,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def data(here: Path) -> str:
     """A small table: five waves in a turn of beta on x, and humidity."""
-    columns = turns((90, 30, 150), step_deg=15.0)
+    columns = turns((90, 30), step_deg=40.0)
     columns["humidity"] = np.random.default_rng(5).uniform(30, 60, len(columns["t_s"]))
     x, y, _ = components(columns)
     wave = 10 * NOISE_V * np.sin(5 * np.radians(columns["beta_deg"]))

@@ -213,6 +213,7 @@ def test_a_small_gap_is_closed_and_that_is_said(rig: Rig, folder: Path, samples:
     assert "a gap is closed up, 5 s in all" in ended.err
 
 
+@pytest.mark.slow
 def test_known_noise_lets_a_quiet_model_be_adequate(rig: Rig, folder: Path) -> None:
     """A sweep under flicker five times the white noise of a mean, whose level a still record has told."""
     from calibrations.importing.foreign import write_csv
