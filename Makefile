@@ -5,6 +5,8 @@
 # Strict: an index that knows no weaknesses is no reason to find none.
 PYTHON ?= python3
 BIN := .venv/bin
+# Compiled modules are kept: each process of the tests would compile all of them anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test test-all setup bench docs lint audit clean
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -38,10 +39,16 @@ def found(still: Still) -> Discovery[NoiseFit]:
     return discover(still, read_model("still"))
 
 
+@cache
+def found_of(seed: int = 0, walk: float = 0.0, **form: float) -> Discovery[NoiseFit]:
+    """The search on such a ramp."""
+    return found(ramp(seed, walk, **form))
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_the_cause_is_named_and_nothing_but_white_noise_is_left(name: str) -> None:
     form, causes = CASES[name]
-    result = found(ramp(**form))
+    result = found_of(**form)
     assert (result.verdict, result.causes) == ("adequate", causes)
     assert result.residual_structure is None
     assert result.start.pooled_excess > 10
@@ -50,14 +57,14 @@ def test_the_cause_is_named_and_nothing_but_white_noise_is_left(name: str) -> No
 
 
 def test_a_line_has_its_slope_and_a_bow_its_curve() -> None:
-    slope = found(ramp(line=5e-4)).model.params[f"{BIAS}.x"]
+    slope = found_of(line=5e-4).model.params[f"{BIAS}.x"]
     assert slope.value == pytest.approx(5e-4, abs=3 * slope.std)
     assert slope.std < 3e-6
-    assert CURVE in found(ramp(line=5e-4, bow=4e-3)).refinements
+    assert CURVE in found_of(line=5e-4, bow=4e-3).refinements
 
 
 def test_a_lag_is_that_of_the_sensor() -> None:
-    result = found(ramp(line=5e-4, delay_s=300.0))
+    result = found_of(line=5e-4, delay_s=300.0)
     (term,) = (term for term in result.model.terms if term.name == BIAS)
     assert term.constants["lead_s"] == pytest.approx(-300, abs=15)
     assert "behind the thermometer" in result.judgement.text
@@ -65,7 +72,7 @@ def test_a_lag_is_that_of_the_sensor() -> None:
 
 @pytest.mark.parametrize("seed", [0, 5])
 def test_branches_have_their_width(seed: int) -> None:
-    result = found(ramp(seed, line=5e-4, glue=4e-3))
+    result = found_of(seed, line=5e-4, glue=4e-3)
     assert result.refinements == (BIAS,)
     assert result.model.params[f"{HYSTERESIS}.play"].value == pytest.approx(2.0, abs=0.2)
     errors = [result.start.pooled_excess, *(step.after.pooled_excess for step in result.steps)]
@@ -83,11 +90,11 @@ def test_a_constant_temperature_is_no_cause() -> None:
 
 def test_a_ramp_that_does_nothing_is_no_cause() -> None:
     for seed in range(3):
-        assert found(ramp(seed)).causes == ()
+        assert found_of(seed).causes == ()
 
 
 def test_noise_is_named_beside_what_the_temperature_does() -> None:
-    result = found(ramp(line=5e-4, walk=1e-5))
+    result = found_of(line=5e-4, walk=1e-5)
     assert result.causes == (BIAS, "rate-random-walk")
 
 
@@ -106,7 +113,7 @@ def test_the_rest_of_a_search_proposes_its_next_effect() -> None:
 
 
 def test_a_calibrated_model_fits_its_record_and_another_one_of_the_sensor(tmp_path: Path) -> None:
-    result = found(ramp(line=5e-4, bow=4e-3))
+    result = found_of(line=5e-4, bow=4e-3)
     model = parse_model(dump_model(result.model), "made.yaml", catalogue())
     for seed in (0, 1):
         other = ramp(seed, line=5e-4, bow=4e-3)
@@ -131,7 +138,7 @@ def test_an_effect_of_temperature_is_added_to_a_noise_model() -> None:
 
 
 def test_a_record_without_temperature_has_no_effect_of_it() -> None:
-    model = found(ramp(line=5e-4)).model
+    model = found_of(line=5e-4).model
     volts, _ = record(np.random.default_rng(0))
     bare = reduce_record([Samples("x", [volts], RATE_HZ, "V")], "made")
     with pytest.raises(DataError, match="temperature_c"):

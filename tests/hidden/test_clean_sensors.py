@@ -16,6 +16,7 @@ def check_nothing_is_missing(layout: str, seed: int, slow: float) -> None:
     assert not found.causes
 
 
+@pytest.mark.slow
 def test_slow_noise_that_looks_like_an_oscillation_is_no_cause() -> None:
     check_nothing_is_missing("upright", 10_034, 1.0)
 

@@ -22,7 +22,6 @@ from rig.record import Record
 from rig.record.measured import table_of
 from rig.runs.runner import start
 from tests.hidden import rigs
-from tests.slow import slow
 
 EVERY_INCLINATION = {"step_deg": "20"}
 GRID = EVERY_INCLINATION | {"inclinations_deg": "90,30,150"}  # enough for most defects of ten times the noise
@@ -38,18 +37,15 @@ def swept(config: WorldConfig, seed: int, folder: Path, **settings: str) -> Tabl
         return table_of(record, outcome.run.run)
 
 
+@pytest.mark.slow
 @pytest.mark.sockets
 @pytest.mark.parametrize(
     ("defect", "effect", "grid"),
     [
         ("plate mismatch", "quadratic-nonlinearity", GRID),
-        *slow(
-            [
-                ("package stress", "temperature-bias", GRID),
-                ("slipping contacts", "hysteresis", EVERY_INCLINATION),
-                ("gear play", "stage-backlash", GRID),
-            ]
-        ),
+        ("package stress", "temperature-bias", GRID),
+        ("slipping contacts", "hysteresis", EVERY_INCLINATION),
+        ("gear play", "stage-backlash", GRID),
     ],
 )
 def test_the_missing_effect_is_named(defect: str, effect: str, grid: dict[str, str], tmp_path: Path) -> None:

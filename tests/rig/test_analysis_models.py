@@ -101,6 +101,7 @@ def test_a_fitted_model_is_evaluated_as_it_is(rig: Rig, data: str, tmp_path: Pat
     assert model.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_data_without_any_noise_has_its_answer(rig: Rig, tmp_path: Path) -> None:
     columns = turns(step_deg=30.0)
     x, y, z = components(columns)

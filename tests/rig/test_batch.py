@@ -108,6 +108,7 @@ def test_results_carry_the_sensors_name(rig: Call, swept: tuple[Path, Path], tmp
     assert {results[f"{name}/noise-pp-x"]["verdict"] for name in NAMES} == {"pass"}
 
 
+@pytest.mark.slow
 def test_a_search_goes_by_the_first_and_finds_all(rig: Call, swept: tuple[Path, Path]) -> None:
     ended = rig("run", "misalignment", "--dwell-s", "1", "--bench", str(swept[1]), "--unattended", "--json")
     assert ended.status == 0, ended.err

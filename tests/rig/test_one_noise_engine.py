@@ -13,6 +13,7 @@ import pytest
 from tests.calibrations import hidden_noise
 from tests.calibrations.hidden_noise import RATE_HZ, RECORDS, SAMPLES, telegraph, walk, white
 from tests.rig.conftest import Ended
+from tests.slow import slow
 
 Rig = Callable[..., Ended]
 Array = np.ndarray
@@ -91,7 +92,7 @@ def test_of_every_process(rig: Rig, tmp_path: Path, name: str) -> None:
     assert named(found["noise"]) == truth
 
 
-@pytest.mark.parametrize("name", DISTURBED)
+@pytest.mark.parametrize("name", [*slow(["two axes"]), *(name for name in DISTURBED if name != "two axes")])
 def test_of_every_disturbance(rig: Rig, tmp_path: Path, name: str) -> None:
     make, kinds, processes = DISTURBED[name]
     found = answers(rig, written(tmp_path, make(np.random.default_rng(5))))
@@ -100,6 +101,7 @@ def test_of_every_disturbance(rig: Rig, tmp_path: Path, name: str) -> None:
     assert named(found["noise"]) == processes
 
 
+@pytest.mark.slow
 def test_of_the_default_rig_both_outputs_follow_the_supply_and_no_random_walk_is_named(
     rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

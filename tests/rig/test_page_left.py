@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import quote
 
@@ -11,9 +12,10 @@ import pytest
 from nicegui import Client
 from nicegui.testing import user_simulation
 
+from rig.bench import DEFAULT
+from rig.services.search import Counted
 from rig.web.desk import Desk
 from rig.web.pages import register
-from tests.browser.held import held_up
 from tests.browser.measured import two_faults
 
 SEARCH = "diagnosed"  # the thread of a search has the name of what it computes
@@ -26,7 +28,13 @@ def searches() -> list[threading.Thread]:
 @pytest.mark.parametrize("closed", [True, False])
 def test_a_closed_page_ends_its_search(closed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RIG_HOME", str(tmp_path / "home"))
-    data, desk = two_faults(tmp_path), Desk(held_up(tmp_path))
+    data, desk, go, iterate = two_faults(tmp_path), Desk(DEFAULT), threading.Event(), Counted.__iter__
+
+    def held(effects: Counted) -> Iterator[str]:
+        assert go.wait(60)
+        yield from iterate(effects)
+
+    monkeypatch.setattr(Counted, "__iter__", held)
 
     async def simulated() -> None:
         async with user_simulation() as user:
@@ -37,7 +45,7 @@ def test_a_closed_page_ends_its_search(closed: bool, tmp_path: Path, monkeypatch
                 [search] = searches()
                 if closed:
                     client.delete()
-                (tmp_path / "go").touch()
+                go.set()
                 await asyncio.to_thread(search.join)
             finally:  # NiceGUI would take the modules of these pages from Python, and all that they lie in
                 Client.page_routes.clear()

@@ -145,6 +145,7 @@ def read_only(rig_home: Path) -> Any:
     rig_home.chmod(0o755)
 
 
+@pytest.mark.slow
 def test_a_read_only_record_is_read_and_a_run_into_it_is_refused(read_only: str) -> None:
     listed = as_nobody("runs")
     assert (listed.returncode, read_only in listed.stdout) == (0, True), listed.stderr

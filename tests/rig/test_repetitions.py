@@ -94,6 +94,7 @@ def test_repetitions_of_every_kind_are_in_the_budget(rig: Rig) -> None:
 
 
 @pytest.mark.sockets
+@pytest.mark.slow
 def test_what_the_technician_does_by_hand_is_in_the_budget(rig: Rig, tmp_path: Path) -> None:
     document = by_hand()
     document["world"] = {"preset": "ideal", "noise": {"white_v": 1e-5}, "seating": {"tilt_deg": 0.02, "grip_pm": 20.0}}

@@ -22,6 +22,7 @@ SESSION = ("--kind", "rates", *(word for name in ["path=part", *NAMES] for word 
 RATE, TURN = ("--constant", "sample_rate_hz=204.8"), ("--constant", "turn_deg=360")
 
 
+@pytest.mark.slow
 def test_six_faces_and_three_turns_give_the_published_calibration(rig: Rig, tmp_path: Path) -> None:
     file = str(DATA / "imucal_ferraris_gyro" / "annotated_session.csv.gz")
     taken = rig("import", file, *SESSION, *RATE, *TURN, "--json")
