@@ -22,7 +22,7 @@ from drivers.transport.link import Link
 
 Settings = TypeVar("Settings", bound=DigitalSettings)
 QUIET_S = 2.0  # silence that ends a record; at least ten samples
-POLL_S = 0.2  # samples that wait in the buffers of the system are read so often
+POLL_S = 0.4  # samples that wait in the buffers of the system are read so often
 STUCK = 100  # equal samples of one axis, while another changes
 RATE_OFF = 0.05  # of the stated rate
 TEST_S = 2.0
@@ -45,7 +45,7 @@ class Decoder(Protocol):
 
     @property
     def unread(self) -> int:
-        """Bytes without a line or message so far."""
+        """Bytes after the last line or message."""
 
 
 Decoding = TypeVar("Decoding", bound=Decoder)
@@ -101,7 +101,7 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         decoder, reception, begun_s = self._decoder(), self._reception(), self._clock.now()
         try:
             self._begin()
-            begun_s = self._clock.now()
+            decoder, begun_s = self._decoder(), self._clock.now()
             while (left_s := begun_s + TEST_S - self._clock.now()) > 0:
                 reception.take(self._listen(decoder, left_s), self._clock.now())
             if not reception.count:
@@ -141,12 +141,15 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         total, block = self.scans(duration_s), self.scans(block_s)
         self._begin()
         decoder, reception, given = self._decoder(), self._reception(), 0
+        begun_s, quiet_s = self._clock.now(), max(QUIET_S, 10 / rate_hz)
         try:
             while given < total:
                 wanted = min(block, total - given)
                 while reception.count < given + wanted:
                     self._pause(reception, total)
-                    reception.take(self._listen(decoder, max(QUIET_S, 10 / rate_hz)), self._clock.now())
+                    reception.take(self._listen(decoder, quiet_s), self._clock.now())
+                    if self._clock.now() - (reception.end_s if reception.count else begun_s) > quiet_s:
+                        raise self._silence(quiet_s)
                 self._require_complete(reception, decoder)
                 values = reception.pull(wanted)
                 self._require_alive(values, names, reception)
@@ -175,7 +178,7 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
                 return Batch(np.empty((0, 0)))
             raise self._silence(timeout_s)
         batch = decoder.take(data)
-        if decoder.damaged > SHOWN + decoder.good or (not decoder.good and decoder.unread > self.longest):
+        if decoder.damaged > SHOWN + decoder.good or decoder.unread > self.longest:
             raise self._unreadable(decoder)
         return batch
 
@@ -230,8 +233,8 @@ def _most(values: NDArray[np.float64]) -> float:
     return float(np.abs(values).max())
 
 
-def no_samples(name: str, url: str, timeout_s: float) -> LinkTimeout:
-    """The error for a link on which nothing arrives."""
+def no_samples(name: str, url: str, timeout_s: float, what: str) -> LinkTimeout:
+    """The error for a link on which `what` does not arrive."""
     return LinkTimeout(
-        f"{name}: nothing came on {url} within {timeout_s:g} s", "Check power and cable, and that the sensor sends"
+        f"{name}: no {what} came on {url} within {timeout_s:g} s", "Check power and cable, and that the sensor sends it"
     )

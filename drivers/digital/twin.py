@@ -18,6 +18,7 @@ from drivers.world.digital import Trim
 
 Floats = NDArray[np.float64]
 G_M_S2 = 9.80665
+HELD = 1 << 16  # bytes
 # unit -> factor from g, deg/s or uT
 FORCE = {"g": 1.0, "m/s^2": G_M_S2, "count": 16384.0}
 RATE = {"deg/s": 1.0, "rad/s": math.radians(1.0), "count": 131.0}
@@ -66,6 +67,10 @@ class Clock:
         """The true time of a tick."""
         return self.tick_s + (tick - self.tick) * self.interval_s
 
+    def local_s(self, now_s: float) -> float:
+        """The clock's own time since its tick 0."""
+        return self.period_s * (self.tick + (now_s - self.tick_s) / self.interval_s)
+
     def ticks(self, now_s: float) -> int:
         """The number of the last tick by then."""
         return self.tick + int(np.floor((now_s - self.tick_s) / self.interval_s + 1e-6))
@@ -84,7 +89,7 @@ class DigitalTwin(Twin):
         self._world, self._port, self._count = world, port, 1
         self._names = list(settings.wired)
         self._factors = factors(settings)
-        self._clock = Clock(1 / settings.rate_hz)
+        self._clock, self._zero_s = Clock(1 / settings.rate_hz), 0.0  # the sensor's time of tick 0
         self._held: float | None = None
 
     @abstractmethod
@@ -93,13 +98,17 @@ class DigitalTwin(Twin):
 
     def advance(self, now_s: float) -> None:
         """Take all samples that are due by `now_s`, and send them."""
+        self._sample(now_s, self._listeners(now_s))
+
+    def _sample(self, now_s: float, listeners: Sequence[Connection]) -> None:
+        """Take all samples that are due by `now_s`, and send them to `listeners`."""
         self._clock.run(1e-6 * (self.faults.size("clock-drift", now_s) or 0.0) if self.faults else 0.0, self._count)
         due = self._clock.ticks(now_s) + 1 - self._count
         if due <= 0:
             return
         start_s, interval_s, first = self._clock.true_s(self._count), self._clock.interval_s, self._count
         self._count += due
-        if listeners := self._listeners(now_s):
+        if listeners:
             values = self._world.sensed(self._names, start_s, interval_s, due) * self._factors
             at_s: Floats = np.minimum(start_s + interval_s * np.arange(due, dtype=np.float64), now_s)
             ticks = np.arange(first, first + due)
@@ -109,11 +118,25 @@ class DigitalTwin(Twin):
         return self._clock.true_s(self._count)
 
     def state(self) -> dict[str, Any]:
-        return {"count": self._count, "clock": asdict(self._clock)}
+        return {"count": self._count, "clock": asdict(self._clock), "zero_s": self._zero_s}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        self._count = state["count"]
+        self._count, self._zero_s = state["count"], state["zero_s"]
         self._clock = Clock(**state["clock"])
+
+    def _begin_at(self, now_s: float, rate_hz: float) -> None:
+        """Begin anew: the sensor's time is 0."""
+        self._clock, self._zero_s, self._count = Clock(1 / rate_hz, 0, now_s, self._clock.gain), 0.0, 1
+
+    def _change_rate(self, now_s: float, rate_hz: float) -> None:
+        """Sample at another rate; the sensor's time goes on."""
+        time_s = self._zero_s + self._clock.local_s(now_s)
+        self._begin_at(now_s, rate_hz)
+        self._zero_s = time_s
+
+    def _sensor_s(self, ticks: NDArray[np.int64]) -> Floats:
+        """The sensor's time of samples, s."""
+        return np.asarray(self._zero_s + self._clock.period_s * ticks)
 
     def _listeners(self, now_s: float) -> list[Connection]:
         """Connections that have read what was sent so far."""
@@ -145,6 +168,11 @@ class DigitalTwin(Twin):
         if self.faults.size("wrong-baud", now_s) is not None:
             return bytes(byte ^ 0xF8 for byte in message)
         return 2 * message if self.faults.size(f"doubled-{self.carrier}", now_s) is not None else message
+
+
+def talking_port(listen: str) -> Port:
+    """A port for a sensor that sends by itself: the system keeps little of what nobody reads."""
+    return Port(listen, held=HELD)
 
 
 def factors(settings: DigitalSettings) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.digital.settings import FIELDS, FORCES, RATES, VOLTAGES
-from drivers.digital.twin import DigitalTwin, Floats, World, common_faults
+from drivers.digital.twin import DigitalTwin, Floats, World, common_faults, talking_port
 from drivers.imu_lines.driver import WRAP, Settings
 from drivers.imu_lines.lines import TIME, checksum
 from drivers.transport.address import Address
@@ -75,6 +75,6 @@ def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str =
     """
     for _, settings in roles.values():
         trims(list(settings.wired), world.trims)
-    ports = {role: Port(listen) for role in roles}
+    ports = {role: talking_port(listen) for role in roles}
     twins = {role: Talker(world, roles[role][1], port) for role, port in ports.items()}
     return Server(list(ports.values()), twins, {role: Address(port.url) for role, port in ports.items()})

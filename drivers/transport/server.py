@@ -173,15 +173,18 @@ class Datagrams(Connection):
 class Port:
     """A place to connect to. `answer` is called with a connection whenever bytes have come in on it.
 
-    `wire` is what faults have to know of it.
+    `wire` is what faults have to know of it. `held` are the bytes, about, that the system keeps for a client that does
+    not read; by default as many as it likes.
     """
 
-    def __init__(self, listen: str, answer: Callable[[Connection, float], None] | None = None) -> None:
+    def __init__(
+        self, listen: str, answer: Callable[[Connection, float], None] | None = None, held: int | None = None
+    ) -> None:
         self.timing = Url.parse(listen)
         self.wire = Wire(mends=self.timing.scheme == "tcp")
         self._faults: dict[int, Faults] = {}  # by unit
         self.connections: dict[int, Connection] = {}
-        self.answer = answer or _ignore
+        self.answer, self._held = answer or _ignore, held
         self._socket: socket.socket | None = None
         if self.timing.scheme == "pty":
             self.url = self._open_pty()
@@ -268,6 +271,8 @@ class Port:
             client, peer = self._socket.accept()
             client.setblocking(False)
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            if self._held is not None:
+                client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, self._held)
             key = connection_key(peer, client.getsockname())
             self.connections[client.fileno()] = Connection(client.fileno(), key, client.close, self._leaving)
 

@@ -19,7 +19,12 @@ class Ramp:
     """Outputs of LEVEL, with a ramp of 1e-3 g, deg/s and uT a second."""
 
     trims = HandheldWorld.trims
+    samples = 0  # taken so far
+
+    def thermometer_c(self) -> float:
+        return 24.5
 
     def sensed(self, outputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:
         t_s = start_s + interval_s * np.arange(n)
+        self.samples += n
         return np.column_stack([LEVEL[name] + 1e-3 * t_s for name in outputs])

@@ -38,13 +38,16 @@ class Steady:
 
     sensed = adc_volts
 
+    def thermometer_c(self) -> float:
+        return 25.0
+
 
 @pytest.fixture(params=WIRES, ids=lambda wire: f"{wire[0]}-{wire[1] or 'usual'}")
 def instrument(request: pytest.FixtureRequest, small_world: Any) -> Iterator[Any]:
     name, listen = request.param
     driver, twin = import_module(f"drivers.{name}.driver"), import_module(f"drivers.{name}.twin")
     settings = driver.Settings() if name != "labjack_t7" else driver.Settings(channels={"supply": 0})
-    if name in ("imu_lines", "epics_adc"):
+    if name in ("imu_lines", "mavlink_imu", "xsens_mti", "epics_adc"):
         small_world = Steady()
     server = twin.serve(small_world, {"alpha": (1, settings)}, listen or twin.LISTEN)
     clock = SimulatedClock()

@@ -1,0 +1,183 @@
+"""Frames of bytes with a checksum, out of a stream that may begin and be damaged anywhere.
+
+Frames are found and checked many at a time. After a damaged one, the search goes on with its second byte.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Bytes = NDArray[np.uint8]
+Ints = NDArray[np.int64]
+BAD, GOOD, UNKNOWN = 0, 1, 2
+
+
+class Framing(Protocol):
+    """What a frame is. Its first `head` bytes determine its length."""
+
+    starts: re.Pattern[bytes]
+    head: int
+
+    def length(self, head: bytes) -> int:
+        """Bytes of the frame that begins with `head`; 0 if none begins so."""
+
+    def judge(self, frames: Bytes) -> Ints:
+        """GOOD, BAD, or UNKNOWN for a kind whose checksum is not known, of each frame, shape (n, length) -> (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Whole frames in `data`, in their order. `known`: the checksum is checked."""
+
+    data: Bytes
+    starts: Ints
+    lengths: Ints
+    known: NDArray[np.bool_]
+
+    def heads(self, count: int) -> Ints:
+        """The first `count` bytes of each frame, shape (n, count); what is beyond the data is its last byte."""
+        places = np.minimum(self.starts[:, None] + np.arange(count), len(self.data) - 1)
+        return np.asarray(self.data[places], dtype=np.int64)
+
+    def parts(self, chosen: Ints, first: int, count: Ints, size: int) -> Bytes:
+        """From byte `first`, `count` bytes of each chosen frame, with zeros up to `size`: shape (n, size)."""
+        out = np.zeros((len(chosen), size), dtype=np.uint8)
+        for n, of in groups(count):
+            used = min(n, size)
+            out[of, :used] = self.data[self.starts[chosen[of], None] + first + np.arange(used)]
+        return out
+
+
+def groups(values: Ints) -> Iterator[tuple[int, Any]]:
+    """Each different value, and an index of where it is."""
+    if len(values) and (values == values[0]).all():
+        yield int(values[0]), slice(None)
+        return
+    for value in np.unique(values).tolist():
+        yield value, values == value
+
+
+@dataclass
+class Frames:
+    """The frames of a stream.
+
+    `damaged`: places after the first good frame where bytes were no good frame. `misfits`: wrong checksums where the
+    next frame follows at once. `unread`: bytes after the last good frame.
+    """
+
+    framing: Framing
+    good: int = 0
+    damaged: int = 0
+    misfits: int = 0
+    unread: int = 0
+    rest: bytes = b""
+    _inside: bool = False  # the last byte belongs to a good frame
+
+    def take(self, data: bytes) -> Found:
+        """The frames that `data` completes."""
+        text = self.rest + data
+        array = np.frombuffer(text, dtype=np.uint8)
+        self.unread += len(data)
+        found: list[tuple[Ints, ...]] = []
+        at, whole = 0, False
+        while not whole:
+            starts, lengths, gaps, end, gap = self._walk(text, array, at)
+            verdicts = self._judged(array, starts, lengths)
+            n = self._accepted(gaps, verdicts)
+            found.append((starts[:n], lengths[:n], verdicts[:n]))
+            if whole := n == len(starts):
+                self.rest = text[end:]
+                self._inside = self._inside and not self._missed(gap)
+            else:
+                follows = not gaps[n + 1] if n + 1 < len(starts) else starts[n] + lengths[n] == len(text)
+                self.misfits += int(follows)
+                self._inside = self._inside and not self._missed(True)
+                at = int(starts[n]) + 1
+        starts, lengths, verdicts = (np.concatenate(column) for column in zip(*found, strict=True))
+        if len(good := np.flatnonzero(verdicts == GOOD)):
+            self.unread = len(text) - int(starts[good[-1]] + lengths[good[-1]])
+        return Found(array, starts, lengths, verdicts == GOOD)
+
+    def _walk(self, text: bytes, array: Bytes, at: int) -> tuple[Ints, Ints, NDArray[np.bool_], int, bool]:
+        """Begin and length of each whole frame from `at` on, and whether bytes were skipped before it.
+
+        And the end of them all, and whether bytes were skipped before it.
+        """
+        starts, lengths, gaps, gap = [_NONE], [_NONE], [_NONE.astype(bool)], False
+        while match := self.framing.starts.search(text, at):
+            gap, at = gap or match.start() > at, match.start()
+            if at + self.framing.head > len(text):
+                break
+            length = self.framing.length(text[at : at + self.framing.head])
+            if not length:
+                gap, at = True, at + 1
+                continue
+            if not (n := _alike(array[at:], length, self.framing.head)):
+                break
+            starts.append(at + length * np.arange(n))
+            lengths.append(np.full(n, length))
+            gaps.append(np.arange(n) < int(gap))
+            gap, at = False, at + n * length
+        if not match:
+            gap, at = gap or at < len(text), len(text)
+        return np.concatenate(starts), np.concatenate(lengths), np.concatenate(gaps), at, gap
+
+    def _judged(self, array: Bytes, starts: Ints, lengths: Ints) -> Ints:
+        verdicts = np.zeros(len(starts), dtype=np.int64)
+        for length, of in groups(lengths):
+            verdicts[of] = self.framing.judge(array[starts[of, None] + np.arange(length)])
+        return verdicts
+
+    def _accepted(self, gaps: NDArray[np.bool_], verdicts: Ints) -> int:
+        """The number of frames before a damaged one. A frame of an unknown kind must follow a good one at once."""
+        trusted = ~gaps
+        trusted[:1] &= self._inside
+        wrong = (verdicts == BAD) | ((verdicts == UNKNOWN) & ~trusted)
+        n = int(np.argmax(wrong)) if wrong.any() else len(verdicts)
+        if n:
+            self.damaged += int(gaps[1:n].sum()) + int(gaps[0] and self._inside)
+            self.good += int((verdicts[:n] == GOOD).sum())
+            self._inside = True
+        return n
+
+    def _missed(self, gap: bool) -> bool:
+        """Count bytes without a good frame, once until the next one."""
+        self.damaged += int(gap and self._inside)
+        return gap
+
+
+class FrameDecoder:
+    """A decoder of samples, see `sensor.Decoder`, whose samples are in frames."""
+
+    def __init__(self, framing: Framing) -> None:
+        self.stream = Frames(framing)
+
+    @property
+    def good(self) -> int:
+        return self.stream.good
+
+    @property
+    def damaged(self) -> int:
+        return self.stream.damaged
+
+    @property
+    def unread(self) -> int:
+        return self.stream.unread
+
+
+_NONE = np.empty(0, dtype=np.int64)
+
+
+def _alike(array: Bytes, length: int, head: int) -> int:
+    """How many whole frames with the head of the first one follow each other."""
+    rows = array[: len(array) // length * length].reshape(-1, length)
+    if not len(rows):
+        return 0
+    same = (rows[:, :head] == rows[0, :head]).all(axis=1)
+    return len(rows) if same.all() else int(np.argmin(same))

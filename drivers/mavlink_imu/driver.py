@@ -1,0 +1,288 @@
+"""A flight controller (PX4, ArduPilot) that sends its samples by MAVLink, over UDP, TCP or a serial line.
+
+It is in the role of the converter. The driver waits for the heartbeat of the autopilot, requests the message of the
+settings at `rate_hz`, and waits for the acknowledgement. Every message has a number, so lost and repeated messages are
+known; the sensor's time in the message tells which of them were samples. A record with more than `most_lost` of its
+samples lost is refused, as is one with an axis at the end of its range, stuck, or not sent at all.
+
+Source  MAVLink, message definitions `common`: HIGHRES_IMU, SCALED_IMU, RAW_IMU, MAV_CMD_SET_MESSAGE_INTERVAL.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.digital.frames import FrameDecoder, Frames, Ints, groups
+from drivers.digital.reception import Batch, Reception, TimeBase
+from drivers.digital.sensor import DigitalSensor, no_samples
+from drivers.digital.settings import OUTPUTS, DigitalSettings, require_outputs
+from drivers.errors import BadFrame, DriverError, LinkTimeout, Refused, SensorFault
+from drivers.instrument import Identity
+from drivers.mavlink_imu import messages as mav
+from drivers.transport import Address, Links
+from drivers.transport.link import Link
+
+HEARTBEAT_S = 3.0  # it comes once a second
+ACK_S, ATTEMPTS = 1.0, 3
+GROUND = (255, 190)  # our own system and component: those of a ground station
+END = 32767  # of a count of 16 bits, each way
+UPDATED = {name: 1 << k for k, name in enumerate(OUTPUTS)}  # bits of `fields_updated`
+
+
+@dataclass(frozen=True)
+class Settings(DigitalSettings):
+    """The message and its outputs: accelerometer (ax, ay, az), gyroscope (gx, gy, gz) and magnetometer (mx, my, mz).
+
+    HIGHRES_IMU is in m/s^2, rad/s and gauss, SCALED_IMU in g, rad/s and gauss. The numbers of RAW_IMU are counts by the
+    definition, and milli-g, mrad/s and mgauss from ArduPilot: `raw` must be `count` or `milli`. `imu` is the number
+    (`id`) of the sensor in HIGHRES_IMU and RAW_IMU. `range` is the end of the accelerometer's range each way, in its
+    unit. Raises ValueError for what cannot be.
+    """
+
+    message: Literal["HIGHRES_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3", "RAW_IMU"] = "HIGHRES_IMU"
+    outputs: tuple[str, ...] = OUTPUTS
+    rate_hz: float = 100.0
+    raw: Literal["count", "milli"] | None = None
+    imu: int = 0
+    range: float | None = None
+    most_lost: float = 0.01
+
+    def __post_init__(self) -> None:
+        self.require_valid()
+        require_outputs(self.outputs)
+        if (self.message == "RAW_IMU") != (self.raw is not None):
+            raise ValueError("raw must be `count` or `milli` with RAW_IMU, and is not for another message")
+        if not 0 <= self.imu <= 255 or (self.imu and self.message.startswith("SCALED")):
+            raise ValueError("imu must be 0 to 255; SCALED_IMU2 and SCALED_IMU3 are messages of their own")
+
+    @property
+    def wired(self) -> Mapping[str, int | str]:
+        return {name: name for name in self.outputs}
+
+    @property
+    def kinds(self) -> tuple[str, str, str]:
+        if self.message == "HIGHRES_IMU":
+            return "m/s^2", "rad/s", "gauss"
+        return ("count", "count", "count") if self.raw == "count" else ("g", "rad/s", "gauss")
+
+    @property
+    def factor(self) -> float:
+        """From a number in the message to the unit of the output."""
+        return 1.0 if self.message == "HIGHRES_IMU" or self.raw == "count" else 1e-3
+
+    @property
+    def time_unit_s(self) -> float:
+        return 1e-3 if self.message.startswith("SCALED") else 1e-6
+
+    def chosen(self, outputs: Sequence[str]) -> Settings:
+        return replace(self, outputs=tuple(name for name in self.outputs if name in outputs))
+
+
+class SampleDecoder(FrameDecoder):
+    """Samples of the outputs `names` out of the messages of one autopilot."""
+
+    def __init__(self, settings: Settings, target: tuple[int, int]) -> None:
+        super().__init__(mav.Mavlink())
+        self.seen: Counter[str] = Counter()
+        self.updated = 0
+        self.temperature_c: float | None = None
+        self._settings, self._target = settings, target
+        self._names = tuple(settings.channels)
+        self._columns = [OUTPUTS.index(name) for name in self._names]
+        self._message = mav.IMU[settings.message]
+        self._sequence: int | None = None
+        self._missing = 0  # messages since the last sample
+
+    def take(self, data: bytes) -> Batch:
+        found = self.stream.take(data)
+        heads = mav.heads(found)
+        for number, of in groups(heads.number):
+            self.seen[mav.MESSAGES[number].name if number in mav.MESSAGES else f"{number}"] += len(heads.number[of])
+        own = np.flatnonzero((heads.system == self._target[0]) & (heads.component == self._target[1]))
+        missing = self._gaps(heads.sequence[own])
+        samples = own[found.known[own] & (heads.number[own] == self._message.number)]
+        content = mav.contents(found, heads, self._message, samples)
+        before = np.cumsum(np.concatenate([[self._missing], np.maximum(missing, 0)]))
+        at = np.searchsorted(own, samples)
+        gaps = np.diff(np.concatenate([[0], before[at + 1]]))
+        self._missing = int(before[-1] - (before[at[-1] + 1] if len(at) else 0))
+        gaps = np.where(missing[at] < 0, -1, gaps) if len(at) else gaps
+        if "id" in (self._message.dtype.names or ()) and len(samples):
+            wanted = content["id"] == self._settings.imu
+            content, gaps = content[wanted], gaps[wanted]
+        return self._batch(content, gaps)
+
+    def _gaps(self, sequence: Ints) -> Ints:
+        """Messages that are missing before each; -1 for one with the number of the one before."""
+        if not len(sequence):
+            return sequence
+        last = int(sequence[0]) - 1 if self._sequence is None else self._sequence
+        self._sequence = int(sequence[-1])
+        return (np.diff(np.concatenate([[last], sequence])) % 256) - 1
+
+    def _batch(self, content: NDArray[np.void], gaps: Ints) -> Batch:
+        numbers = np.concatenate([content[sensor] for sensor in "agm"], axis=1).astype(np.float64)
+        values = numbers[:, self._columns] * self._settings.factor
+        clipped = ""
+        if len(content) and self._message is not mav.HIGHRES_IMU:
+            ends = (np.abs(numbers[:, self._columns]) >= END).any(axis=0)
+            clipped = self._names[int(np.argmax(ends))] if ends.any() else ""
+            if raw := int(content["temperature"][-1]):
+                self.temperature_c = raw / 100
+        elif len(content):
+            self.updated |= int(np.bitwise_or.reduce(content["updated"]))
+            self.temperature_c = float(content["temperature"][-1])
+        return Batch(values, content["time"].astype(np.float64), gaps, clipped)
+
+
+class FlightController(DigitalSensor[Settings, SampleDecoder]):
+    """The autopilot at the other end of the link."""
+
+    carrier = "messages"
+    longest = 4 * mav.LONGEST
+
+    def __init__(self, link: Link, settings: Settings, name: str) -> None:
+        super().__init__(link, settings, name)
+        self._autopilot: tuple[int, int, str, int] | None = None  # system, component, name, version of the protocol
+        self._sequence = 0
+
+    def identify(self) -> Identity:
+        """The autopilot by its heartbeat. Raises LinkTimeout without one, BadFrame for other bytes."""
+        system, component, name, version = self._heard()
+        protocol = "MAVLink 1" if version == mav.V1 else "MAVLink 2"
+        return Identity(f"{name}, {protocol}, system {system}, component {component}")
+
+    @property
+    def base(self) -> TimeBase:
+        return TimeBase(self.settings.time_unit_s, (2**32,) if self.settings.message.startswith("SCALED") else ())
+
+    def _decoder(self) -> SampleDecoder:
+        return SampleDecoder(self.settings, self._autopilot[:2] if self._autopilot else (0, 0))
+
+    def _begin(self) -> None:
+        """Request the message at its rate. Raises Refused, LinkTimeout."""
+        if self._autopilot is None:
+            self._heard()
+        number, interval_us = mav.IMU[self.settings.message].number, 1e6 / self.settings.rate_hz
+        for attempt in range(ATTEMPTS):
+            self._link.discard()
+            self._command(mav.SET_MESSAGE_INTERVAL, number, interval_us, attempt)
+            result = self._acknowledged(mav.SET_MESSAGE_INTERVAL)
+            if result == 0:
+                self._link.discard()
+                return
+            if result is not None:
+                raise Refused(
+                    f"{self.name}: the autopilot refuses {self.settings.message} at {self.settings.rate_hz:g} Hz: "
+                    f"{mav.RESULTS.get(result, f'result {result}')}",
+                    "Choose a message and a rate that its firmware can send, in the sensor's settings",
+                    result,
+                )
+        raise LinkTimeout(
+            f"{self.name}: no acknowledgement of the request of {self.settings.message} within "
+            f"{ATTEMPTS * ACK_S:g} s on {self._link.url}",
+            "Check that the link carries commands to the autopilot, and not only its messages",
+        )
+
+    def _heard(self) -> tuple[int, int, str, int]:
+        """System, component, name and protocol of the autopilot, by its heartbeat.
+
+        Our own heartbeat goes first: many autopilots send only to who has sent to them.
+        """
+        self._link.discard()
+        self._send(mav.HEARTBEAT, type=mav.GROUND_STATION, autopilot=mav.INVALID, status=4, version=3)
+        stream, begun_s, seen = Frames(mav.Mavlink()), self._clock.now(), 0
+        while (left_s := begun_s + HEARTBEAT_S - self._clock.now()) > 0:
+            found = stream.take(self._link.read(left_s))
+            heads = mav.heads(found)
+            beats = np.flatnonzero((heads.number == mav.HEARTBEAT.number) & found.known)
+            for k, beat in zip(beats, mav.contents(found, heads, mav.HEARTBEAT, beats), strict=True):
+                if beat["autopilot"] != mav.INVALID and beat["type"] not in mav.NOT_VEHICLES:
+                    name = mav.AUTOPILOTS.get(int(beat["autopilot"]), f"autopilot {beat['autopilot']}")
+                    self._autopilot = int(heads.system[k]), int(heads.component[k]), name, int(heads.version[k])
+                    return self._autopilot
+            seen += len(found.starts)
+        if stream.unread and not stream.good:
+            raise self._no_frames(stream)
+        raise LinkTimeout(
+            f"{self.name}: no heartbeat of an autopilot on {self._link.url} within {HEARTBEAT_S:g} s "
+            f"({seen} other messages)",
+            "Check power and cable, that MAVLink is on at this port of the autopilot, and the address",
+        )
+
+    def _command(self, command: int, *parameters: float) -> None:
+        """Send a command; the last of `parameters` is the number of the attempt."""
+        assert self._autopilot  # noqa: S101 - a request follows the heartbeat
+        system, component = self._autopilot[:2]
+        *given, attempt = parameters
+        seven = [*given, *[0.0] * (7 - len(given))]
+        self._send(
+            mav.COMMAND_LONG,
+            parameters=seven,
+            command=command,
+            system=system,
+            component=component,
+            confirmation=attempt,
+        )
+
+    def _send(self, message: mav.Message, **values: Any) -> None:
+        version = self._autopilot[3] if self._autopilot else mav.V2
+        (frame,) = mav.frames(message, mav.fields(message, **values), np.array([self._sequence]), *GROUND, version)
+        self._sequence += 1
+        self._link.write(frame)
+
+    def _acknowledged(self, command: int) -> int | None:
+        """The result of a command; None without an answer in time."""
+        stream, begun_s = Frames(mav.Mavlink()), self._clock.now()
+        while (left_s := begun_s + ACK_S - self._clock.now()) > 0 and (data := self._link.read(left_s)):
+            found = stream.take(data)
+            heads = mav.heads(found)
+            answers = np.flatnonzero((heads.number == mav.COMMAND_ACK.number) & found.known)
+            for answer in mav.contents(found, heads, mav.COMMAND_ACK, answers):
+                if answer["command"] == command and mav.RESULTS.get(int(answer["result"])) != "in progress":
+                    return int(answer["result"])
+        return None
+
+    def _require_complete(self, reception: Reception, decoder: SampleDecoder) -> None:
+        super()._require_complete(reception, decoder)
+        if self.settings.message == "HIGHRES_IMU" and (
+            absent := [name for name in self.settings.channels if not decoder.updated & UPDATED[name]]
+        ):
+            raise SensorFault(
+                f"{self.name}: the autopilot sends no {', '.join(absent)} (fields_updated is {decoder.updated:#x})",
+                "Remove these outputs from the sensor's settings, or choose another message or `imu`",
+            )
+
+    def _content(self, decoder: SampleDecoder) -> str:
+        warm = "" if decoder.temperature_c is None else f", the sensor is at {decoder.temperature_c:.1f} C"
+        return f"{', '.join(f'{name} {count}' for name, count in sorted(decoder.seen.items()))}{warm}"
+
+    def _silence(self, timeout_s: float) -> DriverError:
+        return no_samples(self.name, self._link.url, timeout_s, self.settings.message)
+
+    def _unreadable(self, decoder: SampleDecoder) -> DriverError:
+        if decoder.unread <= self.longest and decoder.good:
+            return no_samples(self.name, self._link.url, 2.0, self.settings.message)
+        return self._no_frames(decoder.stream)
+
+    def _no_frames(self, stream: Frames) -> BadFrame:
+        if stream.misfits > 2:
+            return BadFrame(
+                f"{self.name}: {stream.misfits} messages on {self._link.url} have a wrong checksum",
+                "Check the cable; or the autopilot uses other definitions of these messages",
+            )
+        return BadFrame(
+            f"{self.name}: {stream.unread} bytes on {self._link.url} are not MAVLink",
+            "The baud rate is probably wrong: write the autopilot's, as serial:/dev/ttyACM0?baud=57600",
+        )
+
+
+def connect(address: Address, links: Links, settings: Settings, name: str) -> FlightController:
+    """The autopilot at `address`. Raises LinkRefused when its link cannot be opened."""
+    return FlightController(links.link(address.url, name), settings, name)

@@ -1,0 +1,167 @@
+"""The simulated flight controller: heartbeat, and the message of its settings once it is requested."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.digital.frames import Frames, Ints
+from drivers.digital.settings import OUTPUTS
+from drivers.digital.twin import DigitalTwin, Floats, World, common_faults, talking_port
+from drivers.mavlink_imu import messages as mav
+from drivers.mavlink_imu.driver import END, UPDATED, Settings
+from drivers.transport.address import Address
+from drivers.transport.faults import Kind
+from drivers.transport.server import Connection, Port, Server
+from drivers.world.digital import trims
+
+LISTEN = "tcp://127.0.0.1:0"
+SYSTEM, COMPONENT, QUADROTOR, PX4 = 1, 1, 2, 12
+FASTEST_HZ = 4000.0
+ANSWER_S = 0.001
+FAULTS = common_faults("message") | {
+    "no-heartbeat": Kind("sends no heartbeat"),
+    "refuses": Kind("refuses every command with this result", 3),
+    "mute": Kind("acknowledges a request, and sends no samples"),
+    "wrong-checksum": Kind("every message has a wrong checksum"),
+    "half-message": Kind("sends the first half of each message"),
+    "restart": Kind("loses power for a moment: its time and its settings begin anew, once"),
+}
+
+
+class WarmWorld(World, Protocol):
+    """What a flight controller knows of physics."""
+
+    def thermometer_c(self) -> float: ...
+
+
+class Autopilot(DigitalTwin):
+    """A flight controller. It sends its heartbeat from power-on, and samples when they are requested."""
+
+    carrier = "message"
+
+    def __init__(self, world: WarmWorld, settings: Settings, port: Port) -> None:
+        super().__init__(world, settings, port)
+        self._warmth, self._settings, self._message = world, settings, mav.IMU[settings.message]
+        self._columns = [OUTPUTS.index(name) for name in settings.outputs]
+        self._sending, self._beat_s, self._sequence = False, 1.0, 0
+        self._heard: dict[str, Frames] = {}
+        port.answer = self._answer
+
+    def advance(self, now_s: float) -> None:
+        """Send samples and heartbeats in their order."""
+        if self.faults and self.faults.once("restart", now_s):
+            self._sending, self._sequence = False, 0
+            self._begin_at(now_s, self._settings.rate_hz)
+        listeners = self._listeners(now_s)
+        while self._beat_s <= now_s:
+            self._sample(self._beat_s, listeners)
+            self._beat(self._beat_s, listeners)
+            self._beat_s += 1.0
+        self._sample(now_s, listeners)
+
+    def due_s(self) -> float:
+        return min(self._beat_s, super().due_s() if self._sending else math.inf)
+
+    def state(self) -> dict[str, Any]:
+        own = {"sending": self._sending, "beat_s": self._beat_s, "sequence": self._sequence}
+        return super().state() | own
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        super().restore(state)
+        self._sending, self._beat_s, self._sequence = state["sending"], state["beat_s"], state["sequence"]
+
+    def _sample(self, now_s: float, listeners: Sequence[Connection]) -> None:
+        if self._sending:
+            super()._sample(now_s, listeners)
+
+    def _beat(self, now_s: float, listeners: Sequence[Connection]) -> None:
+        if self.faults and self.faults.size("no-heartbeat", now_s) is not None:
+            return
+        data = self._framed(
+            mav.HEARTBEAT, mav.fields(mav.HEARTBEAT, type=QUADROTOR, autopilot=PX4, status=3, version=3)
+        )
+        for connection in listeners:
+            connection.send(self._checked(data[0], now_s), now_s)
+
+    def _answer(self, connection: Connection, now_s: float) -> None:
+        """Act on the commands in what has arrived."""
+        found = self._heard.setdefault(connection.key, Frames(mav.Mavlink())).take(bytes(connection.inbox))
+        connection.inbox.clear()
+        heads = mav.heads(found)
+        commands = np.flatnonzero((heads.number == mav.COMMAND_LONG.number) & found.known)
+        for command in mav.contents(found, heads, mav.COMMAND_LONG, commands):
+            if command["system"] not in (0, SYSTEM):
+                continue
+            acknowledgement = mav.fields(
+                mav.COMMAND_ACK, command=command["command"], result=self._result(command, now_s)
+            )
+            for data in self._framed(mav.COMMAND_ACK, acknowledgement):
+                connection.send(self._checked(data, now_s), now_s + ANSWER_S)
+
+    def _result(self, command: Any, now_s: float) -> int:
+        """Set the interval of the message: the result of a command. 0 is the usual one, -1 stops it."""
+        if self.faults and (refused := self.faults.size("refuses", now_s)) is not None:
+            return int(refused)
+        number, interval_us = command["parameters"][:2].tolist()
+        if command["command"] != mav.SET_MESSAGE_INTERVAL or number != self._message.number:
+            return 3
+        rate_hz = 1e6 / interval_us if interval_us > 0 else self._settings.rate_hz
+        if rate_hz > FASTEST_HZ:
+            return 2
+        if not math.isclose(rate_hz, 1 / self._clock.period_s, rel_tol=1e-6) or not self._sending:
+            self._change_rate(now_s, rate_hz)
+        self._sending = interval_us >= 0 and not (self.faults and self.faults.size("mute", now_s) is not None)
+        return 0
+
+    def _messages(self, values: Floats, ticks: NDArray[np.int64]) -> list[bytes]:
+        content = np.zeros(len(values), dtype=self._message.dtype)
+        numbers = np.zeros((len(values), len(OUTPUTS)))
+        numbers[:, self._columns] = values / self._settings.factor
+        if self._message is not mav.HIGHRES_IMU:
+            numbers = np.clip(np.rint(numbers), -END, END)
+        for k, sensor in enumerate("agm"):
+            content[sensor] = numbers[:, 3 * k : 3 * k + 3]
+        content["time"] = np.rint(self._sensor_s(ticks) / self._settings.time_unit_s)
+        temperature_c = self._warmth.thermometer_c()
+        if self._message is mav.HIGHRES_IMU:
+            content["temperature"], content["pressure"][:, 0] = temperature_c, 1013.25
+            content["updated"] = sum(UPDATED[name] for name in self._settings.outputs) | 1 << 9 | 1 << 12
+        else:
+            content["temperature"] = round(100 * temperature_c) or 1  # 0 is none
+        if "id" in (self._message.dtype.names or ()):
+            content["id"] = self._settings.imu
+        return self._framed(self._message, content)
+
+    def _framed(self, message: mav.Message, content: NDArray[np.void]) -> list[bytes]:
+        sequences: Ints = self._sequence + np.arange(len(content))
+        self._sequence = (self._sequence + len(content)) % 256
+        return mav.frames(message, content, sequences, SYSTEM, COMPONENT)
+
+    def _spoilt(self, message: bytes, now_s: float) -> bytes:
+        return self._checked(super()._spoilt(message, now_s), now_s)
+
+    def _checked(self, message: bytes, now_s: float) -> bytes:
+        """A message, with a wrong checksum or half of it by the faults of the moment."""
+        if not self.faults or not message:
+            return message
+        if self.faults.size("half-message", now_s) is not None:
+            return message[: len(message) // 2]
+        wrong = self.faults.size("wrong-checksum", now_s) is not None
+        return message[:-1] + bytes([message[-1] ^ 0x55]) if wrong else message
+
+
+def serve(world: WarmWorld, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
+    """A link with a flight controller for each role: role -> (unit id, which it has not, settings).
+
+    Raises UnknownInput for an output that the simulated sensor does not have.
+    """
+    for _, settings in roles.values():
+        trims(list(settings.wired), world.trims)
+    ports = {role: talking_port(listen) for role in roles}
+    twins = {role: Autopilot(world, roles[role][1], port) for role, port in ports.items()}
+    return Server(list(ports.values()), twins, {role: Address(port.url) for role, port in ports.items()})
