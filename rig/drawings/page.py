@@ -9,11 +9,35 @@ from rig.drawings.attitude import Attitude
 from rig.drawings.rig_view import BOARD, BOARD_EDGE, PACKAGE, rig_view
 
 WIDTH, HEIGHT = 960, 640
+STRIP_WIDTH, STRIP_HEIGHT = 820, 300
 
 
 def page(attitude: Attitude) -> str:
     """One SVG file, headed by the attitude in words."""
     return svg.document(WIDTH, HEIGHT, attitude.words, _content(attitude))
+
+
+def strip(attitude: Attitude) -> str:
+    """The three views side by side, for a page: legible at the width of a tablet."""
+    return svg.document(STRIP_WIDTH, STRIP_HEIGHT, attitude.words, _side_by_side(attitude))
+
+
+def _side_by_side(attitude: Attitude) -> Iterator[str]:
+    yield svg.text((16, 20), attitude.words, 17, anchor="start", bold=True)
+    yield from rig_view(attitude, (148, 158), 72)
+    yield svg.text((390, 54), f"Alpha {attitude.alpha_deg:g}°, from the front", 14, svg.QUIET, bold=True)
+    yield from front_view(attitude, (390, 172), 80)
+    turned = f"Beta {attitude.beta_deg:g}°, sensor turned by {attitude.mount_deg:g}°"
+    yield svg.text((660, 54), turned, 14, svg.QUIET, bold=True)
+    yield from table_view(attitude, (660, 172), 88)
+    yield svg.text((660, 285), _marks(attitude), 13, svg.QUIET)
+
+
+def _marks(attitude: Attitude) -> str:
+    """What the marks on the sensor mean."""
+    side = "face down: the package is below its board" if attitude.flip else "face up"
+    between = "; grey: nano-positioner and fibre" if attitude.shaken else ""
+    return f"yellow: pin 1; {side}{between}"
 
 
 def _content(attitude: Attitude) -> Iterator[str]:
@@ -25,9 +49,7 @@ def _content(attitude: Attitude) -> Iterator[str]:
     yield from front_view(attitude, (735, 222), 88)
     yield _heading((600, 346), f"Beta {attitude.beta_deg:g}°, sensor turned by {attitude.mount_deg:g}°")
     yield from table_view(attitude, (735, 484), 106)
-    side = "face down: the package is below its board" if attitude.flip else "face up"
-    between = "; grey: nano-positioner and fibre" if attitude.shaken else ""
-    yield svg.text((735, 624), f"yellow: pin 1; {side}{between}", 12, svg.QUIET)
+    yield svg.text((735, 624), _marks(attitude), 12, svg.QUIET)
 
 
 def _heading(at: tuple[float, float], words: str) -> str:
@@ -50,7 +72,7 @@ def dial(centre: tuple[float, float], radius: float, clockwise: bool) -> Iterato
     for deg in range(0, 360, NAMED_EVERY_DEG):
         shown = deg if deg <= 180 else deg - 360
         at = svg.on_circle(centre, radius + 13, -deg if clockwise else deg)
-        yield svg.text(at, str(shown), 10.5, svg.QUIET)
+        yield svg.text(at, str(shown), 12, svg.QUIET)
 
 
 def marked_angle(
@@ -100,7 +122,7 @@ def front_view(attitude: Attitude, centre: tuple[float, float], radius: float) -
     yield svg.turned(centre, attitude.alpha_deg, _edge_on(attitude, radius))
     yield svg.circle(centre, 3.0, svg.PAPER, svg.INK, 1.4)
     top = (centre[0] + radius + 34, centre[1] - 26)
-    yield svg.arrow(top, (top[0], top[1] + 46), svg.INK) + svg.text((top[0], top[1] + 60), "gravity", 11)
+    yield svg.arrow(top, (top[0], top[1] + 46), svg.INK) + svg.text((top[0], top[1] + 60), "gravity", 12)
 
 
 def _edge_on(attitude: Attitude, radius: float) -> Iterator[str]:

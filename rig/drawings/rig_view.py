@@ -196,7 +196,7 @@ def _axis_of_alpha(camera: Camera) -> str:
     """The axis that alpha turns about, dash-dotted as on a drawing."""
     ends = camera.project(np.array([[0, -1.85, 0], [0, 1.9, 0]], float))
     return svg.line(ends, svg.QUIET, 1.0, stroke_dasharray="12 4 2 4") + svg.text(
-        (ends[0][0] - 8, ends[0][1] + 13), "axis of alpha", 11, svg.QUIET
+        (ends[0][0] - 8, ends[0][1] + 13), "axis of alpha", 12, svg.QUIET
     )
 
 

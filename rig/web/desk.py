@@ -11,8 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rig.errors import RigError
 from rig.files import RECORD, home, write_whole
 from rig.record import Record, Run
+from rig.runs.background import control
 
 if TYPE_CHECKING:
     from rig.services.session import ModelSession
@@ -26,10 +28,13 @@ FILES = "files"  # folder of uploaded files
 
 @dataclass
 class Desk:
-    """`dark`: None follows the browser. `sessions`: the open model sessions by data, model and noise model, in order of
+    """`bench_file`: the bench of all pages, None for the simulated rig; `benches`: those that the page Run offers.
+
+    `dark`: None follows the browser. `sessions`: the open model sessions by data, model and noise model, in order of
     use. `reports`: HTML by the content of the data."""
 
     bench_file: Path | None
+    benches: Sequence[Path | None] = ()
     dark: bool | None = None
     sessions: OrderedDict[tuple[str, str, str], ModelSession[Any]] = field(default_factory=OrderedDict)
     reports: OrderedDict[str, str] = field(default_factory=OrderedDict)
@@ -70,6 +75,15 @@ class Desk:
         self.reports[key] = text
         while len(self.reports) > MOST_OPEN:
             self.reports.popitem(last=False)
+
+    def choose_bench(self, bench_file: Path | None) -> None:
+        """Make another bench that of all pages. Raises RigError during a run: its bench stays until it ends."""
+        status = control.latest()
+        if status is not None and status.phase != "ended":
+            raise RigError(f"{status.procedure} is in progress on {status.bench}; choose another bench after its end")
+        self.bench_file = bench_file
+        self.sessions.clear()  # their effects and limits are those of the other bench
+        self.reports.clear()
 
     def forget(self, data: str) -> None:
         """Close the sessions of `data`, which may have changed."""

@@ -11,12 +11,17 @@ from playwright.sync_api import Page, expect
 
 from rig.record import Record
 from rig.runs.background import control
-from tests.browser.conftest import Workbench
+from tests.browser.conftest import TABLET, Workbench
 from tests.browser.test_model_page import BARS
 
 pytestmark = pytest.mark.slow
 
 ANSWER_MS = 2000  # on a busy machine; 300 on a free one
+LEGIBLE_PX = 10  # height of a line of text
+SMALLEST_TEXT = """legible => {
+  const lines = [...document.querySelectorAll('.live .attitude svg text')];
+  return lines.length > 0 && lines.every(line => line.getBoundingClientRect().height > legible);
+}"""
 NIGHT = "/run?procedure=soak&duration_s=43200"
 
 
@@ -179,6 +184,47 @@ def test_a_run_begins_after_the_checks_and_no_single_key_moves_anything(workbenc
     expect(page.get_by_role("dialog").get_by_role("button", name="Begin")).to_be_disabled()
     workbench.shot(page, "resume")
     page.get_by_role("button", name="Cancel").click()
+
+
+def test_a_bench_is_chosen_before_a_run_and_stays_during_it(workbench: Workbench) -> None:
+    page = workbench.visit("/run")
+    bench(page, "demonstration rig")
+    expect(page.get_by_text("positioner")).to_have_count(0)  # the demonstration rig has none
+    other = workbench.visit("/run?procedure=soak&duration_s=43200")
+    expect(other.get_by_label("Measure on")).to_have_value(re.compile("demonstration rig"))
+    expect(other.get_by_text("Takes", exact=True)).to_be_visible()
+    bench(page, "simulated rig")
+    expect(page.get_by_text("positioner")).to_be_visible()
+    begin(other)  # it showed the plan of the demonstration rig
+    expect(page.locator(".live .title")).to_have_text("soak on demonstration rig with three hidden faults")
+    phase(page, "running")
+    bench(page, "demonstration rig")
+    expect(page.get_by_text("choose another bench after its end")).to_be_visible()
+    expect(page.get_by_label("Measure on")).to_have_value("simulated rig")
+    page.keyboard.press("F8")
+    phase(page, "stopped")
+
+
+def bench(page: Page, name: str) -> None:
+    """Choose a bench."""
+    page.bring_to_front()  # a menu opens in the page that is seen only
+    page.get_by_label("Measure on").click()
+    page.get_by_role("option", name=name).click()
+
+
+def test_the_drawing_is_legible_and_an_ended_run_leaves_the_plan_in_view(workbench: Workbench) -> None:
+    page = started(workbench, NIGHT)
+    phase(page, "running")
+    expect(page.locator(".live .attitude svg")).to_be_visible()
+    page.set_viewport_size(TABLET)
+    page.wait_for_function(SMALLEST_TEXT, arg=LEGIBLE_PX)  # the drawing is made anew for each pose
+    page.keyboard.press("F8")
+    phase(page, "stopped")
+    expect(page.locator(".live .tiles")).to_be_visible()  # the last values of a run that this page has shown
+    page.close()
+    page = workbench.visit("/run")
+    expect(page.get_by_text("Takes", exact=True)).to_be_in_viewport()
+    expect(page.locator(".live .tiles")).to_be_hidden()
 
 
 def test_two_pages_that_begin_at_once_start_one_run(workbench: Workbench) -> None:

@@ -15,7 +15,7 @@ import pytest
 
 from procedures.catalogue import SHIPPED
 from procedures.questions import Confirm, Mounting
-from rig.drawings import Attitude, drawing_of, page, sketch, svg
+from rig.drawings import Attitude, drawing_of, page, sketch, strip, svg
 from rig.drawings.attitude import NAMED
 from rig.drawings.rig_view import CAMERA_FROM, Camera, box, cylinder
 
@@ -35,11 +35,12 @@ def test_the_sensor_feels_what_the_geometry_says() -> None:
     assert Attitude(90, 30, mount_deg=60).specific_force_g == pytest.approx((0, 1, 0), abs=1e-9)
 
 
+@pytest.mark.parametrize("draw", [page, strip])
 @pytest.mark.parametrize(
     "attitude", EVERYWHERE, ids=lambda a: f"{a.alpha_deg:g}-{a.beta_deg:g}-{a.mount_deg:g}-{a.flip}"
 )
-def test_a_drawing_is_one_valid_file_within_its_frame(attitude: Attitude) -> None:
-    text = page(attitude)
+def test_a_drawing_is_one_valid_file_within_its_frame(attitude: Attitude, draw: Callable[[Attitude], str]) -> None:
+    text = draw(attitude)
     root = ElementTree.fromstring(text)  # noqa: S314 our own text
     assert root.tag == f"{SVG}svg"
     assert not re.search(r"href|url\(|nan[ ,\"]", text)

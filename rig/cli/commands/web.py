@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.terminal.output import bench_option, json_option, note
+from rig.cli.terminal.output import json_option, note
 
 if TYPE_CHECKING:
     from rig.web.server import Place
@@ -27,10 +27,16 @@ HERE = ("127.0.0.1", "localhost", "::1")
 )
 @click.option("--no-open", is_flag=True, help="Print the address and open no browser.")
 @click.option("--new-token", is_flag=True, help="Replace the kept token: older addresses and open pages end.")
-@bench_option
+@click.option(
+    "--bench",
+    "bench_files",
+    multiple=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="A bench file; give it again for each rig that the page Run offers. Without it, two simulated rigs.",
+)
 @json_option
 def command(
-    port: int | None, host: str, no_open: bool, new_token: bool, bench_file: Path | None, as_json: bool
+    port: int | None, host: str, no_open: bool, new_token: bool, bench_files: tuple[Path, ...], as_json: bool
 ) -> None:
     """Serve the workbench until Ctrl-C; print its address, and open it in the browser.
 
@@ -39,11 +45,14 @@ def command(
     network traffic can read the token. A run continues after the server ends.
     """
     from rig.bench import read_bench
+    from rig.bench.file import DEMO
     from rig.web.desk import Desk
     from rig.web.server import serve
     from rig.web.token import kept_token
 
-    read_bench(bench_file)  # an error appears here and not on a page
+    benches = bench_files or (None, DEMO)
+    for bench_file in benches:
+        read_bench(bench_file)  # an error appears here and not on a page
     if host not in HERE:
         note(
             f"Listening at {host}: other machines can reach the workbench and the rig. Nothing is encrypted; "
@@ -58,4 +67,4 @@ def command(
         if not no_open and not as_json:
             webbrowser.open(place.url)
 
-    serve(Desk(bench_file), host, port, kept_token(new_token), ready)
+    serve(Desk(benches[0], benches), host, port, kept_token(new_token), ready)

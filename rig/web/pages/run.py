@@ -6,6 +6,7 @@ import inspect
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from fastapi import Request
@@ -16,6 +17,8 @@ from procedures.catalogue import Procedure, find, paths, summary
 from procedures.settings import choices, parse
 from rig.bench import Bench, read_bench
 from rig.bench.certificates import expired
+from rig.bench.file import DEMO
+from rig.errors import RigError
 from rig.instruments.instruments import checked
 from rig.planning.plan import Plan, plan, stretches
 from rig.runs.background import control
@@ -24,7 +27,19 @@ from rig.web.frame import Key, frame
 from rig.web.pages.run_begin import BeginDialog, before_start, plan_facts
 from rig.web.pages.run_live import Live
 from rig.web.pages.run_optimal import OptimalDialog
-from rig.web.parts import box, div, facts, failed, off_loop, setting_label, setting_text, table, waiting, words
+from rig.web.parts import (
+    box,
+    div,
+    facts,
+    failed,
+    message,
+    off_loop,
+    setting_label,
+    setting_text,
+    table,
+    waiting,
+    words,
+)
 
 MOST_STRETCHES = 12
 DEFAULT_PROCEDURE = "sweep"
@@ -36,15 +51,18 @@ def register(desk: Desk) -> None:
     @ui.page("/run")
     def page(request: Request) -> None:
         with frame(desk, "/run") as keys:
+            bench_file = desk.bench_file
             try:
-                bench = read_bench(desk.bench_file)
+                bench = read_bench(bench_file)
             except Exception as error:
                 failed("The bench file cannot be used", error)
+                if len(desk.benches) > 1:
+                    BenchChoice(desk)
                 return
             with div("run-page"):
                 with div("stack"):
-                    planning = Planning(desk, bench, dict(request.query_params))
-                    Instruments(bench)
+                    planning = Planning(bench_file, bench, dict(request.query_params))
+                    Instruments(desk, bench)
                 with div("stack"):
                     live = Live()
                     planning.lay_out_plan()
@@ -52,14 +70,52 @@ def register(desk: Desk) -> None:
             keys["p"] = Key("pause the run", live.pause_run)
 
 
+class BenchChoice:
+    """The choice of the bench for all pages, among those that `rig web` was started with."""
+
+    def __init__(self, desk: Desk) -> None:
+        self.desk = desk
+        names = {k: _bench_name(path) for k, path in enumerate(desk.benches)}
+        self.choice = ui.select(names, label="Measure on", value=self._present, on_change=self.choose)
+        self.choice.props("dense options-dense").style("width: 100%")
+
+    @property
+    def _present(self) -> int:
+        return self.desk.benches.index(self.desk.bench_file)
+
+    def choose(self) -> None:
+        """Open the page Run with another bench, unless a run is in progress."""
+        if self.choice.value == self._present:
+            return
+        try:
+            self.desk.choose_bench(self.desk.benches[int(self.choice.value)])
+        except RigError as error:
+            ui.notify(message(error), type="warning")
+            self.choice.set_value(self._present)
+            return
+        ui.navigate.to("/run")
+
+
+def _bench_name(path: Path | None) -> str:
+    """The name in a bench file, and the file; a file that cannot be read has no name."""
+    try:
+        name = read_bench(path).name
+    except RigError:
+        name = "cannot be read"
+    return name if path in (None, DEMO) else f"{name} ({path})"
+
+
 class Instruments:
     """The instruments of the bench, and a button that checks them."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, desk: Desk, bench: Bench) -> None:
         self.bench = bench
         with box("stack"):
             words("Bench", "title")
-            words(bench.name, "quiet small")
+            if len(desk.benches) > 1:
+                BenchChoice(desk)
+            else:
+                words(bench.name, "quiet small")
             for fault in expired(bench, datetime.now(UTC).date()):
                 words(f"{fault}; have it calibrated again", "fault")
             self.rows = div("")
@@ -98,8 +154,8 @@ def _where(url: str) -> str:
 class Planning:
     """The form of a procedure and its settings; every change makes a new plan."""
 
-    def __init__(self, desk: Desk, bench: Bench, given: Mapping[str, str]) -> None:
-        self.desk, self.bench = desk, bench
+    def __init__(self, bench_file: Path | None, bench: Bench, given: Mapping[str, str]) -> None:
+        self.bench_file, self.bench = bench_file, bench
         self.given = {name: value for name, value in given.items() if name != "procedure"}
         self.started: Callable[[], Awaitable[None]] | None = None
         self.asked = 0
@@ -208,7 +264,7 @@ class Planning:
     ) -> None:
         """Start the run in a background process. Raises Busy while another run is in progress."""
         attended = bool(self.attended.value)
-        await off_loop(control.begin, name, settings, self.desk.bench_file, attended, sensor, answers)
+        await off_loop(control.begin, name, settings, self.bench_file, attended, sensor, answers)
         if self.started is not None:
             await self.started()
 

@@ -9,7 +9,7 @@ from nicegui import ui
 
 from calibrations.text import capital, duration, size
 from rig.bench import Bench
-from rig.drawings import Attitude, page
+from rig.drawings import Attitude, strip
 from rig.files import free_bytes, home
 from rig.planning.plan import Plan
 from rig.planning.preparation import checks, first_question, mounting, stops
@@ -80,14 +80,15 @@ class BeginDialog:
         self.content, self.begin = content, begin
         with ui.dialog().props("persistent") as self.dialog, ui.card().classes("begin"):
             words(content.title, "title")
+            with div("attitude"):
+                ui.html(strip(content.attitude), sanitize=False)
             with div("two"):
                 with div("stack"):
                     self._sensor()
                     facts(content.facts)
+                with div("stack"):
                     words("Check by hand", "title")
                     self.boxes = [ui.checkbox(line, on_change=self._look) for line in content.checks]
-                with div("attitude"):
-                    ui.html(page(content.attitude), sanitize=False)
             self.fault = words("", "fault").props("role=alert")
             with div("row-of"):
                 self.button = ui.button("Begin", icon="play_arrow", on_click=self._begin)

@@ -12,7 +12,7 @@ from urllib.parse import urlencode
 
 from nicegui import ui
 
-from rig.drawings import Attitude, page
+from rig.drawings import Attitude, page, strip
 from rig.runs.background import control
 from rig.runs.background.status import NOT_BEGUN, Asked, Status
 from rig.runs.signals import STOPPED_BY
@@ -43,6 +43,7 @@ class Live:
 
     def __init__(self) -> None:
         self.status: Status | None = None
+        self.present = False  # the run was in progress while this page was open
         with box("stack live") as self.box:
             with div("row-of"):
                 self.title = words("", "title")
@@ -57,11 +58,11 @@ class Live:
             self.hint = words("", "quiet small")
             self.alarm = div("")
             self.question = div("")
-            self.tiles = div("tiles").props('role=group aria-label="Live values and their limits"')
-            with div("values"):
-                self.values = div("")
+            with div("stack") as self.details:
+                self.tiles = div("tiles").props('role=group aria-label="Live values and their limits"')
                 self.attitude = div("attitude").on("click", self._enlarge)
-            self.over_time = OverTime()
+                self.values = div("")
+                self.over_time = OverTime()
         ui.timer(LOOK_S, self.look)
 
     def buttons(self) -> None:
@@ -90,7 +91,7 @@ class Live:
         """Show the drawing in the whole window."""
         if self.status is not None and self.status.attitude:
             with ui.dialog() as dialog, ui.card().classes("enlarged attitude").on("click", dialog.close):
-                ui.html(_drawn(self.status.attitude), sanitize=False)
+                ui.html(page(Attitude(**self.status.attitude)), sanitize=False)
             dialog.open()
 
     def _see(self) -> None:
@@ -119,11 +120,14 @@ class Live:
         if status != self.status:
             before, self.status = self.status, status
             self._show(status, before)
-        await self.over_time.follow(status.run)
+        if self.present:
+            await self.over_time.follow(status.run)
 
     def _show(self, status: Status, before: Status | None) -> None:
         word, look = PHASES.get(status.phase, (status.state or "ended", ENDS.get(status.state, "plain")))
         active = status.phase != "ended"
+        self.present = self.present or active
+        self.details.set_visibility(self.present)
         self.title.set_text(f"{status.procedure} on {status.bench}")
         self.phase.set_text(word)
         self.phase.classes(remove="good bad doubt plain", add=look)
@@ -239,4 +243,4 @@ def _limits(value: Mapping[str, Any]) -> str:
 
 
 def _drawn(attitude: Mapping[str, Any]) -> str:
-    return page(Attitude(**attitude))
+    return strip(Attitude(**attitude))
