@@ -11,7 +11,9 @@ import io
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO, cast
 
@@ -185,6 +187,12 @@ def load_yaml(text: str) -> Any:
     """The document in `text`. Raises ValueError for invalid YAML, a document that is too large, and one that contains
     itself.
     """
+    return deepcopy(_document(text))
+
+
+@lru_cache(maxsize=16)
+def _document(text: str) -> Any:
+    """The same, kept: a bench and a model are read again for each run, page and sensor of a batch."""
     if len(text) > LONGEST_YAML:
         raise ValueError(f"the document has {len(text)} characters; the limit is {LONGEST_YAML}")
     try:

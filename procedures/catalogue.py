@@ -12,6 +12,7 @@ import inspect
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -78,14 +79,22 @@ def find(wanted: str, folder: Path | None = None) -> Procedure:
 
 def _is_procedure(path: Path) -> bool:
     try:
-        body = ast.parse(path.read_text(encoding="utf-8")).body
+        return path.stem in _outline(path.read_text(encoding="utf-8"))[0]
     except (SyntaxError, UnicodeDecodeError):
         return False
-    return any(isinstance(node, ast.FunctionDef) and node.name == path.stem for node in body)
 
 
 def _doc(path: Path) -> str:
-    return ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+    return _outline(path.read_text(encoding="utf-8"))[1]
+
+
+@lru_cache(maxsize=256)
+def _outline(text: str) -> tuple[frozenset[str], str]:
+    """The names of the functions of a module, and its docstring. Raises SyntaxError."""
+    module = ast.parse(text)
+    return frozenset(node.name for node in module.body if isinstance(node, ast.FunctionDef)), (
+        ast.get_docstring(module) or ""
+    )
 
 
 def _load(path: Path) -> ModuleType:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from datetime import date
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -68,8 +69,13 @@ class Instrument(Strict):
     def typed_settings(self) -> Any:
         """The driver's frozen Settings. Raises ValidationError."""
         kind = importlib.import_module(f"drivers.{self.driver}.driver").Settings
-        checker = create_model("Checked", settings=(kind, ...), __config__=ConfigDict(extra="forbid"))
-        return checker(settings=self.settings).settings  # type: ignore[attr-defined]
+        return _checker(kind)(settings=self.settings).settings
+
+
+@cache
+def _checker(kind: type[Any]) -> Any:
+    """The model that checks settings of this kind. Making it takes longer than a check."""
+    return create_model("Checked", settings=(kind, ...), __config__=ConfigDict(extra="forbid"))
 
 
 class Sensor(Strict):
