@@ -13,7 +13,7 @@ import numpy as np
 
 from calibrations.analyses.control_chart import Chart, control_chart
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
-from calibrations.text import concise
+from calibrations.text import concise, prefixed
 from drivers.errors import did_you_mean
 from rig.errors import RecordError, UnknownRun
 from rig.record import Run
@@ -71,7 +71,8 @@ def row(each: Controlled) -> tuple[str, ...]:
     chart = each.chart
     last = concise(float(chart.values[-1]), chart.sigma, each.unit)
     progress = f"{len(chart.values)} of {chart.judged}" if chart.verdict == "baseline" else str(len(chart.values))
-    centre, sigma = f"{chart.centre:.7g} {each.unit}", f"{chart.sigma:.2g} {each.unit}"
+    factor, unit = prefixed(each.unit, chart.sigma)
+    centre, sigma = f"{chart.centre:.7g} {each.unit}", f"{factor * chart.sigma:.2g} {unit.replace('µ', 'u')}"
     return each.sensor, each.quantity, progress, centre, sigma, last, chart.verdict
 
 

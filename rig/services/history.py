@@ -24,7 +24,7 @@ from calibrations.means.noise import rms
 from calibrations.model import Model
 from calibrations.presentation.certificate.terms import name as result_name
 from calibrations.tables import MEANS
-from calibrations.text import as_written
+from calibrations.text import as_written, rounded
 from drivers.errors import did_you_mean
 from rig.bench.certificates import EXPIRED
 from rig.errors import RecordError, RigError
@@ -144,8 +144,8 @@ class History:
         worst = max(each.excess for each in open_)
         text = (
             f"The model {self.model} is not complete for {len(open_)} of {len(self.calibrations)} calibrations: the "
-            f"remaining error is up to {worst:.2g} times the noise floor. The values depend on the measured poses, so "
-            "no drift is computed. Choose a complete model."
+            f"remaining error is up to {rounded(worst, 2)} times the noise floor. The values depend on the measured "
+            "poses, so no drift is computed. Choose a complete model."
         )
         return (text,)
 

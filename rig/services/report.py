@@ -19,6 +19,7 @@ from rig.services.provenance import today
 from rig.services.request import Request
 
 if TYPE_CHECKING:
+    from calibrations.effects import Effect
     from calibrations.presentation.chart import Picture
 
 
@@ -81,22 +82,26 @@ def _facts(measured: Measured, date: str, program: str) -> Mapping[str, str]:
 # The page on data and a model.
 
 
-def reported(request: Request, tell: Callable[[str], None], held: Loaded | None = None) -> Page:
+Searched = Callable[[Mapping[str, "Effect"]], Mapping[str, "Effect"]]
+
+
+def reported(request: Request, tell: Callable[[str], None], searched: Searched, held: Loaded | None = None) -> Page:
     """On a model, or on the night of a soak where none is named. Raises what `loaded` and `fit` raise, UnusableData.
 
-    `held`: data and model that are in memory already, so that the page and its report show the same rows.
+    `searched` makes the effects of the search, which tell its progress and may end it. `held`: data and model that are
+    in memory already, so that the page and its report show the same rows.
     """
     night = night_of(request.data, today(), program()) if request.model is None and request.channel is None else None
-    return night or _on_a_model(request, held or loaded(request, tell), tell)
+    return night or _on_a_model(request, held or loaded(request, tell), tell, searched)
 
 
-def _on_a_model(request: Request, asked: Loaded, tell: Callable[[str], None]) -> Page:
-    beside = asked.data.compare(asked.model)
+def _on_a_model(request: Request, question: Loaded, tell: Callable[[str], None], searched: Searched) -> Page:
+    beside = question.data.compare(question.model)
     if (reason := beside.rejection) is not None and reason.verdict == Verdict.NO_RESPONSE:
-        raise UnusableData(f"{asked.data.source}: no report is written: {reason.verdict}: {reason.text}")
-    found = asked.data.discover(asked.model, asked.effects)
-    found = planned(found, request, asked.effects, tell)
-    if asked.data.form == "samples":
+        raise UnusableData(f"{question.data.source}: no report is written: {reason.verdict}: {reason.text}")
+    found = question.data.discover(question.model, searched(question.effects))
+    found = planned(found, request, question.effects, tell)
+    if question.data.form == "samples":
         from calibrations.presentation.charts.noise import still_album
         from calibrations.presentation.report.still import still_report
 

@@ -191,8 +191,9 @@ def raw_message(error: Exception) -> str:
 
 
 def for_page(text: str) -> str:
-    """A sentence of the command line with typographic signs: −, ±, ×, °C."""
+    """A sentence of the command line with typographic signs: −, ±, ×, µ, °C."""
     signs = re.sub(r"(?<![\w.)\]-])-(?=\d)", "−", text.replace("+-", "±"))
+    signs = re.sub(r"(?<=\d )u(?=[Vg]\b)", "µ", signs)
     signs = re.sub(r"(?<=\d) (deg)?C\b", " °C", signs)
     return re.sub(r"(?<=\d) x (?=the |that |its )", " × ", signs)
 

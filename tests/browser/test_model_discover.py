@@ -8,7 +8,7 @@ from urllib.parse import quote
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.conftest import Workbench
+from tests.browser.conftest import TABLET, Workbench
 from tests.browser.measured import two_faults
 
 pytestmark = pytest.mark.slow
@@ -24,7 +24,10 @@ def test_all_effects_are_added_at_a_click_and_any_can_be_removed(workbench: Work
     expect(page.get_by_role("button", name="Clear selection")).to_be_visible()
     expect(page.get_by_role("button", name="Clear selection")).to_be_enabled()
     workbench.shot(page, "discover-places")
-    page.get_by_role("button", name="Discover: add all 2 effects").click()
+    page.set_viewport_size(TABLET)
+    discover = page.get_by_role("button", name="Discover: add all 2 effects")
+    expect(discover).to_be_in_viewport()
+    discover.click()
     expect(page.get_by_text("Step 1 of 2: adding").or_(page.get_by_text("Step 2 of 2: adding"))).to_be_visible()
     expect(page.locator(BARS)).to_have_count(3)
     expect(headline).to_contain_text("Remaining error: 0.9")

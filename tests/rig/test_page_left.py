@@ -1,4 +1,4 @@
-"""A model page that is closed ends its search for missing effects."""
+"""A page that is closed ends the analyses that it waits for."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ from pathlib import Path
 from urllib.parse import quote
 
 import pytest
-from nicegui import Client
+from nicegui import Client, ui
 from nicegui.testing import user_simulation
 
 from rig.bench import DEFAULT
-from rig.services.search import Counted
+from rig.services.report import reported
+from rig.services.request import Request
+from rig.services.search import Cancelled, Counted
 from rig.web.desk import Desk
 from rig.web.pages import register
+from rig.web.visit import Visit
 from tests.browser.measured import two_faults
 
 SEARCH = "diagnosed"  # the thread of a search has the name of what it computes
@@ -54,3 +57,29 @@ def test_a_closed_page_ends_its_search(closed: bool, tmp_path: Path, monkeypatch
     assert not searches()
     (session,) = desk.sessions.values()
     assert bool(session.plans) is not closed
+
+
+def test_a_visit_ends_its_searches_and_its_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RIG_HOME", str(tmp_path / "home"))
+    visits: list[Visit] = []
+
+    async def simulated() -> None:
+        async with user_simulation() as user:
+            try:
+
+                @ui.page("/visited")
+                def visited() -> None:
+                    ui.label("visited")
+                    visits.append(Visit())
+
+                client = await user.open("/visited")
+                visits[0].check()
+                client.delete()
+            finally:
+                Client.page_routes.clear()
+
+    asyncio.run(simulated())
+    with pytest.raises(Cancelled):
+        visits[0].check()
+    with pytest.raises(Cancelled):  # a report fits the model, and is left before the search
+        reported(Request(two_faults(tmp_path), "linear"), print, visits[0].searched)

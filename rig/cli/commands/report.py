@@ -38,7 +38,7 @@ def command(request: Request, out: Path | None, folder: Path | None, form: str, 
 
     require_output(request, out)
     with working("fitting the model and searching for missing effects") as progress:
-        pictures, page = reported(request, note)
+        pictures, page = reported(request, note, progress.searched)
         progress.text = "drawing the pictures"
         if out is not None:
             write_whole(out, page())

@@ -12,10 +12,12 @@ from nicegui import ui
 from calibrations.model.file import dump_model, read_model
 from rig.fleet.members import Member, fleet_of
 from rig.record import Record
+from rig.services.search import Cancelled
 from rig.web.desk import Desk, models
 from rig.web.frame import frame
 from rig.web.pages.run_report import framed
 from rig.web.parts import box, div, failed, off_loop, state, waiting, words
+from rig.web.visit import Visit
 
 WHY = (
     "A fleet is the last complete run of every sensor in the record, or the tables of a folder or of an index with the "
@@ -37,7 +39,7 @@ class FleetPage:
     """Source and model, and the two analyses of `rig fleet`: their reports appear in the page."""
 
     def __init__(self, desk: Desk, source: str, model: str) -> None:
-        self.desk = desk
+        self.desk, self.visit = desk, Visit()
         self.done = ""
         with box("chosen"):
             self.source = ui.input("Folder or index; empty: the record", value=source).classes("data").props("dense")
@@ -65,6 +67,8 @@ class FleetPage:
         try:
             source, model = str(self.source.value or "").strip(), str(self.model.value)
             text = await off_loop(analyse, [source] if source else [], model, self.desk.bench_file, self._tell)
+        except Cancelled:
+            return
         except Exception as error:
             self._end(timer)
             with self.place:
@@ -80,6 +84,7 @@ class FleetPage:
             ui.html(framed("Report on the fleet", text), sanitize=False)
 
     def _tell(self, done: int, of: int) -> None:
+        self.visit.check()
         self.done = f"{done} of {of} sensors analysed"
 
     def _end(self, timer: ui.timer) -> None:

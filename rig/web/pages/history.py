@@ -24,6 +24,7 @@ from rig.services.history import (
     when,
 )
 from rig.services.request import effects_of
+from rig.services.search import Cancelled
 from rig.web.desk import Desk, models, runs
 from rig.web.frame import Key, frame
 from rig.web.pages.check_standards import CheckStandards
@@ -38,6 +39,7 @@ from rig.web.pages.history_results import (
     summary_of,
 )
 from rig.web.parts import LINKED, box, div, failed, off_loop, state, waiting, words
+from rig.web.visit import Visit
 
 # The list of sensors.
 
@@ -71,7 +73,9 @@ def listed(known: Mapping[str, list[Run]]) -> None:
             ui.button("Fleet", icon="grid_view", on_click=lambda: ui.navigate.to("/fleet")).props("outline dense")
         search = ui.input("Search: serial number or name").props("dense clearable")
         rows = [_row(sensor, runs) for sensor, runs in known.items()]
-        table = ui.table(rows=rows, columns=COLUMNS, row_key="sensor", pagination=PAGE).props("flat dense")
+        table = ui.table(rows=rows, columns=COLUMNS, row_key="sensor", pagination=PAGE).props(
+            "flat dense rows-per-page-label='Sensors per page'"
+        )
         table.on("rowClick", opened).bind_filter_from(search, "value")
         table.add_slot("body-cell-sensor", LINKED)
 
@@ -114,6 +118,7 @@ class HistoryPage:
 
     def __init__(self, desk: Desk, request: HistoryRequest, sensors: list[str], keys: dict[str, Key]) -> None:
         self.desk, self.request, self.sensors, self.keys = desk, request, sensors, keys
+        self.visit = Visit()
         self.found: History | None = None
         self.limits: Mapping[str, Limit] = {}
         self.under_way = "Reading the record"
@@ -161,6 +166,8 @@ class HistoryPage:
                 ui.skeleton(height=height)
         try:
             self.found = await off_loop(self._read)
+        except Cancelled:
+            return
         except Exception as error:
             self.body.clear()
             with self.body:
@@ -172,6 +179,7 @@ class HistoryPage:
 
     def _read(self) -> History:
         def tell(text: str) -> None:
+            self.visit.check()
             self.under_way = text
 
         self.limits = limits_of(self.desk.bench_file)

@@ -248,13 +248,11 @@ def _legend(q: Quantity) -> str:
     signs = ["● a calibration, ± two standard uncertainties"]
     if q.chart is not None and q.chart.signals:
         signs.append("◆ outside the limits of a control chart")
-    if q.line is None:
-        signs.append(q.no_drift.rstrip("."))
-    else:
+    if q.line is not None:
         signs.append("line and band: drift, with 95 % interval of the value")
     if q.allowed is not None:
         signs.append("broken lines: limits")
-    return f"{'; '.join(signs)}. Click on a point to open its model."
+    return " ".join(filter(None, [f"{'; '.join(signs)}.", q.no_drift, "Click on a point to open its model."]))
 
 
 # Summary, the calibration closest to a day, and the tables.

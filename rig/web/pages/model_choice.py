@@ -16,6 +16,7 @@ from rig.services.page_words import IMPORT, address
 from rig.web.desk import MODELS, models, noise_models, runs, saved_models
 from rig.web.pages.import_file import upload
 from rig.web.parts import box, message, off_loop, words
+from rig.web.visit import Visit
 
 if TYPE_CHECKING:
     from rig.services.session import ModelSession
@@ -26,7 +27,7 @@ class Choice:
     """Fields for data and model, and buttons for the present model."""
 
     def __init__(self, page: Workbench) -> None:
-        self.page = page
+        self.page, self.visit = page, Visit()
         with box("chosen"):
             self.data = (
                 ui.input("Data: a run, the path of a file, or several: A + B", value=page.data)
@@ -159,6 +160,7 @@ class Choice:
         from rig.services.load import Loaded
         from rig.services.report import reported
         from rig.services.request import Request
+        from rig.services.search import Cancelled
 
         page, session = self.page, self.page.session
         held = Loaded(session.data, session.model, session.effects) if session is not None else None
@@ -169,10 +171,13 @@ class Choice:
                 reported,
                 Request(page.data, page.model or None, page.desk.bench_file, page.noise or None),
                 notes.append,
+                self.visit.searched,
                 held,
             )
             text = await off_loop(made)
             ui.download.content(text, f"{Path(page.data).stem}-{session.model.name if session else 'model'}.html")
+        except Cancelled:
+            return
         except Exception as error:
             ui.notify(message(error), type="negative", multi_line=True, timeout=0, close_button="Close")
         finally:

@@ -71,6 +71,7 @@ class Runs:
                 rows=rows, columns=COLUMNS, row_key="name", selection="multiple", pagination=PAGE,
                 on_select=self._marked,
             ).props("flat dense wrap-cells").classes("runs").on("rowClick", self._open)  # fmt: skip
+            self.table.props("rows-per-page-label='Runs per page'")
             self.table.add_slot("body-cell-sensor", LINKED)
             self.table.add_slot("header-selection", MARK_ALL)
             self.table.add_slot("body-selection", MARK)

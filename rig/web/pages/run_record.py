@@ -23,6 +23,7 @@ from rig.services.history import lives
 from rig.services.next_steps import page_steps, result_rows
 from rig.services.report import reported
 from rig.services.request import Request
+from rig.services.search import Cancelled
 from rig.web.desk import Desk
 from rig.web.frame import frame
 from rig.web.pages.history_results import HistoryRequest
@@ -42,6 +43,7 @@ from rig.web.parts import (
     words,
 )
 from rig.web.pictures import downloads, empty_plot, remember
+from rig.web.visit import Visit
 
 MOST_NAMED = 8
 
@@ -219,7 +221,7 @@ class OneRun:
     """The page of one run."""
 
     def __init__(self, desk: Desk, run: Run, excluded: dict[int, str], known: Mapping[str, int]) -> None:
-        self.desk, self.run = desk, run
+        self.desk, self.run, self.visit = desk, run, Visit()
         self._head()
         headline = div("")
         with div("two"):
@@ -313,8 +315,12 @@ class OneRun:
         hint = ui.notification("Making the report", spinner=True, timeout=None)
         try:
             notes: list[str] = []
-            _, make = await off_loop(reported, Request(data, None, self.desk.bench_file), notes.append)
+            _, make = await off_loop(
+                reported, Request(data, None, self.desk.bench_file), notes.append, self.visit.searched
+            )
             ui.download.content(await off_loop(make), f"{data.replace('/', '-')}.html")
+        except Cancelled:
+            return
         except Exception as error:
             ui.notify(message(error), type="negative", multi_line=True, timeout=0, close_button="Close")
         finally:

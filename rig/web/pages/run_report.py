@@ -12,8 +12,10 @@ from rig.record import Run
 from rig.services.content import content_of
 from rig.services.report import reported
 from rig.services.request import Request
+from rig.services.search import Cancelled
 from rig.web.desk import Desk
 from rig.web.parts import box, div, failed, off_loop, waiting, words
+from rig.web.visit import Visit
 
 # the frame is as high as the report; a report has no scripts, and the page's policy lets it load nothing
 FITTED = (
@@ -30,7 +32,7 @@ class RunReport:
 
     def __init__(self, desk: Desk, run: Run, headline: Element) -> None:
         """`headline`: where the first sentence of the report appears."""
-        self.desk, self.run, self.headline = desk, run, headline
+        self.desk, self.run, self.headline, self.visit = desk, run, headline, Visit()
         self.names = [f"{run.run}/{sensor}" for sensor in run.bench.get("sensors", {})] or [run.run]
         with box("stack report"):
             with div("row-of"):
@@ -53,6 +55,8 @@ class RunReport:
             waiting("Fitting the model, searching for missing effects, drawing")
         try:
             text = await off_loop(self.text, data)
+        except Cancelled:
+            return
         except Exception as error:
             self.place.clear()
             with self.place:
@@ -74,10 +78,10 @@ class RunReport:
         ui.run_javascript("document.querySelector('.report')?.scrollIntoView({block: 'start'})")
 
     def text(self, data: str) -> str:
-        """The report as HTML. Raises what `reported` raises."""
+        """The report as HTML. Raises what `reported` raises, Cancelled."""
         key = content_of(data, None).key
         if key not in self.desk.reports:
-            _, make = reported(Request(data, None, self.desk.bench_file), lambda _: None)
+            _, make = reported(Request(data, None, self.desk.bench_file), lambda _: None, self.visit.searched)
             self.desk.keep_report(key, make())
         return self.desk.reports[key]
 
