@@ -49,10 +49,10 @@ def ranges(selected: Sequence[int]) -> str:
 
 def numbers(text: str) -> tuple[int, ...]:
     """The numbers in a text of `ranges`; empty for another text."""
-    found: set[int] = set()
+    selection: set[int] = set()
     for part in filter(None, text.split(",")):
         low, _, high = part.partition("-")
         if not low.isdecimal() or not (high or low).isdecimal() or int(high or low) > MOST_SELECTED:
             return ()
-        found |= set(range(int(low), int(high or low) + 1))
-    return tuple(sorted(found))
+        selection |= set(range(int(low), int(high or low) + 1))
+    return tuple(sorted(selection))

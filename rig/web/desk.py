@@ -50,17 +50,17 @@ class Desk:
         from rig.services.request import Request
         from rig.services.session import brought_up_to_date, model_session
 
-        found = self.sessions.get((data, model, noise))
-        if found is None:
-            found = model_session(Request(data, model or None, self.bench_file, noise or None))
+        session = self.sessions.get((data, model, noise))
+        if session is None:
+            session = model_session(Request(data, model or None, self.bench_file, noise or None))
             if added is None:
-                found = found.with_added(kept_effects(data, model, noise))
-        elif found.content.key != content_of(data, model or None).key:
-            found = brought_up_to_date(found)
+                session = session.with_added(kept_effects(data, model, noise))
+        elif session.content.key != content_of(data, model or None).key:
+            session = brought_up_to_date(session)
         if added is not None:
-            found = found.with_added(added)
-        self.keep(data, model, found, noise)
-        return found
+            session = session.with_added(added)
+        self.keep(data, model, session, noise)
+        return session
 
     def keep(self, data: str, model: str, session: ModelSession[Any], noise: str = "") -> None:
         """Store the present state of a session."""
@@ -118,8 +118,8 @@ def _name(data: str, model: str, noise: str) -> str:
 
 def _kept() -> dict[str, list[str]]:
     try:
-        found = json.loads((home() / SESSIONS).read_text(encoding="utf-8"))
-        return {str(name): [str(text) for text in texts] for name, texts in found.items()}
+        document = json.loads((home() / SESSIONS).read_text(encoding="utf-8"))
+        return {str(name): [str(text) for text in texts] for name, texts in document.items()}
     except (OSError, ValueError, AttributeError, TypeError):
         return {}
 
@@ -145,8 +145,8 @@ def models(chosen: str = "", default: str = "by kind of data") -> dict[str, str]
     """The available models by name or file, with their labels; "" is the default model."""
     from calibrations.model.file import shipped_names
 
-    found = {"": default, **{name: name for name in shipped_names()}, **saved_models()}
-    return found if chosen in found else {**found, chosen: chosen}
+    labels = {"": default, **{name: name for name in shipped_names()}, **saved_models()}
+    return labels if chosen in labels else {**labels, chosen: chosen}
 
 
 def noise_models() -> dict[str, str]:
@@ -155,12 +155,12 @@ def noise_models() -> dict[str, str]:
     from calibrations.model.file import read_model
     from rig.services.load import is_noise
 
-    found = {}
+    labels = {}
     for path, label in saved_models().items():
         with suppress(CalibrationError, OSError):
             if is_noise(read_model(path)):
-                found[path] = label
-    return found
+                labels[path] = label
+    return labels
 
 
 def saved_models() -> dict[str, str]:

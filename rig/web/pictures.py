@@ -49,8 +49,8 @@ def downloads(plot: Callable[[], ui.plotly | None], name: str) -> None:
 async def _download(plot: Callable[[], ui.plotly | None], name: str, form: str) -> None:
     from calibrations.presentation import static
 
-    found = plot()
-    chart = _CHARTS.get(found) if found is not None else None
+    drawn = plot()
+    chart = _CHARTS.get(drawn) if drawn is not None else None
     if chart is None:
         ui.notify("This picture is not drawn yet.", type="warning")
         return

@@ -33,19 +33,19 @@ class CheckStandards:
                 measure = partial(ui.navigate.to, f"/run?procedure={PROCEDURE}")
                 ui.button("Measure the check standard", icon="play_arrow", on_click=measure).props("outline dense")
             try:
-                self.found = controlled(runs)
+                self.standards = controlled(runs)
             except RecordError as error:  # one run so far
                 verdict.set_visibility(False)
                 failed("There is no chart yet", error)
                 return
-            verdict.set_text(worst(self.found))
-            verdict.classes(LOOKS[worst(self.found)])
+            verdict.set_text(worst(self.standards))
+            verdict.classes(LOOKS[worst(self.standards)])
             self.days = {run.run: when(run).date().isoformat() for run in runs}
             with div("wide-table"):
-                table(HEAD, [tuple(map(for_page, row(each))) for each in self.found])
-            for line in (line for each in self.found for line in signals(each)):
+                table(HEAD, [tuple(map(for_page, row(standard))) for standard in self.standards])
+            for line in (line for standard in self.standards for line in signals(standard)):
                 words(for_page(line), "small")
-            names = {k: f"{each.sensor}: {each.quantity}" for k, each in enumerate(self.found)}
+            names = {k: f"{standard.sensor}: {standard.quantity}" for k, standard in enumerate(self.standards)}
             self.chosen = ui.select(names, value=0, label="Chart of", on_change=self.draw).props("dense options-dense")
             self.chosen.style("min-width: 240px")
             self.plots: dict[str, ui.plotly] = {}
@@ -65,9 +65,9 @@ class CheckStandards:
             draw(self.plots[title], bare(panel), f"{title} {self.chosen.value}")
 
     def _panels(self) -> dict[str, Panel]:
-        each = self.found[int(self.chosen.value or 0)]
-        days = [self.days[run] for run in each.runs]
-        return control_panels(each.quantity, each.chart, each.unit, days, list(each.runs))
+        standard = self.standards[int(self.chosen.value or 0)]
+        days = [self.days[run] for run in standard.runs]
+        return control_panels(standard.quantity, standard.chart, standard.unit, days, list(standard.runs))
 
 
 def _clicked(event: events.GenericEventArguments) -> None:

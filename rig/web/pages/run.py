@@ -131,7 +131,7 @@ class Instruments:
         with self.rows:
             waiting("Connecting; nothing moves")
         try:
-            found = await off_loop(checked, self.bench)
+            results = await off_loop(checked, self.bench)
         except Exception as error:
             self.rows.clear()
             with self.rows:
@@ -139,7 +139,7 @@ class Instruments:
             return
         rows = [
             (role, f"{'✓' if test.ok else '✗ FAILED'} {test.name}", test.detail)
-            for role, (_, tests) in found.items()
+            for role, (_, tests) in results.items()
             for test in tests
         ]
         self.rows.clear()
@@ -158,8 +158,8 @@ class Planning:
         self.bench_file, self.bench = bench_file, bench
         self.given = {name: value for name, value in given.items() if name != "procedure"}
         self.started: Callable[[], Awaitable[None]] | None = None
-        self.asked = 0
-        self.found: Plan | None = None
+        self.turn = 0
+        self.planned: Plan | None = None
         names = {name: f"{name}: {summary(path)}" for name, path in paths(bench.folders.procedures).items()}
         chosen = given.get("procedure", DEFAULT_PROCEDURE)
         with box():
@@ -222,27 +222,27 @@ class Planning:
 
     async def replan(self) -> None:
         """Plan the run with the present settings."""
-        self.asked += 1
-        asked, self.found = self.asked, None
+        self.turn += 1
+        turn, self.planned = self.turn, None
         self.button.disable()
         self.plan.clear()
         with self.plan:
             waiting("Planning; nothing moves")
         try:
             procedure = self.procedure
-            found = await off_loop(plan, self.bench, procedure, parse(procedure, self.settings()))
+            planned = await off_loop(plan, self.bench, procedure, parse(procedure, self.settings()))
         except Exception as error:
-            if asked == self.asked:
+            if turn == self.turn:
                 self.plan.clear()
                 with self.plan:
                     failed("This procedure cannot run", error)
             return
-        if asked == self.asked:
-            self.found = found
+        if turn == self.turn:
+            self.planned = planned
             self.button.enable()
             self.plan.clear()
             with self.plan:
-                _show(found, self.bench)
+                _show(planned, self.bench)
 
     def start(self) -> None:
         """Open the checks before the run; their Begin starts it."""
@@ -255,9 +255,9 @@ class Planning:
         if under_way is not None and under_way.phase != "ended":
             ui.notify(f"{under_way.procedure} is running; stop it first", type="warning")
             return
-        if self.found is not None:
+        if self.planned is not None:
             name, settings = str(self.name.value), self.settings()
-            BeginDialog(before_start(self.found, self.bench), partial(self._begin, name, settings))
+            BeginDialog(before_start(self.planned, self.bench), partial(self._begin, name, settings))
 
     async def _begin(
         self, name: str, settings: Mapping[str, str], sensor: Mapping[str, str], answers: Mapping[str, str]
@@ -269,13 +269,13 @@ class Planning:
             await self.started()
 
 
-def _show(found: Plan, bench: Bench) -> None:
+def _show(planned: Plan, bench: Bench) -> None:
     """Show a plan."""
-    rows = plan_facts(found, bench)
-    if found.questions:
-        rows["Asks you"] = "; ".join(dict.fromkeys(found.questions))
+    rows = plan_facts(planned, bench)
+    if planned.questions:
+        rows["Asks you"] = "; ".join(dict.fromkeys(planned.questions))
     facts(rows)
-    lines = [(duration(stretch.start_s), stretch.words) for stretch in stretches(found)]
+    lines = [(duration(stretch.start_s), stretch.words) for stretch in stretches(planned)]
     table(("at", "what"), lines[:MOST_STRETCHES])
     if len(lines) > MOST_STRETCHES:
         with ui.expansion(f"{len(lines) - MOST_STRETCHES} more").props("dense"):

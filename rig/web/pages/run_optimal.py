@@ -55,7 +55,7 @@ class OptimalDialog:
         with self.place:
             waiting("Choosing the poses; nothing moves. This takes up to some minutes.")
         try:
-            found = await off_loop(self._optimal)
+            choice = await off_loop(self._optimal)
         except Exception as error:
             self.place.clear()
             with self.place:
@@ -63,7 +63,7 @@ class OptimalDialog:
         else:
             self.place.clear()
             with self.place:
-                self._show(found)
+                self._show(choice)
         self.choose.enable()
 
     def _optimal(self) -> Optimal:
@@ -72,22 +72,22 @@ class OptimalDialog:
         settings = parse(self.sweep, self.settings)
         return optimal(self.bench, self.sweep, settings, model, count, str(self.criterion.value))
 
-    def _show(self, found: Optimal) -> None:
+    def _show(self, choice: Optimal) -> None:
         with div("wide-table"):
-            table(PLANS, plan_rows(found))
-        for line in (*savings(found), *purpose(found)):
+            table(PLANS, plan_rows(choice))
+        for line in (*savings(choice), *purpose(choice)):
             words(line, "small")
-        ui.button("Use these poses", icon="done", on_click=lambda: self._used(found))
+        ui.button("Use these poses", icon="done", on_click=lambda: self._used(choice))
 
-    async def _used(self, found: Optimal) -> None:
+    async def _used(self, choice: Optimal) -> None:
         """Write the poses into a file, and hand over the settings of a run with them."""
         try:
-            path = await off_loop(_written, found)
+            path = await off_loop(_written, choice)
         except OSError as error:  # for example a full disk
             with self.place:
                 failed("The poses cannot be stored", error)
             return
-        settings: Mapping[str, Any] = found.equal.plan.settings
+        settings: Mapping[str, Any] = choice.equal.plan.settings
         kept = {name: setting_text(settings[name]) for name in ("dwell_s", "settle_s")}
         self.close()
         self.use({"pose_list": path, **kept})
@@ -98,10 +98,10 @@ class OptimalDialog:
         self.dialog.delete()
 
 
-def _written(found: Optimal) -> str:
+def _written(choice: Optimal) -> str:
     """The file with the chosen poses."""
     folder = home() / FILES
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"poses-{found.over.fit.model.name}-{found.equal.plan.poses}.csv"
-    write_whole(path, "\n".join([*format_poses(held.pose for held in found.equal.plan.held), ""]))
+    path = folder / f"poses-{choice.over.fit.model.name}-{choice.equal.plan.poses}.csv"
+    write_whole(path, "\n".join([*format_poses(held.pose for held in choice.equal.plan.held), ""]))
     return str(path)
