@@ -24,8 +24,8 @@ class Framing(Protocol):
     starts: re.Pattern[bytes]
     head: int
 
-    def length(self, head: bytes) -> int:
-        """Bytes of the frame that begins with `head`; 0 if none begins so."""
+    def length(self, text: bytes, at: int) -> int | None:
+        """Bytes of the frame that begins at `at`; 0 if none does, None if the end of `text` hides it."""
 
     def judge(self, frames: Bytes) -> Ints:
         """GOOD, BAD, or UNKNOWN for a kind whose checksum is not known, of each frame, shape (n, length) -> (n,)."""
@@ -112,13 +112,11 @@ class Frames:
         starts, lengths, gaps, gap = [_NONE], [_NONE], [_NONE.astype(bool)], False
         while match := self.framing.starts.search(text, at):
             gap, at = gap or match.start() > at, match.start()
-            if at + self.framing.head > len(text):
-                break
-            length = self.framing.length(text[at : at + self.framing.head])
-            if not length:
+            length = self.framing.length(text, at)
+            if length == 0:
                 gap, at = True, at + 1
                 continue
-            if not (n := _alike(array[at:], length, self.framing.head)):
+            if length is None or not (n := _alike(array[at:], length, self.framing.head)):
                 break
             starts.append(at + length * np.arange(n))
             lengths.append(np.full(n, length))

@@ -54,6 +54,27 @@ class Batch:
     clipped: str = ""
 
 
+@dataclass
+class Numbers:
+    """The numbers of messages, which count to `modulus`."""
+
+    modulus: int
+    _last: int | None = None
+    _missing: int = 0  # messages that did not arrive since the last sample
+
+    def gaps(self, numbers: Ints, samples: Ints) -> Ints:
+        """Messages missing before each sample, -1 for a repeated one: the numbers, and which of them are samples."""
+        if not len(numbers):
+            return numbers
+        last = int(numbers[0]) - 1 if self._last is None else self._last
+        self._last = int(numbers[-1])
+        missing = np.diff(np.concatenate([[last], numbers])) % self.modulus - 1
+        total = self._missing + np.cumsum(np.maximum(missing, 0))
+        before = np.diff(np.concatenate([[0], total[samples]]))
+        self._missing = int(total[-1] - (total[samples[-1]] if len(samples) else 0))
+        return np.asarray(np.where(missing[samples] < 0, -1, before))
+
+
 class Moment(NamedTuple):
     """One moment on both clocks, s."""
 

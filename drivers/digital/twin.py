@@ -36,12 +36,27 @@ def common_faults(carrier: str) -> dict[str, Kind]:
     }
 
 
+FRAME_FAULTS = {  # of a sensor that sends frames when they are requested
+    "refuses": Kind("refuses every command with this result", 3),
+    "mute": Kind("acknowledges a request, and sends no samples"),
+    "wrong-checksum": Kind("every message has a wrong checksum"),
+    "half-message": Kind("sends the first half of each message"),
+    "restart": Kind("loses power for a moment: its time and its settings begin anew, once"),
+}
+
+
 class World(Protocol):
     """What a sensor knows of physics."""
 
     trims: Mapping[str, Trim]
 
     def sensed(self, outputs: Sequence[str], start_s: float, interval_s: float, n: int) -> Floats: ...
+
+
+class WarmWorld(World, Protocol):
+    """The same, with the temperature of the sensor."""
+
+    def thermometer_c(self) -> float: ...
 
 
 @dataclass
@@ -168,6 +183,47 @@ class DigitalTwin(Twin):
         if self.faults.size("wrong-baud", now_s) is not None:
             return bytes(byte ^ 0xF8 for byte in message)
         return 2 * message if self.faults.size(f"doubled-{self.carrier}", now_s) is not None else message
+
+
+class FramedTwin(DigitalTwin):
+    """A sensor that sends frames of bytes when they are requested."""
+
+    def __init__(self, world: WarmWorld, settings: DigitalSettings, port: Port) -> None:
+        super().__init__(world, settings, port)
+        self._warmth, self._sending = world, False
+        port.answer = self._answer
+
+    @abstractmethod
+    def _answer(self, connection: Connection, now_s: float) -> None:
+        """Act on what has arrived."""
+
+    @abstractmethod
+    def _power_on(self, now_s: float) -> None:
+        """Begin with the settings of power-on."""
+
+    def advance(self, now_s: float) -> None:
+        if self.faults and self.faults.once("restart", now_s):
+            self._power_on(now_s)
+        super().advance(now_s)
+
+    def due_s(self) -> float:
+        return super().due_s() if self._sending else math.inf
+
+    def _sample(self, now_s: float, listeners: Sequence[Connection]) -> None:
+        if self._sending:
+            super()._sample(now_s, listeners)
+
+    def _spoilt(self, message: bytes, now_s: float) -> bytes:
+        return self._checked(super()._spoilt(message, now_s), now_s)
+
+    def _checked(self, message: bytes, now_s: float) -> bytes:
+        """A message, with a wrong checksum or half of it by the faults of the moment."""
+        if not self.faults or not message:
+            return message
+        if self.faults.size("half-message", now_s) is not None:
+            return message[: len(message) // 2]
+        wrong = self.faults.size("wrong-checksum", now_s) is not None
+        return message[:-1] + bytes([message[-1] ^ 0x55]) if wrong else message
 
 
 def talking_port(listen: str) -> Port:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.digital.frames import FrameDecoder, Frames, Ints, groups
-from drivers.digital.reception import Batch, Reception, TimeBase
+from drivers.digital.reception import Batch, Numbers, Reception, TimeBase
 from drivers.digital.sensor import DigitalSensor, no_samples
 from drivers.digital.settings import OUTPUTS, DigitalSettings, require_outputs
 from drivers.errors import BadFrame, DriverError, LinkTimeout, Refused, SensorFault
@@ -96,8 +96,7 @@ class SampleDecoder(FrameDecoder):
         self._names = tuple(settings.channels)
         self._columns = [OUTPUTS.index(name) for name in self._names]
         self._message = mav.IMU[settings.message]
-        self._sequence: int | None = None
-        self._missing = 0  # messages since the last sample
+        self._numbers = Numbers(256)
 
     def take(self, data: bytes) -> Batch:
         found = self.stream.take(data)
@@ -105,26 +104,13 @@ class SampleDecoder(FrameDecoder):
         for number, of in groups(heads.number):
             self.seen[mav.MESSAGES[number].name if number in mav.MESSAGES else f"{number}"] += len(heads.number[of])
         own = np.flatnonzero((heads.system == self._target[0]) & (heads.component == self._target[1]))
-        missing = self._gaps(heads.sequence[own])
         samples = own[found.known[own] & (heads.number[own] == self._message.number)]
+        gaps = self._numbers.gaps(heads.sequence[own], np.searchsorted(own, samples))
         content = mav.contents(found, heads, self._message, samples)
-        before = np.cumsum(np.concatenate([[self._missing], np.maximum(missing, 0)]))
-        at = np.searchsorted(own, samples)
-        gaps = np.diff(np.concatenate([[0], before[at + 1]]))
-        self._missing = int(before[-1] - (before[at[-1] + 1] if len(at) else 0))
-        gaps = np.where(missing[at] < 0, -1, gaps) if len(at) else gaps
         if "id" in (self._message.dtype.names or ()) and len(samples):
             wanted = content["id"] == self._settings.imu
             content, gaps = content[wanted], gaps[wanted]
         return self._batch(content, gaps)
-
-    def _gaps(self, sequence: Ints) -> Ints:
-        """Messages that are missing before each; -1 for one with the number of the one before."""
-        if not len(sequence):
-            return sequence
-        last = int(sequence[0]) - 1 if self._sequence is None else self._sequence
-        self._sequence = int(sequence[-1])
-        return (np.diff(np.concatenate([[last], sequence])) % 256) - 1
 
     def _batch(self, content: NDArray[np.void], gaps: Ints) -> Batch:
         numbers = np.concatenate([content[sensor] for sensor in "agm"], axis=1).astype(np.float64)

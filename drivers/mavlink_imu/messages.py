@@ -123,10 +123,13 @@ class Mavlink:
     starts = re.compile(b"[\xfd\xfe]")
     head = 3
 
-    def length(self, head: bytes) -> int:
-        if head[0] == V1:
-            return head[1] + 8
-        return 0 if head[2] & ~SIGNED else head[1] + 12 + SIGNATURE * (head[2] & SIGNED)
+    def length(self, text: bytes, at: int) -> int | None:
+        if at + self.head > len(text):
+            return None
+        first, size, flags = text[at : at + self.head]
+        if first == V1:
+            return size + 8
+        return 0 if flags & ~SIGNED else size + 12 + SIGNATURE * flags
 
     def judge(self, frames: Bytes) -> Ints:
         verdicts = np.full(len(frames), UNKNOWN, dtype=np.int64)

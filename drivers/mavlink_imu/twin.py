@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.digital.frames import Frames, Ints
 from drivers.digital.settings import OUTPUTS
-from drivers.digital.twin import DigitalTwin, Floats, World, common_faults, talking_port
+from drivers.digital.twin import FRAME_FAULTS, Floats, FramedTwin, WarmWorld, common_faults, talking_port
 from drivers.mavlink_imu import messages as mav
 from drivers.mavlink_imu.driver import END, UPDATED, Settings
 from drivers.transport.address import Address
@@ -23,49 +23,23 @@ LISTEN = "tcp://127.0.0.1:0"
 SYSTEM, COMPONENT, QUADROTOR, PX4 = 1, 1, 2, 12
 FASTEST_HZ = 4000.0
 ANSWER_S = 0.001
-FAULTS = common_faults("message") | {
-    "no-heartbeat": Kind("sends no heartbeat"),
-    "refuses": Kind("refuses every command with this result", 3),
-    "mute": Kind("acknowledges a request, and sends no samples"),
-    "wrong-checksum": Kind("every message has a wrong checksum"),
-    "half-message": Kind("sends the first half of each message"),
-    "restart": Kind("loses power for a moment: its time and its settings begin anew, once"),
-}
+FAULTS = common_faults("message") | FRAME_FAULTS | {"no-heartbeat": Kind("sends no heartbeat")}
 
 
-class WarmWorld(World, Protocol):
-    """What a flight controller knows of physics."""
-
-    def thermometer_c(self) -> float: ...
-
-
-class Autopilot(DigitalTwin):
+class Autopilot(FramedTwin):
     """A flight controller. It sends its heartbeat from power-on, and samples when they are requested."""
 
     carrier = "message"
 
     def __init__(self, world: WarmWorld, settings: Settings, port: Port) -> None:
         super().__init__(world, settings, port)
-        self._warmth, self._settings, self._message = world, settings, mav.IMU[settings.message]
+        self._settings, self._message = settings, mav.IMU[settings.message]
         self._columns = [OUTPUTS.index(name) for name in settings.outputs]
-        self._sending, self._beat_s, self._sequence = False, 1.0, 0
+        self._beat_s, self._sequence = 1.0, 0
         self._heard: dict[str, Frames] = {}
-        port.answer = self._answer
-
-    def advance(self, now_s: float) -> None:
-        """Send samples and heartbeats in their order."""
-        if self.faults and self.faults.once("restart", now_s):
-            self._sending, self._sequence = False, 0
-            self._begin_at(now_s, self._settings.rate_hz)
-        listeners = self._listeners(now_s)
-        while self._beat_s <= now_s:
-            self._sample(self._beat_s, listeners)
-            self._beat(self._beat_s, listeners)
-            self._beat_s += 1.0
-        self._sample(now_s, listeners)
 
     def due_s(self) -> float:
-        return min(self._beat_s, super().due_s() if self._sending else math.inf)
+        return min(self._beat_s, super().due_s())
 
     def state(self) -> dict[str, Any]:
         own = {"sending": self._sending, "beat_s": self._beat_s, "sequence": self._sequence}
@@ -75,9 +49,17 @@ class Autopilot(DigitalTwin):
         super().restore(state)
         self._sending, self._beat_s, self._sequence = state["sending"], state["beat_s"], state["sequence"]
 
+    def _power_on(self, now_s: float) -> None:
+        self._sending, self._sequence = False, 0
+        self._begin_at(now_s, self._settings.rate_hz)
+
     def _sample(self, now_s: float, listeners: Sequence[Connection]) -> None:
-        if self._sending:
-            super()._sample(now_s, listeners)
+        """Send samples and heartbeats in their order."""
+        while self._beat_s <= now_s:
+            super()._sample(self._beat_s, listeners)
+            self._beat(self._beat_s, listeners)
+            self._beat_s += 1.0
+        super()._sample(now_s, listeners)
 
     def _beat(self, now_s: float, listeners: Sequence[Connection]) -> None:
         if self.faults and self.faults.size("no-heartbeat", now_s) is not None:
@@ -141,18 +123,6 @@ class Autopilot(DigitalTwin):
         sequences: Ints = self._sequence + np.arange(len(content))
         self._sequence = (self._sequence + len(content)) % 256
         return mav.frames(message, content, sequences, SYSTEM, COMPONENT)
-
-    def _spoilt(self, message: bytes, now_s: float) -> bytes:
-        return self._checked(super()._spoilt(message, now_s), now_s)
-
-    def _checked(self, message: bytes, now_s: float) -> bytes:
-        """A message, with a wrong checksum or half of it by the faults of the moment."""
-        if not self.faults or not message:
-            return message
-        if self.faults.size("half-message", now_s) is not None:
-            return message[: len(message) // 2]
-        wrong = self.faults.size("wrong-checksum", now_s) is not None
-        return message[:-1] + bytes([message[-1] ^ 0x55]) if wrong else message
 
 
 def serve(world: WarmWorld, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
