@@ -53,6 +53,28 @@ def digital(tmp_path: Path) -> Callable[..., str]:
     return write
 
 
+FRAMED = {  # drivers of sensors that send frames: their settings, and the units of a table and of a magnetometer
+    "mavlink_imu": ({"outputs": ["ax", "ay", "gx", "gy", "gz", "mx", "my", "mz"]}, "m/s^2", "gauss"),
+    "xsens_mti": ({"outputs": ["ax", "ay", "gx", "gy", "gz", "mx", "my", "mz"]}, "m/s^2", "count"),
+}
+NEED_D63 = {"motion"}
+
+
+@pytest.fixture
+def framed(tmp_path: Path) -> Callable[..., str]:
+    """The bench file of the simulated rig with a sensor that sends frames; `faults` are those of the sensor."""
+
+    def write(driver: str, *faults: dict[str, Any]) -> str:
+        document = yaml.safe_load(DEFAULT.read_text(encoding="utf-8"))
+        adc = {"driver": driver, "url": "simulated", "settings": FRAMED[driver][0] | {"rate_hz": 100}}
+        document["instruments"]["adc"] = adc | {"faults": list(faults)}
+        path = tmp_path / f"{driver}.yaml"
+        path.write_text(yaml.safe_dump(document), encoding="utf-8")
+        return str(path)
+
+    return write
+
+
 def unit_expected(name: str, unit: str) -> set[str]:
     """The units that a result can have that depends on the unit of the outputs."""
     if name.startswith(("gyro-bias-x", "gyro-bias-y", "gyro-bias-z")):
@@ -88,6 +110,68 @@ def test_a_procedure_gives_its_results_in_the_unit_of_the_sensor(
     for axis in "xy":
         if (scale := results.get(f"scale-{axis}")) is not None:
             assert scale["value"] == pytest.approx(PER_G[unit], rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.sockets
+@pytest.mark.parametrize("driver", list(FRAMED))
+@pytest.mark.parametrize("procedure", sorted(SHORT.keys() - NEED_D63))
+def test_a_procedure_runs_with_each_digital_sensor(
+    rig: Rig, rig_home: Path, framed: Callable[..., str], procedure: str, driver: str
+) -> None:
+    ended = rig("run", procedure, "--bench", framed(driver), "--unattended", "--json", *SHORT[procedure])
+    assert ended.status in (0, 1), ended.err
+    results = json.loads(ended.out)["results"]
+    _, unit, field = FRAMED[driver]
+    for name, result in results.items():
+        assert result["unit"] not in ("V", "V/g", "V/K", "V/h"), name
+        expected = {u if u != "gauss" else field for u in unit_expected(name, unit)}
+        assert not expected or result["unit"] in expected, name
+    assert not VOLTS.search(ended.err)
+    for axis in "xy":
+        if (scale := results.get(f"scale-{axis}")) is not None:
+            assert scale["value"] == pytest.approx(9.80665, rel=0.1)
+
+
+@pytest.mark.sockets
+@pytest.mark.parametrize("driver", list(FRAMED))
+def test_a_few_poses_with_each_digital_sensor_keep_their_losses(
+    rig: Rig, rig_home: Path, framed: Callable[..., str], driver: str
+) -> None:
+    faults = ({"what": "lost-message", "probability": 0.005}, {"what": "doubled-message", "probability": 0.02})
+    bench = framed(driver, *faults)
+    sweep = ("--inclinations-deg", "90", "--step-deg", "90", "--dwell-s", "2", "--reference-every", "0")
+    ended = rig("run", "sweep", "--bench", bench, "--unattended", *sweep)
+    assert ended.status == 0, ended.err
+    with Record() as record:
+        run = record.run("last").run
+        counted = {reading.name: reading.value for reading in record.readings(run)}
+        log = " ".join(line.text for line in record.lines(run, ["kept"]))
+    for name in ("lost", "doubled"):
+        assert counted[f"samples-{name}"] > 0
+        assert sum(map(int, re.findall(rf"{name} (\d+)", log))) == counted[f"samples-{name}"]
+    assert counted["messages-damaged"] == 0
+    assert abs(counted["sensor-clock-gain"]) < 30
+
+
+@pytest.mark.sockets
+@pytest.mark.parametrize("driver", list(FRAMED))
+def test_a_procedure_that_needs_another_input_says_so(
+    rig: Rig, rig_home: Path, framed: Callable[..., str], driver: str
+) -> None:
+    ended = rig("run", "motion", "--bench", framed(driver), "--unattended")
+    assert ended.status not in (0, 70)
+    assert "d63" in ended.err
+
+
+@pytest.mark.sockets
+@pytest.mark.parametrize("driver", list(FRAMED))
+def test_a_check_shows_each_digital_sensor(rig: Rig, rig_home: Path, framed: Callable[..., str], driver: str) -> None:
+    ended = rig("check", "--bench", framed(driver))
+    assert ended.status == 0, ended.err
+    assert "100 samples a second" in ended.out
+    failed = rig("check", "--bench", framed(driver, {"what": "wrong-baud"}))
+    assert failed.status == 3
 
 
 def test_every_procedure_is_tried() -> None:

@@ -109,20 +109,23 @@ def test_the_bench_file_is_an_example(rig: Rig) -> None:
     assert rig("check", "--example-hand").out == HAND.read_text(encoding="utf-8")
 
 
-@pytest.fixture
-def digital_bench(tmp_path: Path) -> Path:
-    """The bench of the hand with a sensor that sends lines in g."""
-    document = yaml.safe_load(HAND.read_text(encoding="utf-8"))
-    settings = {"columns": {"time": 1, "ax": 2, "ay": 3, "az": 4}, "unit": "g", "rate_hz": 100}
-    document["instruments"]["adc"] = {"driver": "imu_lines", "url": "simulated", "settings": settings}
-    path = tmp_path / "digital.yaml"
-    path.write_text(yaml.safe_dump(document), encoding="utf-8")
-    return path
+DIGITAL = {  # settings of each digital sensor, the unit of its accelerometer, and 1 g in it
+    "imu_lines": ({"columns": {"time": 1, "ax": 2, "ay": 3, "az": 4}, "unit": "g"}, "g", 1.0),
+    "mavlink_imu": ({"outputs": ["ax", "ay", "az"]}, "m/s^2", 9.80665),
+    "xsens_mti": ({"outputs": ["ax", "ay", "az"]}, "m/s^2", 9.80665),
+}
 
 
 @pytest.mark.slow
 @pytest.mark.sockets
-def test_a_digital_sensor_is_calibrated_in_its_own_unit(rig: Rig, rig_home: Path, digital_bench: Path) -> None:
+@pytest.mark.parametrize("driver", list(DIGITAL))
+def test_a_digital_sensor_is_calibrated_in_its_own_unit(rig: Rig, rig_home: Path, tmp_path: Path, driver: str) -> None:
+    settings, unit, one_g = DIGITAL[driver]
+    document = yaml.safe_load(HAND.read_text(encoding="utf-8"))
+    adc = {"driver": driver, "url": "simulated", "settings": settings | {"rate_hz": 100}}
+    document["instruments"]["adc"] = adc
+    digital_bench = tmp_path / "digital.yaml"
+    digital_bench.write_text(yaml.safe_dump(document), encoding="utf-8")
     ended = rig("run", "hand-positions", "--bench", str(digital_bench), "--unattended", "--json")
     assert ended.status == 0, ended.err
     found = json.loads(ended.out)["results"]
@@ -130,12 +133,12 @@ def test_a_digital_sensor_is_calibrated_in_its_own_unit(rig: Rig, rig_home: Path
     assert isinstance(world, HandheldWorld)
     for axis in "xyz":
         mass, bias, scale = getattr(world.triad, axis), found[f"bias-{axis}"], found[f"scale-{axis}"]
-        assert (bias["unit"], scale["unit"]) == ("g", "g/g")
-        assert abs(bias["value"] - (mass.zero_v - 1.65) / 0.8) < 4 * bias["std"] + 4e-5
-        assert abs(scale["value"] - mass.volts_per_g / 0.8) < 4 * scale["std"] + 4e-5
+        assert (bias["unit"], scale["unit"]) == (unit, f"{unit}/g")
+        assert abs(bias["value"] - one_g * (mass.zero_v - 1.65) / 0.8) < 4 * bias["std"] + 4e-5 * one_g
+        assert abs(scale["value"] - one_g * mass.volts_per_g / 0.8) < 4 * scale["std"] + 4e-5 * one_g
     fitted = rig("fit", "last", "--model", "linear")
     assert fitted.status == 0
-    assert " g/g" in fitted.out
+    assert f" {unit}/g" in fitted.out
     assert " V" not in fitted.out
 
 

@@ -1,0 +1,1 @@
+"""A motion tracker Xsens MTi."""
