@@ -177,6 +177,8 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
             if timeout_s < QUIET_S:
                 return Batch(np.empty((0, 0)))
             raise self._silence(timeout_s)
+        while more := self._link.read(0.0):  # a read has an end, and samples must not gather behind it
+            data += more
         batch = decoder.take(data)
         if decoder.damaged > SHOWN + decoder.good or decoder.unread > self.longest:
             raise self._unreadable(decoder)

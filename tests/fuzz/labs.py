@@ -7,11 +7,17 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
+import numpy as np
+
 from drivers.errors import DriverError
 from drivers.imu_lines import lines as imu
+from drivers.mavlink_imu import driver as mavlink
+from drivers.mavlink_imu import messages as mav
 from drivers.scpi_meter.driver import Meter, Settings
 from drivers.transport.channel_access import Circuit
 from drivers.transport.channel_access_server import Field, Session
+from drivers.xsens_mti import driver as xsens
+from drivers.xsens_mti import messages as xbus
 from tests.fuzz.target import Target
 
 __all__ = ["LABS"]
@@ -40,6 +46,19 @@ def line_samples(style: str, columns: dict[str, int | str]) -> Callable[[bytes],
         samples = [*assembly.take(data[:half]), *assembly.take(data[half:])]
         assert all(math.isfinite(value) for sample in samples for value in sample.values())
         return assembly.damaged
+
+    return take
+
+
+def framed_samples(make: Callable[[], Any]) -> Callable[[bytes], object]:
+    """Samples of a decoder of frames, in two pieces."""
+
+    def take(data: bytes) -> object:
+        decoder, half = make(), len(data) // 2
+        batches = [decoder.take(data[:half]), decoder.take(data[half:])]
+        assert all(len(batch.values) == len(batch.missing) for batch in batches)
+        assert len(decoder.stream.rest) < 4096
+        return decoder.damaged
 
     return take
 
@@ -143,6 +162,13 @@ TEXTS = {
     "teleplot": (b"\n>ax:1627551892437:0.0123\n>ay:-0.004\xc2\xa7g\n>az:1.002|np\n", {"ax": "ax", "ay": "ay"}),
     "nmea": (b"\n$PIMU,0.0123,-0.004,1.002*2A\n$PIMU,0.0123,-0.004,1.002*2B\n", {"ax": 1, "ay": 2, "az": 3}),
 }
+MAVLINK = b"".join(
+    mav.frames(message, mav.fields(message, time=7, temperature=20), np.array([k]), 1, 1, version)[0]
+    for k, (message, version) in enumerate([(mav.HIGHRES_IMU, mav.V2), (mav.IMU["SCALED_IMU"], mav.V1)])
+)
+XBUS = b"".join(
+    xbus.data_messages([(xbus.COUNTER, np.arange(2, dtype=">u2")), (xbus.ACCELERATION, np.ones((2, 3), dtype=">f4"))])
+)
 SCPI = b'Keysight,34461A,MY1,A.02\nKeysight,34461A,MY1,A.02\n0,"No error"\n0\n4\n+1.5E+00,2.5,1.5,2.5\n0,"No error"\n'
 OVERLOAD = b'a,b\na,b\n0\n0\n4\n+9.9E37,1,2,3\n-230,"Data stale"\n0\n'
 READ = b'Keysight,34461A,MY1,A.02\nKeysight,34461A,MY1,A.02\n0,"No error"\n1.5,2.5\n1.5,2.5\n0,"No error"\n'
@@ -152,6 +178,8 @@ LABS: dict[str, Target] = {
         f"imu-lines-{style}": Target(line_samples(style, dict(columns)), (), [text], 60)
         for style, (text, columns) in TEXTS.items()
     },
+    "mavlink": Target(framed_samples(lambda: mavlink.SampleDecoder(mavlink.Settings(), (1, 1))), (), [MAVLINK], 40),
+    "xbus": Target(framed_samples(lambda: xsens.SampleDecoder(xsens.Settings())), (), [XBUS], 40),
     "scpi-timer": Target(scpi_answers(timer=True), SAID_SO, [SCPI, OVERLOAD], 40),
     "scpi-read": Target(scpi_answers(timer=False), SAID_SO, [READ], 40),
     "channel-access-answer": Target(ca_answer, SAID_SO, [b"".join(SAID)], 20),

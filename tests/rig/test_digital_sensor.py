@@ -58,6 +58,7 @@ FRAMED = {  # drivers of sensors that send frames: their settings, and the units
     "xsens_mti": ({"outputs": ["ax", "ay", "gx", "gy", "gz", "mx", "my", "mz"]}, "m/s^2", "count"),
 }
 NEED_D63 = {"motion"}
+PAGE = Path(__file__).parents[2] / "docs/how-to/digital.md"
 
 
 @pytest.fixture
@@ -66,7 +67,11 @@ def framed(tmp_path: Path) -> Callable[..., str]:
 
     def write(driver: str, *faults: dict[str, Any]) -> str:
         document = yaml.safe_load(DEFAULT.read_text(encoding="utf-8"))
-        adc = {"driver": driver, "url": "simulated", "settings": FRAMED[driver][0] | {"rate_hz": 100}}
+        adc = {
+            "driver": driver,
+            "url": "simulated",
+            "settings": FRAMED[driver][0] | {"rate_hz": 100, "most_lost": 0.05},
+        }
         document["instruments"]["adc"] = adc | {"faults": list(faults)}
         path = tmp_path / f"{driver}.yaml"
         path.write_text(yaml.safe_dump(document), encoding="utf-8")
@@ -172,6 +177,18 @@ def test_a_check_shows_each_digital_sensor(rig: Rig, rig_home: Path, framed: Cal
     assert "100 samples a second" in ended.out
     failed = rig("check", "--bench", framed(driver, {"what": "wrong-baud"}))
     assert failed.status == 3
+
+
+@pytest.mark.sockets
+@pytest.mark.parametrize("block", range(2))
+def test_the_bench_files_of_the_how_to_page_are_checked(rig: Rig, rig_home: Path, tmp_path: Path, block: int) -> None:
+    path = tmp_path / "bench.yaml"
+    path.write_text(
+        re.findall(r"```yaml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[block], encoding="utf-8"
+    )
+    ended = rig("check", "--bench", str(path))
+    assert ended.status == 0, ended.err
+    assert "100 samples a second" in ended.out
 
 
 def test_every_procedure_is_tried() -> None:
