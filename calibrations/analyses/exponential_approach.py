@@ -78,7 +78,7 @@ class Series:
         """The most likely `k` exponentials, and their -2 log likelihood averaged over the noise."""
         taus_s, point = self._on_grid(k)
         p = self._descended(self._start(taus_s, point), point)
-        likelihood = [np.log(prior) - self._scored(p, each)[0] / 2 for each, prior in self.points.items()]
+        likelihood = [np.log(prior) - self._scored(p, noise)[0] / 2 for noise, prior in self.points.items()]
         return _slowest_first(p), -2 * float(np.logaddexp.reduce(likelihood))
 
     def averaged(self, p: Array) -> Exponentials:
@@ -88,11 +88,11 @@ class Series:
         weight = np.exp((restricted.min() - restricted) / 2) * np.array(list(self.points.values()))
         chosen = np.flatnonzero(weight > LEAST_LIKELIHOOD * weight.sum())
         likely, weight = [list(self.points)[i] for i in chosen], weight[chosen] / weight[chosen].sum()
-        each = np.array([self._descended(p, point) for point in likely])
-        _, _, covariances, noise = zip(*map(self._scored, each, likely), strict=True)
-        mean = weight @ each
+        fits = np.array([self._descended(p, point) for point in likely])
+        _, _, covariances, noise = zip(*map(self._scored, fits, likely), strict=True)
+        mean = weight @ fits
         covariance = np.einsum("i,ijk->jk", weight, np.array(covariances))
-        covariance += np.einsum("i,ij,ik->jk", weight, each - mean, each - mean)
+        covariance += np.einsum("i,ij,ik->jk", weight, fits - mean, fits - mean)
         half = float(np.sum(self.gap_s)) / 2
         walks = [len(taus) == 1 and ratio > WALK_RATIO and taus[0] > half for ratio, taus in likely]
         return Exponentials(
@@ -185,8 +185,8 @@ class Series:
         n, free = len(r), len(r) - len(p)
         inverse = np.linalg.pinv(J.T @ J, hermitian=True)
         square = max(float(r @ r - (J.T @ r) @ inverse @ (J.T @ r)), 0.0)
-        whole, part = float(self._factor(square, n)), float(self._factor(square, free))
-        likelihood = square / whole + n * np.log(whole) + logdet
+        factor_of_all, part = float(self._factor(square, n)), float(self._factor(square, free))
+        likelihood = square / factor_of_all + n * np.log(factor_of_all) + logdet
         information = float(np.linalg.slogdet(J.T @ J + 1e-12 * np.eye(len(p)))[1])
         restricted = square / part + free * np.log(part) + logdet + information
         widened = part * free / max(free - 2, 1)  # Student's t

@@ -105,10 +105,10 @@ class QuantityFilter:
     def forecast(self) -> Forecast:
         """The present forecast."""
         states = self.bank.drawn(DRAWS)
-        rest, taus_s = states[:, REST:LN_TAU], np.exp(states[:, LN_TAU:SLOW])
-        final, present = states[:, LEVEL], states[:, LEVEL] + rest.sum(axis=1)
+        remaining, taus_s = states[:, REST:LN_TAU], np.exp(states[:, LN_TAU:SLOW])
+        final, present = states[:, LEVEL], states[:, LEVEL] + remaining.sum(axis=1)
         tolerance = COVERAGE_FACTOR * self.bank.noise
-        steady_s = self.bank.t_s + _time_to_tolerance_s(rest, taus_s, tolerance)
+        steady_s = self.bank.t_s + _time_to_tolerance_s(remaining, taus_s, tolerance)
         median = float(np.median(final))
         return Forecast(
             self.bank.t_s,
@@ -121,7 +121,7 @@ class QuantityFilter:
         )
 
     def _bounds(self, draws: Array) -> Bounds:
-        return Bounds(*(self.first + self.unit * each for each in _bounds(draws)))
+        return Bounds(*(self.first + self.unit * bound for bound in _bounds(draws)))
 
 
 @dataclass(frozen=True)
@@ -140,14 +140,14 @@ class SoakForecast:
         """
         if self.oven_c and np.abs(part.optional("temperature_c", self.oven_c) - self.oven_c).max() > REACHED_K:
             return replace(self, followed={})
-        found: dict[str, QuantityFilter] = dict(self.followed)
+        filters: dict[str, QuantityFilter] = dict(self.followed)
         for axis in (axis for axis in part.axes if axis in AXES):
-            found |= self._held(part, axis) if part.labels["path"][0].startswith(HOLD) else self._turned(part, axis)
-        return replace(self, followed=found)
+            filters |= self._held(part, axis) if part.labels["path"][0].startswith(HOLD) else self._turned(part, axis)
+        return replace(self, followed=filters)
 
     def forecasts(self) -> dict[str, Forecast]:
         """The present forecast of each quantity."""
-        return {name: each.forecast() for name, each in self.followed.items()}
+        return {name: quantity_filter.forecast() for name, quantity_filter in self.followed.items()}
 
     def _held(self, part: Table, axis: str) -> dict[str, QuantityFilter]:
         before = self.followed.get(name := f"bias-{axis}")
@@ -188,42 +188,42 @@ class ForecastHistory:
     def known_s(self) -> float | None:
         """The time since power-on from which the final value is known to the end; None if it is not."""
         since = None
-        for each in reversed(self.forecasts):
-            if not each.known:
+        for forecast in reversed(self.forecasts):
+            if not forecast.known:
                 break
-            since = each.t_s
+            since = forecast.t_s
         return since
 
 
-def steady_time(found: Mapping[str, ForecastHistory], axis: str = "") -> Bounds | None:
+def steady_time(histories: Mapping[str, ForecastHistory], axis: str = "") -> Bounds | None:
     """When all quantities of an axis, or of all axes, are steady by the last forecasts, s since power-on: the latest of
     each bound, infinite beyond FARTHEST_S. None where one of them is no approach."""
-    last = [course.last for name, course in found.items() if name.endswith(axis)]
-    if not last or any(each.surprised for each in last):
+    last = [course.last for name, course in histories.items() if name.endswith(axis)]
+    if not last or any(forecast.surprised for forecast in last):
         return None
-    within = [[s if s - each.t_s < LATEST_STEADY_S else np.inf for s in each.steady_s] for each in last]
+    within = [[s if s - forecast.t_s < LATEST_STEADY_S else np.inf for s in forecast.steady_s] for forecast in last]
     return Bounds(*np.max(within, axis=0).tolist())
 
 
 def forecast_history(table: Table, oven_c: float = 0.0) -> dict[str, ForecastHistory]:
     """Every quantity of a soak's table by name, as known after LOOKS parts of it, closer together at the beginning."""
-    whole = list(soak_parts(table))
-    looks = set(np.rint(np.geomspace(1, len(whole), FORECASTS)).astype(int).tolist()) if whole else set()
-    seen: dict[str, list[Forecast]] = {}
-    for number, told in enumerate(filter_soak(table, oven_c), 1):
-        for name, each in told.forecasts().items() if number in looks else ():
-            before = seen.setdefault(name, [])
-            if not before or before[-1].t_s < each.t_s:
-                before.append(each)
-    return {name: ForecastHistory(tuple(forecasts)) for name, forecasts in seen.items()}
+    parts = list(soak_parts(table))
+    looks = set(np.rint(np.geomspace(1, len(parts), FORECASTS)).astype(int).tolist()) if parts else set()
+    histories: dict[str, list[Forecast]] = {}
+    for number, state in enumerate(filter_soak(table, oven_c), 1):
+        for name, forecast in state.forecasts().items() if number in looks else ():
+            before = histories.setdefault(name, [])
+            if not before or before[-1].t_s < forecast.t_s:
+                before.append(forecast)
+    return {name: ForecastHistory(tuple(forecasts)) for name, forecasts in histories.items()}
 
 
 def filter_soak(table: Table, oven_c: float = 0.0) -> Iterator[SoakForecast]:
     """The filters after each part of a soak's table."""
-    told = SoakForecast({}, oven_c)
+    state = SoakForecast({}, oven_c)
     for part in soak_parts(table):
-        told = told.after(part)
-        yield told
+        state = state.after(part)
+        yield state
 
 
 def soak_parts(table: Table) -> Iterator[Table]:
@@ -236,16 +236,16 @@ def soak_parts(table: Table) -> Iterator[Table]:
             length_s = float(np.ptp(table.time_s[rows]))
             count = min(len(rows), max(STRETCHES, int(np.ceil(length_s / STRETCH_S))))
         if paths[begin].startswith((HOLD, REVERSAL)):
-            yield from (table.rows(each) for each in np.array_split(rows, count))
+            yield from (table.rows(part) for part in np.array_split(rows, count))
 
 
-def _time_to_tolerance_s(rest: Array, taus_s: Array, tolerance: float) -> Array:
-    """For each draw, how long the remaining drift is beyond the tolerance; `rest` and `taus_s` (n, 2)."""
-    ahead = np.abs(np.sum(rest[:, None, :] * np.exp(-HORIZON_S[None, :, None] / taus_s[:, None, :]), axis=2))
+def _time_to_tolerance_s(remaining: Array, taus_s: Array, tolerance: float) -> Array:
+    """For each draw, how long the remaining drift is beyond the tolerance; `remaining` and `taus_s` (n, 2)."""
+    ahead = np.abs(np.sum(remaining[:, None, :] * np.exp(-HORIZON_S[None, :, None] / taus_s[:, None, :]), axis=2))
     over = np.log(np.maximum(ahead, SMALLEST) / tolerance)
     last = len(HORIZON_S) - 1 - np.argmax(over[:, ::-1] > 0, axis=1)  # the last time at which it is beyond
-    last, each = np.minimum(last, len(HORIZON_S) - 2), np.arange(len(over))
-    before, after = over[each, last], over[each, last + 1]
+    last, draw = np.minimum(last, len(HORIZON_S) - 2), np.arange(len(over))
+    before, after = over[draw, last], over[draw, last + 1]
     share = np.clip(before / np.maximum(before - after, SMALLEST), 0.0, 1.0)
     crossed = HORIZON_S[last] + share * (HORIZON_S[last + 1] - HORIZON_S[last])
     return np.where((over > 0).any(axis=1), crossed, 0.0)

@@ -122,11 +122,11 @@ def fit_positions(table: Table) -> Fit:
     return fit(read_model(MODEL).with_effect(catalogue()[ANGLES]), table)
 
 
-def largest_uncertainty_g(found: Fit) -> tuple[float, str]:
+def largest_uncertainty_g(fit: Fit) -> tuple[float, str]:
     """The largest standard uncertainty of a parameter as an error at 1 g, in g, and its key."""
-    scale = {e.axis: abs(e.value) for e in found.model.estimates("scale-factor")}
+    scale = {e.axis: abs(e.value) for e in fit.model.estimates("scale-factor")}
     errors: dict[str, float] = {}
-    for key, estimate in found.params.items():
+    for key, estimate in fit.params.items():
         if estimate.std is None or not estimate.identified:
             return np.inf, key
         is_angle = key.startswith(ANGLES)

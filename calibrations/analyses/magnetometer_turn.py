@@ -51,8 +51,8 @@ class Ellipse:
 
     def angle_std_deg(self, noise: float) -> float:
         """That of the major axis's angle, from the steps, and from the `noise` of one radius; 52: any angle."""
-        apart = max(self.greatest - self.least, 1e-12 * self.greatest)
-        return float(min(np.hypot(360 / self.n / np.sqrt(12), np.degrees(noise / (2 * apart))), 180 / np.sqrt(12)))
+        difference = max(self.greatest - self.least, 1e-12 * self.greatest)
+        return float(min(np.hypot(360 / self.n / np.sqrt(12), np.degrees(noise / (2 * difference))), 180 / np.sqrt(12)))
 
     @property
     def rotation(self) -> Array:
@@ -82,8 +82,8 @@ def fit_ellipse(xy: Array) -> Ellipse:
 def correct_by_extremes(outputs: Array) -> Array:
     """Outputs (n, axes) with hard iron taken off each axis, and soft iron off the first two."""
     centred = outputs - estimate_hard_iron(outputs)
-    found = fit_ellipse(centred[:, :2])
-    return np.column_stack([centred[:, :2] @ found.correction, centred[:, 2:]])
+    ellipse = fit_ellipse(centred[:, :2])
+    return np.column_stack([centred[:, :2] @ ellipse.correction, centred[:, 2:]])
 
 
 # Full turns of a magnetometer, each with an edge upright: by hand with their extremes; the elements of the field.
@@ -148,12 +148,12 @@ def level_elements_by_extremes(outputs: Array, sensor_from_base: Array, turn_std
     round_z = fit_ellipse(level)
     level = np.column_stack([level @ round_z.correction, np.zeros(len(level))])
     in_base = np.einsum("nij,ni->nj", sensor_from_base, level)
-    found = _of_field(in_base.mean(axis=0))
-    along = np.radians([found["D"], found["D"] + 90])
+    elements = _of_field(in_base.mean(axis=0))
+    along = np.radians([elements["D"], elements["D"] + 90])
     std = [float((in_base[:, :2] @ [np.cos(a), -np.sin(a)]).std(ddof=1) / np.sqrt(len(level))) for a in along]
-    h_std = float(np.hypot(std[0], HIDDEN_IRON * round_z.flattening * found["H"]))
-    d_std = None if turn_std_deg is None else float(np.hypot(np.degrees(std[1] / found["H"]), turn_std_deg))
-    return Elements({k: found[k] for k in "HD"}, {"H": h_std, "D": d_std})
+    h_std = float(np.hypot(std[0], HIDDEN_IRON * round_z.flattening * elements["H"]))
+    d_std = None if turn_std_deg is None else float(np.hypot(np.degrees(std[1] / elements["H"]), turn_std_deg))
+    return Elements({k: elements[k] for k in "HD"}, {"H": h_std, "D": d_std})
 
 
 def iron_by_extremes(outputs: Array, edges: Sequence[str], turns: Sequence[str], std: float) -> ExtremesEstimate:
@@ -174,10 +174,10 @@ def iron_by_extremes(outputs: Array, edges: Sequence[str], turns: Sequence[str],
             0.0 if len(set(turn[edge == mine])) > 1 else _hidden_iron_std(outputs[rows], "xyz".index(mine), round_z)
         )
     count = np.sum(np.isfinite(middles), axis=0)
-    known, least = count > 0, np.maximum(count, 1)
-    middle = np.where(known, np.nansum(middles, axis=0) / least, np.nan)
+    measured, least = count > 0, np.maximum(count, 1)
+    middle = np.where(measured, np.nansum(middles, axis=0) / least, np.nan)
     by_noise, by_iron = std / np.sqrt(2 * least), np.sqrt(np.nansum(unseen**2, axis=0)) / least  # half of a sum of two
-    middle_std = np.where(known, np.hypot(by_noise, by_iron), np.nan)
+    middle_std = np.where(measured, np.hypot(by_noise, by_iron), np.nan)
     return ExtremesEstimate(middle, middle_std, round_z, _remaining_per_mille(outputs, middle, round_z, about_z))
 
 
@@ -203,13 +203,13 @@ def _remaining_per_mille(outputs: Array, middle: Array, round_z: Ellipse, about_
 
 def _of_field(base: Array) -> dict[str, float]:
     x, y, z = base[0], -base[1], -base[2]
-    found = {
+    elements = {
         "F": total(x, y, z),
         "H": horizontal(x, y),
         "D": declination_deg(x, y),
         "I": inclination_deg(x, y, z),
     }
-    return {name: float(each) for name, each in found.items()}
+    return {name: float(value) for name, value in elements.items()}
 
 
 # The elements of the earth's magnetic field: X north, Y east, Z down; F total, H horizontal, D declination, I dip.

@@ -175,8 +175,8 @@ class _Bracket:
         whitened = noise.whiten(np.column_stack([self.columns, self.volts])[None])
         inverse = np.linalg.pinv(whitened[:, :-1])
         factors = inverse @ whitened[:, -1]
-        left = whitened[:, -1] - whitened[:, :-1] @ factors
-        return factors, inverse @ inverse.T, float(left @ left)
+        residual = whitened[:, -1] - whitened[:, :-1] @ factors
+        return factors, inverse @ inverse.T, float(residual @ residual)
 
 
 def _bracket(table: Table, axis: str, rounds: list[RowMask]) -> _Bracket:
@@ -202,9 +202,9 @@ def _is_white(brackets: list[_Bracket]) -> bool:
     """
     if any(bracket.white is None for bracket in brackets):
         return False
-    left = sum(bracket.solved(bracket.noise())[2] for bracket in brackets)
+    square = sum(bracket.solved(bracket.noise())[2] for bracket in brackets)
     free = sum(len(bracket.volts) - np.linalg.matrix_rank(bracket.columns) for bracket in brackets)
-    return bool(left < free + np.sqrt(2 * free))
+    return bool(square < free + np.sqrt(2 * free))
 
 
 def _direction(bracket: _Bracket, noise: Noise) -> Direction:

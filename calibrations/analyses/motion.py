@@ -165,12 +165,12 @@ def evaluate_motion(table: Table, linear: Model, physical: Model, still: Table |
     record = max(find_records(table), key=lambda r: r.end - r.first)
     part = table.rows(np.arange(record.first, record.end))
     times_s = record.times_s(table.time_s)
-    found = reference_acceleration(times_s, part.column("displacement_m"), record.rate_hz)
-    if not found.moves:
+    reference = reference_acceleration(times_s, part.column("displacement_m"), record.rate_hz)
+    if not reference.moves:
         raise DataError(f"{table.source}: the displacement shows no motion above its noise")
-    band = correct_at(butterworth(record.rate_hz), found.at_hz)
-    true = 1e3 * apply_response(found.acceleration_m_s2, record.rate_hz, band)
-    paper = 1e3 * paper_reference(part.column("displacement_m"), record.rate_hz, found.at_hz)
+    band = correct_at(butterworth(record.rate_hz), reference.at_hz)
+    true = 1e3 * apply_response(reference.acceleration_m_s2, record.rate_hz, band)
+    paper = 1e3 * paper_reference(part.column("displacement_m"), record.rate_hz, reference.at_hz)
     errors = {
         name: measured_acceleration(part, record, m, band) - true
         for name, m in (("linear", linear), ("physical", physical))
@@ -184,7 +184,7 @@ def evaluate_motion(table: Table, linear: Model, physical: Model, still: Table |
     inner = slice(edge, len(true) - edge)
     blocks = [np.array_split(errors[name][inner], JACKKNIFE_BLOCKS) for name in ("linear", "physical")]
     low, high = _jackknife(blocks[:1], _rmse), _jackknife(blocks[1:], _rmse)
-    amplitude, std = found.amplitude
+    amplitude, std = reference.amplitude
     return MotionResult(
         t_s=times_s[inner],
         reference=true[inner],
@@ -194,10 +194,10 @@ def evaluate_motion(table: Table, linear: Model, physical: Model, still: Table |
         rmse_linear=Quantity(*low, "mm/s^2"),
         rmse_physical=Quantity(*high, "mm/s^2"),
         improvement=Quantity(*_jackknife(blocks, lambda pair: 1 - _rmse(pair[1:]) / _rmse(pair[:1])), "1"),
-        noise_limit=_noise_limit(part, record, physical, band, found, still),
+        noise_limit=_noise_limit(part, record, physical, band, reference, still),
         amplitude=Quantity(1e3 * amplitude, 1e3 * std, "mm/s^2"),
-        frequency=Quantity(found.at_hz, found.lines[0].frequency_std_hz if found.lines else 0.0, "Hz"),
-        biases=(*reference_biases(found), filter_bias(BAND, band, found.at_hz, record.rate_hz, EDGE_S)),
+        frequency=Quantity(reference.at_hz, reference.lines[0].frequency_std_hz if reference.lines else 0.0, "Hz"),
+        biases=(*reference_biases(reference), filter_bias(BAND, band, reference.at_hz, record.rate_hz, EDGE_S)),
     )
 
 
@@ -208,19 +208,19 @@ def _rmse(groups: list[list[Array]]) -> float:
 def _jackknife(groups: list[list[Array]], of: Callable[[list[list[Array]]], float]) -> tuple[float, float]:
     """A statistic of groups of blocks, and its standard uncertainty from leaving each block out (Efron)."""
     count = len(groups[0])
-    left = np.array([of([blocks[:k] + blocks[k + 1 :] for blocks in groups]) for k in range(count)])
-    return of(groups), float(np.sqrt((count - 1) * np.var(left)))
+    estimates = np.array([of([blocks[:k] + blocks[k + 1 :] for blocks in groups]) for k in range(count)])
+    return of(groups), float(np.sqrt((count - 1) * np.var(estimates)))
 
 
 def _noise_limit(
-    part: Table, record: Record, model: Model, band: Response, found: Reference, still: Table | None
+    part: Table, record: Record, model: Model, band: Response, reference: Reference, still: Table | None
 ) -> Quantity:
     """Rms that the sensor's noise alone leaves in the band, mm/s^2."""
     source = part if still is None else still
     where = record if still is None else max(find_records(still), key=lambda r: r.end - r.first)
     x = source.column(part.output_name("x"))[where.rows]
     if still is None:
-        x = x - _motion_part(x, record, found)
+        x = x - _motion_part(x, record, reference)
     f, density = periodogram(x, where.rate_hz)
     above = f > 1.5 * record.rate_hz / part.n  # slower than the record is its mean
     size = np.abs(inverse_response(part, model, 0, band)(f)) * 1e3 * part.gravity_m_s2 / _per_g(model)
@@ -235,14 +235,14 @@ def _per_g(model: Model) -> float:
     return abs(model.value("scale-factor.x", 1.0))
 
 
-def _motion_part(x: Array, record: Record, found: Reference) -> Array:
+def _motion_part(x: Array, record: Record, reference: Reference) -> Array:
     """The part of an output that follows the motion, with any size and delay."""
-    seen = apply_response(found.acceleration_m_s2, record.rate_hz, first_order(NOMINAL_CORNER_HZ))
-    columns = [np.ones(len(x)), seen, np.gradient(seen)]
+    filtered = apply_response(reference.acceleration_m_s2, record.rate_hz, first_order(NOMINAL_CORNER_HZ))
+    columns = [np.ones(len(x)), filtered, np.gradient(filtered)]
     t = np.arange(len(x)) / record.rate_hz
-    columns += [wave(2 * np.pi * line.frequency_hz * t) for line in found.lines for wave in (np.cos, np.sin)]
-    each = np.column_stack(columns) / np.linalg.norm(columns, axis=1)
-    return np.asarray(each @ np.linalg.lstsq(each, x, rcond=1e-9)[0])
+    columns += [wave(2 * np.pi * line.frequency_hz * t) for line in reference.lines for wave in (np.cos, np.sin)]
+    scaled = np.column_stack(columns) / np.linalg.norm(columns, axis=1)
+    return np.asarray(scaled @ np.linalg.lstsq(scaled, x, rcond=1e-9)[0])
 
 
 # The two models that the paper judges by motion, fitted to a sweep of the same sensor.
@@ -270,9 +270,11 @@ def linear_from_turns(sweep: Table) -> Model:
 
 def fit_physical(sweep: Table) -> Model:
     """The physical model of this sweep. Raises TooFewRows, DataError."""
-    both = "direction" in sweep and np.ptp(sweep.column("direction")) > 0
+    is_two_way = "direction" in sweep and np.ptp(sweep.column("direction")) > 0
     model = read_model("physical")
-    return fit(replace(model.with_effect(catalogue()["hysteresis"]), name=model.name) if both else model, sweep).model
+    return fit(
+        replace(model.with_effect(catalogue()["hysteresis"]), name=model.name) if is_two_way else model, sweep
+    ).model
 
 
 def _mean(sweep: Table, axis: str, beta_deg: float) -> float:

@@ -179,7 +179,7 @@ def fit_steady_state(t_s: Array, values: Array, stds: Array) -> SteadyState:
     series = Series(t_s - t_s[0], (values - middle) / unit, stds / unit)
     most = min(MOST_EXPONENTIALS, (len(t_s) - 1 - SPARE_VALUES) // 2)
     candidates = [series.likeliest(k) for k in range(most + 1)]
-    chosen, _ = min(candidates, key=lambda each: each[1] + EXPONENTIAL_GAIN * (len(each[0]) // 2))
+    chosen, _ = min(candidates, key=lambda candidate: candidate[1] + EXPONENTIAL_GAIN * (len(candidate[0]) // 2))
     best = series.averaged(chosen)
     k = (len(best.parameters) - 1) // 2
     size = np.array([unit] * (1 + k) + [1.0] * k)
@@ -280,8 +280,8 @@ class Soak:
         if self.temperature is None:
             return None
         t_s = self.holds.time_s
-        left = self.holds.column("temperature_c") - self.temperature.at(t_s)
-        return float(np.ptp(left[t_s >= self.temperature.span_s[0]]))
+        residual = self.holds.column("temperature_c") - self.temperature.at(t_s)
+        return float(np.ptp(residual[t_s >= self.temperature.span_s[0]]))
 
     def noise_of_hours(self, axis: str) -> tuple[Array, Array]:
         """(middles of hours, s; rms noise of single samples within blocks, V)."""
@@ -310,13 +310,13 @@ def analyse_soak(table: Table, oven_c: float = 0.0) -> Soak:
     """
     gaps = _gaps(table)
     broken = {gap.path for gap in gaps}
-    whole = np.array([path.startswith(REVERSAL) and path not in broken for path in table.labels["path"]])
+    usable = np.array([path.startswith(REVERSAL) and path not in broken for path in table.labels["path"]])
     if oven_c and "temperature_c" in table:
         away = np.flatnonzero(np.abs(table.column("temperature_c") - oven_c) > REACHED_K)
-        whole[: away[-1] + 1 if len(away) else 0] = False
-    if not whole.any():
+        usable[: away[-1] + 1 if len(away) else 0] = False
+    if not usable.any():
         raise TooFewRows(f"{table.source}: has no reversal yet; resume the run")
-    reversals = table.rows(_complete(table, whole))
+    reversals = table.rows(_complete(table, usable))
     courses: dict[str, Course] = {}
     for axis in (axis for axis in table.axes if axis in AXES):
         done = estimate_tumbles(reversals, axis)
@@ -326,29 +326,29 @@ def analyse_soak(table: Table, oven_c: float = 0.0) -> Soak:
 
 def _pooled(stretches: Sequence[Array], step_s: float) -> tuple[Array, Array]:
     """(times, s; Allan deviations) at 1, 2, 4 ... steps of stretches without gaps; empty where all are too short."""
-    longest = max((len(each) for each in stretches), default=0)
+    longest = max((len(stretch) for stretch in stretches), default=0)
     steps = np.array([2**k for k in range(longest.bit_length()) if 2 * 2**k <= longest], dtype=int)
     if not len(steps):
         return np.zeros(0), np.zeros(0)
-    squares = np.array([np.nan_to_num(deviations(each, steps) ** 2) for each in stretches])
-    counts = np.maximum(np.array([len(each) + 1 for each in stretches])[:, None] - 2 * steps, 0)
+    squares = np.array([np.nan_to_num(deviations(stretch, steps) ** 2) for stretch in stretches])
+    counts = np.maximum(np.array([len(stretch) + 1 for stretch in stretches])[:, None] - 2 * steps, 0)
     return step_s * steps, np.sqrt(np.sum(counts * squares, axis=0) / np.sum(counts, axis=0))
 
 
-def _complete(table: Table, whole: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _complete(table: Table, usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """The rows of tumbles that have as many poses as the first: the last may still be missing some."""
     paths = np.array(table.labels["path"])
-    names, counts = np.unique(paths[whole], return_counts=True)
-    return np.isin(paths, names[counts == counts.max()]) & whole
+    names, counts = np.unique(paths[usable], return_counts=True)
+    return np.isin(paths, names[counts == counts.max()]) & usable
 
 
 def _course(quantity: str, axis: str, done: list[Tumble]) -> Course:
-    t_s = np.array([each.t_s for each in done])
+    t_s = np.array([tumble.t_s for tumble in done])
     if quantity == "bias":
-        values, stds = np.array([(each.bias_v, each.bias_std_v) for each in done]).T
+        values, stds = np.array([(tumble.bias_v, tumble.bias_std_v) for tumble in done]).T
     else:
-        values = np.array([each.scale_v_per_g for each in done])
-        stds = values * np.array([each.scale_std for each in done])
+        values = np.array([tumble.scale_v_per_g for tumble in done])
+        stds = values * np.array([tumble.scale_std for tumble in done])
     state = fit_steady_state(t_s, values, stds) if len(t_s) >= FEWEST_APPROACH_VALUES else None
     return Course(quantity, axis, t_s, values, stds, state)
 
@@ -358,10 +358,10 @@ def _gaps(table: Table) -> tuple[RecordGap, ...]:
     ends, starts = (table.time_s + length / 2)[:-1], (table.time_s - length / 2)[1:]
     within = np.array([a == b and a.startswith(HOLD) for a, b in pairwise(paths)], dtype=bool)
     allowed = np.where(within, LONGEST_HOLD_GAP / _rate_hz(table), LONGEST_MOVE_S)
-    found = np.flatnonzero(starts - ends > allowed)
+    gaps = np.flatnonzero(starts - ends > allowed)
     return tuple(
         RecordGap(float(ends[i]), float(starts[i] - ends[i]), paths[i] if paths[i] == paths[i + 1] else "")
-        for i in found
+        for i in gaps
     )
 
 

@@ -131,7 +131,7 @@ def fit_stability(t_days: Sequence[float], values: Sequence[float], stds: Sequen
 
     Raises TooFewRows for fewer than three, or for calibrations of one day only.
     """
-    t, y, u = (np.asarray(each, dtype=np.float64) for each in (t_days, values, stds))
+    t, y, u = (np.asarray(series, dtype=np.float64) for series in (t_days, values, stds))
     if len(t) < FEWEST_FOR_DRIFT or not np.ptp(t) > 0:
         raise TooFewRows(
             f"a drift needs at least {FEWEST_FOR_DRIFT} calibrations at different times; there are {len(t)}"

@@ -63,28 +63,28 @@ def inclination_planes(table: Table, k: int, v: Array, a: Array) -> list[Plane]:
 
     Raises DataError if the one at 90 deg is not among them, or fewer than three are.
     """
-    found = list(_planes(k, v, a))
+    planes = list(_planes(k, v, a))
     up, down = UP_AND_DOWN_DEG[k]
-    if not any(plane.vertical for plane in found):
+    if not any(plane.vertical for plane in planes):
         raise DataError(
             f"{table.source}: the stepwise estimate needs poses at alpha = 90, beta = {up} and {down} deg, "
             f"where {'xy'[k]} is held up and down; measure a full turn at alpha = 90"
         )
-    if len(found) < 3:
-        angles = " and ".join(f"{plane.inclination_deg:g}" for plane in found)
+    if len(planes) < 3:
+        angles = " and ".join(f"{plane.inclination_deg:g}" for plane in planes)
         raise DataError(
             f"{table.source}: the stepwise estimate needs three inclinations with poses at beta = {up} and {down} deg; "
             f"it has {angles} deg; measure full turns at more"
         )
-    return found
+    return planes
 
 
 def _planes(k: int, v: Array, a: Array) -> Iterator[Plane]:
     inclination = _inclinations(a)
     aligned = np.abs(a[:, 1 - k]) < np.radians(10.0**-DECIMALS)
     for angle in np.unique(inclination):
-        here = aligned & (inclination == angle)
-        up, down = here & (a[:, k] > 0), here & (a[:, k] < 0)
+        rows = aligned & (inclination == angle)
+        up, down = rows & (a[:, k] > 0), rows & (a[:, k] < 0)
         if 0 < angle < 180 and up.any() and down.any():
             yield Plane(float(angle), float(np.mean(a[up | down, 2])), float(np.mean(v[up])), float(np.mean(v[down])))
 
@@ -120,23 +120,23 @@ class AxisEstimate:
         """Output by the manufacturer's method, V. Ang (8)."""
         return a * self.scale + self.bias
 
-    def acceleration(self, v: Array, other: Array, a_z: Array) -> Array:
+    def acceleration(self, v: Array, other_output: Array, a_z: Array) -> Array:
         """Acceleration, g, from this output and that of the other axis, V. Ang (14), (16)."""
-        return (v - self._bias_at(other, a_z)) / np.polyval(self.r, a_z)
+        return (v - self._bias_at(other_output, a_z)) / np.polyval(self.r, a_z)
 
-    def output(self, a: Array, other: Array, a_z: Array) -> Array:
+    def output(self, a: Array, other_output: Array, a_z: Array) -> Array:
         """Output, V, from the acceleration, g, and the other axis's output: Ang (14), (16) the other way round."""
-        return a * np.polyval(self.r, a_z) + self._bias_at(other, a_z)
+        return a * np.polyval(self.r, a_z) + self._bias_at(other_output, a_z)
 
-    def _bias_at(self, other: Array, a_z: Array) -> Array:
+    def _bias_at(self, other_output: Array, a_z: Array) -> Array:
         """Ang (9)."""
-        return np.asarray(self.bias + np.polyval(self.p, other) + np.polyval(self.q, a_z))
+        return np.asarray(self.bias + np.polyval(self.p, other_output) + np.polyval(self.q, a_z))
 
 
-def estimate_axis(axis: str, planes: Sequence[Plane], v: Array, other: Array, a: Array) -> AxisEstimate:
+def estimate_axis(axis: str, planes: Sequence[Plane], v: Array, other_output: Array, a: Array) -> AxisEstimate:
     """The axis's coefficients, from its planes, and from the rows at 90 deg for the step that needs a full turn.
 
-    `v` output, `other` output of the other axis, V, and `a` specific force, g: of the rows at 90 deg.
+    `v` output and `other_output` of the other axis, V, and `a` specific force, g: of the rows at 90 deg.
     """
     vertical = next(plane for plane in planes if plane.vertical)
     a_z = np.array([plane.a_z for plane in planes])
@@ -145,7 +145,7 @@ def estimate_axis(axis: str, planes: Sequence[Plane], v: Array, other: Array, a:
         axis=axis,
         bias=vertical.bias,
         scale=vertical.scale,
-        p=_quadratic(other, v - (a * vertical.scale + vertical.bias)),
+        p=_quadratic(other_output, v - (a * vertical.scale + vertical.bias)),
         q=_quadratic(a_z, shift),
         r=_quadratic(a_z, np.array([plane.scale for plane in planes])),
     )
@@ -218,8 +218,8 @@ class Stepwise:
         """The tilt of x and of y that p1 and q1 hold."""
         return self._tilt(self.x, self.y, 1), self._tilt(self.y, self.x, 0)
 
-    def _tilt(self, own: AxisEstimate, other: AxisEstimate, across: int) -> Tilt:
-        in_plane = (own.p[1] + 2 * own.p[0] * other.bias) * other.scale / own.scale
+    def _tilt(self, own: AxisEstimate, other_axis: AxisEstimate, across: int) -> Tilt:
+        in_plane = (own.p[1] + 2 * own.p[0] * other_axis.bias) * other_axis.scale / own.scale
         out_of_plane = own.q[1] / own.scale
         twice = in_plane * self.force[:, across] + out_of_plane * self.force[:, 2]
         return Tilt(float(in_plane), float(out_of_plane), 1e3 * float(rms(twice)))
@@ -241,5 +241,5 @@ def estimate_stepwise(table: Table) -> Stepwise:
     return Stepwise(table, x, y)
 
 
-def _rmse(given: Array, true: Array) -> Array:
-    return rms((given - true).T)
+def _rmse(predicted: Array, true: Array) -> Array:
+    return rms((predicted - true).T)

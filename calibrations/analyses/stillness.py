@@ -75,7 +75,7 @@ def learn_noise(windows: Sequence[Array], rate_hz: float) -> NoiseAtRest | None:
     """
     if len(windows) < LEARNED_WINDOWS:
         return None
-    shakes, sways = (np.array(each) for each in zip(*(_variances(w, rate_hz) for w in windows), strict=True))
+    shakes, sways = (np.array(variances) for variances in zip(*(_variances(w, rate_hz) for w in windows), strict=True))
     means = np.array([w.mean(axis=0) for w in windows])
     creep = np.mean(np.diff(means, axis=0) ** 2, axis=0) / 2
     tiny = np.finfo(float).tiny
@@ -88,31 +88,31 @@ def learn_noise(windows: Sequence[Array], rate_hz: float) -> NoiseAtRest | None:
     return noise if alike and _creep_ratio(means, noise, FALSE_ALARM) <= 1 else None
 
 
-def judge_window(rest: Sequence[Array], noise: NoiseAtRest) -> Stillness:
-    """The test of the last of the windows `rest`, each (n, 3), which follow each other; all together creep."""
+def judge_window(windows: Sequence[Array], noise: NoiseAtRest) -> Stillness:
+    """The test of the last of successive `windows`, each (n, 3); creep is that of all together."""
     share = FALSE_ALARM / len(TESTS)
-    ratio, by = _window_ratio(rest[-1], noise, share)
-    creep = _creep_ratio(np.array([w.mean(axis=0) for w in rest]), noise, share) if len(rest) > 1 else 0.0
-    spread = float(np.sqrt(np.mean(sum(_variances(rest[-1], noise.rate_hz)) / (noise.shake + noise.sway))))
+    ratio, by = _window_ratio(windows[-1], noise, share)
+    creep = _creep_ratio(np.array([w.mean(axis=0) for w in windows]), noise, share) if len(windows) > 1 else 0.0
+    spread = float(np.sqrt(np.mean(sum(_variances(windows[-1], noise.rate_hz)) / (noise.shake + noise.sway))))
     return Stillness(creep, "creep", spread) if creep > ratio else Stillness(ratio, by, spread)
 
 
 def _window_ratio(window: Array, noise: NoiseAtRest, alarm: float) -> tuple[float, str]:
     """The larger quotient of shake and sway over its limit at the probability `alarm`, and its name."""
-    found = [(0.0, TESTS[0])]
+    ratios = [(0.0, TESTS[0])]
     pairs = zip(TESTS[:2], _variances(window, noise.rate_hz), (noise.shake, noise.sway), noise.freedom, strict=True)
-    for name, v, known, freedom in pairs:
+    for name, v, at_rest, freedom in pairs:
         if freedom > 0:
             limit = float(fdtri(freedom, noise.windows * freedom, 1 - alarm))
-            found.append((float(np.mean(v / known)) / limit, name))
-    return max(found)
+            ratios.append((float(np.mean(v / at_rest)) / limit, name))
+    return max(ratios)
 
 
 def _creep_ratio(means: Array, noise: NoiseAtRest, alarm: float) -> float:
     """The quotient of creep over its limit, from window means (k, 3)."""
     quotient = float(np.mean(means.var(axis=0, ddof=1) / noise.creep))
-    known = 3 * EACH_AXIS * SUCCESSIVE * (noise.windows - 1)
-    return quotient / float(fdtri(3.0 * (len(means) - 1), known, 1 - alarm))
+    freedom = 3 * EACH_AXIS * SUCCESSIVE * (noise.windows - 1)
+    return quotient / float(fdtri(3.0 * (len(means) - 1), freedom, 1 - alarm))
 
 
 def _blocks(samples: int, rate_hz: float) -> int:

@@ -66,10 +66,10 @@ def _missing(table: Table, rows: Rows) -> str:
     set_deg = table.column("beta_set_deg" if "beta_set_deg" in table else "beta_deg")
     quarters = np.round(set_deg[rows] / QUARTER_DEG) % 4
     directions = table.optional("direction", 0.0)[rows]
-    held = set(zip(quarters.tolist(), directions.tolist(), strict=True))
+    positions = set(zip(quarters.tolist(), directions.tolist(), strict=True))
     for direction in sorted(set(directions.tolist()), reverse=True) or [0.0]:
         for quarter in range(4):
-            if (float(quarter), direction) not in held:
+            if (float(quarter), direction) not in positions:
                 side = {1.0: ", reached from below", -1.0: ", reached from above"}.get(direction, "")
                 return f"beta {quarter * QUARTER_DEG:g} deg{side}"
     return ""
@@ -80,15 +80,15 @@ def _tumble(table: Table, axis: str, path: str, rows: Rows) -> Tumble:
     columns = np.column_stack([np.cos(beta), np.sin(beta), np.ones(len(beta))])
     white = white_std(table)
     noise = 0.0 if white is None else float(rms(white[rows, table.axes.index(axis)]))
-    found = least_squares(columns, volts)  # equal weights, so that hysteresis cancels
-    std = noise * np.sqrt(np.diag(found.covariance))
-    scale = float(found.values[OWN_COLUMN[axis]])
+    solution = least_squares(columns, volts)  # equal weights, so that hysteresis cancels
+    std = noise * np.sqrt(np.diag(solution.covariance))
+    scale = float(solution.values[OWN_COLUMN[axis]])
     temperature_c = table.optional("temperature_c", float("nan"))[rows]
     return Tumble(
         path,
         float(table.time_s[rows].mean()),
         float(temperature_c.mean()),
-        float(found.values[2]),
+        float(solution.values[2]),
         scale,
         float(std[2]),
         float(std[OWN_COLUMN[axis]] / abs(scale)),
@@ -119,8 +119,8 @@ def scale_coefficients(steps: Sequence[Tumble]) -> TemperatureCoefficients:
 
 def _fitted(steps: Sequence[Tumble], y: Array, std: Array) -> TemperatureCoefficients:
     temperature_c, t_s = (np.array([getattr(s, name) for s in steps]) for name in ("temperature_c", "t_s"))
-    way = np.array([DIRECTIONS[s.path.partition(" ")[0]] for s in steps])
-    columns = np.column_stack([temperature_c - temperature_c.mean(), way, np.ones(len(steps))])
+    direction = np.array([DIRECTIONS[s.path.partition(" ")[0]] for s in steps])
+    columns = np.column_stack([temperature_c - temperature_c.mean(), direction, np.ones(len(steps))])
     if len({s.path.rpartition(" ")[2] for s in steps}) > 1:
         columns = np.column_stack([columns, (t_s - t_s.mean()) / np.ptp(t_s)])
     free = len(steps) - columns.shape[1]
@@ -129,6 +129,6 @@ def _fitted(steps: Sequence[Tumble], y: Array, std: Array) -> TemperatureCoeffic
     weight = 1 / np.where(std > 0, std, 1.0)
     inverse = np.linalg.pinv(columns * weight[:, None])
     factors = inverse @ (y * weight)
-    left = float(np.sum(((y - columns @ factors) * weight) ** 2))
-    widened = np.sqrt(np.diag(inverse @ inverse.T) * max(1.0, left / max(free - 2, 1)))
+    square = float(np.sum(((y - columns @ factors) * weight) ** 2))
+    widened = np.sqrt(np.diag(inverse @ inverse.T) * max(1.0, square / max(free - 2, 1)))
     return TemperatureCoefficients((float(factors[0]), float(widened[0])), (float(factors[1]), float(widened[1])))

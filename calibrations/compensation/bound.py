@@ -41,24 +41,26 @@ class Interval:
     low: Array
     high: Array
 
-    def __add__(self, other: Interval) -> Interval:
-        return _outward(self.low + other.low, self.high + other.high)
+    def __add__(self, term: Interval) -> Interval:
+        return _outward(self.low + term.low, self.high + term.high)
 
     def __neg__(self) -> Interval:
         return Interval(-self.high, -self.low)
 
-    def __sub__(self, other: Interval) -> Interval:
-        return self + -other
+    def __sub__(self, term: Interval) -> Interval:
+        return self + -term
 
-    def __mul__(self, other: Interval) -> Interval:
+    def __mul__(self, factor: Interval) -> Interval:
         with np.errstate(invalid="ignore"):
-            each = [np.nan_to_num(x * y, nan=0.0, posinf=np.inf, neginf=-np.inf) for x in self.ends for y in other.ends]
-        return _outward(np.minimum.reduce(each), np.maximum.reduce(each))
+            products = [
+                np.nan_to_num(x * y, nan=0.0, posinf=np.inf, neginf=-np.inf) for x in self.ends for y in factor.ends
+            ]
+        return _outward(np.minimum.reduce(products), np.maximum.reduce(products))
 
-    def __truediv__(self, other: Interval) -> Interval:
+    def __truediv__(self, divisor: Interval) -> Interval:
         with np.errstate(divide="ignore"):
-            inverse = _outward(1 / other.high, 1 / other.low)
-        across = (other.low <= 0) & (other.high >= 0)
+            inverse = _outward(1 / divisor.high, 1 / divisor.low)
+        across = (divisor.low <= 0) & (divisor.high >= 0)
         endless = Interval(np.where(across, -np.inf, inverse.low), np.where(across, np.inf, inverse.high))
         return self * endless
 
@@ -93,18 +95,18 @@ def evaluate_interval(
     """Each root's values, shape (boxes,), and its slopes by the variables `by`, shape (len(by), boxes)."""
     roots = list(roots)
     n = np.shape(next(iter(ranges.values())).low)
-    found: dict[Node, tuple[Interval, Interval]] = {}
+    values: dict[Node, tuple[Interval, Interval]] = {}
     for node in sort_nodes(roots):
         if node.operation == "given":
             own = np.array([float(name == node.name) for name in by]).reshape(-1, *(1 for _ in n))
-            found[node] = ranges[node.name], point_interval(np.broadcast_to(own, (len(by), *n)).copy())
+            values[node] = ranges[node.name], point_interval(np.broadcast_to(own, (len(by), *n)).copy())
         elif node.constant:
-            found[node] = point_interval(np.full(n, node.value)), point_interval(np.zeros((len(by), *n)))
+            values[node] = point_interval(np.full(n, node.value)), point_interval(np.zeros((len(by), *n)))
         elif node.table is not None:
-            found[node] = _tabulated(node.table, found[node.inner[0]])
+            values[node] = _tabulated(node.table, values[node.inner[0]])
         else:
-            found[node] = _applied(node.operation, *(found[inner] for inner in node.inner))
-    return [found[root] for root in roots]
+            values[node] = _applied(node.operation, *(values[inner] for inner in node.inner))
+    return [values[root] for root in roots]
 
 
 Pair = tuple[Interval, Interval]
@@ -178,9 +180,9 @@ def _hull(x: Interval, y: Interval) -> Interval:
 
 def _picked(first: Flags, second: Flags, x: Interval, y: Interval) -> Interval:
     """x where the first flag is sure, y where the second is, else their hull."""
-    both = _hull(x, y)
-    low = np.where(first, x.low, np.where(second, y.low, both.low))
-    return Interval(low, np.where(first, x.high, np.where(second, y.high, both.high)))
+    hull = _hull(x, y)
+    low = np.where(first, x.low, np.where(second, y.low, hull.low))
+    return Interval(low, np.where(first, x.high, np.where(second, y.high, hull.high)))
 
 
 def _extreme(name: str, first: Pair, second: Pair) -> Pair:
@@ -215,11 +217,11 @@ def _stepped(name: str, inner: tuple[Pair, ...]) -> Pair:
     )
     apply = OPERATIONS[name].apply
     ends = [np.asarray(apply(p, q) if len(inner) == 2 else apply(p), float) for p in x.ends for q in y.ends]
-    apart = (x.high < y.low) | (y.high < x.low)
+    disjoint = (x.high < y.low) | (y.high < x.low)
     least = -1.0 if name == "sign" else 0.0
-    low = np.where(apart, np.minimum.reduce(ends), least)
-    high = np.where(apart, np.maximum.reduce(ends), 1.0)
-    jumps = ~apart & ~(dx.zero & dy.zero).all(axis=0)
+    low = np.where(disjoint, np.minimum.reduce(ends), least)
+    high = np.where(disjoint, np.maximum.reduce(ends), 1.0)
+    jumps = ~disjoint & ~(dx.zero & dy.zero).all(axis=0)
     flat = np.zeros_like(dx.low)
     return Interval(low, high), Interval(np.where(jumps, -np.inf, flat), np.where(jumps, np.inf, flat))
 
@@ -265,22 +267,22 @@ def prove_bound(
     outputs: Sequence[Node],
     sought: tuple[str, ...],
     reach: float,
-    others: Mapping[str, tuple[float, float]],
+    inputs: Mapping[str, tuple[float, float]],
     want: float,
     memory: tuple[str, ...] = (),
 ) -> Bound | None:
-    """The bound for true values of `sought` within +-`reach` and of `others` within their ranges.
+    """The bound for true values of `sought` within +-`reach` and of `inputs` within their ranges.
 
     None where the contraction cannot be proved.
     """
-    others = {name: others[name] for name in variable_names(outputs) if name not in {*sought, *memory}}
-    others |= dict.fromkeys(memory, UNBOUNDED)
-    slopes = _slopes_in_the_middle(outputs, sought, others)
+    inputs = {name: inputs[name] for name in variable_names(outputs) if name not in {*sought, *memory}}
+    inputs |= dict.fromkeys(memory, UNBOUNDED)
+    slopes = _slopes_in_the_middle(outputs, sought, inputs)
     if not np.isfinite(slopes).all() or abs(np.linalg.det(slopes / (np.max(np.abs(slopes)) or 1.0))) < 1e-9:
         return None
     C = np.asarray(np.linalg.inv(slopes), dtype=np.float64)
-    first = _greatest(outputs, sought, reach, others, C)
-    q = _greatest(outputs, sought, (1 + first) * reach, others, C) if first < 1 else first
+    first = _greatest(outputs, sought, reach, inputs, C)
+    q = _greatest(outputs, sought, (1 + first) * reach, inputs, C) if first < 1 else first
     if not q < 1:
         return None
     steps = max(1, math.ceil(math.log(want / reach) / math.log(max(q, SMALLEST_FACTOR))))
@@ -288,14 +290,14 @@ def prove_bound(
 
 
 def _slopes_in_the_middle(
-    outputs: Sequence[Node], sought: tuple[str, ...], others: Mapping[str, tuple[float, float]]
+    outputs: Sequence[Node], sought: tuple[str, ...], inputs: Mapping[str, tuple[float, float]]
 ) -> Array:
     """d output / d a at 0 g, shape (axes, axes)."""
     at = {name: point_interval(np.zeros(1)) for name in sought}
-    at |= {name: _middle(ends) for name, ends in others.items()}
-    found = evaluate_interval(outputs, at, sought)
+    at |= {name: _middle(ends) for name, ends in inputs.items()}
+    results = evaluate_interval(outputs, at, sought)
     with np.errstate(invalid="ignore"):  # of a jump at 0: no number
-        return np.array([(d.low[:, 0] + d.high[:, 0]) / 2 for _, d in found])
+        return np.array([(d.low[:, 0] + d.high[:, 0]) / 2 for _, d in results])
 
 
 def _middle(ends: tuple[float, float]) -> Interval:
@@ -305,10 +307,10 @@ def _middle(ends: tuple[float, float]) -> Interval:
 
 
 def _greatest(
-    outputs: Sequence[Node], sought: tuple[str, ...], reach: float, others: Mapping[str, tuple[float, float]], C: Array
+    outputs: Sequence[Node], sought: tuple[str, ...], reach: float, inputs: Mapping[str, tuple[float, float]], C: Array
 ) -> float:
     """The greatest row sum of |1 - C G'| over the boxes of the range."""
-    ranges = _boxes(dict.fromkeys(sought, (-reach, reach)), others)
+    ranges = _boxes(dict.fromkeys(sought, (-reach, reach)), inputs)
     slopes = [d for _, d in evaluate_interval(outputs, ranges, sought)]
     boxes = slopes[0].low.shape[1]
     worst = np.zeros(boxes)
@@ -323,14 +325,14 @@ def _greatest(
     return float(np.max(worst)) if np.isfinite(worst).all() else math.inf
 
 
-def _boxes(sought: Mapping[str, tuple[float, float]], others: Mapping[str, tuple[float, float]]) -> dict[str, Interval]:
+def _boxes(sought: Mapping[str, tuple[float, float]], inputs: Mapping[str, tuple[float, float]]) -> dict[str, Interval]:
     """The range divided into boxes: every combination of parts of the bounded variables."""
-    endless = [name for name, ends in others.items() if ends == UNBOUNDED]
-    others = {name: ends for name, ends in others.items() if name not in endless}
-    parts = [BOXES_PER_AXIS] * len(sought) + [BOXES_PER_INPUT] * len(others)
+    endless = [name for name, ends in inputs.items() if ends == UNBOUNDED]
+    inputs = {name: ends for name, ends in inputs.items() if name not in endless}
+    parts = [BOXES_PER_AXIS] * len(sought) + [BOXES_PER_INPUT] * len(inputs)
     while math.prod(parts) > MOST_BOXES:
         parts = [max(1, n // 2) for n in parts]
-    everything = {**sought, **others}
+    everything = {**sought, **inputs}
     cuts = [np.linspace(low, high, n + 1) for (low, high), n in zip(everything.values(), parts, strict=True)]
     lows = np.meshgrid(*(cut[:-1] for cut in cuts), indexing="ij")
     highs = np.meshgrid(*(cut[1:] for cut in cuts), indexing="ij")

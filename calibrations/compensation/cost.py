@@ -64,10 +64,10 @@ def result_uncertainty(
     inputs = {name: span for name, span in beside.items() if name not in FORCES}
     within = {name: _found_in(name, span, model) for name, span in inputs.items()}
     far = reach * a / np.abs(a).max(axis=1, keepdims=True)
-    near = np.concatenate([_stds(model, forward, table, a, at) for at in _corners(within)])
+    stds = np.concatenate([_stds(model, forward, table, a, at) for at in _corners(within)])
     at, largest = _largest(lambda place: _stds(model, forward, table, far, place), inputs)
-    rms = float(np.sqrt(np.mean(near**2, axis=0)).max())
-    return Uncertainty(within, rms, float(near.max()), max(largest, float(near.max())), at)
+    rms = float(np.sqrt(np.mean(stds**2, axis=0)).max())
+    return Uncertainty(within, rms, float(stds.max()), max(largest, float(stds.max())), at)
 
 
 def _found_in(name: str, stated: Span, model: Model) -> Span:
@@ -106,19 +106,21 @@ def _stds(model: Model, forward: Forward, table: Table, a: Array, at: Inputs) ->
 
     R are the correlations of the parameters, 1 on the diagonal and 0 elsewhere where the model has none.
     """
-    here = replace(table, columns={**table.columns, **{name: np.full(table.n, value) for name, value in at.items()}})
+    constant_table = replace(
+        table, columns={**table.columns, **{name: np.full(table.n, value) for name, value in at.items()}}
+    )
     k = ["xyz".index(axis) for axis in forward.axes]
 
     def output(of: Model, force: Array) -> Array:
         steps = steps_of(of)
-        return respond(sensed(force, here, steps), here, steps)[:, k]
+        return respond(sensed(force, constant_table, steps), constant_table, steps)[:, k]
 
     h = 1e-5
     J = np.stack([(output(model, a + h * e) - output(model, a - h * e)) / (2 * h) for e in np.eye(3)[k]], axis=2)
-    inverse, known = np.linalg.inv(J), {key: e for key, e in model.params.items() if e.std and e.identified}
+    inverse, estimates = np.linalg.inv(J), {key: e for key, e in model.params.items() if e.std and e.identified}
     sides = [(output(up, a), output(down, a)) for up, down in _moved(model)]
     moved = np.stack([np.einsum("nij,nj->ni", inverse, up - down) for up, down in sides]) / (2 * PARAMETER_STEP)
-    mixed = moved if model.correlations is None else np.tensordot(model.correlations.among(list(known)), moved, 1)
+    mixed = moved if model.correlations is None else np.tensordot(model.correlations.among(list(estimates)), moved, 1)
     return np.asarray(np.sqrt(np.maximum(np.sum(moved * mixed, axis=0), 0.0)))
 
 
@@ -153,28 +155,28 @@ def memory_at(table: Table, a: Array, forward: Forward) -> dict[str, Array]:
     if not forward.memory:
         return {}
     steps = [step for step in steps_of(forward.model) if step[0].name in forward.remembering]
-    held = np.array(list(_along(table, a, steps)))  # (n, slots, 3)
-    columns = {f"m{slot}{axis}": held[:, slot, k] for slot in range(held.shape[1]) for k, axis in enumerate(AXES)}
+    stored = np.array(list(_along(table, a, steps)))  # (n, slots, 3)
+    columns = {f"m{slot}{axis}": stored[:, slot, k] for slot in range(stored.shape[1]) for k, axis in enumerate(AXES)}
     return {name: columns[name] for name in forward.memory}
 
 
 def _along(table: Table, a: Array, steps: Sequence[Step]) -> Iterator[list[Array]]:
     """What is remembered before each row, (3,) for every slot."""
-    held = [[np.zeros((1, 3))] * effect.memory for effect, _ in steps]
-    way = turning_points(table) if "alpha_deg" in table else np.empty((table.n, 0, 3))
+    stored = [[np.zeros((1, 3))] * effect.memory for effect, _ in steps]
+    paths = turning_points(table) if "alpha_deg" in table else np.empty((table.n, 0, 3))
     for i in range(table.n):
         row = table.rows(np.array([i]))
-        for here in way[i]:
-            held = _after(steps, here, row, held)
-        yield [slot[0] for each in held for slot in each]
-        held = _after(steps, a[i], row, held)
+        for force in paths[i]:
+            stored = _after(steps, force, row, stored)
+        yield [slot[0] for slots in stored for slot in slots]
+        stored = _after(steps, a[i], row, stored)
 
 
-def _after(steps: Sequence[Step], here: Array, row: Table, before: list[list[Array]]) -> list[list[Array]]:
-    """What each effect remembers after one sample more, of the specific force `here`, (3,)."""
+def _after(steps: Sequence[Step], force: Array, row: Table, before: list[list[Array]]) -> list[list[Array]]:
+    """What each effect remembers after one sample more, of the specific `force`, (3,)."""
     return [
-        list(effect.follow(here[None], row, p, held)[1])
-        for (effect, p), held in zip(steps, before, strict=True)
+        list(effect.follow(force[None], row, p, slots)[1])
+        for (effect, p), slots in zip(steps, before, strict=True)
         if effect.memory
     ]
 
@@ -213,13 +215,13 @@ def compensation_costs(
     followed = [step for step in steps_of(model) if fates[step[0].name] == INVERTED]
     trial = _Trial(forward, program, table, a, memory_at(table, sensed(a, table, followed), forward))
     names = {effect.name for effect, _ in followed}
-    kept = replace(model, terms=tuple(term for term in model.terms if term.name in names))
+    reduced = replace(model, terms=tuple(term for term in model.terms if term.name in names))
     hidden = unit == "g" and len(forward.axes) == 2 and "az" in program.inputs
     return Cost(
         {name: _of_left_out(name, model, followed, trial) for name in forward.left_out},
         _of_gravity(followed, trial) if hidden else None,
         result_uncertainty(
-            kept, forward, table, a, {name: spans[name] for name in program.inputs if name in spans}, reach
+            reduced, forward, table, a, {name: spans[name] for name in program.inputs if name in spans}, reach
         ),
     )
 
@@ -237,14 +239,14 @@ class _Trial:
     def inputs(self, steps: Sequence[Step]) -> dict[str, Array]:
         """Of the program, for a sensor of these steps."""
         v = respond(sensed(self.a, self.table, steps), self.table, steps)
-        known = {f"v{axis}": v[:, k] for k, axis in enumerate("xyz")}
-        known |= {name: self.a[:, k] for k, name in enumerate(FORCES)}
-        columns = {name: known[name] if name in known else self.table.column(name) for name in self.program.inputs}
+        by_name = {f"v{axis}": v[:, k] for k, axis in enumerate("xyz")}
+        by_name |= {name: self.a[:, k] for k, name in enumerate(FORCES)}
+        columns = {name: by_name[name] if name in by_name else self.table.column(name) for name in self.program.inputs}
         return columns | dict(self.memory)
 
-    def size(self, found: Mapping[str, Array]) -> ErrorSize:
+    def size(self, result: Mapping[str, Array]) -> ErrorSize:
         """By how much what was found is wrong."""
-        return _size(np.column_stack([found[f"a{x}"] - self.a[:, "xyz".index(x)] for x in self.forward.axes]))
+        return _size(np.column_stack([result[f"a{x}"] - self.a[:, "xyz".index(x)] for x in self.forward.axes]))
 
 
 def restore_axis_by_gravity(program: Program, inputs: Mapping[str, Array], side: Array) -> dict[str, Array]:
@@ -252,11 +254,11 @@ def restore_axis_by_gravity(program: Program, inputs: Mapping[str, Array], side:
 
     Source  Ang (5)-(7), with the model in place of the linear estimate. Fixed passes, as the written sources do.
     """
-    found = program.run({**inputs, "az": np.zeros(np.shape(side))})
+    result = program.run({**inputs, "az": np.zeros(np.shape(side))})
     for _ in range(PASSES):
-        az = side * np.sqrt(np.maximum(0.0, 1 - found["ax"] ** 2 - found["ay"] ** 2))
-        found = program.run({**inputs, "az": az})
-    return found
+        az = side * np.sqrt(np.maximum(0.0, 1 - result["ax"] ** 2 - result["ay"] ** 2))
+        result = program.run({**inputs, "az": az})
+    return result
 
 
 def _sweep(model: Model, spans: Mapping[str, Span]) -> Table:
@@ -288,7 +290,7 @@ def _size(errors: Array) -> ErrorSize:
 
 def _of_left_out(name: str, model: Model, followed: Sequence[Step], trial: _Trial) -> ErrorSize | None:
     """By the whole model with this effect, compensated without it."""
-    steps = [s for s in steps_of(model) if s[0].name == name or any(s[0] is other[0] for other in followed)]
+    steps = [s for s in steps_of(model) if s[0].name == name or any(s[0] is step[0] for step in followed)]
     try:
         inputs = trial.inputs(steps)
     except CalibrationError:  # it needs what no sweep has, such as a motion

@@ -56,9 +56,16 @@ class Origin:
     date: str
 
 
-def header_lines(made: Compensation, origin: Origin) -> list[str]:
+def header_lines(compensation: Compensation, origin: Origin) -> list[str]:
     """The head of a source file, wrapped; an empty line separates its sections."""
-    sections = [_what(made, origin), _inputs(made), _how(made), _effects(made), _uncertainty(made), _parameters(made)]
+    sections = [
+        _what(compensation, origin),
+        _inputs(compensation),
+        _how(compensation),
+        _effects(compensation),
+        _uncertainty(compensation),
+        _parameters(compensation),
+    ]
     return [line for section in sections for line in [*(w for text in section for w in _wrapped(text)), ""]][:-1]
 
 
@@ -67,9 +74,9 @@ def error_text(value: float, unit: str) -> str:
     return f"{1e3 * value:.2g} mg" if unit == "g" else f"{value:.2g} {unit}"
 
 
-def steps_text(made: Compensation) -> str:
+def steps_text(compensation: Compensation) -> str:
     """`7 steps`."""
-    return f"{made.bound.steps} step{'s' if made.bound.steps > 1 else ''}"
+    return f"{compensation.bound.steps} step{'s' if compensation.bound.steps > 1 else ''}"
 
 
 def round_up(bound: float) -> str:
@@ -77,18 +84,18 @@ def round_up(bound: float) -> str:
     return f"{float(UPWARD.create_decimal(bound)):.3g}"
 
 
-def unit_of_input(name: str, made: Compensation) -> str:
+def unit_of_input(name: str, compensation: Compensation) -> str:
     """The unit of an input of the program."""
-    if name[0] == "v" and name[1:] in made.forward.axes:
-        return made.model.unit or "V"
+    if name[0] == "v" and name[1:] in compensation.forward.axes:
+        return compensation.model.unit or "V"
     if name in ("ax", "ay", "az"):
-        return made.unit
+        return compensation.unit
     return UNITS.get(name, "as in the calibration")
 
 
-def operations_text(made: Compensation) -> str:
+def operations_text(compensation: Compensation) -> str:
     """`113 add, 102 multiply: 215 a sample`."""
-    count: Mapping[str, int] = made.program.operations
+    count: Mapping[str, int] = compensation.program.operations
     return f"{', '.join(f'{n} {kind}' for kind, n in count.items())}: {sum(count.values())} a sample"
 
 
@@ -99,10 +106,10 @@ def _wrapped(text: str) -> list[str]:
     ) or [""]
 
 
-def _what(made: Compensation, origin: Origin) -> Iterator[str]:
-    model = made.model
-    yield f"{origin.name}: from outputs to {_sensed(made)} along the reference axes, by the model {model.name}."
-    yield f"  in {UNIT_TEXT[made.unit]}"
+def _what(compensation: Compensation, origin: Origin) -> Iterator[str]:
+    model = compensation.model
+    yield f"{origin.name}: from outputs to {_sensed(compensation)} along the reference axes, by the model {model.name}."
+    yield f"  in {UNIT_TEXT[compensation.unit]}"
     yield f"  model file  {origin.model_file}, SHA-256 {origin.sha256}"
     for key, title in PROVENANCE_TITLES.items():
         if key in model.provenance:
@@ -110,44 +117,45 @@ def _what(made: Compensation, origin: Origin) -> Iterator[str]:
     yield f"  written by {origin.program} on {origin.date}"
 
 
-def _sensed(made: Compensation) -> str:
+def _sensed(compensation: Compensation) -> str:
     return {
         "g": "specific force",
         "field": "the magnetic field",
         "deg/s": "angular rate",
-    }[made.unit]
+    }[compensation.unit]
 
 
-def _inputs(made: Compensation) -> Iterator[str]:
+def _inputs(compensation: Compensation) -> Iterator[str]:
     yield "Inputs:"
-    for axis in made.forward.axes:
-        yield f"  v{axis}  output of the {axis} axis, {unit_of_input(f'v{axis}', made)}"
-    for name, (low, high) in made.beside.items():
-        yield f"  {name}  {unit_of_input(name, made)}, from {low:g} to {high:g}{_of_axis(name, made)}"
-    yield f"Proved for +-{made.range.reach:g} {made.unit} on each axis; not beyond these ranges."
+    for axis in compensation.forward.axes:
+        yield f"  v{axis}  output of the {axis} axis, {unit_of_input(f'v{axis}', compensation)}"
+    for name, (low, high) in compensation.beside.items():
+        yield f"  {name}  {unit_of_input(name, compensation)}, from {low:g} to {high:g}{_of_axis(name, compensation)}"
+    yield f"Proved for +-{compensation.range.reach:g} {compensation.unit} on each axis; not beyond these ranges."
 
 
-def _of_axis(name: str, made: Compensation) -> str:
+def _of_axis(name: str, compensation: Compensation) -> str:
     if name not in ("ax", "ay", "az"):
         return ""
-    if (size := made.costs.out_of_gravity) is None:
+    if (size := compensation.costs.out_of_gravity) is None:
         return "; this axis is not measured: use another sensor for it"
     return (
         "; this axis is not measured. Use another sensor for it; or, if only gravity acts, the function in_gravity, "
-        f"which computes it from the other axes and the side that is up, with an error of {_size_text(size, made.unit)}"
+        "which computes it from the other axes and the side that is up, with an error of "
+        f"{_size_text(size, compensation.unit)}"
     )
 
 
-def _how(made: Compensation) -> Iterator[str]:
-    bound = made.bound
-    left = f"q^{bound.steps} x {made.range.reach:g} {made.unit} = {round_up(bound.within)} {made.unit}"
+def _how(compensation: Compensation) -> Iterator[str]:
+    bound, unit = compensation.bound, compensation.unit
+    remaining = f"q^{bound.steps} x {compensation.range.reach:g} {unit} = {round_up(bound.within)} {unit}"
     yield (
-        f"Method: a <- a + C (v - G(a)), {steps_text(made)} from a = 0. Each step reduces the error by the factor "
-        f"q <= {round_up(bound.q)}, proved over the whole range by interval arithmetic; the remaining error is "
-        f"below {left}, without rounding."
+        f"Method: a <- a + C (v - G(a)), {steps_text(compensation)} from a = 0. Each step reduces the error by the "
+        f"factor q <= {round_up(bound.q)}, proved over the whole range by interval arithmetic; the remaining error is "
+        f"below {remaining}, without rounding."
     )
-    yield f"Operations: {operations_text(made)}."
-    if tables := made.program.tables:
+    yield f"Operations: {operations_text(compensation)}."
+    if tables := compensation.program.tables:
         size = sum(4 * len(table.pieces) for table in tables.values())
         yield (
             f"Tables: {len(tables)}, with {size} numbers, of curves whose form is not known. Each piece is a cubic, "
@@ -157,25 +165,29 @@ def _how(made: Compensation) -> Iterator[str]:
             yield f"  {name}  from {table.low:.6g} to {table.low + table.step * len(table.pieces):.6g}"
 
 
-def _effects(made: Compensation) -> Iterator[str]:
+def _effects(compensation: Compensation) -> Iterator[str]:
     by_how: dict[str, list[str]] = {}
-    for fate in made.forward.fates:
+    for fate in compensation.forward.fates:
         by_how.setdefault(fate.how, []).append(fate.effect)
     yield f"Inverted: {', '.join(by_how.get(INVERTED, ['nothing']))}."
-    if remembering := made.forward.remembering:
+    if remembering := compensation.forward.remembering:
         yield (
-            f"With a history: {', '.join(remembering)}. Give every sample, in order: {len(made.forward.memory)} "
-            "numbers are stored between samples, 0 before the first. The true history is unknown until the input "
-            "has turned round at both ends of its range."
+            f"With a history: {', '.join(remembering)}. Give every sample, in order: "
+            f"{len(compensation.forward.memory)} numbers are stored between samples, 0 before the first. The true "
+            "history is unknown until the input has turned round at both ends of its range."
         )
     if rigs := by_how.get(OF_THE_RIG):
         yield f"Effects of the rig, not compensated: {', '.join(rigs)}."
     if noise := by_how.get(NOISE):
         yield f"Noise, not compensated: {', '.join(noise)}."
-    for fate in made.forward.fates:
+    for fate in compensation.forward.fates:
         if fate.how == LEFT_OUT:
-            size = made.costs.left_out[fate.effect]
-            cost = f"error {_size_text(size, made.unit)}" if size else "a sweep does not excite it: error not computed"
+            size = compensation.costs.left_out[fate.effect]
+            cost = (
+                f"error {_size_text(size, compensation.unit)}"
+                if size
+                else "a sweep does not excite it: error not computed"
+            )
             yield f"Left out: {fate.effect}, because {fate.why}; {cost}."
 
 
@@ -184,70 +196,72 @@ def _size_text(size: ErrorSize, unit: str) -> str:
     return f"{rms} rms and {most} at most in a simulated sweep over the stated ranges"
 
 
-def coverage_text(made: Compensation) -> str:
+def coverage_text(compensation: Compensation) -> str:
     """The temperatures, supplies and times of the calibration data, and stated ranges beyond them."""
-    known = made.model.covered
-    if not known:
+    spans = compensation.model.covered
+    if not spans:
         return (
             "The model file does not give the temperature, supply and time of its calibration. Outside of them "
             "the model is extrapolated."
         )
-    covered = ", ".join(f"{name} {_span(name, known[name], made)}" for name in known)
+    covered = ", ".join(f"{name} {_span(name, spans[name], compensation)}" for name in spans)
     beyond = [
-        name for name, (low, high) in made.beside.items()
-        if name not in FORCES and (name not in known or low < known[name][0] or high > known[name][1])
+        name for name, (low, high) in compensation.beside.items()
+        if name not in FORCES and (name not in spans or low < spans[name][0] or high > spans[name][1])
     ]  # fmt: skip
     text = f"Covered by the data of the calibration: {covered}; beyond, the model is extrapolated"
     return f"{text}. The stated range goes beyond in {', '.join(beyond)}." if beyond else f"{text}."
 
 
-def uncertainty_text(made: Compensation) -> str:
+def uncertainty_text(compensation: Compensation) -> str:
     """The standard uncertainty due to the parameters, over the data's coverage and at its maximum."""
-    found = made.costs.parameters
-    if found is None:
+    uncertainty = compensation.costs.parameters
+    if uncertainty is None:
         return "Uncertainty: the model file has none."
-    where = ", ".join(f"{name} {_span(name, span, made)}" for name, span in found.within.items())
-    at = ", ".join(f"{name} {value:.6g}" for name, value in found.at.items())
-    rms, most, largest = (error_text(value, made.unit) for value in (found.rms, found.most, found.largest))
-    how = (
+    where = ", ".join(f"{name} {_span(name, span, compensation)}" for name, span in uncertainty.within.items())
+    at = ", ".join(f"{name} {value:.6g}" for name, value in uncertainty.at.items())
+    rms, most, largest = (
+        error_text(value, compensation.unit) for value in (uncertainty.rms, uncertainty.most, uncertainty.largest)
+    )
+    correlation = (
         "with their correlations"
-        if made.model.correlations is not None
+        if compensation.model.correlations is not None
         else "taken as independent, because the model file does not give their correlations"
     )
     return (
-        f"Standard uncertainty of the result from the parameters, {how}: {rms} rms, {most} at most over the sphere of "
-        f"directions{f' with {where}' if where else ''}; {largest} at most over the whole stated range"
+        f"Standard uncertainty of the result from the parameters, {correlation}: {rms} rms, {most} at most over the "
+        f"sphere of directions{f' with {where}' if where else ''}; {largest} at most over the whole stated range"
         f"{f', at {at}' if at else ''}. Noise and errors of the model are not included."
     )
 
 
-def _span(name: str, span: tuple[float, float], made: Compensation) -> str:
+def _span(name: str, span: tuple[float, float], compensation: Compensation) -> str:
     low, high = (f"{end:.6g}" for end in span)
-    return f"{low if low == high else f'{low} to {high}'} {unit_of_input(name, made)}"
+    return f"{low if low == high else f'{low} to {high}'} {unit_of_input(name, compensation)}"
 
 
-def _uncertainty(made: Compensation) -> Iterator[str]:
-    yield uncertainty_text(made)
-    yield coverage_text(made)
+def _uncertainty(compensation: Compensation) -> Iterator[str]:
+    yield uncertainty_text(compensation)
+    yield coverage_text(compensation)
 
 
-def _parameters(made: Compensation) -> Iterator[str]:
+def _parameters(compensation: Compensation) -> Iterator[str]:
     yield "Parameters, with standard uncertainties:"
-    for term in made.model.terms:
+    for term in compensation.model.terms:
         for e in term.quantities:
             yield f"  {term.name} {f'{e.name} {e.axis}'.strip()} = {_value(e)} {e.unit}".rstrip()
         for axis, count in term.coefficients.items():
             yield f"  {term.name} {f'curve {axis}'.strip()}: {count} coefficient{'s' if count > 1 else ''}"
-    if (known := _correlations(made)) is not None:
+    if (correlations := _correlations(compensation)) is not None:
         yield "Correlation coefficients of the parameters, each with those above it in this list:"
-        for name, row in zip(known.names, known.lower, strict=True):
+        for name, row in zip(correlations.names, correlations.lower, strict=True):
             yield f"  {name}{': ' if row else ''}{' '.join(f'{r:.3f}' for r in row)}"
 
 
-def _correlations(made: Compensation) -> Correlations | None:
+def _correlations(compensation: Compensation) -> Correlations | None:
     """Those of the parameters, where the model has them."""
-    known = made.model.correlations
-    return known.only(made.model.params) if known is not None else None
+    correlations = compensation.model.correlations
+    return correlations.only(compensation.model.params) if correlations is not None else None
 
 
 def _value(e: Estimate) -> str:
@@ -274,41 +288,44 @@ class ReferenceVectors:
     tolerance: float
 
 
-def make_vectors(made: Compensation, count: int = COUNT) -> ReferenceVectors:
+def make_vectors(compensation: Compensation, count: int = COUNT) -> ReferenceVectors:
     """`count` vectors, a power of two; the first is a corner of the range, the second its middle."""
-    ranges = dict.fromkeys(made.forward.sought, (-made.range.reach, made.range.reach)) | made.beside
+    ranges = (
+        dict.fromkeys(compensation.forward.sought, (-compensation.range.reach, compensation.range.reach))
+        | compensation.beside
+    )
     unit = scipy.stats.qmc.Sobol(len(ranges), scramble=False).random(count)
     low, high = np.array(list(ranges.values())).T
     at = dict(zip(ranges, (low + unit * (high - low)).T, strict=True))
-    outputs = [np.broadcast_to(v, count) for v in _in_a_row(made, at, count)]
-    at |= {f"v{axis}": v for axis, v in zip(made.forward.axes, outputs, strict=True)}
-    inputs = np.column_stack([at[name] for name in made.program.inputs])
-    expected = np.column_stack([at[name] for name in made.forward.sought])
-    return ReferenceVectors(inputs, expected, TOLERANCE[made.precision] * made.range.reach)
+    outputs = [np.broadcast_to(v, count) for v in _in_a_row(compensation, at, count)]
+    at |= {f"v{axis}": v for axis, v in zip(compensation.forward.axes, outputs, strict=True)}
+    inputs = np.column_stack([at[name] for name in compensation.program.inputs])
+    expected = np.column_stack([at[name] for name in compensation.forward.sought])
+    return ReferenceVectors(inputs, expected, TOLERANCE[compensation.precision] * compensation.range.reach)
 
 
-def _in_a_row(made: Compensation, at: Mapping[str, Array], count: int) -> list[Array]:
+def _in_a_row(compensation: Compensation, at: Mapping[str, Array], count: int) -> list[Array]:
     """The model's outputs for successive samples, shape (count,) each."""
-    forward = made.forward
+    forward = compensation.forward
     if not forward.memory:
         return evaluate_nodes(forward.outputs, at)
     remembered: dict[str, Array] = dict.fromkeys(forward.memory, np.zeros(()))
     rows = []
     for i in range(count):
-        found = evaluate_nodes(
+        values = evaluate_nodes(
             (*forward.outputs, *forward.memory.values()), {k: v[i] for k, v in at.items()} | remembered
         )
-        rows.append(found[: len(forward.outputs)])
-        remembered = dict(zip(forward.memory, found[len(forward.outputs) :], strict=True))
+        rows.append(values[: len(forward.outputs)])
+        remembered = dict(zip(forward.memory, values[len(forward.outputs) :], strict=True))
     return list(np.array(rows, float).T)
 
 
-def files(made: Compensation, origin: Origin, checks: ReferenceVectors) -> dict[str, str]:
+def files(compensation: Compensation, origin: Origin, checks: ReferenceVectors) -> dict[str, str]:
     """The file by its name."""
-    program = made.program
-    whole = {
-        **summary(made, origin),
-        "about": header_lines(made, origin),
+    program = compensation.program
+    fields = {
+        **summary(compensation, origin),
+        "about": header_lines(compensation, origin),
         "before": [_line(line) for line in program.before],
         "loop": [_line(line) for line in program.loop],
         "next": list(program.next),
@@ -324,39 +341,55 @@ def files(made: Compensation, origin: Origin, checks: ReferenceVectors) -> dict[
             "expected": checks.expected.tolist(),
         },
     }
-    return {f"{origin.name}.json": json.dumps(whole, indent=1, allow_nan=False, ensure_ascii=False) + "\n"}
+    return {f"{origin.name}.json": json.dumps(fields, indent=1, allow_nan=False, ensure_ascii=False) + "\n"}
 
 
-def summary(made: Compensation, origin: Origin) -> dict[str, Any]:
+def summary(compensation: Compensation, origin: Origin) -> dict[str, Any]:
     """The document without the program."""
-    program, bound, beside, known = made.program, made.bound, made.beside, _correlations(made)
+    program, bound, beside, correlations = (
+        compensation.program,
+        compensation.bound,
+        compensation.beside,
+        _correlations(compensation),
+    )
     return {
         "schema": "rig.compensation/1",
         "name": origin.name,
-        "model": made.model.name,
+        "model": compensation.model.name,
         "model_sha256": origin.sha256,
         "program": origin.program,
         "date": origin.date,
-        "provenance": dict(made.model.provenance),
-        "precision": made.precision,
-        "unit": made.unit,
+        "provenance": dict(compensation.model.provenance),
+        "precision": compensation.precision,
+        "unit": compensation.unit,
         "inputs": [
-            {"name": name, "unit": unit_of_input(name, made), "range": list(beside[name]) if name in beside else None}
+            {
+                "name": name,
+                "unit": unit_of_input(name, compensation),
+                "range": list(beside[name]) if name in beside else None,
+            }
             for name in program.inputs
         ],
         "outputs": list(program.sought),
         "steps": program.steps,
-        "bound": {"reach": made.range.reach, "q": bound.q, "within": bound.within},
+        "bound": {"reach": compensation.range.reach, "q": bound.q, "within": bound.within},
         "operations": dict(program.operations),
         "effects": [
-            {"effect": f.effect, "how": f.how, "why": f.why or None, "cost": _size(made.costs.left_out.get(f.effect))}
-            for f in made.forward.fates
+            {
+                "effect": f.effect,
+                "how": f.how,
+                "why": f.why or None,
+                "cost": _size(compensation.costs.left_out.get(f.effect)),
+            }
+            for f in compensation.forward.fates
         ],
-        "out_of_gravity": _size(made.costs.out_of_gravity),
-        "uncertainty": None if made.costs.parameters is None else asdict(made.costs.parameters),
-        "covered": {name: list(span) for name, span in made.model.covered.items()},
-        "parameters": parameters_document(made.model),
-        "correlations": None if known is None else {"of": list(known.names), "matrix": known.matrix.tolist()},
+        "out_of_gravity": _size(compensation.costs.out_of_gravity),
+        "uncertainty": None if compensation.costs.parameters is None else asdict(compensation.costs.parameters),
+        "covered": {name: list(span) for name, span in compensation.model.covered.items()},
+        "parameters": parameters_document(compensation.model),
+        "correlations": None
+        if correlations is None
+        else {"of": list(correlations.names), "matrix": correlations.matrix.tolist()},
     }
 
 

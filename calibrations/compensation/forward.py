@@ -96,10 +96,10 @@ def measured_axes(model: Model) -> tuple[str, ...]:
     """
     named = {e.axis for e in model.params.values()}
     if empty := [term.name for term in model.terms if not term.estimates]:
-        what = f"{empty[0]} has no value" if named else "has no values"
-        raise ModelError(f"{model.name}: {what} yet; `rig fit DATA --model {model.name} --out FILE` gives it some")
-    found = tuple(axis for axis in AXES if axis in named)
-    return found or AXES
+        reason = f"{empty[0]} has no value" if named else "has no values"
+        raise ModelError(f"{model.name}: {reason} yet; `rig fit DATA --model {model.name} --out FILE` gives it some")
+    axes = tuple(axis for axis in AXES if axis in named)
+    return axes or AXES
 
 
 def steps_of(model: Model) -> list[Step]:
@@ -130,9 +130,9 @@ def trace_model(model: Model, without: Collection[str] = ()) -> Forward:
     own = {name for effect, _ in steps for name in effect.needs if name not in NUMBERS and can_be_written(name)}
     table = RunTime(axes, {name: name for name in (*KNOWN, *sorted(own))})
     fates = [_fate(step, table, without) for step in steps]
-    taken = [step for step, fate in zip(steps, fates, strict=True) if fate.how == INVERTED]
-    whole, after = _outputs(taken, table)
-    outputs = tuple(whole.nodes[0, : len(axes)])
+    inverted = [step for step, fate in zip(steps, fates, strict=True) if fate.how == INVERTED]
+    traced, after = _outputs(inverted, table)
+    outputs = tuple(traced.nodes[0, : len(axes)])
     return Forward(model, axes, outputs, tuple(fates), _used(outputs, after))
 
 
@@ -169,10 +169,10 @@ def _fate(step: Step, table: RunTime, without: Collection[str]) -> Fate:
 
 def _used(outputs: Sequence[Node], after: Mapping[str, Node]) -> dict[str, Node]:
     """The stored values that the outputs use, directly or through other stored values."""
-    found: dict[str, Node] = {}
-    while new := {name for name in variable_names([*outputs, *found.values()]) if name in after} - found.keys():
-        found |= {name: after[name] for name in sorted(new)}
-    return {name: found[name] for name in after if name in found}
+    stored: dict[str, Node] = {}
+    while new := {name for name in variable_names([*outputs, *stored.values()]) if name in after} - stored.keys():
+        stored |= {name: after[name] for name in sorted(new)}
+    return {name: stored[name] for name in after if name in stored}
 
 
 def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str, Node]]:
@@ -190,11 +190,11 @@ def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str,
     for effect, p in steps:
         before_v = v
         if effect.memory:
-            known = [[f"m{len(memory) // 3 + k}{axis}" for axis in AXES] for k in range(effect.memory)]
-            before: Any = [Traced([[variable(name) for name in row]]) for row in known]
+            slots = [[f"m{len(memory) // 3 + k}{axis}" for axis in AXES] for k in range(effect.memory)]
+            before: Any = [Traced([[variable(name) for name in row]]) for row in slots]
             part, after = effect.follow(a, table, p, before)
-            for row, each in zip(known, after, strict=True):
-                memory |= dict(zip(row, as_traced(each).nodes[0], strict=True))
+            for row, stored in zip(slots, after, strict=True):
+                memory |= dict(zip(row, as_traced(stored).nodes[0], strict=True))
             v = v + part
         elif "transduction" in effect.places and not effect.scales:
             v = v + _response(effect, a, table, p)

@@ -150,11 +150,11 @@ def power(base: Node, exponent: int) -> Node:
 
 def sort_nodes(roots: Iterable[Node]) -> list[Node]:
     """Every node below the roots once, after its operands."""
-    found: dict[Node, None] = {}
+    nodes: dict[Node, None] = {}
     for root in roots:
-        for node in _below(root, found):
-            found.setdefault(node)
-    return list(found)
+        for node in _below(root, nodes):
+            nodes.setdefault(node)
+    return list(nodes)
 
 
 def variable_names(roots: Iterable[Node]) -> list[str]:
@@ -164,22 +164,22 @@ def variable_names(roots: Iterable[Node]) -> list[str]:
 
 def evaluate_nodes(roots: Iterable[Node], values: Mapping[str, Array]) -> list[Array]:
     """The roots' values for the variables' `values`, with broadcasting."""
-    roots, found = list(roots), {}
+    roots, results = list(roots), {}
     for node in sort_nodes(roots):
         if node.operation == "given":
-            found[node] = np.asarray(values[node.name])
+            results[node] = np.asarray(values[node.name])
         elif node.constant:
-            found[node] = np.asarray(node.value)
+            results[node] = np.asarray(node.value)
         else:
             table = () if node.table is None else (node.table,)
-            found[node] = OPERATIONS[node.operation].apply(*(found[inner] for inner in node.inner), *table)
-    return [found[root] for root in roots]
+            results[node] = OPERATIONS[node.operation].apply(*(results[inner] for inner in node.inner), *table)
+    return [results[root] for root in roots]
 
 
-def _below(node: Node, known: Mapping[Node, None]) -> Iterator[Node]:
-    if node not in known:
+def _below(node: Node, visited: Mapping[Node, None]) -> Iterator[Node]:
+    if node not in visited:
         for inner in node.inner:
-            yield from _below(inner, known)
+            yield from _below(inner, visited)
         yield node
 
 

@@ -66,11 +66,11 @@ class Range:
 
         Raises ModelError for an input with unknown range.
         """
-        known = dict.fromkeys(FORCES, (-self.reach, self.reach)) | dict(self.beside)
+        ranges = dict.fromkeys(FORCES, (-self.reach, self.reach)) | dict(self.beside)
         for name in inputs:
-            if name not in known:
+            if name not in ranges:
                 raise ModelError(f"the range of the input {name} is unknown; give --input {name}=LOW:HIGH")
-        return {name: known[name] for name in inputs}
+        return {name: ranges[name] for name in inputs}
 
 
 @dataclass(frozen=True)
@@ -108,45 +108,45 @@ def invert_model(
     unit = input_unit(model)
     within = within or Range.for_model(model)
     forward = trace_model(model, without)
-    found = _bound(forward, within, precision)
-    if found is None:
+    bound = _bound(forward, within, precision)
+    if bound is None:
         raise ModelError(_why_not(model, within, without, precision, unit))
-    made = write_program(forward, found)
+    program = write_program(forward, bound)
     return Compensation(
         model,
         forward,
         within,
-        found,
-        made,
+        bound,
+        program,
         precision,
         unit,
-        compensation_costs(model, forward, made, within.reach, unit, within.beside),
+        compensation_costs(model, forward, program, within.reach, unit, within.beside),
     )
 
 
 def _bound(forward: Forward, within: Range, precision: str) -> Bound | None:
-    others = within.of(
+    inputs = within.of(
         [name for name in variable_names(forward.outputs) if name not in {*forward.sought, *forward.memory}]
     )
     want = DEFAULT_TOLERANCE[precision] * within.reach
-    return prove_bound(forward.outputs, forward.sought, within.reach, others, want, tuple(forward.memory))
+    return prove_bound(forward.outputs, forward.sought, within.reach, inputs, want, tuple(forward.memory))
 
 
 def _why_not(model: Model, within: Range, without: Collection[str], precision: str, unit: str) -> str:
     """The message for a model without a provable inverse; it names a single effect that prevents it."""
     inverted = [fate.effect for fate in trace_model(model, without).fates if fate.how == INVERTED]
     guilty = [n for n in inverted if _bound(trace_model(model, [*without, n]), within, precision) is not None]
-    said = (
+    message = (
         f"{model.name}: the inverse does not converge for certain within +-{within.reach:g} {unit}: no number of "
         "steps is "
         "proved to be enough"
     )
     if guilty:
         return (
-            f"{said}. It converges without {guilty[-1]}: use --leave-out {guilty[-1]}, which reports the error "
+            f"{message}. It converges without {guilty[-1]}: use --leave-out {guilty[-1]}, which reports the error "
             "due to it"
         )
-    return f"{said}; take a smaller --range, or leave out the most nonlinear effect with --leave-out EFFECT"
+    return f"{message}; take a smaller --range, or leave out the most nonlinear effect with --leave-out EFFECT"
 
 
 # Errors of a compensation on unseen poses, compared with the data sheet's linear model fitted to the same poses
@@ -169,8 +169,8 @@ class Residual:
     @property
     def rmse(self) -> Mapping[str, tuple[float, float]]:
         """By axis: linear, compensated, mm/s^2."""
-        each = zip(self.axes, rms(self.linear.T), rms(self.compensated.T), strict=True)
-        return {axis: (float(a), float(b)) for axis, a, b in each}
+        errors = zip(self.axes, rms(self.linear.T), rms(self.compensated.T), strict=True)
+        return {axis: (float(a), float(b)) for axis, a, b in errors}
 
     def lines(self) -> list[str]:
         """For people."""
@@ -186,17 +186,17 @@ class Residual:
         return {"data": self.table.source, "n": self.table.n, "unit": "mm/s^2", "rmse": rmse}
 
 
-def compensated_residual(made: Compensation, table: Table) -> Residual:
+def compensated_residual(compensation: Compensation, table: Table) -> Residual:
     """Errors on a table of poses. Raises DataError for another kind, MissingColumn for a missing input."""
-    if not table.type.stage_angles or made.unit != "g":
+    if not table.type.stage_angles or compensation.unit != "g":
         raise DataError(
             f"{table.source}: a compensation is compared with poses of an accelerometer, not with {table.kind}"
         )
     table = table.in_order()
-    rigs = {fate.effect for fate in made.forward.fates if fate.how == OF_THE_RIG}
-    a = force(table, [step for step in steps_of(made.model) if step[0].name in rigs])
-    found = _compensated(made, table, a)
-    axes = tuple(axis for axis in made.forward.axes if axis in table.axes)
+    rigs = {fate.effect for fate in compensation.forward.fates if fate.how == OF_THE_RIG}
+    a = force(table, [step for step in steps_of(compensation.model) if step[0].name in rigs])
+    result = _compensated(compensation, table, a)
+    axes = tuple(axis for axis in compensation.forward.axes if axis in table.axes)
     true = np.column_stack([a[:, AXES.index(axis)] for axis in axes])
     linear = fit(read_model(LINEAR_MODEL), replace(table, source=LINEAR_MODEL)).model
     by_hand = [
@@ -208,7 +208,7 @@ def compensated_residual(made: Compensation, table: Table) -> Residual:
         table,
         axes,
         unit * (np.column_stack(by_hand) - true),
-        unit * (np.column_stack([found[f"a{axis}"] for axis in axes]) - true),
+        unit * (np.column_stack([result[f"a{axis}"] for axis in axes]) - true),
     )
 
 
@@ -219,11 +219,11 @@ def _input(name: str, table: Table) -> Array:
     return table.output(name[1]) if name[0] == "v" else table.column(name)
 
 
-def _compensated(made: Compensation, table: Table, a: Array) -> dict[str, Array]:
+def _compensated(compensation: Compensation, table: Table, a: Array) -> dict[str, Array]:
     """The program's output; an axis without measurement follows from gravity and the side that is up."""
-    program = made.program
+    program = compensation.program
     inputs = {name: _input(name, table) for name in program.inputs if name not in FORCES}
-    memory = memory_at(table, sensed(a, table, steps_of(made.model)), made.forward)
-    if made.costs.out_of_gravity is not None:
+    memory = memory_at(table, sensed(a, table, steps_of(compensation.model)), compensation.forward)
+    if compensation.costs.out_of_gravity is not None:
         return restore_axis_by_gravity(program, inputs | memory, np.where(a[:, 2] < 0, -1.0, 1.0))
     return program.run(inputs | memory | {name: a[:, k] for k, name in enumerate(FORCES) if name in program.inputs})

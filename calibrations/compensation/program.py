@@ -75,8 +75,8 @@ def write_program(forward: Forward, bound: Bound) -> Program:
     nexts, later = _next(forward, bound, outputs), list(forward.memory.values())
     nodes = sort_nodes([*nexts, *later])
     moving = _following(nodes, set(forward.sought))
-    known = {*forward.sought, *outputs, *forward.memory}
-    used = [node.name for node in nodes if node.operation == "given" and node.name not in known]
+    own = {*forward.sought, *outputs, *forward.memory}
+    used = [node.name for node in nodes if node.operation == "given" and node.name not in own]
     named = _Names()
     in_loop = [node for node in sort_nodes(nexts) if node in moving]
     before = [named.line(node) for node in nodes if node not in moving and node.inner]
@@ -107,7 +107,7 @@ class _Names:
 
     def line(self, node: Node) -> Line:
         """The node as the next line."""
-        inner = tuple(self.word(each) for each in node.inner)
+        inner = tuple(self.word(operand) for operand in node.inner)
         if node.table is not None:
             inner = (*inner, self.tables.setdefault(node.table, f"table{len(self.tables)}"))
         self._of[node] = f"t{self._lines}"
@@ -137,11 +137,11 @@ def _next(forward: Forward, bound: Bound, outputs: tuple[str, ...]) -> list[Node
 
 def _following(nodes: list[Node], sought: set[str]) -> set[Node]:
     """The nodes that depend on the sought values."""
-    found: set[Node] = set()
+    dependent: set[Node] = set()
     for node in nodes:
-        if node.name in sought or any(inner in found for inner in node.inner):
-            found.add(node)
-    return found
+        if node.name in sought or any(inner in dependent for inner in node.inner):
+            dependent.add(node)
+    return dependent
 
 
 def _do(lines: tuple[Line, ...], values: dict[str, Any]) -> None:

@@ -22,21 +22,21 @@ def compensate(model: Model, samples: Any, columns: Mapping[str, Any]) -> Any:
 
     Raises ModelError where the model has no values or cannot be inverted, DataError where the samples do not fit it.
     """
-    made = invert_model(model)
-    if made.program.remembered:
+    compensation = invert_model(model)
+    if compensation.program.remembered:
         raise DataError(f"{model.name}: has hysteresis, so its inverse needs earlier samples; use `rig compensate`")
     named = _named(samples)
-    given = dict(columns)
+    inputs = dict(columns)
     if named is None:
-        outputs = _array(samples, made.forward.axes)
+        outputs = _array(samples, compensation.forward.axes)
     else:
-        outputs = _columns(named, made)
-        given = {name: named[name] for name in made.program.inputs if name in named} | given
-    found = made.program.run(_inputs(made, outputs, given))
-    forces = np.column_stack([found[name] for name in made.program.sought])
+        outputs = _columns(named, compensation)
+        inputs = {name: named[name] for name in compensation.program.inputs if name in named} | inputs
+    result = compensation.program.run(_inputs(compensation, outputs, inputs))
+    forces = np.column_stack([result[name] for name in compensation.program.sought])
     if not hasattr(samples, "iloc"):
         return forces
-    names = [NAMES[made.unit].format(axis) for axis in made.forward.axes]
+    names = [NAMES[compensation.unit].format(axis) for axis in compensation.forward.axes]
     return data_frame(forces, index=samples.index, columns=names)
 
 
@@ -56,28 +56,28 @@ def _array(samples: Any, axes: tuple[str, ...]) -> Array:
         outputs = outputs[:, None] if len(axes) == 1 else outputs[None, :]
     if outputs.ndim == 2 and outputs.shape[1] == len(axes):
         return outputs
-    wanted = f"the model has the axes {', '.join(axes)}, so (n, {len(axes)}) is needed"
+    needed = f"the model has the axes {', '.join(axes)}, so (n, {len(axes)}) is needed"
     hint = "give a column for each of these axes"
     if outputs.ndim == 2 and outputs.shape[0] == len(axes):
         hint = "exchange rows and columns, as in outputs.T"
     elif outputs.ndim == 2 and outputs.shape[1] == len(AXES):
         hint = f"select their columns, as in outputs[:, {[AXES.index(axis) for axis in axes]}]"
-    raise DataError(f"the outputs have shape {np.shape(samples)}; {wanted}: {hint}")
+    raise DataError(f"the outputs have shape {np.shape(samples)}; {needed}: {hint}")
 
 
-def _columns(named: Mapping[str, Any], made: Compensation) -> Array:
+def _columns(named: Mapping[str, Any], compensation: Compensation) -> Array:
     """Outputs (n, axes) from columns with the names of data files. Raises MissingColumn."""
-    kinds = [kind for kind in KINDS.values() if kind.input_unit == made.unit]
-    wanted = list(dict.fromkeys(_outputs(kind.outputs, made.forward.axes) for kind in kinds))
-    wanted = [names for names in wanted if len(names) == len(made.forward.axes)]
-    for names in wanted:
+    kinds = [kind for kind in KINDS.values() if kind.input_unit == compensation.unit]
+    sets = list(dict.fromkeys(_outputs(kind.outputs, compensation.forward.axes) for kind in kinds))
+    sets = [names for names in sets if len(names) == len(compensation.forward.axes)]
+    for names in sets:
         if all(name in named for name in names):
             return np.column_stack([_numbers(named[name], f'the column "{name}"') for name in names])
-    close = max(wanted, key=lambda names: sum(name in named for name in names))
+    close = max(sets, key=lambda names: sum(name in named for name in names))
     missing = next(name for name in close if name not in named)
     raise MissingColumn(
         f'the column "{missing}" is missing{nearest(missing, map(str, named))}. The model has the axes '
-        f"{', '.join(made.forward.axes)}; name the columns of its outputs {' or '.join(map(', '.join, wanted))}"
+        f"{', '.join(compensation.forward.axes)}; name the columns of its outputs {' or '.join(map(', '.join, sets))}"
     )
 
 
@@ -85,15 +85,17 @@ def _outputs(names: tuple[str, ...], axes: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(name for axis, name in zip(AXES, names, strict=False) if axis in axes)
 
 
-def _inputs(made: Compensation, outputs: Array, given: Mapping[str, Any]) -> dict[str, Array]:
+def _inputs(compensation: Compensation, outputs: Array, columns: Mapping[str, Any]) -> dict[str, Array]:
     """All inputs of the program, a value a row. Raises DataError for one that is missing or of another length."""
-    if missing := [name for name in made.program.inputs[len(made.forward.axes) :] if name not in given]:
+    if missing := [
+        name for name in compensation.program.inputs[len(compensation.forward.axes) :] if name not in columns
+    ]:
         raise DataError(
-            f"{made.model.name}: needs {', '.join(missing)}; give an array with a value for each row, or one number, "
-            f"as in {missing[0]}=..."
+            f"{compensation.model.name}: needs {', '.join(missing)}; give an array with a value for each row, or one "
+            f"number, as in {missing[0]}=..."
         )
-    inputs = {f"v{axis}": values for axis, values in zip(made.forward.axes, outputs.T, strict=True)}
-    for name, column in given.items():
+    inputs = {f"v{axis}": values for axis, values in zip(compensation.forward.axes, outputs.T, strict=True)}
+    for name, column in columns.items():
         values = _numbers(column, f'the column "{name}"')
         if values.shape not in ((), (len(outputs),)):
             raise DataError(
@@ -104,8 +106,8 @@ def _inputs(made: Compensation, outputs: Array, given: Mapping[str, Any]) -> dic
     return inputs
 
 
-def _numbers(values: Any, what: str) -> Array:
+def _numbers(values: Any, name: str) -> Array:
     try:
         return np.asarray(values, dtype=float)
     except (TypeError, ValueError):
-        raise DataError(f"{what}: not numbers, but {type(values).__name__}; give an array of numbers") from None
+        raise DataError(f"{name}: not numbers, but {type(values).__name__}; give an array of numbers") from None

@@ -58,7 +58,7 @@ class CubicTable:
         value = [np.minimum(*ends), np.maximum(*ends)]
         slope = [np.full(np.shape(low), np.inf), np.full(np.shape(low), -np.inf)]
         beyond = (low <= edges[0]) | (high >= edges[-1])  # constant there
-        slope = [np.where(beyond, 0.0, each) for each in slope]
+        slope = [np.where(beyond, 0.0, end) for end in slope]
         reach = self.step * 1e-9  # a knot belongs to both pieces
         for k in range(len(values)):
             inside = (low <= edges[k + 1] + reach) & (high >= edges[k] - reach)
@@ -162,14 +162,14 @@ def _times(factor: float, x: Node) -> Node:
 
 
 def _total(nodes: list[Node]) -> Node:
-    found = number(0.0)
+    total = number(0.0)
     for node in nodes:
-        found = apply_operation("+", found, node)
-    return found
+        total = apply_operation("+", total, node)
+    return total
 
 
 def _product(nodes: list[Node]) -> Node:
-    found = number(1.0)
+    product = number(1.0)
     for node in nodes:
-        found = apply_operation("*", found, node)
-    return found
+        product = apply_operation("*", product, node)
+    return product

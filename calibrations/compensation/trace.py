@@ -86,10 +86,10 @@ class Traced(NDArrayOperatorsMixin):
                 return _elementwise(lambda *x: apply_operation(UFUNCS[name], *x), *inputs)
         raise NotTraced(f"its function uses np.{ufunc.__name__}")
 
-    def __array_function__(self, function: Callable[..., Any], _: Any, given: Any, options: Any) -> Any:
+    def __array_function__(self, function: Callable[..., Any], _: Any, arguments: Any, options: Any) -> Any:
         if function not in FUNCTIONS:
             raise NotTraced(f"its function uses np.{function.__name__}")
-        return FUNCTIONS[function](*given, **options)
+        return FUNCTIONS[function](*arguments, **options)
 
 
 @dataclass(frozen=True)
@@ -137,10 +137,10 @@ def as_nodes(value: Any) -> np.ndarray:
     if isinstance(value, Traced):
         return value.nodes
     numbers = np.asarray(value)
-    made = np.empty(numbers.shape, dtype=object)
+    nodes = np.empty(numbers.shape, dtype=object)
     for place in np.ndindex(numbers.shape):
-        made[place] = number(float(numbers[place]))
-    return made
+        nodes[place] = number(float(numbers[place]))
+    return nodes
 
 
 def _elementwise(make: Callable[..., Node], *inputs: Any) -> Traced:
@@ -162,11 +162,11 @@ def _power(base: Any, exponent: Any) -> Traced:
 
 
 def _product(a: Any, b: Any) -> Traced:
-    left, right = np.atleast_2d(as_nodes(a)), as_nodes(b)
+    matrix, right = np.atleast_2d(as_nodes(a)), as_nodes(b)
     columns = right if right.ndim == 2 else right[:, None]
     out = [
         [_sum([apply_operation("*", x, y) for x, y in zip(row, column, strict=True)]) for column in columns.T]
-        for row in left
+        for row in matrix
     ]
     product = Traced(out)
     if right.ndim == 1:

@@ -99,17 +99,17 @@ def _distance(right: Fit, wrong: Fit, table: Table) -> Callable[[bool], float]:
 
     Predictions come from both fits' own history.
     """
-    whole = joined([right.table, table])
-    known = np.arange(whole.n) < right.table.n
-    truth = right.problem.on(whole).residual(right.theta)
-    mistaken = wrong.problem.on(whole)
+    all_data = joined([right.table, table])
+    is_present = np.arange(all_data.n) < right.table.n
+    truth = right.problem.on(all_data).residual(right.theta)
+    mistaken = wrong.problem.on(all_data)
     noise = noise_on_rows(right.noise, right.problem.on(table))
 
     def least(together: bool) -> float:
         def white(columns: Array) -> Array:
             """(channels, n, k) -> (rows, k)."""
-            new = noise.whiten(columns[:, ~known])
-            return np.concatenate([right.noise.whiten(columns[:, known]), new]) if together else new
+            new = noise.whiten(columns[:, ~is_present])
+            return np.concatenate([right.noise.whiten(columns[:, is_present]), new]) if together else new
 
         def distance(theta: Array) -> Array:
             return white((mistaken.residual(theta) - truth)[:, :, None])[:, 0]
@@ -118,8 +118,8 @@ def _distance(right: Fit, wrong: Fit, table: Table) -> Callable[[bool], float]:
             return white(mistaken.jacobian(theta))
 
         size, bounds = mistaken.layout.typical, mistaken.layout.bounds
-        found = least_squares(distance, wrong.theta, slope, bounds, x_scale=size, ftol=CLOSE_GAIN, max_nfev=ROUNDS)
-        return 2 * float(found.cost)
+        solution = least_squares(distance, wrong.theta, slope, bounds, x_scale=size, ftol=CLOSE_GAIN, max_nfev=ROUNDS)
+        return 2 * float(solution.cost)
 
     return least
 
@@ -157,8 +157,8 @@ def _sensed(
 ) -> Table:
     """A table of the poses, with outputs of 1 V/g."""
     n = len(columns["alpha_deg"])
-    known = {name: value for term in model.terms for name, value in term.constants.items()}
-    calm = {column: np.full(n, known.get(name, usual)) for name, (column, usual) in CALM_SPREAD.items()}
+    references = {name: value for term in model.terms for name, value in term.constants.items()}
+    calm = {column: np.full(n, references.get(name, usual)) for name, (column, usual) in CALM_SPREAD.items()}
     noise = {f"v{axis}_std_v": np.full(n, SAMPLE_STD_V) for axis in axes}
     flat = {f"v{axis}_v": np.zeros(n) for axis in axes}
     table = Table.from_columns("poses", {"n": np.ones(n)} | calm | dict(columns) | noise | flat, constants, "a plan")
@@ -199,11 +199,11 @@ def predict_data(like: Fit, columns: Mapping[str, Array]) -> Table:
     if not data.type.stage_angles:
         raise DataError(f"{data.source}: a fit to {data.kind} cannot predict poses; fit the model to poses")
     names = data.output_names
-    given = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items() if name != "dwell_s"}
-    rows = len(given["alpha_deg"])
-    held = {name: np.full(rows, np.mean(data.column(name))) for name in _needed(like) if name not in given}
-    made = held | _noise(like, columns, rows) | given | {name: np.zeros(rows) for name in names}
-    table = Table.from_columns("poses", made, data.constants, f"a plan like {data.source}")
+    planned = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items() if name != "dwell_s"}
+    rows = len(planned["alpha_deg"])
+    constant = {name: np.full(rows, np.mean(data.column(name))) for name in _needed(like) if name not in planned}
+    values = constant | _noise(like, columns, rows) | planned | {name: np.zeros(rows) for name in names}
+    table = Table.from_columns("poses", values, data.constants, f"a plan like {data.source}")
     _check_planned(like, table)
     outputs = forward(table, like.problem.layout.steps(like.theta))
     return replace(table, columns={**table.columns, **dict(zip(names, outputs.T, strict=True))})

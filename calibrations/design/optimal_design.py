@@ -54,16 +54,16 @@ def covariance_of(rows: Array) -> Array:
 def noise_on_rows(noise: Noise, problem: Problem) -> Noise:
     """The noise found on some rows, on those of another problem: white as their means have it, the rest as found."""
     white = np.zeros((len(problem.channels), problem.table.n)) if problem.white is None else problem.white
-    there = replace(noise, white=white, gap_s=problem.gap_s)
-    return replace(there, ratio=noise.slow / rms(there.fast))
+    noise_there = replace(noise, white=white, gap_s=problem.gap_s)
+    return replace(noise_there, ratio=noise.slow / rms(noise_there.fast))
 
 
 def _noise(fit: Fit, problem: Problem) -> Noise:
     """The fit's noise on the rows of another problem; with times, it flickers on as for the fit's own uncertainties."""
-    found = fit.noise.prolonged() if "t_s" in problem.table else fit.noise
+    noise = fit.noise.prolonged() if "t_s" in problem.table else fit.noise
     if "t_s" not in problem.table:
-        found = replace(found, scatter=np.hypot(found.scatter, found.slow), ratio=0 * found.ratio)
-    return noise_on_rows(found, problem)
+        noise = replace(noise, scatter=np.hypot(noise.scatter, noise.slow), ratio=0 * noise.ratio)
+    return noise_on_rows(noise, problem)
 
 
 # Poses with the most information on a model: D- and I-optimal designs, by exchange of one pose after another.
@@ -156,21 +156,21 @@ def information_gain(measured: Array, candidates: Array, criterion: Criterion) -
 
 def choose_repeats(rows: Array, chosen: Chosen, more: int, criterion: Criterion) -> Chosen:
     """Which of `chosen` to measure once more, each at most once: those that help most, one after another; (more,)."""
-    left, taken = [int(k) for k in np.unique(chosen)], list[int]()
-    for _ in range(min(more, len(left))):
-        covariance = _covariance(rows[np.concatenate([chosen, np.array(taken, dtype=np.intp)])])
-        taken.append(left.pop(int(np.argmax(criterion.gain(covariance, rows[left])))))
-    return np.array(taken, dtype=np.intp)
+    remaining, repeats = [int(k) for k in np.unique(chosen)], list[int]()
+    for _ in range(min(more, len(remaining))):
+        covariance = _covariance(rows[np.concatenate([chosen, np.array(repeats, dtype=np.intp)])])
+        repeats.append(remaining.pop(int(np.argmax(criterion.gain(covariance, rows[remaining])))))
+    return np.array(repeats, dtype=np.intp)
 
 
 def farthest_poses(places: Array, chosen: Chosen, count: int) -> Chosen:
     """The `places` (candidates, k) that are farthest from all `chosen` and from each other, one by one; (count,)."""
     nearest = np.min(np.linalg.norm(places[:, None] - places[None, np.unique(chosen)], axis=2), axis=1)
-    taken: list[int] = []
+    farthest: list[int] = []
     for _ in range(count):
-        taken.append(int(np.argmax(nearest)))
-        nearest = np.minimum(nearest, np.linalg.norm(places - places[taken[-1]], axis=1))
-    return np.array(taken, dtype=np.intp)
+        farthest.append(int(np.argmax(nearest)))
+        nearest = np.minimum(nearest, np.linalg.norm(places - places[farthest[-1]], axis=1))
+    return np.array(farthest, dtype=np.intp)
 
 
 def _improved(rows: Array, chosen: Chosen, criterion: Criterion, rng: np.random.Generator) -> Chosen:

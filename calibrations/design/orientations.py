@@ -46,43 +46,43 @@ class Next:
     turn: str
 
 
-def directions_up(outputs: Array, told: Array) -> Array:
+def directions_up(outputs: Array, named: Array) -> Array:
     """Directions upward of the positions with the mean `outputs` (n, 3), as unit vectors (n, 3).
 
-    The first positions do not determine the zero of the sensor: for them these are the `told` directions (n, 3).
+    The first positions do not determine the zero of the sensor: for them these are the `named` directions (n, 3).
     """
     if len(outputs) < KNOWN_AFTER:
-        return told
+        return named
     away = outputs - sphere_centre(outputs)
     return np.asarray(away / np.linalg.norm(away, axis=1, keepdims=True))
 
 
-def next_orientation(taken: Array, last: Array | None = None, sides: int = FIRST_SIDES) -> Next:
-    """The orientation that tells most after those `taken` (n, 3). Among equals it is the nearest to `last` (3,).
+def next_orientation(measured: Array, last: Array | None = None, sides: int = FIRST_SIDES) -> Next:
+    """The orientation that tells most after those `measured` (n, 3). Among equals it is the nearest to `last` (3,).
 
     Of the first `sides` orientations each is a whole side, as long as there is one that is not taken.
     """
-    free = not len(taken) or (ORIENTATIONS[:FIRST_SIDES] @ taken.T).max(axis=1).min() < 1 - 1e-6
-    candidates = ORIENTATIONS[:FIRST_SIDES] if len(taken) < sides and free else ORIENTATIONS
-    gains = gain(taken, candidates)
-    near = candidates @ (candidates[0] if last is None else last)
+    free = not len(measured) or (ORIENTATIONS[:FIRST_SIDES] @ measured.T).max(axis=1).min() < 1 - 1e-6
+    candidates = ORIENTATIONS[:FIRST_SIDES] if len(measured) < sides and free else ORIENTATIONS
+    gains = gain(measured, candidates)
+    closeness = candidates @ (candidates[0] if last is None else last)
     best = np.flatnonzero(gains >= gains.max() * (1 - ALIKE))
-    up = candidates[best[np.argmax(near[best])]]
+    up = candidates[best[np.argmax(closeness[best])]]
     return Next(up, orientation_words(up), "" if last is None else turn_words(last, up))
 
 
-def gain(taken: Array, wanted: Array) -> Array:
-    """Information of each orientation of `wanted` (k, 3) after those `taken` (n, 3), shape (k,)."""
-    degree = 1 if len(taken) < FIRST_SIDES else 2
-    rows = harmonics(wanted, degree)[:, None, :]
-    return information_gain(harmonics(taken.reshape(-1, 3), degree)[:, None, :], rows, DOptimal())
+def gain(measured: Array, candidates: Array) -> Array:
+    """Information of each orientation of `candidates` (k, 3) after those `measured` (n, 3), shape (k,)."""
+    degree = 1 if len(measured) < FIRST_SIDES else 2
+    rows = harmonics(candidates, degree)[:, None, :]
+    return information_gain(harmonics(measured.reshape(-1, 3), degree)[:, None, :], rows, DOptimal())
 
 
-def is_worth(up: Array, wanted: Array, taken: Array) -> bool:
-    """Whether a rest with `up` (3,) upward is worth taking: it is the `wanted` one, or tells about as much."""
-    if up @ wanted >= np.cos(np.radians(NEAR_DEG)):
+def is_worth(up: Array, proposed: Array, measured: Array) -> bool:
+    """Whether a rest with `up` (3,) upward is worth taking: it is the `proposed` one, or tells about as much."""
+    if up @ proposed >= np.cos(np.radians(NEAR_DEG)):
         return True
-    gains = gain(taken, np.array([up, wanted]))
+    gains = gain(measured, np.array([up, proposed]))
     return bool(gains[0] >= WORTH * gains[1])
 
 
@@ -90,16 +90,16 @@ def is_other_side(mean: Array, outputs: Array, noise_std: float) -> bool:
     """Whether the mean (3,) is another position than `outputs` (n, 3), before their directions are known."""
     if not len(outputs):
         return True
-    apart = np.linalg.norm(outputs[:, None] - outputs[None], axis=2).max()
-    least = LEAST_TURN * apart if apart > 0 else 10 * noise_std
+    distance = np.linalg.norm(outputs[:, None] - outputs[None], axis=2).max()
+    least = LEAST_TURN * distance if distance > 0 else 10 * noise_std
     return bool(np.min(np.linalg.norm(outputs - mean, axis=1)) > least)
 
 
-def covered(taken: Array) -> Array:
+def covered(measured: Array) -> Array:
     """Which of ORIENTATIONS have a position within CELL_DEG, shape (26,)."""
-    if not len(taken):
+    if not len(measured):
         return np.zeros(len(ORIENTATIONS), dtype=bool)
-    return np.asarray((ORIENTATIONS @ taken.T).max(axis=1) >= np.cos(np.radians(CELL_DEG)))
+    return np.asarray((ORIENTATIONS @ measured.T).max(axis=1) >= np.cos(np.radians(CELL_DEG)))
 
 
 def named_orientation(words: str) -> Array | None:

@@ -57,11 +57,11 @@ class Tour:
         """
         axes, p = self.rows.shape[1:]
         lost = (self._trend.T @ self._rooted[order]).reshape(len(DEGREES) * axes, p)
-        left = np.eye(len(lost)) - lost @ lost.T
-        if np.linalg.eigvalsh(left)[0] < RELATIVE_RANK:
+        remaining = np.eye(len(lost)) - lost @ lost.T
+        if np.linalg.eigvalsh(remaining)[0] < RELATIVE_RANK:
             return float("inf")
         spread = lost @ self._root.T
-        return float(np.max(np.sum(spread * np.linalg.solve(left, spread), axis=0) / self._variance))
+        return float(np.max(np.sum(spread * np.linalg.solve(remaining, spread), axis=0) / self._variance))
 
     @cached_property
     def _root(self) -> Array:
@@ -109,10 +109,10 @@ def order_tour(tour: Tour) -> Order:
 
 def _nearest_neighbours(tour: Tour) -> Order:
     order = [int(np.argmin(tour.start_s))]
-    left = set(range(len(tour.start_s))) - set(order)
-    while left:
-        order.append(min(left, key=lambda k: (tour.move_s[order[-1], k], k)))
-        left.remove(order[-1])
+    remaining = set(range(len(tour.start_s))) - set(order)
+    while remaining:
+        order.append(min(remaining, key=lambda k: (tour.move_s[order[-1], k], k)))
+        remaining.remove(order[-1])
     return np.array(order, dtype=np.intp)
 
 
@@ -121,6 +121,6 @@ def _changed(order: Order, rng: np.random.Generator) -> Order:
     i, j = np.sort(rng.integers(0, len(order) + 1, 2))
     if rng.random() < 0.5:
         return np.concatenate([order[:i], order[i:j][::-1], order[j:]])
-    rest = np.concatenate([order[:i], order[j:]])
-    k = rng.integers(0, len(rest) + 1)
-    return np.concatenate([rest[:k], order[i:j], rest[k:]])
+    remaining = np.concatenate([order[:i], order[j:]])
+    k = rng.integers(0, len(remaining) + 1)
+    return np.concatenate([remaining[:k], order[i:j], remaining[k:]])

@@ -103,19 +103,19 @@ class Bank:
         """The bank at a later time, with nothing measured since."""
         gap_s, mean = t_s - self.t_s, self.belief.mean.copy()
         over = gap_s * np.exp(-mean[:, LN_TAU:SLOW])
-        kept, slow = np.exp(-over), np.exp(-gap_s / SLOW_S)
+        decay, slow = np.exp(-over), np.exp(-gap_s / SLOW_S)
         step = np.tile(np.eye(SIZE), (len(mean), 1, 1))
         noise = np.zeros_like(step)
         for k in range(2):
-            step[:, REST + k, REST + k] = kept[:, k]
-            step[:, REST + k, LN_TAU + k] = mean[:, REST + k] * kept[:, k] * over[:, k]
+            step[:, REST + k, REST + k] = decay[:, k]
+            step[:, REST + k, LN_TAU + k] = mean[:, REST + k] * decay[:, k] * over[:, k]
         for k in range(len(SLOW_S)):
             step[:, SLOW + k, SLOW + k] = slow[k]
             noise[:, SLOW + k, SLOW + k] = self.slow[:, k] ** 2 * (1 - slow[k] ** 2)
         noise[:, WALK, WALK] = self.walk**2 * gap_s / HOUR_S
         step[:, ROOM:, ROOM:], lost = _swung(gap_s)
         noise[:, range(ROOM, SIZE), range(ROOM, SIZE)] = self.room[:, None] ** 2 * lost
-        mean[:, REST:LN_TAU] *= kept
+        mean[:, REST:LN_TAU] *= decay
         mean[:, SLOW:WALK] *= slow
         mean[:, ROOM:] = mean[:, ROOM:] @ step[0, ROOM:, ROOM:].T
         return replace(self, t_s=t_s, belief=Belief(mean, predict(self.belief, step, noise).covariance))
@@ -135,10 +135,10 @@ class Bank:
         """States that may be the true one, up to SLOW: shape (n, SLOW). The same bank gives the same."""
         random = np.random.default_rng(seed)
         chosen = np.sort(random.choice(len(self.weight), n, p=self.weight))
-        members, which = np.unique(chosen, return_inverse=True)
+        members, member = np.unique(chosen, return_inverse=True)
         sizes, ways = np.linalg.eigh(self.belief.covariance[members, :SLOW, :SLOW])
         roots = ways * np.sqrt(np.maximum(sizes, 0.0))[:, None, :]
-        away = roots[which] @ random.standard_normal((n, SLOW, 1))
+        away = roots[member] @ random.standard_normal((n, SLOW, 1))
         return np.asarray(self.belief.mean[chosen, :SLOW] + away[:, :, 0])
 
     def _pruned(self, nis: float) -> Bank:
@@ -151,38 +151,38 @@ class Bank:
 def make_bank(t_s: float, value: float, most: float) -> Bank:
     """Before anything is measured: the first `value`, at `t_s`, is near; a drift is seldom much beyond `most`."""
     kinds = product(_approaches(), _noises(), ROOM_SWINGS)
-    members = [(tau, (*noise, room * most), p * q * w) for (tau, p), (noise, q), (room, w) in kinds]
+    members = [(tau, (*noise, swing * most), p * q * w) for (tau, p), (noise, q), (swing, w) in kinds]
     taus_s, noise = np.array([m[0] for m in members]), np.array([m[1] for m in members])
-    scatter, slow, walk, room = noise[:, 0], noise[:, 1:-2], noise[:, -2], noise[:, -1]
+    scatter, slow, walk, swings = noise[:, 0], noise[:, 1:-2], noise[:, -2], noise[:, -1]
     mean, covariance = np.zeros((len(members), SIZE)), np.zeros((len(members), SIZE, SIZE))
     mean[:, LEVEL] = value
     mean[:, LN_TAU:SLOW] = np.log(np.where(taus_s > 0, taus_s, 1.0))
     begins = (SLOW_S < SPREAD_S) * (SPREAD * most) ** 2
     variances = np.column_stack([
         np.full((len(members), 2), (3 * most) ** 2), (taus_s > 0) * most**2, (taus_s > 0) * (TAU_STEP / 2) ** 2,
-        slow**2 + begins, np.zeros(len(members)), room**2, room**2,
+        slow**2 + begins, np.zeros(len(members)), swings**2, swings**2,
     ])  # fmt: skip
     covariance[:, range(SIZE), range(SIZE)] = variances
-    return Bank(t_s, Belief(mean, covariance), slow, scatter, walk, room, np.log([m[2] for m in members]))
+    return Bank(t_s, Belief(mean, covariance), slow, scatter, walk, swings, np.log([m[2] for m in members]))
 
 
 def _swung(gap_s: float) -> tuple[Array, float]:
     """How a room's swing goes on over a gap, (2, 2), and the share of its variance that is new by then."""
-    angle, kept = 2 * np.pi * gap_s / DAY_S, np.exp(-gap_s / LASTING_S)
+    angle, decay = 2 * np.pi * gap_s / DAY_S, np.exp(-gap_s / LASTING_S)
     c, s = np.cos(angle), np.sin(angle)
-    return kept * np.array([[c, s], [-s, c]]), 1 - kept**2
+    return decay * np.array([[c, s], [-s, c]]), 1 - decay**2
 
 
 def _approaches() -> list[tuple[tuple[float, float], float]]:
     """Slow and fast time constant, s, 0 where there is none; and their probability beforehand."""
     pairs = [(s, f) for s, f in product(TAUS_S.tolist(), FAST_S.tolist()) if s > LEAST_TAU_RATIO * f]
     kinds = [(0.0, 0.0)], [(s, 0.0) for s in TAUS_S.tolist()], pairs
-    found: list[tuple[tuple[float, float], float]] = []
+    result: list[tuple[tuple[float, float], float]] = []
     for kind, probability in zip(kinds, APPROACH_PRIOR, strict=True):
         slow = np.array([max(s, 1.0) for s, _ in kind])
         usual = np.exp(-((np.log(slow / USUAL_S) / USUAL_LN_SPREAD) ** 2) / 2)
-        found += zip(kind, (probability * usual / usual.sum()).tolist(), strict=True)
-    return found
+        result += zip(kind, (probability * usual / usual.sum()).tolist(), strict=True)
+    return result
 
 
 def _noises() -> list[tuple[tuple[float, ...], float]]:

@@ -58,8 +58,8 @@ def correct(belief: Belief, measured: Array, matrix: Array, noise: Array) -> Cor
     cross = belief.covariance @ _turned(matrix)
     covariance = matrix @ cross + noise
     gain = _turned(np.asarray(np.linalg.solve(covariance, _turned(cross))))
-    kept = np.eye(belief.mean.shape[-1]) - gain @ matrix
-    joseph = kept @ belief.covariance @ _turned(kept) + gain @ noise @ _turned(gain)
+    correction = np.eye(belief.mean.shape[-1]) - gain @ matrix
+    joseph = correction @ belief.covariance @ _turned(correction) + gain @ noise @ _turned(gain)
     mean = belief.mean + (gain @ innovation[..., None])[..., 0]
     return Correction(Belief(mean, (joseph + _turned(joseph)) / 2), innovation, covariance)
 

@@ -52,8 +52,8 @@ def least_squares(matrix: Array, measured: Array, variances: Array | float = 1.0
     if len(diagonal) < n or diagonal.min() <= SMALLEST_DIAGONAL * diagonal.max():
         raise TooFewRows(f"the measurements do not determine {n} unknowns; measure more, or at other conditions")
     inverse = solve_triangular(triangle[:n, :n], np.eye(n))
-    left = triangle[n:, n]
-    return Estimate(inverse @ triangle[:n, n], inverse @ inverse.T, float(left @ left), m - n)
+    residual = triangle[n:, n]
+    return Estimate(inverse @ triangle[:n, n], inverse @ inverse.T, float(residual @ residual), m - n)
 
 
 # Least squares, one measurement after another: what is known so far is a triangle, into which the next one is turned.
@@ -90,11 +90,13 @@ class Recursive:
         n = len(self.triangle) - 1
         size = np.linalg.norm(self.triangle[:, :n], axis=0)
         size[size == 0] = 1.0
-        left, lengths, turned = np.linalg.svd(self.triangle[:, :n] / size, full_matrices=False)
-        told = lengths > SMALLEST_DIAGONAL * lengths[0]
-        back = (turned[told].T / lengths[told]) / size[:, None]
-        values, covariance = back @ left[:, told].T @ self.triangle[:, n], back @ back.T
-        hidden = np.any(np.abs(turned[~told]) > UNDETERMINED_SHARE, axis=0)
+        left_vectors, lengths, turned = np.linalg.svd(self.triangle[:, :n] / size, full_matrices=False)
+        determined = lengths > SMALLEST_DIAGONAL * lengths[0]
+        back = (turned[determined].T / lengths[determined]) / size[:, None]
+        values, covariance = back @ left_vectors[:, determined].T @ self.triangle[:, n], back @ back.T
+        hidden = np.any(np.abs(turned[~determined]) > UNDETERMINED_SHARE, axis=0)
         values[hidden], covariance[hidden], covariance[:, hidden] = np.nan, np.nan, np.nan
-        rest = self.triangle[:, n] - left[:, told] @ (left[:, told].T @ self.triangle[:, n])
-        return Estimate(values, covariance, float(rest @ rest), self.count - int(told.sum()))
+        residual = self.triangle[:, n] - left_vectors[:, determined] @ (
+            left_vectors[:, determined].T @ self.triangle[:, n]
+        )
+        return Estimate(values, covariance, float(residual @ residual), self.count - int(determined.sum()))

@@ -35,13 +35,13 @@ def without_scatter(read: Array, readings: int) -> tuple[Array, float]:
     k = np.arange(1, min(m, readings))
     if len(k) < FEWEST_ORDINATES:
         return read, 0.0
-    seen = dct(read, type=2, norm="ortho")[k]
-    held, turn = max(1.0, m / readings), np.pi * k / (2 * m)
-    power = (seen * held * np.sin(turn) / np.sin(held * turn)) ** 2  # as if none had been held
-    share, doubt = _level_share(power, 2 * np.sin(turn), seen**2)
-    kept = np.zeros(m)
-    kept[k] = seen * share
-    return np.asarray(idct(kept, type=2, norm="ortho")), doubt
+    coefficients = dct(read, type=2, norm="ortho")[k]
+    repeats, turn = max(1.0, m / readings), np.pi * k / (2 * m)
+    power = (coefficients * repeats * np.sin(turn) / np.sin(repeats * turn)) ** 2  # as if none had been held
+    share, doubt = _level_share(power, 2 * np.sin(turn), coefficients**2)
+    smoothed = np.zeros(m)
+    smoothed[k] = coefficients * share
+    return np.asarray(idct(smoothed, type=2, norm="ortho")), doubt
 
 
 def _level_share(power: Array, frequency: Array, weight: Array) -> tuple[Array, float]:
@@ -50,10 +50,10 @@ def _level_share(power: Array, frequency: Array, weight: Array) -> tuple[Array, 
     Also by how much the slope of what follows the level would be off where another spectrum is true, relative and rms.
     """
     spectra = [_Spectrum.of(power, frequency**-slope) for slope in SLOPES]
-    likeliest = min(each.unlikely for each in spectra)
-    odds = [each.std * float(np.exp((likeliest - each.unlikely) / 2)) for each in spectra]  # by Laplace
+    likeliest = min(spectrum.unlikely for spectrum in spectra)
+    odds = [spectrum.std * float(np.exp((likeliest - spectrum.unlikely) / 2)) for spectrum in spectra]  # by Laplace
     chances = np.outer(odds, [chance for _, chance in NODES]).ravel()
-    shares = np.array([each.share(stds) for each in spectra for stds, _ in NODES])
+    shares = np.array([spectrum.share(stds) for spectrum in spectra for stds, _ in NODES])
     share = np.average(shares, axis=0, weights=chances)
     off = shares @ (share * weight) / (share**2 @ weight) - 1
     return np.asarray(share), float(np.sqrt(np.average(off**2, weights=chances)))
@@ -71,10 +71,10 @@ class _Spectrum:
     @classmethod
     def of(cls, power: Array, level: Array) -> _Spectrum:
         """By the power that was seen (k,). Where nothing scatters the likelihood is flat, and so is the share."""
-        found = minimize_scalar(_deviance_of_ratio, bounds=LOG_RATIOS, args=(power, level), method="bounded")
-        beside = sum(_deviance_of_ratio(found.x + step, power, level) for step in (-CURVATURE_STEP, CURVATURE_STEP))
-        curvature = (beside - 2 * found.fun) / CURVATURE_STEP**2
-        return cls(level, float(found.x), float(np.sqrt(2 / max(curvature, FLAT))), float(found.fun))
+        optimum = minimize_scalar(_deviance_of_ratio, bounds=LOG_RATIOS, args=(power, level), method="bounded")
+        beside = sum(_deviance_of_ratio(optimum.x + step, power, level) for step in (-CURVATURE_STEP, CURVATURE_STEP))
+        curvature = (beside - 2 * optimum.fun) / CURVATURE_STEP**2
+        return cls(level, float(optimum.x), float(np.sqrt(2 / max(curvature, FLAT))), float(optimum.fun))
 
     def share(self, stds: float) -> Array:
         """The level's share of each ordinate (k,), where the ratio is so many standard deviations higher."""
@@ -83,5 +83,5 @@ class _Spectrum:
 
 def _deviance_of_ratio(log_ratio: float, power: Array, level: Array) -> float:
     """Twice the negative log-likelihood of a level with scatter, at its best scale."""
-    both = level + np.exp(log_ratio)
-    return float(len(power) * np.log(np.mean(power / both)) + np.sum(np.log(both)))
+    expected = level + np.exp(log_ratio)
+    return float(len(power) * np.log(np.mean(power / expected)) + np.sum(np.log(expected)))

@@ -171,12 +171,12 @@ def _polynomial(form: LinearForm, t: float) -> Array:
     return np.asarray(sum(form.offsets[k] * d**k for k in range(1, form.degree + 1)))
 
 
-def _check_range(program: str, outputs: Outputs, what: str, values: Array, span: tuple[float, float]) -> None:
+def _check_range(program: str, outputs: Outputs, quantity: str, values: Array, span: tuple[float, float]) -> None:
     for axis, value in zip("xyz", values, strict=True):
         if not span[0] <= value <= span[1]:
             raise ModelError(
-                f"{outputs.simulated.model.name}: {program} accepts for {what} values from {span[0]:g} to {span[1]:g}, "
-                f"and that of {axis} is {value:.4g}; check the sensor and the unit of its data, "
+                f"{outputs.simulated.model.name}: {program} accepts for {quantity} values from {span[0]:g} to "
+                f"{span[1]:g}, and that of {axis} is {value:.4g}; check the sensor and the unit of its data, "
                 f"{outputs.simulated.model.unit}"
             )
 

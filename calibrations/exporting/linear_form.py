@@ -92,8 +92,8 @@ def unit_factor(unit: str, target: str, gravity_m_s2: float) -> float | None:
     """Units of `target` in one `unit`; None where they are not of one kind."""
     kinds = {"m/s^2": ("m/s2", "g", "mg"), "rad/s": ("rad/s", "deg/s"), "gauss": ("gauss", "mgauss", "uT")}
     plain = {"gauss": "gauss", "G": "gauss", "mgauss": "mgauss", "mG": "mgauss"}.get(unit) or parse_unit(unit)
-    known = {**IN_SI, "g": gravity_m_s2, "mg": 1e-3 * gravity_m_s2}
-    return known[plain] if plain in kinds[target] else None
+    factors = {**IN_SI, "g": gravity_m_s2, "mg": 1e-3 * gravity_m_s2}
+    return factors[plain] if plain in kinds[target] else None
 
 
 def fit_form(outputs: Outputs, kind: str, degree: int = 0, t0: float | None = None) -> LinearForm:
@@ -110,8 +110,8 @@ def fit_form(outputs: Outputs, kind: str, degree: int = 0, t0: float | None = No
         rows = [_solved(np.column_stack([outputs.x[:, i], -powers]), outputs.a[:, i]) for i in range(3)]
         scales = np.array([row[0] for row in rows])
         return LinearForm(kind, np.diag(scales), np.column_stack([row[1:] / row[0] for row in rows]), t0)
-    found = _solved(np.column_stack([outputs.x, -powers]), outputs.a)
-    matrix = found[:3].T
+    solution = _solved(np.column_stack([outputs.x, -powers]), outputs.a)
+    matrix = solution[:3].T
     if kind == SYMMETRIC:
         matrix = (matrix + matrix.T) / 2
     offsets = _solved(powers, outputs.x - np.linalg.solve(matrix, outputs.a.T).T)
@@ -127,20 +127,20 @@ def losses(form: LinearForm, outputs: Outputs) -> Iterator[Loss]:
     """What the form cannot hold, largest first: the part of each effect that no values of the form describe."""
     simulated = outputs.simulated
     powers = _powers(outputs, form.degree, form.t0)
-    found = []
+    result = []
     for name, part in simulated.parts.items():
         if name in ALWAYS or (name in GAINS and form.kind != OFFSETS):
             continue
         gain = outputs.a if name in GAINS else 0.0
-        left = (outputs.factor * part - gain) @ form.matrix.T
+        remaining = (outputs.factor * part - gain) @ form.matrix.T
         for i in range(3):
             own = {OFFSETS: [], DIAGONAL: [outputs.a[:, i]]}.get(form.kind, [*outputs.a.T])
             basis = np.column_stack([*own, powers])
-            left[:, i] -= basis @ _solved(basis, left[:, i])
-        rms, most = _size(left / outputs.per)
+            remaining[:, i] -= basis @ _solved(basis, remaining[:, i])
+        rms, most = _size(remaining / outputs.per)
         if most > NEGLIGIBLE * np.abs(simulated.a).max():
-            found.append(Loss(name, CANNOT[form.kind], rms, most, simulated.unit))
-    yield from sorted(found, key=lambda loss: -(loss.rms or 0.0))
+            result.append(Loss(name, CANNOT[form.kind], rms, most, simulated.unit))
+    yield from sorted(result, key=lambda loss: -(loss.rms or 0.0))
     yield from simulated.lost
 
 
@@ -158,5 +158,5 @@ def _powers(outputs: Outputs, degree: int, t0: float) -> Array:
 def _solved(basis: Array, values: Array) -> Array:
     """Least squares with columns of like size."""
     sizes = np.maximum(np.abs(basis).max(axis=0), 1e-300)
-    found = np.linalg.lstsq(basis / sizes, values, rcond=None)[0]
-    return np.asarray((found.T / sizes).T)
+    solution = np.linalg.lstsq(basis / sizes, values, rcond=None)[0]
+    return np.asarray((solution.T / sizes).T)

@@ -115,10 +115,10 @@ def _sensor(model: Model) -> str:
 
 def _factor(model: Model, sensor: str) -> float:
     gravity = model.provenance.get("gravity_m_s2")
-    found = unit_factor(
+    factor = unit_factor(
         model.unit, SENSORS[sensor][0], float(gravity) if isinstance(gravity, (int, float)) else STANDARD_GRAVITY
     )
-    return found or 1.0
+    return factor or 1.0
 
 
 def _largest(model: Model, effect: str) -> float:

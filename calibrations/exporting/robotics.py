@@ -60,21 +60,21 @@ def imucal(sensors: Sequence[Simulated], comment: str) -> Exported:
     document["K_ga"] = _of_acceleration(rate).tolist()
     parts = [
         _exported("", acceleration, forms[0], sensor="accelerometer"),
-        _exported("", rate, forms[1], sensor="gyroscope", held=(G_SENSITIVITY,)),
+        _exported("", rate, forms[1], sensor="gyroscope", included=(G_SENSITIVITY,)),
     ]
-    found = [loss for part in parts for loss in part.losses]
+    losses_of_all = [loss for part in parts for loss in part.losses]
     errors = tuple(error for part in parts for error in part.errors)
-    return Exported(json.dumps(document, indent=1) + "\n", tuple(found), (), errors)
+    return Exported(json.dumps(document, indent=1) + "\n", tuple(losses_of_all), (), errors)
 
 
 def _of_acceleration(rate: Outputs) -> Array:
     """Output of the gyroscope in rad/s by specific force in m/s^2, (3, 3)."""
     simulated = rate.simulated
-    found = np.zeros((3, 3))
+    sensitivity = np.zeros((3, 3))
     for i, axis in enumerate(AXES):
         for k, along in enumerate(AXES):
-            found[i, k] = simulated.model.value(f"{G_SENSITIVITY}.{along}.{axis}")
-    return found * rate.factor / simulated.gravity_m_s2
+            sensitivity[i, k] = simulated.model.value(f"{G_SENSITIVITY}.{along}.{axis}")
+    return sensitivity * rate.factor / simulated.gravity_m_s2
 
 
 def _accelerometer(sensors: Sequence[Simulated], program: str) -> tuple[Outputs, LinearForm]:
@@ -90,10 +90,10 @@ def _exported(
     form: LinearForm,
     notes: tuple[str, ...] = (),
     sensor: str = "accelerometer",
-    held: tuple[str, ...] = (),
+    included: tuple[str, ...] = (),
 ) -> Exported:
-    found = tuple(loss for loss in losses(form, outputs) if loss.effect not in held)
-    return Exported(text, found, notes, ((sensor, *error_of(form, outputs), outputs.simulated.unit),))
+    lost = tuple(loss for loss in losses(form, outputs) if loss.effect not in included)
+    return Exported(text, lost, notes, ((sensor, *error_of(form, outputs), outputs.simulated.unit),))
 
 
 def _row(values: Array) -> str:

@@ -73,8 +73,8 @@ class Simulated:
     @property
     def gravity_m_s2(self) -> float:
         """Local gravity of the calibration; standard gravity where the model file does not give it."""
-        given = self.model.provenance.get("gravity_m_s2")
-        return float(given) if isinstance(given, (int, float)) else STANDARD_GRAVITY
+        gravity = self.model.provenance.get("gravity_m_s2")
+        return float(gravity) if isinstance(gravity, (int, float)) else STANDARD_GRAVITY
 
 
 def simulate(
@@ -91,22 +91,24 @@ def simulate(
         raise ModelError(
             f"{model.name}: has the axes {', '.join(forward.axes)}; these formats hold three axes. Use `rig compensate`"
         )
-    made = invert_model(model, Range.for_model(model), remembering)
-    reach = reach or REACH[made.unit]
-    others = [name for name in variable_names(forward.outputs) if name not in FORCES]
-    ranges = {name: _span(model, name, spans or {}) for name in others}
+    compensation = invert_model(model, Range.for_model(model), remembering)
+    reach = reach or REACH[compensation.unit]
+    inputs = [name for name in variable_names(forward.outputs) if name not in FORCES]
+    ranges = {name: _span(model, name, spans or {}) for name in inputs}
     a, beside = _grid(reach, ranges)
     at = {**dict(zip(FORCES, a.T, strict=True)), **beside}
-    whole = _outputs(model, remembering, at, len(a))
-    taken = [f.effect for f in forward.fates if f.how == INVERTED]
-    parts = {name: whole - _outputs(model, (*remembering, name), at, len(a)) for name in taken}
+    outputs = _outputs(model, remembering, at, len(a))
+    inverted = [f.effect for f in forward.fates if f.how == INVERTED]
+    parts = {name: outputs - _outputs(model, (*remembering, name), at, len(a)) for name in inverted}
     lost = []
-    for fate in made.forward.fates:
+    for fate in compensation.forward.fates:
         if fate.how == LEFT_OUT:
-            size = made.costs.left_out.get(fate.effect)
+            size = compensation.costs.left_out.get(fate.effect)
             why = HISTORY if fate.effect in remembering else fate.why
-            lost.append(Loss(fate.effect, why, size.rms if size else None, size.most if size else None, made.unit))
-    return Simulated(model, made.unit, a, whole, ranges, beside.get("temperature_c"), parts, tuple(lost))
+            lost.append(
+                Loss(fate.effect, why, size.rms if size else None, size.most if size else None, compensation.unit)
+            )
+    return Simulated(model, compensation.unit, a, outputs, ranges, beside.get("temperature_c"), parts, tuple(lost))
 
 
 def _span(model: Model, name: str, spans: Mapping[str, tuple[float, float]]) -> tuple[float, float]:

@@ -63,29 +63,29 @@ def find_batch_effects(looks: Sequence[Screening], of_stage: Container[str] = ()
     for look in looks:
         for score in look.scores:
             tried[score.effect, score.start, len(score.score)].append((score, look.rows))
-    asked = [of for of in tried.values() if len(of) >= max(FEWEST_SENSORS, len(looks) / 2)]
-    found = [_judged(of, 2 * len(asked), of[0][0].effect not in of_stage) for of in asked]
-    found = sorted((each for each in found if each.p_value < SIGNIFICANT), key=lambda e: e.gain, reverse=True)
+    tests = [of for of in tried.values() if len(of) >= max(FEWEST_SENSORS, len(looks) / 2)]
+    judged = [_judged(of, 2 * len(tests), of[0][0].effect not in of_stage) for of in tests]
+    judged = sorted((effect for effect in judged if effect.p_value < SIGNIFICANT), key=lambda e: e.gain, reverse=True)
     best: dict[str, BatchEffect] = {}
-    for each in found:
-        best.setdefault(each.effect, each)
-    return [_with_rivals(each, list(best.values())) for each in best.values()]
+    for effect in judged:
+        best.setdefault(effect.effect, effect)
+    return [_with_rivals(effect, list(best.values())) for effect in best.values()]
 
 
-def _with_rivals(each: BatchEffect, found: list[BatchEffect]) -> BatchEffect:
-    rivals = tuple(o.effect for o in found if o is not each and o.gain > each.gain - INSEPARABLE)
-    return replace(each, rivals=rivals)
+def _with_rivals(effect: BatchEffect, candidates: list[BatchEffect]) -> BatchEffect:
+    rivals = tuple(o.effect for o in candidates if o is not effect and o.gain > effect.gain - INSEPARABLE)
+    return replace(effect, rivals=rivals)
 
 
 def _judged(of: list[tuple[Score, int]], tests: int, may_differ: bool) -> BatchEffect:
     scores = [score for score, _ in of]
     statistics, ranks = np.array([s.statistic for s in scores]), np.array([s.rank for s in scores])
     price = float(np.median(ranks)) * float(np.median(np.log([rows for _, rows in of])))
-    asked = [(True, *_common(scores, int(np.median(ranks))))]
+    options = [(True, *_common(scores, int(np.median(ranks))))]
     if may_differ:
-        asked.append((False, _own(statistics, ranks), len(of) * (float(np.median(statistics)) - price)))
-    significant = [each for each in asked if each[1] * tests < SIGNIFICANT]
-    common, p_value, gain = max(significant or asked, key=lambda each: each[2])
+        options.append((False, _own(statistics, ranks), len(of) * (float(np.median(statistics)) - price)))
+    significant = [option for option in options if option[1] * tests < SIGNIFICANT]
+    common, p_value, gain = max(significant or options, key=lambda option: option[2])
     return BatchEffect(
         effect=scores[0].effect,
         common=common,
@@ -101,12 +101,12 @@ def _common(scores: list[Score], rank: int) -> tuple[float, float]:
     u, weights = _bounded(scores)
     n, total = len(u), u.sum(axis=0)
     values, vectors = np.linalg.eigh(u.T @ u)
-    kept = values > SMALLEST_EIGENVALUE * values[-1]
-    rank = min(rank, int(kept.sum()))
+    is_determined = values > SMALLEST_EIGENVALUE * values[-1]
+    rank = min(rank, int(is_determined.sum()))
     if not rank or n <= rank + 1:
         return 1.0, 0.0
-    along = (vectors.T @ total)[kept][-rank:]
-    share = float(np.sum(along**2 / values[kept][-rank:])) / n  # the common share of their information
+    along = (vectors.T @ total)[is_determined][-rank:]
+    share = float(np.sum(along**2 / values[is_determined][-rank:])) / n  # the common share of their information
     f = share / max(1 - share, 1e-12) * (n - rank) / rank
     information = sum((w * s.information for w, s in zip(weights, scores, strict=True)), np.zeros((u.shape[1],) * 2))
     gain = float(total @ np.linalg.pinv(information, rcond=1e-9, hermitian=True) @ total)
@@ -125,8 +125,8 @@ def _own(statistics: Array, ranks: Array) -> float:
     n, gaining = len(statistics), int(np.sum(statistics > LEAST_SHARED_GAIN * ranks))
     if gaining < LEAST_GAINING_SHARE * n:
         return 1.0
-    each = float(np.max(chdtrc(ranks, LEAST_SHARED_GAIN * ranks)))
-    return float(bdtrc(gaining - 1, n, each))
+    chance = float(np.max(chdtrc(ranks, LEAST_SHARED_GAIN * ranks)))
+    return float(bdtrc(gaining - 1, n, chance))
 
 
 # What a fleet turned out to be: batches with what they miss, rigs with their errors, sensors with their verdicts.
@@ -181,12 +181,12 @@ class Population:
     @property
     def verdicts(self) -> Counter[str]:
         """How many sensors have each verdict."""
-        return Counter(each.verdict for each in self.sensors)
+        return Counter(sensor.verdict for sensor in self.sensors)
 
 
 def batch_verdict(batch: str, effects: tuple[BatchEffect, ...], sensors: tuple[SensorVerdict, ...]) -> BatchVerdict:
     """The summary of a batch from its sensors'."""
-    judged = [each for each in sensors if each.verdict != "failed"]
-    counts = Counter(name for each in judged for name in each.effects)
+    judged = [sensor for sensor in sensors if sensor.verdict != "failed"]
+    counts = Counter(name for sensor in judged for name in sensor.effects)
     shares = {name: count / len(judged) for name, count in counts.most_common()}
     return BatchVerdict(batch, len(sensors), effects, shares)

@@ -75,39 +75,39 @@ class SharedDesigns:
         self._groups: dict[Key, tuple[Group, ...]] = {}
         self._trials: dict[Key, float] = {}
 
-    def of(self, found: Fit) -> SearchGroups:
+    def of(self, fit: Fit) -> SearchGroups:
         """Those for a fitted table."""
-        table = found.table
+        table = fit.table
         design = _key(table, ())
         can: Key = (*table.columns, *design)
-        asked = _once(self._asked, can, lambda: _asked(found, self.effects))
-        groups = [group for effect in asked for group in self._effect(found, effect)]
-        shapes: tuple[Group, ...] = _once(self._groups, design, lambda: tuple(_patterns(found)))
+        effects = _once(self._asked, can, lambda: _asked(fit, self.effects))
+        groups = [group for effect in effects for group in self._effect(fit, effect)]
+        shapes: tuple[Group, ...] = _once(self._groups, design, lambda: tuple(_patterns(fit)))
         groups += shapes
-        search: Key = (*(effect.name for effect in asked), *design)
-        return SearchGroups(tuple(groups), _once(self._trials, search, lambda: _trials(found, groups)))
+        search: Key = (*(effect.name for effect in effects), *design)
+        return SearchGroups(tuple(groups), _once(self._trials, search, lambda: _trials(fit, groups)))
 
-    def _effect(self, found: Fit, effect: Effect) -> tuple[Group, ...]:
+    def _effect(self, fit: Fit, effect: Effect) -> tuple[Group, ...]:
         if "output" in effect.places:
-            return tuple(_derivatives(found, effect))
-        constants = np.array([float(constant(found.table)) for constant in effect.constants.values()])
-        key = (effect.name, constants.tobytes(), *_key(found.table, effect.needs))
-        return _once(self._groups, key, lambda: tuple(_derivatives(found, effect)))
+            return tuple(_derivatives(fit, effect))
+        constants = np.array([float(constant(fit.table)) for constant in effect.constants.values()])
+        key = (effect.name, constants.tobytes(), *_key(fit.table, effect.needs))
+        return _once(self._groups, key, lambda: tuple(_derivatives(fit, effect)))
 
 
-def _once(made: dict[Key, V], key: Key, make: Callable[[], V]) -> V:
+def _once(cache: dict[Key, V], key: Key, make: Callable[[], V]) -> V:
     """What was made for a key, or is now; where there are MOST of them all are forgotten, so that memory stays flat."""
-    value = made.get(key)
+    value = cache.get(key)
     if value is None:
         value = make()
-        if len(made) >= MOST_CACHED:
-            made.clear()
-        made[key] = value
+        if len(cache) >= MOST_CACHED:
+            cache.clear()
+        cache[key] = value
     return value
 
 
-def _asked(found: Fit, effects: Mapping[str, Effect]) -> tuple[Effect, ...]:
-    return tuple(effect for effect in askable(found, effects) if effect.searched(found.table) <= 1)
+def _asked(fit: Fit, effects: Mapping[str, Effect]) -> tuple[Effect, ...]:
+    return tuple(effect for effect in askable(fit, effects) if effect.searched(fit.table) <= 1)
 
 
 def _key(table: Table, needs: tuple[str, ...]) -> Key:
@@ -123,30 +123,30 @@ def _ranges(table: Table, channels: int) -> Array:
     return (ranges if len(ranges) == channels else np.ones(channels))[:, None, None]
 
 
-def _derivatives(found: Fit, effect: Effect) -> Iterator[Group]:
+def _derivatives(fit: Fit, effect: Effect) -> Iterator[Group]:
     """Of the residual with respect to the effect's parameters, from each of its starts."""
-    problem = Problem.of(found.model.with_effect(effect), found.table)
+    problem = Problem.of(fit.model.with_effect(effect), fit.table)
     mine = problem.layout.of_effect(effect.name)
     scaled = bool(effect.places & {"pose", "force"})
     for start, theta in enumerate(problem.layout.starts()):
         columns = problem.jacobian(theta, mine)
         if np.any(columns):
-            yield Group(effect.name, start, columns / _ranges(found.table, len(columns)) if scaled else columns, scaled)
+            yield Group(effect.name, start, columns / _ranges(fit.table, len(columns)) if scaled else columns, scaled)
 
 
-def _patterns(found: Fit) -> Iterator[Group]:
+def _patterns(fit: Fit) -> Iterator[Group]:
     """Of poses those that angles and the order of rows can show: they are the same for all sensors of a design."""
-    table = found.table
+    table = fit.table
     if table.type.stage_angles:
         chosen = [name for name in (*ANGLES, *table.output_names) if name in table]
         table = Table.from_columns(table.kind, {name: table.column(name) for name in chosen})
-    return (Group("", k, each.columns) for k, each in enumerate(patterns(table, found.channels)))
+    return (Group("", k, pattern.columns) for k, pattern in enumerate(patterns(table, fit.channels)))
 
 
-def _trials(found: Fit, groups: list[Group]) -> float:
+def _trials(fit: Fit, groups: list[Group]) -> float:
     """To how many independent tests the search amounts under white noise, whatever else the first sensor has."""
-    screen = Screen(without_slow(found))
-    return Search(screen, [screen.basis(group.of(found.table)) for group in groups]).trials
+    screen = Screen(without_slow(fit))
+    return Search(screen, [screen.basis(group.of(fit.table)) for group in groups]).trials
 
 
 # A look at one sensor: the model fitted, and how much of the residual each effect and each pattern can explain.
@@ -214,21 +214,21 @@ class Screening:
 
 def screen_sensor(table: Table, model: Model, shared: SharedDesigns) -> Screening:
     """Fit `model` to `table` and weigh what `shared` holds for its design. Raises what `fit` raises."""
-    found, outliers = fit_without(model, table)
-    groups = shared.of(found)
-    columns = [group.of(found.table) for group in groups.all]
-    screen = Screen(found)
+    fit, outliers = fit_without(model, table)
+    groups = shared.of(fit)
+    columns = [group.of(fit.table) for group in groups.all]
+    screen = Screen(fit)
     scores, chance, gram, along = _weighed(screen, groups, columns)
     return Screening(
         unit=table.unit,
-        names=tuple((found.model.terms[s.term].name, s.parameter.name, s.axis, _unit(found, s.parameter.unit))
-                    for s in found.problem.layout.slots),
-        theta=found.theta,
-        information=information(found),
-        typical=found.problem.layout.typical,
-        rows=found.residual.size,
+        names=tuple((fit.model.terms[s.term].name, s.parameter.name, s.axis, _unit(fit, s.parameter.unit))
+                    for s in fit.problem.layout.slots),
+        theta=fit.theta,
+        information=information(fit),
+        typical=fit.problem.layout.typical,
+        rows=fit.residual.size,
         free=screen.free,
-        excess=found.pooled_excess,
+        excess=fit.pooled_excess,
         chance=chance,
         outliers=outliers,
         scores=scores,
@@ -236,16 +236,16 @@ def screen_sensor(table: Table, model: Model, shared: SharedDesigns) -> Screenin
     )  # fmt: skip
 
 
-def _unit(found: Fit, unit: str) -> str:
-    return unit.replace("{out}", found.problem.layout.unit)
+def _unit(fit: Fit, unit: str) -> str:
+    return unit.replace("{out}", fit.problem.layout.unit)
 
 
-def information(found: Fit) -> Array:
+def information(fit: Fit) -> Array:
     """Inverse covariance (p, p) of the parameters, with the standard uncertainties that the fit states."""
-    cautious = cautiously(found)
+    cautious = cautiously(fit)
     white = cautious.information
-    own = np.sqrt(np.diag(covariance(white, found.problem.layout.typical)[0]))
-    stated = np.array([e.std or 0.0 for e in found.params.values()])
+    own = np.sqrt(np.diag(covariance(white, fit.problem.layout.typical)[0]))
+    stated = np.array([e.std or 0.0 for e in fit.params.values()])
     wider = np.where((own > 0) & (stated > 0), stated / np.where(own > 0, own, 1.0), 1.0)
     return np.asarray((white.T @ white) / np.outer(wider, wider))
 
@@ -254,18 +254,18 @@ def _weighed(
     screen: Screen, groups: SearchGroups, columns: list[Array]
 ) -> tuple[tuple[Score, ...], float, Array, Array]:
     """The effects' scores, the chance of the best of all, and Gram matrix and score of all columns freed."""
-    found = screen.fit
-    white = found.noise.whiten(np.concatenate(columns, axis=2))
+    fit = screen.fit
+    white = fit.noise.whiten(np.concatenate(columns, axis=2))
     size = np.linalg.norm(white, axis=0)
     free = white - screen.explained @ (screen.explained.T @ white)
     free[:, np.linalg.norm(free, axis=0) <= NOT_SHOWN * size] = 0.0
     gram, along = free.T @ free, free.T @ screen.residual
-    edges = np.cumsum([0, *(each.shape[2] for each in columns)])
+    edges = np.cumsum([0, *(column.shape[2] for column in columns)])
     blocks = [slice(a, b) for a, b in pairwise(edges)]
     statistics, ranks = statistics_of([gram[b, b] for b in blocks], [along[b] for b in blocks])
-    free_rows = min(screen.free, found.noise.freedom)
+    free_rows = min(screen.free, fit.noise.freedom)
     single = np.where(ranks > 0, fdtrc(np.maximum(ranks, 1), free_rows, statistics / np.maximum(ranks, 1)), 1.0)
-    single = np.minimum(single, _beside_slow_noise(found, groups, columns, ranks))
+    single = np.minimum(single, _beside_slow_noise(fit, groups, columns, ranks))
     scores = tuple(
         Score(g.effect, g.start, along[b], gram[b, b], float(s), int(r), float(p))
         for g, b, s, r, p in zip(groups.all, blocks, statistics, ranks, single, strict=True)
@@ -284,11 +284,13 @@ def statistics_of(grams: list[Array], scores: list[Array]) -> tuple[Array, Array
     scale = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
     values, vectors = np.linalg.eigh(padded * scale[:, :, None] * scale[:, None, :])
     along = np.einsum("gkj,gk->gj", vectors, sides * scale)
-    kept = values > LEAST_RANK
-    return np.sum(np.where(kept, along**2 / np.where(kept, values, 1.0), 0.0), axis=1), kept.sum(axis=1)
+    is_determined = values > LEAST_RANK
+    return np.sum(
+        np.where(is_determined, along**2 / np.where(is_determined, values, 1.0), 0.0), axis=1
+    ), is_determined.sum(axis=1)
 
 
-def _beside_slow_noise(found: Fit, groups: SearchGroups, columns: list[Array], ranks: Array) -> Array:
+def _beside_slow_noise(fit: Fit, groups: SearchGroups, columns: list[Array], ranks: Array) -> Array:
     """How often noise alone gains as much as each effect if the noise is fitted again with it.
 
     1 for patterns, where no slow noise was found, so that there is nothing to weigh an effect against, and for effects
@@ -296,27 +298,25 @@ def _beside_slow_noise(found: Fit, groups: SearchGroups, columns: list[Array], r
     """
     p_values = np.ones(len(columns))
     effects = [k for k, group in enumerate(groups.all) if group.effect and ranks[k]]
-    if not effects or not np.any(found.noise.slow):
+    if not effects or not np.any(fit.noise.slow):
         return p_values
     tried = [
-        k
-        for k, p in zip(effects, _without_slow(found, [columns[k] for k in effects]), strict=True)
-        if p < POSSIBLY_SLOW
+        k for k, p in zip(effects, _without_slow(fit, [columns[k] for k in effects]), strict=True) if p < POSSIBLY_SLOW
     ]
     scaled = [columns[k] / np.maximum(np.sqrt(np.sum(columns[k] ** 2, axis=(0, 1))), 1e-300) for k in tried]
-    smooth = found.problem.smooth
-    worth = np.array(gains(found.noise, found.residual, found.jacobian, scaled, smooth)) if tried else np.zeros(0)
-    rows, rank = found.residual.size, ranks[tried]
-    free = np.maximum(rows - found.jacobian.shape[2] - rank - smooth.shape[1] * len(found.channels), 1)
+    smooth = fit.problem.smooth
+    worth = np.array(gains(fit.noise, fit.residual, fit.jacobian, scaled, smooth)) if tried else np.zeros(0)
+    rows, rank = fit.residual.size, ranks[tried]
+    free = np.maximum(rows - fit.jacobian.shape[2] - rank - smooth.shape[1] * len(fit.channels), 1)
     p_values[tried] = fdtrc(rank, free, np.expm1(np.minimum(worth / rows, 500.0)) * free / rank)
     return p_values
 
 
-def _without_slow(found: Fit, columns: list[Array]) -> Array:
+def _without_slow(fit: Fit, columns: list[Array]) -> Array:
     """Chances of the effects if all that is slow were theirs to explain."""
-    screen = Screen(without_slow(found))
+    screen = Screen(without_slow(fit))
     falls = screen.reductions(columns)
-    ranks = np.array([each.shape[2] for each in columns])
+    ranks = np.array([column.shape[2] for column in columns])
     level = max(float(screen.residual @ screen.residual) / screen.free, 1.0)
     return np.asarray(chdtrc(ranks, falls / level))
 

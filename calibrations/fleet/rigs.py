@@ -33,8 +33,8 @@ def correct_stage_errors(table: Table, errors: StageErrors, effects: Mapping[str
     pose = nominal_pose(table)
     for name, values in errors.items():
         effect = effects[name]
-        given = Values.of({p.name: values.get(p.name, 0.0) for p in effect.parameters})
-        pose = effect.pose(pose, table, given)
+        parameters = Values.of({p.name: values.get(p.name, 0.0) for p in effect.parameters})
+        pose = effect.pose(pose, table, parameters)
     down = specific_force(replace(pose, mount=np.zeros(table.n), flip=np.zeros(table.n)))
     columns = dict(table.columns)
     columns["alpha_deg"] = np.degrees(np.arctan2(np.hypot(down[:, 0], down[:, 1]), down[:, 2]))
@@ -100,21 +100,21 @@ class _Found:
 
 def find_rig_errors(fleet: Sequence[Measured]) -> list[RigError]:
     """The errors of rigs that the fleet shows, effect by effect in the order found; none where no two are connected."""
-    names = next((each.stage.names for each in fleet if each.stage.names), ())
-    fleet = [each for each in fleet if each.stage.names == names]
+    names = next((measured.stage.names for measured in fleet if measured.stage.names), ())
+    fleet = [measured for measured in fleet if measured.stage.names == names]
     effects = list(dict.fromkeys(effect for effect, *_ in names))
-    taken = {rig: np.zeros(len(names)) for rig in {each.rig for each in fleet}}
+    corrections = {rig: np.zeros(len(names)) for rig in {measured.rig for measured in fleet}}
     errors: list[RigError] = []
     while effects and fleet:
-        found = {effect: _effect(fleet, names, effect, taken) for effect in effects}
-        significant = [e for e, of in found.items() if of.p_value * len(effects) < SIGNIFICANT and of.fall > 0]
+        results = {effect: _effect(fleet, names, effect, corrections) for effect in effects}
+        significant = [e for e, of in results.items() if of.p_value * len(effects) < SIGNIFICANT and of.fall > 0]
         if not significant:
             break
-        best = max(significant, key=lambda effect: found[effect].fall)
-        errors += found[best].errors
-        for error in found[best].errors:
+        best = max(significant, key=lambda effect: results[effect].fall)
+        errors += results[best].errors
+        for error in results[best].errors:
             if error.beyond:
-                taken[error.rig][_place(names, error.effect, error.parameter)] = error.value
+                corrections[error.rig][_place(names, error.effect, error.parameter)] = error.value
         effects.remove(best)
     return errors
 
@@ -122,8 +122,8 @@ def find_rig_errors(fleet: Sequence[Measured]) -> list[RigError]:
 def unconnected_rigs(fleet: Sequence[Measured]) -> list[tuple[str, ...]]:
     """Groups of rigs between which no batch connects; one group where all can be compared."""
     groups: list[set[str]] = []
-    for batch in dict.fromkeys(each.batch for each in fleet):
-        rigs = {each.rig for each in fleet if each.batch == batch}
+    for batch in dict.fromkeys(measured.batch for measured in fleet):
+        rigs = {measured.rig for measured in fleet if measured.batch == batch}
         joined = [group for group in groups if group & rigs]
         groups = [group for group in groups if not group & rigs] + [rigs.union(*joined)]
     return [tuple(sorted(group)) for group in groups]
@@ -134,20 +134,20 @@ def _place(names: Sequence[tuple[str, str, str]], effect: str, parameter: str) -
 
 
 def _effect(
-    fleet: Sequence[Measured], names: Sequence[tuple[str, str, str]], effect: str, taken: Mapping[str, Array]
+    fleet: Sequence[Measured], names: Sequence[tuple[str, str, str]], effect: str, corrections: Mapping[str, Array]
 ) -> _Found:
     """The errors of one effect, of every rig, after the corrections made already."""
     mine = [k for k, name in enumerate(names) if name[0] == effect]
     sensors, values, variances, scores, informations = [], [], [], [], []
-    for each in fleet:
-        A = each.stage.information
+    for measured in fleet:
+        A = measured.stage.information
         own = A[mine][:, mine]
         size = np.diag(own)
         if not np.all(size > 0) or np.linalg.cond(own / np.sqrt(np.outer(size, size))) > 1 / DETERMINED:
             continue
-        score = each.stage.score[mine] + A[mine] @ taken[each.rig]
+        score = measured.stage.score[mine] + A[mine] @ corrections[measured.rig]
         inverse = np.linalg.inv(own)
-        sensors.append(each)
+        sensors.append(measured)
         values.append(-inverse @ score)  # the residual falls as the prediction grows
         scores.append(score)
         variances.append(np.diag(inverse))
@@ -155,16 +155,16 @@ def _effect(
     if not sensors:
         return _Found()
     y, v = np.array(values), np.array(variances)
-    found = [_parameter(sensors, y[:, j], v[:, j], names[k]) for j, k in enumerate(mine)]
-    least = min(len(mine) * min((e.p_value for of in found for e in of), default=1.0), 1.0)
-    errors = tuple(replace(error, p_value=least) for of in found for error in of)
-    off = {rig: np.zeros(len(mine)) for rig in taken}
+    errors_of_parameters = [_parameter(sensors, y[:, j], v[:, j], names[k]) for j, k in enumerate(mine)]
+    least = min(len(mine) * min((e.p_value for of in errors_of_parameters for e in of), default=1.0), 1.0)
+    errors = tuple(replace(error, p_value=least) for of in errors_of_parameters for error in of)
+    off = {rig: np.zeros(len(mine)) for rig in corrections}
     for error in errors:
         if error.beyond:
             off[error.rig][[names[k][1] for k in mine].index(error.parameter)] = error.value
     falls = (
-        -2 * score @ off[each.rig] - off[each.rig] @ own @ off[each.rig]
-        for each, score, own in zip(sensors, scores, informations, strict=True)
+        -2 * score @ off[measured.rig] - off[measured.rig] @ own @ off[measured.rig]
+        for measured, score, own in zip(sensors, scores, informations, strict=True)
     )
     return _Found(errors, float(sum(falls)))
 
@@ -172,19 +172,21 @@ def _effect(
 def _parameter(sensors: Sequence[Measured], y: Array, v: Array, name: tuple[str, str, str]) -> list[RigError]:
     """One parameter of every rig; nothing where the rigs cannot be compared."""
     alike = ~_far(sensors, y, v)
-    sensors = [each for each, good in zip(sensors, alike, strict=True) if good]
+    sensors = [measured for measured, good in zip(sensors, alike, strict=True) if good]
     y, v = y[alike], v[alike]
-    batches, rigs = sorted({each.batch for each in sensors}), sorted({each.rig for each in sensors})
-    of_batch = np.array([[each.batch == batch for batch in batches] for each in sensors], dtype=float)
-    both = np.hstack([of_batch, np.array([[each.rig == rig for rig in rigs] for each in sensors], dtype=float)])
-    more = int(np.linalg.matrix_rank(both)) - len(batches)
+    batches, rigs = sorted({measured.batch for measured in sensors}), sorted({measured.rig for measured in sensors})
+    of_batch = np.array([[measured.batch == batch for batch in batches] for measured in sensors], dtype=float)
+    design = np.hstack(
+        [of_batch, np.array([[measured.rig == rig for rig in rigs] for measured in sensors], dtype=float)]
+    )
+    more = int(np.linalg.matrix_rank(design)) - len(batches)
     free = len(y) - len(batches) - more
     if more <= 0 or free < FEWEST_SENSORS_PER_RIG:
         return []
-    total = v + _between(both, y, v, free)
-    left, theta, cov = _least_squares(both, y, total)
-    scale = max(1.0, left / free)
-    f = (_least_squares(of_batch, y, total)[0] - left) / more / scale
+    total = v + _between(design, y, v, free)
+    square, theta, cov = _least_squares(design, y, total)
+    scale = max(1.0, square / free)
+    f = (_least_squares(of_batch, y, total)[0] - square) / more / scale
     p_value = float(fdtrc(more, free, max(f, 0.0)))
     errors = []
     for group in unconnected_rigs(sensors):
@@ -195,8 +197,8 @@ def _parameter(sensors: Sequence[Measured], y: Array, v: Array, name: tuple[str,
             along[places] = np.eye(len(group))[k] - middle
             value, std = float(along @ theta), float(np.sqrt(scale * along @ cov @ along))
             beyond = std > 0 and 2 * float(stdtr(free, -abs(value) / std)) * len(rigs) < SIGNIFICANT
-            here = sum(each.rig == rig for each in sensors)
-            errors.append(RigError(rig, name[0], name[1], name[2], value, std, p_value, here, beyond))
+            count = sum(measured.rig == rig for measured in sensors)
+            errors.append(RigError(rig, name[0], name[1], name[2], value, std, p_value, count, beyond))
     return errors
 
 
@@ -213,8 +215,8 @@ def _far(sensors: Sequence[Measured], y: Array, v: Array) -> NDArray[np.bool_]:
     """Sensors far off the others of their batch on their rig, (n,)."""
     far = np.zeros(len(y), dtype=bool)
     places: dict[tuple[str, str], list[int]] = {}
-    for k, each in enumerate(sensors):
-        places.setdefault((each.batch, each.rig), []).append(k)
+    for k, sensor in enumerate(sensors):
+        places.setdefault((sensor.batch, sensor.rig), []).append(k)
     for chosen in map(np.array, places.values()):
         off = np.abs(y[chosen] - np.median(y[chosen]))
         far[chosen] = off > FAR_SENSOR * np.sqrt(robust_std(off) ** 2 + v[chosen])

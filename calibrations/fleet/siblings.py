@@ -122,14 +122,14 @@ class Siblings:
 
 def fit_siblings(y: Array, v: Array) -> Siblings:
     """The posterior of values `y` with variances `v`, (n,), those that are unlike all others set apart."""
-    apart = _suspects(y, v)
-    if apart.any():
-        alike = _posterior(y, v, apart)
+    unlike = _suspects(y, v)
+    if unlike.any():
+        alike = _posterior(y, v, unlike)
         variance = alike.variance + alike.mean_std**2 + v
         off = np.abs(y - alike.mean) / np.sqrt(variance)
-        freedom = max(int(np.sum(~apart)) - 1, 1)
-        apart &= 2 * stdtr(freedom, -off) * len(y) < FALSE_OUTLIER
-    return _posterior(y, v, apart)
+        freedom = max(int(np.sum(~unlike)) - 1, 1)
+        unlike &= 2 * stdtr(freedom, -off) * len(y) < FALSE_OUTLIER
+    return _posterior(y, v, unlike)
 
 
 def _suspects(y: Array, v: Array) -> NDArray[np.bool_]:
@@ -140,10 +140,10 @@ def _suspects(y: Array, v: Array) -> NDArray[np.bool_]:
     return out if int(np.sum(~out)) >= FEWEST_SIBLINGS else np.zeros(len(y), dtype=bool)
 
 
-def _posterior(y: Array, v: Array, apart: NDArray[np.bool_]) -> Siblings:
-    own, noise = y[~apart], v[~apart]
+def _posterior(y: Array, v: Array, unlike: NDArray[np.bool_]) -> Siblings:
+    own, noise = y[~unlike], v[~unlike]
     if len(own) < FEWEST_SIBLINGS:
-        return Siblings(y, v, apart, np.zeros(1), np.ones(1))
+        return Siblings(y, v, unlike, np.zeros(1), np.ones(1))
     at = (np.arange(GRID) + 0.5) / GRID
     scale = float(np.std(own)) + np.sqrt(float(np.median(noise))) / 4
     tau = scale * at / (1 - at)
@@ -152,7 +152,7 @@ def _posterior(y: Array, v: Array, apart: NDArray[np.bool_]) -> Siblings:
     log = -0.5 * np.sum(np.log(total) + (own - mu[:, None]) ** 2 / total, axis=1) + 0.5 * np.log(variance)
     log -= 2 * np.log1p(-at)  # the grid's spacing, which makes the density flat in tau
     weight = np.exp(log - log.max())
-    return Siblings(y, v, apart, tau, weight / weight.sum())
+    return Siblings(y, v, unlike, tau, weight / weight.sum())
 
 
 def _means(y: Array, v: Array, tau: Array) -> tuple[Array, Array]:
@@ -182,55 +182,55 @@ class Pooled:
     @property
     def values(self) -> Array:
         """(n, p)."""
-        return np.column_stack([each.values for each in self.parameters]) * self.scale
+        return np.column_stack([parameter.values for parameter in self.parameters]) * self.scale
 
     @property
     def stds(self) -> Array:
         """(n, p)."""
-        return np.column_stack([each.stds for each in self.parameters]) * self.scale
+        return np.column_stack([parameter.stds for parameter in self.parameters]) * self.scale
 
     def intervals(self, coverage: float = 0.95) -> tuple[Array, Array]:
         """Lowest and highest values, (n, p) each."""
-        ends = np.array([each.interval(coverage) for each in self.parameters])  # (p, 2, n)
+        ends = np.array([parameter.interval(coverage) for parameter in self.parameters])  # (p, 2, n)
         return np.asarray(ends[:, 0].T * self.scale), np.asarray(ends[:, 1].T * self.scale)
 
     @property
     def apart(self) -> Array:
         """(n, p): whether a sensor's parameter is unlike those of all siblings."""
-        return np.column_stack([each.apart for each in self.parameters])
+        return np.column_stack([parameter.apart for parameter in self.parameters])
 
 
 def pool_siblings(theta: Array, information: Array, typical: Array) -> Pooled:
     """Pool estimates `theta` (n, p) with `information` (n, p, p); `typical` (p,) magnitudes."""
-    known = information * np.outer(typical, typical) + NOTHING * np.eye(len(typical))
-    weighted = np.einsum("nij,nj->ni", known, theta / typical)
+    scaled = information * np.outer(typical, typical) + NOTHING * np.eye(len(typical))
+    weighted = np.einsum("nij,nj->ni", scaled, theta / typical)
     prior, mean = np.full(theta.shape, WIDE**-2.0), np.zeros(theta.shape)
-    found: list[Siblings] = []
+    siblings: list[Siblings] = []
     for _ in range(SWEEPS):
         before = prior.copy()
-        found = []
+        siblings = []
         for k in range(theta.shape[1]):
-            found.append(fit_siblings(*_alone(known, weighted, prior, mean, k)))
-            mean[:, k], prior[:, k] = _foretold(found[-1])
+            siblings.append(fit_siblings(*_alone(scaled, weighted, prior, mean, k)))
+            mean[:, k], prior[:, k] = _foretold(siblings[-1])
         if np.all(np.abs(prior / before - 1) < SETTLED):
             break
-    own = np.linalg.inv(known)
+    own = np.linalg.inv(scaled)
     std = np.sqrt(np.diagonal(own, axis1=1, axis2=2))
-    return Pooled(tuple(found), typical, np.where(std < WIDE, std, np.inf) * typical)
+    return Pooled(tuple(siblings), typical, np.where(std < WIDE, std, np.inf) * typical)
 
 
-def _alone(known: Array, weighted: Array, prior: Array, mean: Array, k: int) -> tuple[Array, Array]:
+def _alone(scaled: Array, weighted: Array, prior: Array, mean: Array, k: int) -> tuple[Array, Array]:
     """Parameter k and its variance for each sensor, (n,), by its own data and the prior of its other parameters."""
-    others = prior.copy()
-    others[:, k] = 0.0
-    total = known + others[:, :, None] * np.eye(known.shape[1])
+    prior_of_others = prior.copy()
+    prior_of_others[:, k] = 0.0
+    total = scaled + prior_of_others[:, :, None] * np.eye(scaled.shape[1])
     inverse = np.linalg.inv(total)[:, k]
-    return np.einsum("nj,nj->n", inverse, weighted + others * mean), np.asarray(inverse[:, k])
+    return np.einsum("nj,nj->n", inverse, weighted + prior_of_others * mean), np.asarray(inverse[:, k])
 
 
-def _foretold(found: Siblings) -> tuple[Array | float, Array | float]:
+def _foretold(siblings: Siblings) -> tuple[Array | float, Array | float]:
     """Prior of each sensor from its batch: mean and inverse variance; none for outliers."""
-    if not found.pooled:
+    if not siblings.pooled:
         return 0.0, WIDE**-2.0
-    precision = 1 / (found.variance + found.mean_std**2)
-    return np.where(found.apart, 0.0, found.mean), np.where(found.apart, WIDE**-2.0, precision)
+    precision = 1 / (siblings.variance + siblings.mean_std**2)
+    return np.where(siblings.apart, 0.0, siblings.mean), np.where(siblings.apart, WIDE**-2.0, precision)

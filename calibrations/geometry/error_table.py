@@ -67,27 +67,27 @@ class ErrorTable:
 
         Raises DataError for an angle at which the table has nothing.
         """
-        wanted = np.atleast_1d(np.asarray(set_deg, dtype=np.float64))
+        angles_set = np.atleast_1d(np.asarray(set_deg, dtype=np.float64))
         angles, errors, stds = self._nodes
-        at = self._joined(wanted % TURN_DEG, wanted)
+        at = self._joined(angles_set % TURN_DEG, angles_set)
         true = scipy.interpolate.PchipInterpolator(angles, angles + errors)(at)
-        return wanted + true - at, np.interp(at, angles, stds)
+        return angles_set + true - at, np.interp(at, angles, stds)
 
     def _joined(self, at: Array, named: Array) -> Array:
         """`at`, moved to the nearest point at the edge of a gap. Raises DataError inside a gap."""
         angles = self._nodes[0]
         k = np.searchsorted(angles, at, side="right") - 1
         below, above = angles[k], angles[k + 1]
-        near = np.where(at - below <= above - at, below, above)
+        nearest = np.where(at - below <= above - at, below, above)
         inside = above - below <= LONGEST_GAP_DEG
-        lost = np.flatnonzero(~inside & (np.abs(at - near) > POINT_REACH_DEG))
+        lost = np.flatnonzero(~inside & (np.abs(at - nearest) > POINT_REACH_DEG))
         if lost.size:
             first = lost[0]
             raise DataError(
                 f"at {named[first]:g} deg the stage's error table has no point between {below[first]:g} and "
                 f"{above[first]:g} deg; measure there, or choose angles within the table"
             )
-        return np.where(inside, at, near)
+        return np.where(inside, at, nearest)
 
 
 def read_error_table(path: Path) -> tuple[Point, ...]:

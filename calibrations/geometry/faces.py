@@ -37,7 +37,7 @@ def estimate_faces(outputs: Array) -> Faces | None:
 
 def _mean_along(outputs: Array, cosine: Array) -> Array | None:
     """Mean output of each axis over the rows in which it is upright, shape (3,); None if one never is."""
-    held = cosine > UPRIGHT_COSINE
-    if not held.any(axis=0).all():
+    upright = cosine > UPRIGHT_COSINE
+    if not upright.any(axis=0).all():
         return None
-    return np.array([outputs[held[:, k], k].mean() for k in range(3)])
+    return np.array([outputs[upright[:, k], k].mean() for k in range(3)])

@@ -37,13 +37,13 @@ def turn_axes(table: Table) -> Array:
         return _unit(np.column_stack([table.column(f"axis_{axis}") for axis in AXES]), table)
     if all(f"a{axis}" in table for axis in AXES):
         return _upright(table)
-    found = np.abs(rate_slopes(table))
-    if found.max() < LEAST_MAIN_SLOPE * np.linalg.norm(found):
+    slopes = np.abs(rate_slopes(table))
+    if slopes.max() < LEAST_MAIN_SLOPE * np.linalg.norm(slopes):
         raise DataError(
             f"{table.source}: more than one output follows the rate, and the axis of each turn is not known; add the "
             "columns axis_x, axis_y, axis_z (1, 0, 0 for a turn about x), or ax, ay, az"
         )
-    return np.tile(np.eye(3)[np.argmax(found)], (table.n, 1))
+    return np.tile(np.eye(3)[np.argmax(slopes)], (table.n, 1))
 
 
 def rate_slopes(table: Table) -> Array:
@@ -77,9 +77,9 @@ def specific_force_g(table: Table) -> Array:
     """
     a = np.column_stack([table.column(f"a{axis}") for axis in AXES])
     still = table.column("rate_deg_s") == 0
-    held = estimate_faces(a[still]) if still.any() else None
-    if held is not None:
-        return (a - held.bias) / held.scale
+    faces = estimate_faces(a[still]) if still.any() else None
+    if faces is not None:
+        return (a - faces.bias) / faces.scale
     gravity = float(np.median(np.linalg.norm(a, axis=1)))
     if not gravity > 0:
         raise DataError(f"{table.source}: ax, ay and az are 0; remove the columns if there was no accelerometer")

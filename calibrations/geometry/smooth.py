@@ -39,8 +39,8 @@ def _directions(table: Table) -> Array:
         columns = np.column_stack(list(_harmonics(a, degree)))
         if "direction" in table:
             turning = table.column("direction")[:, None]
-            other = np.column_stack(list(_harmonics(a, min(degree, DIRECTION_DEGREE))))
-            columns = np.hstack([columns, turning * other])
+            by_direction = np.column_stack(list(_harmonics(a, min(degree, DIRECTION_DEGREE))))
+            columns = np.hstack([columns, turning * by_direction])
         basis = _orthonormal(columns)
         if basis.shape[1] <= most:
             return basis

@@ -24,23 +24,22 @@ REMEDIES = {
 
 def coverage_fault(table: Table, degree: int) -> str | None:
     """Why these directions do not determine harmonics up to `degree`; None where they do."""
-    found = worst_ratio(directions(table), degree)
-    if found <= MOST_WORSE_COVERED:
+    ratio = worst_ratio(directions(table), degree)
+    if ratio <= MOST_WORSE_COVERED:
         return None
-    times = f"{found:.0f} times less certain than with all directions covered (limit: {MOST_WORSE_COVERED:g} times)"
-    known = times if found < 1e4 else "unknown"
-    return (
-        f"the orientations cover too little of the sphere: a combination of parameters is {known}; {REMEDIES[degree]}"
-    )
+    times = f"{ratio:.0f} times less certain than with all directions covered (limit: {MOST_WORSE_COVERED:g} times)"
+    certainty = times if ratio < 1e4 else "unknown"
+    remedy = REMEDIES[degree]
+    return f"the orientations cover too little of the sphere: a combination of parameters is {certainty}; {remedy}"
 
 
 def magnetometer_coverage_warning(table: Table) -> str | None:
     """The effects that a magnetometer's directions cannot determine; None where they cover the sphere."""
     if not table.type.field:
         return None
-    for degree, what in ((HARD_IRON, "hard-iron and soft-iron"), (SOFT_IRON, "soft-iron")):
+    for degree, effects in ((HARD_IRON, "hard-iron and soft-iron"), (SOFT_IRON, "soft-iron")):
         if why := coverage_fault(table, degree):
-            return f"{what} cannot be tested: {why}; the values assume a sensor without this effect"
+            return f"{effects} cannot be tested: {why}; the values assume a sensor without this effect"
     return None
 
 
@@ -76,8 +75,8 @@ def worst_ratio(u: Array, degree: int) -> float:
 def harmonics(u: Array, degree: int) -> Array:
     """Real spherical harmonics up to `degree` (at most 2), of mean square 1 over the sphere, shape (n, 1, 4 or 9)."""
     x, y, z = u.T
-    columns = [np.ones(len(u)), *(np.sqrt(3) * each for each in (x, y, z))]
+    columns = [np.ones(len(u)), *(np.sqrt(3) * product for product in (x, y, z))]
     if degree > 1:
-        columns += [np.sqrt(15) * each for each in (x * y, x * z, y * z, (x**2 - y**2) / 2)]
+        columns += [np.sqrt(15) * product for product in (x * y, x * z, y * z, (x**2 - y**2) / 2)]
         columns.append(np.sqrt(5) * (3 * z**2 - 1) / 2)
     return np.column_stack(columns)

@@ -54,16 +54,16 @@ class Group:
     def _topic(self, name: str, rows: int, names: list[str]) -> Topic:
         alone = len(names) == 1 and len(self.arrays) == 1
         header = [
-            each for array in names for each in _columns(array, self.arrays[array][0], self.arrays[array][1], alone)
+            column for array in names for column in _columns(array, self.arrays[array][0], self.arrays[array][1], alone)
         ]
 
         def cells() -> Cells:
-            found: dict[str, Array] = {}
+            columns: dict[str, Array] = {}
             for array in names:
                 shape, unit, read = self.arrays[array]
                 values = _upright(np.asarray(read(), dtype=np.float64), rows)
-                found |= dict(zip(_columns(array, shape, unit, alone), values.T.copy(), strict=True))
-            return found
+                columns |= dict(zip(_columns(array, shape, unit, alone), values.T.copy(), strict=True))
+            return columns
 
         return Topic(name, tuple(header), rows, cells, constants=self.constants)
 
@@ -118,8 +118,8 @@ def _add(group: Group, name: str, value: Any) -> None:
     """Add an array in memory to a group: numbers, a structured array, or a constant."""
     values = np.asarray(value)
     if values.dtype.names:
-        for each in values.dtype.names:
-            _add(group, each, values[each])
+        for field_name in values.dtype.names:
+            _add(group, field_name, values[field_name])
     elif values.dtype.kind in "iufb" and values.size > 1:
         group.arrays[name] = (values.shape, "", lambda values=values: values)  # type: ignore[misc]
     elif values.dtype.kind in "mM" and values.ndim == 1 and len(values) > 1:
@@ -197,11 +197,11 @@ def _add_dataset(path: Path, group: Group, key: str, data: Any) -> None:
         return
     matlab, where = "MATLAB_class" in data.attrs, data.name
     if data.dtype.names:
-        for each in data.dtype.names:
-            kind, inner = data.dtype[each].base.kind, data.dtype[each].shape
+        for name in data.dtype.names:
+            kind, inner = data.dtype[name].base.kind, data.dtype[name].shape
             if kind in "iufb":
                 require_size(path, data.size * 8)
-                group.arrays[each] = ((*data.shape, *inner), "", _later(path, where, False, each))
+                group.arrays[name] = ((*data.shape, *inner), "", _later(path, where, False, name))
     elif data.dtype.kind in "iufb" and data.size > 1:
         require_size(path, data.size * 8)
         unit = next((parse_unit(str(_constant(data.attrs[k]))) for k in ("units", "unit") if k in data.attrs), "")
@@ -240,7 +240,7 @@ def _matlab_groups(variables: Mapping[str, Any], name: str, depth: int) -> Itera
         values = np.asarray(value)
         if values.dtype.names and values.size == 1 and depth < DEEPEST:
             record = values.reshape(-1)[0]
-            inner[key] = {each: record[each] for each in values.dtype.names}
+            inner[key] = {field_name: record[field_name] for field_name in values.dtype.names}
         elif values.dtype.kind in "iufbUS":
             _add(group, key, values)
     yield group
@@ -260,13 +260,13 @@ def _matlab_bytes(path: Path) -> int:
                 total += size
                 file.seek(size, 1)
                 continue
-            unpack, left = zlib.decompressobj(), size
-            while left > 0 and total <= LARGEST_BYTES and (chunk := file.read(min(left, 1 << 16))):
-                left -= len(chunk)
+            unpack, remaining = zlib.decompressobj(), size
+            while remaining > 0 and total <= LARGEST_BYTES and (chunk := file.read(min(remaining, 1 << 16))):
+                remaining -= len(chunk)
                 while chunk and total <= LARGEST_BYTES:
                     total += len(unpack.decompress(chunk, 1 << 20))
                     chunk = unpack.unconsumed_tail
-            file.seek(left, 1)
+            file.seek(remaining, 1)
     return total
 
 

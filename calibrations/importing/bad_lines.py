@@ -47,8 +47,10 @@ class BadLines:
         total = self.good + self.bad
         many = f"{self.bad} of {total} lines" if self.bad > 1 else f"1 of {total} lines"
         if self.bad > self.share * total:
-            asked = "" if self.share == MOST_ASKED else "; --bad-lines skip skips them"
-            raise DataError(f"{self.first} ({many} are damaged, and at most {100 * self.share:g} % are skipped{asked})")
+            option = "" if self.share == MOST_ASKED else "; --bad-lines skip skips them"
+            raise DataError(
+                f"{self.first} ({many} are damaged, and at most {100 * self.share:g} % are skipped{option})"
+            )
         more = f" and {self.bad - len(self.shown)} more" if self.bad > len(self.shown) else ""
         verb = "are damaged and were" if self.bad > 1 else "is damaged and was"
         tell(f"{self.name}: {many} {verb} skipped: {', '.join(self.shown)}{more}.")

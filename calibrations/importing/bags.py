@@ -38,7 +38,7 @@ def bag_topics(path: Path) -> list[Topic]:
         _require_suffix(path)
     try:
         with _opened(anyreader, path) as reader:
-            names = list(dict.fromkeys(each.topic for each in reader.connections))
+            names = list(dict.fromkeys(connection.topic for connection in reader.connections))
             by_name = {name: [c for c in reader.connections if c.topic == name] for name in names}
             return [_topic(anyreader, path, name, of) for name, of in by_name.items()]
     except anyreader.AnyReaderError as error:
@@ -49,9 +49,9 @@ def _require_suffix(path: Path) -> None:
     """Raises DataError for a name by which rosbags does not know the format."""
     with path.open("rb") as file:
         head = file.read(16)
-    wanted = next(suffixes for mark, suffixes in SUFFIXES.items() if head.startswith(mark))
-    if path.suffix not in wanted:
-        raise DataError(f"{path}: is a ROS bag; rename it so that its name ends with {wanted[0]}")
+    endings = next(suffixes for mark, suffixes in SUFFIXES.items() if head.startswith(mark))
+    if path.suffix not in endings:
+        raise DataError(f"{path}: is a ROS bag; rename it so that its name ends with {endings[0]}")
 
 
 def _opened(anyreader: Any, path: Path) -> Any:
@@ -61,17 +61,17 @@ def _opened(anyreader: Any, path: Path) -> Any:
 
 
 def _refused(path: Path, error: Exception) -> DataError:
-    said = " ".join(str(error).split())[:200]
-    if "mismatch" in said or "definition" in said:
+    reason = " ".join(str(error).split())[:200]
+    if "mismatch" in reason or "definition" in reason:
         remedy = "its message definitions do not fit its messages; record the bag again with the sensor's own messages"
     else:
         remedy = "copy the bag again; `rosbag reindex` (ROS 1), `ros2 bag reindex` or `mcap recover` repair a cut one"
-    return DataError(f"{path}: the bag cannot be read ({said}); {remedy}")
+    return DataError(f"{path}: the bag cannot be read ({reason}); {remedy}")
 
 
 def _topic(anyreader: Any, path: Path, name: str, connections: Sequence[Any]) -> Topic:
-    kinds = sorted({each.msgtype for each in connections})
-    rows = sum(each.msgcount for each in connections)
+    kinds = sorted({connection.msgtype for connection in connections})
+    rows = sum(connection.msgcount for connection in connections)
     if len(kinds) > 1 or kinds[0] not in VECTORS:
         refusal = (
             f"holds {' and '.join(kinds)}; only {IMU} and {FIELD} can be imported. "
@@ -93,8 +93,8 @@ def _cells(anyreader: Any, path: Path, name: str, kind: str) -> Cells:
     absent, frames = set[int](), set[str]()
     try:
         with _opened(anyreader, path) as reader:
-            wanted = [each for each in reader.connections if each.topic == name]
-            for connection, received_ns, raw in reader.messages(connections=wanted):
+            connections = [c for c in reader.connections if c.topic == name]
+            for connection, received_ns, raw in reader.messages(connections=connections):
                 message = reader.deserialize(raw, connection.msgtype)
                 stamp_ns = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
                 stamps.append(stamp_ns or received_ns)

@@ -65,8 +65,8 @@ def _topics(path: Path) -> list[Topic] | None:
     except OSError:
         return None  # the text reader gives the reason
     read = next((reader for mark, reader in READERS.items() if head.startswith(mark)), None)
-    if said := next((said for mark, said in CANNOT.items() if head.startswith(mark)), None):
-        raise DataError(f"{path}: {said}")
+    if reason := next((reason for mark, reason in CANNOT.items() if head.startswith(mark)), None):
+        raise DataError(f"{path}: {reason}")
     if len(head) == MATLAB_HEADER_BYTES and head[126:] in (b"IM", b"MI") and head.startswith(b"MATLAB 5"):
         read = ("arrays", "matlab_topics")
     elif head.startswith(b"MATLAB 7.3"):
@@ -119,5 +119,5 @@ def _zip_reader(path: Path) -> str:
 
 
 def _damaged(path: Path, error: Exception) -> DataError:
-    said = " ".join(str(error).split())[:200] or type(error).__name__
-    return DataError(f"{path}: is damaged or cut short ({said}); copy it again from where it was recorded")
+    reason = " ".join(str(error).split())[:200] or type(error).__name__
+    return DataError(f"{path}: is damaged or cut short ({reason}); copy it again from where it was recorded")

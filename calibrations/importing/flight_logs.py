@@ -45,8 +45,8 @@ def ulog_topics(path: Path) -> list[Topic]:
     log = core.ULog(str(path))
     remarks = list(_ulog_remarks(path, log))
     several = {d.name for d in log.data_list if d.multi_id > 0}
-    found = [_ulog_topic(data, data.name in several, tuple(remarks)) for data in log.data_list]
-    return sorted(found, key=lambda t: (t.rank, t.name))
+    topics = [_ulog_topic(data, data.name in several, tuple(remarks)) for data in log.data_list]
+    return sorted(topics, key=lambda t: (t.rank, t.name))
 
 
 def _ulog_topic(data: Any, is_one_of_several: bool, remarks: tuple[str, ...]) -> Topic:
@@ -83,7 +83,7 @@ def _ulog_remarks(path: Path, log: Any) -> list[str]:
     elif (cut := _cut_at(path)) is not None:
         remarks.append(f"{path}: ends inside a record, at byte {cut}; the complete records before it are used")
     if log.dropouts:
-        lost_s = sum(each.duration for each in log.dropouts) / 1000
+        lost_s = sum(dropout.duration for dropout in log.dropouts) / 1000
         remarks.append(f"{path}: the logger lost {lost_s:.3g} s of data in {len(log.dropouts)} dropouts")
     return remarks
 
@@ -130,9 +130,9 @@ def dataflash_topics(path: Path) -> list[Topic]:
 
 def _require_lengths(path: Path) -> None:
     """Raises DataError for records of less than 3 bytes: pymavlink would read the same bytes for ever."""
-    if (found := TOO_SHORT.search(path.read_bytes())) is not None:
+    if (match := TOO_SHORT.search(path.read_bytes())) is not None:
         raise DataError(
-            f"{path}: is damaged: the format at byte {found.start()} has records of {found[0][4]} bytes, which cannot "
+            f"{path}: is damaged: the format at byte {match.start()} has records of {match[0][4]} bytes, which cannot "
             "be; copy it again from the vehicle"
         )
 
@@ -159,8 +159,8 @@ def _dataflash_topics(path: Path, log: Any) -> list[Topic]:
     remarks = _dataflash_remarks(path, log)
     topics = [_dataflash_topic(name, cells, corrections, remarks) for name, cells in columns.items()]
     refusal = "has no accelerometer, gyroscope or magnetometer; choose ACC, GYR, IMU or MAG"
-    others = [name for name in names if name not in read and name not in ("FMT", "FMTU", "UNIT", "MULT", "PARM")]
-    return topics + [Topic(n, (), log.counts[log.name_to_id[n]], refusal=refusal, sensor="") for n in others]
+    unread = [name for name in names if name not in read and name not in ("FMT", "FMTU", "UNIT", "MULT", "PARM")]
+    return topics + [Topic(n, (), log.counts[log.name_to_id[n]], refusal=refusal, sensor="") for n in unread]
 
 
 def _dataflash_remarks(path: Path, log: Any) -> list[str]:
@@ -189,7 +189,10 @@ def _dataflash_topic(
     sensor = next((s for s in "amg" if any(k.startswith(f"{s}x ") for k in cells)), "")
     prefixes = {"a": "INS", "g": "INS", "m": "COMPASS"}
     kinds = {"a": "ACC", "g": "GYR", "m": "COMPASS"}
-    known = {k: v for k, v in corrections.items() if k.startswith(prefixes.get(sensor, "-")) and kinds[sensor] in k}
-    constants: dict[str, Constant] = {**known}
-    notes = (*remarks, f"{name}: {CORRECTED}" + (f" ({len(known)} parameters are kept with the run)" if known else ""))
+    applied = {k: v for k, v in corrections.items() if k.startswith(prefixes.get(sensor, "-")) and kinds[sensor] in k}
+    constants: dict[str, Constant] = {**applied}
+    notes = (
+        *remarks,
+        f"{name}: {CORRECTED}" + (f" ({len(applied)} parameters are kept with the run)" if applied else ""),
+    )
     return Topic(name, tuple(cells), len(cells["t_s (us)"]), lambda: cells, None, constants, notes, "", sensor)

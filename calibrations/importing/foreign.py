@@ -94,28 +94,28 @@ def _import_with(
     laid: Sheet, kind: str | None, chosen: Sequence[ColumnMapping], constants: Mapping[str, Constant]
 ) -> ImportedTable:
     """The table by a complete mapping. Raises DataError, MissingColumn without advice."""
-    kept = _unmapped_columns(laid, chosen, bool(chosen))
+    unmapped = _unmapped_columns(laid, chosen, bool(chosen))
     try:
-        kind = kind or guess_kind([*(m.name for m in chosen), *kept])
+        kind = kind or guess_kind([*(m.name for m in chosen), *unmapped])
     except MissingColumn as error:
-        what = error if look_like_names(laid.header) else "a header line with column names is missing"
-        raise MissingColumn(f"{laid.place}: {what}") from None
-    known = {**laid.constants, **constants}
-    known |= _output_unit(chosen, kind, known.get("triad") == "m", laid.name)
-    taken = {m.theirs for m in chosen}
+        reason = error if look_like_names(laid.header) else "a header line with column names is missing"
+        raise MissingColumn(f"{laid.place}: {reason}") from None
+    merged = {**laid.constants, **constants}
+    merged |= _output_unit(chosen, kind, merged.get("triad") == "m", laid.name)
+    mapped_names = {m.theirs for m in chosen}
     path = next((m.theirs for m in chosen if m.name == PATH), PATH)
     first = zip(laid.header, laid.sample[0], strict=True)
-    words = [name for name, cell in first if name not in taken and _is_text(name, cell)]
-    needed = {*taken - {path}, *NUMBERS}
+    words = [name for name, cell in first if name not in mapped_names and _is_text(name, cell)]
+    needed = {*mapped_names - {path}, *NUMBERS}
     notes: list[str] = []
     words = list(dict.fromkeys([*words, path])) if path in laid.header else words
     numbers, texts = read_cells(laid, words, needed, notes.append)
     columns = {m.name: _converted(numbers[m.theirs], m) for m in chosen if m.name != PATH}
-    columns |= {name: numbers[name] for name in kept if name in numbers}
-    labels = {k: texts[k] for k in kept if k in texts} | ({PATH: texts[path]} if path in texts else {})
+    columns |= {name: numbers[name] for name in unmapped if name in numbers}
+    labels = {k: texts[k] for k in unmapped if k in texts} | ({PATH: texts[path]} if path in texts else {})
     if is_session(kind, columns, labels.get(PATH)):
-        columns[RATE] = sample_rates(columns, labels[PATH], known, laid.name)
-    table = Table.from_columns(kind, columns, known, laid.name, labels)
+        columns[RATE] = sample_rates(columns, labels[PATH], merged, laid.name)
+    table = Table.from_columns(kind, columns, merged, laid.name, labels)
     _check_units(table, laid, chosen)
     check_at_rest(table)
     return ImportedTable(table, laid, tuple(chosen), tuple(notes))
@@ -125,12 +125,12 @@ def complete_mapping(laid: Sheet, mapped: Sequence[ColumnMapping]) -> list[Colum
     """`mapped` with names and units from the header, and the columns that have our names. Raises DataError."""
     chosen: list[ColumnMapping] = []
     for m in mapped:
-        if m.name in [other.name for other in chosen]:
+        if m.name in [mapping.name for mapping in chosen]:
             raise DataError(f'{laid.name}: the column "{m.name}" is mapped twice; give it once')
         chosen.append(_locate(laid, m))
-    taken = {m.theirs for m in chosen}
+    mapped_names = {m.theirs for m in chosen}
     for header, bare, unit in zip(laid.header, laid.bare, laid.units, strict=True):
-        if bare in NUMBERS - {m.name for m in chosen} and header not in taken:
+        if bare in NUMBERS - {m.name for m in chosen} and header not in mapped_names:
             chosen.append(check_unit(ColumnMapping(bare, header, unit), laid.name))
     return [m for m in chosen if m.unit or m.name != m.theirs]
 
@@ -144,8 +144,8 @@ def needs_mapping(laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping]
 
         return bool(missing_columns(kind, laid, chosen))
     kinds = [FILE_KINDS[kind]] if kind else FILE_KINDS.values()
-    sets = [wanted for each in kinds for wanted in each.columns if kind or len(wanted) > 1]
-    return not any(names.issuperset(wanted) for wanted in sets)
+    sets = [columns for kind_of_table in kinds for columns in kind_of_table.columns if kind or len(columns) > 1]
+    return not any(names.issuperset(columns) for columns in sets)
 
 
 def _locate(laid: Sheet, m: ColumnMapping) -> ColumnMapping:
@@ -172,8 +172,8 @@ def check_unit(m: ColumnMapping, source: str) -> ColumnMapping:
 
 def _unmapped_columns(laid: Sheet, chosen: Sequence[ColumnMapping], is_mapped: bool) -> list[str]:
     """The columns that keep their own names; none of a file without a header if some are mapped."""
-    gone = {name for m in chosen for name in (m.name, m.theirs)}
-    return [name for name in laid.header if name not in gone] if laid.named or not is_mapped else []
+    used = {name for m in chosen for name in (m.name, m.theirs)}
+    return [name for name in laid.header if name not in used] if laid.named or not is_mapped else []
 
 
 def _is_text(name: str, cell: str) -> bool:
@@ -189,19 +189,19 @@ def _converted(values: Array, m: ColumnMapping) -> Array:
 
 def _check_units(table: Table, laid: Sheet, chosen: Sequence[ColumnMapping]) -> None:
     """Raises DataError for numbers that are unlikely in their unit, with the import command for a better one."""
-    found = find_unit_doubts(table, {m.name for m in chosen if m.unit})
-    if not found:
+    doubts = find_unit_doubts(table, {m.name for m in chosen if m.unit})
+    if not doubts:
         return
     from calibrations.importing.proposal import import_command  # as above
 
-    name, (what, unit) = next(iter(found.items()))
-    by_name = {name: ColumnMapping(name, name) for name in found} | {m.name: m for m in chosen}
-    better = [replace(m, unit=found[m.name][1] if m.name in found else m.unit) for m in by_name.values()]
+    name, (reason, unit) = next(iter(doubts.items()))
+    by_name = {name: ColumnMapping(name, name) for name in doubts} | {m.name: m for m in chosen}
+    better = [replace(m, unit=doubts[m.name][1] if m.name in doubts else m.unit) for m in by_name.values()]
     own = next(replace(m, unit=column_unit(name)) for m in better if m.name == name)
     if not unit:
-        raise DataError(f'{laid.name}: the column "{name}" {what}; state its unit, as in --column {own.text}')
+        raise DataError(f'{laid.name}: the column "{name}" {reason}; state its unit, as in --column {own.text}')
     raise DataError(
-        f'{laid.name}: the column "{name}" {what}\nIf its unit is {unit}, import it with:\n\n'
+        f'{laid.name}: the column "{name}" {reason}\nIf its unit is {unit}, import it with:\n\n'
         f"    {import_command(laid, table.kind, better)}\n\n"
         f"If its unit is {own.unit} after all, state it: --column {own.text}"
     )
@@ -214,11 +214,11 @@ def _output_unit(mapped: Sequence[ColumnMapping], kind: str, field: bool, source
     """
     accelerometer = any(m.name == "ax" for m in mapped)
     for axes in (RATES,) if kind == "rates" else TRIADS[1:] if field else TRIADS[:1] if accelerometer else TRIADS:
-        given = {m.name: UNITS[m.unit][0] for m in mapped if m.unit}
-        units = {axis: given.get(axis, "") for axis in axes}
+        stated = {m.name: UNITS[m.unit][0] for m in mapped if m.unit}
+        units = {axis: stated.get(axis, "") for axis in axes}
         if len(set(units.values())) > 1:
-            said = ", ".join(f"{axis} in {unit or 'no unit'}" for axis, unit in units.items())
-            raise DataError(f"{source}: the three axes must have the same unit: {said}")
+            units_of_axes = ", ".join(f"{axis} in {unit or 'no unit'}" for axis, unit in units.items())
+            raise DataError(f"{source}: the three axes must have the same unit: {units_of_axes}")
         if units[axes[0]]:
             return {"unit": units[axes[0]]}
     return {}
@@ -238,16 +238,16 @@ def drop_duplicate_rows(table: Table) -> tuple[Table, str | None]:
     if "t_s" not in table:
         return table, None
     rows = np.column_stack(list(table.columns.values()))
-    _, first, which = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    _, first, group = np.unique(rows, axis=0, return_index=True, return_inverse=True)
     copies = np.setdiff1d(np.arange(table.n), first)
     if not len(copies):
         return table, None
-    pairs = [f"{row + 1} (as {first[which.ravel()[row]] + 1})" for row in copies[:MOST_ROWS_LISTED]]
+    pairs = [f"{row + 1} (as {first[group.ravel()[row]] + 1})" for row in copies[:MOST_ROWS_LISTED]]
     more = f" and {len(copies) - MOST_ROWS_LISTED} more" if len(copies) > MOST_ROWS_LISTED else ""
-    what = "copies an earlier row" if len(copies) == 1 else "copy earlier rows"
+    verb = "copies an earlier row" if len(copies) == 1 else "copy earlier rows"
     rows_said = f"row{'s' if len(copies) > 1 else ''} {', '.join(pairs)}{more}"
     return table.rows(np.sort(first)), (
-        f"{table.source}: {rows_said} {what} (same time, same values); each is used once."
+        f"{table.source}: {rows_said} {verb} (same time, same values); each is used once."
     )
 
 

@@ -27,9 +27,9 @@ JSON_FORM = 'give arrays of equal length, {"mag": [[1, 2, 3], ...]}, or [{"mx": 
 def json_as_lines(source: Source) -> Source:
     """The JSON document of `source` as comma-separated lines; another text as it is. Raises DataError."""
     with source.lines() as lines:
-        whole = "".join(_bounded(lines, source.name))
+        text = "".join(_bounded(lines, source.name))
     try:
-        document = json.loads(whole)
+        document = json.loads(text)
     except (ValueError, RecursionError):
         if source.name.endswith(".json"):
             raise DataError(f"{source.name}: is not valid JSON; {JSON_FORM}") from None

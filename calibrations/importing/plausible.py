@@ -38,8 +38,8 @@ Doubt = tuple[str, str]  # the reason, and the unit that would fit, "" for none
 
 def find_unit_doubts(table: Table, stated: Collection[str]) -> dict[str, Doubt]:
     """The columns with an unlikely unit. `stated`: columns whose unit the file or a person gives."""
-    asked = {name: _doubt(name, values, name in stated) for name, values in table.columns.items()}
-    return {name: doubt for name, doubt in asked.items() if doubt is not None}
+    doubts = {name: _doubt(name, values, name in stated) for name, values in table.columns.items()}
+    return {name: doubt for name, doubt in doubts.items() if doubt is not None}
 
 
 def looks_like_radians(values: Array) -> bool:
@@ -64,8 +64,8 @@ def likely_unit(name: str, values: Array) -> str:
 def gravity_unit(outputs: Array) -> str:
     """The unit in which still outputs, shape (n, 3), have the magnitude of gravity: g, mg or m/s2; else "counts"."""
     size = float(np.median(np.linalg.norm(outputs, axis=1)))
-    near = {"g": 1.0, "m/s2": 9.81, "mg": 1000.0}
-    return next((unit for unit, one_g in near.items() if 0.8 < size / one_g < 1.25), "counts")
+    magnitudes = {"g": 1.0, "m/s2": 9.81, "mg": 1000.0}
+    return next((unit for unit, one_g in magnitudes.items() if 0.8 < size / one_g < 1.25), "counts")
 
 
 def field_unit(outputs: Array) -> str:
@@ -186,8 +186,8 @@ def check_at_rest(table: Table) -> None:
         return
     unit = gravity_unit(table.outputs)
     fits = f"they look like {unit}: give --column ax=...:{unit}, likewise ay and az" if unit != "counts" else ""
-    other = "import outputs of an unknown scale as counts: --column ax=...:counts, likewise ay and az"
+    as_counts = "import outputs of an unknown scale as counts: --column ax=...:counts, likewise ay and az"
     raise DataError(
         f"{table.source}: ax, ay, az have the magnitude {size:.4g} {table.unit}; a sensor at rest shows "
-        f"{one_g:.4g}; {fits or other}"
+        f"{one_g:.4g}; {fits or as_counts}"
     )

@@ -98,16 +98,16 @@ def propose_mapping(laid: Sheet, kind: str | None = None, mapped: Sequence[Colum
     kind = kind or likely_kind(laid, mapped)
     if kind not in NAME_PATTERNS:
         return list(mapped)
-    found = list(mapped)
-    left = [name for name in laid.header if name not in {m.theirs for m in mapped} | NUMBERS]
-    values = {name: numbers for name in left if len(numbers := sample_values(laid, name))}
+    mapping = list(mapped)
+    unmapped = [name for name in laid.header if name not in {m.theirs for m in mapped} | NUMBERS]
+    values = {name: numbers for name in unmapped if len(numbers := sample_values(laid, name))}
     guesses = guess_by_names(laid, values, kind) if laid.named else guess_by_values(values, kind)
     for name, ours in guesses:
-        if ours not in {m.name for m in found} and ours not in laid.header and (ours != "n" or _counts(values[name])):
-            found.append(ColumnMapping(ours, name, _unit(laid, name, ours, values[name])))
+        if ours not in {m.name for m in mapping} and ours not in laid.header and (ours != "n" or _counts(values[name])):
+            mapping.append(ColumnMapping(ours, name, _unit(laid, name, ours, values[name])))
     if kind == "rates":
-        return _with_sections(found, laid)
-    return _with_gravity(found, values) if kind == "positions" else _with_scatter(_with_time(found, laid))
+        return _with_sections(mapping, laid)
+    return _with_gravity(mapping, values) if kind == "positions" else _with_scatter(_with_time(mapping, laid))
 
 
 def likely_kinds(laid: Sheet, mapped: Iterable[ColumnMapping] = ()) -> list[str]:
@@ -140,15 +140,15 @@ def likely_kind(laid: Sheet, mapped: Iterable[ColumnMapping] = ()) -> str:
 
 def missing_columns(kind: str | None, laid: Sheet, mapped: Iterable[ColumnMapping]) -> list[str]:
     """The columns that a table of this kind needs and that neither header nor mapping gives."""
-    given = {m.name for m in mapped} | set(laid.bare)
-    if kind == "rates" and "path" in given:
-        given.add("rate_deg_s")  # given by the sections of a session
-    return [name for name in required_columns(kind, given) if name not in given]
+    present = {m.name for m in mapped} | set(laid.bare)
+    if kind == "rates" and "path" in present:
+        present.add("rate_deg_s")  # given by the sections of a session
+    return [name for name in required_columns(kind, present) if name not in present]
 
 
-def required_columns(kind: str | None, given: Collection[str]) -> tuple[str, ...]:
-    """The columns that a table of this kind needs; of several sets the one nearest to `given`."""
-    return min(KINDS[kind].columns, key=lambda wanted: len(set(wanted) - set(given))) if kind else ()
+def required_columns(kind: str | None, present: Collection[str]) -> tuple[str, ...]:
+    """The columns that a table of this kind needs; of several sets the one nearest to `present`."""
+    return min(KINDS[kind].columns, key=lambda columns: len(set(columns) - set(present))) if kind else ()
 
 
 def import_command(
@@ -172,28 +172,30 @@ def guess_by_names(laid: Sheet, values: Mapping[str, Array], kind: str) -> list[
     """(their name, our name) for the columns with a meaningful name."""
     bare = dict(zip(laid.header, laid.bare, strict=True))
     units = dict(zip(laid.header, laid.units, strict=True))
-    said = [(name, _by_name(bare[name], kind) or _by_unit(bare[name], units[name])) for name in values]
-    named = {ours for _, ours in said}
+    guesses = [(name, _by_name(bare[name], kind) or _by_unit(bare[name], units[name])) for name in values]
+    named = {ours for _, ours in guesses}
     nameless = iter(name for name in KINDS[kind].outputs if name not in named)
-    plain = {name: next(nameless, "") for name, ours in said if not ours and _is_output(bare[name])}
-    return [(name, ours or plain.get(name, "")) for name, ours in said if ours or plain.get(name)]
+    plain = {name: next(nameless, "") for name, ours in guesses if not ours and _is_output(bare[name])}
+    return [(name, ours or plain.get(name, "")) for name, ours in guesses if ours or plain.get(name)]
 
 
 def guess_by_values(values: Mapping[str, Array], kind: str) -> list[tuple[str, str]]:
     """(their name, our name) for columns without names: time grows, angles lie on a grid, the others are outputs in
     order.
     """
-    left = dict(values)
-    found = []
-    clock = next((name for name, v in left.items() if len(v) > 2 and np.all(np.diff(v) > 0)), None)
-    if clock is not None and len(left) > 3:
-        found.append((clock, "t_s"))
-        left.pop(clock)
+    remaining = dict(values)
+    guesses = []
+    clock = next((name for name, v in remaining.items() if len(v) > 2 and np.all(np.diff(v) > 0)), None)
+    if clock is not None and len(remaining) > 3:
+        guesses.append((clock, "t_s"))
+        remaining.pop(clock)
     if kind == "poses":
-        angles = sorted((name for name, v in left.items() if _is_angle(v)), key=lambda name: len(np.unique(left[name])))
-        found += list(zip(angles[:2], ("alpha_deg", "beta_deg"), strict=False))
-        left = {name: v for name, v in left.items() if name not in angles[:2]}
-    return [*found, *zip(left, KINDS[kind].outputs, strict=False)]
+        angles = sorted(
+            (name for name, v in remaining.items() if _is_angle(v)), key=lambda name: len(np.unique(remaining[name]))
+        )
+        guesses += list(zip(angles[:2], ("alpha_deg", "beta_deg"), strict=False))
+        remaining = {name: v for name, v in remaining.items() if name not in angles[:2]}
+    return [*guesses, *zip(remaining, KINDS[kind].outputs, strict=False)]
 
 
 def sample_values(laid: Sheet, name: str) -> Array:
@@ -216,8 +218,8 @@ def sensed_by(header: Iterable[str], topic: str) -> str:
 
 def _by_name(bare: str, kind: str) -> str:
     """Our name for theirs, "" for a name without a known meaning."""
-    if (found := INDEXED.match(bare)) and int(found["index"]) < len(AXES):
-        bare = f"{found['name']}_{AXES[int(found['index'])]}"  # accSmooth[0] of Betaflight
+    if (match := INDEXED.match(bare)) and int(match["index"]) < len(AXES):
+        bare = f"{match['name']}_{AXES[int(match['index'])]}"  # accSmooth[0] of Betaflight
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", bare)
     axis = next((m["axis"] for m in re.finditer(AXIS, re.sub(r"[^a-z]", " ", words.lower()))), "")
     lower = words.lower()
@@ -269,11 +271,11 @@ def _section(laid: Sheet) -> str:
     return next((name for name in words if re.search(SECTION, name.lower())), "")
 
 
-def _with_sections(found: list[ColumnMapping], laid: Sheet) -> list[ColumnMapping]:
+def _with_sections(mapping: list[ColumnMapping], laid: Sheet) -> list[ColumnMapping]:
     """The mapping with the section column, where no column gives the rate."""
-    given, section = {m.name for m in found} | set(laid.bare), _section(laid)
-    lacks = section and not {"rate_deg_s", "path"} & given
-    return [ColumnMapping("path", section), *found] if lacks else found
+    present, section = {m.name for m in mapping} | set(laid.bare), _section(laid)
+    lacks = section and not {"rate_deg_s", "path"} & present
+    return [ColumnMapping("path", section), *mapping] if lacks else mapping
 
 
 def time_doubt(laid: Sheet, mapped: Iterable[ColumnMapping]) -> Doubt | None:
@@ -287,26 +289,26 @@ def time_doubt(laid: Sheet, mapped: Iterable[ColumnMapping]) -> Doubt | None:
     return find_time_doubt(time_s, np.column_stack(angles)) if len(time_s) else None
 
 
-def _with_time(found: list[ColumnMapping], laid: Sheet) -> list[ColumnMapping]:
+def _with_time(mapping: list[ColumnMapping], laid: Sheet) -> list[ColumnMapping]:
     """The mapping in which a time that cannot be in s has the unit that fits."""
-    doubt = time_doubt(laid, found)
-    return [replace(m, unit=doubt[1]) if doubt and m.name == "t_s" else m for m in found]
+    doubt = time_doubt(laid, mapping)
+    return [replace(m, unit=doubt[1]) if doubt and m.name == "t_s" else m for m in mapping]
 
 
-def _with_scatter(found: list[ColumnMapping]) -> list[ColumnMapping]:
+def _with_scatter(mapping: list[ColumnMapping]) -> list[ColumnMapping]:
     """The mapping in which a standard deviation has its output's unit."""
-    units = {m.name.replace("_v", "_std_v"): m.unit for m in found if m.name in KINDS["poses"].outputs}
-    return [replace(m, unit=m.unit or units.get(m.name, "")) for m in found]
+    units = {m.name.replace("_v", "_std_v"): m.unit for m in mapping if m.name in KINDS["poses"].outputs}
+    return [replace(m, unit=m.unit or units.get(m.name, "")) for m in mapping]
 
 
-def _with_gravity(found: list[ColumnMapping], values: Mapping[str, Array]) -> list[ColumnMapping]:
+def _with_gravity(mapping: list[ColumnMapping], values: Mapping[str, Array]) -> list[ColumnMapping]:
     """The mapping in which axes have the unit that gives 1 g, else counts; axes of a magnetometer uT, where it fits."""
     for names, unit_of_all in ((KINDS["positions"].outputs, gravity_unit), (KINDS["fields"].outputs, field_unit)):
-        axes = {m.name: m.theirs for m in found if m.name in names and not m.unit and m.theirs in values}
+        axes = {m.name: m.theirs for m in mapping if m.name in names and not m.unit and m.theirs in values}
         if len(axes) == len(AXES):
             unit = unit_of_all(np.column_stack([values[theirs] for theirs in axes.values()]))
-            found = [replace(m, unit=unit) if m.name in axes else m for m in found]
-    return found
+            mapping = [replace(m, unit=unit) if m.name in axes else m for m in mapping]
+    return mapping
 
 
 # The import that may be meant, which has been tried: the tail of a message about a column that is missing.
@@ -339,7 +341,7 @@ def suggest_import(
 ) -> str:
     """The end of an error message: a likely import command. `import_sheet` raises DataError."""
     kinds = [kind] if kind else likely_kinds(laid, mapped)
-    attempts = [_attempt(laid, each, mapped, constants, take) for each in kinds]
+    attempts = [_attempt(laid, likely, mapped, constants, take) for likely in kinds]
     return _suggestion(laid, next((a for a in attempts if not a.refused), attempts[0]))
 
 
@@ -349,21 +351,21 @@ def _attempt(
     columns = tuple(propose_mapping(laid, kind, mapped))
     if lacking := missing_columns(kind, laid, columns):
         return Attempt(kind, columns, constants, tuple(lacking))
-    known, unknown = dict(constants), []
+    merged, unknown = dict(constants), []
     while True:
         try:
-            table = average_raw_log(take(kind, columns, known))
+            table = average_raw_log(take(kind, columns, merged))
             why = _objection(table, laid)
         except MissingConstant as error:
-            if error.name in known:
+            if error.name in merged:
                 why = str(error)
             else:
-                known[error.name] = error.likely or EXAMPLES[error.name][0]
+                merged[error.name] = error.likely or EXAMPLES[error.name][0]
                 unknown += [] if error.likely else [error.name]
                 continue
         except DataError as error:
             why = str(error)
-        return Attempt(kind, columns, known, (), tuple(unknown), why)
+        return Attempt(kind, columns, merged, (), tuple(unknown), why)
 
 
 def _objection(table: Table, laid: Sheet) -> str:
@@ -382,8 +384,8 @@ def _suggestion(laid: Sheet, tried: Attempt) -> str:
         theirs = "such as vx_v=Vout:mV" if laid.named else "by its number, such as vx_v=2:mV"
         return f"; name a column with --column, {theirs}"
     columns = [*tried.columns, *(ColumnMapping(name, PLACEHOLDER) for name in tried.lacking)]
-    said = {k: PLACEHOLDER if k in tried.unknown else v for k, v in tried.constants.items()}
-    words = [f"{key}={value:.15g}" if isinstance(value, float) else f"{key}={value}" for key, value in said.items()]
+    stated = {k: PLACEHOLDER if k in tried.unknown else v for k, v in tried.constants.items()}
+    words = [f"{key}={value:.15g}" if isinstance(value, float) else f"{key}={value}" for key, value in stated.items()]
     line = f"\n\n    {import_command(laid, tried.kind, columns, words)}\n"
     if tried.refused:
         return f"\nThe most likely import fails: {tried.refused}{line}"

@@ -310,10 +310,10 @@ def _inflations(log: Table, axes: list[str], bounds: list[tuple[int, int]]) -> d
     length = int(np.quantile([b - a for a, b in bounds], 0.1))
     starts = [a for a, b in bounds if b - a >= length][:: 1 + len(bounds) // MOST_BLOCKS]
     blocks = np.stack([np.column_stack([log.columns[name][a : a + length] for name in axes]) for a in starts])
-    found = zip(axes, *measured_inflation(blocks), strict=True)
+    inflations = zip(axes, *measured_inflation(blocks), strict=True)
     return {
         f"noise_inflation_{name[1]}": float(factor)
-        for name, factor, std in found
+        for name, factor, std in inflations
         if std < MOST_UNCERTAIN_INFLATION * factor
     }
 

@@ -30,7 +30,7 @@ def is_session(kind: str | None, columns: Mapping[str, Array], sections: Sequenc
 
 
 def sample_rates(
-    columns: Mapping[str, Array], sections: Sequence[str], known: Mapping[str, Constant], source: str
+    columns: Mapping[str, Array], sections: Sequence[str], constants: Mapping[str, Constant], source: str
 ) -> Array:
     """The mean rate of each sample's section, deg/s, shape (n,); 0 at rest. Raises DataError."""
     bounds, outputs = _bounds(sections), np.column_stack([columns[name] for name in OUTPUTS])
@@ -46,7 +46,7 @@ def sample_rates(
     rates = np.zeros(len(outputs))
     for (a, b), size in zip(bounds, away, strict=True):
         if size > LEAST_TURN_SHARE * away.max():
-            rates[a:b] = _turn_deg(known, source) / _length_s(columns, known, (a, b), source)
+            rates[a:b] = _turn_deg(constants, source) / _length_s(columns, constants, (a, b), source)
     return rates
 
 
@@ -77,8 +77,8 @@ def _bounds(sections: Sequence[str]) -> list[tuple[int, int]]:
     return list(zip([0, *ends[:-1]], ends, strict=True))
 
 
-def _turn_deg(known: Mapping[str, Constant], source: str) -> float:
-    turn = known.get("turn_deg")
+def _turn_deg(constants: Mapping[str, Constant], source: str) -> float:
+    turn = constants.get("turn_deg")
     if not isinstance(turn, (int, float)) or not turn:
         raise MissingConstant(
             f"{source}: the angle of each turn is unknown; give the constant turn_deg, "
@@ -89,13 +89,13 @@ def _turn_deg(known: Mapping[str, Constant], source: str) -> float:
 
 
 def _length_s(
-    columns: Mapping[str, Array], known: Mapping[str, Constant], bound: tuple[int, int], source: str
+    columns: Mapping[str, Array], constants: Mapping[str, Constant], bound: tuple[int, int], source: str
 ) -> float:
     """Duration of a section: number of samples times sample interval. Raises MissingConstant without times and sample
     rate.
     """
     a, b = bound
-    rate_hz = known.get("sample_rate_hz")
+    rate_hz = constants.get("sample_rate_hz")
     if isinstance(rate_hz, (int, float)) and rate_hz > 0:
         return (b - a) / float(rate_hz)
     if "t_s" in columns and b - a > 1 and columns["t_s"][b - 1] > columns["t_s"][a]:

@@ -249,19 +249,21 @@ def _units(header: Sequence[str], rows: list[Row], named: bool) -> tuple[list[Ro
     units = [split_unit(name)[1] for name in header]
     if named and rows and len(rows[0][1]) >= len(header) and _is_units(rows[0][1]):
         below = map(parse_unit, rows[0][1])
-        return rows[1:], [unit or other for unit, other in zip(units, below, strict=False)]
+        return rows[1:], [unit or unit_below for unit, unit_below in zip(units, below, strict=False)]
     return rows, units
 
 
 def _is_units(cells: Sequence[str]) -> bool:
     """Whether cells hold no numbers, and most of the filled ones are units."""
-    said = [cell for cell in cells if cell not in NO_UNIT]
-    return bool(said) and not any(map(is_number, said)) and 2 * sum(map(bool, map(parse_unit, said))) >= len(said)
+    filled = [cell for cell in cells if cell not in NO_UNIT]
+    return (
+        bool(filled) and not any(map(is_number, filled)) and 2 * sum(map(bool, map(parse_unit, filled))) >= len(filled)
+    )
 
 
 def _another_width(name: str, line: int, cells: Sequence[str], header: Sequence[str]) -> str:
-    found = f"{len(cells)} values for {len(header)} columns{_names(header)}"
-    return f"{name}, line {line}: {found}; correct this line or remove it"
+    count = f"{len(cells)} values for {len(header)} columns{_names(header)}"
+    return f"{name}, line {line}: {count}; correct this line or remove it"
 
 
 def _names(header: Sequence[str], form: str = " ({})") -> str:
@@ -288,9 +290,9 @@ def read_cells(
     if not texts and (numbers := _at_once(sheet)) is not None:
         return dict(zip(sheet.header, numbers.T, strict=True)), {}
     bad = BadLines(sheet.name, sheet.skipped)
-    found = _one_by_one(sheet, texts, bad)
+    columns = _one_by_one(sheet, texts, bad)
     bad.end(tell)
-    return found
+    return columns
 
 
 def _in_memory(
@@ -321,11 +323,11 @@ def _at_once(sheet: Sheet) -> Array | None:
     with sheet.source.lines() as lines:
         for _ in range(sheet.first - 1):
             next(lines)
-        given = (line.replace(",", ".") for line in lines) if comma else lines
+        numeric = (line.replace(",", ".") for line in lines) if comma else lines
         try:
-            first = next(given)  # numpy warns of an iterator without any
+            first = next(numeric)  # numpy warns of an iterator without any
             numbers = np.loadtxt(
-                chain([first], given), delimiter=sheet.separator, ndmin=2, comments=None, quotechar='"'
+                chain([first], numeric), delimiter=sheet.separator, ndmin=2, comments=None, quotechar='"'
             )
         except UnicodeError:
             if sheet.skipped:
@@ -341,16 +343,16 @@ def _one_by_one(
 ) -> tuple[Mapping[str, Array], Mapping[str, tuple[str, ...]]]:
     numbers = {name: array("d") for name in sheet.header if name not in texts}
     words: dict[str, list[str]] = {name: [] for name in sheet.header if name in texts}
-    wanted = [(k, numbers[name]) for k, name in enumerate(sheet.header) if name in numbers]
+    numeric = [(k, numbers[name]) for k, name in enumerate(sheet.header) if name in numbers]
     for row in sheet.rows(bad):
         try:
-            values = [_number(sheet, row, k) for k, _ in wanted]
+            values = [_number(sheet, row, k) for k, _ in numeric]
         except DataError as error:
             again = tuple(row[1][: len(sheet.header)]) == sheet.header
             bad.add(row[0], "the header again" if again else _wrong(sheet, row), str(error))
             continue
         bad.good += 1
-        for (_, column), value in zip(wanted, values, strict=True):
+        for (_, column), value in zip(numeric, values, strict=True):
             column.append(value)
         for k, name in enumerate(sheet.header):
             if name in words:
@@ -373,10 +375,10 @@ def _number(sheet: Sheet, row: Row, k: int) -> float:
     try:
         value = parse_number(cells[k])
     except ValueError:
-        what = f'"{cells[k]}" where a number belongs' if cells[k] else "empty where a number belongs"
+        reason = f'"{cells[k]}" where a number belongs' if cells[k] else "empty where a number belongs"
     else:
         if isfinite(value):
             return value
-        what = f'"{cells[k]}" is not a finite number'
+        reason = f'"{cells[k]}" is not a finite number'
     where = f'{sheet.name}, line {line}, column "{sheet.header[k]}"'
-    raise DataError(f"{where}: {what}; correct the cell or remove the row")
+    raise DataError(f"{where}: {reason}; correct the cell or remove the row")

@@ -68,25 +68,25 @@ class Topic:
         return f"{self.name} ({self.rows} rows: {names})"
 
 
-def topic_sheet(path: Path, topics: Sequence[Topic], wanted: str | None) -> Sheet:
-    """The sheet of the topic `wanted`, or of the only one that holds an accelerometer, else a magnetometer, else a
+def topic_sheet(path: Path, topics: Sequence[Topic], name: str | None) -> Sheet:
+    """The sheet of the topic `name`, or of the only one that holds an accelerometer, else a magnetometer, else a
     gyroscope.
 
     Raises SeveralTopics where a person has to choose, DataError for a topic that does not exist or cannot be read.
     """
     if not topics:
         raise DataError(f"{path}: has no table of two or more rows of numbers; export the measurements again")
-    topic = _chosen(path, topics, wanted)
+    topic = _chosen(path, topics, name)
     if topic.refusal:
         raise DataError(f"{path}, topic {topic.name}: {topic.refusal}")
-    others = [t for t in topics if t is not topic]
+    unread = [t for t in topics if t is not topic]
     notes = topic.notes
-    if others and wanted is None:
+    if unread and name is None:
         notes = (
-            f"{path}: reading {topic.name}; choose another with --topic: {_listed(t.name for t in others)}",
+            f"{path}: reading {topic.name}; choose another with --topic: {_listed(t.name for t in unread)}",
             *notes,
         )
-    chosen = topic.name if others else ""
+    chosen = topic.name if unread else ""
     if topic.text is not None:
         sheet = read_sheet(text_source(topic.text(), str(path))).of_topic(chosen, notes)
         return replace(sheet, topics=tuple(t.name for t in topics))
@@ -102,27 +102,28 @@ def column_sheet(
     """Columns in memory as a sheet. Columns without any finite number are left out. Raises DataError without a
     column of numbers.
     """
-    kept = {k: v for k, v in cells.items() if isinstance(v, tuple) or bool(np.isfinite(v).any())}
-    if all(isinstance(v, tuple) for v in kept.values()):
+    columns = {k: v for k, v in cells.items() if isinstance(v, tuple) or bool(np.isfinite(v).any())}
+    if all(isinstance(v, tuple) for v in columns.values()):
         place = f"{name}, topic {topic}" if topic else name
         raise DataError(f"{place}: has no numbers; choose a file or a topic with columns of measurements")
-    sample = tuple(zip(*(_head(v) for v in kept.values()), strict=False))
-    header = tuple(kept)
-    named = not all(each.isdigit() for each in header)
+    sample = tuple(zip(*(_head(v) for v in columns.values()), strict=False))
+    header = tuple(columns)
+    named = not all(column.isdigit() for column in header)
+    units = tuple(split_unit(column)[1] for column in header)
     return Sheet(
-        Source(name, _no_text), None, header, tuple(split_unit(each)[1] for each in header), named, len(header), 1, 1,
-        sample, dict(constants), kept, topic, notes,
+        Source(name, _no_text), None, header, units, named, len(header), 1, 1, sample, dict(constants), columns,
+        topic, notes,
     )  # fmt: skip
 
 
-def library(module: str, extra: str, path: Path, what: str) -> Any:
+def library(module: str, extra: str, path: Path, description: str) -> Any:
     """An optional library, imported. Raises DataError that names it and the extra that brings it."""
     try:
         return import_module(module)
     except ImportError:
         package = module.partition(".")[0]
         raise DataError(
-            f"{path}: is {what}; the library {package} that reads it is not installed. Install it with\n\n"
+            f"{path}: is {description}; the library {package} that reads it is not installed. Install it with\n\n"
             f"    pip install 'inertial-rig[{extra}]'\n"
         ) from None
 
@@ -142,16 +143,16 @@ def require_size(path: Path, unpacked: int) -> None:
         )
 
 
-def _chosen(path: Path, topics: Sequence[Topic], wanted: str | None) -> Topic:
+def _chosen(path: Path, topics: Sequence[Topic], name: str | None) -> Topic:
     names = [t.name for t in topics]
-    if wanted is not None:
-        if wanted not in names:
-            raise DataError(f'{path}: there is no topic "{wanted}"{nearest(wanted, names)}')
-        return topics[names.index(wanted)]
+    if name is not None:
+        if name not in names:
+            raise DataError(f'{path}: there is no topic "{name}"{nearest(name, names)}')
+        return topics[names.index(name)]
     if len(topics) == 1:
         return topics[0]
     able = [t for t in topics if not t.refusal and t.rows > 1]
-    best = [t for t in able if t.rank == min(each.rank for each in able)]
+    best = [t for t in able if t.rank == min(candidate.rank for candidate in able)]
     proposed = best[0].name if best and best[0].rank < 3 else ""
     if len(best) == 1:
         return best[0]

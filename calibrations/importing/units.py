@@ -47,11 +47,11 @@ def parse_unit(text: str) -> str:
 
 def split_unit(header: str) -> tuple[str, str]:
     """`Vx (mV)`, `Vx [mV]` or `Vx / mV` as ("Vx", "mV"); (header, "") for a header without a unit."""
-    found = _IN_NAME.match(header)
-    if found and found["name"]:
-        unit = parse_unit(found["round"] or found["square"] or found["slash"] or "")
+    match = _IN_NAME.match(header)
+    if match and match["name"]:
+        unit = parse_unit(match["round"] or match["square"] or match["slash"] or "")
         if unit:
-            return found["name"].strip(), unit
+            return match["name"].strip(), unit
     return header, ""
 
 
@@ -76,10 +76,10 @@ class ColumnMapping:
     @staticmethod
     def parse(text: str) -> ColumnMapping:
         """Parse `vx_v=Vout:mV` or `vx_v=Vout`. Raises DataError."""
-        name, equals, rest = text.partition("=")
-        bare, _, last = rest.rpartition(":")
+        name, equals, source = text.partition("=")
+        bare, _, last = source.rpartition(":")
         unit = parse_unit(last) if bare else ""
-        theirs = bare if unit else rest
-        if not equals or not name.strip() or not theirs.strip() or (not bare and ":" in rest and parse_unit(last)):
+        theirs = bare if unit else source
+        if not equals or not name.strip() or not theirs.strip() or (not bare and ":" in source and parse_unit(last)):
             raise DataError(f'"{text}": write a column as NAME=THEIRS or NAME=THEIRS:UNIT, such as vx_v=Vout:mV')
         return ColumnMapping(name.strip(), theirs.strip(), unit)

@@ -76,7 +76,8 @@ class Noise:
     def known_slow(self) -> Array:
         """That of the slow noise known beforehand, about its mean over these rows."""
         return np.array(
-            [_about_mean(each, float(np.sum(self.gap_s))) for each in self.given] or [0.0] * len(self.ratio)
+            [_about_mean(channel_processes, float(np.sum(self.gap_s))) for channel_processes in self.given]
+            or [0.0] * len(self.ratio)
         )
 
     @property
@@ -89,10 +90,10 @@ class Noise:
         """Degrees of freedom with which the noise is known: few where it is slow, as a record holds few long times."""
         return SLOW_FREEDOM if np.any(self.slow > 0.1 * rms(self.fast)) else float(self.white.size)
 
-    def is_like(self, other: Noise) -> bool:
+    def is_like(self, noise: Noise) -> bool:
         """Whether both weigh the rows alike, scatter within 1 % of the noise."""
-        same = np.array_equal(self.ratio, other.ratio) and self.taus_s == other.taus_s
-        return same and bool(np.all(np.abs(rms(self.fast) / rms(other.fast) - 1) < 1e-2))
+        same = np.array_equal(self.ratio, noise.ratio) and self.taus_s == noise.taus_s
+        return same and bool(np.all(np.abs(rms(self.fast) / rms(noise.fast) - 1) < 1e-2))
 
     def prolonged(self) -> Noise:
         """Flicker noise goes on at times longer than a record: with time constants up to BEYOND times its length.
@@ -113,8 +114,8 @@ class Noise:
         return np.concatenate([self._whiten_channel(c, columns[c])[0] for c in range(len(columns))])
 
     def _whiten_channel(self, c: int, columns: Array) -> tuple[Array, float]:
-        given = self.given[c] if self.given else ()
-        return correlated(columns, self.gap_s, self.fast[c], float(self.slow[c]), self.taus_s[c], given)
+        known_processes = self.given[c] if self.given else ()
+        return correlated(columns, self.gap_s, self.fast[c], float(self.slow[c]), self.taus_s[c], known_processes)
 
     @cached_property
     def logdet(self) -> float:
@@ -124,18 +125,18 @@ class Noise:
 
 
 def correlated(
-    columns: Array, gap_s: Array, fast: Array, slow: float, taus_s: tuple[float, ...], given: Processes = ()
+    columns: Array, gap_s: Array, fast: Array, slow: float, taus_s: tuple[float, ...], known: Processes = ()
 ) -> tuple[Array, float]:
     """Columns (n, k) of one channel made white, and log det Sigma."""
-    stds, times_s = (np.array(values) for values in zip(*processes(slow, taus_s, given), strict=True))
+    stds, times_s = (np.array(values) for values in zip(*processes(slow, taus_s, known), strict=True))
     out, logdet = whiten(np.ascontiguousarray(columns), gap_s, fast, stds, times_s)
     return out, float(logdet)
 
 
-def processes(slow: float, taus_s: tuple[float, ...], given: Processes = ()) -> Processes:
+def processes(slow: float, taus_s: tuple[float, ...], known: Processes = ()) -> Processes:
     """Those that make up slow noise of a standard deviation, evenly shared, and those that are given."""
     std = slow / len(taus_s) ** 0.5
-    return (*((std, tau_s) for tau_s in taus_s if slow or not given), *given)
+    return (*((std, tau_s) for tau_s in taus_s if slow or not known), *known)
 
 
 def _about_mean(processes: Processes, span_s: float) -> float:
@@ -151,12 +152,12 @@ def rms(x: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(x * x, axis=-1)))
 
 
-def white_only(white: Array | None, gap_s: Array, channels: int, given: tuple[Processes, ...] = ()) -> Noise:
+def white_only(white: Array | None, gap_s: Array, channels: int, known: tuple[Processes, ...] = ()) -> Noise:
     """The noise before anything is fitted."""
     ones = np.ones(channels)
     if white is None:
-        return Noise(np.zeros((channels, len(gap_s))), gap_s, ones, 0 * ones, ((1.0,),) * channels, given)
-    return Noise(white, gap_s, 0 * ones, 0 * ones, ((1.0,),) * channels, given)
+        return Noise(np.zeros((channels, len(gap_s))), gap_s, ones, 0 * ones, ((1.0,),) * channels, known)
+    return Noise(white, gap_s, 0 * ones, 0 * ones, ((1.0,),) * channels, known)
 
 
 WINDOW = 6.0  # lags summed, at least, and in correlation times: exp(-6) of an exponential's sum is left out
@@ -226,8 +227,8 @@ def measured_inflation(blocks: Array) -> tuple[Array, Array]:
     NaN for a channel without noise, and where the correlation lasts too long for blocks of n samples.
     """
     covariance = _autocovariance(blocks)
-    found = [_summed(c, blocks.shape[1]) for c in covariance.T]
-    factor, lags = (np.array(each) for each in zip(*found, strict=True))
+    sums = [_summed(c, blocks.shape[1]) for c in covariance.T]
+    factor, lags = (np.array(values) for values in zip(*sums, strict=True))
     return factor, factor * np.sqrt(2 * (2 * lags + 1) / (blocks.shape[0] * blocks.shape[1]))
 
 

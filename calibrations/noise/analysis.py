@@ -149,13 +149,13 @@ class ChannelNoise:
 
     def _estimates(self, effect: Effect) -> list[Estimate]:
         """Of an effect's parameters in this channel, as every command shows them; none for an effect not in the fit."""
-        return [each for each in self.search.end.model.estimates(effect.name) if each.axis == self.axis]
+        return [estimate for estimate in self.search.end.model.estimates(effect.name) if estimate.axis == self.axis]
 
     def _beside(self, effect: Effect) -> list[Effect]:
         """The other processes of the fit, and those that may be present beside any."""
         slow = [self.search.effects[name] for name in SLOW if name in self.search.effects]
-        others = (*self.fit.effects, *(each for each in slow if each not in self.fit.effects))
-        return [each for each in others if each is not effect]
+        processes = (*self.fit.effects, *(process for process in slow if process not in self.fit.effects))
+        return [process for process in processes if process is not effect]
 
     def _sinusoid(self, unit: str) -> Coefficient:
         if not self.lines:
@@ -197,8 +197,10 @@ class NoiseAnalysis(Result):
 
     def records(self) -> list[Document]:
         """A row a process of each channel."""
-        processes = [(axis, each) for axis, noise in self.channels.items() for each in noise.coefficients.items()]
-        return [{"axis": axis, "process": name, **_coefficient(each)} for axis, (name, each) in processes]
+        processes = [
+            (axis, coefficient) for axis, noise in self.channels.items() for coefficient in noise.coefficients.items()
+        ]
+        return [{"axis": axis, "process": name, **_coefficient(coefficient)} for axis, (name, coefficient) in processes]
 
     def plot(self) -> Figure:
         """The Allan deviation of the first channel."""
@@ -216,7 +218,7 @@ class NoiseAnalysis(Result):
     def spoils(self, disturbance: Disturbance) -> tuple[str, ...]:
         """The coefficients that a disturbance changes, or would change had it not been removed."""
         after = self.channels[disturbance.axis].coefficients
-        identified = tuple(name for name, each in after.items() if each.identified)
+        identified = tuple(name for name, coefficient in after.items() if coefficient.identified)
         if disturbance.pattern is not None and self.uncleaned is not None:
             before = self.uncleaned[disturbance.axis].coefficients
             return tuple(name for name in after if _differ(before[name], after[name]))
@@ -230,9 +232,9 @@ def analyse(still: Still) -> NoiseAnalysis:
     return NoiseAnalysis(still, search(still, read_model(MODEL), catalogue()))
 
 
-def _channels(record: Still, found: Search) -> dict[str, ChannelNoise]:
+def _channels(record: Still, search: Search) -> dict[str, ChannelNoise]:
     return {
-        fit.channel.axis: ChannelNoise(found, fit, record.deviations[fit.channel.axis]) for fit in found.end.channels
+        fit.channel.axis: ChannelNoise(search, fit, record.deviations[fit.channel.axis]) for fit in search.end.channels
     }
 
 
@@ -258,7 +260,7 @@ def noise_document(analysis: NoiseAnalysis) -> Document:
     intervals of 95 %; `spectrum` is two-sided, without lines. `coefficients` are those without the disturbances that
     could be removed; `coefficients_without` repeats them where one was. `channels` has all channels by axis.
     """
-    channels = {axis: _channel(each) for axis, each in analysis.channels.items()}
+    channels = {axis: _channel(channel) for axis, channel in analysis.channels.items()}
     first = next(iter(channels.values()))
     return {
         "schema": "rig.noise/1",
@@ -267,7 +269,8 @@ def noise_document(analysis: NoiseAnalysis) -> Document:
         "unit": analysis.record.unit,
         **first,
         "disturbances": [
-            disturbance_document(each) | {"spoils": list(analysis.spoils(each))} for each in analysis.disturbances
+            disturbance_document(disturbance) | {"spoils": list(analysis.spoils(disturbance))}
+            for disturbance in analysis.disturbances
         ],
         "coefficients_without": first["coefficients"] if analysis.search.patterns else None,
         "channels": channels,
@@ -286,7 +289,7 @@ def _channel(noise: ChannelNoise) -> Document:
         "deviations": {kind: _curve(noise.deviations[kind]) for kind in OCTAVE_KINDS if kind != OVERLAPPING},
         "spectrum": {name: values[order].tolist() for name, values in bands.items()} | {"unit": f"({noise.unit})^2/Hz"},
         "lines": [{"frequency_hz": line.frequency_hz, "amplitude": line.amplitude} for line in noise.lines],
-        "coefficients": {name: _coefficient(each) for name, each in noise.coefficients.items()},
+        "coefficients": {name: _coefficient(coefficient) for name, coefficient in noise.coefficients.items()},
     }
 
 
@@ -297,6 +300,6 @@ def _curve(curve: Curve) -> dict[str, list[float]]:
 
 def _coefficient(coefficient: Coefficient) -> Document:
     """Value, uncertainty, unit, whether it is identified; and those of the other fields that it has."""
-    given = {name: value for name, value in asdict(coefficient).items() if value is not None}
-    unknown = {name: None for name in ("std", "upper") if np.isinf(given.get(name, 0.0))}
-    return {**given, **unknown, "alternatives": list(coefficient.alternatives), "identified": coefficient.identified}
+    fields = {name: value for name, value in asdict(coefficient).items() if value is not None}
+    unknown = {name: None for name in ("std", "upper") if np.isinf(fields.get(name, 0.0))}
+    return {**fields, **unknown, "alternatives": list(coefficient.alternatives), "identified": coefficient.identified}

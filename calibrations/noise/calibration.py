@@ -34,10 +34,10 @@ class Calibration:
     after: Search
     containing: Mapping[str, tuple[str, ...]]  # by effect, those that it contains
 
-    def steps(self, baseline: NoiseFit, others: tuple[Pattern, ...]) -> tuple[Step[NoiseFit], ...]:
-        """A step for each term, on the record without the `others`, patterns that the temperature does not make."""
-        whole = without_patterns(self.start.still, others)
-        fits = [baseline, *(fit(with_terms(self.start.model, terms), whole) for terms in self.signal.steps)]
+    def steps(self, baseline: NoiseFit, patterns: tuple[Pattern, ...]) -> tuple[Step[NoiseFit], ...]:
+        """A step for each term, on the record without `patterns`, which the temperature does not make."""
+        still = without_patterns(self.start.still, patterns)
+        fits = [baseline, *(fit(with_terms(self.start.model, terms), still) for terms in self.signal.steps)]
         return tuple(Step(name, *pair) for name, pair in zip(self.signal.names, pairwise(fits), strict=True))
 
     def candidates(self, steps: tuple[Step[NoiseFit], ...]) -> tuple[Candidate, ...]:
@@ -60,35 +60,37 @@ class Calibration:
     def alternatives(self) -> dict[str, tuple[str, ...]]:
         """By cause, what the record cannot separate from it."""
         names = self.signal.names
-        rivals = {CAUSES.get((r.kind, r.cause)) for each in self.patterns for r in each.rivals}
-        given = self.signal.found.alternatives
-        found = {  # a wider effect whose further shape vanishes is no other cause
-            name: tuple(r for r in given.get(name, ()) if name not in self.containing.get(r, ()))
+        rivals = {CAUSES.get((r.kind, r.cause)) for pattern in self.patterns for r in pattern.rivals}
+        by_search = self.signal.found.alternatives
+        by_cause = {  # a wider effect whose further shape vanishes is no other cause
+            name: tuple(r for r in by_search.get(name, ()) if name not in self.containing.get(r, ()))
             for name in self.signal.causes
         }
         first = self.signal.causes[0]
-        found[first] = tuple(dict.fromkeys([*found[first], *sorted(filter(None, rivals - set(names)))]))
-        return {name: others for name, others in found.items() if others}
+        by_cause[first] = tuple(dict.fromkeys([*by_cause[first], *sorted(filter(None, rivals - set(names)))]))
+        return {name: names_of_rivals for name, names_of_rivals in by_cause.items() if names_of_rivals}
 
     @property
     def separations(self) -> Mapping[str, Experiment]:
         """By cause in doubt, the experiment that separates it from what it may be."""
-        doubtful = next((each for each in self.patterns if each.rivals), None)
+        doubtful = next((pattern for pattern in self.patterns if pattern.rivals), None)
         experiment = experiment_for_pattern(doubtful, self.start.still.length_s) if doubtful else None
         return {self.signal.causes[0]: experiment} if experiment and self.alternatives else {}
 
 
-def calibrated(found: Search, start: NoiseFit, effects: Mapping[str, Effect]) -> Calibration | None:
-    """The record of `found` without what the temperature does; None where it does nothing beyond the model."""
-    given = signal_terms(start.model)
-    warm = tuple(each for each in found.patterns if each.kind == FOLLOWS and each.cause == TEMPERATURE)
-    if not (warm or given):
+def calibrated(search_before: Search, start: NoiseFit, effects: Mapping[str, Effect]) -> Calibration | None:
+    """What the temperature does to the record of `search_before`; None where it does nothing beyond the model."""
+    own = signal_terms(start.model)
+    warm = tuple(
+        pattern for pattern in search_before.patterns if pattern.kind == FOLLOWS and pattern.cause == TEMPERATURE
+    )
+    if not (warm or own):
         return None
-    others = () if given else tuple(each for each in found.patterns if each not in warm)
-    whole = without_patterns(start.still, others)
-    lag_s = max(warm, key=lambda each: each.gain).lag_s if warm else 0.0
-    signal = search_signal(whole, effects, lag_s, given)
-    signal = _needed(signal, start.model, whole, effects) if signal.steps else signal
+    unrelated = () if own else tuple(pattern for pattern in search_before.patterns if pattern not in warm)
+    still = without_patterns(start.still, unrelated)
+    lag_s = max(warm, key=lambda pattern: pattern.gain).lag_s if warm else 0.0
+    signal = search_signal(still, effects, lag_s, own)
+    signal = _needed(signal, start.model, still, effects) if signal.steps else signal
     if not signal.names:
         return None
     model = with_terms(start.model, signal.steps[-1])
@@ -104,7 +106,7 @@ def _needed(signal: SignalSearch, model: Model, still: Still, effects: Mapping[s
         smaller = [signal.without(name, effects, still)]
         if PLACE not in (*signal.names, *signal.given):  # branches of any form may hold a straight line
             smaller.append(signal.with_line(name, effects, still))
-        signal = max((signal, *smaller), key=lambda each: _worth(each, model, still))
+        signal = max((signal, *smaller), key=lambda candidate: _worth(candidate, model, still))
     return signal
 
 

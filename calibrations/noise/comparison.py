@@ -110,33 +110,33 @@ class DeviationComparison:
         return float(np.sqrt(np.average(square, weights=self.edf)))
 
 
-def compare_deviations(found: ChannelFit, curve: Curve) -> DeviationComparison:
+def compare_deviations(fit: ChannelFit, curve: Curve) -> DeviationComparison:
     """The measured curve beside the model's. A variance is distributed as chi-square over its degrees of freedom."""
-    judged = curve.tau_s >= (FILTER_PERIODS / found.channel.corner_hz if np.isfinite(found.channel.corner_hz) else 0.0)
+    judged = curve.tau_s >= (FILTER_PERIODS / fit.channel.corner_hz if np.isfinite(fit.channel.corner_hz) else 0.0)
     tau_s, measured, edf = curve.tau_s[judged], curve.deviation[judged], curve.edf[judged]
-    modelled = deviation(found, tau_s)
+    modelled = deviation(fit, tau_s)
     scaled = edf * (measured / modelled) ** 2
     chance = np.minimum(1.0, 2 * np.minimum(chdtr(edf, scaled), chdtrc(edf, scaled)))
     return DeviationComparison(tau_s, measured, curve.low[judged], curve.high[judged], modelled, edf, chance)
 
 
-def deviation(found: ChannelFit, tau_s: Array) -> Array:
+def deviation(fit: ChannelFit, tau_s: Array) -> Array:
     """Of all effects and lines, shape of `tau_s`."""
-    total = sum(variance_parts(found, tau_s).values(), np.zeros(len(tau_s)))
+    total = sum(variance_parts(fit, tau_s).values(), np.zeros(len(tau_s)))
     return np.asarray(np.sqrt(np.maximum(total, np.finfo(float).tiny)))
 
 
-def variance_parts(found: ChannelFit, tau_s: Array) -> dict[str, Array]:
+def variance_parts(fit: ChannelFit, tau_s: Array) -> dict[str, Array]:
     """The variance that each effect makes at averaging times (k,), which are taken to whole samples."""
-    rate_hz, steps = found.channel.rate_hz, steps_of(tau_s, found.channel.rate_hz)
-    asked = [quadrature(m, rate_hz, found.channel.corner_hz) for m in steps]
-    each = {
-        effect.name: np.array([w @ effect_spectrum(effect, (at,), found.values[effect.name]) for at, w in asked])
-        for effect in found.effects
+    rate_hz, steps = fit.channel.rate_hz, steps_of(tau_s, fit.channel.rate_hz)
+    quadratures = [quadrature(m, rate_hz, fit.channel.corner_hz) for m in steps]
+    parts = {
+        effect.name: np.array([w @ effect_spectrum(effect, (at,), fit.values[effect.name]) for at, w in quadratures])
+        for effect in fit.effects
     }
-    for line in found.lines:
-        each[f"{line.frequency_hz:.4g} Hz"] = line.amplitude**2 * line_variance(line.frequency_hz / rate_hz, steps)
-    return each
+    for line in fit.lines:
+        parts[f"{line.frequency_hz:.4g} Hz"] = line.amplitude**2 * line_variance(line.frequency_hz / rate_hz, steps)
+    return parts
 
 
 LENGTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96)  # bands to a stretch
@@ -170,14 +170,14 @@ class Stretch:
         )
 
 
-def stretches(found: ChannelFit, most: int = 3) -> list[Stretch]:
+def stretches(fit: ChannelFit, most: int = 3) -> list[Stretch]:
     """Those that differ most certainly, none of which overlap, surest first; with chances of 1 where none does."""
-    order = np.argsort(found.frequency_hz)
-    f, nu = found.frequency_hz[order], found.freedom[order]
-    power = nu * (found.seen / found.expected)[order]
+    order = np.argsort(fit.frequency_hz)
+    f, nu = fit.frequency_hz[order], fit.freedom[order]
+    power = nu * (fit.seen / fit.expected)[order]
     sums = [np.concatenate([[0.0], np.cumsum(x)]) for x in (nu, power)]
     tried = []
-    for length in (each for each in LENGTHS if each <= len(f)):
+    for length in (size for size in LENGTHS if size <= len(f)):
         freedom, got = (x[length:] - x[:-length] for x in sums)
         chance = 2 * np.minimum(chdtr(freedom, got), chdtrc(freedom, got))
         chance = np.where(np.abs(got / freedom - 1) < NEGLIGIBLE, 1.0, chance)
@@ -185,16 +185,16 @@ def stretches(found: ChannelFit, most: int = 3) -> list[Stretch]:
             (float(p), k, k + length, float(g / n))
             for k, (p, g, n) in enumerate(zip(chance, got, freedom, strict=True))
         ]
-    tried.sort(key=lambda each: (each[0], -abs(np.log(each[3])) * (sums[0][each[2]] - sums[0][each[1]])))
+    tried.sort(key=lambda stretch: (stretch[0], -abs(np.log(stretch[3])) * (sums[0][stretch[2]] - sums[0][stretch[1]])))
     chosen: list[tuple[float, int, int, float]] = []
-    for each in tried:
+    for stretch in tried:
         if len(chosen) == most:
             break
-        if all(each[2] <= other[1] or each[1] >= other[2] for other in chosen):
-            chosen.append(each)
+        if all(stretch[2] <= wider[1] or stretch[1] >= wider[2] for wider in chosen):
+            chosen.append(stretch)
     return [
         Stretch(
-            found.channel.axis, float(f[a]), float(f[b - 1]), ratio,
+            fit.channel.axis, float(f[a]), float(f[b - 1]), ratio,
             float((ratio - 1) * np.sqrt((sums[0][b] - sums[0][a]) / 2)), min(1.0, p * len(tried)),
         )
         for p, a, b, ratio in chosen
@@ -204,10 +204,10 @@ def stretches(found: ChannelFit, most: int = 3) -> list[Stretch]:
 TIME, FREQUENCY = "averaging time", "frequency"
 
 
-def places(found: NoiseFit) -> tuple[Place, ...]:
+def places(fit: NoiseFit) -> tuple[Place, ...]:
     """Where a noise model fails: surest first, times before frequencies of the same channel."""
-    curves = tuple(compare_deviations(each, found.still.allan[each.channel.axis]) for each in found.channels)
-    return tuple(_failures(found, curves))
+    curves = tuple(compare_deviations(channel, fit.still.allan[channel.channel.axis]) for channel in fit.channels)
+    return tuple(_failures(fit, curves))
 
 
 def evaluate(model: Model, still: Still) -> NoiseFit | None:
@@ -217,8 +217,8 @@ def evaluate(model: Model, still: Still) -> NoiseFit | None:
     if not model.params or not all(term.estimates for term in signal):
         return None
     still = without_signal(still, signal)
-    known = {(term.name, e.axis, e.name): e.value for term in terms for e in term.estimates}
-    axes = {axis for _, axis, _ in known}
+    by_key = {(term.name, e.axis, e.name): e.value for term in terms for e in term.estimates}
+    axes = {axis for _, axis, _ in by_key}
     if missing := [channel.axis for channel in still.channels if channel.axis not in axes]:
         raise DataError(
             f"{still.source}: {model.name} has values for the axes {', '.join(sorted(axes))}, and none for "
@@ -228,7 +228,7 @@ def evaluate(model: Model, still: Still) -> NoiseFit | None:
     for channel in still.channels:
         values = {
             term.name: {
-                name: v for (effect, axis, name), v in known.items() if (effect, axis) == (term.name, channel.axis)
+                name: v for (effect, axis, name), v in by_key.items() if (effect, axis) == (term.name, channel.axis)
             }
             for term in terms
         }
@@ -239,24 +239,26 @@ def evaluate(model: Model, still: Still) -> NoiseFit | None:
 
 def _with_values(channel: Channel, lines: tuple[Line, ...], values: dict[str, Values], model: Model) -> ChannelFit:
     effects = tuple(term.effect for term in noise_terms(model) if "spectrum" in term.effect.places)
-    given = tuple(effect for effect in effects if all(p.name in values[effect.name] for p in effect.parameters))
-    return replace(without_effects(channel, lines), effects=given, values={e.name: values[e.name] for e in given})
+    complete = tuple(effect for effect in effects if all(p.name in values[effect.name] for p in effect.parameters))
+    return replace(without_effects(channel, lines), effects=complete, values={e.name: values[e.name] for e in complete})
 
 
-def _failures(found: NoiseFit, curves: tuple[DeviationComparison, ...]) -> list[Place]:
+def _failures(fit: NoiseFit, curves: tuple[DeviationComparison, ...]) -> list[Place]:
     """Surest first, times before frequencies of the same channel."""
     limit = SIGNIFICANT / (2 * len(curves))
-    places = [place for each, curve in zip(found.channels, curves, strict=True) for place in _times(each, curve, limit)]
+    places = [
+        place for channel, curve in zip(fit.channels, curves, strict=True) for place in _times(channel, curve, limit)
+    ]
     places += [
-        Place(FREQUENCY, each.low_hz, each.high_hz, each.axis, abs(each.deviations), each.text)
-        for channel in found.channels
-        for each in stretches(channel)
-        if each.chance < limit
+        Place(FREQUENCY, stretch.low_hz, stretch.high_hz, stretch.axis, abs(stretch.deviations), stretch.text)
+        for channel in fit.channels
+        for stretch in stretches(channel)
+        if stretch.chance < limit
     ]
     return sorted(places, key=lambda place: -place.excess)
 
 
-def _times(found: ChannelFit, curve: DeviationComparison, limit: float) -> list[Place]:
+def _times(fit: ChannelFit, curve: DeviationComparison, limit: float) -> list[Place]:
     """Stretches of neighbouring averaging times that fail on the same side."""
     off = (curve.chance < limit / len(curve.tau_s)) & (np.abs(curve.ratio - 1) > NEGLIGIBLE)
     side = np.where(off, np.sign(curve.ratio - 1), 0).astype(int)
@@ -267,13 +269,13 @@ def _times(found: ChannelFit, curve: DeviationComparison, limit: float) -> list[
             worst = max(rows, key=lambda k: abs(float(curve.deviations[k])))
             excess = float(np.sqrt(np.mean(curve.deviations[rows] ** 2)))
             low, high = float(curve.tau_s[rows[0]]), float(curve.tau_s[rows[-1]])
-            places.append(Place(TIME, low, high, found.channel.axis, excess, _text(found, curve, low, high, worst)))
+            places.append(Place(TIME, low, high, fit.channel.axis, excess, _text(fit, curve, low, high, worst)))
     return places
 
 
-def _text(found: ChannelFit, curve: DeviationComparison, low: float, high: float, worst: int) -> str:
+def _text(fit: ChannelFit, curve: DeviationComparison, low: float, high: float, worst: int) -> str:
     span = f"{low:.4g} s" if low == high else f"{low:.4g} to {high:.4g} s"
-    unit, axis = found.channel.unit, found.channel.axis
+    unit, axis = fit.channel.unit, fit.channel.axis
     return (
         f"averaging times of {span}: the Allan deviation of {axis} is {curve.ratio[worst]:.3g} x that of the model at "
         f"{curve.tau_s[worst]:.4g} s ({curve.measured[worst]:.3g} {unit} for {curve.modelled[worst]:.3g}), "
@@ -310,19 +312,19 @@ class Levels:
         )
 
 
-def noise_levels(found: ChannelFit) -> Levels | None:
+def noise_levels(fit: ChannelFit) -> Levels | None:
     """Of one channel; None where its record is too short to tell."""
-    channel = found.channel
-    means, step_s = means_without(channel, found.lines), channel.sampling.interval_s
+    channel = fit.channel
+    means, step_s = means_without(channel, fit.lines), channel.sampling.interval_s
     length = len(means) // PARTS
     f = np.arange(1, length) / (2 * max(length, 1) * step_s)
     highest_hz = min(channel.highest_hz, 0.5 / step_s)
-    told = (f > TREND_SHARE * highest_hz) & (f < highest_hz)
-    if np.count_nonzero(told) < FEWEST_LEVEL_ORDINATES:
+    chosen = (f > TREND_SHARE * highest_hz) & (f < highest_hz)
+    if np.count_nonzero(chosen) < FEWEST_LEVEL_ORDINATES:
         return None
     parts = means[: PARTS * length].reshape(PARTS, length)
-    power = dct(parts, type=2, norm="ortho", axis=1)[:, 1:][:, told] ** 2 * step_s
-    each = (power / found.level(f[told])).mean(axis=1)
-    ratio = each / each.mean()
-    gain = float(np.count_nonzero(told) * np.sum(ratio - 1 - np.log(ratio)))
+    power = dct(parts, type=2, norm="ortho", axis=1)[:, 1:][:, chosen] ** 2 * step_s
+    levels = (power / fit.level(f[chosen])).mean(axis=1)
+    ratio = levels / levels.mean()
+    gain = float(np.count_nonzero(chosen) * np.sum(ratio - 1 - np.log(ratio)))
     return Levels(channel.axis, np.sqrt(ratio), length * step_s, float(chdtrc(PARTS - 1, gain)))

@@ -107,9 +107,9 @@ class StillRecord(Dataset[NoiseFit]):
         """The model with its values. Raises DataError for a channel without values."""
         return evaluate(model, self.still)
 
-    def places(self, found: NoiseFit) -> tuple[Place, ...]:
+    def places(self, fit: NoiseFit) -> tuple[Place, ...]:
         """Averaging times and frequencies."""
-        return places(found)
+        return places(fit)
 
     def search(self, model: Model, effects: Mapping[str, Effect]) -> NoiseFindings:
         """What the temperature does, then lines, disturbances and every mixture of processes."""
@@ -123,16 +123,16 @@ class StillRecord(Dataset[NoiseFit]):
         self, before: NoiseFit, plan: Findings[NoiseFit], effects: Mapping[str, Effect]
     ) -> tuple[Candidate, ...]:
         """Every process alone, the next one of the plan first."""
-        found = candidates(search(before.still, before.model, effects), before, plan.alternatives)
+        processes = candidates(search(before.still, before.model, effects), before, plan.alternatives)
         planned = tuple(c for c in plan.candidates if not c.effect.is_noise and c.name in plan.names)
-        return (*planned, *sorted(found, key=lambda c: c.name not in plan.names[:1]))
+        return (*planned, *sorted(processes, key=lambda c: c.name not in plan.names[:1]))
 
-    def figures(self, found: NoiseFit) -> dict[str, str]:
+    def figures(self, fit: NoiseFit) -> dict[str, str]:
         """Mismatch of the spectrum, also on the other half, and of the Allan deviation."""
         return {
-            "mismatch / chance": f"{rounded(found.pooled_excess)} ×",
-            "on the other half": f"{rounded(found.held_out_excess)} ×",
-            "Allan deviation is off by": ", ".join(f"{100 * value:.2g} %" for value in mismatch(found).values()),
+            "mismatch / chance": f"{rounded(fit.pooled_excess)} ×",
+            "on the other half": f"{rounded(fit.held_out_excess)} ×",
+            "Allan deviation is off by": ", ".join(f"{100 * value:.2g} %" for value in mismatch(fit).values()),
         }
 
     def facts(self, candidate: Candidate, result: Diagnosis[NoiseFit]) -> dict[str, str]:
@@ -145,48 +145,51 @@ class StillRecord(Dataset[NoiseFit]):
         }
 
     def _found(self, start: NoiseFit, effects: Mapping[str, Effect], origin: NoiseFit | None = None) -> NoiseFindings:
-        found = search(start.still, start.model, effects)
-        calibration = calibrated(found, start, effects)
-        found = calibration.after if calibration else found
-        baseline = fit(start.model, without_patterns(start.still, found.patterns)) if found.patterns else start
-        signal = calibration.steps(baseline, found.patterns) if calibration else ()
+        missing = search(start.still, start.model, effects)
+        calibration = calibrated(missing, start, effects)
+        missing = calibration.after if calibration else missing
+        baseline = fit(start.model, without_patterns(start.still, missing.patterns)) if missing.patterns else start
+        signal = calibration.steps(baseline, missing.patterns) if calibration else ()
         present = signal[-1].after if signal else baseline
-        structure = structure_of(found)
-        names = () if found.still.hidden else tuple(found.gains)
-        doubts = alternatives(found, names) | (calibration.alternatives if calibration else {})
+        structure = structure_of(missing)
+        names = () if missing.still.hidden else tuple(missing.gains)
+        doubts = alternatives(missing, names) | (calibration.alternatives if calibration else {})
         of_noise = {name: rivals for name, rivals in doubts.items() if name in names}
-        spoilt = structure is not None and (found.still.hidden or disturbed(found))
+        spoilt = structure is not None and (missing.still.hidden or disturbed(missing))
         result = NoiseFindings(
             data=self,
             start=start,
             origin=origin or start,
             baseline=baseline,
-            steps=(*signal, *_steps(present, found, names)),
+            steps=(*signal, *_steps(present, missing, names)),
             candidates=(
                 *(calibration.candidates(signal) if calibration else ()),
-                *candidates(found, present, alternatives(found, tuple(found.gains))),
+                *candidates(missing, present, alternatives(missing, tuple(missing.gains))),
             ),
             causes=(*(calibration.signal.causes if calibration else ()), *names),
             alternatives=doubts,
             left=structure,
             spoilt=spoilt,
-            reason=reason_of(found, doubts, structure),
+            reason=reason_of(missing, doubts, structure),
             disturbances=tuple(
-                disturbance_document(each)
-                for each in (*map(as_disturbance, calibration.patterns if calibration else ()), *disturbances(found))
+                disturbance_document(disturbance)
+                for disturbance in (
+                    *map(as_disturbance, calibration.patterns if calibration else ()),
+                    *disturbances(missing),
+                )
             ),
             separations=calibration.separations if calibration else {},
-            further=next_of(found, {} if spoilt else of_noise, structure),
+            further=next_of(missing, {} if spoilt else of_noise, structure),
             remarks=(
                 *(calibration.signal.lags if calibration else ()),
                 *(
                     sentence(filter_text(name, corner))
                     for name in doubts
-                    if (corner := possible_corner_hz(found, name))
+                    if (corner := possible_corner_hz(missing, name))
                 ),
-                *(sentence(each.text) for each in found.telegraphs),
+                *(sentence(disturbance.text) for disturbance in missing.telegraphs),
             ),
-            search=found,
+            search=missing,
         )
         if names and not (signal or spoilt) and result.given.verdict is Verdict.UNEXPLAINED:
             return result.without_steps()
@@ -228,29 +231,29 @@ class StillRecord(Dataset[NoiseFit]):
             return
         if acts_on_record(effect) and all(TEMPERATURE in channel.logged for channel in self.still.channels):
             return
-        known = ", ".join(sorted(name for name, each in catalogue().items() if each.is_noise))
+        noises = ", ".join(sorted(name for name, e in catalogue().items() if e.is_noise))
         raise ModelError(
             f"{effect.name} is not noise, and a still record shows only noise, and what a logged temperature does to "
-            f"the bias; effects of noise: {known}"
+            f"the bias; effects of noise: {noises}"
         )
 
-    def errors_document(self, found: NoiseFit) -> dict[str, Any]:
+    def errors_document(self, fit: NoiseFit) -> dict[str, Any]:
         """Mismatch of the spectrum by axis, and of the Allan deviation."""
-        each = {channel.channel.axis: channel for channel in found.channels}
+        fits = {channel.channel.axis: channel for channel in fit.channels}
         return {
-            "rmse": {axis: channel.mismatch for axis, channel in each.items()},
-            "noise_floor": {axis: channel.floor for axis, channel in each.items()},
-            "excess": {axis: channel.excess for axis, channel in each.items()},
-            "log_likelihood": {axis: channel.log_likelihood for axis, channel in each.items()},
-            "allan_mismatch": mismatch(found),
+            "rmse": {axis: channel.mismatch for axis, channel in fits.items()},
+            "noise_floor": {axis: channel.floor for axis, channel in fits.items()},
+            "excess": {axis: channel.excess for axis, channel in fits.items()},
+            "log_likelihood": {axis: channel.log_likelihood for axis, channel in fits.items()},
+            "allan_mismatch": mismatch(fit),
         }
 
     def comparison_fields(self, result: Comparison[NoiseFit]) -> dict[str, Any]:
         """The Allan deviations that are compared."""
         curves = {}
-        for each in result.fit.channels:
-            curve = compare_deviations(each, self.still.allan[each.channel.axis])
-            curves[each.channel.axis] = {
+        for channel in result.fit.channels:
+            curve = compare_deviations(channel, self.still.allan[channel.channel.axis])
+            curves[channel.channel.axis] = {
                 "tau_s": curve.tau_s.tolist(),
                 "deviation": curve.measured.tolist(),
                 "low": curve.low.tolist(),
@@ -273,35 +276,35 @@ class StillRecord(Dataset[NoiseFit]):
         """The gain in log-likelihood."""
         return {"log_likelihood_gain": candidate.gain / 2}
 
-    def error_table(self, found: NoiseFit) -> Cells:
+    def error_table(self, fit: NoiseFit) -> Cells:
         """Mismatch of the spectrum and of the Allan deviation, beside those by chance."""
         rows = []
-        for each in found.channels:
-            curve = compare_deviations(each, found.still.allan[each.channel.axis])
-            shares = (each.mismatch, each.floor), (curve.mismatch, curve.by_chance)
+        for channel in fit.channels:
+            curve = compare_deviations(channel, fit.still.allan[channel.channel.axis])
+            shares = (channel.mismatch, channel.floor), (curve.mismatch, curve.by_chance)
             (spectrum, by_chance), (allan, allan_by_chance) = (
                 (f"{100 * a:.3g} %", f"{100 * b:.3g} %") for a, b in shares
             )
-            rows.append((each.channel.axis, spectrum, by_chance, f"{each.excess:.2f}", allan, allan_by_chance))
+            rows.append((channel.channel.axis, spectrum, by_chance, f"{channel.excess:.2f}", allan, allan_by_chance))
         head = ("axis", "mismatch of the spectrum", "by chance", "ratio", "of the Allan deviation", "by chance")
         return head, rows
 
     def comparison_table(self, result: Comparison[NoiseFit]) -> Cells:
         """Measured and modelled Allan deviations."""
         unit, rows = self.unit, []
-        for each in result.fit.channels:
-            curve = compare_deviations(each, self.still.allan[each.channel.axis])
+        for channel in result.fit.channels:
+            curve = compare_deviations(channel, self.still.allan[channel.channel.axis])
             for k, tau in enumerate(curve.tau_s):
                 shown = [quantity(float(x[k]), unit) for x in (curve.measured, curve.low, curve.high, curve.modelled)]
                 off = f"{curve.deviations[k]:+.1f}" if abs(curve.deviations[k]) >= 0.05 else "0"
-                rows.append((each.channel.axis, f"{tau:.4g}", shown[0], f"{shown[1]} .. {shown[2]}", shown[3], off))
+                rows.append((channel.channel.axis, f"{tau:.4g}", shown[0], f"{shown[1]} .. {shown[2]}", shown[3], off))
         return ("axis", "time (s)", "Allan deviation", "95 % interval", "model", "deviations off"), rows
 
-    def step_table(self, found: Discovery[NoiseFit]) -> Cells:
+    def step_table(self, discovery: Discovery[NoiseFit]) -> Cells:
         """Gains that add up, and the mismatch after each step."""
-        several = len(found.steps) > 1
+        several = len(discovery.steps) > 1
         chosen = [k for k in range(len(HEAD)) if k != LOST or several]
-        rows = [[row[k] for k in chosen] for row in _rows(found, several)]
+        rows = [[row[k] for k in chosen] for row in _rows(discovery, several)]
         return tuple(HEAD[k] for k in chosen), [tuple(row) for row in rows]
 
     def candidate_table(self, result: Diagnosis[NoiseFit], candidates: Sequence[Candidate]) -> Cells:
@@ -323,71 +326,71 @@ class StillRecord(Dataset[NoiseFit]):
         )  # fmt: skip
         return head, rows
 
-    def fit_chart(self, found: NoiseFit) -> Chart:
+    def fit_chart(self, fit: NoiseFit) -> Chart:
         """Measured and modelled Allan deviations."""
         from calibrations.presentation.charts.noise import fit_chart
 
-        return fit_chart(found)
+        return fit_chart(fit)
 
-    def steps_chart(self, found: Discovery[NoiseFit]) -> Chart:
+    def steps_chart(self, discovery: Discovery[NoiseFit]) -> Chart:
         """Error by model."""
         from calibrations.presentation.charts.noise import steps_chart
 
-        return steps_chart(found.start, found.steps)
+        return steps_chart(discovery.start, discovery.steps)
 
-    def fit_album(self, found: NoiseFit) -> list[Picture]:
+    def fit_album(self, fit: NoiseFit) -> list[Picture]:
         """Allan deviation and spectrum."""
         from calibrations.presentation.charts.noise import still_album
 
-        return still_album(found, found)
+        return still_album(fit, fit)
 
-    def steps_album(self, found: Discovery[NoiseFit]) -> list[Picture]:
+    def steps_album(self, discovery: Discovery[NoiseFit]) -> list[Picture]:
         """Error by model, Allan deviation and spectrum of the given and of the final model."""
         from calibrations.presentation.charts.noise import steps_picture, still_album
 
-        return [steps_picture(found), *still_album(found.end, found.start)]
+        return [steps_picture(discovery), *still_album(discovery.end, discovery.start)]
 
-    def remarks(self, found: NoiseFit) -> list[str]:
+    def remarks(self, fit: NoiseFit) -> list[str]:
         """Lines that the log-likelihood does not include."""
-        if any(line.frequency_hz > each.channel.highest_hz for each in found.channels for line in each.lines):
+        if any(line.frequency_hz > channel.channel.highest_hz for channel in fit.channels for line in channel.lines):
             return ["Lines above half the corner of the low-pass are not part of the fit."]
         return []
 
-    def cautions(self, found: NoiseFit) -> list[str]:  # noqa: ARG002
+    def cautions(self, fit: NoiseFit) -> list[str]:  # noqa: ARG002
         """What a person should check in the record."""
         return record_doubts(self.still.channels)
 
 
-def mismatch(found: NoiseFit) -> dict[str, float]:
+def mismatch(fit: NoiseFit) -> dict[str, float]:
     """Rms of the logarithm of measured over modelled Allan deviation, by axis."""
     return {
-        each.channel.axis: compare_deviations(each, found.still.allan[each.channel.axis]).mismatch
-        for each in found.channels
+        channel.channel.axis: compare_deviations(channel, fit.still.allan[channel.channel.axis]).mismatch
+        for channel in fit.channels
     }
 
 
-def _steps(start: NoiseFit, found: Search, names: tuple[str, ...]) -> Iterator[Step[NoiseFit]]:
+def _steps(start: NoiseFit, search: Search, names: tuple[str, ...]) -> Iterator[Step[NoiseFit]]:
     """The effects one after another, the last fit being that of the search."""
     present = start
     for k, name in enumerate(names):
-        last = k == len(found.gains) - 1
-        after = found.end if last else fit(present.model.with_effect(found.effects[name]), found.still)
-        yield Step(name, present, after, found.gains[name] / 2)
+        last = k == len(search.gains) - 1
+        after = search.end if last else fit(present.model.with_effect(search.effects[name]), search.still)
+        yield Step(name, present, after, search.gains[name] / 2)
         present = after
 
 
-def _rows(found: Discovery[NoiseFit], several: bool) -> Iterator[tuple[str, ...]]:
-    start, baseline = found.start, found.findings.baseline
+def _rows(discovery: Discovery[NoiseFit], several: bool) -> Iterator[tuple[str, ...]]:
+    start, baseline = discovery.start, discovery.findings.baseline
     yield _row(start.model.name, start)
     if baseline is not start:
         yield _row(CLEANED, baseline, baseline.log_likelihood - start.log_likelihood)
-    for s in found.steps:
+    for s in discovery.steps:
         gained = s.after.log_likelihood - s.before.log_likelihood
         yield _row(f"+ {s.name}", s.after, gained, s.alone if several else None)
 
 
-def _row(name: str, found: NoiseFit, gained: float | None = None, lost: float | None = None) -> tuple[str, ...]:
+def _row(name: str, fit: NoiseFit, gained: float | None = None, lost: float | None = None) -> tuple[str, ...]:
     """In the order of HEAD. A gain depends on the rows above, and gains add up; losses do not."""
-    off = ", ".join(f"{100 * value:.3g} %" for value in mismatch(found).values())
+    off = ", ".join(f"{100 * value:.3g} %" for value in mismatch(fit).values())
     shown = ["" if value is None else f"{value:+.5g}" for value in (gained, None if lost is None else -lost)]
-    return name, *shown, f"{found.pooled_excess:.2f}", f"{found.held_out_excess:.2f}", off
+    return name, *shown, f"{fit.pooled_excess:.2f}", f"{fit.held_out_excess:.2f}", off

@@ -124,17 +124,17 @@ class Octaves:
 
 def octaves(blocks: Iterable[Array], rate_hz: float, kind: str = OVERLAPPING) -> Curve:
     """The curve of a record that comes in blocks, shape (n,) each."""
-    seen = Octaves(rate_hz, OCTAVE_KINDS[kind][0] != ALLAN)
+    reduction = Octaves(rate_hz, OCTAVE_KINDS[kind][0] != ALLAN)
     for block in blocks:
-        seen.add(block)
-    return seen.curve(kind)
+        reduction.add(block)
+    return reduction.curve(kind)
 
 
 def _point(tree: Tree, kind: str, octave: int) -> tuple[float, float, int] | None:
     """(deviation, degrees of freedom, noise type) at 2^octave samples; None where the record is too short."""
     level, factor = max(0, octave - FACTORS + 1), min(octave, FACTORS - 1)
-    which, divisor = OCTAVE_KINDS[kind]
-    where = (level, factor if level == 0 else 0, which)
+    order, divisor = OCTAVE_KINDS[kind]
+    where = (level, factor if level == 0 else 0, order)
     number, total = int(tree.windows[where]), float(tree.squares[where])
     if not number:
         return None
@@ -155,9 +155,9 @@ def _ends(tree: Tree, level: int, bins: int) -> float:
 def _octave_noise_type(tree: Tree, octave: int) -> int:
     """The noise type at an averaging time: of the longest time up to it that can tell."""
     for level in range(octave, -1, -1):
-        found = noise_type(int(tree.seen[level]), tree.moments[level])
-        if found is not None:
-            return found
+        alpha = noise_type(int(tree.seen[level]), tree.moments[level])
+        if alpha is not None:
+            return alpha
     return 0
 
 
@@ -280,16 +280,16 @@ def deviations(values: Array, steps: Iterable[int], kind: str = "overlapping") -
     """
     if kind not in ESTIMATORS:
         raise DataError(f'unknown kind of deviation "{kind}"; there are {", ".join(ESTIMATORS)}')
-    whole = [int(m) for m in steps]
-    if min(whole, default=1) < 1:
-        raise DataError(f"an averaging time of {min(whole)} samples; it is 1 or more")
+    counts = [int(m) for m in steps]
+    if min(counts, default=1) < 1:
+        raise DataError(f"an averaging time of {min(counts)} samples; it is 1 or more")
     values = np.ascontiguousarray(values, dtype=np.float64)
     if not np.isfinite(values).all():
         row = int(np.argmin(np.isfinite(values)))
         raise DataError(f"row {row + 1} is {values[row]:g}, not a number; take a stretch of the record without gaps")
     centred = values - values.mean() if len(values) else values
     phase = np.concatenate([[0.0], np.cumsum(centred)])
-    return np.array([_deviation(*ESTIMATORS[kind](phase, centred, m)) for m in whole])
+    return np.array([_deviation(*ESTIMATORS[kind](phase, centred, m)) for m in counts])
 
 
 def _deviation(total: float, number: int, divisor: float) -> float:
@@ -344,7 +344,7 @@ def curve_at(values: Array, rate_hz: float, tau_s: Sequence[float], source: str)
     Raises DataError for a time below one sample, TooFewRows for one of which the record does not hold two.
     """
     steps = [_steps(tau, len(values), rate_hz, source) for tau in tau_s]
-    found = deviations(values, steps, OVERLAPPING)
+    deviation = deviations(values, steps, OVERLAPPING)
     alphas = tuple(_noise_type_at(values, m) for m in steps)
     edf = np.array(
         [
@@ -352,8 +352,8 @@ def curve_at(values: Array, rate_hz: float, tau_s: Sequence[float], source: str)
             for a, m in zip(alphas, steps, strict=True)
         ]
     )
-    bounds = np.array([interval(*pair) for pair in zip(found.tolist(), edf.tolist(), strict=True)])
-    return Curve(OVERLAPPING, np.array(steps) / rate_hz, found, bounds[:, 0], bounds[:, 1], alphas, edf)
+    bounds = np.array([interval(*pair) for pair in zip(deviation.tolist(), edf.tolist(), strict=True)])
+    return Curve(OVERLAPPING, np.array(steps) / rate_hz, deviation, bounds[:, 0], bounds[:, 1], alphas, edf)
 
 
 def _steps(tau_s: float, n: int, rate_hz: float, source: str) -> int:

@@ -66,17 +66,19 @@ class Disturbance:
 def disturbances(search: Search) -> tuple[Disturbance, ...]:
     """All disturbances: removed patterns, two levels, odd samples; a misfit only where none of these matters."""
     patterns = list(map(as_disturbance, search.patterns))
-    two_levels = [Disturbance(TWO_LEVELS, each.axis, each.text, False) for each in search.telegraphs]
-    odd = [
-        Disturbance(each.kind, channel.axis, f"of {channel.axis}, {each.text}", each.matters)
-        for channel in search.still.channels
-        for each in channel.oddities
+    two_levels = [
+        Disturbance(TWO_LEVELS, disturbance.axis, disturbance.text, False) for disturbance in search.telegraphs
     ]
-    known = (*patterns, *two_levels, *odd)
-    if any(each.matters for each in known):
-        return known
+    odd = [
+        Disturbance(disturbance.kind, channel.axis, f"of {channel.axis}, {disturbance.text}", disturbance.matters)
+        for channel in search.still.channels
+        for disturbance in channel.oddities
+    ]
+    entries = (*patterns, *two_levels, *odd)
+    if any(disturbance.matters for disturbance in entries):
+        return entries
     misfit = misfit_of(search.end.channels)
-    return known if misfit is None else (*known, misfit)
+    return entries if misfit is None else (*entries, misfit)
 
 
 def as_disturbance(pattern: Pattern) -> Disturbance:
@@ -87,8 +89,8 @@ def as_disturbance(pattern: Pattern) -> Disturbance:
 def misfit_of(channels: tuple[ChannelFit, ...]) -> Disturbance | None:
     """The first misfit that chance does not explain, over all channels."""
     limit = SIGNIFICANT / (len(MISFITS) * len(channels))
-    each = (_line(fit) or _level(fit, limit) or _stretch(fit, limit) for fit in channels)
-    return next((misfit for misfit in each if misfit is not None), None)
+    misfits = (_line(fit) or _level(fit, limit) or _stretch(fit, limit) for fit in channels)
+    return next((misfit for misfit in misfits if misfit is not None), None)
 
 
 def disturbance_document(disturbance: Disturbance) -> dict[str, Any]:
@@ -148,10 +150,12 @@ def experiment_for_pattern(pattern: Pattern, length_s: float) -> Experiment | No
     """The experiment that separates the cause of a pattern from its rivals, or from noise; None without one."""
     if pattern.kind == STEP:
         return repeat_record(length_s)
-    cause, *others = (CAUSES.get((each.kind, each.cause)) for each in (pattern, *pattern.rivals))
+    cause, *causes_of_rivals = (
+        CAUSES.get((candidate.kind, candidate.cause)) for candidate in (pattern, *pattern.rivals)
+    )
     if cause is None:
         return None
-    rivals = [name for name in others if name is not None] or [TAKEN_FOR]
+    rivals = [name for name in causes_of_rivals if name is not None] or [TAKEN_FOR]
     procedure, settings, why = experiment_by_physics({cause, *rivals} - {TAKEN_FOR})
     why = OVEN_SHOWS if pattern.kind == FOLLOWS and rivals == [TAKEN_FOR] else why
     return Experiment(procedure, settings, tuple((cause, rival) for rival in rivals), why)
@@ -168,19 +172,19 @@ def _round_up_to_tens(seconds: float) -> float:
     return float(10 * np.ceil(seconds / 10))
 
 
-def separating_record(found: Search, named: tuple[str, ...]) -> Experiment | None:
+def separating_record(search: Search, named: tuple[str, ...]) -> Experiment | None:
     """The shortest record that separates the first effect in doubt from its rivals with certainty.
 
     None of them certain, the longest that is proposed.
     """
-    name, rivals = next(((name, found.rivals[name]) for name in named if found.rivals.get(name)), ("", ()))
+    name, rivals = next(((name, search.rivals[name]) for name in named if search.rivals.get(name)), ("", ()))
     if not rivals:
         return None
     pairs = tuple((name, rival) for rival in rivals)
-    lengths = [k * found.still.length_s for k in LONGER if k * found.still.length_s <= LONGEST_RECORD_S]
-    lengths = lengths or [2 * found.still.length_s]
-    foreseen = [(length_s, _information(found, name, rivals, length_s)) for length_s in lengths]
-    chosen = next((each for each in foreseen if pairs_separated(each[1]) >= CERTAIN_PROBABILITY), foreseen[-1])
+    lengths = [k * search.still.length_s for k in LONGER if k * search.still.length_s <= LONGEST_RECORD_S]
+    lengths = lengths or [2 * search.still.length_s]
+    foreseen = [(length_s, _information(search, name, rivals, length_s)) for length_s in lengths]
+    chosen = next((option for option in foreseen if pairs_separated(option[1]) >= CERTAIN_PROBABILITY), foreseen[-1])
     return Experiment(
         PROCEDURE,
         {"duration_s": _round_up_to_tens(chosen[0])},
@@ -190,25 +194,25 @@ def separating_record(found: Search, named: tuple[str, ...]) -> Experiment | Non
     )
 
 
-def _information(found: Search, name: str, rivals: tuple[str, ...], length_s: float) -> float:
+def _information(search: Search, name: str, rivals: tuple[str, ...], length_s: float) -> float:
     """Lambda of the pair that is hardest to separate, in the direction with less information."""
-    effects = {effect.name: effect for effect in found.mixtures.others}
-    rest = [effect for effect in found.mixture.effects if effect.name != name]
-    each = []
+    effects = {effect.name: effect for effect in search.mixtures.others}
+    remaining = [effect for effect in search.mixture.effects if effect.name != name]
+    deviances = []
     for rival in rivals:
-        sides = (found.mixture, effects[name]), (found.mixtures.of([*rest, effects[rival]]), effects[rival])
-        each += [
+        sides = (search.mixture, effects[name]), (search.mixtures.of([*remaining, effects[rival]]), effects[rival])
+        deviances += [
             sum(_deviance_of_wrong(*pair, length_s) for pair in zip(right.channels, wrong.channels, strict=True))
-            for (right, own), (wrong, other) in (sides, sides[::-1])
-            if own.name not in other.contains  # a process that contains it can take its form
+            for (right, own), (wrong, rival_effect) in (sides, sides[::-1])
+            if own.name not in rival_effect.contains  # a process that contains it can take its form
         ]
-    return min(each)
+    return min(deviances)
 
 
 def _deviance_of_wrong(right: ChannelFit, wrong: ChannelFit, length_s: float) -> float:
     """Deviance of the wrong effects on what the right ones expect of a record of this length."""
-    there = longer_channel(right.channel, length_s)
-    truth = replace(right, channel=there, parts=(_slow(there),), lines=(), fits={})
+    channel = longer_channel(right.channel, length_s)
+    truth = replace(right, channel=channel, parts=(_slow(channel),), lines=(), fits={})
     bands = replace(truth.parts[0], density=truth.expected)
     return fit_effects(replace(truth, parts=(bands,), fits={}), wrong.effects).deviance
 
@@ -228,13 +232,13 @@ OUTPUT_FILTER = "output-filter"
 WHITE = "white-noise"
 
 
-def possible_corner_hz(found: Search, name: str) -> float | None:
+def possible_corner_hz(search: Search, name: str) -> float | None:
     """The corner of a low-pass that would explain the process `name`; None where no low-pass can."""
     if name != GAUSS_MARKOV:
         return None
-    jumping = {telegraph.axis for telegraph in found.telegraphs}  # no filter makes two levels
-    free = (each for each in found.mixture.channels if not np.isfinite(each.channel.corner_hz))
-    corners = [_channel_corner_hz(each) for each in free if each.channel.axis not in jumping]
+    jumping = {telegraph.axis for telegraph in search.telegraphs}  # no filter makes two levels
+    free = (fit for fit in search.mixture.channels if not np.isfinite(fit.channel.corner_hz))
+    corners = [_channel_corner_hz(fit) for fit in free if fit.channel.axis not in jumping]
     return next((corner for corner in corners if corner is not None), None)
 
 
@@ -247,69 +251,69 @@ def filter_text(name: str, corner: float) -> str:
     )
 
 
-def _channel_corner_hz(found: ChannelFit) -> float | None:
-    sigma, time_s = found.values[GAUSS_MARKOV].values()
+def _channel_corner_hz(fit: ChannelFit) -> float | None:
+    sigma, time_s = fit.values[GAUSS_MARKOV].values()
     if sigma == 0:
         return None
-    white = sum(value**2 for value in found.values.get(WHITE, {}).values())
+    white = sum(value**2 for value in fit.values.get(WHITE, {}).values())
     corner = 1 / (2 * np.pi * time_s)
     alone = white < LEAST_WHITE * 2 * sigma**2 * time_s
     return float(corner) if alone or corner > SLOWEST_FILTER_HZ else None
 
 
-def structure_of(found: Search) -> str | None:
+def structure_of(search: Search) -> str | None:
     """The disturbances that matter, in words; None where there are none."""
-    return "; ".join(each.text for each in disturbances(found) if each.matters) or None
+    return "; ".join(disturbance.text for disturbance in disturbances(search) if disturbance.matters) or None
 
 
-def alternatives(found: Search, named: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
+def alternatives(search: Search, named: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
     """By named effect, those that the record cannot separate from it; a low-pass is named by its effect."""
-    behind = {name: (OUTPUT_FILTER,) for name in named if possible_corner_hz(found, name) is not None}
-    each = {name: (*found.rivals.get(name, ()), *behind.get(name, ())) for name in named}
-    return {name: rivals for name, rivals in each.items() if rivals}
+    behind = {name: (OUTPUT_FILTER,) for name in named if possible_corner_hz(search, name) is not None}
+    doubtful = {name: (*search.rivals.get(name, ()), *behind.get(name, ())) for name in named}
+    return {name: rivals for name, rivals in doubtful.items() if rivals}
 
 
-def reason_of(found: Search, doubts: Mapping[str, tuple[str, ...]], structure: str | None) -> str | None:
+def reason_of(search: Search, doubts: Mapping[str, tuple[str, ...]], structure: str | None) -> str | None:
     """Why something is in doubt, in words."""
-    said = []
+    reasons = []
     for name, rivals in doubts.items():
         if processes := [rival for rival in rivals if rival != OUTPUT_FILTER]:
-            said.append(f"this record cannot separate {name} from {' or '.join(processes)}")
-        if (corner := possible_corner_hz(found, name)) is not None:
-            said.append(filter_text(name, corner))
-    if structure is not None and found.still.hidden:
-        said.append(structure)
+            reasons.append(f"this record cannot separate {name} from {' or '.join(processes)}")
+        if (corner := possible_corner_hz(search, name)) is not None:
+            reasons.append(filter_text(name, corner))
+    if structure is not None and search.still.hidden:
+        reasons.append(structure)
     elif structure is not None:
-        said.append(f"no noise of the catalogue explains: {structure}")
-    return "; ".join(said) or None
+        reasons.append(f"no noise of the catalogue explains: {structure}")
+    return "; ".join(reasons) or None
 
 
-def next_of(found: Search, doubts: Mapping[str, tuple[str, ...]], structure: str | None) -> Experiment | None:
+def next_of(search: Search, doubts: Mapping[str, tuple[str, ...]], structure: str | None) -> Experiment | None:
     """The experiment for the first doubt that one can settle."""
-    if any(hidden_in(channel.oddities) for channel in found.still.channels):
+    if any(hidden_in(channel.oddities) for channel in search.still.channels):
         return None  # the text says what to do, and no run does it
     if any(rival != OUTPUT_FILTER for rivals in doubts.values() for rival in rivals):
-        return separating_record(found, tuple(doubts))
-    shaken = (
+        return separating_record(search, tuple(doubts))
+    motions = (
         experiment_for_filter(name, corner)
         for name in doubts
-        if (corner := possible_corner_hz(found, name)) is not None
+        if (corner := possible_corner_hz(search, name)) is not None
     )
-    if (first := next(filter(None, shaken), None)) is not None:
+    if (first := next(filter(None, motions), None)) is not None:
         return first
-    if found.patterns:
-        return experiment_for_pattern(found.patterns[0], found.still.length_s)
-    return repeat_record(found.still.length_s) if structure is not None else None
+    if search.patterns:
+        return experiment_for_pattern(search.patterns[0], search.still.length_s)
+    return repeat_record(search.still.length_s) if structure is not None else None
 
 
 def record_doubts(channels: tuple[Channel, ...]) -> list[str]:
     """What a person should check in a record whatever its model: odd samples that matter, and a level that jumps."""
     advice = "use a part of the record without it, or measure again (`rig noise` shows where)"
     odd = [
-        f"{each.text} ({channel.axis}): {advice}"
+        f"{oddity.text} ({channel.axis}): {advice}"
         for channel in channels
-        for each in channel.oddities
-        if each.matters and each.hidden is None
+        for oddity in channel.oddities
+        if oddity.matters and oddity.hidden is None
     ]
     jumps = ((channel, _jump(channel.means)) for channel in channels)
     return odd + [
@@ -335,6 +339,6 @@ def _jump(means: Array) -> tuple[float, float] | None:
     return (k + 1) / n, float(-sums[k] / (n - k - 1) - sums[k] / (k + 1))
 
 
-def disturbed(found: Search) -> bool:
+def disturbed(search: Search) -> bool:
     """Whether there is a disturbance with a place or a cause of its own: a pattern, or odd samples."""
-    return any(each.matters and each.kind not in MISFITS for each in disturbances(found))
+    return any(disturbance.matters and disturbance.kind not in MISFITS for disturbance in disturbances(search))

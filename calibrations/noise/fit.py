@@ -48,24 +48,24 @@ DERIVATIVE_STEP = 1e-3  # of a value, for the derivative
 Deviations = Mapping[tuple[str, str], float]  # of each strength's square and of each shape, by effect and parameter
 
 
-def estimates(found: ChannelFit, effect: Effect, unit: str, deviations: Deviations) -> Iterator[Estimate]:
+def estimates(fit: ChannelFit, effect: Effect, unit: str, deviations: Deviations) -> Iterator[Estimate]:
     """Of one effect's parameters, in the order in which they are declared."""
     lines = "lines" in effect.places
-    seen = _line_estimates(found, unit) if lines else _spectrum_estimates(found, effect, unit, deviations)
-    hidden = hidden_in(found.channel.oddities)
+    values = _line_estimates(fit, unit) if lines else _spectrum_estimates(fit, effect, unit, deviations)
+    hidden = hidden_in(fit.channel.oddities)
     if hidden is None or not hidden.hides(effect.name):
-        yield from seen
+        yield from values
         return
     why = f"the noise is below the converter's step of {hidden.step:.4g} {unit}"
-    for each in seen:
-        yield replace(each, std=None, identified=False, why=why)
+    for estimate in values:
+        yield replace(estimate, std=None, identified=False, why=why)
 
 
-def _spectrum_estimates(found: ChannelFit, effect: Effect, unit: str, deviations: Deviations) -> Iterator[Estimate]:
-    strength, values, axis = effect.parameters[0], found.values[effect.name], found.channel.axis
+def _spectrum_estimates(fit: ChannelFit, effect: Effect, unit: str, deviations: Deviations) -> Iterator[Estimate]:
+    strength, values, axis = effect.parameters[0], fit.values[effect.name], fit.channel.axis
     of_power = deviations[effect.name, strength.name]
-    if gain_of(found, effect) <= IDENTIFIED:
-        yield from _unidentified(found, effect, unit)
+    if gain_of(fit, effect) <= IDENTIFIED:
+        yield from _unidentified(fit, effect, unit)
         return
     for p in effect.parameters:
         value = values[p.name]
@@ -73,10 +73,10 @@ def _spectrum_estimates(found: ChannelFit, effect: Effect, unit: str, deviations
         yield Estimate(p.name, axis, value, std, p.unit.replace("{out}", unit))
 
 
-def _unidentified(found: ChannelFit, effect: Effect, unit: str) -> Iterator[Estimate]:
+def _unidentified(fit: ChannelFit, effect: Effect, unit: str) -> Iterator[Estimate]:
     """A process that may be absent: the bound of its strength; its shape means nothing."""
-    strength, values, axis = effect.parameters[0], found.values[effect.name], found.channel.axis
-    value, below, _ = upper_bound(found, effect, [other for other in found.effects if other is not effect])
+    strength, values, axis = effect.parameters[0], fit.values[effect.name], fit.channel.axis
+    value, below, _ = upper_bound(fit, effect, [e for e in fit.effects if e is not effect])
     own = strength.unit.replace("{out}", unit)
     why = f"the process may be absent: {strength.name} is below {below:.2g} {own} (95 %)"
     yield Estimate(strength.name, axis, value, (below - value) / INTERVAL_STDS, own, False, why)
@@ -84,18 +84,18 @@ def _unidentified(found: ChannelFit, effect: Effect, unit: str) -> Iterator[Esti
         yield Estimate(p.name, axis, values[p.name], None, p.unit, False, "the process may be absent")
 
 
-def gain_of(found: ChannelFit, effect: Effect) -> float:
+def gain_of(fit: ChannelFit, effect: Effect) -> float:
     """Twice the log-likelihood that a channel's fit loses without one of its effects, the others refitted.
 
     Divided by the squared excess where the model does not describe the spectrum, as uncertainties are widened there.
     """
-    if found.values[effect.name][effect.parameters[0].name] == 0:
+    if fit.values[effect.name][effect.parameters[0].name] == 0:
         return 0.0
-    rest = [other for other in found.effects if other is not effect]
-    if not rest:
+    remaining = [e for e in fit.effects if e is not effect]
+    if not remaining:
         return np.inf
-    lost = 2 * (found.log_likelihood - fit_effects(found, rest).log_likelihood)
-    return float(lost / max(1.0, found.excess) ** 2)
+    lost = 2 * (fit.log_likelihood - fit_effects(fit, remaining).log_likelihood)
+    return float(lost / max(1.0, fit.excess) ** 2)
 
 
 def upper_bound(fit: ChannelFit, effect: Effect, beside: Sequence[Effect]) -> tuple[float, float, dict[str, float]]:
@@ -106,10 +106,10 @@ def upper_bound(fit: ChannelFit, effect: Effect, beside: Sequence[Effect]) -> tu
     """
     most = fit_effects(fit, (*beside, effect))
     fall = IDENTIFIED * max(1.0, fit.excess) ** 2
-    column, *others = (unit_spectrum(each, fit.parts, _shape(each, most)) for each in (effect, *beside))
+    column, *columns = (unit_spectrum(e, fit.parts, _shape(e, most)) for e in (effect, *beside))
     power = most.values[effect.name][effect.parameters[0].name] ** 2
-    G = np.column_stack(others) if others else None
-    start = np.array([most.values[each.name][each.parameters[0].name] ** 2 for each in beside])
+    G = np.column_stack(columns) if columns else None
+    start = np.array([most.values[e.name][e.parameters[0].name] ** 2 for e in beside])
 
     def loss(log_power: float) -> float:
         base = np.exp(log_power) * column
@@ -128,41 +128,41 @@ def upper_bound(fit: ChannelFit, effect: Effect, beside: Sequence[Effect]) -> tu
     return float(np.sqrt(power)), float(np.exp(bound / 2)), most.values[effect.name]
 
 
-def _shape(effect: Effect, found: ChannelFit) -> Values:
+def _shape(effect: Effect, fit: ChannelFit) -> Values:
     """Its fitted parameters but the strength."""
-    return {p.name: found.values[effect.name][p.name] for p in effect.parameters[1:]}
+    return {p.name: fit.values[effect.name][p.name] for p in effect.parameters[1:]}
 
 
-def power_covariance(found: ChannelFit) -> tuple[list[tuple[str, str]], Array]:
+def power_covariance(fit: ChannelFit) -> tuple[list[tuple[str, str]], Array]:
     """Each strength's square and each shape as (effect, parameter), and their covariance (p, p)."""
     columns: dict[tuple[str, str], Array] = {}
-    for effect in found.effects:
-        strength, values = effect.parameters[0].name, found.values[effect.name]
-        columns[effect.name, strength] = effect_spectrum(effect, found.parts, {**values, strength: 1.0})
+    for effect in fit.effects:
+        strength, values = effect.parameters[0].name, fit.values[effect.name]
+        columns[effect.name, strength] = effect_spectrum(effect, fit.parts, {**values, strength: 1.0})
         for p in effect.parameters[1:]:
             step = DERIVATIVE_STEP * values[p.name]
             ahead, behind = ({**values, p.name: values[p.name] + side * step} for side in (1, -1))
-            columns[effect.name, p.name] = (found.part_of(effect, ahead) - found.part_of(effect, behind)) / (2 * step)
-    J = information(np.column_stack(list(columns.values())), found.expected, found.freedom)
+            columns[effect.name, p.name] = (fit.part_of(effect, ahead) - fit.part_of(effect, behind)) / (2 * step)
+    J = information(np.column_stack(list(columns.values())), fit.expected, fit.freedom)
     scale = np.sqrt(np.maximum(np.diag(J), np.finfo(float).tiny))
-    wider = max(1.0, found.excess)
+    wider = max(1.0, fit.excess)
     return list(columns), wider**2 * np.linalg.pinv(J / np.outer(scale, scale)) / np.outer(scale, scale)
 
 
-def power_deviations(found: ChannelFit) -> Deviations:
+def power_deviations(fit: ChannelFit) -> Deviations:
     """Standard deviation of each strength's square and of each shape, by (effect, parameter)."""
-    names, matrix = power_covariance(found)
+    names, matrix = power_covariance(fit)
     return dict(zip(names, np.sqrt(np.diag(matrix)).tolist(), strict=True))
 
 
-def _line_estimates(found: ChannelFit, unit: str) -> Iterator[Estimate]:
-    axis = found.channel.axis
-    for k, line in enumerate(found.lines, 1):
+def _line_estimates(fit: ChannelFit, unit: str) -> Iterator[Estimate]:
+    axis = fit.channel.axis
+    for k, line in enumerate(fit.lines, 1):
         yield Estimate(f"amplitude_{k}", axis, float(line.amplitude), float(line.std), unit)
         yield Estimate(f"frequency_{k}", axis, float(line.frequency_hz), float(line.std_hz), "Hz")
-    if not found.lines:
-        why = f"no line exceeds the noise; its amplitude is below {found.line_bound:.2g} {unit}"
-        yield Estimate("amplitude_1", axis, 0.0, float(found.line_bound / INTERVAL_STDS), unit, False, why)
+    if not fit.lines:
+        why = f"no line exceeds the noise; its amplitude is below {fit.line_bound:.2g} {unit}"
+        yield Estimate("amplitude_1", axis, 0.0, float(fit.line_bound / INTERVAL_STDS), unit, False, why)
 
 
 ROUNDS = 2  # over the shapes, where a model has several
@@ -182,11 +182,11 @@ class NoiseFit:
         """The model with its values; uncertainties take as long as the fit."""
         if not self.fitted:
             return self.stated
-        every = [(each, power_deviations(each) if each.effects else {}) for each in self.channels]
+        every = [(pair, power_deviations(pair) if pair.effects else {}) for pair in self.channels]
         terms = tuple(
             Term(
                 term.effect,
-                estimates=tuple(e for each in every for e in estimates(each[0], term.effect, self.still.unit, each[1])),
+                estimates=tuple(e for pair in every for e in estimates(pair[0], term.effect, self.still.unit, pair[1])),
             )
             if term.effect.is_noise
             else term
@@ -202,19 +202,21 @@ class NoiseFit:
     @property
     def log_likelihood(self) -> float:
         """Of all channels."""
-        return sum(each.log_likelihood for each in self.channels)
+        return sum(channel.log_likelihood for channel in self.channels)
 
     @property
     def pooled_excess(self) -> float:
         """The excess over all channels together."""
-        return float(np.sqrt(np.mean([each.excess**2 for each in self.channels])))
+        return float(np.sqrt(np.mean([channel.excess**2 for channel in self.channels])))
 
     @cached_property
     def held_out_excess(self) -> float:
         """Pooled excess on each half of the record with the model fitted to the other half."""
         effects = tuple(term.effect for term in noise_terms(self.stated))
-        each = [_excess_on_other(pair, effects) for c in self.still.channels for pair in (c.halves(), c.halves()[::-1])]
-        return float(np.sqrt(np.mean(np.square(each))))
+        excesses = [
+            _excess_on_other(pair, effects) for c in self.still.channels for pair in (c.halves(), c.halves()[::-1])
+        ]
+        return float(np.sqrt(np.mean(np.square(excesses))))
 
     def share_left(self, start: NoiseFit) -> float:
         """Part of the excess variance of `start` that this fit does not explain; all of it where there is none."""
@@ -224,10 +226,10 @@ class NoiseFit:
 
 def _excess_on_other(halves: tuple[Channel, Channel], effects: Sequence[Effect]) -> float:
     """Excess on the second half with the fit to the first; lines have the phase there that fits."""
-    known, other = halves
-    found = fit_channel(known, effects)
-    there = without_effects(other, found.lines)
-    return ChannelFit(other, there.parts, found.lines, found.effects, found.values).excess
+    fitted_half, other_half = halves
+    fit = fit_channel(fitted_half, effects)
+    spectrum = without_effects(other_half, fit.lines)
+    return ChannelFit(other_half, spectrum.parts, fit.lines, fit.effects, fit.values).excess
 
 
 def noise_terms(model: Model) -> tuple[Term, ...]:
@@ -272,14 +274,14 @@ def find_lines(channel: Channel, beside: Sequence[Effect], most: int) -> Channel
     """
     lines: list[Line] = []
     while True:
-        rest = without_effects(channel, lines)
-        found = strongest_line(channel, tuple(lines), fit_effects(rest, beside).level)
-        if isinstance(found, float) or len(lines) == most:
-            bound = found if isinstance(found, float) else found.amplitude
+        remaining = without_effects(channel, lines)
+        strongest = strongest_line(channel, tuple(lines), fit_effects(remaining, beside).level)
+        if isinstance(strongest, float) or len(lines) == most:
+            bound = strongest if isinstance(strongest, float) else strongest.amplitude
             ordered = tuple(sorted(lines, key=lambda line: -line.amplitude))
-            rest = rest if ordered == rest.lines else without_effects(channel, ordered)
-            return replace(rest, line_bound=bound, fits={})
-        lines.append(found)
+            remaining = remaining if ordered == remaining.lines else without_effects(channel, ordered)
+            return replace(remaining, line_bound=bound, fits={})
+        lines.append(strongest)
 
 
 def without_effects(channel: Channel, lines: Iterable[Line] = ()) -> ChannelFit:
@@ -334,8 +336,8 @@ def _unit_columns(at: ChannelFit, effects: Sequence[Effect], shapes: Mapping[str
 def _best_shape(at: ChannelFit, effect: Effect, grid: Array, shapes: Mapping[str, Values]) -> Values:
     """The most likely shape of one effect beside the others, near the best of a grid (g,)."""
     name = effect.parameters[1].name
-    others = [other for other in at.effects if other is not effect]
-    G = np.column_stack([_unit_columns(at, others, shapes), at.seen]) if others else at.seen[:, None].copy()
+    beside = [e for e in at.effects if e is not effect]
+    G = np.column_stack([_unit_columns(at, beside, shapes), at.seen]) if beside else at.seen[:, None].copy()
     tried = np.array([unit_spectrum(effect, at.parts, {name: value}) for value in grid.tolist()])
     thetas, values = profile(G, tried, at.seen, at.freedom)
     best = int(np.argmax(values))
@@ -349,5 +351,5 @@ def _best_shape(at: ChannelFit, effect: Effect, grid: Array, shapes: Mapping[str
         G[:, -1] = unit_spectrum(effect, at.parts, {name: float(np.exp(log_value))})
         return -float(maximise_from(thetas[best].copy(), G, at.seen, at.freedom, none)[1])
 
-    found = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": 0.02})
-    return {name: float(np.exp(found.x))}
+    optimum = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": 0.02})
+    return {name: float(np.exp(optimum.x))}

@@ -62,10 +62,10 @@ def absorb(tree: Tree, samples: Array, offset: float, third: bool) -> None:
     place = 0
     while place < len(samples):
         have = tree.filled[0]
-        taken = min(TAIL + STEP - have, len(samples) - place)
-        tree.sums[0, have : have + taken] = samples[place : place + taken] - offset
-        _noted(tree, 0, taken)
-        place += taken
+        count = min(TAIL + STEP - have, len(samples) - place)
+        tree.sums[0, have : have + count] = samples[place : place + count] - offset
+        _noted(tree, 0, count)
+        place += count
         level = 0
         while level < LEVELS - 1 and tree.filled[level] >= TAIL + STEP:
             _hand_up(tree, level, third)
@@ -80,14 +80,14 @@ def finish(tree: Tree, third: bool) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _noted(tree: Tree, level: int, taken: int) -> None:
+def _noted(tree: Tree, level: int, count: int) -> None:
     """Count bins that were put into a buffer, and keep the very first."""
     have = tree.filled[level]
-    seen = tree.seen[level]
-    lacks = max(0, min(taken, 2 * OVERLAP - seen))
-    tree.heads[level, seen : seen + lacks] = tree.sums[level, have : have + lacks]
-    tree.filled[level] += taken
-    tree.seen[level] += taken
+    before = tree.seen[level]
+    lacks = max(0, min(count, 2 * OVERLAP - before))
+    tree.heads[level, before : before + lacks] = tree.sums[level, have : have + lacks]
+    tree.filled[level] += count
+    tree.seen[level] += count
 
 
 @njit(cache=True, nogil=True)
@@ -107,11 +107,11 @@ def _hand_up(tree: Tree, level: int, third: bool) -> None:
     tree.sums[level + 1, above : above + pairs] = b0 + b1
     tree.phases[level + 1, above : above + pairs] = p0 + p1 + size * b0
     _noted(tree, level + 1, pairs)
-    kept = min(TAIL, n)
-    b[:kept] = b[n - kept : n].copy()
-    p[:kept] = p[n - kept : n].copy()
-    tree.filled[level] = tree.measured[level] = kept
-    tree.paired[level] = kept - (n - first - 2 * pairs)
+    tail = min(TAIL, n)
+    b[:tail] = b[n - tail : n].copy()
+    p[:tail] = p[n - tail : n].copy()
+    tree.filled[level] = tree.measured[level] = tail
+    tree.paired[level] = tail - (n - first - 2 * pairs)
 
 
 @njit(cache=True, nogil=True)
@@ -201,14 +201,14 @@ def _add_moments(z: Array, old: int, to: Array) -> None:
         a += new[i]
         b += new[i] * new[i]
     start = max(old, 1)
-    here, before = z[start:], z[start - 1 : -1]
-    for i in range(len(here)):
-        c += here[i] * before[i]
-        d += (here[i] - before[i]) ** 2
+    current, before = z[start:], z[start - 1 : -1]
+    for i in range(len(current)):
+        c += current[i] * before[i]
+        d += (current[i] - before[i]) ** 2
     start = max(old, 2)
-    here, before, earlier = z[start:], z[start - 1 : -1], z[start - 2 : -2]
-    for i in range(len(here)):
-        e += (here[i] - before[i]) * (before[i] - earlier[i])
+    current, before, earlier = z[start:], z[start - 1 : -1], z[start - 2 : -2]
+    for i in range(len(current)):
+        e += (current[i] - before[i]) * (before[i] - earlier[i])
     to += np.array((a, b, c, d, e))
 
 
@@ -234,11 +234,11 @@ def reflected_squares(b: Array, k: int) -> float:
     Before the first bin the record goes on as its own mirror image: the total deviation's extension. b (2k,) or more.
     """
     total = 0.0
-    right, left = np.sum(b[1 : k + 1]), b[0] + np.sum(b[: k - 1])
+    right, sum_left = np.sum(b[1 : k + 1]), b[0] + np.sum(b[: k - 1])
     for i in range(1, k):  # `right` is the sum of b[i : i + k], `left` that of the k bins before i
-        total += (right - left) ** 2
+        total += (right - sum_left) ** 2
         right += b[i + k] - b[i]
-        left += b[i] - b[k - 1 - i]
+        sum_left += b[i] - b[k - 1 - i]
     return total
 
 

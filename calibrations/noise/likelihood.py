@@ -32,81 +32,81 @@ NEARLY = 1e-3  # the same on a grid, of which the best point is refined
 
 
 @njit(cache=True, nogil=True)
-def log_likelihood(expected: Array, seen: Array, freedom: Array) -> float:
+def log_likelihood(expected: Array, measured: Array, freedom: Array) -> float:
     """But for a constant."""
-    return -0.5 * float(np.sum(freedom * (np.log(expected) + seen / expected)))
+    return -0.5 * float(np.sum(freedom * (np.log(expected) + measured / expected)))
 
 
 @njit(cache=True, nogil=True)
-def maximise(G: Array, seen: Array, freedom: Array, base: Array) -> tuple[Array, float]:
+def maximise(G: Array, measured: Array, freedom: Array, base: Array) -> tuple[Array, float]:
     """(theta, log L) of S = base + G theta; G (b, p) with p of 1 or more, all others (b,)."""
     p = G.shape[1]
     theta = np.zeros(p)
     for j in range(p):
-        theta[j] = np.exp(np.sum(freedom * np.log(seen / G[:, j])) / np.sum(freedom)) / p
+        theta[j] = np.exp(np.sum(freedom * np.log(measured / G[:, j])) / np.sum(freedom)) / p
     for _ in range(MULTIPLICATIVE_STEPS):
         share = freedom / (base + G @ theta)
-        theta *= np.sqrt((G.T @ (share * share * seen / freedom)) / (G.T @ share))
-    return maximise_from(theta, G, seen, freedom, base)
+        theta *= np.sqrt((G.T @ (share * share * measured / freedom)) / (G.T @ share))
+    return maximise_from(theta, G, measured, freedom, base)
 
 
 @njit(cache=True, nogil=True)
 def maximise_from(
-    theta: Array, G: Array, seen: Array, freedom: Array, base: Array, converged: float = CONVERGED
+    theta: Array, G: Array, measured: Array, freedom: Array, base: Array, converged: float = CONVERGED
 ) -> tuple[Array, float]:
     """The same from coefficients (p,) near the maximum, such as those for a shape nearby."""
-    value = log_likelihood(base + G @ theta, seen, freedom)
+    value = log_likelihood(base + G @ theta, measured, freedom)
     for _ in range(SCORING_STEPS):
-        step = _scoring_step(G, seen, freedom, base, theta) - theta
+        step = _scoring_step(G, measured, freedom, base, theta) - theta
         length = 1.0
         while length > 1e-4:
-            there = theta + length * step
-            S = base + G @ there
+            trial = theta + length * step
+            S = base + G @ trial
             if S.min() > 0.0:
-                better = log_likelihood(S, seen, freedom)
+                better = log_likelihood(S, measured, freedom)
                 if better >= value:
                     break
             length /= 2
         if length <= 1e-4:
             break
         gained = better - value
-        theta, value = there, better
+        theta, value = trial, better
         if gained < converged:
             break
     return theta, value
 
 
 @njit(cache=True, nogil=True)
-def profile(G: Array, shapes: Array, seen: Array, freedom: Array) -> tuple[Array, Array]:
+def profile(G: Array, shapes: Array, measured: Array, freedom: Array) -> tuple[Array, Array]:
     """Coefficients (g, p) and log L (g,) with the last column of G (b, p) replaced by each of `shapes` (g, b)."""
-    base = np.zeros(len(seen))
+    base = np.zeros(len(measured))
     thetas, values = np.zeros((len(shapes), G.shape[1])), np.zeros(len(shapes))
     for k in range(len(shapes)):
         G[:, -1] = shapes[k]
         if k == 0:
-            thetas[k], values[k] = maximise(G, seen, freedom, base)
+            thetas[k], values[k] = maximise(G, measured, freedom, base)
         else:
-            thetas[k], values[k] = maximise_from(thetas[k - 1].copy(), G, seen, freedom, base, NEARLY)
+            thetas[k], values[k] = maximise_from(thetas[k - 1].copy(), G, measured, freedom, base, NEARLY)
     return thetas, values
 
 
 @njit(cache=True, nogil=True)
-def _scoring_step(G: Array, seen: Array, freedom: Array, base: Array, theta: Array) -> Array:
+def _scoring_step(G: Array, measured: Array, freedom: Array, base: Array, theta: Array) -> Array:
     """Where the weighted least squares without negative coefficients has its minimum: coordinate by coordinate."""
     p = len(theta)
     S = base + G @ theta
     weighted = G / (S**2 / freedom).reshape(-1, 1)
-    A, r = G.T @ weighted, weighted.T @ (seen - base)
-    found = theta.copy()
+    A, r = G.T @ weighted, weighted.T @ (measured - base)
+    solution = theta.copy()
     for _ in range(SWEEPS):
         change = 0.0
         for j in range(p):
-            best = max(0.0, found[j] + (r[j] - np.dot(A[j], found)) / A[j, j])
-            change = max(change, abs(best - found[j]) * np.sqrt(A[j, j]))
-            found[j] = best
+            best = max(0.0, solution[j] + (r[j] - np.dot(A[j], solution)) / A[j, j])
+            change = max(change, abs(best - solution[j]) * np.sqrt(A[j, j]))
+            solution[j] = best
         if change < 1e-8:
             break
-    return found
+    return solution
 
 
 def information(columns: Array, expected: Array, freedom: Array) -> Array:
@@ -134,8 +134,8 @@ class ChannelFit:
     @cached_property
     def seen(self) -> Array:
         """Density; no band is quite without power."""
-        seen = np.concatenate([part.density for part in self.parts])
-        return np.asarray(np.maximum(seen, LEAST_DENSITY * seen.max()))
+        density = np.concatenate([part.density for part in self.parts])
+        return np.asarray(np.maximum(density, LEAST_DENSITY * density.max()))
 
     @cached_property
     def freedom(self) -> Array:

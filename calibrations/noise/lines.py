@@ -74,21 +74,21 @@ def without_line(
     turns = _peak(means * window, best + FEWEST_PERIODS)
     wave = np.exp(-2j * np.pi * turns / n * np.arange(n))
     tone = 2 * np.sum(means * window * wave) / window.sum()
-    kept = abs(np.sin(np.pi * turns / n) / (sampling.size * np.sin(np.pi * turns / n / sampling.size)))
-    std = np.sqrt(2 * WINDOW_LOSS * noise[best] / (n * dt)) / kept
-    std_hz = np.sqrt(12) / (2 * np.pi * n * dt) * std * kept / abs(tone)
-    line = Line(turns / (n * dt), float(abs(tone)) / kept, float(std), float(std_hz))
+    response = abs(np.sin(np.pi * turns / n) / (sampling.size * np.sin(np.pi * turns / n / sampling.size)))
+    std = np.sqrt(2 * WINDOW_LOSS * noise[best] / (n * dt)) / response
+    std_hz = np.sqrt(12) / (2 * np.pi * n * dt) * std * response / abs(tone)
+    line = Line(turns / (n * dt), float(abs(tone)) / response, float(std), float(std_hz))
     return means - (tone * wave.conj()).real, line
 
 
-def _peak(windowed: Array, near: int) -> float:
+def _peak(windowed: Array, start: int) -> float:
     """Periods of the tone in the record, to a small part of one."""
     times = np.arange(len(windowed)) / len(windowed)
 
     def negative(turns: float) -> float:
         return -abs(float(np.abs(np.dot(windowed, np.exp(-2j * np.pi * turns * times)))))
 
-    return float(minimize_scalar(negative, bounds=(near - 1, near + 1), method="bounded", options={"xatol": 1e-4}).x)
+    return float(minimize_scalar(negative, bounds=(start - 1, start + 1), method="bounded", options={"xatol": 1e-4}).x)
 
 
 def _median_around(density: Array) -> Array:
@@ -110,21 +110,21 @@ def _median_around(density: Array) -> Array:
 def fast_lines(f: Array, density: Array, freedom: float, above_hz: float, length_s: float) -> tuple[Array, list[Line]]:
     """(densities (f,) with the lines taken off, the lines above a frequency, strongest first)."""
     around = _median_around(density)
-    found, left = [], density.copy()
+    lines, remaining = [], density.copy()
     for _ in range(MOST_FAST_LINES):
-        height = np.where(f > above_hz, left / around, 0.0)
+        height = np.where(f > above_hz, remaining / around, 0.0)
         best = int(np.argmax(height))
         if not len(f) * chdtrc(freedom, freedom * height[best]) < FALSE_LINE:
             break
         lobe = slice(max(0, best - LOBE), best + LOBE + 1)
-        excess = np.maximum(left[lobe] - around[lobe], 0.0)
+        excess = np.maximum(remaining[lobe] - around[lobe], 0.0)
         amplitude = float(np.sqrt(4 * (f[1] - f[0]) * excess.sum()))
         std = float(np.sqrt(2 * WINDOW_LOSS * around[best] / length_s))
-        found.append(
+        lines.append(
             Line(float(np.sum(f[lobe] * excess) / excess.sum()), amplitude, std, CENTROID * float(f[1] - f[0]))
         )
-        left[lobe] = around[lobe]
-    return left, sorted(found, key=lambda line: -line.amplitude)
+        remaining[lobe] = around[lobe]
+    return remaining, sorted(lines, key=lambda line: -line.amplitude)
 
 
 Lines = tuple[Line, ...]
@@ -175,11 +175,13 @@ def fast_without(channel: Channel, lines: Iterable[Line]) -> tuple[Array, Array]
     chosen = f > (above_hz if int(channel.segments.stretches.sum()) >= FEWEST_FAST_STRETCHES else np.inf)
     f, density = f[chosen], density[chosen].copy()
     for line in lines:
-        near = np.flatnonzero(np.abs(f - line.frequency_hz) < REACH * channel.rate_hz / LENGTH)
-        if len(near):
-            around = density[max(0, near[0] - AROUND) : near[-1] + AROUND]
-            left = density[near] - line.amplitude**2 * _window_density(f[near] - line.frequency_hz, channel.rate_hz)
-            density[near] = np.maximum(left, LEAST_DENSITY * np.median(around))
+        chosen_lobe = np.flatnonzero(np.abs(f - line.frequency_hz) < REACH * channel.rate_hz / LENGTH)
+        if len(chosen_lobe):
+            around = density[max(0, chosen_lobe[0] - AROUND) : chosen_lobe[-1] + AROUND]
+            remaining = density[chosen_lobe] - line.amplitude**2 * _window_density(
+                f[chosen_lobe] - line.frequency_hz, channel.rate_hz
+            )
+            density[chosen_lobe] = np.maximum(remaining, LEAST_DENSITY * np.median(around))
     return f, density
 
 

@@ -107,7 +107,7 @@ class Mixtures:
     @cached_property
     def tubes(self) -> dict[str, tuple[float, ...]]:
         """Of each of the others, per channel."""
-        return {effect.name: tuple(tube(each, effect) for each in self.base) for effect in self.others}
+        return {effect.name: tuple(tube(fit, effect) for fit in self.base) for effect in self.others}
 
     @cached_property
     def prices(self) -> dict[str, float]:
@@ -140,13 +140,13 @@ class Mixtures:
 
     def lost_without(self, mixture: Mixture, name: str) -> float:
         """Twice the log-likelihood that a mixture loses without one of its effects."""
-        rest = self.of(effect for effect in mixture.effects if effect.name != name)
-        return mixture.gain - rest.gain
+        smaller = self.of(effect for effect in mixture.effects if effect.name != name)
+        return mixture.gain - smaller.gain
 
     def _fitted(self, effects: Sequence[Effect]) -> tuple[ChannelFit, ...]:
-        return tuple(fit_effects(each, (*self.given, *effects)) for each in self.seen)
+        return tuple(fit_effects(fit, (*self.given, *effects)) for fit in self.seen)
 
 
 def likelihood(channels: Iterable[ChannelFit]) -> float:
     """Logarithm, of all channels together."""
-    return sum(each.log_likelihood for each in channels)
+    return sum(channel.log_likelihood for channel in channels)

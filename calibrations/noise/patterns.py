@@ -89,33 +89,38 @@ class Pattern:
     @property
     def text(self) -> str:
         """In words, with the patterns that the record cannot separate from it."""
-        others = " or ".join(each.plain for each in self.rivals)
-        return f"{self.plain} (this record cannot separate it from {others})" if others else self.plain
+        names_of_rivals = " or ".join(rival.plain for rival in self.rivals)
+        return (
+            f"{self.plain} (this record cannot separate it from {names_of_rivals})" if names_of_rivals else self.plain
+        )
 
     def taken_off(self, channel: Channel) -> Channel:
         """The record without it."""
         return replace(channel, means=channel.means - self.size * self.form) if channel.axis == self.axis else channel
 
 
-def pattern_of(found: ChannelFit, removed: Iterable[Pattern] = ()) -> Pattern | None:
+def pattern_of(fit: ChannelFit, removed: Iterable[Pattern] = ()) -> Pattern | None:
     """The pattern with the greatest gain in one channel; None where chance explains it. `removed`: those before it."""
-    if hidden_in(found.channel.oddities) is not None:
+    if hidden_in(fit.channel.oddities) is not None:
         return None  # rounding makes steps and slopes
-    spectrum, unit = _Ordinates.of(found), found.channel.unit
+    spectrum, unit = _Ordinates.of(fit), fit.channel.unit
     every = [
-        _step(found.channel, spectrum, unit), *_courses(found.channel, spectrum, unit),
-        *_followed(found.channel, spectrum, unit, removed), *_further(found.channel, spectrum, unit, removed),
+        _step(fit.channel, spectrum, unit), *_courses(fit.channel, spectrum, unit),
+        *_followed(fit.channel, spectrum, unit, removed), *_further(fit.channel, spectrum, unit, removed),
     ]  # fmt: skip
-    kinds = {(each.kind, each.cause) for each in every}
-    best, *others = sorted((_best(every, *kind) for kind in kinds), key=lambda each: -each.worth)
+    kinds = {(pattern.kind, pattern.cause) for pattern in every}
+    best, *weaker = sorted((_best(every, *kind) for kind in kinds), key=lambda pattern: -pattern.worth)
     if best.worth <= 0:
         return None
-    return replace(best, rivals=tuple(each for each in others if best.worth - each.worth < INSEPARABLE))
+    return replace(best, rivals=tuple(pattern for pattern in weaker if best.worth - pattern.worth < INSEPARABLE))
 
 
 def _best(every: Iterable[Pattern], kind: str, cause: str) -> Pattern:
     """The best pattern of one kind."""
-    return max((each for each in every if (each.kind, each.cause) == (kind, cause)), key=lambda each: each.worth)
+    return max(
+        (pattern for pattern in every if (pattern.kind, pattern.cause) == (kind, cause)),
+        key=lambda pattern: pattern.worth,
+    )
 
 
 @dataclass(frozen=True)
@@ -127,13 +132,13 @@ class _Ordinates:
     n: int
 
     @classmethod
-    def of(cls, found: ChannelFit) -> _Ordinates:
-        channel = found.channel
+    def of(cls, fit: ChannelFit) -> _Ordinates:
+        channel = fit.channel
         n, step_s = len(channel.means), channel.sampling.interval_s
         last = min(n, 2 + int(channel.corner_hz * n * step_s)) if np.isfinite(channel.corner_hz) else n
         f = np.arange(1, last) / (2 * n * step_s)
-        seen = dct(means_without(channel, found.lines), type=2, norm="ortho")[1:last]
-        return cls(seen, found.level(f) / step_s, n)
+        coefficients = dct(means_without(channel, fit.lines), type=2, norm="ortho")[1:last]
+        return cls(coefficients, fit.level(f) / step_s, n)
 
     def coefficients(self, form: Array) -> Array:
         """Cosine coefficients (k,) of a form of the means (n,)."""
@@ -183,7 +188,7 @@ def _courses(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
     """A straight drift, and the settling with the greatest gain."""
     n, axis = by.n, channel.axis
     tops, bottoms = matched_sums(_course_coefficients(n, len(by.seen)), by.seen / by.variance, 1 / by.variance)
-    sizes, stds, gains = (each.tolist() for each in (tops / bottoms, bottoms**-0.5, tops**2 / bottoms))
+    sizes, stds, gains = (values.tolist() for values in (tops / bottoms, bottoms**-0.5, tops**2 / bottoms))
     hours = channel.sampling.interval_s / 3600
     yield Pattern(
         DRIFT, axis, f"a drift of {axis} by {{}} {unit}/h", partial(_ramp, n, hours), sizes[0] / hours,
@@ -214,20 +219,20 @@ def _course_coefficients(n: int, k: int) -> Array:
     number = np.arange(1, k + 1)
     y = np.pi * number / (2 * n)
     cosine, square, odd = np.cos(y), np.sin(y) ** 2, number % 2 == 1
-    found = np.empty((1 + len(TIMES), k))
-    found[0] = np.where(odd, -cosine / square, 0.0)
-    for row, share in zip(found[1:], TIMES.tolist(), strict=True):
+    coefficients = np.empty((1 + len(TIMES), k))
+    coefficients[0] = np.where(odd, -cosine / square, 0.0)
+    for row, share in zip(coefficients[1:], TIMES.tolist(), strict=True):
         half, end = np.sinh(1 / (2 * n * share)), np.exp(-1 / share)
         row[:] = -half * cosine / (square + half**2) * np.where(odd, 1 + end, 1 - end)
-    return np.asarray(found / np.sqrt(2 * n))
+    return np.asarray(coefficients / np.sqrt(2 * n))
 
 
 def _followed(channel: Channel, by: _Ordinates, unit: str, removed: Iterable[Pattern]) -> Iterator[Pattern]:
     """Outputs that follow a column, as read or without its scatter, at once or with a lag; each column once."""
     price = PATTERN_AMPLITUDE + 2 * float(np.log(len(LAGS) * max(1, len(channel.logged))))
-    known = {each.cause for each in removed if each.axis == channel.axis}
+    removed_causes = {pattern.cause for pattern in removed if pattern.axis == channel.axis}
     for name, column in channel.logged.items():
-        if name in known:
+        if name in removed_causes:
             continue
         for values, doubt in ((column.read, 0.0), (column.level, column.doubt)):
             share = _best_lag(values, by)
@@ -254,8 +259,8 @@ def _best_lag(values: Array, by: _Ordinates) -> float:
     if losses[0] - losses[best] < INSEPARABLE or -losses[best] < PATTERN_AMPLITUDE:
         return 0.0
     ends = LAGS[max(1, best - 1)], LAGS[min(len(LAGS) - 1, best + 1)]
-    found = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": LAG_PRECISION * LAGS[best]})
-    return float(found.x if found.fun < losses[best] else LAGS[best])
+    optimum = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": LAG_PRECISION * LAGS[best]})
+    return float(optimum.x if optimum.fun < losses[best] else LAGS[best])
 
 
 def _further(channel: Channel, by: _Ordinates, unit: str, removed: Iterable[Pattern]) -> Iterator[Pattern]:
@@ -274,11 +279,11 @@ def _further(channel: Channel, by: _Ordinates, unit: str, removed: Iterable[Patt
             yield Pattern(FOLLOWS, channel.axis, text, make, *by.matched(form), price, line.cause, further=True)
 
 
-def refitted(patterns: tuple[Pattern, ...], found: ChannelFit, whole: Channel) -> tuple[Pattern, ...]:
-    """The patterns of one channel with their amounts fitted together to the `whole` record, beside a fit's effects."""
-    by = _Ordinates.of(replace(found, channel=whole))
-    forms = np.column_stack([by.coefficients(each.form) for each in patterns]) / np.sqrt(by.variance)[:, None]
+def refitted(patterns: tuple[Pattern, ...], fit: ChannelFit, channel: Channel) -> tuple[Pattern, ...]:
+    """The patterns of one channel with amounts fitted together to its whole record, beside a fit's effects."""
+    by = _Ordinates.of(replace(fit, channel=channel))
+    forms = np.column_stack([by.coefficients(pattern.form) for pattern in patterns]) / np.sqrt(by.variance)[:, None]
     size, *_ = np.linalg.lstsq(forms, by.seen / np.sqrt(by.variance), rcond=None)
     std = np.sqrt(np.diag(np.linalg.pinv(forms.T @ forms)))
-    std = np.hypot(std, [each.doubt * a for each, a in zip(patterns, size, strict=True)])
+    std = np.hypot(std, [pattern.doubt * a for pattern, a in zip(patterns, size, strict=True)])
     return tuple(replace(p, size=float(a), std=float(s)) for p, a, s in zip(patterns, size, std, strict=True))

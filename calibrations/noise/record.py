@@ -38,10 +38,10 @@ class Logged:
     doubt: float
     mean: float = 0.0
 
-    def part(self, which: slice) -> Logged:
+    def part(self, span: slice) -> Logged:
         """Some of the record, which is a record of its own."""
-        read, level = (values[which] - values[which].mean() for values in (self.read, self.level))
-        return Logged(read, level, self.doubt, self.mean + float(self.read[which].mean()))
+        read, level = (values[span] - values[span].mean() for values in (self.read, self.level))
+        return Logged(read, level, self.doubt, self.mean + float(self.read[span].mean()))
 
 
 def logged_column(blocks: Sequence[Array], n: int) -> Logged | None:
@@ -54,8 +54,8 @@ def logged_column(blocks: Sequence[Array], n: int) -> Logged | None:
     read = means.values()
     if sum(map(len, blocks)) != n or np.ptp(read) == 0:
         return None
-    whole = sum(float(np.sum(block)) for block in blocks) / n
-    return Logged(read, *without_scatter(read, readings), whole)
+    mean = sum(float(np.sum(block)) for block in blocks) / n
+    return Logged(read, *without_scatter(read, readings), mean)
 
 
 # A still record of any length, reduced in one pass to all that its noise is told from.
@@ -86,8 +86,8 @@ class Reduction:
         odd = self._ends, self._outliers, self._stuck, self._steps
         for block in blocks:
             samples = require_numbers(np.asarray(block), self.n, source)
-            for each in (self.octaves, self.means, self.welch, *odd):
-                each.add(samples)
+            for statistic in (self.octaves, self.means, self.welch, *odd):
+                statistic.add(samples)
             yield samples
         require_length(self.n, self.rate_hz, self.corner_hz, source)
         self._ends.check(source)
@@ -173,9 +173,9 @@ class Channel:
             self._part(slice(middle, None), self.segments.part(parts // 2, parts)),
         )
 
-    def _part(self, which: slice, segments: Segments) -> Channel:
-        means = self.means[which]
-        logged = {name: column.part(which) for name, column in self.logged.items()}
+    def _part(self, span: slice, segments: Segments) -> Channel:
+        means = self.means[span]
+        logged = {name: column.part(span) for name, column in self.logged.items()}
         return replace(self, n=len(means) * self.size, means=means - means.mean(), segments=segments, logged=logged)
 
 
@@ -222,8 +222,8 @@ class Still:
     @property
     def hidden(self) -> bool:
         """Whether the noise of every channel is below its converter's step."""
-        each = [hidden_in(channel.oddities) for channel in self.channels]
-        return all(hidden is not None and hidden.all for hidden in each)
+        hidden_of_channels = [hidden_in(channel.oddities) for channel in self.channels]
+        return all(hidden is not None and hidden.all for hidden in hidden_of_channels)
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -245,7 +245,7 @@ class Samples:
 
 
 def reduce_record(
-    each: Iterable[Samples],
+    records: Iterable[Samples],
     source: str,
     constants: Mapping[str, str | float] | None = None,
     every_deviation: bool = False,
@@ -258,7 +258,7 @@ def reduce_record(
     """
     digest, channels, unit = hashlib.sha256(), [], ""
     curves: dict[str, dict[str, Curve]] = {}
-    for samples in each:
+    for samples in records:
         reduction = Reduction(samples.rate_hz, samples.corner_hz, every_deviation)
         for values in reduction.read(samples.blocks, f"{source}, channel {samples.name or samples.axis}"):
             digest.update(np.ascontiguousarray(values).tobytes())
@@ -280,7 +280,7 @@ def _channel(samples: Samples, reduction: Reduction) -> Channel:
 
 def logged_columns(blocks: Mapping[str, Sequence[Array]], n: int) -> dict[str, Logged]:
     """Columns read with n samples, in blocks, without constant ones."""
-    every = {name: logged_column(each, n) for name, each in blocks.items()}
+    every = {name: logged_column(block, n) for name, block in blocks.items()}
     return {name: column for name, column in every.items() if column is not None}
 
 

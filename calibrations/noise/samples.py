@@ -161,12 +161,12 @@ class Outliers:
 
     def found(self) -> Wild:
         """Of all samples."""
-        rest = self._waiting
-        if len(rest) > 2 * SIDE:
-            head = rest[SIDE:0:-1] if not self._judged else rest[:0]
+        waiting = self._waiting
+        if len(waiting) > 2 * SIDE:
+            head = waiting[SIDE:0:-1] if not self._judged else waiting[:0]
             self._before -= len(head)
-            self._judge(np.concatenate([head, rest, rest[-2 : -2 - SIDE : -1]]))
-            self._waiting = rest[:0]
+            self._judge(np.concatenate([head, waiting, waiting[-2 : -2 - SIDE : -1]]))
+            self._waiting = waiting[:0]
         placeholder = self._values[0] == self._values[1]  # as 0 or -9.99 for a missing reading
         most = MOST_PLACEHOLDERS if placeholder else MOST_WILD
         return self._wild if self._wild.count <= max(1, int(most * self._judged)) else Wild()
@@ -174,10 +174,10 @@ class Outliers:
     def _judge(self, part: Array) -> None:
         """All but the outer samples of a part."""
         middle = part[SIDE:-SIDE]
-        left, right = middle - _median(part, 0), middle - _median(part, SIDE + 1)
+        to_left, right = middle - _median(part, 0), middle - _median(part, SIDE + 1)
         if len(middle) >= FEWEST_FOR_SCALE or not self._scale:
-            self._scale = float(np.quantile(np.abs(left), DECILE)) / NORMAL
-        off = np.where(np.sign(left) == np.sign(right), np.minimum(np.abs(left), np.abs(right)), 0.0)
+            self._scale = float(np.quantile(np.abs(to_left), DECILE)) / NORMAL
+        off = np.where(np.sign(to_left) == np.sign(right), np.minimum(np.abs(to_left), np.abs(right)), 0.0)
         wild = np.flatnonzero(off > WILD_SAMPLE * self._scale)
         if len(wild) and self._scale > 0:
             self._note(self._before + SIDE + wild, off[wild])
@@ -235,8 +235,8 @@ class Stuck:
     def found(self) -> Run | None:
         """The longest run; None where chance makes such runs."""
         longest = max(self._longest, self._present, key=lambda run: run.length)
-        others = max(1, self._runs)
-        by_chance = (self._n - longest.length) / others * (1 + np.log(others))
+        count = max(1, self._runs)
+        by_chance = (self._n - longest.length) / count * (1 + np.log(count))
         return longest if longest.length > max(SHORTEST_STUCK, STUCK_BEYOND_CHANCE * by_chance) else None
 
     def _end(self, more: int) -> None:
@@ -298,25 +298,25 @@ class Oddity:
     hidden: Hidden | None = None
 
 
-def hidden_in(found: Iterable[Oddity]) -> Hidden | None:
+def hidden_in(oddities_of_channel: Iterable[Oddity]) -> Hidden | None:
     """The noise below a converter's step; None where none is."""
-    return next((each.hidden for each in found if each.hidden is not None), None)
+    return next((oddity.hidden for oddity in oddities_of_channel if oddity.hidden is not None), None)
 
 
 def oddities(
     wild: Wild, stuck: Run | None, hidden: Hidden | None, n: int, rate_hz: float, variance: float
 ) -> tuple[Oddity, ...]:
     """Of a record of n samples, whose neighbours have the Allan variance `variance`."""
-    found = []
+    result = []
     if wild.count:
-        found.append(_wild(wild, n, rate_hz, variance))
+        result.append(_wild(wild, n, rate_hz, variance))
     if stuck is not None and hidden is None:  # below a step, samples are the same for long
         start_s, length_s = stuck.start / rate_hz, stuck.length / rate_hz
         text = f"{stuck.length} samples from t = {start_s:.6g} s on are equal, for {length_s:.4g} s"
-        found.append(Oddity(CONSTANT, text, stuck.length / n > _uncertain(n)))
+        result.append(Oddity(CONSTANT, text, stuck.length / n > _uncertain(n)))
     if hidden is not None:
-        found.append(Oddity(COARSE, hidden.text, True, hidden))
-    return tuple(found)
+        result.append(Oddity(COARSE, hidden.text, True, hidden))
+    return tuple(result)
 
 
 def _wild(wild: Wild, n: int, rate_hz: float, variance: float) -> Oddity:

@@ -69,10 +69,10 @@ class Search:
 
         Each one gains most on top of those before it, so that the error falls early.
         """
-        each = {name: self.mixtures.lost_without(self.mixture, name) for name in self.mixture.names}
+        losses = {name: self.mixtures.lost_without(self.mixture, name) for name in self.mixture.names}
         if self.liner is not None:
-            each[self.liner.name] = max(self._of_lines(), sum(map(_gain_of_lines, self.lines)))
-        return {name: each[name] for name in self._in_order(each)}
+            losses[self.liner.name] = max(self._of_lines(), sum(map(_gain_of_lines, self.lines)))
+        return {name: losses[name] for name in self._in_order(losses)}
 
     def _of_lines(self) -> float:
         """Twice the log-likelihood that the bands lose where lines stay in the record."""
@@ -81,17 +81,17 @@ class Search:
             model = model.with_effect(self.effects[name])
         return 2 * (likelihood(self.mixture.channels) - fit(model, self.still).log_likelihood)
 
-    def _in_order(self, each: Mapping[str, float]) -> Iterator[str]:
+    def _in_order(self, losses: Mapping[str, float]) -> Iterator[str]:
         """Lines gain the same in any order."""
-        left, level = list(each), 0.0
+        waiting, level = list(losses), 0.0
         present: list[Effect] = []
-        while left:
-            rest = [effect for effect in self.mixture.effects if effect.name in left]
-            tried = {effect.name: self.mixtures.of([*present, effect]).gain - level for effect in rest}
-            best = max(left, key=lambda name: tried.get(name, each[name]))
+        while waiting:
+            remaining = [effect for effect in self.mixture.effects if effect.name in waiting]
+            tried = {effect.name: self.mixtures.of([*present, effect]).gain - level for effect in remaining}
+            best = max(waiting, key=lambda name: tried.get(name, losses[name]))
             yield best
-            left.remove(best)
-            present += [effect for effect in rest if effect.name == best]
+            waiting.remove(best)
+            present += [effect for effect in remaining if effect.name == best]
             level += tried.get(best, 0.0)
 
     @cached_property
@@ -108,17 +108,17 @@ class Search:
         return NoiseFit(self.still, model, self.mixture.channels)
 
     def _rivals(self, effect: Effect) -> list[str]:
-        rest = [e for e in self.mixture.effects if e is not effect]
-        found = []
-        for other in self.mixtures.others:
-            if other in self.mixture.effects:
+        remaining = [e for e in self.mixture.effects if e is not effect]
+        names_of_rivals = []
+        for candidate in self.mixtures.others:
+            if candidate in self.mixture.effects:
                 continue
-            swapped = self.mixtures.of([*rest, other])
-            if effect.name in other.contains and _at_longest_shape(swapped, other):
+            swapped = self.mixtures.of([*remaining, candidate])
+            if effect.name in candidate.contains and _at_longest_shape(swapped, candidate):
                 continue
-            if self.mixture.gain - swapped.gain < INSEPARABLE and _is_identified(swapped, other):
-                found.append(other.name)
-        return found
+            if self.mixture.gain - swapped.gain < INSEPARABLE and _is_identified(swapped, candidate):
+                names_of_rivals.append(candidate.name)
+        return names_of_rivals
 
 
 def _gain_of_lines(lines: Lines) -> float:
@@ -128,84 +128,84 @@ def _gain_of_lines(lines: Lines) -> float:
 
 def _is_identified(mixture: Mixture, effect: Effect) -> bool:
     """Whether an effect of a mixture is identified in a channel, as in a table of parameters."""
-    return any(gain_of(each, effect) > IDENTIFIED for each in mixture.channels)
+    return any(gain_of(channel, effect) > IDENTIFIED for channel in mixture.channels)
 
 
 def _at_longest_shape(mixture: Mixture, effect: Effect) -> bool:
     """Whether an effect's shape is the longest that a record shows: it then is the process that it contains."""
     shape = effect.parameters[1].name
     return all(
-        each.values[effect.name][shape] > AT_LONGEST_TIME * shape_grid(effect, shape, each.channel)[-1]
-        for each in mixture.channels
+        channel.values[effect.name][shape] > AT_LONGEST_TIME * shape_grid(effect, shape, channel.channel)[-1]
+        for channel in mixture.channels
     )
 
 
 def search(still: Still, model: Model, effects: Mapping[str, Effect]) -> Search:
     """Raises ModelError for a model without noise."""
-    given = tuple(term.effect for term in noise_terms(model))
-    known = {name: effect for name, effect in effects.items() if effect.is_noise}
-    known |= {effect.name: effect for effect in given}
-    found = _search_once(still, model, known, given)
-    if found.mixture.effects:
-        found = replace(found, telegraphs=tuple(filter(None, map(telegraph_of, found.mixture.channels))))
-    first = found
-    while len(found.patterns) < MOST_PATTERNS * len(still.channels):
-        more = _remove_next_pattern(still, found, given)
-        if more is found:
+    own = tuple(term.effect for term in noise_terms(model))
+    noises = {name: effect for name, effect in effects.items() if effect.is_noise}
+    noises |= {effect.name: effect for effect in own}
+    result = _search_once(still, model, noises, own)
+    if result.mixture.effects:
+        result = replace(result, telegraphs=tuple(filter(None, map(telegraph_of, result.mixture.channels))))
+    first = result
+    while len(result.patterns) < MOST_PATTERNS * len(still.channels):
+        more = _remove_next_pattern(still, result, own)
+        if more is result:
             break
-        found = more
-    return replace(_with_common_amounts(still, found, given), uncleaned=first) if found.patterns else found
+        result = more
+    return replace(_with_common_amounts(still, result, own), uncleaned=first) if result.patterns else result
 
 
-def _with_common_amounts(whole: Still, found: Search, given: tuple[Effect, ...]) -> Search:
+def _with_common_amounts(still: Still, search: Search, own: tuple[Effect, ...]) -> Search:
     """With the amounts of all patterns fitted at once, beside the processes that are left."""
-    beside = found.mixture.channels
-    patterns = _with_amounts(whole, found.patterns, beside)
-    patterns = _with_amounts(whole, tuple(each for each in patterns if not each.needless), beside)
-    cleaned = with_cleaned_curves(without_patterns(whole, patterns), {each.axis for each in patterns})
-    left = _search_once(cleaned, found.model, found.effects, given)
-    return replace(left, patterns=patterns, telegraphs=found.telegraphs)
+    beside = search.mixture.channels
+    patterns = _with_amounts(still, search.patterns, beside)
+    patterns = _with_amounts(still, tuple(pattern for pattern in patterns if not pattern.needless), beside)
+    cleaned = with_cleaned_curves(without_patterns(still, patterns), {pattern.axis for pattern in patterns})
+    result = _search_once(cleaned, search.model, search.effects, own)
+    return replace(result, patterns=patterns, telegraphs=search.telegraphs)
 
 
-def _with_amounts(whole: Still, patterns: tuple[Pattern, ...], beside: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
+def _with_amounts(still: Still, patterns: tuple[Pattern, ...], beside: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
     """The patterns with their amounts fitted together, channel by channel, to the record that holds them all."""
     fitted: list[Pattern] = []
-    for channel, present in zip(whole.channels, beside, strict=True):
+    for channel, present in zip(still.channels, beside, strict=True):
         own = tuple(pattern for pattern in patterns if pattern.axis == channel.axis)
         fitted += refitted(own, present, channel) if own else ()
     return tuple(fitted)
 
 
-def _remove_next_pattern(whole: Still, found: Search, given: tuple[Effect, ...]) -> Search:
-    """The search without the patterns that stand out, if that explains the record better; otherwise `found`.
+def _remove_next_pattern(still: Still, search: Search, own: tuple[Effect, ...]) -> Search:
+    """The search without the patterns that stand out, if that explains the record better; otherwise `search`.
 
     A form that is searched for in the record itself must also make a process unnecessary, or be no chance beside the
     best mixture: noise that jumps has steps and slopes of its own. A logged column is independent of the noise.
     """
-    sure, likely = (_patterns(found, channels) for channels in (found.mixture.channels, found.mixtures.base))
-    tried = [_search_without(whole, found, each, given) for each in (sure, likely) if each]
-    best = max(tried, key=_worth, default=found)
-    logged = any(pattern.kind == FOLLOWS for pattern in best.patterns[len(found.patterns) :])
-    least = _worth(found) + (0.0 if logged else INSEPARABLE)
-    if _worth(best) <= least or likelihood(best.mixtures.base) < likelihood(found.mixtures.base):
-        return found  # without it the model explains less: it was noise
-    fewer = len(best.gains) < len(found.gains)
-    return best if fewer or logged or any(pattern.certain for pattern in sure) else found
+    sure, likely = (_patterns(search, channels) for channels in (search.mixture.channels, search.mixtures.base))
+    tried = [_search_without(still, search, patterns, own) for patterns in (sure, likely) if patterns]
+    best = max(tried, key=_worth, default=search)
+    logged = any(pattern.kind == FOLLOWS for pattern in best.patterns[len(search.patterns) :])
+    least = _worth(search) + (0.0 if logged else INSEPARABLE)
+    if _worth(best) <= least or likelihood(best.mixtures.base) < likelihood(search.mixtures.base):
+        return search  # without it the model explains less: it was noise
+    fewer = len(best.gains) < len(search.gains)
+    return best if fewer or logged or any(pattern.certain for pattern in sure) else search
 
 
-def _search_without(whole: Still, found: Search, patterns: tuple[Pattern, ...], given: tuple[Effect, ...]) -> Search:
+def _search_without(still: Still, search: Search, patterns: tuple[Pattern, ...], own: tuple[Effect, ...]) -> Search:
     """The search without further patterns. A curvature changes the slope beside it, so that amounts are fitted anew."""
-    together = found.patterns + patterns
-    together = _with_amounts(whole, together, found.mixture.channels) if found.patterns else together
-    rest = _search_once(without_patterns(whole, together), found.model, found.effects, given)
-    return replace(rest, patterns=together, telegraphs=found.telegraphs)
+    together = search.patterns + patterns
+    together = _with_amounts(still, together, search.mixture.channels) if search.patterns else together
+    result = _search_once(without_patterns(still, together), search.model, search.effects, own)
+    return replace(result, patterns=together, telegraphs=search.telegraphs)
 
 
-def _patterns(found: Search, channels: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
+def _patterns(search: Search, channels: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
     """The pattern of each channel that has one. A channel that jumps between two levels has steps anyway."""
-    jumping = {telegraph.axis for telegraph in found.telegraphs}
-    free = (each for each in channels if each.channel.axis not in jumping)
-    return tuple(filter(None, (pattern_of(each, found.patterns) for each in free)))
+    jumping = {telegraph.axis for telegraph in search.telegraphs}
+    free = (fit for fit in channels if fit.channel.axis not in jumping)
+    return tuple(filter(None, (pattern_of(fit, search.patterns) for fit in free)))
 
 
 def without_patterns(still: Still, patterns: tuple[Pattern, ...]) -> Still:
@@ -216,48 +216,48 @@ def without_patterns(still: Still, patterns: tuple[Pattern, ...]) -> Still:
     return replace(still, channels=channels)
 
 
-def _worth(found: Search) -> float:
+def _worth(search: Search) -> float:
     """Twice the log-likelihood of the best mixture, less the prices of its effects and of the patterns."""
-    price = sum(found.mixtures.prices[name] for name in found.mixture.names)
-    price += sum(pattern.price for pattern in found.patterns)
-    return 2 * sum(each.log_likelihood for each in found.mixture.channels) - price
+    price = sum(search.mixtures.prices[name] for name in search.mixture.names)
+    price += sum(pattern.price for pattern in search.patterns)
+    return 2 * sum(channel.log_likelihood for channel in search.mixture.channels) - price
 
 
-def _search_once(still: Still, model: Model, known: Mapping[str, Effect], given: tuple[Effect, ...]) -> Search:
-    smooth = tuple(effect for effect in given if "spectrum" in effect.places)
-    others = tuple(e for e in known.values() if "spectrum" in e.places and e not in smooth)
-    plain = tuple(effect for effect in (*smooth, *others) if len(effect.parameters) == 1)
-    most = most_lines(known.values())
+def _search_once(still: Still, model: Model, noises: Mapping[str, Effect], own: tuple[Effect, ...]) -> Search:
+    smooth = tuple(effect for effect in own if "spectrum" in effect.places)
+    missing = tuple(e for e in noises.values() if "spectrum" in e.places and e not in smooth)
+    plain = tuple(effect for effect in (*smooth, *missing) if len(effect.parameters) == 1)
+    most = most_lines(noises.values())
     shown = tuple(find_lines(c, plain, most) if most else without_effects(c) for c in still.channels)
-    return Search(still, model, known, tuple(each.lines for each in shown), (), Mixtures(shown, smooth, others))
+    return Search(still, model, noises, tuple(fit.lines for fit in shown), (), Mixtures(shown, smooth, missing))
 
 
-def candidates(found: Search, before: NoiseFit, doubts: Mapping[str, tuple[str, ...]]) -> tuple[Candidate, ...]:
+def candidates(search: Search, before: NoiseFit, doubts: Mapping[str, tuple[str, ...]]) -> tuple[Candidate, ...]:
     """Every effect that the model does not hold, each alone on top of it; those that are missed come first."""
-    others = [effect for name, effect in found.effects.items() if name not in before.model.effects]
-    after = {effect.name: fit(before.model.with_effect(effect), found.still) for effect in others}
-    gains = {name: 2 * (each.log_likelihood - before.log_likelihood) for name, each in after.items()}
-    if found.liner is not None:
-        gains[found.liner.name] = max(gains[found.liner.name], found.gains[found.liner.name])
-    bands = sum(len(each.seen) for each in before.channels)
-    worth = np.array([_schwarz(effect, gains[effect.name], before, bands) for effect in others])
+    missing = [effect for name, effect in search.effects.items() if name not in before.model.effects]
+    after = {effect.name: fit(before.model.with_effect(effect), search.still) for effect in missing}
+    gains = {name: 2 * (extended.log_likelihood - before.log_likelihood) for name, extended in after.items()}
+    if search.liner is not None:
+        gains[search.liner.name] = max(gains[search.liner.name], search.gains[search.liner.name])
+    bands = sum(len(extended.seen) for extended in before.channels)
+    worth = np.array([_schwarz(effect, gains[effect.name], before, bands) for effect in missing])
     odds = np.exp(np.minimum(np.append(worth, 0.0) - max([*worth, 0.0]), 0.0) / 2)
     probability = odds / odds.sum()
-    made = [
+    result = [
         Candidate(
             effect=effect,
             gain=gains[effect.name],
-            p_value=_p_value(effect, gains[effect.name], before, len(others)),
+            p_value=_p_value(effect, gains[effect.name], before, len(missing)),
             probability=float(probability[k]),
             excess_after=after[effect.name].pooled_excess,
             held_out_after=after[effect.name].held_out_excess,
             indistinguishable_from=doubts.get(effect.name, ()),
         )
-        for k, effect in enumerate(others)
+        for k, effect in enumerate(missing)
     ]
-    order = {name: k for k, name in enumerate(found.gains)}
-    made.sort(key=lambda c: (order.get(c.name, len(order)), -_schwarz(c.effect, c.gain, before, bands)))
-    return tuple(made)
+    order = {name: k for k, name in enumerate(search.gains)}
+    result.sort(key=lambda c: (order.get(c.name, len(order)), -_schwarz(c.effect, c.gain, before, bands)))
+    return tuple(result)
 
 
 def _schwarz(effect: Effect, gain: float, before: NoiseFit, bands: int) -> float:
@@ -269,6 +269,6 @@ def _schwarz(effect: Effect, gain: float, before: NoiseFit, bands: int) -> float
 def _p_value(effect: Effect, gain: float, before: NoiseFit, tried: int) -> float:
     """Chance of such a gain anywhere in the search where nothing is missing."""
     if "lines" in effect.places:
-        ordinates = sum(each.channel.n / 2 for each in before.channels)
+        ordinates = sum(channel.channel.n / 2 for channel in before.channels)
         return float(min(1.0, tried * ordinates * np.exp(-gain / 2)))
-    return min(1.0, tried * chance(gain, [tube(each, effect) for each in before.channels]))
+    return min(1.0, tried * chance(gain, [tube(channel, effect) for channel in before.channels]))

@@ -92,10 +92,10 @@ def table_of_means(still: Still) -> Table:
     """The record as at most `MOST_ROWS` poses at one orientation, with the noise that neighbouring means show."""
     first = still.channels[0]
     size = -(-len(first.means) // MOST_ROWS)
-    whole = _table(first, dict(zip(AXES, (c.means for c in still.channels), strict=False)), still.source)
-    n = whole.n // size
-    columns = {name: x[: n * size].reshape(n, size).mean(axis=1) for name, x in whole.columns.items()}
-    table = replace(whole, columns=columns)
+    means = _table(first, dict(zip(AXES, (c.means for c in still.channels), strict=False)), still.source)
+    n = means.n // size
+    columns = {name: x[: n * size].reshape(n, size).mean(axis=1) for name, x in means.columns.items()}
+    table = replace(means, columns=columns)
     second = np.median(np.abs(np.diff(table.outputs, 2, axis=0)), axis=0) / 0.6745 / np.sqrt(6)
     white = np.maximum(second, LEAST_STD * np.ptp(table.outputs, axis=0))
     return with_white(table, np.tile(white[:, None], (1, n)))
@@ -129,8 +129,8 @@ class SignalSearch:
         """The same with a straight line in the place of one effect, the others fitted anew from their own starts."""
         line = Term(effects[PLACE])
         last = tuple(line if term.name == name else replace(term, estimates=()) for term in self.steps[-1])
-        found = fit_rows(_biased(last, effects), self.table)
-        terms = _terms(found, {term.name for term in last}, still)
+        fit = fit_rows(_biased(last, effects), self.table)
+        terms = _terms(fit, {term.name for term in last}, still)
         steps = []
         for before in self.steps:
             names = {PLACE if term.name == name else term.name for term in before}
@@ -141,20 +141,21 @@ class SignalSearch:
     def without(self, name: str, effects: Mapping[str, Effect], still: Still) -> SignalSearch:
         """The same without one effect, the others fitted anew."""
         at = self.names.index(name)
-        rest = [tuple(term for term in terms if term.name != name) for terms in self.steps]
-        found = fit_rows(_biased(_relabelled(rest[-1], still.axes, AXES), effects), self.table)
-        rest[-1] = _terms(found, {term.name for term in rest[-1]}, still)
+        remaining = [tuple(term for term in terms if term.name != name) for terms in self.steps]
+        fit = fit_rows(_biased(_relabelled(remaining[-1], still.axes, AXES), effects), self.table)
+        remaining[-1] = _terms(fit, {term.name for term in remaining[-1]}, still)
         return replace(
-            self, steps=tuple(terms for k, terms in enumerate(rest) if k != (at if at < len(rest) - 1 else at - 1))
+            self,
+            steps=tuple(terms for k, terms in enumerate(remaining) if k != (at if at < len(remaining) - 1 else at - 1)),
         )
 
     @property
     def names(self) -> tuple[str, ...]:
         """The effects in the order in which they are added to those that are given."""
-        known = list(self.given)
+        names_in_order = list(self.given)
         for terms in self.steps:
-            known += [term.name for term in terms if term.name not in known]
-        return tuple(known[len(self.given) :])
+            names_in_order += [term.name for term in terms if term.name not in names_in_order]
+        return tuple(names_in_order[len(self.given) :])
 
     @property
     def causes(self) -> tuple[str, ...]:
@@ -163,28 +164,28 @@ class SignalSearch:
 
 
 def search_signal(
-    still: Still, effects: Mapping[str, Effect], lag_s: float, given: tuple[Term, ...] = ()
+    still: Still, effects: Mapping[str, Effect], lag_s: float, own: tuple[Term, ...] = ()
 ) -> SignalSearch:
-    """What the temperature does to outputs that follow it beyond the `given` terms, by the search at one orientation.
+    """What the temperature does to outputs that follow it beyond the `own` terms, by the search at one orientation.
 
     Beside slow noise that search may see nothing: then a straight line, with the lag that was found beside that noise.
     """
     from calibrations.discovery.rows import Rows  # noise alone needs no search in rows
 
     table = table_of_means(without_signal(still, ()))
-    found = Rows(table).search(_biased(_relabelled(given, still.axes, AXES), effects), effects)
-    known = {term.name for term in given}
+    search = Rows(table).search(_biased(_relabelled(own, still.axes, AXES), effects), effects)
+    names_so_far = {term.name for term in own}
     steps: list[tuple[Term, ...]] = []
-    for step in found.steps:
+    for step in search.steps:
         if place_of_effect(step.name) == PLACE:
-            known |= {step.name}
-            steps.append(_terms(step.after, known, still))
+            names_so_far |= {step.name}
+            steps.append(_terms(step.after, names_so_far, still))
     if steps:
-        steps[-1] = _terms(found.end, known, still)
-    elif not given:
+        steps[-1] = _terms(search.end, names_so_far, still)
+    elif not own:
         line = Term(effects[PLACE], constants={"lead_s": -lag_s})
         steps.append(_terms(fit_rows(_biased((line,), effects), table), {PLACE}, still))
-    return SignalSearch(tuple(steps), found, table, tuple(term.name for term in given))
+    return SignalSearch(tuple(steps), search, table, tuple(term.name for term in own))
 
 
 def fit_signal(model: Model, still: Still, effects: Mapping[str, Effect]) -> Model:
@@ -192,8 +193,8 @@ def fit_signal(model: Model, still: Still, effects: Mapping[str, Effect]) -> Mod
     terms = signal_terms(model)
     if not terms:
         return model
-    found = fit_rows(_biased(_relabelled(terms, still.axes, AXES), effects), table_of_means(without_signal(still, ())))
-    fitted = {term.name: term for term in _terms(found, {term.name for term in terms}, still)}
+    fit = fit_rows(_biased(_relabelled(terms, still.axes, AXES), effects), table_of_means(without_signal(still, ())))
+    fitted = {term.name: term for term in _terms(fit, {term.name for term in terms}, still)}
     return replace(model, terms=tuple(fitted.get(term.name, term) for term in model.terms))
 
 
@@ -201,16 +202,16 @@ def _biased(terms: tuple[Term, ...], effects: Mapping[str, Effect]) -> Model:
     return Model("at rest", (Term(effects["bias"]), *terms))
 
 
-def _terms(found: Fit, names: set[str], still: Still) -> tuple[Term, ...]:
+def _terms(fit: Fit, names: set[str], still: Still) -> tuple[Term, ...]:
     """Terms of a fit to the table of means, for the axes and the unit of the record.
 
     The scatter of the thermometer is taken off as far as it is known: its doubt adds to that of a slope.
     """
-    chosen = tuple(term for term in found.model.terms if term.name in names)
+    chosen = tuple(term for term in fit.model.terms if term.name in names)
     doubts = {channel.axis: channel.logged[TEMPERATURE].doubt for channel in still.channels}
 
     def stated(e: Estimate) -> Estimate:
-        unit = e.unit.replace(found.table.unit, still.unit)
+        unit = e.unit.replace(fit.table.unit, still.unit)
         doubt = doubts.get(e.axis, 0.0) * e.value if e.name == "slope" else 0.0
         return replace(e, unit=unit, std=None if e.std is None else float(np.hypot(e.std, doubt)))
 

@@ -53,32 +53,34 @@ class Telegraph:
         )
 
 
-def telegraph_of(found: ChannelFit) -> Telegraph | None:
+def telegraph_of(fit: ChannelFit) -> Telegraph | None:
     """The two levels of a channel; None where its processes explain it without them."""
-    if hidden_in(found.channel.oddities) is not None:
+    if hidden_in(fit.channel.oddities) is not None:
         return None  # rounding makes levels
-    values = means_without(found.channel, found.lines)
+    values = means_without(fit.channel, fit.lines)
     widths = [width for width in WIDTHS if width <= len(values)]
     paths = [path for width in widths if (path := _path(values, width)) is not None]
     if not paths:
         return None
     best = min(paths, key=lambda path: _path_price(path) + _path_deviance(values, path))
-    rest = replace(found.channel, means=values - _levels(values, best)[best])
-    left = fit_effects(without_effects(rest, found.lines), found.effects)
-    if 2 * (left.log_likelihood - found.log_likelihood) < _path_price(best) + TWO_LEVELS_BETTER or not _needless(left):
+    remaining = replace(fit.channel, means=values - _levels(values, best)[best])
+    refit = fit_effects(without_effects(remaining, fit.lines), fit.effects)
+    if 2 * (refit.log_likelihood - fit.log_likelihood) < _path_price(best) + TWO_LEVELS_BETTER or not _needless(refit):
         return None
-    return _telegraph(found, values, best)
+    return _telegraph(fit, values, best)
 
 
-def _needless(left: ChannelFit) -> bool:
+def _needless(fit: ChannelFit) -> bool:
     """Whether a slow process is needless without the two levels."""
-    slow = [effect for effect in left.effects if effect.name not in FASTEST]
-    rest = ([other for other in left.effects if other is not effect] for effect in slow)
-    return any(2 * (left.log_likelihood - fit_effects(left, each).log_likelihood) < TWO_LEVELS_BETTER for each in rest)
+    slow = [effect for effect in fit.effects if effect.name not in FASTEST]
+    smaller = ([e for e in fit.effects if e is not effect] for effect in slow)
+    return any(
+        2 * (fit.log_likelihood - fit_effects(fit, effects).log_likelihood) < TWO_LEVELS_BETTER for effects in smaller
+    )
 
 
-def _telegraph(found: ChannelFit, values: Array, path: Path) -> Telegraph:
-    channel, (low, high) = found.channel, _levels(values, path)
+def _telegraph(fit: ChannelFit, values: Array, path: Path) -> Telegraph:
+    channel, (low, high) = fit.channel, _levels(values, path)
     goes, upper = np.flatnonzero(np.diff(path)), int(path.sum())
     stays = [np.count_nonzero(path[np.append(goes, -1)] == level) for level in (0, 1)]
     step_s = channel.sampling.interval_s

@@ -83,8 +83,8 @@ def unknown_text(result: Discovery[Any]) -> str:
         if place["expression"]:
             name = f"{place['place'].replace(':', '-').replace('_', '-')}-form"
             one = place["expression"].startswith(("vx +=", "vy +=", "vz +=")) and len(curve["value"]) > 1
-            other = " (one output; the others need the same with their own axes)" if one else ""
-            lines.append(f"    It looks like: {place['expression']}{other}")
+            remark = " (one output; the others need the same with their own axes)" if one else ""
+            lines.append(f"    It looks like: {place['expression']}{remark}")
             lines.append(
                 f'    To add that in its stead: rig add "{place["expression"]}" --name {name} --model MODEL '
                 f"--data {result.findings.data.source} --out MODEL2"

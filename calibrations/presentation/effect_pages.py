@@ -83,11 +83,11 @@ def drawing(effect: Effect) -> str:
 def write(folder: Path) -> None:
     """Write all pages and pictures, and remove those of effects that are no more."""
     effects = catalogue()
-    made = pages(effects) | {f"pictures/{effect.name}.svg": drawing(effect) for effect in effects.values()}
-    for stale in {*folder.glob("*.md"), *folder.glob("pictures/*.svg")} - {folder / name for name in made}:
+    files = pages(effects) | {f"pictures/{effect.name}.svg": drawing(effect) for effect in effects.values()}
+    for stale in {*folder.glob("*.md"), *folder.glob("pictures/*.svg")} - {folder / name for name in files}:
         stale.unlink()
     (folder / "pictures").mkdir(exist_ok=True)
-    for name, text in made.items():
+    for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
 
 
@@ -101,11 +101,11 @@ def _caption(effect: Effect) -> str:
     """What the picture shows, and of how large an effect."""
     if effect.is_noise:
         return _caption_of_noise(effect)
-    kept = {"bias": "a model without a bias", "scale-factor": "a model without a scale factor"}
+    incomplete = {"bias": "a model without a bias", "scale-factor": "a model without a scale factor"}
     kind = effect.first_kind
     plain, turned = kind.perfect_sensor, kind.field or kind.turning
     values = [_value(p, effect) for p in effect.parameters if turned or not p.where]
-    model, shown = kept.get(effect.name, plain), ", ".join(values)
+    model, shown = incomplete.get(effect.name, plain), ", ".join(values)
     return f"Residual of {model} for a sensor{kind.nominal} with {shown}, without noise."
 
 

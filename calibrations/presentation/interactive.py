@@ -61,7 +61,7 @@ def figure(chart: c.Chart, keep: str, drag: Literal["select", "zoom", False] = "
         _panel(panel, "" if number == 1 else str(number), x_domain, y_domain, data, layout)
         if len(places) > 1 and (panel.title or panel.remark):
             layout["margin"]["t"] = TITLE_PX + LEGEND_PX
-            layout["annotations"] += [_referred(each, str(number) if number > 1 else "") for each in _titles(panel)]
+            layout["annotations"] += [_referred(title, str(number) if number > 1 else "") for title in _titles(panel)]
     _share_axes(chart, layout)
     _one_bar_a_scale(data)
     return {"data": data, "layout": layout, "config": CONFIG}
@@ -107,10 +107,10 @@ def height_px(chart: c.Chart) -> int:
 def _places(chart: c.Chart) -> Iterator[tuple[c.Panel, list[float] | None, list[float] | None]]:
     rows = len(chart.panels)
     heights = [chart.height] * rows if isinstance(chart.height, (int, float)) else list(chart.height)
-    whole, top = sum(heights), 1.0
-    gap = ROW_GAP / (whole * INCH_PX)
+    total, top = sum(heights), 1.0
+    gap = ROW_GAP / (total * INCH_PX)
     for row, height in zip(chart.panels, heights, strict=True):
-        bottom = top - height / whole
+        bottom = top - height / total
         for j, panel in enumerate(row):
             x = None if len(row) == 1 else [j / len(row) + COLUMN_GAP * (j > 0), (j + 1) / len(row)]
             yield panel, x, None if rows == 1 else [min(max(bottom, 0.0) + gap * (bottom > 1e-9), top), top]
@@ -122,11 +122,11 @@ def _panel(panel: c.Panel, number: str, x: Any, y: Any, data: list[Trace], layou
     for series in panel.series:
         traces, shapes, notes = _series(series, panel)
         data += [{**trace, **axes, "legend": f"legend{number}"} if number else trace for trace in traces]
-        layout["shapes"] += [_referred(each, number) for each in shapes]
-        layout["annotations"] += [_referred(each, number) for each in notes]
-    for side, axis, domain, other in (("x", panel.x, x, "y"), ("y", panel.y, y, "x")):
-        made = _axis(axis) | ({"domain": domain} if domain else {})
-        layout[f"{side}axis{number}"] = made | ({"anchor": f"{other}{number}"} if number else {})
+        layout["shapes"] += [_referred(shape, number) for shape in shapes]
+        layout["annotations"] += [_referred(note, number) for note in notes]
+    for side, axis, domain, across in (("x", panel.x, x, "y"), ("y", panel.y, y, "x")):
+        settings = _axis(axis) | ({"domain": domain} if domain else {})
+        layout[f"{side}axis{number}"] = settings | ({"anchor": f"{across}{number}"} if number else {})
     if panel.equal:
         layout[f"yaxis{number}"]["scaleanchor"] = f"x{number}"
     if panel.legend:
@@ -149,29 +149,29 @@ DOMAINS = ("x domain", "y domain")
 
 
 def _axis(axis: c.Axis) -> dict[str, Any]:
-    made: dict[str, Any] = {"zeroline": False, "automargin": True, "exponentformat": "none"}
-    made["title"] = {"text": axis.label, "standoff": 6, "font": {"size": SIZE}}
+    settings: dict[str, Any] = {"zeroline": False, "automargin": True, "exponentformat": "none"}
+    settings["title"] = {"text": axis.label, "standoff": 6, "font": {"size": SIZE}}
     ends = (axis.low, axis.high)
     if axis.log:
-        made |= {"type": "log", "exponentformat": "power", "dtick": 1, "tickfont": {"size": SIZE - 2}}
-        made |= _marks(axis)
+        settings |= {"type": "log", "exponentformat": "power", "dtick": 1, "tickfont": {"size": SIZE - 2}}
+        settings |= _marks(axis)
         ends = tuple(None if end is None else float(np.log10(end)) for end in ends)  # type: ignore[assignment]
     if axis.names:
-        made |= {"tickvals": list(range(len(axis.names))), "ticktext": list(axis.names), "showgrid": False}
+        settings |= {"tickvals": list(range(len(axis.names))), "ticktext": list(axis.names), "showgrid": False}
     if axis.ticks == "quarters":
-        made["dtick"] = 90
+        settings["dtick"] = 90
     if axis.ticks == "integers":
-        made["tickformat"] = "d"
+        settings["tickformat"] = "d"
         if axis.low is not None and axis.high is not None and axis.high - axis.low < FEW_INTEGERS:
-            made["dtick"] = 1
+            settings["dtick"] = 1
     if axis.ticks == "dates":
-        made["type"] = "date"
+        settings["type"] = "date"
         ends = tuple(None if end is None else _dates([end])[0] for end in ends)  # type: ignore[assignment]
     if ends != (None, None):
-        made["range"] = list(reversed(ends)) if axis.reverse else list(ends)
+        settings["range"] = list(reversed(ends)) if axis.reverse else list(ends)
     elif axis.reverse:
-        made["autorange"] = "reversed"
-    return made
+        settings["autorange"] = "reversed"
+    return settings
 
 
 def _marks(axis: c.Axis) -> dict[str, Any]:

@@ -56,24 +56,26 @@ def coefficient_table(noise: ChannelNoise, sensed: Sensed | None) -> Cells:
 
 def _disturbances(analysis: NoiseAnalysis) -> Iterable[str]:
     """What is not a noise process, and the coefficients that it spoils."""
-    for each in analysis.disturbances:
-        if each.kind in NOISE:
-            yield f"{sentence(each.text)}\n"
-    others = [each for each in analysis.disturbances if each.kind not in NOISE]
-    if not others:
+    for disturbance in analysis.disturbances:
+        if disturbance.kind in NOISE:
+            yield f"{sentence(disturbance.text)}\n"
+    removable = [disturbance for disturbance in analysis.disturbances if disturbance.kind not in NOISE]
+    if not removable:
         return
     yield "Disturbances that are not noise:"
-    for each in others:
-        effect = " and ".join(analysis.spoils(each))
-        removed = ", removed before the fit" if each.pattern is not None else ""
+    for disturbance in removable:
+        effect = " and ".join(analysis.spoils(disturbance))
+        removed = ", removed before the fit" if disturbance.pattern is not None else ""
         spoils = f"; it spoils {effect}" if effect else ""
-        yield f"  {each.text}{removed}{spoils}{'' if each.matters else '; too small to matter'}"
+        yield f"  {disturbance.text}{removed}{spoils}{'' if disturbance.matters else '; too small to matter'}"
     yield ""
     if analysis.uncleaned is None:
         return
     yield "With these disturbances in the record, the fit would give:"
     for axis, noise in analysis.uncleaned.items():
-        spoilt = {name for each in others if each.axis == axis for name in analysis.spoils(each)}
+        spoilt = {
+            name for disturbance in removable if disturbance.axis == axis for name in analysis.spoils(disturbance)
+        }
         for name, coefficient in noise.coefficients.items():
             if name in spoilt:
                 shown = _shown(coefficient, 1.0, noise.unit, noise.unit)
@@ -123,15 +125,15 @@ def density(noise: ChannelNoise, sensed: Sensed | None) -> str:
 def _allan(noise: ChannelNoise) -> str:
     curve, cleaned = noise.allan, noise.cleaned_allan
     scale, spelt = _ascii_prefixed(float(curve.deviation.max()), noise.unit)
-    values = [f"{each * scale:.4g}" for each in curve.deviation.tolist()]
+    values = [f"{value * scale:.4g}" for value in curve.deviation.tolist()]
     bounds = [f"{low * scale:.4g} .. {high * scale:.4g}" for low, high in zip(curve.low, curve.high, strict=True)]
     table = [[f"{tau:.4g}" for tau in curve.tau_s.tolist()], values, bounds]
     head = ["time (s)", f"Allan deviation ({spelt})", "95 % interval"]
     if noise.search.patterns and np.array_equal(cleaned.tau_s, curve.tau_s):
         head.append("without disturbances")
-        table.append([f"{each * scale:.4g}" for each in cleaned.deviation.tolist()])
+        table.append([f"{value * scale:.4g}" for value in cleaned.deviation.tolist()])
     head.append("by these processes")
-    table.append([f"{each * scale:.4g}" for each in noise.modelled(curve.tau_s).tolist()])
+    table.append([f"{value * scale:.4g}" for value in noise.modelled(curve.tau_s).tolist()])
     lowest_s = minimum_s(curve)
     end = "" if lowest_s is None else f"\nLowest at {lowest_s:.4g} s: averaging for longer does not help."
     return columns(head, list(zip(*table, strict=True))) + end

@@ -76,12 +76,12 @@ def tab_separated(rows: Sequence[ParameterRow]) -> str:
     return "\n".join("\t".join(cells) for cells in (HEAD, *(row.cells for row in rows)))
 
 
-def correlations(found: FittedModel) -> list[Correlated]:
+def correlations(fit: FittedModel) -> list[Correlated]:
     """Pairs of identified parameters with |r| of `STRONG` or more, strongest first.
 
     For data with an uncertainty budget they include the shared inputs, as in the certificate; else the noise alone.
     """
-    pairs = [pair for names, matrix in _matrices(found) for pair in _pairs(names, matrix)]
+    pairs = [pair for names, matrix in _matrices(fit) for pair in _pairs(names, matrix)]
     return sorted(pairs, key=lambda pair: -abs(pair.coefficient))
 
 
@@ -124,26 +124,26 @@ def _change(e: Estimate, before: Estimate | None) -> str:
     return f"{'+' if by > 0 else ''}{minus(rounded(by * factor, 2))} {of}".rstrip() + beyond
 
 
-def _matrices(found: FittedModel) -> Iterator[tuple[list[str], Array]]:
+def _matrices(fit: FittedModel) -> Iterator[tuple[list[str], Array]]:
     """Names and correlation matrix of parameters that were fitted together."""
-    if isinstance(found, Fit):
-        every = [(term, e) for term in found.model.terms for e in term.estimates]
+    if isinstance(fit, Fit):
+        every = [(term, e) for term in fit.model.terms for e in term.estimates]
         shown = [k for k, (term, e) in enumerate(every) if e.identified and e.std and e in term.quantities]
         if shown:
             names = [_name(every[k][0].name, every[k][1].name, every[k][1].axis) for k in shown]
-            yield names, _of_rows(found)[np.ix_(shown, shown)]
-    elif isinstance(found, NoiseFit):
-        for each in found.channels:
-            if each.effects:
-                keys, matrix = power_covariance(each)
-                yield [_name(effect, name, each.channel.axis) for effect, name in keys], normalised(matrix)
+            yield names, _of_rows(fit)[np.ix_(shown, shown)]
+    elif isinstance(fit, NoiseFit):
+        for channel in fit.channels:
+            if channel.effects:
+                keys, matrix = power_covariance(channel)
+                yield [_name(effect, name, channel.channel.axis) for effect, name in keys], normalised(matrix)
 
 
-def _of_rows(found: Fit) -> Array:
-    inputs: Any = input_contributions(found.table) if found.table.type.budget else ()
-    if inputs and (drawn := make_budget(found, inputs)).given:
-        return parameter_correlation(found, drawn, inputs)
-    return normalised(covariance(cautiously(found).information, found.problem.layout.typical)[0])
+def _of_rows(fit: Fit) -> Array:
+    inputs: Any = input_contributions(fit.table) if fit.table.type.budget else ()
+    if inputs and (drawn := make_budget(fit, inputs)).given:
+        return parameter_correlation(fit, drawn, inputs)
+    return normalised(covariance(cautiously(fit).information, fit.problem.layout.typical)[0])
 
 
 def _name(effect: str, parameter: str, axis: str) -> str:

@@ -54,13 +54,13 @@ def specific_force(fit: Fit) -> Array:
 def columns(fit: Fit) -> list[Column]:
     """What the residual is drawn against: angle or specific force, time, temperature, as far as measured."""
     table, n = fit.table, len(fit.channels)
-    found: list[Column] = []
+    first: list[Column] = []
     if table.type.drawn_over:
         name, label, column = table.type.drawn_over
-        found = [_same(name, label, table.column(column), n)]
+        first = [_same(name, label, table.column(column), n)]
     elif table.type.magnitude:
-        found = _sensed(fit, "a")
-    return found + _others(table, n)
+        first = _sensed(fit, "a")
+    return first + _others(table, n)
 
 
 def _sensed(fit: Fit, letter: str) -> list[Column]:
@@ -100,10 +100,10 @@ def _needed(table: Table, name: str, n: int) -> Column:
 
 def _others(table: Table, n: int) -> list[Column]:
     """Time, and temperature where it was measured and moved."""
-    found = [_time(table, n)]
+    columns = [_time(table, n)]
     if "temperature_c" in table and np.ptp(table.column("temperature_c")) > RESOLUTION_C:
-        found.append(_needed(table, "temperature_c", n))
-    return found
+        columns.append(_needed(table, "temperature_c", n))
+    return columns
 
 
 def _time(table: Table, n: int) -> Column:
@@ -121,16 +121,16 @@ def _same(name: str, label: str, values: Array, n: int) -> Column:
 def choices(fit: Fit) -> dict[str, Column]:
     """Columns that a residual may be drawn against or coloured by; the most likely causes first."""
     table, n = fit.table, len(fit.channels)
-    found = {column.name: column for column in columns(fit)}
+    by_name = {column.name: column for column in columns(fit)}
     if table.type.stage_angles:
-        found |= {column.name: column for column in _sensed(fit, "a")}
+        by_name |= {column.name: column for column in _sensed(fit, "a")}
     elif not table.type.moving:
-        found["axis"] = nearest_axis(fit)
-    drawn = {"beta_deg" if name == "beta" else name for name in found} | {"t_s", "temperature_c"} & set(table.columns)
+        by_name["axis"] = nearest_axis(fit)
+    drawn = {"beta_deg" if name == "beta" else name for name in by_name} | {"t_s", "temperature_c"} & set(table.columns)
     for name, values in table.columns.items():
         if name not in drawn:
-            found[name] = Column(name, (named(name),) * n, np.tile(values, (n, 1)))
-    return found
+            by_name[name] = Column(name, (named(name),) * n, np.tile(values, (n, 1)))
+    return by_name
 
 
 def nearest_axis(fit: Fit) -> Column:
@@ -139,10 +139,10 @@ def nearest_axis(fit: Fit) -> Column:
     return Column("axis", (f"axis nearest to {fit.table.type.nearest_to}",) * n, np.tile(nearest, (n, 1)), AXES)
 
 
-def first_choices(found: Sequence[str]) -> tuple[str, str]:
+def first_choices(names: Sequence[str]) -> tuple[str, str]:
     """What to draw against, and what to colour by, at first."""
-    colour = next((name for name in ("alpha_deg", "axis", "time", "row") if name in found), found[-1])
-    return found[0], colour
+    colour = next((name for name in ("alpha_deg", "axis", "time", "row") if name in names), names[-1])
+    return names[0], colour
 
 
 def named(column: str) -> str:
@@ -227,23 +227,25 @@ class Shown:
     def summary(self, points: Sequence[int]) -> str:
         """Selected points, as a number, a range of angles and an error."""
         rows = self.rows[list(points)]
-        left = self.factor * self.fit.residual[self.c, rows]
+        residual = self.factor * self.fit.residual[self.c, rows]
         text = f"{len(rows)} of {self.fit.table.n} selected"
         for name in ("alpha_deg", "beta_deg"):
             if name in self.fit.table:
                 values = self.fit.table.column(name)[rows]
                 text += f", {NAMES[name][0]} {values.min():g} to {values.max():g}°"
-        times = rounded(float(rms(left)) / self.floor, 2)
-        return f"{text}: residual {minus(f'{left.mean():+.3g}')} {self.unit} on average, rms {times} × the noise floor"
+        times = rounded(float(rms(residual)) / self.floor, 2)
+        return (
+            f"{text}: residual {minus(f'{residual.mean():+.3g}')} {self.unit} on average, rms {times} × the noise floor"
+        )
 
     def place(self, row: int) -> str:
         """The pose of a row, and when it was."""
         return "<br>".join(_place(self.fit.table, row))
 
     def _text(self, row: int) -> str:
-        left = float(self.fit.residual[self.c, row])
-        times = rounded(abs(left) / float(self.fit.noise.floor[self.c]), 2)
-        error = f"residual {minus(f'{self.factor * left:+.3g}')} {self.unit}, {times} × the noise floor"
+        residual = float(self.fit.residual[self.c, row])
+        times = rounded(abs(residual) / float(self.fit.noise.floor[self.c]), 2)
+        error = f"residual {minus(f'{self.factor * residual:+.3g}')} {self.unit}, {times} × the noise floor"
         return f"{self.place(row)}<br>{error}"
 
 

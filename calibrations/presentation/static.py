@@ -348,16 +348,16 @@ def compact(text: str) -> str:
     return re.sub(r">\n\s+<", ">\n<", text)
 
 
-def _hoisted(found: re.Match[str]) -> str:
+def _hoisted(match: re.Match[str]) -> str:
     """The markers of one line, their common style given once."""
-    attributes, markers, style = found.groups()
+    attributes, markers, style = match.groups()
     repeated = f' style="{style}"'
     return f"<g{attributes}{repeated}>{markers.replace(repeated, '')}</g>"
 
 
-def _rounded(found: re.Match[str]) -> str:
+def _rounded(match: re.Match[str]) -> str:
     """One attribute with its numbers cut to two decimals, on one line."""
-    return " " + " ".join(FINE.sub(r"\1", found[0]).split())
+    return " " + " ".join(FINE.sub(r"\1", match[0]).split())
 
 
 def sparing(text: str) -> str:
@@ -365,7 +365,7 @@ def sparing(text: str) -> str:
     text = re.sub(r"<!DOCTYPE.*?>\s*|<metadata>.*?</metadata>\s*|<\?xml.*?\?>\s*", "", text, flags=re.DOTALL)
     text = re.sub(r'<g id="[^"]*"', "<g", text).replace("font-family: 'DejaVu Sans', Verdana, sans-serif; ", "")
     text = re.sub(r' transform="rotate\(-0 [^"]*"', "", text)
-    text = COORDINATES.sub(lambda found: re.sub(r"\.0(?=[ \"])", "", re.sub(r"(\.\d)\d+", r"\1", found[0])), text)
+    text = COORDINATES.sub(lambda match: re.sub(r"\.0(?=[ \"])", "", re.sub(r"(\.\d)\d+", r"\1", match[0])), text)
     text = re.sub(r' d="M [-\d. L]*"', lambda path: path[0].replace(" L ", " "), text)
     text = text.replace("<svg ", "<svg font-family=\"'DejaVu Sans', Verdana, sans-serif\" ", 1)
     return re.sub(r">\n(?=</?[a-z])", ">", _classes(text)) + "\n"

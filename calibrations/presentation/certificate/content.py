@@ -217,11 +217,11 @@ class Certificate:
 
 def document(c: Certificate) -> dict[str, Any]:
     """Plain mappings; an infinite value is null."""
-    whole = asdict(c)
-    figures = whole.pop("figures")
+    fields = asdict(c)
+    figures = fields.pop("figures")
     outcomes = [_outcome(o) for o in c.figures.outcomes]
-    made: dict[str, Any] = _finite({"schema": "rig.certificate/1", **whole, **figures, "outcomes": outcomes})
-    return made
+    result: dict[str, Any] = _finite({"schema": "rig.certificate/1", **fields, **figures, "outcomes": outcomes})
+    return result
 
 
 def _outcome(o: Outcome) -> dict[str, Any]:
@@ -233,5 +233,5 @@ def _finite(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
-        return {key: _finite(each) for key, each in value.items()}
-    return [_finite(each) for each in value] if isinstance(value, (list, tuple)) else value
+        return {key: _finite(item) for key, item in value.items()}
+    return [_finite(item) for item in value] if isinstance(value, (list, tuple)) else value

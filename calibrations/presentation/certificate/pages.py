@@ -135,7 +135,7 @@ def _widths(table: Table) -> tuple[float, ...]:
     columns = [[str(row[k]) for row in (table.head, *table.rows)] for k in range(len(table.head))]
     longest = [max(map(len, column)) for column in columns]
     words = [max(len(word) for cell in column for word in cell.split(" ")) for column in columns]
-    return tuple(float(max(min(whole, LONGEST), word) + ROOM) for whole, word in zip(longest, words, strict=True))
+    return tuple(float(max(min(letters, LONGEST), word) + ROOM) for letters, word in zip(longest, words, strict=True))
 
 
 def _write(page: FPDF, text: str, size: float, colour: tuple[int, int, int], style: str = "") -> None:

@@ -47,18 +47,18 @@ LEVEL = 0.95
 CONFIRMED, CONSERVATIVE, WIDENED = "confirmed", "conservative", "widened"
 
 
-def simulate(found: Fit, inputs: Sequence[Contribution], trials: int = TRIALS) -> Array:
+def simulate(fit: Fit, inputs: Sequence[Contribution], trials: int = TRIALS) -> Array:
     """Parameters of each trial, shape (trials, p). The same fit gives the same trials."""
     rng = np.random.default_rng(SEED)
-    cautious = cautiously(found)
+    cautious = cautiously(fit)
     G = row_gains(cautious)
     disturbed = cautious.birge * _noise(cautious.noise, trials, rng)
     for c in inputs:
         if c.std:
-            number = c.shared(found.table)
+            number = c.shared(fit.table)
             errors = c.std * rng.standard_normal((trials, int(number.max()) + 1))
-            disturbed += c.derivative(found.problem, found.theta) * errors[:, None, number]
-    return np.stack([_estimate(found, G, each) for each in disturbed])
+            disturbed += c.derivative(fit.problem, fit.theta) * errors[:, None, number]
+    return np.stack([_estimate(fit, G, residual) for residual in disturbed])
 
 
 def interval(values: Array) -> tuple[Array, Array]:
@@ -80,12 +80,12 @@ def verdict(value: float, expanded: float, std: float, low: float, high: float) 
     return CONSERVATIVE if max(beyond) > tolerance(std) else CONFIRMED
 
 
-def _estimate(found: Fit, G: Array, disturbed: Array) -> Array:
+def _estimate(fit: Fit, G: Array, disturbed: Array) -> Array:
     """The parameters that the disturbed residual leads to: Newton's way with the fit's own gain."""
-    theta = found.theta
+    theta = fit.theta
     for _ in range(STEPS):
-        left = found.problem.residual(theta) - found.residual + disturbed
-        theta = theta - np.einsum("pcn,cn->p", G, left)
+        residual = fit.problem.residual(theta) - fit.residual + disturbed
+        theta = theta - np.einsum("pcn,cn->p", G, residual)
     return theta
 
 
@@ -112,37 +112,35 @@ MISFIT = 1.05  # Birge ratio from which on it is reported
 CERTAIN_K = 2.0  # coverage factor, where the degrees of freedom ask for no more
 
 
-def figures(found: Fit, before: Model | None, limits: Mapping[str, Limit], trials: int = TRIALS) -> Figures:
+def figures(fit: Fit, before: Model | None, limits: Mapping[str, Limit], trials: int = TRIALS) -> Figures:
     """All figures of a fit to poses, positions, rates or fields; `before` is the model in use until now, with values.
 
     Raises ModelError for another kind of table, and where nothing is determined; UnusableData.
     """
-    require_reference(found.table.source, found.table.kind)
-    if (reason := rejection(found) or unexplained_scatter(found)) is not None:
-        raise UnusableData(f"{found.table.source}: no certificate is drawn up: {reason.verdict}: {reason.text}")
-    inputs = input_contributions(found.table)
-    drawn = make_budget(found, inputs)
-    trial = simulate(found, inputs, trials)
-    weights = _weights(found)
+    require_reference(fit.table.source, fit.table.kind)
+    if (reason := rejection(fit) or unexplained_scatter(fit)) is not None:
+        raise UnusableData(f"{fit.table.source}: no certificate is drawn up: {reason.verdict}: {reason.text}")
+    inputs = input_contributions(fit.table)
+    drawn = make_budget(fit, inputs)
+    trial = simulate(fit, inputs, trials)
+    weights = _weights(fit)
     earlier = _values(before) if before is not None else {}
-    certified = [k for k, (_, e) in enumerate(_estimates(found.model)) if e.identified and e.std]
+    certified = [k for k, (_, e) in enumerate(_estimates(fit.model)) if e.identified and e.std]
     outcomes = tuple(
-        _outcome(k, each, e, drawn, trial[:, k], weights[k], found, earlier, limits)
-        for k, (each, e) in enumerate(_estimates(found.model))
+        _outcome(k, t, e, drawn, trial[:, k], weights[k], fit, earlier, limits)
+        for k, (t, e) in enumerate(_estimates(fit.model))
         if k in certified
     )
     if not outcomes:
-        raise ModelError(
-            f"{found.table.source}: the data determine no parameter of {found.model.name}: nothing to certify"
-        )
-    joint = parameter_correlation(found, drawn, inputs)[np.ix_(certified, certified)]
+        raise ModelError(f"{fit.table.source}: the data determine no parameter of {fit.model.name}: nothing to certify")
+    joint = parameter_correlation(fit, drawn, inputs)[np.ix_(certified, certified)]
     return Figures(
-        found.model.name,
+        fit.model.name,
         outcomes,
-        tuple(_errors(found, before)),
+        tuple(_errors(fit, before)),
         drawn.not_given,
         trials,
-        tuple(_remarks(found)),
+        tuple(_remarks(fit)),
         tuple(map(tuple, joint.tolist())),
     )
 
@@ -157,13 +155,11 @@ def require_reference(source: str, kind: str) -> None:
 
 
 def _estimates(model: Model) -> Iterator[tuple[Term, Estimate]]:
-    for each in model.terms:
-        for e in each.estimates:
-            yield each, e
+    return ((t, e) for t in model.terms for e in t.estimates)
 
 
 def _values(model: Model) -> dict[tuple[str, str, str], tuple[float, float | None]]:
-    return {(each.name, e.name, e.axis): (e.value, e.std) for each, e in _estimates(model) if e.identified}
+    return {(t.name, e.name, e.axis): (e.value, e.std) for t, e in _estimates(model) if e.identified}
 
 
 def _outcome(
@@ -173,19 +169,19 @@ def _outcome(
     drawn: Budget,
     trial: Array,
     weights: Array,
-    found: Fit,
+    fit: Fit,
     earlier: Mapping[tuple[str, str, str], tuple[float, float | None]],
     limits: Mapping[str, Limit],
 ) -> Outcome:
     std, coverage = float(drawn.combined[k]), max(CERTAIN_K, float(drawn.coverage[k]))
     low, high = (float(end) for end in interval(trial))
-    said = verdict(e.value, coverage * std, std, low, high)
-    why = _why_further(k, coverage, std, float(trial.std()), drawn) if said == CONSERVATIVE else ""
-    if said == WIDENED:
+    judgement = verdict(e.value, coverage * std, std, low, high)
+    why = _why_further(k, coverage, std, float(trial.std()), drawn) if judgement == CONSERVATIVE else ""
+    if judgement == WIDENED:
         coverage = max(coverage, (e.value - low) / std, (high - e.value) / std)
     limit = limits.get(own := name(of.effect, e.name, e.axis))
     order = np.argsort(-weights)
-    numbers = found.table.numbered(np.arange(found.table.n))
+    numbers = fit.table.numbered(np.arange(fit.table.n))
     return Outcome(
         name=own,
         term=term(of.effect, next(p for p in of.effect.parameters if p.name == e.name)),
@@ -198,7 +194,7 @@ def _outcome(
         coverage=coverage,
         freedom=float(drawn.freedom[k]),
         sources=sources(drawn, k),
-        simulated=Simulated(float(trial.std()), low, high, said, why),
+        simulated=Simulated(float(trial.std()), low, high, judgement, why),
         found=earlier.get((of.name, e.name, e.axis)),
         decision=None if limit is None else decide(e.value, std, coverage * std, limit),
         weights=tuple((int(numbers[i]), float(weights[i])) for i in order),
@@ -215,48 +211,48 @@ def _why_further(k: int, coverage: float, std: float, simulated: float, drawn: B
     return ", ".join(filter(None, reasons))
 
 
-def _weights(found: Fit) -> Array:
+def _weights(fit: Fit) -> Array:
     """By what share each row makes up the square of each parameter's sensitivities to the means, shape (p, n)."""
-    squares = np.sum(row_gains(cautiously(found)) ** 2, axis=1)
-    whole = squares.sum(axis=1, keepdims=True)
-    return np.asarray(squares / np.where(whole > 0, whole, 1.0))
+    squares = np.sum(row_gains(cautiously(fit)) ** 2, axis=1)
+    total = squares.sum(axis=1, keepdims=True)
+    return np.asarray(squares / np.where(total > 0, total, 1.0))
 
 
-def _errors(found: Fit, before: Model | None) -> Iterator[Error]:
+def _errors(fit: Fit, before: Model | None) -> Iterator[Error]:
     """In thousandths of what is sensed, by channel; as found where the earlier model has every value that is needed."""
-    earlier = None if before is None else evaluate(before, found.table)
-    for c, channel in enumerate(found.channels):
-        as_found = None if earlier is None else _size(earlier, c, found)
-        yield Error(channel, milli_unit(found), as_found, _size(found, c, found))
+    earlier = None if before is None else evaluate(before, fit.table)
+    for c, channel in enumerate(fit.channels):
+        as_found = None if earlier is None else _size(earlier, c, fit)
+        yield Error(channel, milli_unit(fit), as_found, _size(fit, c, fit))
 
 
 def _size(of: Fit, c: int, unit_of: Fit) -> tuple[float, float]:
-    each = np.zeros((len(of.channels), 2))
-    each[c] = rms(of.residual[c]), np.abs(of.residual[c]).max()
-    return float(in_milli(each[:, 0], unit_of)[c]), float(in_milli(each[:, 1], unit_of)[c])
+    sizes = np.zeros((len(of.channels), 2))
+    sizes[c] = rms(of.residual[c]), np.abs(of.residual[c]).max()
+    return float(in_milli(sizes[:, 0], unit_of)[c]), float(in_milli(sizes[:, 1], unit_of)[c])
 
 
-def _remarks(found: Fit) -> Iterator[str]:
-    if (why := doubt(found.table)) is not None:
+def _remarks(fit: Fit) -> Iterator[str]:
+    if (why := doubt(fit.table)) is not None:
         yield f"Check: {why}."
-    if found.birge > MISFIT:
+    if fit.birge > MISFIT:
         yield (
-            f"The residual is larger than the noise (Birge ratio {found.birge:.2f}). The uncertainties are multiplied "
+            f"The residual is larger than the noise (Birge ratio {fit.birge:.2f}). The uncertainties are multiplied "
             "by this ratio, and the budget lists it as misfit."
         )
-    for each, e in _estimates(found.model):
+    for t, e in _estimates(fit.model):
         if not e.identified:
-            what = f"{each.name} {f'{e.name} {e.axis}'.strip()}"
-            yield f"Not determined by these data and not certified: {what} ({e.why})."
-    if found.table.type.field:
+            quantity = f"{t.name} {f'{e.name} {e.axis}'.strip()}"
+            yield f"Not determined by these data and not certified: {quantity} ({e.why})."
+    if fit.table.type.field:
         yield (
             "No reference for the strength of the field: the offset and the strength are in the sensor's own unit, and "
             "no scale factor is certified. The relative results need no reference: the field was the same in all rows."
         )
-    if found.table.type.turning and "latitude_deg" not in found.table.constants:
+    if fit.table.type.turning and "latitude_deg" not in fit.table.constants:
         yield (
             f"The latitude is not stated: up to {EARTH_DEG_S:.4f} deg/s of the earth's rotation is in the bias and not "
             "in its uncertainty. Give latitude_deg."
         )
-    if not found.noise.known:
+    if not fit.noise.known:
         yield "The noise of single means is not known; their scatter is used instead."

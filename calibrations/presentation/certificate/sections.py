@@ -107,8 +107,12 @@ def _procedure(c: Certificate) -> Section:
 
 def _environment(c: Certificate) -> Section:
     rows = tuple(
-        (each.name, *(minus(f"{value:.6g}") for value in (each.low, each.mean, each.high)), unit(each.unit))
-        for each in c.conditions
+        (
+            condition.name,
+            *(minus(f"{value:.6g}") for value in (condition.low, condition.mean, condition.high)),
+            unit(condition.unit),
+        )
+        for condition in c.conditions
     )
     head = ("influence", "lowest", "mean", "highest", "unit")
     tables = (Table("During the measurement", head, rows, (1, 2, 3)),) if rows else ()

@@ -71,12 +71,12 @@ class Measure:
     unseen: str = "rows not used in the fit"
 
 
-def levels(found: Falling) -> list[Level]:
+def levels(steps: Falling) -> list[Level]:
     """The model as it was, then each effect added."""
     start = Level(
-        found.start.model.name, found.start.pooled_excess, found.start.held_out_excess, error_text(found.start)
+        steps.start.model.name, steps.start.pooled_excess, steps.start.held_out_excess, error_text(steps.start)
     )
-    after = [Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, error_text(s.after)) for s in found.steps]
+    after = [Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, error_text(s.after)) for s in steps.steps]
     return [start, *after]
 
 
@@ -90,15 +90,15 @@ def waterfall(steps: Sequence[Level], words: Measure = Measure()) -> Chart:
 
     Bars are errors on rows of the fit, diamonds on rows that the fit did not use.
     """
-    seen, unseen = (np.array([getattr(level, name) for level in steps], float) for name in ("seen", "unseen"))
-    reach = 2.2 * max(*seen, *unseen, 3.0)
-    colours = [MODEL, *(GOOD if value < NEAR else MEASURED for value in seen[1:])]
+    excess, unseen = (np.array([getattr(level, name) for level in steps], float) for name in ("seen", "unseen"))
+    reach = 2.2 * max(*excess, *unseen, 3.0)
+    colours = [MODEL, *(GOOD if value < NEAR else MEASURED for value in excess[1:])]
     texts = [f"{rounded(level.seen)} × ({level.rms})" for level in steps]
-    inside = [log10(max(value, BELOW) / BELOW) > LONG * log10(reach / BELOW) for value in seen]
+    inside = [log10(max(value, BELOW) / BELOW) > LONG * log10(reach / BELOW) for value in excess]
     hover = [f"{rounded(value)} × {words.over} on {words.unseen}" for value in unseen]
     series = (
         Span(BELOW, 1.0, "x"),
-        Bars(BELOW, seen, colours, texts, inside),
+        Bars(BELOW, excess, colours, texts, inside),
         Points(unseen, np.arange(len(steps), dtype=float), colour=UNSEEN, symbol="diamond", size=10, hover=hover),
     )
     x = Axis(words.axis, log=True, low=BELOW, high=reach)
@@ -108,8 +108,8 @@ def waterfall(steps: Sequence[Level], words: Measure = Measure()) -> Chart:
 
 def effect_chart(step: Step[Fit]) -> Chart:
     """A row for each channel: the residual before with the effect's curve through it, and the residual after."""
-    found = choices(step.before)
-    colour, x = found[first_choices(list(found))[1]], most_telling(step)
+    columns_of_fit = choices(step.before)
+    colour, x = columns_of_fit[first_choices(list(columns_of_fit))[1]], most_telling(step)
     rows = []
     for k, c in enumerate(drawn_channels(step.before, change_of(step))):
         titles = (f"before; line: {step.name}", "after") if k == 0 else ("", "")
@@ -122,26 +122,26 @@ def effect_chart(step: Step[Fit]) -> Chart:
     return Chart(tuple(rows), row_height(step.before), share_y=True, bar=bar)
 
 
-def album(found: Discovery[Fit], compared: Comparison[Fit], motion: MotionResult | None = None) -> list[Picture]:
+def album(discovery: Discovery[Fit], compared: Comparison[Fit], motion: MotionResult | None = None) -> list[Picture]:
     """Error by model, the given model and its data, the residual pattern, and each effect's curve.
 
     The result of a run of the procedure motion comes first, if it is given.
     """
-    falling, *effects = steps_album(found)
-    return [*(_evaluated(each) for each in (motion,) if each), falling, *fit_album(compared.fit), *effects]
+    falling, *effects = steps_album(discovery)
+    return [*(_evaluated(result) for result in (motion,) if result), falling, *fit_album(compared.fit), *effects]
 
 
-def steps_album(found: Discovery[Fit]) -> list[Picture]:
+def steps_album(discovery: Discovery[Fit]) -> list[Picture]:
     """Error by model, each effect's curve, and the curves of places."""
-    rows = found.start.table.type.rows
+    rows = discovery.start.table.type.rows
     fall = (
         "Error of the model before and after each effect, as a multiple of the noise floor (grey): "
         f"bars on the {rows} of the fit, diamonds on {rows} that the fit did not use."
     )
     return [
-        Picture("waterfall", "Error by model", fall, waterfall(levels(found))),
-        *(_curve(step, found) for step in tried(found)),
-        *place_pictures(found),
+        Picture("waterfall", "Error by model", fall, waterfall(levels(discovery))),
+        *(_curve(step, discovery) for step in tried(discovery)),
+        *place_pictures(discovery),
     ]
 
 
@@ -155,12 +155,12 @@ def _evaluated(motion: MotionResult) -> Picture:
     return Picture("evaluation", "Both models and the displacement sensor", caption, evaluation(motion))
 
 
-def tried(found: Discovery[Fit]) -> tuple[Step[Fit], ...]:
+def tried(discovery: Discovery[Fit]) -> tuple[Step[Fit], ...]:
     """The effects that reduced the error most, in the order added; where none was kept, the best that was tried."""
-    if not found.steps:
-        return found.findings.tried[:1]
-    least = sorted((_fall(step) for step in found.steps), reverse=True)[:MOST_CURVES][-1]
-    return tuple(step for step in found.steps if _fall(step) >= least)
+    if not discovery.steps:
+        return discovery.findings.tried[:1]
+    least = sorted((_fall(step) for step in discovery.steps), reverse=True)[:MOST_CURVES][-1]
+    return tuple(step for step in discovery.steps if _fall(step) >= least)
 
 
 def _fall(step: Step[Fit]) -> float:
@@ -168,10 +168,10 @@ def _fall(step: Step[Fit]) -> float:
     return step.before.pooled_excess / step.after.pooled_excess
 
 
-def _curve(step: Step[Fit], found: Discovery[Fit]) -> Picture:
-    kept = "" if found.steps else "This effect was tried and not kept: it does not explain the residual. "
+def _curve(step: Step[Fit], discovery: Discovery[Fit]) -> Picture:
+    remark = "" if discovery.steps else "This effect was tried and not kept: it does not explain the residual. "
     caption = (
-        f"{kept}Left: the residual before, and the part explained by {step.name} (full line clockwise, broken "
+        f"{remark}Left: the residual before, and the part explained by {step.name} (full line clockwise, broken "
         "line anticlockwise). Right: the residual after, on the same scale."
     )
     return Picture(f"effect-{step.name}", f"Contribution of {step.name}", caption, effect_chart(step))

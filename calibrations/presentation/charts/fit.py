@@ -65,12 +65,12 @@ def fit_album(fit: Fit) -> list[Picture]:
     """The model and its data, the residual, and the residual pattern."""
     model, kind = fit.model.name, fit.table.type
     shown, mapped = (text.format(model) for text in (kind.measurement_caption, kind.failure_caption))
-    left = f"Measured less the model {model}. The grey band is the noise floor, one standard deviation each way."
+    difference = f"Measured less the model {model}. The grey band is the noise floor, one standard deviation each way."
     if len(fit.channels) > len(drawn_channels(fit, fit.residual)):
-        left += f" Only the {MOST_ROWS} outputs with the largest residual are drawn."
+        difference += f" Only the {MOST_ROWS} outputs with the largest residual are drawn."
     return [
         Picture("measurement", "Measurement and model", shown, measurement_chart(fit)),
-        Picture("residual", "Residual", left, residual_chart(fit)),
+        Picture("residual", "Residual", difference, residual_chart(fit)),
         Picture("failure", "Residual pattern", mapped, failure_chart(fit)),
     ]
 
@@ -79,8 +79,8 @@ def measurement_chart(fit: Fit) -> Chart:
     """A panel for each output, or one for the magnitude of positions."""
     if fit.table.type.moving:
         return stacked([motion.measurement(Shown(fit, c, False)) for c in motion.firsts(fit)], 2.6)
-    found, n = choices(fit), 1 if fit.table.type.magnitude else len(fit.channels)
-    x, colour = (found[name] for name in first_choices(list(found)))
+    columns_of_fit, n = choices(fit), 1 if fit.table.type.magnitude else len(fit.channels)
+    x, colour = (columns_of_fit[name] for name in first_choices(list(columns_of_fit)))
     if fit.table.type.magnitude:
         x = columns(fit)[3]
     panels = [measurement(Shown(fit, c, False), x, colour) for c in range(n)]
@@ -90,8 +90,8 @@ def measurement_chart(fit: Fit) -> Chart:
 
 def residual_chart(fit: Fit) -> Chart:
     """A row of panels for each channel, a column for each thing that the residual may follow."""
-    found = choices(fit)
-    colour = found[first_choices(list(found))[1]]
+    columns_of_fit = choices(fit)
+    colour = columns_of_fit[first_choices(list(columns_of_fit))[1]]
     across = columns(fit)
     rows = tuple(
         tuple(residual(Shown(fit, c, False), x, colour, second=x is across[-1]) for x in across)
@@ -218,8 +218,8 @@ def _outputs(shown: Shown) -> tuple[Array, Array, str]:
     """Measured values, the model's values, and their label, for every row."""
     fit, c = shown.fit, shown.c
     if fit.table.type.magnitude:
-        what = f"|{fit.table.type.symbol}| by the model ({fit.table.type.sensed_in})"
-        return 1.0 + fit.residual[0], np.ones(fit.table.n), what
+        magnitude_label = f"|{fit.table.type.symbol}| by the model ({fit.table.type.sensed_in})"
+        return 1.0 + fit.residual[0], np.ones(fit.table.n), magnitude_label
     measured = fit.table.outputs[:, c]
     model = measured - fit.residual[c]
     if not shown.in_g:
@@ -265,7 +265,7 @@ def _map(shown: Shown) -> tuple[Array, Array, tuple[Axis, Axis]]:
         inclinations, row = np.unique(alpha, return_inverse=True)
         if len(inclinations) > MOST_INCLINATIONS:
             return fit.table.column("beta_deg"), alpha, (label, Axis("α (deg)"))
-        names = tuple(f"{each:g}" for each in inclinations)
+        names = tuple(f"{inclination:g}" for inclination in inclinations)
         return fit.table.column("beta_deg"), row.ravel() + APART * side, (label, Axis("α (deg)", names=names))
     if fit.table.type.magnitude:
         a = specific_force(fit)
@@ -296,25 +296,25 @@ def most_telling(step: Step[Fit]) -> Column:
     """The plainest column that the change follows; the change itself where it follows none."""
     change, sides = change_of(step) / step.before.noise.floor[:, None], _sides(step)
     effect = next(term.effect for term in step.after.model.terms if term.name == step.name)
-    found = telling_columns(step.before, effect)
-    told = np.array([explained(change, column.values, sides) for column in found])
+    candidates = telling_columns(step.before, effect)
+    shares = np.array([explained(change, column.values, sides) for column in candidates])
     if step.before.table.type.moving:
-        return found[0]
-    if told.max() < TELLING:
+        return candidates[0]
+    if shares.max() < TELLING:
         label = f"change made by {step.name} ({residual_unit(step.before)})"
         return Column("change", (label,) * len(change), 1e3 * change_of(step))
-    return found[int(np.argmax(told >= told.max() - EQUAL))]
+    return candidates[int(np.argmax(shares >= shares.max() - EQUAL))]
 
 
 def explained(change: Array, values: Array, sides: Array) -> float:
     """Part of the change's variance that is a function of the column, for each side apart; shapes (channels, n)."""
-    left = 0.0
+    unexplained = 0.0
     for y, x in zip(change, values, strict=True):
         part = _parts(x, sides)
         mean = np.bincount(part, y) / np.bincount(part)
-        left += float(np.sum((y - mean[part]) ** 2))
+        unexplained += float(np.sum((y - mean[part]) ** 2))
     total = float(np.sum((change - change.mean(axis=1, keepdims=True)) ** 2))
-    return 1 - left / total if total > 0 else 0.0
+    return 1 - unexplained / total if total > 0 else 0.0
 
 
 def curves(step: Step[Fit], column: Column, c: int) -> Iterator[tuple[float, Array, Array]]:
@@ -357,5 +357,5 @@ def _parts(x: Array, sides: Array) -> NDArray[np.intp]:
     """Number of the part that each row is in: stretches of the column with equal numbers of rows, each side apart."""
     most = min(MOST_PARTS, max(len(x) // ROWS_IN_A_PART, 2))
     edges = np.unique(np.quantile(x, np.linspace(0, 1, most + 1)[1:-1]))
-    both = np.stack([np.searchsorted(edges, x, side="right"), sides])
-    return np.asarray(np.unique(both, axis=1, return_inverse=True)[1]).ravel()
+    keys = np.stack([np.searchsorted(edges, x, side="right"), sides])
+    return np.asarray(np.unique(keys, axis=1, return_inverse=True)[1]).ravel()

@@ -33,12 +33,12 @@ MOST_DOTS = 400  # of a batch
 MOST_NAMED = 6  # sensors of a batch
 
 
-def shares(found: Population) -> Chart:
+def shares(population: Population) -> Chart:
     """Share of each batch's sensors that have each effect."""
-    effects = list(dict.fromkeys(name for batch in found.batches for name in batch.shares))
-    share = np.array([[batch.shares.get(name, 0.0) for batch in found.batches] for name in effects])
+    effects = list(dict.fromkeys(name for batch in population.batches for name in batch.shares))
+    share = np.array([[batch.shares.get(name, 0.0) for batch in population.batches] for name in effects])
     texts = [[percent(float(value)) if value else "" for value in row] for row in share]
-    x = Axis(names=tuple(batch.batch or "no batch" for batch in found.batches))
+    x = Axis(names=tuple(batch.batch or "no batch" for batch in population.batches))
     y = Axis(low=-0.5, high=len(effects) - 0.5, names=tuple(effects), reverse=True)
     return one(Panel((Cells(share, texts),), x, y), ROW * len(effects) + 0.4)
 
@@ -72,26 +72,26 @@ class Spread:
 
 def spreads(quantities: Mapping[str, Sequence[Spread]]) -> Chart:
     """A panel for each quantity, in which every batch has its place."""
-    batches = list(dict.fromkeys(each.batch for of in quantities.values() for each in of))
+    batches = list(dict.fromkeys(spread.batch for of in quantities.values() for spread in of))
     x = Axis(low=-0.6, high=len(batches) - 0.4, names=tuple(batch or "no batch" for batch in batches))
     panels = [
-        Panel(tuple(part for each in of for part in _spread(batches.index(each.batch), each)), x, Axis(), name)
+        Panel(tuple(part for spread in of for part in _spread(batches.index(spread.batch), spread)), x, Axis(), name)
         for name, of in quantities.items()
     ]
     return stacked(panels, 1.7)
 
 
-def _spread(place: int, each: Spread) -> Iterator[Band | Points | Note]:
+def _spread(place: int, spread: Spread) -> Iterator[Band | Points | Note]:
     rng = np.random.default_rng(place)
-    shown = np.sort(rng.permutation(len(each.values))[:MOST_DOTS])
-    shown = np.union1d(shown, np.flatnonzero(each.apart))
-    x = place + WIDE * rng.uniform(-1, 1, len(each.values))
-    if each.band is not None:
-        low, high = (np.full(2, end) for end in each.band)
+    shown = np.sort(rng.permutation(len(spread.values))[:MOST_DOTS])
+    shown = np.union1d(shown, np.flatnonzero(spread.apart))
+    x = place + WIDE * rng.uniform(-1, 1, len(spread.values))
+    if spread.band is not None:
+        low, high = (np.full(2, end) for end in spread.band)
         yield Band(np.array([place - 0.4, place + 0.4]), low, high)
-    values, expanded = each.values[shown], each.expanded[shown]
-    colours = [VERMILION if apart else BLUE for apart in each.apart[shown]]
-    hover = [each.sensors[k] for k in shown]
+    values, expanded = spread.values[shown], spread.expanded[shown]
+    colours = [VERMILION if is_unlike else BLUE for is_unlike in spread.apart[shown]]
+    hover = [spread.sensors[k] for k in shown]
     yield Points(x[shown], values, colour=colours, size=4, low=values - expanded, high=values + expanded, hover=hover)
-    for k in np.flatnonzero(each.apart)[:MOST_NAMED]:
-        yield Note(each.sensors[k], float(x[k]), float(each.values[k]), vertical="middle")
+    for k in np.flatnonzero(spread.apart)[:MOST_NAMED]:
+        yield Note(spread.sensors[k], float(x[k]), float(spread.values[k]), vertical="middle")

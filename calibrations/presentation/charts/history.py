@@ -57,14 +57,14 @@ class Life:
 
 def lives(quantities: Sequence[Life]) -> Chart:
     """A panel for each quantity, over the time of all of them."""
-    ends = [_ends(each) for each in quantities]
+    ends = [_ends(quantity) for quantity in quantities]
     x = _dates(min(start for start, _ in ends), max(end for _, end in ends))
-    return stacked([replace(life(each), x=x) for each in quantities], 2.2)
+    return stacked([replace(life(quantity), x=x) for quantity in quantities], 2.2)
 
 
 def _dates(start: float, end: float) -> Axis:
-    room = MARGIN * (end - start)
-    return Axis(low=start - room, high=end + room, ticks="dates")
+    margin = MARGIN * (end - start)
+    return Axis(low=start - margin, high=end + margin, ticks="dates")
 
 
 def life(q: Life) -> Panel:
@@ -129,7 +129,7 @@ def control_panels(
         RANGES: (2, chart.ranges, 0 * limit, limit, (), since - 1, "range", ""),
     }
     x = Axis("calibration", low=0.5, high=len(chart.values) + 0.5, ticks="integers")
-    made = {}
+    panels = {}
     for title, (first, values, low, high, beyond, judged, label, remark) in parts.items():
         factor, spelt = prefixed(unit(of), float(np.abs([values, high]).max()))
         numbers = np.arange(first, first + len(values), dtype=float)
@@ -138,8 +138,8 @@ def control_panels(
         dots = _control_points(numbers, factor * values, beyond, judged, texts, mine)
         band = Band(numbers, factor * low, factor * high, steps=True)
         series = (band, Rule(0.0, width=0.7), Line(numbers, factor * values, colour=MEASURED, width=1), dots)
-        made[title] = Panel(series, x, Axis(labelled(label, spelt)), title, remark)
-    return made
+        panels[title] = Panel(series, x, Axis(labelled(label, spelt)), title, remark)
+    return panels
 
 
 def _control_points(

@@ -66,21 +66,21 @@ def _models(result: MotionResult) -> tuple[tuple[str, Array, Quantity], ...]:
 def measurement(shown: Shown) -> Panel:
     """Output less its mean over a few periods; dots are measured, the line is the model."""
     axis = _axis(shown)
-    found = waveform(shown.fit, axis)
-    texts = [f"{y:.5g} at {x:.3f} s" for x, y in zip(found.at, shown.factor * found.measured, strict=True)]
-    line = Line(found.at, shown.factor * found.model, "model", hover="model: %{y:.5g}")
-    dots = Points(found.at, shown.factor * found.measured, "measured", size=5, hover=texts)
+    wave = waveform(shown.fit, axis)
+    texts = [f"{y:.5g} at {x:.3f} s" for x, y in zip(wave.at, shown.factor * wave.measured, strict=True)]
+    line = Line(wave.at, shown.factor * wave.model, "model", hover="model: %{y:.5g}")
+    dots = Points(wave.at, shown.factor * wave.measured, "measured", size=5, hover=texts)
     return Panel((line, dots), Axis("time (s)"), Axis(f"{axis} − mean ({shown.unit})"), f"axis {axis}")
 
 
 def failure(shown: Shown) -> Panel:
     """Mean residual over one period of the strongest line; the band is the noise of a mean."""
     axis = _axis(shown)
-    found = over_a_period(shown.fit, axis)
+    period = over_a_period(shown.fit, axis)
     hover = "%{y:.3g} at %{x:.0f} deg"
-    line = Line(found.phase_deg, shown.factor * found.residual, colour=CANDIDATE, hover=hover, markers=True)
-    x = Axis(f"phase of the motion {found.line} (deg)", ticks="quarters")
-    series = (*floor_band(shown.factor * found.floor), line)
+    line = Line(period.phase_deg, shown.factor * period.residual, colour=CANDIDATE, hover=hover, markers=True)
+    x = Axis(f"phase of the motion {period.line} (deg)", ticks="quarters")
+    series = (*floor_band(shown.factor * period.floor), line)
     return Panel(series, x, Axis(f"mean residual of {axis} ({shown.unit})"), f"axis {axis}")
 
 
@@ -130,12 +130,12 @@ def over_a_period(fit: Fit, axis: str) -> Period:
     phase, line = _phase(table)
     part = np.minimum((phase * BINS / 360).astype(int), BINS - 1)
     count = np.bincount(part, minlength=BINS)
-    c, there = table.axes.index(axis), count > 0
+    c, filled = table.axes.index(axis), count > 0
     residual = table.samples.outputs[:, c] - _predicted(fit)[:, c]
     mean = np.bincount(part, residual, minlength=BINS) / np.maximum(count, 1)
     # a part of the period comes once in a period: by then the output filter has forgotten
     floor = float(rms(residual - mean[part])) / np.sqrt(np.median(count))
-    return Period(((np.arange(BINS) + 0.5) * 360 / BINS)[there], mean[there], float(floor), line)
+    return Period(((np.arange(BINS) + 0.5) * 360 / BINS)[filled], mean[filled], float(floor), line)
 
 
 def _stretches(fit: Fit) -> Stretches:
@@ -153,15 +153,15 @@ def _phase(table: Stretches) -> tuple[Array, str]:
     return np.degrees(np.arctan2(-line.in_quadrature, line.in_phase)) % 360, line.name
 
 
-def compensated(found: Residual) -> Chart:
+def compensated(residual: Residual) -> Chart:
     """A row for each axis: the linear model's error on the left, the compensated one on the same scale."""
-    poses = np.arange(found.table.n, dtype=float)
+    poses = np.arange(residual.table.n, dtype=float)
     rows = []
-    for k, axis in enumerate(found.axes):
-        sides = ((found.linear, VERMILION, "linear model"), (found.compensated, BLUE, "compensated"))
+    for k, axis in enumerate(residual.axes):
+        sides = ((residual.linear, VERMILION, "linear model"), (residual.compensated, BLUE, "compensated"))
         rows.append(tuple(
             Panel((Rule(0.0, width=0.7), Points(poses, errors[:, k], colour=colour, size=5)), Axis("pose"),
                   Axis("sensor − reference (mm/s²)"), f"{axis}, {name}: rmse {rounded(rmse)} mm/s²")
-            for (errors, colour, name), rmse in zip(sides, found.rmse[axis], strict=True)
+            for (errors, colour, name), rmse in zip(sides, residual.rmse[axis], strict=True)
         ))  # fmt: skip
     return Chart(tuple(rows), 2.6, share_x=True, share_y=True)

@@ -95,9 +95,9 @@ def scaled(still: Still, axis: str, in_sensed: bool) -> Scaled:
 
 def units(still: Still) -> dict[bool, str]:
     """Units that all of its axes can be drawn in: False the output's, True that of what is sensed."""
-    names = {each.unit for each in still.sensed.values()}
-    known = set(still.sensed) == set(still.axes) and len(names) == 1
-    return {False: still.unit} | ({True: names.pop()} if known else {})
+    names = {sensed.unit for sensed in still.sensed.values()}
+    alike = set(still.sensed) == set(still.axes) and len(names) == 1
+    return {False: still.unit} | ({True: names.pop()} if alike else {})
 
 
 # One channel with noise models
@@ -121,7 +121,7 @@ def allan(curve: Curve | DeviationComparison, into: Scaled, models: Sequence[Dra
     if len(first.effects) + len(first.lines) > 1:
         variances = variance_parts(first, tau_s)
         series += [_part(name, tau_s, by * np.sqrt(variance)) for name, variance in variances.items()]
-    series += [_model(each, tau_s, by * deviation(each.fit, tau_s)) for each in models]
+    series += [_model(model, tau_s, by * deviation(model.fit, tau_s)) for model in models]
     sure = curve.edf > 1
     low, high = by * float(curve.low.min()), by * float(curve.high[sure].max() if sure.any() else curve.high.max())
     y = Axis(f"Allan deviation ({into.unit})", log=True, low=low / 2, high=3 * high)
@@ -137,20 +137,20 @@ def ratio(curve: DeviationComparison) -> Panel:
     return Panel((Rule(1.0, colour=MODEL, width=1.4), dots), Axis(TIME, log=True), Axis("measured / model", log=True))
 
 
-def spectrum(found: ChannelFit, into: Scaled, models: Sequence[Drawn]) -> Panel:
-    """Dots are measured; 95 % of them should be in the grey band by the model `found`; lines are the models."""
-    order, by = np.argsort(found.frequency_hz), into.factor
-    f = found.frequency_hz[order]
-    low, high = (by * root(each[order]) for each in found.interval(COVERAGE))
-    density = by * root(found.seen[order])
+def spectrum(fit: ChannelFit, into: Scaled, models: Sequence[Drawn]) -> Panel:
+    """Dots are measured; 95 % of them should be in the grey band by the model `fit`; lines are the models."""
+    order, by = np.argsort(fit.frequency_hz), into.factor
+    f = fit.frequency_hz[order]
+    low, high = (by * root(bound[order]) for bound in fit.interval(COVERAGE))
+    density = by * root(fit.seen[order])
     series: list[Band | Points | Line | Rule] = [Band(f, low, high), _density_points(f, density, into.unit)]
-    for effect in found.effects if len(found.effects) > 1 else ():
-        series.append(_part(effect.name, f, by * root(found.part_of(effect)[order])))
-    for each in models:
-        there = np.argsort(each.fit.frequency_hz)
-        series.append(_model(each, each.fit.frequency_hz[there], by * root(each.fit.expected[there])))
-    series += [Rule(line.frequency_hz, "x", VERMILION, 0.9, "dot") for line in found.lines]
-    expected = by * root(found.expected)
+    for effect in fit.effects if len(fit.effects) > 1 else ():
+        series.append(_part(effect.name, f, by * root(fit.part_of(effect)[order])))
+    for drawn in models:
+        by_frequency = np.argsort(drawn.fit.frequency_hz)
+        series.append(_model(drawn, drawn.fit.frequency_hz[by_frequency], by * root(drawn.fit.expected[by_frequency])))
+    series += [Rule(line.frequency_hz, "x", VERMILION, 0.9, "dot") for line in fit.lines]
+    expected = by * root(fit.expected)
     bottom = min(float(expected.min()) / ROOM, float(density.min()) / 2)  # no measured point is cut off
     top = max(ROOM * float(expected.max()), 2 * float(density.max()))
     y = Axis(f"density ({into.unit}/√Hz)", log=True, low=bottom, high=top)
@@ -160,8 +160,8 @@ def spectrum(found: ChannelFit, into: Scaled, models: Sequence[Drawn]) -> Panel:
 def record(channel: Channel, into: Scaled) -> Panel:
     """A still record over time: means of its samples, less the mean of all."""
     together = max(1, -(-len(channel.means) // MOST))
-    whole = len(channel.means) // together * together
-    values = into.factor * channel.means[:whole].reshape(-1, together).mean(axis=1)
+    used = len(channel.means) // together * together
+    values = into.factor * channel.means[:used].reshape(-1, together).mean(axis=1)
     each_s = together * channel.size / channel.rate_hz
     size, unit = in_time(channel.length_s)
     hover = f"%{{y:.4g}} {into.unit} at %{{x:.4g}} {unit}"
@@ -182,34 +182,34 @@ def steps_chart(start: NoiseFit, steps: Sequence[Step[NoiseFit]]) -> Chart:
     return waterfall(levels(start, steps), MEASURE)
 
 
-def fit_chart(found: NoiseFit) -> Chart:
+def fit_chart(fit: NoiseFit) -> Chart:
     """The measured Allan deviation of each channel, and that of the model."""
-    into = Scaled(1.0, found.still.unit)
-    curves = (found.still.allan[each.channel.axis] for each in found.channels)
-    drawn = ([Drawn(each, found.model.name, INK)] for each in found.channels)
-    return _named([allan(curve, into, models) for curve, models in zip(curves, drawn, strict=True)], found)
+    into = Scaled(1.0, fit.still.unit)
+    curves = (fit.still.allan[channel.channel.axis] for channel in fit.channels)
+    drawn = ([Drawn(channel, fit.model.name, INK)] for channel in fit.channels)
+    return _named([allan(curve, into, models) for curve, models in zip(curves, drawn, strict=True)], fit)
 
 
-def _off(found: NoiseFit) -> str:
-    return " and ".join(f"{100 * value:.2g} %" for value in mismatch(found).values())
+def _off(fit: NoiseFit) -> str:
+    return " and ".join(f"{100 * value:.2g} %" for value in mismatch(fit).values())
 
 
-def steps_picture(found: Discovery[NoiseFit]) -> Picture:
+def steps_picture(discovery: Discovery[NoiseFit]) -> Picture:
     """Error by model, with its caption."""
     caption = (
         "Mismatch of the model before and after each effect, as a multiple of what chance leaves (grey): bars on the "
         "whole record, diamonds on the part that the fit did not use."
     )
-    return Picture("waterfall", "Error by model", caption, steps_chart(found.start, found.steps))
+    return Picture("waterfall", "Error by model", caption, steps_chart(discovery.start, discovery.steps))
 
 
-def still_album(end: NoiseFit, given: NoiseFit) -> list[Picture]:
-    """Both charts of a report on a noise model, fitted. `given` is the model as it was given; both may be the same."""
-    name, cleaned = end.model.name, end.still is not given.still
-    line = f"The broken grey line is the model {given.model.name}, the full line {name}; thin lines are its parts."
-    other = f", the broken grey line is the model {given.model.name}"
-    if _alike(end, given):
-        line, other = f"The full line is the model {name}; thin lines are its parts.", ""
+def still_album(end: NoiseFit, start: NoiseFit) -> list[Picture]:
+    """Both charts of a report on a noise model, fitted. `start` is the model as it was given; both may be the same."""
+    name, cleaned = end.model.name, end.still is not start.still
+    line = f"The broken grey line is the model {start.model.name}, the full line {name}; thin lines are its parts."
+    dashed = f", the broken grey line is the model {start.model.name}"
+    if _alike(end, start):
+        line, dashed = f"The full line is the model {name}; thin lines are its parts.", ""
     averaging = (
         "Difference of neighbouring means over the time of a mean. Dots are measured, bars are intervals of 95 %. "
         + line
@@ -218,16 +218,16 @@ def still_album(end: NoiseFit, given: NoiseFit) -> list[Picture]:
         averaging += " Rings are the record as measured; dots are the record after removing non-noise signals."
     power = (
         "Power over frequency, one-sided, without the lines that were found. Dots are averages over narrow bands; the "
-        f"grey band holds 95 % of them by the model {name}{other}."
+        f"grey band holds 95 % of them by the model {name}{dashed}."
     )
     curves, densities = [], []
     into = Scaled(1.0, end.still.unit)
-    for after, before in zip(end.channels, given.channels, strict=True):
+    for after, before in zip(end.channels, start.channels, strict=True):
         axis = after.channel.axis
-        models = [Drawn(after, _name(end, given), INK)]
-        if not _alike(end, given):
-            models.append(Drawn(before, given.model.name, dash="dash"))
-        raw = given.still.allan[axis] if cleaned else None
+        models = [Drawn(after, _name(end, start), INK)]
+        if not _alike(end, start):
+            models.append(Drawn(before, start.model.name, dash="dash"))
+        raw = start.still.allan[axis] if cleaned else None
         curves.append(allan(end.still.allan[axis], into, models, raw))
         densities.append(spectrum(after, into, models))
     return [
@@ -239,21 +239,21 @@ def still_album(end: NoiseFit, given: NoiseFit) -> list[Picture]:
 def _named(panels: Sequence[Panel], end: NoiseFit) -> Chart:
     if len(panels) == 1:
         return one(panels[0], HEIGHT)
-    titles = [f"axis {each.channel.axis}" for each in end.channels]
+    titles = [f"axis {channel.channel.axis}" for channel in end.channels]
     return beside([replace(panel, title=title) for panel, title in zip(panels, titles, strict=True)], HEIGHT)
 
 
-def _alike(end: NoiseFit, given: NoiseFit) -> bool:
+def _alike(end: NoiseFit, start: NoiseFit) -> bool:
     """Whether both are one curve: the same effects with the same values, on the same record."""
-    same = [after.values == before.values for after, before in zip(end.channels, given.channels, strict=True)]
-    return all(same) and end.model.effects == given.model.effects
+    same = [after.values == before.values for after, before in zip(end.channels, start.channels, strict=True)]
+    return all(same) and end.model.effects == start.model.effects
 
 
-def _name(end: NoiseFit, given: NoiseFit) -> str:
+def _name(end: NoiseFit, start: NoiseFit) -> str:
     """Of the final model: the given one may have its name and other values, or another record."""
-    if end.model.name != given.model.name or _alike(end, given):
+    if end.model.name != start.model.name or _alike(end, start):
         return end.model.name
-    return f"{end.model.name}, {LESS if end.still is not given.still else 'fitted'}"
+    return f"{end.model.name}, {LESS if end.still is not start.still else 'fitted'}"
 
 
 # Coefficients of `rig noise`
@@ -286,13 +286,15 @@ def _deviations(noise: ChannelNoise) -> Chart:
     processes = noise.processes(tau_s)
     several = len(processes) + len(noise.lines) > 1
     thin = tuple(_part(name, tau_s, np.sqrt(v)) for name, v in processes.items()) if several else ()
-    whole = Line(tau_s, noise.modelled(tau_s), SUM if several else next(iter(processes), SUM), INK, 1.8)
+    total = Line(tau_s, noise.modelled(tau_s), SUM if several else next(iter(processes), SUM), INK, 1.8)
     y = Axis(f"deviation ({noise.unit})", log=True, low=curve.low.min() / 2, high=3 * curve.high.max())
-    left = Panel((*thin, whole, dots), Axis(TIME, log=True), y, "Overlapping Allan deviation", legend="upper center")
-    others = [part for kind, name, colour in OTHERS for part in _other(noise.deviations[kind], name, colour)]
+    overlapping = Panel(
+        (*thin, total, dots), Axis(TIME, log=True), y, "Overlapping Allan deviation", legend="upper center"
+    )
+    curves = [part for kind, name, colour in OTHERS for part in _other(noise.deviations[kind], name, colour)]
     line = Line(curve.tau_s, curve.deviation, "overlapping Allan", QUIET)
-    right = Panel((*others, line), Axis(TIME, log=True), y, "Other deviations", legend="upper center")
-    return beside([left, right], 4.0, share_y=True)
+    right = Panel((*curves, line), Axis(TIME, log=True), y, "Other deviations", legend="upper center")
+    return beside([overlapping, right], 4.0, share_y=True)
 
 
 def _other(curve: Curve, name: str, colour: str) -> tuple[Band, Line]:
@@ -303,9 +305,9 @@ def _other(curve: Curve, name: str, colour: str) -> tuple[Band, Line]:
 def _density(noise: ChannelNoise) -> Chart:
     """Measured and expected one-sided amplitude densities."""
     fit, order = noise.fit, np.argsort(noise.fit.frequency_hz)
-    f, expected, seen = (values[order] for values in (fit.frequency_hz, fit.expected, fit.seen))
+    f, expected, measured = (values[order] for values in (fit.frequency_hz, fit.expected, fit.seen))
     low, high = (root(bound[order]) for bound in fit.interval(COVERAGE))
-    bars, density = [root(bound[order]) for bound in noise.interval], root(seen)
+    bars, density = [root(bound[order]) for bound in noise.interval], root(measured)
     present = [effect for effect in fit.effects if noise.power(effect) > 0]
     series = (
         Band(f, low, high),
@@ -360,5 +362,5 @@ def _part(name: str, x: Array, values: Array) -> Line:
     return Line(x, values, name, COLOURS.get(name, PURPLE), 1.0, "dash", hover=f"{name}: %{{y:.3g}}")
 
 
-def _model(each: Drawn, x: Array, values: Array) -> Line:
-    return Line(x, values, each.label, each.colour, each.width, each.dash, hover=f"{each.label}: %{{y:.3g}}")
+def _model(drawn: Drawn, x: Array, values: Array) -> Line:
+    return Line(x, values, drawn.label, drawn.colour, drawn.width, drawn.dash, hover=f"{drawn.label}: %{{y:.3g}}")

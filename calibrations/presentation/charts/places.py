@@ -76,14 +76,14 @@ class Through:
     share: float
 
 
-def place_pictures(found: Falling) -> list[Picture]:
+def place_pictures(steps: Falling) -> list[Picture]:
     """The falling error as shares by place, and the curve of each place of the last model, the largest first."""
-    end = _end(found)
+    end = _end(steps)
     curves = model_curves(end)
     if not curves:
         return []
-    shares = Picture("shares", "Explained share by place", SHARES_CAPTION, shares_chart(found))
-    return [*([shares] if found.steps else []), *(_picture(curve, forms_through(end, curve)) for curve in curves)]
+    shares = Picture("shares", "Explained share by place", SHARES_CAPTION, shares_chart(steps))
+    return [*([shares] if steps.steps else []), *(_picture(curve, forms_through(end, curve)) for curve in curves)]
 
 
 def model_curves(end: Fit) -> list[PlaceCurve]:
@@ -91,8 +91,8 @@ def model_curves(end: Fit) -> list[PlaceCurve]:
     if end.table.content != "poses":
         return []
     places = dict.fromkeys(place_of_effect(term.name) for term in end.model.terms)
-    found = [curve for place in places if place and (curve := place_curve(end, place)) is not None]
-    return sorted(found, key=lambda curve: -_size(curve, end))[:MOST_PLACES]
+    curves = [curve for place in places if place and (curve := place_curve(end, place)) is not None]
+    return sorted(curves, key=lambda curve: -_size(curve, end))[:MOST_PLACES]
 
 
 def forms_through(end: Fit, curve: PlaceCurve) -> list[Through]:
@@ -109,8 +109,8 @@ def forms_through(end: Fit, curve: PlaceCurve) -> list[Through]:
     table = replace(end.table, columns={**end.table.columns, **outputs})
     table = table.rows(np.arange(0, table.n, max(1, table.n // MOST_ROWS)))  # without noise, a part of the poses does
     base = replace(end.model, terms=tuple(term for term in end.model.terms if term.name in BASE))
-    known = catalogue()
-    effects = [known[name] for name in EFFECTS_AT.get(curve.place, ()) if name in known]
+    effects_by_name = catalogue()
+    effects = [effects_by_name[name] for name in EFFECTS_AT.get(curve.place, ()) if name in effects_by_name]
     fitted = [through for effect in effects if (through := _through(base, effect, end, table, curve)) is not None]
     return sorted((t for t in fitted if t.share >= LEAST_SHARE), key=lambda t: -t.share)[:MOST_FORMS]
 
@@ -125,12 +125,12 @@ def _through(base: Model, effect: Effect, end: Fit, table: Table, curve: PlaceCu
         return None
     if own is None:
         return None
-    left = total = 0.0
+    unexplained = total = 0.0
     for axis, value in curve.value.items():
         form = np.interp(curve.at[axis], own.at[axis], own.value[axis])
-        left += float(np.sum((value - form - np.mean(value - form)) ** 2))
+        unexplained += float(np.sum((value - form - np.mean(value - form)) ** 2))
         total += float(np.sum((value - np.mean(value)) ** 2))
-    return Through(effect.name, own, 1 - left / total if total > 0 else 0.0)
+    return Through(effect.name, own, 1 - unexplained / total if total > 0 else 0.0)
 
 
 def curve_chart(curve: PlaceCurve, forms: Sequence[Through] = ()) -> Chart:
@@ -158,34 +158,34 @@ def curve_panel(curve: PlaceCurve, axis: str, forms: Sequence[Through] = ()) -> 
     return Panel(tuple(series), x, y, axis, legend="best" if first else "")
 
 
-def shares_chart(found: Falling) -> Chart:
+def shares_chart(steps: Falling) -> Chart:
     """For each model the part of the first model's excess variance that it leaves, divided among the places."""
-    names, shares = shares_by_place(found)
+    names, shares = shares_by_place(steps)
     rows = len(shares)
     ends = np.cumsum(shares, axis=1)
-    left = [f"{100 - 100 * each[-1]:.0f} % explained" for each in ends]
-    left[0] = f"{rounded(found.start.pooled_excess)} × the noise floor"
+    texts_of_models = [f"{100 - 100 * row[-1]:.0f} % explained" for row in ends]
+    texts_of_models[0] = f"{rounded(steps.start.pooled_excess)} × the noise floor"
     series = []
     for k in range(len(names) - 1, -1, -1):  # the longest bars below the others
-        texts = left if k == len(names) - 1 else [""] * rows
+        texts = texts_of_models if k == len(names) - 1 else [""] * rows
         colour = {REST: BAND, LINEAR: QUIET, OTHERS: INK}.get(names[k], PLACE_COLOURS[k % len(PLACE_COLOURS)])
         series.append(Bars(0.0, 100 * ends[:, k], [colour] * rows, texts, [False] * rows, names[k]))
-    models = (found.start.model.name, *(f"+ {step.name}" for step in found.steps))
+    models = (steps.start.model.name, *(f"+ {step.name}" for step in steps.steps))
     y = Axis(low=-0.5, high=max(rows, FEWEST_BARS) - 0.5, names=models, reverse=True)
     x = Axis("remaining variance beyond the noise, % of that of the first model", low=0.0, high=135.0)
     return one(Panel(tuple(series), x, y, legend="outside"), 0.9 + ROW * max(rows, FEWEST_BARS))
 
 
-def shares_by_place(found: Falling) -> tuple[list[str], Array]:
+def shares_by_place(steps: Falling) -> tuple[list[str], Array]:
     """Places, and the part of the first model's excess variance that each still holds, (models, places).
 
     The last place is what no step explains. A step's part is the fall of the variance when it is added.
     """
-    errors = np.array([found.start.pooled_excess, *(step.after.pooled_excess for step in found.steps)]) ** 2
+    errors = np.array([steps.start.pooled_excess, *(step.after.pooled_excess for step in steps.steps)]) ** 2
     gains = np.maximum(-np.diff(errors), 0.0)
-    rest = max(float(errors[-1]) - 1.0, 0.0)
-    total = float(gains.sum()) + rest or 1.0
-    at = [_named(step.name) for step in found.steps]
+    unexplained = max(float(errors[-1]) - 1.0, 0.0)
+    total = float(gains.sum()) + unexplained or 1.0
+    at = [_named(step.name) for step in steps.steps]
     size = {name: sum(g for g, a in zip(gains, at, strict=True) if a == name) for name in at}
     names = sorted(size, key=lambda name: (name == LINEAR, -size[name]))
     few = [name for name in names if name != LINEAR][MOST_SHARES:]
@@ -195,7 +195,7 @@ def shares_by_place(found: Falling) -> tuple[list[str], Array]:
     for row in range(len(errors)):
         for k in range(row, len(gains)):
             shares[row, names.index(at[k])] += gains[k] / total
-    shares[:, -1] = rest / total
+    shares[:, -1] = unexplained / total
     return [*names, REST], shares
 
 
@@ -207,8 +207,8 @@ def _named(effect: str) -> str:
     return LINEAR if place == "geometry" else place or effect
 
 
-def _end(found: Falling) -> Fit:
-    return found.steps[-1].after if found.steps else found.start
+def _end(steps: Falling) -> Fit:
+    return steps.steps[-1].after if steps.steps else steps.start
 
 
 def _size(curve: PlaceCurve, end: Fit) -> float:

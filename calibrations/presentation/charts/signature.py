@@ -68,17 +68,17 @@ def signature(effect: Effect) -> list[Part]:
         return [of_field(effect)]
     if effect.first_kind.turning:
         return of_rates(effect)
-    known = catalogue()
+    effects_by_name = catalogue()
     linear: list[Step] = [
-        (known["bias"], Values(bias=np.full(3, 2.5))),
-        (known["scale-factor"], Values(scale=np.ones(3))),
+        (effects_by_name["bias"], Values(bias=np.full(3, 2.5))),
+        (effects_by_name["scale-factor"], Values(scale=np.ones(3))),
     ]
     table = sweep() if effect.excluded(sweep()) is None else motion()
     v, a = forward(table, linear), force(table, linear)
     table = replace(table, columns={**table.columns, "vx_v": v[:, 0], "vy_v": v[:, 1]})
     change = forward(table, [*linear, (effect, shown(effect, table))]) - v
     lefts = [(k, _left(table, change[:, k], v[:, k], effect.name)) for k in range(v.shape[1])]
-    return [_panel(effect, table, a, k, left) for k, left in lefts if left.any()]
+    return [_panel(effect, table, a, k, residual) for k, residual in lefts if residual.any()]
 
 
 def _left(table: Table, change: Array, v: Array, name: str) -> Array:
@@ -89,26 +89,26 @@ def _left(table: Table, change: Array, v: Array, name: str) -> Array:
     once = table.optional("beta_deg", 0.0) < 360.0  # the end of a turn is its beginning
     line = np.column_stack([np.ones(len(v)), v])
     line = {"bias": line[:, :0], "scale-factor": line[:, :1]}.get(name, line)
-    left = change - line @ np.linalg.lstsq(line[once], change[once], rcond=None)[0]
-    return np.asarray(np.round(1e3 * left, DIGITS) + 0.0)
+    residual = change - line @ np.linalg.lstsq(line[once], change[once], rcond=None)[0]
+    return np.asarray(np.round(1e3 * residual, DIGITS) + 0.0)
 
 
-def _panel(effect: Effect, table: Table, a: Array, k: int, left: Array) -> Part:
+def _panel(effect: Effect, table: Table, a: Array, k: int, residual: Array) -> Part:
     """The column of the picture: one that the effect needs, a force that determines the residual, or beta."""
-    axis, other = "xyz"[k], "yxx"[k]
+    axis, other_axis = "xyz"[k], "yxx"[k]
     if table.type.moving:
         close = (table.time_s >= CLOSE_S[0]) & (table.time_s <= CLOSE_S[1])
         rows = np.flatnonzero(close) if "output" in effect.places else np.arange(0, table.n, 8)
-        return Part(axis, left, table.time_s, "time (s)", (Curve("", BLUE, "-", rows),))
+        return Part(axis, residual, table.time_s, "time (s)", (Curve("", BLUE, "-", rows),))
     if needed := [name for name in effect.needs if name in LABELS]:
         over = table.column(needed[0]) / (60.0 if needed[0] == "t_s" else 1.0)
-        return Part(axis, left, over, LABELS[needed[0]], tuple(_by_inclination(table, ("-", "-"))))
-    for name, felt in ((axis, a[:, k]), (other, other_in_plane(a)[:, k])):
-        _, rows, each = np.unique(np.round(felt, 6), return_index=True, return_inverse=True)
-        if np.max(np.abs(left - left[rows][each])) < SAME * np.ptp(left) and _smooth(left[rows]):
-            return Part(axis, left, felt, f"specific force along {name} (g)", (Curve("", BLUE, "-", rows),))
+        return Part(axis, residual, over, LABELS[needed[0]], tuple(_by_inclination(table, ("-", "-"))))
+    for name, felt in ((axis, a[:, k]), (other_axis, other_in_plane(a)[:, k])):
+        _, rows, group = np.unique(np.round(felt, 6), return_index=True, return_inverse=True)
+        if np.max(np.abs(residual - residual[rows][group])) < SAME * np.ptp(residual) and _smooth(residual[rows]):
+            return Part(axis, residual, felt, f"specific force along {name} (g)", (Curve("", BLUE, "-", rows),))
     styles = ("-", "--") if "direction" in effect.needs else ("-",)
-    return Part(axis, left, table.column("beta_deg"), "β (deg)", tuple(_by_inclination(table, styles)))
+    return Part(axis, residual, table.column("beta_deg"), "β (deg)", tuple(_by_inclination(table, styles)))
 
 
 def _smooth(values: Array) -> bool:
@@ -226,29 +226,29 @@ RATES_DEG_S = np.linspace(-100.0, 100.0, 21)
 
 def of_field(effect: Effect) -> Part:
     """What a magnetometer without error leaves of the field's magnitude, in parts per thousand, over full turns."""
-    known = catalogue()["field-strength"]
+    strength = catalogue()["field-strength"]
     table = _turned_in_a_field()
-    steps: list[Step] = [] if effect.name == known.name else [(known, Values(total=np.asarray(1.0)))]
+    steps: list[Step] = [] if effect.name == strength.name else [(strength, Values(total=np.asarray(1.0)))]
     steps.append((effect, shown(effect, table)))
     output = respond(sensed(table.outputs, table, steps), table, steps)
-    left = np.asarray(np.round(1e3 * (np.linalg.norm(output, axis=1) - 1.0), 4) + 0.0)
+    residual = np.asarray(np.round(1e3 * (np.linalg.norm(output, axis=1) - 1.0), 4) + 0.0)
     curves = tuple(_curves(len(TURN_DEG)))
-    return Part("|m|", left, np.tile(TURN_DEG, 3), "angle of the turn (deg)", curves, "‰ of the field")
+    return Part("|m|", residual, np.tile(TURN_DEG, 3), "angle of the turn (deg)", curves, "‰ of the field")
 
 
 def of_rates(effect: Effect) -> list[Part]:
     """What a gyroscope without error leaves of each output, in deg/s, over the rate of turns about each edge."""
-    known = catalogue()["gyro-scale-factor"]
+    ideal = catalogue()["gyro-scale-factor"]
     table = _turned_at_rates()
     rate = rate_deg_s(table)
-    whole = Values({**shown(known, table), "scale": np.ones(3)})
-    steps: list[Step] = [] if effect.name == known.name else [(known, whole)]
+    unit_scale = Values({**shown(ideal, table), "scale": np.ones(3)})
+    steps: list[Step] = [] if effect.name == ideal.name else [(ideal, unit_scale)]
     steps.append((effect, shown(effect, table)))
-    left = respond(sensed(rate, table, steps), table, steps) - rate
+    residual = respond(sensed(rate, table, steps), table, steps) - rate
     curves = tuple(_curves(len(RATES_DEG_S)))
     over = table.column("rate_deg_s")
     return [
-        Part(axis, np.asarray(np.round(left[:, k], 4) + 0.0), over, "rate (deg/s)", curves, "deg/s")
+        Part(axis, np.asarray(np.round(residual[:, k], 4) + 0.0), over, "rate (deg/s)", curves, "deg/s")
         for k, axis in enumerate(AXES)
     ]
 
@@ -262,7 +262,7 @@ def _curves(n: int) -> Iterator[Curve]:
 def _turned_in_a_field() -> Table:
     """Full turns about x, y and z across a field of 1."""
     c, s, none = np.cos(np.radians(TURN_DEG)), np.sin(np.radians(TURN_DEG)), np.zeros(len(TURN_DEG))
-    turns = [np.column_stack(each) for each in ((none, c, s), (s, none, c), (c, s, none))]
+    turns = [np.column_stack(components) for components in ((none, c, s), (s, none, c), (c, s, none))]
     m: Array = np.vstack(turns)
     return Table.from_columns("positions", dict(zip(("mx", "my", "mz"), m.T, strict=True)), source="turns")
 
@@ -304,13 +304,15 @@ def noise_signature_chart(effect: Effect) -> Chart:
     without, added = _with_white(None), _with_white(effect)
     tau_s = np.geomspace(1, SAMPLES / 8, 70).round() / RATE_HZ
     looks: tuple[tuple[ChannelFit, Dash, str], ...] = ((without, "dash", QUIET), (added, "solid", BLUE))
-    left = tuple(Line(tau_s, deviation(fit, tau_s), colour=colour, width=1.6, dash=dash) for fit, dash, colour in looks)
+    deviations = tuple(
+        Line(tau_s, deviation(fit, tau_s), colour=colour, width=1.6, dash=dash) for fit, dash, colour in looks
+    )
     right = tuple(
         Line(fit.frequency_hz[::SPARE], root(fit.expected)[::SPARE], colour=colour, width=1.6, dash=dash)
         for fit, dash, colour in looks
     )
     lines = tuple(Rule(line.frequency_hz, "x", VERMILION, 1.6) for line in added.lines)
-    panels = (_named(left, "averaging time (s)", "Allan deviation (V)"),
+    panels = (_named(deviations, "averaging time (s)", "Allan deviation (V)"),
               _named((*right, *lines), "frequency (Hz)", "density (V/√Hz)"))  # fmt: skip
     return Chart((panels,), 1.95, SMALL)
 

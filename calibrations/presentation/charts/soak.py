@@ -46,7 +46,7 @@ FORESEEN = (
 )
 
 
-def soak_album(found: Soak, foreseen: Mapping[str, ForecastHistory] = MappingProxyType({})) -> list[Picture]:
+def soak_album(soak: Soak, foreseen: Mapping[str, ForecastHistory] = MappingProxyType({})) -> list[Picture]:
     """All pictures of a soak, and of what was foreseen of it, with words for a page."""
     course = (
         "Dots are reversals, with their standard errors; the line is the exponential approach with its standard error. "
@@ -63,56 +63,56 @@ def soak_album(found: Soak, foreseen: Mapping[str, ForecastHistory] = MappingPro
         "square root of time, drift rises with it."
     )
     pictures = [
-        Picture("drift", "Bias and scale factor since power-on", course, drift(found)),
-        Picture("night", "Temperature, supply and noise", around, surroundings(found)),
+        Picture("drift", "Bias and scale factor since power-on", course, drift(soak)),
+        Picture("night", "Temperature, supply and noise", around, surroundings(soak)),
     ]
     if foreseen:
-        pictures.insert(1, Picture("foreseen", "Forecasts of the final values", FORESEEN, forecasts(found, foreseen)))
-    times_s, _ = found.allan(found.axes[0])
-    return [*pictures, Picture("allan", "Allan deviation", noise, allan(found))] if len(times_s) else pictures
+        pictures.insert(1, Picture("foreseen", "Forecasts of the final values", FORESEEN, forecasts(soak, foreseen)))
+    times_s, _ = soak.allan(soak.axes[0])
+    return [*pictures, Picture("allan", "Allan deviation", noise, allan(soak))] if len(times_s) else pictures
 
 
-def drift(found: Soak) -> Chart:
+def drift(soak: Soak) -> Chart:
     """A column for each axis: bias above, scale factor below, as change from the final value."""
     above, below = [], []
-    factor, unit = in_milli(found.table.unit)
-    for axis in found.axes:
-        bias = found.courses[f"bias-{axis}"]
-        above.append(_course(found, bias, factor, f"bias − final value ({unit})", f"axis {axis}"))
-        scale = found.courses[f"scale-{axis}"]
-        below.append(_course(found, scale, 1e6 / _final(scale), "scale factor − final value (ppm)"))
+    factor, unit = in_milli(soak.table.unit)
+    for axis in soak.axes:
+        bias = soak.courses[f"bias-{axis}"]
+        above.append(_course(soak, bias, factor, f"bias − final value ({unit})", f"axis {axis}"))
+        scale = soak.courses[f"scale-{axis}"]
+        below.append(_course(soak, scale, 1e6 / _final(scale), "scale factor − final value (ppm)"))
     return Chart((tuple(above), tuple(below)), 2.9, share_x=True)
 
 
-def forecasts(found: Soak, foreseen: Mapping[str, ForecastHistory]) -> Chart:
+def forecasts(soak: Soak, foreseen: Mapping[str, ForecastHistory]) -> Chart:
     """A column for each axis: forecasts of the final bias and scale factor, less the last forecast."""
     rows = []
-    scales = (("bias", "bias", *in_milli(found.table.unit)), ("scale", "scale factor", 1e6, "ppm"))
+    scales = (("bias", "bias", *in_milli(soak.table.unit)), ("scale", "scale factor", 1e6, "ppm"))
     for quantity, name, factor, unit in scales:
         panels = []
-        for axis in found.axes:
+        for axis in soak.axes:
             course = foreseen.get(f"{quantity}-{axis}")
             title, y = f"axis {axis}" if quantity == "bias" else "", f"{name} forecast ({unit})"
             if course is None:
                 panels.append(Panel((), Axis(TIME), Axis(y), title))
                 continue
-            whole = 1.0 if quantity == "bias" else course.last.final.value
-            panels.append(_forecast(course, factor / whole, COLOURS[axis], y, title))
+            scale_of_change = 1.0 if quantity == "bias" else course.last.final.value
+            panels.append(_forecast(course, factor / scale_of_change, COLOURS[axis], y, title))
         rows.append(tuple(panels))
     return Chart(tuple(rows), 2.6, share_x=True)
 
 
 def _forecast(course: ForecastHistory, factor: float, colour: str, label: str, title: str) -> Panel:
     """Bounds of the final value, and the drift, against the time of the forecast."""
-    hours = np.array([each.t_s for each in course.forecasts]) / HOUR_S
+    hours = np.array([forecast.t_s for forecast in course.forecasts]) / HOUR_S
     low, value, high = (factor * (np.array(column) - course.last.final.value)
-                        for column in zip(*(each.final for each in course.forecasts), strict=True))  # fmt: skip
-    now = factor * (np.array([each.present.value for each in course.forecasts]) - course.last.final.value)
-    reach = WINDOW * max(np.abs(now).max(), (high[-1] - low[-1]) / 2)
+                        for column in zip(*(forecast.final for forecast in course.forecasts), strict=True))  # fmt: skip
+    drift_now = factor * (np.array([forecast.present.value for forecast in course.forecasts]) - course.last.final.value)
+    reach = WINDOW * max(np.abs(drift_now).max(), (high[-1] - low[-1]) / 2)
     series: list[Series] = [
         Band(hours, low, high, colour=colour, opacity=0.25),
         Line(hours, value, colour=colour, width=1.8),
-        Line(hours, now, colour=INK, width=1.1, dash="dot"),
+        Line(hours, drift_now, colour=INK, width=1.1, dash="dot"),
     ]
     words = "not known at the end"
     if course.known_s is not None:
@@ -122,27 +122,27 @@ def _forecast(course: ForecastHistory, factor: float, colour: str, label: str, t
     return Panel(tuple(series), Axis(TIME, low=0.0), Axis(label, low=-reach, high=reach), title)
 
 
-def surroundings(found: Soak) -> Chart:
+def surroundings(soak: Soak) -> Chart:
     """Temperature, supply and noise over the hours, as far as they were measured."""
-    holds, begin = found.holds, Axis(TIME, low=_begin_h(found))
+    holds, begin = soak.holds, Axis(TIME, low=_begin_h(soak))
     panels = []
     for name, label, colour in (("temperature_c", "sensor (°C)", AMBER), ("supply_v", "supply (V)", GREEN)):
         if name in holds:
             line = Line(*_thinned(holds.time_s / HOUR_S, holds.column(name)), colour=colour)
-            panels.append(Panel((*_gaps(found), line), begin, Axis(label)))
-    lines, (factor, unit) = [], in_milli(found.table.unit)
-    for axis in found.axes:
-        times_s, rms = found.noise_of_hours(axis)
+            panels.append(Panel((*_gaps(soak), line), begin, Axis(label)))
+    lines, (factor, unit) = [], in_milli(soak.table.unit)
+    for axis in soak.axes:
+        times_s, rms = soak.noise_of_hours(axis)
         lines.append(Line(times_s / HOUR_S, factor * rms, f"axis {axis}", COLOURS[axis], markers=True))
-    panels.append(Panel((*_gaps(found), *lines), begin, Axis(f"noise, rms ({unit})"), legend="best"))
+    panels.append(Panel((*_gaps(soak), *lines), begin, Axis(f"noise, rms ({unit})"), legend="best"))
     return stacked(panels, 1.7)
 
 
-def allan(found: Soak) -> Chart:
+def allan(soak: Soak) -> Chart:
     """Allan deviation of each axis on logarithmic axes, and the slope of white noise."""
-    lines, (factor, unit) = [], prefixed(found.table.unit, max(found.allan(axis)[1].max() for axis in found.axes))
-    for axis in found.axes:
-        times_s, deviations = found.allan(axis)
+    lines, (factor, unit) = [], prefixed(soak.table.unit, max(soak.allan(axis)[1].max() for axis in soak.axes))
+    for axis in soak.axes:
+        times_s, deviations = soak.allan(axis)
         lines.append(Line(times_s, factor * deviations, f"axis {axis}", COLOURS[axis], markers=True))
     slope = factor * deviations[0] * np.sqrt(times_s[0] / times_s)
     lines.append(Line(times_s, slope, "white noise", QUIET, dash="dot"))
@@ -150,12 +150,12 @@ def allan(found: Soak) -> Chart:
                      legend="best"), 3.0)  # fmt: skip
 
 
-def _course(found: Soak, course: Course, factor: float, label: str, title: str = "") -> Panel:
+def _course(soak: Soak, course: Course, factor: float, label: str, title: str = "") -> Panel:
     """One quantity as change from its final value, times `factor`."""
     state, final, colour = course.state, _final(course), COLOURS[course.axis]
-    series: list[Series] = list(_gaps(found))
+    series: list[Series] = list(_gaps(soak))
     if course.quantity == "bias":
-        t_s, volts = _still(found, course)
+        t_s, volts = _still(soak, course)
         series.append(Line(t_s / HOUR_S, factor * (volts - final), colour=BAND, width=0.8))
     if state is not None:
         series.append(Span(-factor * state.tolerance, factor * state.tolerance))
@@ -166,10 +166,10 @@ def _course(found: Soak, course: Course, factor: float, label: str, title: str =
     values, stds = factor * (course.values - final), factor * course.stds
     series.append(Points(course.t_s / HOUR_S, values, colour=INK, symbol="circle-open", size=5, low=values - stds,
                          high=values + stds))  # fmt: skip
-    seen = np.append(values, 0.0)
-    room = 0.12 * np.ptp(seen) + factor * (state.tolerance if state else 0.0)
-    y = Axis(label, low=seen.min() - room, high=seen.max() + room)
-    return Panel((*series, *_steady(course)), Axis(TIME, low=_begin_h(found)), y, title)
+    drawn_values = np.append(values, 0.0)
+    margin = 0.12 * np.ptp(drawn_values) + factor * (state.tolerance if state else 0.0)
+    y = Axis(label, low=drawn_values.min() - margin, high=drawn_values.max() + margin)
+    return Panel((*series, *_steady(course)), Axis(TIME, low=_begin_h(soak)), y, title)
 
 
 def _steady(course: Course) -> Iterator[Rule | Note]:
@@ -185,21 +185,21 @@ def _steady(course: Course) -> Iterator[Rule | Note]:
     yield Note(words, 1, 1 if up else 0, "xy", "right", "top" if up else "bottom")
 
 
-def _gaps(found: Soak) -> tuple[Span, ...]:
+def _gaps(soak: Soak) -> tuple[Span, ...]:
     """Gaps of the record as shaded time."""
-    ends = [(gap.start_s / HOUR_S, (gap.start_s + gap.length_s) / HOUR_S) for gap in found.gaps]
-    return tuple(Span(*each, "x", VERMILION, 0.25) for each in ends)
+    ends = [(gap.start_s / HOUR_S, (gap.start_s + gap.length_s) / HOUR_S) for gap in soak.gaps]
+    return tuple(Span(*end, "x", VERMILION, 0.25) for end in ends)
 
 
-def _begin_h(found: Soak) -> float | None:
+def _begin_h(soak: Soak) -> float | None:
     """Left end of the axes of time: power-on, unless the record began long after it."""
-    first, last = (t / HOUR_S for t in _span_s(found))
+    first, last = (t / HOUR_S for t in _span_s(soak))
     return 0.0 if first < last - first else None
 
 
-def _span_s(found: Soak) -> tuple[float, float]:
+def _span_s(soak: Soak) -> tuple[float, float]:
     """First and last time of the table, since power-on, s."""
-    times_s = found.table.time_s
+    times_s = soak.table.time_s
     return float(times_s.min()), float(times_s.max())
 
 
@@ -207,9 +207,9 @@ def _final(course: Course) -> float:
     return course.state.final[0] if course.state else float(course.values[-1])
 
 
-def _still(found: Soak, course: Course) -> tuple[Array, Array]:
+def _still(soak: Soak, course: Course) -> tuple[Array, Array]:
     """The still record at 0 g, shifted onto the bias: what differs there is load along z."""
-    t_s, volts = _thinned(found.holds.time_s, found.holds.output(course.axis))
+    t_s, volts = _thinned(soak.holds.time_s, soak.holds.output(course.axis))
     return t_s, volts - np.median(volts - np.interp(t_s, course.t_s, course.values))
 
 

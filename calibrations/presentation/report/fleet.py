@@ -49,7 +49,7 @@ def population_report(population: Population, model: str, facts: Mapping[str, st
 
 
 def calibration_report(
-    quantities: Mapping[str, Sequence[Spread]], batches: Section, count: int, what: str, facts: Mapping[str, str]
+    quantities: Mapping[str, Sequence[Spread]], batches: Section, count: int, subject: str, facts: Mapping[str, str]
 ) -> str:
     """The page of a calibration: `quantities` by name over `count` batches, means and spreads of these."""
     caption = (
@@ -60,7 +60,7 @@ def calibration_report(
     unlike = sum(int(spread.apart.sum()) for values in quantities.values() for spread in values)
     return html(
         Page(
-            headline=f"{what}: calibrated together with their batches",
+            headline=f"{subject}: calibrated together with their batches",
             verdict="calibrated",
             state="adequate",
             subject="Fleet",

@@ -32,41 +32,40 @@ from calibrations.text import capital, estimate_text, joined, minus, probability
 LONG_MIN = 120  # longer durations are given in hours
 
 
-def summary(found: Discovery[Fit]) -> str:
+def summary(discovery: Discovery[Fit]) -> str:
     """The error before and after the added effects, and the reasons to doubt them."""
-    doubts = [found.caution, found.start.table.constants.get("expired")]
-    return " ".join([_error(found), *(f"But {doubt}." for doubt in doubts if doubt)])
+    doubts = [discovery.caution, discovery.start.table.constants.get("expired")]
+    return " ".join([_error(discovery), *(f"But {doubt}." for doubt in doubts if doubt)])
 
 
-def _error(found: Discovery[Fit]) -> str:
-    (error, floor), unit = pooled_milli(found.start), milli_unit(found.start)
-    rows = f"{found.start.table.n} {found.start.table.type.rows}"
-    if not found.steps:
-        left = f" Remaining: {found.residual_structure}." if found.residual_structure else ""
+def _error(discovery: Discovery[Fit]) -> str:
+    start, end, structure = discovery.start, discovery.end, discovery.residual_structure
+    (error, floor), unit = pooled_milli(start), milli_unit(start)
+    rows, pattern = f"{start.table.n} {start.table.type.rows}", f" Remaining: {structure}." if structure else ""
+    if not discovery.steps:
         return (
-            f"On {rows} its rms error is {rounded(error, 2)} {unit}, {rounded(found.start.pooled_excess)} × the noise "
-            f"floor of {rounded(floor, 2)} {unit}.{left}"
+            f"On {rows} its rms error is {rounded(error, 2)} {unit}, {rounded(start.pooled_excess)} × the noise floor "
+            f"of {rounded(floor, 2)} {unit}.{pattern}"
         )
-    unseen = rounded(found.start.held_out_excess), rounded(found.steps[-1].held_out_after)
     text = (
-        f"On {rows} the rms error falls from {rounded(error, 2)} {unit} to {rounded(pooled_milli(found.end)[0], 2)} "
-        f"{unit}; the noise floor is {rounded(floor, 2)} {unit}. The held-out error falls from {unseen[0]} to "
-        f"{unseen[1]} × the noise floor."
+        f"On {rows} the rms error falls from {rounded(error, 2)} {unit} to {rounded(pooled_milli(end)[0], 2)} {unit}; "
+        f"the noise floor is {rounded(floor, 2)} {unit}. The held-out error falls from "
+        f"{rounded(start.held_out_excess)} to {rounded(discovery.steps[-1].held_out_after)} × the noise floor."
     )
-    if found.refinements:
-        text += f" For the form of these effects the model also holds {joined(found.refinements)}."
-    return f"{text} Remaining: {found.residual_structure}." if found.residual_structure else text
+    if discovery.refinements:
+        text += f" For the form of these effects the model also holds {joined(discovery.refinements)}."
+    return text + pattern
 
 
-def key_figures(found: Discovery[Fit]) -> list[tuple[str, str, str]]:
+def key_figures(discovery: Discovery[Fit]) -> list[tuple[str, str, str]]:
     """The few numbers to remember: (what, value, remark)."""
-    start, floor, unit = found.start, pooled_milli(found.start)[1], milli_unit(found.start)
-    first = "error before" if found.steps else "rms error"
+    start, floor, unit = discovery.start, pooled_milli(discovery.start)[1], milli_unit(discovery.start)
+    first = "error before" if discovery.steps else "rms error"
     shown = [(first, f"{rounded(pooled_milli(start)[0], 2)} {unit}", _of_floor(start, start.held_out_excess))]
-    if found.steps:
-        held_out = found.steps[-1].held_out_after
+    if discovery.steps:
+        held_out = discovery.steps[-1].held_out_after
         shown.append(
-            ("error after", f"{rounded(pooled_milli(found.end)[0], 2)} {unit}", _of_floor(found.end, held_out))
+            ("error after", f"{rounded(pooled_milli(discovery.end)[0], 2)} {unit}", _of_floor(discovery.end, held_out))
         )
     kind = "white noise of one mean" if start.noise.known else "from the scatter: the white noise is not known"
     return [*shown, ("noise floor", f"{rounded(floor, 2)} {unit}", kind)]
@@ -93,8 +92,8 @@ def next_takes(e: Experiment) -> str:
         return f"{takes}. Its result cannot be predicted."
     alone = e.expected.probability_alone >= CERTAIN_PROBABILITY
     percent = 100 * pairs_separated(e.expected.alone if alone else e.expected.together)
-    whose = "its own data" if alone else "all data together"
-    return f"{takes} and separates them with a probability of {min(percent, 99.9):.3g} %, from {whose}."
+    source = "its own data" if alone else "all data together"
+    return f"{takes} and separates them with a probability of {min(percent, 99.9):.3g} %, from {source}."
 
 
 EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
@@ -168,10 +167,10 @@ def report(
 def _sections(
     discovery: Discovery[Fit], comparison: Comparison[Fit], shown: Mapping[str, Picture]
 ) -> Iterable[Section]:
-    end, given = discovery.end, comparison.fit.model.name
+    end, given_model = discovery.end, comparison.fit.model.name
     yield Section("Error by model", (shown["waterfall"], _steps(discovery), _held_out(discovery)))
     three = [shown[name] for name in ("measurement", "residual", "failure")]
-    yield Section(f"Residuals of the model {given}", (*_places(comparison), _errors(comparison.fit), *three))
+    yield Section(f"Residuals of the model {given_model}", (*_places(comparison), _errors(comparison.fit), *three))
     curves = [picture for name, picture in shown.items() if name.startswith("effect-")]
     yield Section("Candidates", (*_candidates(discovery), *curves))
     if places := [picture for name, picture in shown.items() if name.startswith("place-") or name == "shares"]:

@@ -179,8 +179,8 @@ def _outlook(name: str, history: ForecastHistory, of: str) -> tuple[str, ...]:
         value = "not a warm-up: no forecast"
     else:
         value = f"not known: {rounded(factor * final.low, 6)} to {rounded(factor * final.high, 6)}"
-    known = "–" if known_s is None else rounded(known_s / HOUR_S)
-    return quantity.replace("scale", "scale factor"), axis, value, unit, known
+    known_after = "–" if known_s is None else rounded(known_s / HOUR_S)
+    return quantity.replace("scale", "scale factor"), axis, value, unit, known_after
 
 
 def _verdict(name: str, result: Mapping[str, Any]) -> tuple[str, ...]:

@@ -63,8 +63,8 @@ def _sections(
     yield Section("Mismatch by model", (steps, Remark(MISMATCH)))
     yield Section("Measurement and model", pictures)
     fails = [capital(place.text) for place in comparison.fails]
-    given = discovery.start.model.name
-    yield Section(f"Mismatch of the model {given}", (PLACES, Items(fails)) if fails else (NO_PLACE,))
+    name = discovery.start.model.name
+    yield Section(f"Mismatch of the model {name}", (PLACES, Items(fails)) if fails else (NO_PLACE,))
     if discovery.findings.candidates:
         yield Section("Candidates", _candidates(discovery))
     rows = [
