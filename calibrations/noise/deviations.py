@@ -48,10 +48,8 @@ from calibrations.noise.kernels import (
     absorb,
     empty_tree,
     finish,
-    modified_squares,
     reflected_squares,
     second_order,
-    third_order,
 )
 from calibrations.table import Array
 
@@ -165,9 +163,8 @@ LARGEST_FILTER = 1024  # samples to an averaging time beyond which it might as w
 SHORT = 32  # samples to an averaging time below which a total deviation is an overlapping one
 MOST_OVERLAP = 64  # windows to an averaging time beyond which more say nothing, but of noise of the phase
 ORDERS: Mapping[str, tuple[int, bool]] = MappingProxyType(  # order of the difference, phase averaged
-    {"overlapping": (2, False), "allan": (2, False), "modified": (2, True), "hadamard": (3, False),
-     "separate-hadamard": (3, False)}
-)  # fmt: skip
+    {OVERLAPPING: (2, False), "modified": (2, True), "hadamard": (3, False)}
+)
 TOTAL: Mapping[int, tuple[float, float]] = MappingProxyType({0: (1.5, 0.0), -1: (1.168, 0.222), -2: (0.927, 0.358)})
 COVARIANCES: Mapping[int, Callable[[Array], Any]] = MappingProxyType(
     {
@@ -186,7 +183,7 @@ COVARIANCES: Mapping[int, Callable[[Array], Any]] = MappingProxyType(
 def freedom(kind: str, alpha: int, n: int, m: int, overlap: int) -> float:
     """Equivalent degrees of freedom, at least 1.
 
-    kind     of `exact.KINDS`
+    kind     of OCTAVE_KINDS
     alpha    the spectrum of the values goes as f^alpha: 2 quantisation, 0 white, -1 flicker, -2 random walk
     n, m     samples of the record, and to an averaging time
     overlap  windows to an averaging time: m is every one, 1 none
@@ -207,10 +204,8 @@ def freedom(kind: str, alpha: int, n: int, m: int, overlap: int) -> float:
     return max(1.0, float(windows * z[0] ** 2 / pairs))
 
 
-def overlap_of(kind: str, m: int, alpha: int) -> int:
+def overlap_of(m: int, alpha: int) -> int:
     """Windows to an averaging time that count, where all are used."""
-    if kind in ("allan", "separate-hadamard"):
-        return 1
     return m if alpha > 0 else min(m, MOST_OVERLAP)
 
 
@@ -268,18 +263,11 @@ def _order(correlation: float) -> float:
     return correlation / (1 + correlation) if correlation > -1 else -1.0
 
 
-Squares = tuple[float, int, float]  # sum, number, what their mean is divided by to be a variance
+def deviations(values: Array, steps: Iterable[int]) -> Array:
+    """Overlapping Allan deviation of `values`, shape (n,), over each of `steps` samples; nan in too short a record.
 
-
-def deviations(values: Array, steps: Iterable[int], kind: str = "overlapping") -> Array:
-    """Deviation of `values`, shape (n,), over each of `steps` samples; nan where the record is too short for it.
-
-    `kind`: overlapping, modified, total; hadamard (overlapping); and, without overlap, allan and separate-hadamard.
-
-    Raises DataError for another kind, for values that are no numbers, and for steps below 1.
+    Raises DataError for values that are no numbers, and for steps below 1.
     """
-    if kind not in ESTIMATORS:
-        raise DataError(f'unknown kind of deviation "{kind}"; there are {", ".join(ESTIMATORS)}')
     counts = [int(m) for m in steps]
     if min(counts, default=1) < 1:
         raise DataError(f"an averaging time of {min(counts)} samples; it is 1 or more")
@@ -287,55 +275,13 @@ def deviations(values: Array, steps: Iterable[int], kind: str = "overlapping") -
     if not np.isfinite(values).all():
         row = int(np.argmin(np.isfinite(values)))
         raise DataError(f"row {row + 1} is {values[row]:g}, not a number; take a stretch of the record without gaps")
-    centred = values - values.mean() if len(values) else values
-    phase = np.concatenate([[0.0], np.cumsum(centred)])
-    return np.array([_deviation(*ESTIMATORS[kind](phase, centred, m)) for m in counts])
+    phase = np.concatenate([[0.0], np.cumsum(values - values.mean() if len(values) else values)])
+    return np.array([_deviation(phase, m) for m in counts])
 
 
-def _deviation(total: float, number: int, divisor: float) -> float:
-    return float(np.sqrt(total / number / divisor)) if number > 0 else np.nan
-
-
-def _overlapping(phase: Array, _: Array, m: int) -> Squares:
-    return second_order(phase, m, 0), len(phase) - 2 * m, 2.0 * m**2
-
-
-def _hadamard(phase: Array, _: Array, m: int) -> Squares:
-    return third_order(phase, m, 0), len(phase) - 3 * m, 6.0 * m**2
-
-
-def _allan(phase: Array, _: Array, m: int) -> Squares:
-    every = np.ascontiguousarray(phase[::m])
-    return second_order(every, 1, 0), len(every) - 2, 2.0 * m**2
-
-
-def _separate_hadamard(phase: Array, _: Array, m: int) -> Squares:
-    every = np.ascontiguousarray(phase[::m])
-    return third_order(every, 1, 0), len(every) - 3, 6.0 * m**2
-
-
-def _modified(_: Array, centred: Array, m: int) -> Squares:
-    total, number = modified_squares(np.append(centred, 0.0), m)  # one more, as the last phase is where it would begin
-    return total, number, 2.0 * float(m) ** 4
-
-
-def _total(phase: Array, centred: Array, m: int) -> Squares:
-    if len(centred) < 2 * m:
-        return 0.0, 0, 1.0
-    ends = reflected_squares(centred, m) + reflected_squares(centred[::-1].copy(), m)
-    return second_order(phase, m, 0) + ends, len(centred) - 1, 2.0 * m**2
-
-
-ESTIMATORS: Mapping[str, Callable[[Array, Array, int], Squares]] = MappingProxyType(
-    {
-        "overlapping": _overlapping,
-        "modified": _modified,
-        "hadamard": _hadamard,
-        "total": _total,
-        "allan": _allan,
-        "separate-hadamard": _separate_hadamard,
-    }
-)
+def _deviation(phase: Array, m: int) -> float:
+    windows = len(phase) - 2 * m
+    return float(np.sqrt(second_order(phase, m, 0) / windows / 2) / m) if windows > 0 else np.nan
 
 
 def curve_at(values: Array, rate_hz: float, tau_s: Sequence[float], source: str) -> Curve:
@@ -344,13 +290,10 @@ def curve_at(values: Array, rate_hz: float, tau_s: Sequence[float], source: str)
     Raises DataError for a time below one sample, TooFewRows for one of which the record does not hold two.
     """
     steps = [_steps(tau, len(values), rate_hz, source) for tau in tau_s]
-    deviation = deviations(values, steps, OVERLAPPING)
+    deviation = deviations(values, steps)
     alphas = tuple(_noise_type_at(values, m) for m in steps)
     edf = np.array(
-        [
-            freedom(OVERLAPPING, a, len(values), m, overlap_of(OVERLAPPING, m, a))
-            for a, m in zip(alphas, steps, strict=True)
-        ]
+        [freedom(OVERLAPPING, a, len(values), m, overlap_of(m, a)) for a, m in zip(alphas, steps, strict=True)]
     )
     bounds = np.array([interval(*pair) for pair in zip(deviation.tolist(), edf.tolist(), strict=True)])
     return Curve(OVERLAPPING, np.array(steps) / rate_hz, deviation, bounds[:, 0], bounds[:, 1], alphas, edf)

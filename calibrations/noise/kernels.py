@@ -213,21 +213,6 @@ def _add_moments(z: Array, old: int, to: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def modified_squares(values: Array, m: int) -> tuple[float, int]:
-    """Sum and number of squared differences of neighbouring means of the phase over `m` steps, at every step.
-
-    Stretch by stretch, as the running sum of a running sum over a whole record would lose its digits.
-    """
-    step, total = max(STEP, 3 * m), 0.0
-    none = np.zeros(step + 3 * m)
-    for start in range(0, len(values) - 3 * m + 1, step):
-        part = values[start : start + step + 3 * m - 1]
-        _, summed = integrals(part, none[: len(part)], 1.0)
-        total += third_order(summed, m, 0)
-    return total, max(0, len(values) - 3 * m + 1)
-
-
-@njit(cache=True, nogil=True)
 def reflected_squares(b: Array, k: int) -> float:
     """Sum of squared differences of sums over `k` bins around each of the first k - 1 inner points.
 

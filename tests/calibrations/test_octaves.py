@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from calibrations.noise.deviations import (
     OCTAVE_KINDS,
     Octaves,
-    deviations,
     freedom,
     interval,
     moments_of,
@@ -18,6 +17,7 @@ from calibrations.noise.deviations import (
     octaves,
     overlap_of,
 )
+from tests.calibrations.exact_deviations import exact_deviations
 from tests.calibrations.noises import flicker, quantisation, random_walk
 
 GRID = 2.0**-20
@@ -34,14 +34,14 @@ def test_up_to_32_samples_every_overlap_is_used(kind: str) -> None:
     samples = np.random.default_rng(1).standard_normal(5000)
     curve = octaves([samples], 1.0, kind)
     assert curve.tau_s[:6].tolist() == [1, 2, 4, 8, 16, 32]
-    assert curve.deviation[:6] == pytest.approx(deviations(samples, (1, 2, 4, 8, 16, 32), kind), rel=1e-12)
+    assert curve.deviation[:6] == pytest.approx(exact_deviations(samples, (1, 2, 4, 8, 16, 32), kind), rel=1e-12)
 
 
 @pytest.mark.parametrize("kind", OCTAVE_KINDS)
 def test_beyond_it_is_as_near_as_the_windows_left_out_allow(kind: str) -> None:
     samples = np.random.default_rng(1).standard_normal(100_000)
     curve = octaves([samples], 1.0, kind)
-    exact = deviations(samples, curve.tau_s.astype(int), kind)
+    exact = exact_deviations(samples, curve.tau_s.astype(int), kind)
     apart = np.abs(curve.deviation / exact - 1) * np.sqrt(2 * curve.edf)  # in standard deviations
     assert len(apart) >= 15
     assert np.all(apart[:-2] < 0.2)
@@ -51,7 +51,7 @@ def test_bins_hold_the_phase_within_them() -> None:
     """Else the modified deviation would be that of a 32 times finer averaging only: 0.05 % too large."""
     samples = np.random.default_rng(1).standard_normal(100_000)
     curve = octaves([samples], 1.0, "modified")
-    exact = deviations(samples, curve.tau_s[6:10].astype(int), "modified")
+    exact = exact_deviations(samples, curve.tau_s[6:10].astype(int), "modified")
     assert curve.deviation[6:10] == pytest.approx(exact, rel=1e-4)
 
 
@@ -100,7 +100,7 @@ def test_the_windows_that_are_left_out_would_tell_nothing() -> None:
         samples = random.standard_normal(4096)
         curve = octaves([samples], 1.0)
         ours.append(curve.deviation**2)
-        all_of_them.append(deviations(samples, curve.tau_s.astype(int)) ** 2)
+        all_of_them.append(exact_deviations(samples, curve.tau_s.astype(int)) ** 2)
     assert np.all(np.var(ours, axis=0) / np.var(all_of_them, axis=0) < 1.05)
 
 
@@ -122,9 +122,9 @@ def test_degrees_of_freedom_are_those_that_records_show(alpha: int, kind: str) -
     """Twice the mean squared over the variance, over records; at a tenth of their length."""
     n, m = 640, 64
     random = np.random.default_rng(7)
-    variances = np.array([deviations(NOISES[alpha](random, n), [m], kind)[0] ** 2 for _ in range(400)])
+    variances = np.array([exact_deviations(NOISES[alpha](random, n), [m], kind)[0] ** 2 for _ in range(400)])
     shown = 2 * variances.mean() ** 2 / variances.var()
-    assert freedom(kind, alpha, n, m, overlap_of(kind, m, alpha)) == pytest.approx(shown, rel=0.25)
+    assert freedom(kind, alpha, n, m, overlap_of(m, alpha)) == pytest.approx(shown, rel=0.25)
 
 
 def test_an_interval_holds_the_deviation_and_narrows() -> None:
