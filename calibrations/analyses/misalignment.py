@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 
 from calibrations.errors import DataError
 from calibrations.fitting.noise_fit import estimate
+from calibrations.geometry.orientation import rotation
 from calibrations.means.noise import Noise, white_only, white_std
-from calibrations.table import Array, Table
+from calibrations.table import AXES, Array, Table
 
 # The directions of the sensing axes from a search for the extreme output, and the correction that they call for.
 #
@@ -45,12 +46,12 @@ def search_angles_y(alpha_deg: float, beta_deg: float) -> tuple[float, float]:
 
 def theta_x(alpha_x_deg: float, beta_x_deg: float) -> Array:
     """Direction of the x sensing axis in the reference frame, a unit vector, shape (3,). Ang (18)."""
-    return np.asarray(_about_y(alpha_x_deg) @ _about_z(beta_x_deg) @ [1.0, 0.0, 0.0])
+    return np.asarray(_about("y", alpha_x_deg) @ _about("z", beta_x_deg) @ [1.0, 0.0, 0.0])
 
 
 def theta_y(alpha_y_deg: float, beta_y_deg: float) -> Array:
     """Direction of the y sensing axis in the reference frame, a unit vector, shape (3,). Ang (19)."""
-    return np.asarray(_about_x(alpha_y_deg) @ _about_z(beta_y_deg) @ [0.0, 1.0, 0.0])
+    return np.asarray(_about("x", alpha_y_deg) @ _about("z", beta_y_deg) @ [0.0, 1.0, 0.0])
 
 
 def along_reference(a: Array, x: Array, y: Array) -> Array:
@@ -64,19 +65,9 @@ def along_reference(a: Array, x: Array, y: Array) -> Array:
     return np.column_stack([along_x, along_y])
 
 
-def _about_x(angle_deg: float) -> Array:
-    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-
-
-def _about_y(angle_deg: float) -> Array:
-    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-
-
-def _about_z(angle_deg: float) -> Array:
-    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+def _about(axis: str, angle_deg: float) -> Array:
+    """Rotation matrix about an axis of the reference frame, shape (3, 3)."""
+    return rotation(np.radians(angle_deg) * np.eye(3)[AXES.index(axis)])
 
 
 Rows = NDArray[np.intp]
@@ -209,7 +200,7 @@ def _is_white(brackets: list[_Bracket]) -> bool:
 
 def _direction(bracket: _Bracket, noise: Noise) -> Direction:
     factors, covariance, _ = bracket.solved(noise)
-    back, size = _about_z(bracket.centre_deg), float(np.linalg.norm(factors[:3]))
+    back, size = _about("z", bracket.centre_deg), float(np.linalg.norm(factors[:3]))
     theta = back @ factors[:3] / size
     slope = (np.eye(3) - np.outer(theta, theta)) @ back / size
     return Direction(bracket.axis, theta, slope @ covariance[:3, :3] @ slope.T, bracket.rounds)

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibrations.errors import DataError
+from calibrations.means.noise import autocovariance
 from calibrations.table import Array
 
 LONGEST_LAG = 0.02  # of a record: at longer lags an autocorrelation is mostly noise
@@ -34,8 +35,8 @@ def noise_rms(stretches: Sequence[Array]) -> tuple[float, float]:
 def _autocorrelation(centred: Array) -> Array:
     """rho_k from lag 1 to the first that is not significant, shape (lags,)."""
     n = len(centred)
-    padded = np.fft.rfft(centred, 2 * n)
-    rho = np.fft.irfft(np.abs(padded) ** 2)[1 : max(2, int(LONGEST_LAG * n))] / np.dot(centred, centred)
+    covariance = autocovariance(centred, max(2, int(LONGEST_LAG * n)))
+    rho = covariance[1:] / covariance[0]
     below = np.flatnonzero(rho < 2 / np.sqrt(n))
     return np.asarray(rho[: below[0]] if len(below) else rho)
 

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.special import stdtrit
 
 from calibrations.criteria import COVERAGE, COVERAGE_FACTOR, FEWEST_FOR_DRIFT, HORIZON_DAYS
 from calibrations.errors import DataError, TooFewRows
+from calibrations.estimators.least_squares import between_variance, least_squares
 from calibrations.table import Array
 
 
@@ -136,31 +136,16 @@ def fit_stability(t_days: Sequence[float], values: Sequence[float], stds: Sequen
         raise TooFewRows(
             f"a drift needs at least {FEWEST_FOR_DRIFT} calibrations at different times; there are {len(t)}"
         )
-    scatter = _scatter(t, y, u)
-    middle = float(np.average(t, weights=1 / (u**2 + scatter**2)))
-    theta, covariance, _ = _line(t - middle, y, u, scatter)
-    return Stability(t, y, u, middle, float(theta[0]), float(theta[1]), scatter, covariance)
+    scatter = float(np.sqrt(between_variance(_line(t - t.mean()), y, u**2, len(t) - 2)))
+    variances = u**2 + scatter**2
+    middle = float(np.average(t, weights=1 / variances))
+    line = least_squares(_line(t - middle), y, variances)
+    return Stability(t, y, u, middle, float(line.values[0]), float(line.values[1]), scatter, line.covariance)
 
 
-def _line(t: Array, y: Array, u: Array, scatter: float) -> tuple[Array, Array, float]:
-    """Weighted least squares: (value at 0, slope), covariance, and the weighted sum of squares."""
-    w = 1 / (u**2 + scatter**2)
-    X = np.column_stack([np.ones_like(t), t])
-    covariance = np.asarray(np.linalg.inv((X.T * w) @ X))
-    theta = covariance @ (X.T @ (w * y))
-    return theta, covariance, float(np.sum(w * (y - X @ theta) ** 2))
-
-
-def _scatter(t: Array, y: Array, u: Array) -> float:
-    """s, with which the weighted square sum equals the degrees of freedom; 0 where it is smaller without s."""
-    centred, freedom = t - t.mean(), len(t) - 2
-
-    def excess(s: float) -> float:
-        return _line(centred, y, u, s)[2] - freedom
-
-    if excess(0.0) <= 0:
-        return 0.0
-    return float(brentq(excess, 0.0, 10 * float(np.ptp(y)) + float(u.max())))
+def _line(t: Array) -> Array:
+    """Columns of a straight line over times (n,): value at 0 and slope."""
+    return np.column_stack([np.ones_like(t), t])
 
 
 # A straight line through repeated measurements: the drift of a reference pose.
@@ -170,5 +155,5 @@ def fit_trend(times: Array, values: Array) -> tuple[float, float]:
     """(slope, its standard error from the scatter about the line), shape (n,) each. Raises TooFewRows."""
     if len(times) < FEWEST_FOR_DRIFT:
         raise TooFewRows(f"a trend needs at least {FEWEST_FOR_DRIFT} measurements; there are {len(times)}")
-    theta, covariance, squares = _line(times - times.mean(), values, np.ones_like(values), 0.0)
-    return float(theta[1]), float(np.sqrt(covariance[1, 1] * squares / (len(times) - 2)))
+    line = least_squares(_line(times - times.mean()), values)
+    return float(line.values[1]), float(line.scattered[1])

@@ -126,9 +126,7 @@ def _fitted(steps: Sequence[Tumble], y: Array, std: Array) -> TemperatureCoeffic
     free = len(steps) - columns.shape[1]
     if not np.isfinite(columns).all() or np.linalg.matrix_rank(columns) < columns.shape[1]:
         raise DataError("the cycle lacks different temperatures on the way up and down; use a bench with an oven")
-    weight = 1 / np.where(std > 0, std, 1.0)
-    inverse = np.linalg.pinv(columns * weight[:, None])
-    factors = inverse @ (y * weight)
-    square = float(np.sum(((y - columns @ factors) * weight) ** 2))
-    widened = np.sqrt(np.diag(inverse @ inverse.T) * max(1.0, square / max(free - 2, 1)))
+    solution = least_squares(columns, y, np.where(std > 0, std, 1.0) ** 2)
+    factors = solution.values
+    widened = np.sqrt(np.diag(solution.covariance) * max(1.0, solution.square / max(free - 2, 1)))
     return TemperatureCoefficients((float(factors[0]), float(widened[0])), (float(factors[1]), float(widened[1])))

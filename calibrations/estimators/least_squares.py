@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.optimize import brentq
 
 from calibrations.errors import TooFewRows
 from calibrations.table import Array
@@ -54,6 +55,33 @@ def least_squares(matrix: Array, measured: Array, variances: Array | float = 1.0
     inverse = solve_triangular(triangle[:n, :n], np.eye(n))
     residual = triangle[n:, n]
     return Estimate(inverse @ triangle[:n, n], inverse @ inverse.T, float(residual @ residual), m - n)
+
+
+def shortest_solution(matrix: Array, measured: Array, variances: Array) -> Estimate:
+    """The same where columns may depend on each other: of all solutions the one of least length."""
+    weight = 1 / np.sqrt(variances)
+    weighted, values = matrix * weight[:, None], measured * weight
+    covariance = np.asarray(np.linalg.pinv(weighted.T @ weighted, rcond=1e-10, hermitian=True))
+    solution = covariance @ (weighted.T @ values)
+    square = float(np.sum((values - weighted @ solution) ** 2))
+    return Estimate(solution, covariance, square, len(measured) - int(np.linalg.matrix_rank(weighted)))
+
+
+def between_variance(matrix: Array, measured: Array, variances: Array, freedom: int) -> float:
+    """The variance that, added to `variances`, makes the weighted sum of squares equal `freedom`; 0 where it is less.
+
+    Source  Mandel and Paule, Anal. Chem. 42 (1970).
+    """
+
+    def excess(between: float) -> float:
+        return shortest_solution(matrix, measured, variances + between).square - freedom
+
+    if excess(0.0) <= 0:
+        return 0.0
+    high = float(np.var(measured)) + float(np.max(variances))
+    while excess(high) > 0:
+        high *= 4
+    return float(brentq(excess, 0.0, high, rtol=1e-9))
 
 
 # Least squares, one measurement after another: what is known so far is a triangle, into which the next one is turned.

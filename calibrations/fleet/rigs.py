@@ -12,11 +12,11 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 from scipy.special import fdtrc, stdtr
 
 from calibrations.criteria import FAR_SENSOR, FEWEST_SENSORS_PER_RIG, SIGNIFICANT
 from calibrations.effects import Effect, Values
+from calibrations.estimators.least_squares import between_variance, shortest_solution
 from calibrations.estimators.robust import robust_std
 from calibrations.fleet.look import StageScore
 from calibrations.geometry.orientation import nominal_pose, specific_force
@@ -183,10 +183,10 @@ def _parameter(sensors: Sequence[Measured], y: Array, v: Array, name: tuple[str,
     free = len(y) - len(batches) - more
     if more <= 0 or free < FEWEST_SENSORS_PER_RIG:
         return []
-    total = v + _between(design, y, v, free)
-    square, theta, cov = _least_squares(design, y, total)
-    scale = max(1.0, square / free)
-    f = (_least_squares(of_batch, y, total)[0] - square) / more / scale
+    total = v + between_variance(design, y, v, free)
+    solution = shortest_solution(design, y, total)
+    theta, scale = solution.values, max(1.0, solution.square / free)
+    f = (shortest_solution(of_batch, y, total).square - solution.square) / more / scale
     p_value = float(fdtrc(more, free, max(f, 0.0)))
     errors = []
     for group in unconnected_rigs(sensors):
@@ -195,7 +195,7 @@ def _parameter(sensors: Sequence[Measured], y: Array, v: Array, name: tuple[str,
         for k, rig in enumerate(group if len(group) > 1 else ()):
             along = np.zeros(len(theta))
             along[places] = np.eye(len(group))[k] - middle
-            value, std = float(along @ theta), float(np.sqrt(scale * along @ cov @ along))
+            value, std = float(along @ theta), float(np.sqrt(scale * along @ solution.covariance @ along))
             beyond = std > 0 and 2 * float(stdtr(free, -abs(value) / std)) * len(rigs) < SIGNIFICANT
             count = sum(measured.rig == rig for measured in sensors)
             errors.append(RigError(rig, name[0], name[1], name[2], value, std, p_value, count, beyond))
@@ -221,25 +221,3 @@ def _far(sensors: Sequence[Measured], y: Array, v: Array) -> NDArray[np.bool_]:
         off = np.abs(y[chosen] - np.median(y[chosen]))
         far[chosen] = off > FAR_SENSOR * np.sqrt(robust_std(off) ** 2 + v[chosen])
     return far
-
-
-def _between(X: Array, y: Array, v: Array, free: int) -> float:
-    """tau^2 that makes the weighted sum of squares what its degrees of freedom are; 0 where it is less without."""
-
-    def beyond(tau2: float) -> float:
-        return _least_squares(X, y, v + tau2)[0] - free
-
-    if beyond(0.0) <= 0:
-        return 0.0
-    high = float(np.var(y)) + float(np.max(v))
-    while beyond(high) > 0:
-        high *= 4
-    return float(brentq(beyond, 0.0, high, rtol=1e-6))
-
-
-def _least_squares(X: Array, y: Array, variance: Array) -> tuple[float, Array, Array]:
-    """Weighted sum of squares left, the solution of least length, and its covariance."""
-    w = 1 / np.sqrt(variance)
-    inverse = np.linalg.pinv((X * w[:, None]).T @ (X * w[:, None]), rcond=1e-10, hermitian=True)
-    theta = inverse @ ((X * w[:, None]).T @ (y * w))
-    return float(np.sum(((y - X @ theta) * w) ** 2)), theta, np.asarray(inverse)

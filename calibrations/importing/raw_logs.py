@@ -26,7 +26,7 @@ from calibrations.criteria import (
 from calibrations.errors import DataError, MissingConstant
 from calibrations.geometry.sphere import sphere_centre
 from calibrations.importing.sessions import average_sections, is_section_log
-from calibrations.means.noise import measured_inflation
+from calibrations.means.noise import autocovariance, measured_inflation
 from calibrations.table import Array, Constant, Table, std_column
 
 # Still intervals of a raw log: a table of positions from samples of a sensor that was put down again and again.
@@ -122,10 +122,7 @@ def _effective_std(x: Array) -> float:
     From the autocovariance, summed until it first falls below zero (initial positive sequence).
     """
     n = len(x)
-    centred = x - x.mean()
-    size = 1 << (2 * n - 1).bit_length()
-    spectrum = np.abs(np.fft.rfft(centred, size)) ** 2
-    acov = np.fft.irfft(spectrum, size)[: n // 2] / n
+    acov = autocovariance(x, n // 2)
     below = np.flatnonzero(acov <= 0)
     end = int(below[0]) if len(below) else len(acov)
     return float(np.sqrt(max(acov[0] + 2 * acov[1:end].sum(), 0.0) * n / (n - 1)))

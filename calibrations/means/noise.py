@@ -226,23 +226,19 @@ def measured_inflation(blocks: Array) -> tuple[Array, Array]:
     WINDOW correlation times (Madras and Sokal, 1988); what the unknown means take away is given back (Wolff, 2004).
     NaN for a channel without noise, and where the correlation lasts too long for blocks of n samples.
     """
-    covariance = _autocovariance(blocks)
-    sums = [_summed(c, blocks.shape[1]) for c in covariance.T]
-    factor, lags = (np.array(values) for values in zip(*sums, strict=True))
-    return factor, factor * np.sqrt(2 * (2 * lags + 1) / (blocks.shape[0] * blocks.shape[1]))
-
-
-def _autocovariance(blocks: Array) -> Array:
-    """Mean over the blocks, at lags 0 .. n // 4, shape (lags, channels)."""
-    count, n, channels = blocks.shape
+    n = blocks.shape[1]
     lags = n // 4 + 1
+    covariance = np.mean([autocovariance(block.T, lags) for block in blocks], axis=0) * n / (n - np.arange(lags))
+    factor, last = (np.array(values) for values in zip(*(_summed(c, n) for c in covariance), strict=True))
+    return factor, factor * np.sqrt(2 * (2 * last + 1) / (len(blocks) * n))
+
+
+def autocovariance(x: Array, lags: int) -> Array:
+    """Of values (..., n) about their mean, at lags 0 .. lags - 1: sums of products over n, shape (..., lags)."""
+    n = x.shape[-1]
     size = 1 << (n + lags - 1).bit_length()  # no lag that is used wraps round
-    power = np.zeros((channels, size // 2 + 1))
-    for block in blocks:
-        spectrum = np.fft.rfft((block - block.mean(axis=0)).T, size)
-        power += spectrum.real**2 + spectrum.imag**2
-    products = np.fft.irfft(power, size)[:, :lags]
-    return np.asarray((products / (count * (n - np.arange(lags)))).T)
+    spectrum = np.fft.rfft(x - x.mean(axis=-1, keepdims=True), size)
+    return np.asarray(np.fft.irfft(spectrum.real**2 + spectrum.imag**2, size)[..., :lags] / n)
 
 
 def _summed(covariance: Array, n: int) -> tuple[float, int]:
