@@ -25,9 +25,8 @@ from calibrations.exporting.linear_form import (
     SYMMETRIC,
     LinearForm,
     Outputs,
-    error_of,
+    exported,
     fit_form,
-    losses,
     outputs_in,
 )
 from calibrations.exporting.simulated import Exported, Loss, Simulated
@@ -35,7 +34,6 @@ from calibrations.table import Array
 
 Value = float | int
 UNIT = {"g": "m/s^2", "deg/s": "rad/s", "field": "gauss"}
-SENSOR = {"g": "accelerometer", "deg/s": "gyroscope", "field": "magnetometer"}
 KIND = {"g": DIAGONAL, "deg/s": OFFSETS, "field": SYMMETRIC}
 CUBIC = 3
 PAIRS = ((0, 1), (0, 2), (1, 2))
@@ -57,20 +55,22 @@ class Slot:
 
 def px4(sensors: Sequence[Simulated], slot: Slot) -> Exported:
     """A file of parameters for QGroundControl: tab-separated vehicle, component, name, value, type."""
-    exported = [_px4_sensor(_fitted(sensor, "PX4", None), slot) for sensor in sensors]
+    sensor_parts = [_px4_sensor(_fitted(sensor, "PX4", None), slot) for sensor in sensors]
     lines = ["# Onboard parameters: sensor calibration", "# Vehicle-Id Component-Id Name Value Type"]
-    for values, _ in exported:
+    for values, _ in sensor_parts:
         for name, value in values.items():
             kind = INTEGER if isinstance(value, int) else FLOAT
             lines.append(f"1\t1\t{name}\t{_written(value)}\t{kind}")
-    return _together("\n".join(lines) + "\n", [part for _, part in exported], _identity_notes(slot, "PX4"))
+    parts = [part for _, part in sensor_parts]
+    return Exported.of_parts("\n".join(lines) + "\n", parts, _identity_notes(slot, "PX4"))
 
 
 def ardupilot(sensors: Sequence[Simulated], slot: Slot) -> Exported:
     """A file of parameters for Mission Planner, QGroundControl and MAVProxy: NAME,VALUE."""
-    exported = [_ardupilot_sensor(_fitted(sensor, "ArduPilot", ARDUPILOT_T0), slot) for sensor in sensors]
-    lines = [f"{name},{_written(value)}" for values, _ in exported for name, value in values.items()]
-    return _together("\n".join(lines) + "\n", [part for _, part in exported], _identity_notes(slot, "ArduPilot"))
+    sensor_parts = [_ardupilot_sensor(_fitted(sensor, "ArduPilot", ARDUPILOT_T0), slot) for sensor in sensors]
+    lines = [f"{name},{_written(value)}" for values, _ in sensor_parts for name, value in values.items()]
+    parts = [part for _, part in sensor_parts]
+    return Exported.of_parts("\n".join(lines) + "\n", parts, _identity_notes(slot, "ArduPilot"))
 
 
 def _fitted(sensor: Simulated, program: str, t0: float | None) -> tuple[Outputs, LinearForm]:
@@ -94,7 +94,7 @@ def _px4_sensor(fitted: tuple[Outputs, LinearForm], slot: Slot) -> tuple[Mapping
         values |= {f"CAL_MAG{n}_{axis}ODIAG": form.matrix[pair] for axis, pair in pairs}
     if form.degree:
         values |= _px4_thermal(form, outputs.simulated, {"g": "A", "deg/s": "G", "field": "M"}[unit], slot)
-    return values, _result(outputs, form, list(_px4_ignored(outputs, form)))
+    return values, exported(outputs, form, ignored=list(_px4_ignored(outputs, form)))
 
 
 def _px4_thermal(form: LinearForm, simulated: Simulated, letter: str, slot: Slot) -> Iterator[tuple[str, Value]]:
@@ -127,7 +127,7 @@ def _ardupilot_sensor(fitted: tuple[Outputs, LinearForm], slot: Slot) -> tuple[M
     outputs, form = fitted
     unit, k = outputs.simulated.unit, slot.number + 1
     if unit == "field":
-        return _ardupilot_compass(form, slot), _result(outputs, form)
+        return _ardupilot_compass(form, slot), exported(outputs, form)
     sensor, number = ("ACC" if unit == "g" else "GYR"), (str(k) if k > 1 else "")
     prefix = f"INS_{sensor}{number}"
     caltemp = float(np.mean(outputs.simulated.spans["temperature_c"])) if form.degree else None
@@ -146,7 +146,7 @@ def _ardupilot_sensor(fitted: tuple[Outputs, LinearForm], slot: Slot) -> tuple[M
         for order in range(1, CUBIC + 1):
             for i, axis in enumerate(AXIS_NAMES):
                 values[f"INS_TCAL{k}_{sensor}{order}_{axis}"] = 1e6 * form.offsets[order, i]
-    return values, _result(outputs, form, notes=_gyroscope_note(unit))
+    return values, exported(outputs, form, notes=_gyroscope_note(unit))
 
 
 def _gyroscope_note(unit: str) -> tuple[str, ...]:
@@ -179,20 +179,6 @@ def _check_range(program: str, outputs: Outputs, quantity: str, values: Array, s
                 f"{span[1]:g}, and that of {axis} is {value:.4g}; check the sensor and the unit of its data, "
                 f"{outputs.simulated.model.unit}"
             )
-
-
-def _result(outputs: Outputs, form: LinearForm, ignored: Sequence[Loss] = (), notes: tuple[str, ...] = ()) -> Exported:
-    unit = outputs.simulated.unit
-    return Exported("", (*losses(form, outputs), *ignored), notes, ((SENSOR[unit], *error_of(form, outputs), unit),))
-
-
-def _together(text: str, parts: Sequence[Exported], notes: Sequence[str]) -> Exported:
-    return Exported(
-        text,
-        tuple(loss for part in parts for loss in part.losses),
-        (*notes, *(note for part in parts for note in part.notes)),
-        tuple(error for part in parts for error in part.errors),
-    )
 
 
 def _identity_notes(slot: Slot, program: str) -> tuple[str, ...]:

@@ -7,16 +7,17 @@ the smallest mean square of the error over the range of the data.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calibrations.errors import ModelError
-from calibrations.exporting.simulated import Loss, Simulated
+from calibrations.exporting.simulated import Exported, Loss, Simulated
 from calibrations.importing.units import parse_unit
 from calibrations.table import Array
 
+SENSOR = {"g": "accelerometer", "deg/s": "gyroscope", "field": "magnetometer"}
 DIAGONAL, SYMMETRIC, FULL, OFFSETS = "diagonal", "symmetric", "full", "offsets"
 NEGLIGIBLE = 1e-8  # of the largest input: a loss below this is not named
 IN_SI = {"m/s2": 1.0, "rad/s": 1.0, "deg/s": np.pi / 180, "gauss": 1.0, "uT": 1e-2, "mgauss": 1e-3}
@@ -142,6 +143,20 @@ def losses(form: LinearForm, outputs: Outputs) -> Iterator[Loss]:
             result.append(Loss(name, CANNOT[form.kind], rms, most, simulated.unit))
     yield from sorted(result, key=lambda loss: -(loss.rms or 0.0))
     yield from simulated.lost
+
+
+def exported(
+    outputs: Outputs,
+    form: LinearForm,
+    text: str = "",
+    notes: tuple[str, ...] = (),
+    ignored: Sequence[Loss] = (),
+    held: Collection[str] = (),
+) -> Exported:
+    """The part of a file on one sensor: errors and losses of its form. `held`: effects that the file has beside it."""
+    unit = outputs.simulated.unit
+    lost = (loss for loss in losses(form, outputs) if loss.effect not in held)
+    return Exported(text, (*lost, *ignored), notes, ((SENSOR[unit], *error_of(form, outputs), unit),))
 
 
 def _size(error: Array) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibrations.errors import ModelError
-from calibrations.exporting.linear_form import FULL, LinearForm, Outputs, error_of, fit_form, losses, outputs_in
+from calibrations.exporting.linear_form import FULL, LinearForm, Outputs, exported, fit_form, outputs_in
 from calibrations.exporting.simulated import Exported, Simulated
 from calibrations.table import AXES, Array
 
@@ -29,7 +29,7 @@ def imu_calib(sensors: Sequence[Simulated], comment: str) -> Exported:
     outputs, form = _accelerometer(sensors, "imu_calib")
     bias = form.matrix @ form.offsets[0]
     text = f"# {comment}\nSM: {_row(form.matrix.ravel())}\nbias: {_row(bias)}\n"
-    return _exported(text, outputs, form, (GYROSCOPE_OFFSET,))
+    return exported(outputs, form, text, (GYROSCOPE_OFFSET,))
 
 
 def imu_tk(sensors: Sequence[Simulated], comment: str) -> Exported:  # noqa: ARG001 the format has no comments
@@ -39,7 +39,7 @@ def imu_tk(sensors: Sequence[Simulated], comment: str) -> Exported:  # noqa: ARG
     blocks = [form.matrix / gains, np.diag(gains)]
     rows = ["\n".join(" ".join(map(_number, row)) for row in block) for block in blocks]
     text = "\n\n".join([*rows, "\n".join(map(_number, form.offsets[0]))]) + "\n"
-    return _exported(text, outputs, form)
+    return exported(outputs, form, text)
 
 
 def imucal(sensors: Sequence[Simulated], comment: str) -> Exported:
@@ -58,13 +58,8 @@ def imucal(sensors: Sequence[Simulated], comment: str) -> Exported:
         document |= {f"K_{letter}": np.diag(gains).tolist(), f"R_{letter}": (forward / gains[:, None]).tolist()}
         document[f"b_{letter}"] = form.offsets[0].tolist()
     document["K_ga"] = _of_acceleration(rate).tolist()
-    parts = [
-        _exported("", acceleration, forms[0], sensor="accelerometer"),
-        _exported("", rate, forms[1], sensor="gyroscope", included=(G_SENSITIVITY,)),
-    ]
-    losses_of_all = [loss for part in parts for loss in part.losses]
-    errors = tuple(error for part in parts for error in part.errors)
-    return Exported(json.dumps(document, indent=1) + "\n", tuple(losses_of_all), (), errors)
+    parts = [exported(acceleration, forms[0]), exported(rate, forms[1], held=(G_SENSITIVITY,))]
+    return Exported.of_parts(json.dumps(document, indent=1) + "\n", parts)
 
 
 def _of_acceleration(rate: Outputs) -> Array:
@@ -82,18 +77,6 @@ def _accelerometer(sensors: Sequence[Simulated], program: str) -> tuple[Outputs,
         raise ModelError(f"{program}: a file holds one accelerometer; give its model only")
     outputs = outputs_in(sensors[0], "m/s^2", program)
     return outputs, fit_form(outputs, FULL)
-
-
-def _exported(
-    text: str,
-    outputs: Outputs,
-    form: LinearForm,
-    notes: tuple[str, ...] = (),
-    sensor: str = "accelerometer",
-    included: tuple[str, ...] = (),
-) -> Exported:
-    lost = tuple(loss for loss in losses(form, outputs) if loss.effect not in included)
-    return Exported(text, lost, notes, ((sensor, *error_of(form, outputs), outputs.simulated.unit),))
 
 
 def _row(values: Array) -> str:

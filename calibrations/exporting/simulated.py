@@ -52,6 +52,16 @@ class Exported:
     notes: tuple[str, ...] = ()
     errors: tuple[tuple[str, float, float, str], ...] = ()  # sensor, rms, largest, unit
 
+    @staticmethod
+    def of_parts(text: str, parts: Sequence[Exported], notes: Sequence[str] = ()) -> Exported:
+        """A file that holds several sensors."""
+        return Exported(
+            text,
+            tuple(loss for part in parts for loss in part.losses),
+            (*notes, *(note for part in parts for note in part.notes)),
+            tuple(error for part in parts for error in part.errors),
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Simulated:

@@ -20,7 +20,7 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.effects.effect import Effect
 from calibrations.model import Estimate
 from calibrations.model.file import read_model
-from calibrations.noise.comparison import deviation, variance_parts
+from calibrations.noise.comparison import deviation
 from calibrations.noise.deviations import OCTAVE_KINDS, OVERLAPPING, Curve
 from calibrations.noise.doubts import MISFITS, Disturbance, disturbance_document, disturbances
 from calibrations.noise.fit import upper_bound
@@ -114,11 +114,6 @@ class ChannelNoise:
     def modelled(self, tau_s: Array) -> Array:
         """Allan deviation that the processes and lines expect, shape of `tau_s`."""
         return deviation(self.fit, tau_s)
-
-    def processes(self, tau_s: Array) -> dict[str, Array]:
-        """Allan variance of each process that is present, at averaging times (k,)."""
-        present = {effect.name for effect in self.fit.effects if self.power(effect) > 0}
-        return {name: variance for name, variance in variance_parts(self.fit, tau_s).items() if name in present}
 
     def power(self, effect: Effect) -> float:
         """Square of an effect's fitted coefficient."""

@@ -37,6 +37,7 @@ from calibrations.presentation.chart import (
     Picture,
     Points,
     Rule,
+    Series,
     beside,
     one,
 )
@@ -137,19 +138,27 @@ def ratio(curve: DeviationComparison) -> Panel:
     return Panel((Rule(1.0, colour=MODEL, width=1.4), dots), Axis(TIME, log=True), Axis("measured / model", log=True))
 
 
-def spectrum(fit: ChannelFit, into: Scaled, models: Sequence[Drawn]) -> Panel:
-    """Dots are measured; 95 % of them should be in the grey band by the model `fit`; lines are the models."""
+def spectrum(
+    fit: ChannelFit, into: Scaled, models: Sequence[Drawn], bounds: tuple[Array, Array] | None = None
+) -> Panel:
+    """Dots are measured; 95 % of them should be in the grey band by the model `fit`; lines are the models.
+
+    `bounds` (b,) are the intervals of the measured densities.
+    """
     order, by = np.argsort(fit.frequency_hz), into.factor
     f = fit.frequency_hz[order]
     low, high = (by * root(bound[order]) for bound in fit.interval(COVERAGE))
     density = by * root(fit.seen[order])
-    series: list[Band | Points | Line | Rule] = [Band(f, low, high), _density_points(f, density, into.unit)]
+    hover = [f"{value:.3g} {into.unit}/√Hz at {at:.4g} Hz" for at, value in zip(f, density, strict=True)]
+    lowest, highest = (by * root(bound[order]) for bound in bounds) if bounds else (None, None)
+    dots = Points(f, density, "measured", size=4, low=lowest, high=highest, hover=hover)
+    series: list[Series] = [Band(f, low, high), dots]
     for effect in fit.effects if len(fit.effects) > 1 else ():
         series.append(_part(effect.name, f, by * root(fit.part_of(effect)[order])))
     for drawn in models:
         by_frequency = np.argsort(drawn.fit.frequency_hz)
         series.append(_model(drawn, drawn.fit.frequency_hz[by_frequency], by * root(drawn.fit.expected[by_frequency])))
-    series += [Rule(line.frequency_hz, "x", VERMILION, 0.9, "dot") for line in fit.lines]
+    series += [mark for line in fit.lines for mark in _marked(line.frequency_hz)]
     expected = by * root(fit.expected)
     bottom = min(float(expected.min()) / ROOM, float(density.min()) / 2)  # no measured point is cut off
     top = max(ROOM * float(expected.max()), 2 * float(density.max()))
@@ -268,56 +277,40 @@ def noise_album(analysis: NoiseAnalysis) -> list[Picture]:
     )
     power = (
         "Power over frequency, one-sided. Dots are averages over narrow bands with intervals of 95 %, the grey band "
-        "should hold 95 % of them; the full line is the sum of the processes, marks on top are lines that were removed."
+        "should hold 95 % of them; the full line is the sum of the processes, dotted lines are spectral lines that "
+        "were removed."
     )
     album = []
     for k, (axis, noise) in enumerate(analysis.channels.items()):
         end, of = (f"-{axis}", f" of {axis}") if k else ("", "")
-        album.append(Picture(f"allan{end}", f"Allan deviation{of}", averaging, _deviations(noise)))
-        album.append(Picture(f"spectrum{end}", f"Spectrum{of}", power, _density(noise)))
+        model, into = _present_processes(noise), Scaled(1.0, noise.unit)
+        density = one(spectrum(model.fit, into, [model], noise.interval), 4.0)
+        album.append(Picture(f"allan{end}", f"Allan deviation{of}", averaging, _deviations(noise, model, into)))
+        album.append(Picture(f"spectrum{end}", f"Spectrum{of}", power, density))
     return album
 
 
-def _deviations(noise: ChannelNoise) -> Chart:
+def _present_processes(noise: ChannelNoise) -> Drawn:
+    """The fit of a channel without processes of no power; one process alone has its name."""
+    effects = tuple(effect for effect in noise.fit.effects if noise.power(effect) > 0)
+    is_alone = len(effects) == 1 and not noise.lines
+    return Drawn(replace(noise.fit, effects=effects), effects[0].name if is_alone else SUM, INK)
+
+
+def _deviations(noise: ChannelNoise, model: Drawn, into: Scaled) -> Chart:
     """The overlapping deviation with its interval, the processes and their sum; on the right the other deviations."""
     curve = noise.allan
-    dots = measured_points(curve.tau_s, curve.deviation, curve.low, curve.high, noise.unit, "measured")
-    tau_s = whole_steps(float(curve.tau_s[0]), float(curve.tau_s[-1]), noise.channel.rate_hz)
-    processes = noise.processes(tau_s)
-    several = len(processes) + len(noise.lines) > 1
-    thin = tuple(_part(name, tau_s, np.sqrt(v)) for name, v in processes.items()) if several else ()
-    total = Line(tau_s, noise.modelled(tau_s), SUM if several else next(iter(processes), SUM), INK, 1.8)
-    y = Axis(f"deviation ({noise.unit})", log=True, low=curve.low.min() / 2, high=3 * curve.high.max())
-    overlapping = Panel(
-        (*thin, total, dots), Axis(TIME, log=True), y, "Overlapping Allan deviation", legend="upper center"
-    )
+    panel = allan(curve, into, [model])
+    left = replace(panel, y=replace(panel.y, label=f"deviation ({into.unit})"), title="Overlapping Allan deviation")
     curves = [part for kind, name, colour in OTHERS for part in _other(noise.deviations[kind], name, colour)]
     line = Line(curve.tau_s, curve.deviation, "overlapping Allan", QUIET)
-    right = Panel((*curves, line), Axis(TIME, log=True), y, "Other deviations", legend="upper center")
-    return beside([overlapping, right], 4.0, share_y=True)
+    right = Panel((*curves, line), Axis(TIME, log=True), left.y, "Other deviations", legend="upper center")
+    return beside([left, right], 4.0, share_y=True)
 
 
 def _other(curve: Curve, name: str, colour: str) -> tuple[Band, Line]:
     band = Band(curve.tau_s, curve.low, curve.high, colour=colour, opacity=0.18)
     return band, Line(curve.tau_s, curve.deviation, name, colour, markers=True)
-
-
-def _density(noise: ChannelNoise) -> Chart:
-    """Measured and expected one-sided amplitude densities."""
-    fit, order = noise.fit, np.argsort(noise.fit.frequency_hz)
-    f, expected, measured = (values[order] for values in (fit.frequency_hz, fit.expected, fit.seen))
-    low, high = (root(bound[order]) for bound in fit.interval(COVERAGE))
-    bars, density = [root(bound[order]) for bound in noise.interval], root(measured)
-    present = [effect for effect in fit.effects if noise.power(effect) > 0]
-    series = (
-        Band(f, low, high),
-        Points(f, density, "measured", size=4, low=bars[0], high=bars[1], hover=_told(f, density, noise.unit)),
-        *(_part(e.name, f, root(fit.part_of(e)[order])) for e in (present if len(present) > 1 else ())),
-        Line(f, root(expected), present[0].name if len(present) == 1 else SUM, INK, 1.8),
-        *(part for line in noise.lines for part in _marked(line.frequency_hz)),
-    )
-    y = Axis(f"density ({noise.unit}/√Hz)", log=True, low=low.min() / 2, high=2 * max(high.max(), density.max()))
-    return one(Panel(series, Axis(FREQUENCY, log=True), y, legend="best"), 4.0)
 
 
 def _marked(frequency_hz: float) -> Iterator[Rule | Note]:
@@ -348,14 +341,6 @@ def root(two_sided: Array) -> Array:
 def candidate(fit: ChannelFit, name: str) -> Drawn:
     """The curve of a model with an effect that is considered."""
     return Drawn(fit, f"with {name}", CANDIDATE, 2.6)
-
-
-def _density_points(f: Array, density: Array, unit: str) -> Points:
-    return Points(f, density, "measured", size=4, hover=_told(f, density, unit))
-
-
-def _told(f: Array, density: Array, unit: str) -> list[str]:
-    return [f"{value:.3g} {unit}/√Hz at {at:.4g} Hz" for at, value in zip(f, density, strict=True)]
 
 
 def _part(name: str, x: Array, values: Array) -> Line:
