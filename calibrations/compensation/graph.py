@@ -1,6 +1,7 @@
 """Arithmetic as a graph. Equal parts are one node, computed once; constants are folded.
 
-Only `number`, `variable` and `apply_operation` make nodes. A variable gets its value at run time, by name.
+Only `number`, `variable`, `apply_operation` and the signs +, -, * and / make nodes. A variable gets its value at run
+time, by name.
 """
 
 from __future__ import annotations
@@ -108,6 +109,25 @@ class Node:
     def constant(self) -> bool:
         return self.operation == "number"
 
+    def __add__(self, other: Node) -> Node:
+        return apply_operation("+", self, other)
+
+    def __sub__(self, other: Node) -> Node:
+        return apply_operation("-", self, other)
+
+    def __mul__(self, other: Node) -> Node:
+        return apply_operation("*", self, other)
+
+    def __truediv__(self, other: Node) -> Node:
+        return apply_operation("/", self, other)
+
+    def __abs__(self) -> Node:
+        return apply_operation("abs", self)
+
+    def clipped(self, least: Node, most: Node) -> Node:
+        """The node, not below `least` and not above `most`."""
+        return apply_operation("min", apply_operation("max", self, least), most)
+
 
 @lru_cache(MANY)
 def number(value: float) -> Node:
@@ -141,11 +161,11 @@ def tabulated(table: Table, x: Node) -> Node:
 def power(base: Node, exponent: int) -> Node:
     """A whole power by repeated squares."""
     if exponent < 0:
-        return apply_operation("/", ONE, power(base, -exponent))
+        return ONE / power(base, -exponent)
     if exponent < 2:
         return base if exponent else ONE
     half = power(base, exponent // 2)
-    return apply_operation("*", apply_operation("*", half, half), power(base, exponent % 2))
+    return half * half * power(base, exponent % 2)
 
 
 def sort_nodes(roots: Iterable[Node]) -> list[Node]:
@@ -196,13 +216,13 @@ def _shortened(operation: str, inner: tuple[Node, ...]) -> Node | None:
         case ("+", (left, right)) if left is ZERO:
             return right
         case ("+", (left, Node(operation="neg", inner=(right,)))):
-            return apply_operation("-", left, right)
+            return left - right
         case ("-", (left, right)) if right is ZERO:
             return left
         case ("-", (left, right)) if left is ZERO:
             return apply_operation("neg", right)
         case ("-", (left, Node(operation="neg", inner=(right,)))):
-            return apply_operation("+", left, right)
+            return left + right
         case ("*", (left, right)) if ZERO in (left, right):
             return ZERO
         case ("*", (left, right)) if right is ONE:

@@ -15,7 +15,7 @@ import numpy as np
 
 from calibrations.compensation.bound import Bound
 from calibrations.compensation.forward import Forward
-from calibrations.compensation.graph import OPERATIONS, Node, Table, apply_operation, number, sort_nodes, variable
+from calibrations.compensation.graph import OPERATIONS, Node, Table, number, sort_nodes, variable
 from calibrations.table import Array
 
 
@@ -125,12 +125,12 @@ class _Names:
 
 
 def _next(forward: Forward, bound: Bound, outputs: tuple[str, ...]) -> list[Node]:
-    errors = [apply_operation("-", variable(name), G) for name, G in zip(outputs, forward.outputs, strict=True)]
+    errors = [variable(name) - G for name, G in zip(outputs, forward.outputs, strict=True)]
     nexts = []
     for name, row in zip(forward.sought, bound.C, strict=True):
         moved = variable(name)
         for share, error in zip(row, errors, strict=True):
-            moved = apply_operation("+", moved, apply_operation("*", number(float(share)), error))
+            moved += number(float(share)) * error
         nexts.append(moved)
     return nexts
 

@@ -8,13 +8,15 @@ Source  Farouki, The Bernstein polynomial basis: a centennial retrospective, CAG
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
 from typing import Any
 
 import numpy as np
 
-from calibrations.compensation.graph import Node, apply_operation, number, power, tabulated
+from calibrations.compensation.graph import ONE, ZERO, Node, number, power, tabulated
 from calibrations.compensation.trace import NotTraced, RunTime, Traced, as_nodes, as_traced
 from calibrations.effects import Values
 from calibrations.effects.thermometer import sensor_temperature_c
@@ -103,17 +105,16 @@ def trace_free_form(effect: FreeForm, a: Traced, v: Traced, table: RunTime, p: V
     out = as_nodes(np.zeros((1, 3)))
     for k in range(len(table.axes)):
         for form in effect.forms:
-            part = _part(form, coefficients_of(form, p, k), a.nodes[0], v.nodes[0, k], table, k)
-            out[0, k] = apply_operation("+", out[0, k], part)
+            out[0, k] += _part(form, coefficients_of(form, p, k), a.nodes[0], v.nodes[0, k], table, k)
     return as_traced(Traced(out))
 
 
-def _part(form: Form, u: Array, a: Any, v: Node, table: RunTime, k: int) -> Node:
+def _part(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, k: int) -> Node:
     """One form at axis k, with its coefficients u."""
     basis = form.basis(k)
     if isinstance(basis, Products):
-        f = _total([_times(float(c), _product([power(x, e) for x, e in zip(a, powers, strict=True)]))
-                    for c, powers in zip(u, basis.powers, strict=False)])  # fmt: skip
+        products = [prod(map(power, a, powers), start=ONE) for powers in basis.powers]
+        f = _weighted(u, products)
     else:
         x = _driver(form, a, v, table, k)
         if isinstance(basis, Spline):
@@ -121,28 +122,27 @@ def _part(form: Form, u: Array, a: Any, v: Node, table: RunTime, k: int) -> Node
         elif isinstance(basis, Line):
             half = (basis.high - basis.low) / 2 or 1.0
             slope = float(np.sum(u)) / half
-            f = apply_operation("+", _times(slope, x), number(-slope * (basis.low + basis.high) / 2))
+            f = number(slope) * x + number(-slope * (basis.low + basis.high) / 2)
         elif isinstance(basis, Ramp):
-            columns = [number(1.0), apply_operation("abs", x), x]
-            f = _total([_times(float(c), column) for c, column in zip(u, columns, strict=False)])
+            f = _weighted(u, [ONE, abs(x), x])
         elif isinstance(basis, Clips):
-            f = _total([_times(float(c) / w, _clipped(x, w)) for c, w in zip(u, basis.widths, strict=False)])
+            clips = [x.clipped(number(-width), number(width)) for width in basis.widths]
+            f = _weighted([c / width for c, width in zip(u, basis.widths, strict=False)], clips)
         else:
             raise NotTraced(f"a product cannot follow its {basis.kind}")
     if form.factor == "force":
-        return apply_operation("*", a[k], f)
+        return a[k] * f
     if form.factor == "load":
-        return apply_operation("*", apply_operation("abs", a[CROSS[k]]), f)
+        return abs(a[CROSS[k]]) * f
     if form.factor:
         raise NotTraced(f"a product does not know the {form.factor}")
     return f
 
 
-def _driver(form: Form, a: Any, v: Node, table: RunTime, k: int) -> Node:
+def _driver(form: Form, a: Sequence[Node], v: Node, table: RunTime, k: int) -> Node:
     """What drives a function of axis k."""
     if form.driver in ("own", "cross", "out-of-plane"):
-        node: Node = a[{"own": k, "cross": CROSS[k], "out-of-plane": (2, 2, 1)[k]}[form.driver]]
-        return node
+        return a[{"own": k, "cross": CROSS[k], "out-of-plane": (2, 2, 1)[k]}[form.driver]]
     if form.driver == "output":
         return v
     if form.driver == "temperature":
@@ -153,23 +153,6 @@ def _driver(form: Form, a: Any, v: Node, table: RunTime, k: int) -> Node:
     raise NotTraced(f"a product does not know the {form.driver}")
 
 
-def _clipped(x: Node, width: float) -> Node:
-    return apply_operation("min", apply_operation("max", x, number(-width)), number(width))
-
-
-def _times(factor: float, x: Node) -> Node:
-    return apply_operation("*", number(factor), x)
-
-
-def _total(nodes: list[Node]) -> Node:
-    total = number(0.0)
-    for node in nodes:
-        total = apply_operation("+", total, node)
-    return total
-
-
-def _product(nodes: list[Node]) -> Node:
-    product = number(1.0)
-    for node in nodes:
-        product = apply_operation("*", product, node)
-    return product
+def _weighted(weights: Iterable[float], nodes: Sequence[Node]) -> Node:
+    """The sum of the nodes times their weights; nodes without a weight stay out."""
+    return sum((number(float(weight)) * node for weight, node in zip(weights, nodes, strict=False)), start=ZERO)

@@ -6,7 +6,7 @@ The function of an effect is called with it, so that its formula is written once
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any
@@ -69,7 +69,7 @@ class Traced(NDArrayOperatorsMixin):
             raise NotTraced(f"its function uses np.{ufunc.__name__}.{method} or changes an array in place")
         match ufunc.__name__:
             case "matmul":
-                return _product(*inputs)
+                return Traced(np.matmul(*map(as_nodes, inputs)))
             case "square":
                 return _elementwise(lambda x: power(x, 2), *inputs)
             case "power":
@@ -161,27 +161,6 @@ def _power(base: Any, exponent: Any) -> Traced:
     return np.sqrt(base) if e[0] == 0.5 else _elementwise(lambda x: power(x, int(e[0])), base)
 
 
-def _product(a: Any, b: Any) -> Traced:
-    matrix, right = np.atleast_2d(as_nodes(a)), as_nodes(b)
-    columns = right if right.ndim == 2 else right[:, None]
-    out = [
-        [_sum([apply_operation("*", x, y) for x, y in zip(row, column, strict=True)]) for column in columns.T]
-        for row in matrix
-    ]
-    product = Traced(out)
-    if right.ndim == 1:
-        product = product[:, 0]
-    return product if len(np.shape(as_nodes(a))) == 2 else product[0]
-
-
-def _sum(terms: Sequence[Node]) -> Node:
-    return reduce(lambda x, y: apply_operation("+", x, y), terms)
-
-
-def _outer(a: Any, b: Any) -> Traced:
-    return _elementwise(lambda x, y: apply_operation("*", x, y), as_traced(a)[:, None], as_traced(b)[None, :])
-
-
 def as_traced(value: Any) -> Traced:
     return Traced(as_nodes(value))
 
@@ -191,15 +170,13 @@ def _where(condition: Any, yes: Any, no: Any) -> Traced:
 
 
 def _clip(a: Any, low: Any, high: Any) -> Traced:
-    return _elementwise(
-        lambda x, least, most: apply_operation("min", apply_operation("max", x, least), most), a, low, high
-    )
+    return _elementwise(Node.clipped, a, low, high)
 
 
 FUNCTIONS: Mapping[Callable[..., Any], Callable[..., Any]] = {
     np.where: _where,
     np.clip: _clip,
-    np.outer: _outer,
+    np.outer: lambda a, b: Traced(np.outer(as_nodes(a), as_nodes(b))),
     np.broadcast_to: lambda a, shape: Traced(np.broadcast_to(as_nodes(a), shape)),
     np.column_stack: lambda columns: Traced(np.column_stack([as_nodes(column) for column in columns])),
     np.zeros_like: lambda a, **_: as_traced(np.zeros(a.shape)),
