@@ -1,7 +1,7 @@
-"""Results of runs: one file for each procedure that has results, with the name of the procedure.
+"""Results of runs: a function for each procedure that has results, in the module on its kind of measurement.
 
-`noise_floor.py` has `evaluate(measured) -> {name: Result | Missing}` for the procedure "noise-floor", and NAMES, the
-names that its results can have. A user's procedure can return such a mapping itself instead.
+`samples.py` has `@evaluates("noise-floor", NAMES...)` and below it a function of what the run measured, which gives a
+Result, or the reason why it is Missing, for each name. A user's procedure can return such a mapping itself instead.
 """
 
 from rig.results.evaluate import judged

@@ -1,10 +1,9 @@
-"""The results of a run, computed from the record by the file of its procedure."""
+"""The results of a run, computed from the record by the evaluation of its procedure."""
 
 from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from calibrations.errors import CalibrationError
@@ -13,7 +12,16 @@ from rig.bench import Bench
 from rig.errors import RecordError
 from rig.record import Record, Run
 from rig.record.measured import Measured, sensors_of
-from rig.results.result import Missing, Result, documents
+from rig.results.result import EVALUATIONS, Evaluation, Missing, Result, documents
+
+AXES = "xyz"
+MODULES = {  # with the evaluation of each procedure, imported when it is needed
+    **dict.fromkeys(("check-standard", "repeat", "temperature-cycle", "sweep"), "tumbles"),
+    **dict.fromkeys(("level-check", "misalignment"), "alignment"),
+    **dict.fromkeys(("noise-floor", "motion"), "samples"),
+    **dict.fromkeys(("hand-positions", "rate-turn", "magnetometer-turn"), "triads"),
+    "soak": "soak",
+}
 
 
 def judged(record: Record, run: Run) -> tuple[dict[str, Any], str | None]:
@@ -25,8 +33,8 @@ def judged(record: Record, run: Run) -> tuple[dict[str, Any], str | None]:
         results = evaluated(record, record.run(run.run))  # read again: the number of its rows bounds the memory
     except (CalibrationError, RecordError) as error:
         return {}, f"none: {error}"
-    given = {name: result for name, result in results.items() if isinstance(result, Result)}
-    return documents(given, Bench.model_validate(run.bench).result_limits), _missing(results)
+    known = {name: result for name, result in results.items() if isinstance(result, Result)}
+    return documents(known, Bench.model_validate(run.bench).result_limits), _missing(results)
 
 
 def _missing(results: Mapping[str, Result | Missing]) -> str | None:
@@ -41,29 +49,29 @@ def _missing(results: Mapping[str, Result | Missing]) -> str | None:
 def evaluated(record: Record, run: Run) -> dict[str, Result | Missing]:
     """The run's results by name; empty for a procedure without results.
 
-    In a batch the names begin with that of the sensor: `a1/bias-drift-x`. Results of the bench (OF_THE_BENCH in the
-    file) are given once. Raises DataError if the record has too few measurements.
+    In a batch the names begin with that of the sensor: `a1/bias-drift-x`. Results of the bench are given once. Raises
+    DataError if the record has too few measurements.
     """
-    name = run.procedure.replace("-", "_")
-    if not Path(__file__).with_name(f"{name}.py").is_file():
+    if run.procedure not in MODULES:
         return {}
-    module = importlib.import_module(f"rig.results.{name}")
-    sensors = [] if getattr(module, "OF_THE_BENCH", False) else sensors_of(run)
+    evaluation = _evaluation(run.procedure)
+    sensors = [] if evaluation.of_bench else sensors_of(run)
     if not sensors:
-        results: dict[str, Result | Missing] = module.evaluate(Measured(record, run))
-        return results
-    by_sensor = {sensor: module.evaluate(Measured(record, run, sensor)) for sensor in sensors}
-    return {f"{sensor}/{name}": result for sensor, of_one in by_sensor.items() for name, result in of_one.items()}
-
-
-# The names that results can have: NAMES of each procedure's file, in which `{axis}` stands for any axis.
-
-AXES = "xyz"
+        return dict(evaluation.evaluate(Measured(record, run)))
+    by_sensor = {sensor: evaluation.evaluate(Measured(record, run, sensor)) for sensor in sensors}
+    return {f"{sensor}/{name}": result for sensor, results in by_sensor.items() for name, result in results.items()}
 
 
 def names() -> list[str]:
-    """The names of results of all shipped procedures, in alphabetical order."""
-    files = (path.stem for path in Path(__file__).parent.glob("[a-z]*.py"))
-    modules = [importlib.import_module(f"rig.results.{file}") for file in files]
-    patterns = [pattern for module in modules for pattern in getattr(module, "NAMES", ())]
-    return sorted({pattern.format(axis=axis) for pattern in patterns for axis in AXES})
+    """The names of results of all shipped procedures, and of parameters on certificates, in alphabetical order."""
+    from calibrations.effects.catalogue import catalogue
+    from calibrations.presentation.certificate.terms import names as certificate_names
+
+    patterns = [pattern for procedure in MODULES for pattern in _evaluation(procedure).names]
+    parameters = {name for effect in catalogue().values() for name in certificate_names(effect)}
+    return sorted(parameters | {pattern.format(axis=axis) for pattern in patterns for axis in AXES})
+
+
+def _evaluation(procedure: str) -> Evaluation:
+    importlib.import_module(f"rig.results.{MODULES[procedure]}")  # registers it
+    return EVALUATIONS[procedure]

@@ -8,9 +8,9 @@ Source    ISO 14253-1, JCGM 106: a guard band on both sides of the limit.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from calibrations.criteria import COVERAGE_FACTOR
 from calibrations.effects.catalogue import catalogue
@@ -19,6 +19,7 @@ from calibrations.model import Estimate
 from calibrations.model.file import read_model
 from calibrations.table import Table
 from procedures.errors import ProcedureError
+from rig.record.measured import Measured
 
 Limit = float | tuple[float, float]
 
@@ -44,6 +45,38 @@ class Missing:
     """A result that the poses do not determine, and the reason."""
 
     why: str
+
+
+# The evaluation of a procedure: a function of what a run measured, which its module registers.
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The results of a procedure by name, and their names, in which `{axis}` stands for any axis.
+
+    `of_bench`: the results are those of the bench, and the same for all sensors of a batch.
+    """
+
+    evaluate: Callable[[Measured], Mapping[str, Result | Missing]]
+    names: tuple[str, ...]
+    of_bench: bool = False
+
+
+EVALUATIONS: dict[str, Evaluation] = {}
+Evaluate = TypeVar("Evaluate", bound=Callable[[Measured], Mapping[str, Any]])
+
+
+def evaluates(procedure: str, *names: str, of_bench: bool = False) -> Callable[[Evaluate], Evaluate]:
+    """Register a function as the evaluation of `procedure`, see Evaluation."""
+
+    def register(evaluate: Evaluate) -> Evaluate:
+        EVALUATIONS[procedure] = Evaluation(evaluate, names, of_bench)
+        return evaluate
+
+    return register
+
+
+# Results that a procedure returns itself, and results as documents.
 
 
 def returned(name: str, given: Any) -> Result:

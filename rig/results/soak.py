@@ -16,11 +16,14 @@ from procedures.instruments import OUTPUTS, output_channel
 from procedures.session import Dwell
 from procedures.soak import REVERSAL
 from rig.record.measured import Measured
-from rig.results.result import Result
+from rig.results.result import Result, evaluates
 
 ENDS = {names["xyz".index(axis)] for names in OUTPUTS for axis in AXES}
 FEWEST_STEADY = 3  # reversals after the steady state before it ends a soak
-NAMES = (
+
+
+@evaluates(
+    "soak",
     *("steady-state", "steady-state-time", "steady-state-{axis}", "steady-state-time-{axis}"),
     *("steady-state-earliest", "steady-state-expected", "steady-state-latest"),
     *("steady-state-earliest-{axis}", "steady-state-expected-{axis}", "steady-state-latest-{axis}"),
@@ -28,9 +31,7 @@ NAMES = (
     *("time-constant-{axis}", "scale-time-constant-{axis}", "temperature-wander", "gap"),
     *("bias-final-{axis}", "scale-final-{axis}", "bias-foreseen-{axis}", "scale-foreseen-{axis}"),
 )
-
-
-def evaluate(measured: Measured) -> dict[str, Result]:
+def soak(measured: Measured) -> dict[str, Result]:
     """Results of each axis and of all axes. Times in h are since power-on.
 
     steady-state           1 if it is reached within the soak, else 0

@@ -12,7 +12,7 @@ from calibrations.errors import UnusableData
 from rig.files import program
 from rig.record import Record
 from rig.record.measured import Measured
-from rig.results.motion import beside_displacement
+from rig.results.samples import beside_displacement
 from rig.services.load import Loaded, loaded
 from rig.services.next_experiment import planned
 from rig.services.provenance import today

@@ -132,10 +132,10 @@ def test_a_bench_without_a_level_has_it_read_and_typed(rig: Rig, tmp_path: Path)
 
 @pytest.mark.sockets
 def test_what_was_measured_is_complete_even_if_nothing_comes_of_it(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
-    def cannot(measured: object) -> None:
+    def cannot(*readings: object) -> None:
         raise DataError("the stretches are too short; measure longer")
 
-    monkeypatch.setattr("rig.results.level_check.evaluate", cannot)
+    monkeypatch.setattr("rig.results.alignment.reversal", cannot)
     ended = rig("run", "level-check", "--unattended", "--json")
     document = json.loads(ended.out)
     assert (ended.status, document["state"], document["results"]) == (1, "complete", {})

@@ -1,24 +1,26 @@
-"""noise-floor: rms and peak-to-peak noise of each axis, and the smallest inclination above the noise."""
+"""Results from single samples: the noise at rest (noise-floor), and models in vibration (motion)."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from calibrations.analyses.motion import MotionResult, evaluate_motion, fit_physical, linear_from_turns
 from calibrations.analyses.noise_floor import hidden_inclination_deg, noise_rms
 from calibrations.errors import DataError
 from calibrations.geometry.orientation import UPRIGHT_DEG
 from procedures.instruments import output_channel
+from procedures.motion import SWEEP
 from procedures.noise_floor import STILL
 from rig.record import Kept
 from rig.record.measured import Measured
 from rig.record.tables import units_of
-from rig.results.result import Missing, Result
+from rig.results.result import Missing, Result, evaluates
 
 PEAK_TO_PEAK = 4  # x rms: Ang V
-NAMES = ("noise-rms-{axis}", "noise-pp-{axis}", "inclination-{axis}")
 
 
-def evaluate(measured: Measured) -> dict[str, Result | Missing]:
+@evaluates("noise-floor", "noise-rms-{axis}", "noise-pp-{axis}", "inclination-{axis}")
+def noise_floor(measured: Measured) -> dict[str, Result | Missing]:
     """Noise in the unit of the outputs, inclination in deg. The inclination needs the poses at +1 g and -1 g.
 
     Raises DataError without a still record.
@@ -51,3 +53,20 @@ def _inclination(upright: list[Kept], axis: str, channel: str, rms: float, std: 
     plus, minus = outputs
     inclination = hidden_inclination_deg(PEAK_TO_PEAK * rms, (plus - minus) / 2)
     return Result(inclination, "deg", inclination * std / rms if rms else None)
+
+
+@evaluates("motion", "rmse-linear-x", "rmse-physical-x", "improvement-x", "noise-limit-x", "amplitude", "frequency")
+def motion(measured: Measured) -> dict[str, Result]:
+    """rmse-linear-x, rmse-physical-x, noise-limit-x and amplitude in mm/s^2, improvement-x, frequency in Hz.
+
+    Raises SensorFault for a reading outside the curve of the displacement sensor; RecordError or DataError if a part of
+    the run is missing.
+    """
+    results = beside_displacement(measured).results
+    return {name: Result(q.value, "" if q.unit == "1" else q.unit, q.std) for name, q in results.items()}
+
+
+def beside_displacement(measured: Measured) -> MotionResult:
+    """Both models compared with the displacement sensor, as in Ang Fig. 12. Raises as `motion`."""
+    sweep = measured.part("poses", SWEEP)
+    return evaluate_motion(measured.table(), linear_from_turns(sweep), fit_physical(sweep), measured.part("still"))

@@ -1,22 +1,41 @@
-"""misalignment: the directions of the sensing axes, their angles, and the matrix that corrects for them."""
+"""Results on directions: the tilt of the table (level-check), and the axes of the sensor (misalignment)."""
 
 from __future__ import annotations
+
+from math import hypot
 
 import numpy as np
 
 from calibrations.analyses.misalignment import Direction, correction_matrix, estimate_directions, non_orthogonality_deg
+from procedures.level_check import reversal
 from rig.record.measured import Measured
-from rig.results.result import Result
+from rig.results.result import Result, evaluates
 
 REFERENCE = "xyz"
-NAMES = (
+
+
+@evaluates("level-check", "level-{axis}", "level-offset-{axis}", "base-{axis}", "base-offset-{axis}", of_bench=True)
+def level_check(measured: Measured) -> dict[str, Result]:
+    """Tilt of the table or of the base along x and y of the level, and the offset of the level, deg."""
+    readings = {reading.name: reading for reading in measured.readings()}
+    what = "base" if measured.run.settings.get("on") == "base" else "level"
+    results = {}
+    for axis in "xy":
+        front, back = readings[f"{what}-front-{axis}"], readings[f"{what}-back-{axis}"]
+        std = hypot(front.std, back.std) / 2 if front.std is not None and back.std is not None else None
+        tilt_deg, offset_deg = reversal(front.value, back.value)
+        results[f"{what}-{axis}"] = Result(tilt_deg, "deg", std)
+        results[f"{what}-offset-{axis}"] = Result(offset_deg, "deg", std)
+    return results
+
+
+@evaluates(
+    "misalignment",
     *(f"theta-{axis}{reference}" for axis in "xy" for reference in REFERENCE),
     *("alpha-{axis}", "beta-{axis}", "non-orthogonality", "rounds"),
     *(f"correction-{row}{column}" for row in REFERENCE for column in REFERENCE),
 )
-
-
-def evaluate(measured: Measured) -> dict[str, Result]:
+def misalignment(measured: Measured) -> dict[str, Result]:
     """theta-xx .. theta-yz, alpha-x .. beta-y in deg, and the matrix of Ang (20)-(21) that corrects accelerations.
 
     Raises DataError if no round of the search is complete.

@@ -1,11 +1,14 @@
-"""magnetometer-turn: hard and soft iron by an ellipsoid fit and by hand, and the elements of the field."""
+"""Results of sensors with three axes: hand-positions, rate-turn and magnetometer-turn."""
 
 from __future__ import annotations
 
+import math
+from itertools import permutations
 from math import hypot
 
 import numpy as np
 
+from calibrations.analyses.hand_positions import ANGLES, fit_positions, largest_uncertainty_g
 from calibrations.analyses.magnetometer_turn import (
     Elements,
     ExtremesEstimate,
@@ -19,25 +22,98 @@ from calibrations.fitting.matrices import calibration_matrices
 from calibrations.geometry.sphere import magnetometer_coverage_warning
 from calibrations.means.noise import rms, white_std
 from calibrations.table import Array, Table
+from procedures.questions import EDGES
 from procedures.session import Pose
 from rig.record.measured import Measured, sensor_from_base
-from rig.results.result import Missing, Result, fitted, result
+from rig.results.result import Missing, Result, evaluates, fitted, result
 
 AXES = "xyz"
+ANGLE_PAIRS = ("xy", "xz", "yz")
+
+
+@evaluates(
+    "hand-positions",
+    "bias-{axis}",
+    "scale-{axis}",
+    *(f"nonorthogonality-{pair}" for pair in ANGLE_PAIRS),
+    "uncertainty",
+)
+def hand_positions(measured: Measured) -> dict[str, Result | Missing]:
+    """From all positions together, by the magnitude of gravity:
+
+    bias                 output without specific force, in the unit of the outputs
+    scale                that unit per g
+    nonorthogonality-xy  deg, departure of the angle between two sensing axes from 90 deg
+    uncertainty          g, the largest standard uncertainty of these as an error at 1 g
+
+    The uncertainty is Missing if it is above the setting target_g: the run ended at most_positions.
+    """
+    fit = fit_positions(measured.table())
+    results = {f"bias-{e.axis}": result(e) for e in fit.model.estimates("bias")}
+    results |= {f"scale-{e.axis}": result(e) for e in fit.model.estimates("scale-factor")}
+    results |= {f"nonorthogonality-{e.name}": result(e) for e in fit.model.estimates(ANGLES)}
+    worst_g, parameter = largest_uncertainty_g(fit)
+    target_g = float(measured.run.settings.get("target_g", math.inf))
+    if worst_g > target_g:
+        why = (
+            f"{parameter} is known to {worst_g:.2g} g only, wanted {target_g:g} g; take more positions, or longer rests"
+        )
+        return results | {"uncertainty": Missing(why)}
+    return results | {"uncertainty": Result(worst_g, "g")}
+
+
+AXIS_PAIRS = tuple(own + other for own, other in permutations(AXES, 2))
+
+
+@evaluates(
+    "rate-turn",
+    *("gyro-bias-{axis}", "gyro-bias-rate-{axis}", "gyro-scale-{axis}", "rate-residual-{axis}"),
+    *(f"gyro-misalignment-{pair}" for pair in AXIS_PAIRS),
+    *(f"gyro-g-sensitivity-{own}{other}" for own in AXES for other in AXES),
+)
+def rate_turn(measured: Measured) -> dict[str, Result | Missing]:
+    """For each axis:
+
+    gyro-bias                output at rest without specific force, in the unit of the outputs
+    gyro-scale               that unit per deg/s
+    gyro-misalignment-xy     deg, response of x to a turn about y, as an arc sine
+    gyro-g-sensitivity-xy    (deg/s)/g, sensitivity of x to a specific force along y
+    rate-residual            deg/s, rms residual of the four over all turns and rests
+
+    The rotation of the earth is subtracted if the bench has its latitude. An axis without a turn about it has no scale
+    factor, and the other axes have no misalignment towards it.
+    """
+    table = measured.table()
+    fit = fitted(table, "gyroscope", "gyro-misalignment", "gyro-g-sensitivity")
+    results = {f"gyro-bias-{e.axis}": result(e) for e in fit.model.estimates("gyro-bias")}
+    scales = {e.axis: e for e in fit.model.estimates("gyro-scale-factor")}
+    results |= {f"gyro-scale-{axis}": result(scale) for axis, scale in scales.items()}
+    results |= {f"gyro-misalignment-{e.name}": result(e) for e in fit.model.estimates("gyro-misalignment")}
+    left = dict(zip(fit.channels, rms(fit.residual), strict=True))
+    for axis, scale in scales.items():
+        if scale.identified and scale.value:
+            for e in (e for e in fit.model.estimates("gyro-g-sensitivity") if e.axis == axis):
+                results[f"gyro-g-sensitivity-{axis}{e.name}"] = result(e, "(deg/s)/g", scale.value)
+            results[f"rate-residual-{axis}"] = Result(abs(float(left[axis]) / scale.value), "deg/s")
+    whole = measured.run.settings["mounts"] == len(EDGES)
+    return {name: value for name, value in results.items() if whole or isinstance(value, Result)}
+
+
 SOFT = ("xx", "yy", "xy", "xz", "yz")
 ELEMENTS = {"F": "field-total", "H": "field-horizontal", "D": "field-azimuth", "I": "field-inclination"}
 HEADING = "heading_deg"
 DECLINATION = "field-declination"
-NAMES = (
+
+
+@evaluates(
+    "magnetometer-turn",
     *("hard-iron-{axis}", "hard-iron-by-hand-{axis}", "soft-iron-by-hand", "soft-iron-angle-by-hand"),
     *(f"soft-iron-{pair}" for pair in SOFT),
     *(*ELEMENTS.values(), DECLINATION),
     *(f"{ELEMENTS[name]}-by-hand" for name in "HD"),
     *("left-by-ellipsoid", "left-by-hand"),
 )
-
-
-def evaluate(measured: Measured) -> dict[str, Result | Missing]:
+def magnetometer_turn(measured: Measured) -> dict[str, Result | Missing]:
     """By an ellipsoid fit to all directions (equations of Book 17):
 
     hard-iron                of each axis, in the unit of the outputs
