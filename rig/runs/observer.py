@@ -1,4 +1,4 @@
-"""Observers of a run, and the view of the run that they show: present step, progress, live values and limits.
+"""Observers of a run: their common base, and the view of the run that they show (step, progress, values, limits).
 
 The guided terminal and the workbench show the same view.
 """
@@ -8,37 +8,134 @@ from __future__ import annotations
 import statistics
 import time
 from collections import defaultdict, deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 
-from calibrations.analyses.forecast import Forecast
 from calibrations.text import duration, in_milli
-from procedures.instruments import output_channel
+from procedures.errors import NoAnswer
 from procedures.level_check import reversal
 from procedures.questions import Question
 from procedures.session import Guidance, Limits, Reading
 from rig.bench import Bench
 from rig.planning.plan import Plan
 from rig.record import Kept, Run
-from rig.runs.progress import Progress, RunningEstimates
-from rig.runs.soak_forecast import outlook, present, soak_forecaster
+from rig.runs.estimates import Value, live_estimates
 
 UNUSUAL = 2.0  # ratio to the usual scatter, up or down, above which it is shown
 REMEMBERED = 200  # dwells of a kind for the usual scatter
-NEAR = 0.1  # of the span: distance from a limit below which a value is marked
+
+Decision = Literal["resume", "repeat", "end"]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The end of a run: complete, stopped or failed. `error`: why it is not complete. `moving`: instruments that did
+    not stop.
+    """
+
+    run: Run
+    error: Exception | None = None
+    moving: tuple[str, ...] = ()
+
+
+class Observer:
+    """The observer of a run: a terminal, a page, a test. This one shows nothing, and nobody is there to decide."""
+
+    def planned(self, plan: Plan) -> None:
+        """The plan of a new run, before it begins. Raises Declined if a person does not want it."""
+
+    def begun(self, run: str) -> None:
+        """The run begins or continues."""
+
+    def doing(self, text: str) -> None:
+        """The present step, in words."""
+
+    def guide(self, guidance: Guidance) -> None:
+        """What a person with the sensor in the hand does next; a sound marks the position that was taken."""
+
+    def expect(self, total: int, done: int) -> None:
+        """The number of poses of the run, and how many of them are recorded."""
+
+    def kept(self, kept: Kept) -> None:
+        """A pose is recorded."""
+
+    def read(self, reading: Reading) -> None:
+        """A reading is recorded."""
+
+    def ask(self, question: Question, instead: str | None) -> str:
+        """The checked answer of a person, or `instead` if nobody is there. Raises NoAnswer without any answer."""
+        if instead is None:
+            raise NoAnswer(
+                f'the question "{question.text}" has no answer; write `{question.name}: ...` ({question.accepts}) '
+                "into a file for --answers, or run in a terminal without --unattended"
+            )
+        return instead
+
+    def interrupted(self, outcome: Outcome) -> Decision:  # noqa: ARG002
+        """The run is interrupted and the rig is at rest: resume the run, repeat its last pose first, or end it."""
+        return "end"
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Progress and remaining time of a run: at first from the plan, later from the pace of the run.
+
+    `at_s`: time of each pose in the plan, s; empty without a plan. `end_s`: end of the plan. `total`: number of poses.
+    `first`: poses that were recorded when this process began, at `began_s` of the wall clock. `done`: recorded poses;
+    the last one was recorded at `kept_s`.
+    """
+
+    at_s: tuple[float, ...] = ()
+    end_s: float = 0.0
+    total: int = 0
+    first: int = 0
+    done: int = 0
+    began_s: float = 0.0
+    kept_s: float = 0.0
+
+    def begin(self, now_s: float) -> Progress:
+        """This process begins or continues the run."""
+        return replace(self, total=0, first=0, done=0, began_s=now_s, kept_s=now_s)
+
+    def expect(self, total: int, done: int) -> Progress:
+        """The number of poses of the procedure and of the record, for the whole run or for its next part."""
+        first = done if not self.total else self.first
+        return replace(self, total=max(total, len(self.at_s)), first=first, done=done)
+
+    def step(self, now_s: float) -> Progress:
+        """One more pose is recorded."""
+        return replace(self, done=self.done + 1, kept_s=now_s)
+
+    def planned_left_s(self) -> float | None:
+        """Remaining time of the plan, s of the rig's time; None without a plan."""
+        return self.end_s - self._work(self.done) if self.at_s else None
+
+    def left_s(self, now_s: float) -> float | None:
+        """Remaining time by the wall clock, s; None before the first pose."""
+        gone = self._work(self.done) - self._work(self.first)
+        if gone <= 0 or self.done == self.first:
+            return None
+        end = self.end_s if self.at_s else float(self.total)
+        left = (end - self._work(self.done)) * (self.kept_s - self.began_s) / gone
+        return max(0.0, left - (now_s - self.kept_s))
+
+    def _work(self, done: int) -> float:
+        """The work of `done` poses: seconds of the plan, or poses without a plan."""
+        if not self.at_s:
+            return float(done)
+        return self.at_s[done] if done < len(self.at_s) else self.end_s
 
 
 @dataclass(frozen=True)
 class RunView:
     """The view of a run at one moment.
 
-    `usual`: usual scatter of dwells of this kind, by channel. `tilt`: readings of the level by name, deg. `foreseen`:
-    forecast of bias and scale factor in a soak. `so_far`: estimates from the poses so far, in other runs. `range`:
-    range of the converter, or of the digital sensor. `simulated`: the rig's time is simulated. `guidance`: what a
-    person with the sensor in the hand does next.
+    `usual`: usual scatter of dwells of this kind, by channel. `tilt`: readings of the level by name, deg. `estimates`:
+    those of the sensor so far. `range`: range of the converter, or of the digital sensor. `simulated`: the rig's time
+    is simulated. `guidance`: what a person with the sensor in the hand does next.
     """
 
     title: str
@@ -51,8 +148,7 @@ class RunView:
     kept: Kept | None = None
     usual: Mapping[str, float] = field(default_factory=dict)
     tilt: Mapping[str, float] = field(default_factory=dict)
-    foreseen: Mapping[str, Forecast] = field(default_factory=dict)
-    so_far: Mapping[str, str] = field(default_factory=dict)
+    estimates: Sequence[Value] = ()
     guidance: Guidance | None = None
 
     @property
@@ -70,79 +166,57 @@ class RunView:
         return f"{duration(planned_s)} {'of simulated time ' if self.simulated else ''}left by the plan"
 
 
-@dataclass(frozen=True)
-class Value:
-    """A live value as text, with the `reading` for the comparison with its limits."""
+class RunViewer(Observer):
+    """An observer that keeps the view of a run up to date."""
 
-    name: str
-    shown: str
-    remark: str = ""
-    reading: float = 0.0
-    limits: tuple[float, float] | None = None
-
-    @property
-    def near(self) -> str:
-        """A remark if it is near or beyond a limit, else an empty text."""
-        return nearness(self.reading, *self.limits) if self.limits else ""
-
-
-class RunViewer:
-    """Keeps the view of a run up to date with the events of the run."""
-
-    def __init__(self, title: str, bench: Bench) -> None:
+    def __init__(self, procedure: str, bench: Bench) -> None:
         adc = bench.instruments.get("adc")
         settings = adc.typed_settings() if adc else None
         end = getattr(settings, "range_v", None) or getattr(settings, "range", None)
-        self.view = RunView(title, bench.limits, end, bench.simulated, bench.unit_of)
-        self._soak, self._so_far = soak_forecaster(title), RunningEstimates()
+        self._name = procedure
+        self.view = RunView(procedure, bench.limits, end, bench.simulated, bench.unit_of)
+        self._estimates = live_estimates(procedure)
         self._scatter: dict[tuple[str, str], deque[float]] = defaultdict(lambda: deque(maxlen=REMEMBERED))
 
+    def changed(self) -> None:
+        """Called after each change of the view during the run."""
+
     def planned(self, plan: Plan) -> None:
-        """The plan of the run."""
         progress = replace(self.view.progress, at_s=tuple(held.start_s for held in plan.held), end_s=plan.duration_s)
         self.view = replace(self.view, progress=progress)
 
-    def begun(self, title: str, run: str = "") -> None:
-        """The run begins or continues; the title may be its id."""
-        if self._soak:
-            self._soak.begun(run or title)
-        else:
-            self._so_far.begun(run or title)
-        self.view = replace(self.view, title=title, progress=self.view.progress.begin(time.monotonic()))
+    def begun(self, run: str) -> None:
+        self._estimates.begun(run)
+        progress = self.view.progress.begin(time.monotonic())
+        self.view = replace(self.view, title=f"{self._name}  {run}", progress=progress)
 
     def doing(self, text: str) -> None:
-        self.view = replace(self.view, now=text)
+        self._change(now=text)
 
     def guide(self, guidance: Guidance) -> None:
-        """What a person with the sensor in the hand does next."""
-        self.view = replace(self.view, now=guidance.text, guidance=guidance)
+        self._change(now=guidance.text, guidance=guidance)
 
     def expect(self, total: int, done: int) -> None:
-        self.view = replace(self.view, progress=self.view.progress.expect(total, done))
+        self._change(progress=self.view.progress.expect(total, done))
 
     def kept(self, kept: Kept) -> None:
         """Update the values with a new pose, and the usual scatter with the poses before it."""
         kind = kept.pose.path.partition(" ")[0]
         usual = {}
         for name, std in kept.dwell.stds.items():
-            before_it = self._scatter[name, kind]
-            if before_it:
-                usual[name] = statistics.median(before_it)
-            before_it.append(std)
-        foreseen = (self._soak.kept(kept) if self._soak else {}) or self.view.foreseen
-        progress, so_far = self.view.progress.step(time.monotonic()), self._so_far.kept(kept)
-        self.view = replace(self.view, kept=kept, usual=usual, foreseen=foreseen, so_far=so_far, progress=progress)
+            earlier = self._scatter[name, kind]
+            if earlier:
+                usual[name] = statistics.median(earlier)
+            earlier.append(std)
+        estimates = self._estimates.values(kept) or self.view.estimates
+        self._change(kept=kept, usual=usual, estimates=estimates, progress=self.view.progress.step(time.monotonic()))
 
     def read(self, reading: Reading) -> None:
-        self.view = replace(self.view, tilt={**self.view.tilt, reading.name: reading.value})
+        self._change(tilt={**self.view.tilt, reading.name: reading.value})
 
-
-def nearness(value: float, low: float, high: float) -> str:
-    """ "" | near its limit | beyond its limit"""
-    inside = min(value - low, high - value)
-    if not inside >= 0:  # NaN is beyond as well
-        return "beyond its limit"
-    return "near its limit" if inside < NEAR * (high - low) else ""
+    def _change(self, **values: Any) -> None:
+        self.view = replace(self.view, **values)
+        self.changed()
 
 
 def values(view: RunView) -> Iterator[Value]:
@@ -159,11 +233,7 @@ def values(view: RunView) -> Iterator[Value]:
         for name, column in zip(kept.samples.channels, volts.T, strict=True):
             farthest = float(column[np.argmax(np.abs(column))])
             yield _channel(name, dwell.means[name], dwell.stds[name], farthest, view)
-    for name, each in view.foreseen.items():
-        unit = view.unit_of(output_channel("x", kept.samples.channels) or "") if kept is not None else "V"
-        yield Value(name, present(name, each, unit), outlook(name, each, unit))
-    for name, shown in view.so_far.items():
-        yield Value(name, shown, "from the poses so far")
+    yield from view.estimates
 
 
 def _channel(name: str, mean: float, std: float, farthest: float, view: RunView) -> Value:
@@ -182,39 +252,3 @@ def _tilt(read: Mapping[str, float], axis: str) -> float | None:
     """The tilt of the table, if both readings of the level are there."""
     front, back = (read.get(f"level-{side}-{axis}") for side in ("front", "back"))
     return None if front is None or back is None else reversal(front, back)[0]
-
-
-Decision = Literal["resume", "repeat", "end"]
-
-
-class Observer(Protocol):
-    """The observer of a run: a terminal, a page, a test."""
-
-    def planned(self, plan: Plan) -> None:
-        """The plan of a new run, before it begins. Raises Declined if a person does not want it."""
-
-    def begun(self, run: str) -> None: ...
-    def doing(self, text: str) -> None: ...
-    def guide(self, guidance: Guidance) -> None:
-        """What a person with the sensor in the hand does next; a sound marks the position that was taken."""
-
-    def expect(self, total: int, done: int) -> None: ...
-    def kept(self, kept: Kept) -> None: ...
-    def read(self, reading: Reading) -> None: ...
-
-    def ask(self, question: Question, instead: str | None) -> str:
-        """The checked answer of a person, or `instead` if nobody is there. Raises NoAnswer without any answer."""
-
-    def interrupted(self, outcome: Outcome) -> Decision:
-        """The run is interrupted and the rig is at rest: resume the run, repeat its last pose first, or end it."""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """The end of a run: complete, stopped or failed. `error`: why it is not complete. `moving`: instruments that did
-    not stop.
-    """
-
-    run: Run
-    error: Exception | None = None
-    moving: tuple[str, ...] = ()

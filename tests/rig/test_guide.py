@@ -28,8 +28,8 @@ from rig.files import free_bytes
 from rig.planning.plan import Plan, plan
 from rig.planning.preparation import checks, mounting
 from rig.record import Block, Kept, Record
-from rig.runs.observer import RunView, nearness
-from rig.runs.progress import Progress
+from rig.runs.estimates import nearness
+from rig.runs.observer import Progress, RunView
 from rig.runs.runner import Outcome
 from tests.rig.rigging import POSES, small_sweep
 

@@ -13,7 +13,7 @@ from procedures.rate_turn import turns
 from procedures.session import Pose
 from rig.record import Block, Kept, Record
 from rig.record.measured import sensor_from_base, sensor_from_table, specific_force_g
-from rig.runs.progress import RunningEstimates
+from rig.runs.estimates import RunningEstimates
 
 NOISE_V = 1e-4
 
@@ -46,7 +46,7 @@ def follower(rig_home: Any) -> Any:
 
 
 def last(told: RunningEstimates, poses: list[Kept]) -> dict[str, str]:
-    return [told.kept(each) for each in poses][-1]
+    return {value.name: value.shown for value in [told.values(each) for each in poses][-1]}
 
 
 def number(words: str) -> tuple[float, float]:
@@ -111,7 +111,7 @@ def test_hard_iron_comes_turn_by_turn_each_axis_when_it_was_level(follower: Any)
 def test_a_run_that_goes_on_knows_what_came_before_and_tells_each_path_when_it_is_over(follower: Any) -> None:
     poses = kept(swept((90.0, 60.0)), {"a1.vx": askew, "a2.vx": askew})
     whole, resumed = follower("poses"), follower("poses", poses[:14])
-    said = [whole.told(each) for each in poses]
+    said = [whole.report(each) for each in poses]
     assert [line for line in said if line] == [said[12]]
     assert said[12].startswith("after at 90\n  a1 bias-x ")
     assert "a2 scale-x" in said[12]
@@ -119,4 +119,4 @@ def test_a_run_that_goes_on_knows_what_came_before_and_tells_each_path_when_it_i
 
 
 def test_a_run_of_samples_is_not_followed(follower: Any) -> None:
-    assert follower("still").told(kept(swept((90.0,)), {"vx": askew})[0]) == ""
+    assert follower("still").report(kept(swept((90.0,)), {"vx": askew})[0]) == ""

@@ -22,8 +22,8 @@ from rig.record import Record
 from rig.record.measured import Measured
 from rig.results.evaluate import names
 from rig.results.soak import night
+from rig.runs.estimates import SoakForecaster, lines, outlook
 from rig.runs.runner import resume, start
-from rig.runs.soak_forecast import SoakForecaster, lines, outlook
 from rig.services.exclusion import exclude
 from tests.rig.nursery import Harm, Nursery
 from tests.rig.rigging import Onlooker, sigterm_at
@@ -93,7 +93,7 @@ def test_a_soak_that_goes_on_is_foreseen_as_one_that_was_not_interrupted(rig: Ri
     assert set(begun) == {"bias-x", "scale-x", "bias-y", "scale-y"}
     assert "not yet known" in lines(begun, "V")
     resumed.followers[0].forecast = SoakForecast({})
-    told = [forecasts for each in kept if (forecasts := resumed.kept(each))]
+    told = [forecasts for each in kept if (forecasts := resumed.forecasts(each))]
     assert len(told) == len([pose for pose in schedule(**SHORT) if pose.path.startswith("reversal")]) / 8
     assert told[-1]["scale-x"].final.value == pytest.approx(begun["scale-x"].final.value, rel=1e-6)
 

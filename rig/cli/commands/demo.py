@@ -11,13 +11,10 @@ import click
 from rig.cli.terminal.output import emit, json_option, note
 
 if TYPE_CHECKING:
-    from procedures.questions import Question
-    from procedures.session import Guidance, Reading
     from rig.bench import Bench
     from rig.cli.terminal.progress import Progress
-    from rig.planning.plan import Plan
     from rig.record import Kept
-    from rig.runs.runner import Decision, Outcome
+    from rig.runs.observer import Observer
 
 SETTINGS = {"inclinations_deg": "90,30,150,60", "step_deg": "30"}  # 104 poses show the three faults
 MEASURING = 0.4  # share of the bar
@@ -89,45 +86,25 @@ def _measured(bench: Bench, settings: Mapping[str, str], progress: Progress) -> 
 
     sweep = find("sweep")
     with Record() as record:
-        outcome = start(record, bench, sweep, parse(sweep, dict(settings)), _Watch(progress))
+        outcome = start(record, bench, sweep, parse(sweep, dict(settings)), _watch(progress))
     if outcome.error is not None:
         raise outcome.error
     return outcome.run.run
 
 
-class _Watch:
+def _watch(progress: Progress) -> Observer:
     """The observer of the demonstration's sweep: it moves the bar."""
+    from rig.runs.observer import Observer
 
-    def __init__(self, progress: Progress) -> None:
-        self._progress, self._total, self._done = progress, 1, 0
+    class Bar(Observer):
+        total, done = 1, 0
 
-    def planned(self, plan: Plan) -> None:
-        """A simulated run needs no confirmation."""
+        def expect(self, total: int, done: int) -> None:
+            self.total, self.done = max(total, 1), done
 
-    def begun(self, run: str) -> None:
-        """Shown at the end."""
+        def kept(self, kept: Kept) -> None:  # noqa: ARG002
+            self.done += 1
+            progress.text = f"measuring, {self.done} of {self.total} poses"
+            progress.share = MEASURING * self.done / self.total
 
-    def doing(self, text: str) -> None:
-        """Not shown."""
-
-    def guide(self, guidance: Guidance) -> None:
-        """No sensor is in a hand."""
-
-    def expect(self, total: int, done: int) -> None:
-        self._total, self._done = max(total, 1), done
-
-    def kept(self, kept: Kept) -> None:  # noqa: ARG002
-        self._done += 1
-        self._progress.text = f"measuring, {self._done} of {self._total} poses"
-        self._progress.share = MEASURING * self._done / self._total
-
-    def read(self, reading: Reading) -> None:
-        """Not shown."""
-
-    def ask(self, question: Question, instead: str | None) -> str:
-        if instead is None:
-            raise RuntimeError(f"the simulated technician has no answer to: {question.text}")
-        return instead
-
-    def interrupted(self, outcome: Outcome) -> Decision:  # noqa: ARG002
-        return "end"
+    return Bar()

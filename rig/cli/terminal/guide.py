@@ -33,16 +33,16 @@ NEXT = Choice("interrupted", "Continue?", choices=("resume", "repeat", "end"))
 FRAMES_HZ = 8
 
 
-class Guide:
+class Guide(RunViewer):
     """Shows a run on standard error while it runs."""
 
     def __init__(
         self, procedure: Procedure, bench: Bench, answers: Mapping[str, str], console: Console | None = None
     ) -> None:
+        super().__init__(procedure.name, bench)
         self._procedure, self._bench, self._answers = procedure, bench, answers
         self._console = console or Console(stderr=True)
         self._drawn: Attitude | None = None
-        self._viewer = RunViewer(procedure.name, bench)
         self._live = Live(
             get_renderable=self._screen, console=self._console, refresh_per_second=FRAMES_HZ, transient=True
         )
@@ -57,7 +57,7 @@ class Guide:
 
     def planned(self, plan: Plan) -> None:
         """Show the plan on one screen; raises Declined if the person cancels it."""
-        self._viewer.planned(plan)
+        super().planned(plan)
         self._console.print(before(plan, self._procedure, self._bench, free_bytes(home()), datetime.now(UTC).date()))
         if plan.reach:  # without stages there is no mounting
             self._draw(mounting(plan), "mounting")
@@ -65,31 +65,20 @@ class Guide:
             raise Declined("cancelled before the start; nothing moved and nothing was recorded")
 
     def begun(self, run: str) -> None:
-        """The run begins or continues."""
-        self._viewer.begun(f"{self._procedure.name}  {run}", run)
+        super().begun(run)
         self._live.start()
-
-    def doing(self, text: str) -> None:
-        self._viewer.doing(text)
 
     def guide(self, guidance: Guidance) -> None:
         """Show the next orientation. A sound and a tick mark a position that was taken: the person looks elsewhere."""
-        before = self._viewer.view.guidance
-        self._viewer.guide(guidance)
+        before = self.view.guidance
+        super().guide(guidance)
         if before is not None and len(guidance.taken) > len(before.taken):
             self._console.bell()
             self._console.print(f"✓ position {len(guidance.taken)} taken", style="green", highlight=False)
         self._console.print(guidance.text, style="bold", highlight=False)
 
-    def expect(self, total: int, done: int) -> None:
-        self._viewer.expect(total, done)
-
-    def kept(self, kept: Kept) -> None:
-        """Show the values of the last dwell, compared with the dwells before it."""
-        self._viewer.kept(kept)
-
     def read(self, reading: Reading) -> None:
-        self._viewer.read(reading)
+        super().read(reading)
         self._console.print(f"{reading.name} = {reading.value:g} {reading.unit}", highlight=False)
 
     def ask(self, question: Question, instead: str | None) -> str:
@@ -107,7 +96,7 @@ class Guide:
         for complaint in outcome.moving:
             self._console.print(complaint, style="bold red", highlight=False)
         self._console.print(str(outcome.error), style="yellow", highlight=False)
-        self._console.print(_choices(self._viewer.view.kept, outcome))
+        self._console.print(_choices(self.view.kept, outcome))
         try:
             return cast(Decision, self._prompt(NEXT, "resume"))
         except NoAnswer:
@@ -145,7 +134,7 @@ class Guide:
         self._drawn = attitude
 
     def _screen(self) -> RenderableType:
-        return screen(self._viewer.view, time.monotonic())
+        return screen(self.view, time.monotonic())
 
 
 def _choices(kept: Kept | None, outcome: Outcome) -> Text:

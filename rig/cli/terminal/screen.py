@@ -22,7 +22,8 @@ from rig.bench.certificates import expired
 from rig.drawings import Attitude, orientation_map, sketch
 from rig.planning.plan import Plan, stretches
 from rig.planning.preparation import checks, stops
-from rig.runs.observer import RunView, Value, nearness, values
+from rig.runs.estimates import Value, nearness
+from rig.runs.observer import RunView, values
 
 WIDTH = 15  # characters, the ends included
 STYLES = {"": "green", "near its limit": "yellow", "beyond its limit": "bold red"}

@@ -44,7 +44,7 @@ from rig.runs.observer import Decision, Observer, Outcome
 P = ParamSpec("P")
 
 
-class PublishingObserver:
+class PublishingObserver(Observer):
     """An observer that forwards all events to `observer`, and publishes the status of the run.
 
     An error of the status file is ignored: it must not disturb the run.

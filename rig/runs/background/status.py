@@ -14,13 +14,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from procedures.questions import Choice, Confirm, Question
-from procedures.session import Guidance, Reading
 from rig.bench import Bench, read_bench
 from rig.drawings import drawing_of
 from rig.files import home, write_whole
 from rig.lease import is_held
-from rig.planning.plan import Plan
-from rig.record import Kept
 from rig.runs.observer import RunViewer, values
 
 FOLDER = "apart"
@@ -101,7 +98,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Status:
-    """`values` are keywords of `rig.runs.observer.Value`, with `near`. `state` is the state of the run after its end.
+    """`values` are keywords of `rig.runs.estimates.Value`, with `near`. `state` is the state of the run after its end.
 
     `seat`: where a person answers: a page, the terminal of the run, or nobody: then it cannot pause. `error`: why it is
     paused or not complete. `moving`: instruments that did not stop.
@@ -190,7 +187,7 @@ def _last_words(key: str, run: str) -> str:
     return "it was killed; `rig resume` continues its run" if run else NOT_BEGUN
 
 
-class StatusWriter:
+class StatusWriter(RunViewer):
     """Publishes the events of a run in its status file. `seat`: where a person answers.
 
     A simulated night has thousands of poses in a minute, so its events are written at most every EVERY_S. The begin,
@@ -198,14 +195,14 @@ class StatusWriter:
     """
 
     def __init__(self, key: str, procedure: str, bench: Bench, seat: Seat = "page") -> None:
-        self._viewer = RunViewer(procedure, bench)
+        super().__init__(procedure, bench)
         self._status = Status(key, os.getpid(), procedure, bench.name, seat=seat)
         self._every_s = EVERY_S if bench.simulated else 0.0
         self._written_s = -math.inf
 
     def publish(self, **changes: Any) -> None:
         """Write the present status."""
-        view, self._written_s = self._viewer.view, time.monotonic()
+        view, self._written_s = self.view, time.monotonic()
         progress, left = view.progress, view.left(self._written_s)
         values_now = [{**asdict(value), "near": value.near} for value in values(view)]
         attitude = {name: getattr(view.kept.pose, name) for name in ATTITUDE} if view.kept else {}
@@ -221,34 +218,12 @@ class StatusWriter:
         )
         self._status.write()
 
-    def planned(self, plan: Plan) -> None:
-        self._viewer.planned(plan)
-
     def begun(self, run: str) -> None:
-        self._viewer.begun(run)
+        super().begun(run)
         self.publish(phase="running", run=run, error="", moving=())
 
-    def doing(self, text: str) -> None:
-        self._viewer.doing(text)
-        self._publish_seldom()
-
-    def guide(self, guidance: Guidance) -> None:
-        self._viewer.guide(guidance)
-        self._publish_seldom()
-
-    def expect(self, total: int, done: int) -> None:
-        self._viewer.expect(total, done)
-        self._publish_seldom()
-
-    def kept(self, kept: Kept) -> None:
-        self._viewer.kept(kept)
-        self._publish_seldom()
-
-    def read(self, reading: Reading) -> None:
-        self._viewer.read(reading)
-        self._publish_seldom()
-
-    def _publish_seldom(self) -> None:
+    def changed(self) -> None:
+        """Write the status, unless that was done a moment ago."""
         if time.monotonic() - self._written_s >= self._every_s:
             self.publish()
 
