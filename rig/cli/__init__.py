@@ -1,87 +1,102 @@
-"""The command line. `rig COMMAND` is the module `rig/cli/commands/COMMAND.py`, imported only when it is called.
+"""The command line. A command is a function `NAME_command` in a module of `rig/cli/commands`, and a line in SECTIONS.
 
-A command module holds a click command named `command`; the first line of its docstring is its line in
-`rig --help`. A hyphen in the name is an underscore in the file; `import` is `import_.py`. To add a command,
-add a file. A command returns nothing, or the exit status (1: done, and a limit or check was not met).
+It returns nothing, or the exit status (1: done, and a limit or check was not met).
 """
 
 from __future__ import annotations
 
-import ast
 import importlib
 import os
 import sys
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Any, cast
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import click
 
 from rig.cli.terminal.failure import exit_status
 from rig.cli.terminal.options import with_record
 
-FOLDER = Path(__file__).parent / "commands"
-# The sections of `rig --help`. A command that is in none of them is listed under "Other".
-GROUPS = {
-    "Start": ("demo", "web"),
-    "Measure": (
-        "check", "procedures", "plan", "run", "resume", "runs", "show", "import", "exclude", "draw", "simulate",
-    ),
-    "Find what is missing": (
-        "compare", "fit", "diagnose", "add", "discover", "noise", "report", "effects", "models",
-    ),
-    "Hand over": ("certificate", "compensate", "export", "export-model", "push"),
-    "Look after": ("control", "history", "doctor", "completion"),
-    "Many sensors": ("fleet",),
-}  # fmt: skip
+SECTIONS: Mapping[str, Mapping[str, tuple[str, str]]] = {  # of `rig --help`: command -> its module, its line
+    "Start": {
+        "demo": ("demo", "find three hidden faults of a simulated sensor, and compare them with what was hidden"),
+        "web": ("web", "the workbench in a browser: models, runs, record and comparison"),
+    },
+    "Measure": {
+        "check": ("bench", "connect to every instrument of the bench, identify and test it; list certificates"),
+        "procedures": ("lists", "list the procedures with their purposes and settings"),
+        "plan": ("plan", "dry run of a procedure: every move, its limits, its duration; nothing moves"),
+        "run": ("run", "run a procedure on the bench, guided or --unattended, and record it"),
+        "resume": ("run", "continue an interrupted run at its first missing pose"),
+        "runs": ("lists", "list the runs of the record, newest first"),
+        "show": ("record", "show one run: its settings, its events, its results"),
+        "import": ("import_", "store a file in the record as a run"),
+        "exclude": ("record", "exclude a pose from every analysis, with a reason, or include it again"),
+        "draw": ("bench", "draw the stages and the mounting of the sensor, as an SVG file or in the terminal"),
+        "simulate": ("bench", "serve the simulated instruments in real time for any client"),
+    },
+    "Find what is missing": {
+        "compare": ("discovery", "compare a model with data, and show where it fails"),
+        "fit": ("fit", "estimate a model's parameters from data, with uncertainties"),
+        "diagnose": ("discovery", "find the physical effect that a model misses"),
+        "add": ("discovery", "add one physical effect, from the catalogue or your own, to a model"),
+        "discover": ("discovery", "add missing effects until no effect is missing"),
+        "noise": ("noise", "Allan deviation and noise coefficients of a still record"),
+        "report": ("report", "write a self-contained page on data and model, or its pictures"),
+        "effects": ("lists", "list the catalogue of physical effects, or show one"),
+        "models": ("lists", "list the shipped models"),
+    },
+    "Hand over": {
+        "certificate": ("report", "a calibration certificate for people (HTML, PDF) and for machines (DCC XML)"),
+        "compensate": ("compensation", "write the inverse of a model as source code for the product"),
+        "export": ("record", "write a run, or a file, in another format"),
+        "export-model": (
+            "compensation",
+            "write a model in the file format of PX4, ArduPilot, ROS, imucal, Kalibr or OpenVINS",
+        ),
+        "push": ("push", "copy finished runs to the lab's record, a PostgreSQL database of many rigs"),
+    },
+    "Look after": {
+        "control": ("history", "control charts of the check standard; is the rig in control?"),
+        "history": ("history", "all calibrations of a sensor, their stability, and the date of the next one"),
+        "doctor": ("doctor", "check this installation, and write an archive for a maintainer"),
+        "completion": ("doctor", "print the script that completes commands, runs and files in bash, zsh or fish"),
+    },
+    "Many sensors": {
+        "fleet": (
+            "fleet",
+            "find the missing effects of thousands of sensors, and calibrate each with the statistics of its batch",
+        ),
+    },
+}
+COMMANDS = {name: entry for section in SECTIONS.values() for name, entry in section.items()}
 
 
 class Commands(click.Group):
-    """The commands, found by the names of their files."""
+    """The commands. Their modules are imported when they are called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 click calls it so
-        return sorted(name for path in FOLDER.glob("*.py") if (name := _name(path)))
+        return sorted(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
-        path = _path(cmd_name)
-        if not path.is_file() or _name(path) != cmd_name:
+        if cmd_name not in COMMANDS:
             return None
-        return with_record(cast(click.Command, importlib.import_module(f"{__name__}.commands.{path.stem}").command))
+        module = importlib.import_module(f"{__name__}.commands.{COMMANDS[cmd_name][0]}")
+        return with_record(getattr(module, f"{cmd_name.replace('-', '_')}_command"))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        if not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+        if not args[0].startswith("-") and args[0] not in COMMANDS:
             from drivers.errors import did_you_mean
 
-            known = self.list_commands(ctx)
-            raise click.UsageError(f"no command {args[0]!r}.{did_you_mean(args[0], known)}", ctx)
+            raise click.UsageError(f"no command {args[0]!r}.{did_you_mean(args[0], sorted(COMMANDS))}", ctx)
         return super().resolve_command(ctx, args)
 
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        names = self.list_commands(ctx)
-        grouped = {name for group in GROUPS.values() for name in group}
-        width = max(map(len, names))
-        for title, group in {**GROUPS, "Other": tuple(name for name in names if name not in grouped)}.items():
-            if group:
-                with formatter.section(title):
-                    formatter.write_dl([(name.ljust(width), _short_help(_path(name))) for name in group])
-
-
-def _path(name: str) -> Path:
-    stem = name.replace("-", "_")
-    return FOLDER / f"{stem}_.py" if stem == "import" else FOLDER / f"{stem}.py"
-
-
-def _name(path: Path) -> str:
-    return path.stem.strip("_").replace("_", "-") if path.stem != "__init__" else ""
-
-
-def _short_help(path: Path) -> str:
-    """The first line of the module's docstring, without importing it; a leading `name: ` is dropped."""
-    doc = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
-    first = doc.partition("\n")[0].rstrip(".")
-    return first.removeprefix(f"{_name(path)}: ")
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        width = max(map(len, COMMANDS))
+        for title, section in SECTIONS.items():
+            with formatter.section(title):
+                formatter.write_dl([(name.ljust(width), summary) for name, (_, summary) in section.items()])
 
 
 COMPLETE = "_RIG_COMPLETE"  # set by the completion script of a shell

@@ -24,7 +24,6 @@ from rig.record import Record, Run
 from rig.record.measured import table_of
 from rig.services.tables import load
 
-FORMATS = ("csv", "parquet", "hdf5", "event-model")
 UNITS = {"deg": "deg", "v": "V", "s": "s", "c": "degC"}
 
 

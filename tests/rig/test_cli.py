@@ -13,7 +13,7 @@ import pytest
 from calibrations.errors import DataError
 from drivers.errors import LimitError, LinkTimeout
 from procedures.errors import SafetyLimit, UnknownProcedure
-from rig.cli import GROUPS, Commands, main
+from rig.cli import SECTIONS, Commands, main
 from rig.cli import rig as group
 from rig.cli.terminal.failure import BROKEN_PIPE, PROGRAM_FAULT, exit_status, status_of
 from rig.errors import BenchError, InstrumentFailed, Stopped
@@ -30,7 +30,7 @@ def loaded(program: str) -> tuple[str, set[str]]:
 
 
 def test_help_groups_every_command_once() -> None:
-    grouped = [name for group in GROUPS.values() for name in group]
+    grouped = [name for section in SECTIONS.values() for name in section]
     assert sorted(grouped) == COMMANDS
 
 

@@ -70,7 +70,7 @@ def test_the_signals_are_given_back(rig: Callable[..., Any], monkeypatch: pytest
         assert until()
 
     before = [signal.getsignal(each) for each in ENDING]
-    monkeypatch.setattr("rig.cli.commands.simulate.serve_forever", ended_by_both)
+    monkeypatch.setattr("rig.cli.commands.bench.serve_forever", ended_by_both)
     assert rig("simulate").status == 0
     assert [signal.getsignal(each) for each in ENDING] == before
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.terminal.output import emit, json_option, note
+from rig.cli.terminal.output import FOLDER, emit, json_option, note
 
 if TYPE_CHECKING:
     from rig.bench import Bench
@@ -25,12 +25,12 @@ MEASURING = 0.4  # share of the bar
     "--folder",
     default="rig-demo",
     show_default=True,
-    type=click.Path(file_okay=False, path_type=Path),
+    type=FOLDER,
     help="Folder for the model and the report.",
 )
 @click.option("--realistic", is_flag=True, help="The default rig with all its faults at once; takes minutes.")
 @json_option
-def command(folder: Path, realistic: bool, as_json: bool) -> None:
+def demo_command(folder: Path, realistic: bool, as_json: bool) -> None:
     """Measure a simulated sensor with three hidden faults, find them, and compare them with what was hidden.
 
     --realistic is the second act: the default simulated rig, a standard sweep of 518 poses, and all faults at once.

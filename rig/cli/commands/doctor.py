@@ -1,4 +1,4 @@
-"""doctor: check this installation, and write an archive for a maintainer."""
+"""doctor and completion: look after the installation."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import get_completion_class
 
 from calibrations.text import columns
 from rig.bench import read_bench
-from rig.cli.terminal.output import bench_option, emit, json_option
+from rig.cli import COMPLETE, rig
+from rig.cli.terminal.output import FILE, FOLDER, bench_option, emit, json_option
 from rig.errors import OutputError, RecordError
 from rig.files import home, require_out
 from rig.record.recover import recover
@@ -21,19 +23,19 @@ from rig.services.health import Finding, findings, last_run, list_runs, versions
 
 
 @click.command("doctor")
-@click.option(
-    "--out", type=click.Path(dir_okay=False, path_type=Path), help="The archive. Default: a name with the time."
-)
+@click.option("--out", type=FILE, help="The archive. Default: a name with the time.")
 @click.option("--run", "run", help="The run whose log goes into the archive. Default: the newest.")
 @click.option(
     "--recover",
     "folder",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=FOLDER,
     help="Only copy the readable rows of a damaged record to a new record in this folder.",
 )
 @bench_option
 @json_option
-def command(out: Path | None, run: str | None, folder: Path | None, bench_file: Path | None, as_json: bool) -> int:
+def doctor_command(
+    out: Path | None, run: str | None, folder: Path | None, bench_file: Path | None, as_json: bool
+) -> int:
     """Check packages, disk and record, and write an archive for a maintainer. Exit status 1: a check fails.
 
     The archive has versions, checks, the list of runs, the bench, and the log of one run. It has no samples, and no
@@ -92,3 +94,24 @@ def _recovered(folder: Path, as_json: bool) -> int:
         click.echo(f"{folder}: {rows or 'nothing'}")
         click.echo(f"lost: {'; '.join(lost) or 'nothing'}. RIG_HOME={folder} uses this record.")
     return int(bool(lost))
+
+
+SHELLS = ("bash", "zsh", "fish")
+
+
+@click.command("completion")
+@click.argument("shell", type=click.Choice(SHELLS))
+def completion_command(shell: str) -> None:
+    """Print the completion script for SHELL.
+
+    \b
+    bash   in ~/.bashrc:                   eval "$(rig completion bash)"
+    zsh    in ~/.zshrc, after compinit:    eval "$(rig completion zsh)"
+    fish   in ~/.config/fish/config.fish:  rig completion fish | source
+
+    The Tab key then completes commands, options, procedures, effects, runs, sensors and files.
+    """
+    made = get_completion_class(shell)
+    if made is None:
+        raise click.UsageError(f"click has no completion for {shell}")
+    click.echo(made(rig, {}, "rig", COMPLETE).source())

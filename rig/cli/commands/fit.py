@@ -19,7 +19,7 @@ from calibrations.table import Array, Table
 from calibrations.text import columns, concise
 from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.options import request_options
-from rig.cli.terminal.output import check_option, emit, model_option, note, notes
+from rig.cli.terminal.output import FILE, check_option, emit, model_option, note, notes
 from rig.cli.terminal.progress import working
 
 if TYPE_CHECKING:
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 @click.command("fit")
 @click.argument("data", shell_complete=complete_data)
 @model_option
-@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the fitted model to this file.")
+@click.option("--out", type=FILE, help="Write the fitted model to this file.")
 @check_option
 @request_options
-def command(request: Request, out: Path | None, check: bool, as_json: bool) -> int:
+def fit_command(request: Request, out: Path | None, check: bool, as_json: bool) -> int:
     """Estimate the parameters of a model from DATA (a file or a run), with standard uncertainties."""
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import fit_document

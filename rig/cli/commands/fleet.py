@@ -14,7 +14,7 @@ import click
 from calibrations.fleet.batch import BatchEffect, Population, SensorVerdict
 from calibrations.text import columns, concise, joined, percent
 from rig.cli.terminal.complete import complete_model
-from rig.cli.terminal.output import bench_option, emit, json_option, note
+from rig.cli.terminal.output import FILE, FOLDER, bench_option, emit, json_option, note
 from rig.fleet.calibrate import Calibrated, Calibration
 
 if TYPE_CHECKING:
@@ -23,17 +23,13 @@ if TYPE_CHECKING:
 
 
 @click.group("fleet")
-def command() -> None:
+def fleet_command() -> None:
     """Analyse and calibrate many sensors at once.
 
     SOURCES are an index (a CSV file with the columns sensor, batch, rig, file), a folder of tables, tables, or runs;
     without SOURCES, the last complete run of every sensor in the record. The record stores every result, so a stopped
     command continues when you repeat it.
     """
-
-
-FILE = click.Path(dir_okay=False, path_type=Path)
-FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
 @dataclass(frozen=True)
@@ -67,17 +63,17 @@ def _fleet_options(model: str, out: str) -> Callable[[Callable[[Request], None]]
 
     def decorated(function: Callable[[Request], None]) -> Callable[..., None]:
         @wraps(function)
-        def command(**words: Any) -> None:
+        def decorated_command(**words: Any) -> None:
             function(Request(**words))
 
         for option in reversed(options):
-            command = option(command)
-        return command
+            decorated_command = option(decorated_command)
+        return decorated_command
 
     return decorated
 
 
-@command.command("discover")
+@fleet_command.command("discover")
 @_fleet_options("Model to test: a name or a file.", "Write the model of each batch into this folder.")
 def discover(request: Request) -> None:
     """Find effects that batches miss, errors of rigs, and sensors unlike the others of their batch."""
@@ -99,7 +95,7 @@ def discover(request: Request) -> None:
         click.echo("\n".join([*population(result, model), *(f"written: {path}" for path in written)]))
 
 
-@command.command("calibrate")
+@fleet_command.command("calibrate")
 @_fleet_options("A name, a file, or the folder of fleet discover.", "Write the model of each sensor into this folder.")
 def calibrate(request: Request) -> None:
     """Calibrate the sensors of SOURCES with the statistics of their batch, with 95 % intervals."""

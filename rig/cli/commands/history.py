@@ -1,4 +1,4 @@
-"""history: all calibrations of a sensor, their stability, and the date of the next one."""
+"""history and control: a sensor over its life, and the rig over its check standards."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from calibrations.analyses.stability import YEAR_DAYS, Agreement
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
 from calibrations.text import columns, concise
 from rig.cli.terminal.complete import complete_model, complete_sensor
-from rig.cli.terminal.output import bench_option, emit, json_option, note
+from rig.cli.terminal.output import bench_option, emit, json_option, note, picture_options
 from rig.cli.terminal.progress import working
 from rig.record import Record
+from rig.services.control import HEAD, OUT, Controlled, controlled, row, signals, worst
 from rig.services.history import (
     Calibration,
     Compared,
@@ -67,13 +68,10 @@ DAY = click.DateTime(["%Y-%m-%d"])
 @click.option("--between", nargs=2, type=DAY, help="Compare the calibrations closest to two days.")
 @click.option("--beside", help="Compare with the last calibration of another sensor.")
 @click.option("--rigs", nargs=2, help="Compare two rigs by all calibrations of this sensor on them.")
-@click.option(
-    "--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Write pictures into this folder."
-)
-@click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
+@picture_options("Write pictures into this folder.")
 @bench_option
 @json_option
-def command(
+def history_command(
     sensor: str,
     model: str,
     chosen: Sequence[str],
@@ -238,3 +236,70 @@ def _agreements(rows: Mapping[str, tuple[str, Agreement]]) -> dict[str, Any]:
         name: {"difference": a.difference, "expanded": a.expanded, "e_n": a.e_n, "unit": unit, "agrees": a.agrees}
         for name, (unit, a) in rows.items()
     }
+
+
+@click.command("control")
+@click.argument("sensor", shell_complete=complete_sensor, required=False)
+@click.option(
+    "--baseline",
+    type=click.IntRange(min=FEWEST_RUNS),
+    default=BASELINE_RUNS,
+    show_default=True,
+    help="Runs that set the limits.",
+)
+@click.option("--since", metavar="RUN", help="Start with this run, for example the first one after a repair.")
+@picture_options("Write the charts here.")
+@json_option
+def control_command(
+    sensor: str | None, baseline: int, since: str | None, folder: Path | None, form: str, as_json: bool
+) -> int:
+    """Show control charts of `rig run check-standard` for SENSOR (its serial number), or for all check standards.
+
+    The first runs set the limits. A later run outside them is out of control; so is a slow drift of the weighted mean.
+    Exit status 1: out of control.
+    """
+    with Record.to_read() as record:
+        found = controlled(record.runs(), sensor, baseline, since)
+    written = _draw_charts(found, folder, form) if folder else []
+    if as_json:
+        emit({"schema": "rig.control/1", "verdict": worst(found), "charts": [_chart_document(each) for each in found]})
+    else:
+        click.echo(columns(HEAD, map(row, found)))
+        lines = [line for each in found for line in signals(each)]
+        click.echo("\n".join([*lines, *(f"written: {path}" for path in written), worst(found)]))
+    return int(worst(found) == OUT)
+
+
+def _chart_document(each: Controlled) -> dict[str, Any]:
+    chart = each.chart
+    signals = [("individuals", k) for k in chart.jumps] + [("ewma", k) for k in chart.drifts]
+    return {
+        "sensor": each.sensor,
+        "quantity": each.quantity,
+        "unit": each.unit,
+        "verdict": chart.verdict,
+        "baseline": chart.judged,
+        "centre": chart.centre,
+        "sigma": chart.sigma,
+        "limits": [chart.centre - chart.reach, chart.centre + chart.reach],
+        "range_limit": chart.range_limit,
+        "runs": list(each.runs),
+        "values": chart.values.tolist(),
+        "ewma": chart.ewma.tolist(),
+        "ewma_limits": [[chart.centre - reach, chart.centre + reach] for reach in chart.ewma_reach.tolist()],
+        "signals": [{"chart": name, "run": each.runs[k]} for name, k in signals],
+    }
+
+
+def _draw_charts(found: list[Controlled], folder: Path, form: str) -> list[Path]:
+    """One picture for each sensor."""
+    from calibrations.presentation.charts.history import control_charts
+    from calibrations.presentation.static import save_all
+
+    figures = {}
+    for sensor in dict.fromkeys(each.sensor for each in found):
+        mine = [each for each in found if each.sensor == sensor]
+        name = "".join(letter if letter.isalnum() else "-" for letter in sensor)
+        charts, units = {each.quantity: each.chart for each in mine}, {each.quantity: each.unit for each in mine}
+        figures[f"control-{name}"] = control_charts(charts, units)
+    return save_all(figures, folder, form)

@@ -16,12 +16,12 @@ from calibrations.importing.proposal import (
     COLUMN_NAMES,
     NAME_PATTERNS,
     column_names,
-    import_command,
     likely_kind,
     missing_columns,
     propose_mapping,
     sample_values,
 )
+from calibrations.importing.proposal import import_command as repeating_command
 from calibrations.importing.sheet import Sheet
 from calibrations.importing.units import ColumnMapping, parse_unit
 from calibrations.table import NUMBERS
@@ -47,7 +47,7 @@ LEAVE = "-"
     help="Damaged lines of a text: skip all, or refuse the first. Without it at most 1 % of the lines are skipped.",
 )
 @json_option
-def command(
+def import_command(
     file: Path,
     kind: str | None,
     mapped: tuple[str, ...],
@@ -132,7 +132,7 @@ def ask_mapping(
     while lacking := missing_columns(kind, sheet, whole):
         note(f"\nA table of {kind} also needs {', '.join(lacking)}. Again:\n")
         whole = _columns(sheet, kind, mapped)
-    note(f"\nTo repeat this import without questions:\n    {import_command(sheet, kind, whole, constants)}\n")
+    note(f"\nTo repeat this import without questions:\n    {repeating_command(sheet, kind, whole, constants)}\n")
     return kind, whole
 
 

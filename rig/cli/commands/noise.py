@@ -11,7 +11,7 @@ import numpy as np
 
 from calibrations.noise.analysis import NoiseAnalysis
 from rig.cli.terminal.complete import complete_data
-from rig.cli.terminal.output import Positive, emit, json_option, note, notes
+from rig.cli.terminal.output import Positive, emit, json_option, note, notes, picture_options
 from rig.cli.terminal.progress import working
 
 if TYPE_CHECKING:
@@ -29,10 +29,9 @@ if TYPE_CHECKING:
     multiple=True,
     help="Averaging time, s, with every overlap; repeatable. Default: octaves.",
 )
-@click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Write pictures here.")
-@click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
+@picture_options("Write pictures here.")
 @json_option
-def command(
+def noise_command(
     data: str,
     channel: str | None,
     rate_hz: float | None,

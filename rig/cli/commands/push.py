@@ -37,7 +37,7 @@ def _given(context: click.Context, _: click.Parameter, url: str | None) -> str |
 )
 @bench_option
 @json_option
-def command(
+def push_command(
     named: tuple[str, ...], given: str | None, prepares: bool, verifies: bool, bench_file: Path | None, as_json: bool
 ) -> int:
     """Push RUNS, or all finished runs that the lab does not have or has in another version.

@@ -1,4 +1,4 @@
-"""report: write a self-contained page on data and model, or its pictures."""
+"""report and certificate: documents on data and a model."""
 
 from __future__ import annotations
 
@@ -7,23 +7,24 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.terminal.complete import complete_data
+from rig.cli.terminal.complete import complete_data, complete_model
 from rig.cli.terminal.options import request_options
-from rig.cli.terminal.output import emit, model_option, note
+from rig.cli.terminal.output import FILE, bench_option, emit, json_option, model_option, note, picture_options
 from rig.cli.terminal.progress import working
+from rig.errors import OutputError
 
 if TYPE_CHECKING:
+    from calibrations.presentation.certificate.content import Certificate
     from rig.services.request import Request
 
 
 @click.command("report")
 @click.argument("data", shell_complete=complete_data)
 @model_option
-@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the page to this HTML file.")
-@click.option("--pictures", "folder", type=click.Path(file_okay=False, path_type=Path), help="Write all pictures here.")
-@click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
+@click.option("--out", type=FILE, help="Write the page to this HTML file.")
+@picture_options("Write all pictures here.")
 @request_options
-def command(request: Request, out: Path | None, folder: Path | None, form: str, as_json: bool) -> None:
+def report_command(request: Request, out: Path | None, folder: Path | None, form: str, as_json: bool) -> None:
     """Write a page on DATA (a file or a run) and a model: missing effects, and the completed model.
 
     The page is one file and needs no network. For a soak without --model it shows the soak. --pictures writes the
@@ -48,3 +49,95 @@ def command(request: Request, out: Path | None, folder: Path | None, form: str, 
     else:
         for path in [*([out] if out else []), *written]:
             click.echo(f"written: {path}")
+
+
+FORMS = (".html", ".pdf", ".xml")
+
+
+@click.command("certificate")
+@click.argument("data", shell_complete=complete_data)
+@click.option(
+    "--model",
+    required=True,
+    shell_complete=complete_model,
+    help="The certificate states the parameters of this model, fitted to DATA.",
+)
+@click.option(
+    "--out",
+    type=FILE,
+    required=True,
+    help="A file that ends in .html, .pdf or .xml; any other name gives all three.",
+)
+@click.option(
+    "--as-found", "before", help="The model file in use before. Default: --model, if it has values from other data."
+)
+@click.option("--number", default="", help="Number of the certificate. Default: the run and a digest.")
+@click.option("--customer", default="", help="The customer.")
+@bench_option
+@json_option
+def certificate_command(
+    data: str,
+    model: str,
+    out: Path,
+    before: str | None,
+    number: str,
+    customer: str,
+    bench_file: Path | None,
+    as_json: bool,
+) -> int:
+    """Write a calibration certificate for DATA: results and uncertainty budgets, as found and as left.
+
+    Results are compared with the limits of the bench file (limits.results, such as bias-x) by guarded acceptance. Exit
+    status 1: a result exceeds its limit, or the data cannot be used and no certificate is written.
+    """
+    from calibrations.presentation.certificate.content import document
+    from calibrations.presentation.certificate.results import require_reference
+    from rig.bench import read_bench
+    from rig.services.certify import Certified, certified, failed_results
+    from rig.services.load import is_still, loaded_table
+    from rig.services.request import Request
+
+    paths = _paths(out)
+    if is_still(data):
+        require_reference(data, "still")
+    with working("fitting the model") as progress:
+        table, given, effects = loaded_table(Request(data, model, bench_file), note)
+        require_reference(table.source, table.kind)
+        bench = read_bench(bench_file) if bench_file is not None else None
+        asked = Certified(data, table, given, Path(model).name, effects, bench, before)
+        certificate = certified(asked, number, customer)
+        for path in paths:
+            progress.text = f"writing {path}"
+            _write_certificate(path, certificate)
+    if as_json:
+        emit(document(certificate) | {"files": [str(path) for path in paths]})
+    else:
+        click.echo("\n".join([*_certificate_lines(certificate), *(f"written: {path}" for path in paths)]))
+    return int(bool(failed_results(certificate)))
+
+
+def _paths(out: Path) -> list[Path]:
+    """The files to write. Raises OutputError for another ending or a missing folder."""
+    if out.suffix and out.suffix not in FORMS and not out.suffix[1:].isdigit():
+        raise OutputError(f'{out}: a certificate ends in .html, .pdf or .xml, not in "{out.suffix}"')
+    if not out.parent.is_dir():
+        raise OutputError(f"{out}: there is no folder {out.parent}; make it, or give another file")
+    return [out] if out.suffix in FORMS else [out.with_name(out.name + form) for form in FORMS]
+
+
+def _write_certificate(path: Path, certificate: Certificate) -> None:
+    """Write one format of the certificate."""
+    from rig.files import write_whole
+    from rig.services.certify import written
+
+    write_whole(path, written(certificate, path.suffix))
+
+
+def _certificate_lines(certificate: Certificate) -> list[str]:
+    from calibrations.presentation.certificate.sections import results_table
+    from calibrations.text import columns
+    from rig.services.certify import certificate_head
+
+    table = results_table(certificate)
+    results = columns(table.head, table.rows)
+    return [certificate_head(certificate), "", results, "", *certificate.figures.remarks, *certificate.remarks]

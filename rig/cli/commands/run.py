@@ -1,4 +1,4 @@
-"""run: run a procedure on the bench, guided or --unattended, and record it."""
+"""run and resume: a procedure on the bench, guided or unattended."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ import click
 
 from procedures.catalogue import find
 from procedures.settings import parse
-from rig.bench import read_bench
-from rig.cli.terminal.complete import complete_procedure
+from rig.bench import Bench, read_bench
+from rig.cli.terminal.complete import complete_procedure, complete_run
 from rig.cli.terminal.options import PASS_ON, read_settings, settings_arguments
-from rig.cli.terminal.output import bench_option, json_option, note, watch_options
+from rig.cli.terminal.output import bench_option, json_option, note, notes, watch_options
 from rig.cli.terminal.settings_help import ProcedureCommand
 from rig.cli.terminal.watch import print_end, trace_option, watching
 from rig.record import Record
 from rig.record.push import push_after
-from rig.runs.runner import start
+from rig.record.values import CHANGED
+from rig.runs.runner import Outcome, resume, start
 
 
 @click.command("run", cls=ProcedureCommand, context_settings=PASS_ON)
@@ -26,7 +27,7 @@ from rig.runs.runner import start
 @trace_option
 @bench_option
 @json_option
-def command(
+def run_command(
     procedure: str,
     given: tuple[str, ...],
     pairs: tuple[str, ...],
@@ -48,4 +49,30 @@ def command(
         with watching(found, bench, unattended, answers) as observer:
             outcome = start(record, bench, found, settings, observer, trace=trace)
         push_after(record, outcome.run, bench.lab, note)
+        return print_end(record, outcome, as_json)
+
+
+@click.command("resume")
+@click.argument("run", shell_complete=complete_run)
+@watch_options
+@trace_option
+@bench_option
+@json_option
+def resume_command(
+    run: str, unattended: bool, answers: Path | None, trace: bool, bench_file: Path | None, as_json: bool
+) -> int:
+    """Continue RUN at its first missing pose, on the bench of its first part.
+
+    With --bench, the run continues only if that bench file has not changed.
+    """
+    bench = read_bench(bench_file) if bench_file else None
+    with Record.to_find(run, own=True) as record:
+        found = record.run(run)
+        if found.state == "complete":
+            return print_end(record, Outcome(found), as_json)
+        own = Bench.model_validate(found.bench)
+        with watching(find(found.procedure, own.folders.procedures), own, unattended, answers) as observer:
+            outcome = resume(record, found.run, observer, bench, trace)
+        notes(f"program changed {event.text}" for event in record.events(found.run) if event.what == CHANGED)
+        push_after(record, outcome.run, (bench or own).lab, note)
         return print_end(record, outcome, as_json)

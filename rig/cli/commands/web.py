@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.terminal.output import json_option, note
+from rig.cli.terminal.output import FILE, json_option, note
 
 if TYPE_CHECKING:
     from rig.web.server import Place
@@ -31,11 +31,11 @@ HERE = ("127.0.0.1", "localhost", "::1")
     "--bench",
     "bench_files",
     multiple=True,
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FILE,
     help="A bench file; give it again for each rig that the page Run offers. Without it, two simulated rigs.",
 )
 @json_option
-def command(
+def web_command(
     port: int | None, host: str, no_open: bool, new_token: bool, bench_files: tuple[Path, ...], as_json: bool
 ) -> None:
     """Serve the workbench until Ctrl-C; print its address, and open it in the browser.

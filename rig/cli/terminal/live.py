@@ -9,7 +9,6 @@ from typing import Any
 import click
 
 from calibrations.design.experiment import Experiment
-from calibrations.discovery.verdict import Verdict
 from calibrations.documents import discovery_document
 from calibrations.model.file import read_model
 from calibrations.table import Table
@@ -17,7 +16,7 @@ from calibrations.text import duration, joined
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import Bench, read_bench
-from rig.cli.terminal.output import emit, note, notes
+from rig.cli.terminal.output import emit, note, notes, verdict_status
 from rig.cli.terminal.watch import watching
 from rig.cli.terminal.words import discovery, parameters, warning
 from rig.files import require_out
@@ -108,7 +107,7 @@ def discover_live(
         notes(warning([found.caution]))
     else:
         click.echo(_end(done, live, standard_s, path))
-    return int(found.verdict is Verdict.NO_RESPONSE or (check and found.verdict is not Verdict.ADEQUATE))
+    return verdict_status(found.verdict, check)
 
 
 def progress(done: list[Measurement], time_s: float) -> str:

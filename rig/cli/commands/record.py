@@ -1,8 +1,9 @@
-"""show: show one run: its settings, its events, its results."""
+"""show, exclude and export: one run of the record."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import click
@@ -11,15 +12,14 @@ from calibrations.errors import CalibrationError
 from calibrations.tables import MEANS
 from calibrations.text import columns, duration
 from rig.bench.certificates import EXPIRED
-from rig.cli.terminal.complete import complete_run
-from rig.cli.terminal.output import emit, json_option
+from rig.cli.terminal.complete import complete_data, complete_run
+from rig.cli.terminal.output import emit, json_option, note
 from rig.cli.terminal.progress import working
 from rig.errors import RecordError
 from rig.record import Event, Kept, Line, Record, Run
 from rig.record.codec import digest_of
 from rig.record.measured import Measured, sensors_of
 from rig.record.tables import units_of
-from rig.services.history import lives
 from rig.services.next_steps import next_steps, results_table
 
 TURNS = ("begun", "error", "stopped", "complete")  # of a run's log: its beginnings and its ends
@@ -31,8 +31,10 @@ Ranges = Mapping[str, tuple[float, float]]
 @click.option("--poses", is_flag=True, help="List every pose with its number, and the reason if it is excluded.")
 @click.option("--log", "wants_log", is_flag=True, help="List the log: every step with its time.")
 @json_option
-def command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
+def show_command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
     """Show the settings, events and results of RUN, and the range of each column."""
+    from rig.services.history import lives  # loads the fit
+
     with working(f"reading {run}"), Record.to_find(run) as record:
         found = record.run(run)
         run = found.run
@@ -45,7 +47,7 @@ def command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
         known = lives(found, record.runs())
     if as_json:
         more = ({"kept": listed} if poses else {}) | ({"log": [vars(line) for line in lines]} if wants_log else {})
-        emit(_document(found, events, ranges) | more)
+        emit(_run_document(found, events, ranges) | more)
     else:
         after = [*results_table(found.results), *next_steps(found, left_out)]
         after += [
@@ -179,7 +181,7 @@ def _cell(value: object) -> str:
     return f"{value:.7g}" if isinstance(value, float) else str(value)
 
 
-def _document(run: Run, events: list[Event], ranges: Ranges) -> dict[str, object]:
+def _run_document(run: Run, events: list[Event], ranges: Ranges) -> dict[str, object]:
     return {
         "schema": "rig.show/1",
         "run": run.run,
@@ -199,3 +201,55 @@ def _document(run: Run, events: list[Event], ranges: Ranges) -> dict[str, object
         "results": run.results,
         EXPIRED: run.constants.get(EXPIRED),
     }
+
+
+@click.command("exclude")
+@click.argument("run", shell_complete=complete_run)
+@click.argument("pose", type=click.IntRange(min=0))
+@click.option("--reason", metavar="TEXT", help="The reason; the record stores it.")
+@click.option("--include", is_flag=True, help="Include the pose again.")
+@json_option
+def exclude_command(run: str, pose: int, reason: str | None, include: bool, as_json: bool) -> None:
+    """Exclude pose number POSE of RUN, or that row of an imported table, from every analysis.
+
+    The pose stays in the record, with the reason and the date. The results of a complete run are computed again; an
+    incomplete run measures the pose again on `rig resume`. `rig show RUN --poses` lists the numbers.
+    """
+    if include == bool(reason and reason.strip()):
+        raise click.UsageError("give a reason (--reason TEXT), or include the pose again (--include)")
+    from rig.record import Record
+    from rig.services.exclusion import RESULTS, exclude
+    from rig.services.next_steps import results_table
+
+    with Record.to_find(run) as record:
+        found = exclude(record, run, [pose], None if include else reason)
+        run = found.run
+        told = [event.text for event in record.events(run) if event.what == RESULTS]
+    if as_json:
+        said = None if include else reason
+        emit({"schema": "rig.exclude/1", "run": run, "pose": pose, "excluded": said, "results": found.results})
+        return
+    state = "included again" if include else f"excluded: {reason}"
+    after = [f"results: {told[-1]}", *results_table(found.results)] if found.state == "complete" and told else []
+    if found.state != "complete" and not include:
+        after = [f"Next: rig resume {run} measures it again"]
+    click.echo("\n".join([f"{run}: pose {pose} {state}", *after]))
+
+
+@click.command("export")
+@click.argument("data", shell_complete=complete_data)
+@click.option(
+    "--format", "kind", type=click.Choice(["csv", "parquet", "hdf5", "event-model"]), default="csv", show_default=True
+)
+@click.option("--out", "path", type=click.Path(path_type=Path), required=True, help="The file to write.")
+@json_option
+def export_command(data: str, kind: str, path: Path, as_json: bool) -> None:
+    """Write DATA, a run or a file, to --out."""
+    from rig.services.export import export
+
+    with working(f"writing {path}"):
+        rows = export(data, kind, path)
+    if as_json:
+        emit({"schema": "rig.export/1", "data": data, "format": kind, "rows": rows, "path": str(path)})
+    else:
+        note(f"{rows} rows to {path}")
