@@ -272,9 +272,9 @@ def _of_sensor(key: str, sensor: Sensor) -> Iterator[KeyFault]:
 
 
 def _of_channels(bench: Bench) -> Iterator[KeyFault]:
-    seen: dict[int, str] = {}
+    names: dict[int, str] = {}
     for name, number in bench.wired.items():
-        if (other := seen.setdefault(number, name)) != name:
+        if (other := names.setdefault(number, name)) != name:
             yield "instruments.adc.settings.channels", f"{other} and {name} are both input {number}; give each its own"
 
 

@@ -150,8 +150,8 @@ class Displacement(Strict):
 
     @field_validator("curve", mode="before")
     @classmethod
-    def _shipped(cls, given: Any) -> Any:
-        return Curve.from_file(SIMULATED_CURVE) if given == SIMULATED else given
+    def _shipped(cls, curve: Any) -> Any:
+        return Curve.from_file(SIMULATED_CURVE) if curve == SIMULATED else curve
 
 
 class Folders(Strict):

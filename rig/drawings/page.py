@@ -85,8 +85,8 @@ def marked_angle(
     yield svg.line([centre, svg.on_circle(centre, radius, shown)], svg.ORANGE, 1.4)
     if abs(shown) > 1:
         points = svg.arc(centre, inner * radius, 0, shown)
-        way = [b - a for a, b in zip(points[-2], points[-1], strict=True)]
-        yield svg.line(points, svg.ORANGE, 1.8) + svg.head(points[-1], way, svg.ORANGE)
+        direction = [b - a for a, b in zip(points[-2], points[-1], strict=True)]
+        yield svg.line(points, svg.ORANGE, 1.8) + svg.head(points[-1], direction, svg.ORANGE)
 
 
 # What a still sensor feels along each of its axes, as bars from -1 g to +1 g.
@@ -189,9 +189,9 @@ def _mount(attitude: Attitude, centre: tuple[float, float], radius: float) -> It
     if abs(attitude.mount_deg) < 1:
         return
     points = svg.arc(centre, 0.5 * radius, mark_deg, mark_deg - attitude.mount_deg)
-    way = [b - a for a, b in zip(points[-2], points[-1], strict=True)]
+    direction = [b - a for a, b in zip(points[-2], points[-1], strict=True)]
     yield svg.line([centre, svg.on_circle(centre, 0.86 * radius, mark_deg)], svg.QUIET, 1.0, stroke_dasharray="3 3")
-    yield svg.line(points, svg.QUIET, 1.8) + svg.head(points[-1], way, svg.QUIET)
+    yield svg.line(points, svg.QUIET, 1.8) + svg.head(points[-1], direction, svg.QUIET)
 
 
 def _axes(attitude: Attitude, centre: tuple[float, float], radius: float, x_deg: float) -> Iterator[str]:

@@ -17,8 +17,8 @@ Point = Sequence[float] | NDArray[np.float64]
 
 def element(name: str, content: str = "", /, **attributes: object) -> str:
     """One element; `stroke_width` stands for `stroke-width`, numbers are rounded to 0.01 px."""
-    given = "".join(f' {key.replace("_", "-")}="{_text(value)}"' for key, value in attributes.items())
-    return f"<{name}{given}>{content}</{name}>" if content else f"<{name}{given}/>"
+    written = "".join(f' {key.replace("_", "-")}="{_text(value)}"' for key, value in attributes.items())
+    return f"<{name}{written}>{content}</{name}>" if content else f"<{name}{written}/>"
 
 
 def polygon(points: Iterable[Point], fill: str, stroke: str = "none", width: float = 1.0, **more: str) -> str:
@@ -50,10 +50,10 @@ def arrow(start: Point, end: Point, colour: str, width: float = 2.2) -> str:
 
 def head(tip: Point, along: Point, colour: str) -> str:
     """The head of an arrow that points along a direction of any length."""
-    b, way = np.asarray(tip, float), np.asarray(along, float)
-    way = way / np.hypot(*way)
-    across = np.array([-way[1], way[0]])
-    foot = b - HEAD_PX * way
+    b, direction = np.asarray(tip, float), np.asarray(along, float)
+    direction = direction / np.hypot(*direction)
+    across = np.array([-direction[1], direction[0]])
+    foot = b - HEAD_PX * direction
     return polygon([b, foot + 0.42 * HEAD_PX * across, foot - 0.42 * HEAD_PX * across], colour)
 
 

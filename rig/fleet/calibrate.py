@@ -75,11 +75,11 @@ def calibrate_fleet(fleet: Fleet, members: Sequence[Member], guide: Guide) -> Ca
     """Fit all sensors, and pool those of a batch that have the same parameters."""
     faults = {member: member.fault for member in members if member.fault}
     looks: dict[Member, Screening] = {}
-    for member, said in fleet.ask([(m, guide.question(m)) for m in members if m not in faults]):
-        if "fault" in said:
-            faults[member] = said["fault"]
+    for member, answer in fleet.ask([(m, guide.question(m)) for m in members if m not in faults]):
+        if "fault" in answer:
+            faults[member] = answer["fault"]
         else:
-            looks[member] = replace(read_look(said), scores=(), stage=NOWHERE)  # pooling needs no scores
+            looks[member] = replace(read_look(answer), scores=(), stage=NOWHERE)  # pooling needs no scores
     groups: dict[tuple[str, Names], list[Member]] = defaultdict(list)
     for member in members:
         if member in looks:
@@ -98,34 +98,34 @@ def _batch(batch: str, names: Names, of: list[Member], looks: Mapping[Member, Sc
     return Calibrated(batch, names, tuple(of), mine, together, guide.question(of[0]))
 
 
-def models(found: Calibrated) -> dict[str, Model]:
+def models(calibrated: Calibrated) -> dict[str, Model]:
     """The models by sensor, with pooled values and standard uncertainties."""
-    base = _base(found)
-    values, stds = found.pooled.values, found.pooled.stds
-    return {m.sensor: _model(base, found, m, values[k], stds[k]) for k, m in enumerate(found.members)}
+    base = _base(calibrated)
+    values, stds = calibrated.pooled.values, calibrated.pooled.stds
+    return {m.sensor: _model(base, calibrated, m, values[k], stds[k]) for k, m in enumerate(calibrated.members)}
 
 
-def _base(found: Calibrated) -> Model:
-    return replace(model_of(found.question), unit=found.looks[0].unit)
+def _base(calibrated: Calibrated) -> Model:
+    return replace(model_of(calibrated.question), unit=calibrated.looks[0].unit)
 
 
-def _model(base: Model, found: Calibrated, member: Member, values: object, stds: object) -> Model:
-    said: dict[str, str | float] = {
+def _model(base: Model, calibrated: Calibrated, member: Member, values: object, stds: object) -> Model:
+    provenance: dict[str, str | float] = {
         "data": member.data,
         "sensor": member.sensor,
         "batch": member.batch,
-        "pooled": len(found.members),
+        "pooled": len(calibrated.members),
     }
-    return _with(base, found.names, np.asarray(values), np.asarray(stds), said)
+    return _with(base, calibrated.names, np.asarray(values), np.asarray(stds), provenance)
 
 
-def _with(base: Model, names: Names, values: object, stds: object, said: Mapping[str, str | float]) -> Model:
+def _with(base: Model, names: Names, values: object, stds: object, provenance: Mapping[str, str | float]) -> Model:
     numbers = zip(names, np.asarray(values), np.asarray(stds), strict=True)
     estimates: dict[str, list[Estimate]] = defaultdict(list)
     for (effect, name, axis, unit), value, std in numbers:
         estimates[effect].append(Estimate(name, axis, float(value), float(std), unit))
     terms = tuple(replace(term, estimates=tuple(estimates[term.name])) for term in base.terms if estimates[term.name])
-    return replace(base, terms=terms, provenance={**said, "program": program()})
+    return replace(base, terms=terms, provenance={**provenance, "program": program()})
 
 
 # The output of a discovery for a calibration: a folder with a model for each batch, and the errors of the rigs.
@@ -135,11 +135,11 @@ SCHEMA = "rig.fleet-rigs/1"
 OTHERWISE = "other.yaml"  # for sensors without a batch
 
 
-def write_guide(found: Population, start: Question, folder: Path) -> list[Path]:
+def write_guide(population: Population, start: Question, folder: Path) -> list[Path]:
     """Write a model file for each batch, and the errors of the rigs; return the paths. Raises OutputError."""
     make_folder(folder)
-    texts = {f"{safe(each.batch)}.yaml": _guide_model(start, each) for each in found.batches}
-    rigs = {error.rig: errors_of(found.rigs, error.rig) for error in found.rigs}
+    texts = {f"{safe(batch.batch)}.yaml": _guide_model(start, batch) for batch in population.batches}
+    rigs = {error.rig: errors_of(population.rigs, error.rig) for error in population.rigs}
     texts[RIGS] = json.dumps({"schema": SCHEMA, "rigs": {rig: of for rig, of in rigs.items() if of}}, indent=1) + "\n"
     for name, text in texts.items():
         write_whole(folder / name, text)
@@ -155,11 +155,11 @@ def write_models(result: Calibration, folder: Path) -> list[Path]:
     return [folder / f"{sensor}.yaml" for sensor in texts]
 
 
-def read_guide(given: str, batches: set[str], own: Own = ()) -> Guide:
+def read_guide(source: str, batches: set[str], own: Own = ()) -> Guide:
     """The guide from a folder, or from the name or file of one model. Raises ModelError, UnknownName."""
-    folder, effects = Path(given), effects_of(own)
+    folder, effects = Path(source), effects_of(own)
     if not folder.is_dir():
-        return Guide({}, dump_model(read_model(given, effects)), {}, own)
+        return Guide({}, dump_model(read_model(source, effects)), {}, own)
     texts = {batch: dump_model(read_model(folder / f"{safe(batch)}.yaml", effects)) for batch in batches}
     return Guide(texts, "", _rigs(folder / RIGS), own)
 
@@ -170,18 +170,18 @@ def safe(name: str) -> str:
 
 
 def _guide_model(start: Question, batch: BatchVerdict) -> str:
-    return dump_model(model_of(replace(start, effects=tuple(each.effect for each in batch.effects))))
+    return dump_model(model_of(replace(start, effects=tuple(effect.effect for effect in batch.effects))))
 
 
 def _rigs(path: Path) -> Mapping[str, StageErrors]:
     if not path.is_file():
         return {}
     try:
-        said = json.loads(path.read_text(encoding="utf-8"))
-        if said["schema"] != SCHEMA:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        if document["schema"] != SCHEMA:
             raise ModelError(
-                f"{path}: its schema is {said['schema']!r}, not {SCHEMA}; write it by `rig fleet discover`"
+                f"{path}: its schema is {document['schema']!r}, not {SCHEMA}; write it by `rig fleet discover`"
             )
-        return dict(said["rigs"])
+        return dict(document["rigs"])
     except (ValueError, KeyError, TypeError) as error:
         raise ModelError(f"{path}: is not a list of rig errors ({error}); write it by `rig fleet discover`") from None

@@ -65,7 +65,7 @@ class Stand:
 
     def question(self, what: Any, member: Member) -> Question:
         """The present question for a sensor."""
-        effects = tuple(each.effect for each in self.effects.get(member.batch, ()))
+        effects = tuple(effect.effect for effect in self.effects.get(member.batch, ()))
         return replace(self.start, what=what, effects=effects, errors=errors_of(self.errors, member.rig))
 
     def judged_beside(self, batch: str, effects: tuple[BatchEffect, ...]) -> Stand:
@@ -106,41 +106,41 @@ def _looks(
     fleet: Fleet, stand: Stand, batches: Batches, faults: dict[Member, str]
 ) -> Iterator[tuple[Member, Screening | None]]:
     """Every sensor with its screening, batch by batch; without one, the reason is added to `faults`."""
-    asked = [(m, stand.question("look", m)) for of in batches.values() for m in of if m not in faults]
-    for member, said in fleet.ask(asked):
-        if "fault" in said:
-            faults[member] = said["fault"]
-        yield member, None if "fault" in said else read_look(said)
+    questions = [(m, stand.question("look", m)) for of in batches.values() for m in of if m not in faults]
+    for member, answer in fleet.ask(questions):
+        if "fault" in answer:
+            faults[member] = answer["fault"]
+        yield member, None if "fault" in answer else read_look(answer)
 
 
 def _grown(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
     """The state with the missing effects of every batch, added one after another."""
     open_ = batches
     for left in reversed(range(MOST_ROUNDS + 1)):
-        stand, found = _judged(fleet, stand, open_)
-        open_ = {batch: batches[batch] for batch, effects in found.items() if effects and left}
+        stand, missing = _judged(fleet, stand, open_)
+        open_ = {batch: batches[batch] for batch, effects in missing.items() if effects and left}
         for batch in open_:
-            stand = stand.judged_beside(batch, (*stand.effects.get(batch, ()), found[batch][0]))
+            stand = stand.judged_beside(batch, (*stand.effects.get(batch, ()), missing[batch][0]))
     return stand
 
 
 def _judged(fleet: Fleet, stand: Stand, batches: Batches) -> tuple[Stand, dict[str, list[BatchEffect]]]:
     """The state with the screened sensors, and the missing effects of each batch, found after its last sensor."""
     stage = {name for name, effect in effects_of(stand.start.own).items() if "pose" in effect.places}
-    faults, seen = dict(stand.faults), dict(stand.seen)
+    faults, screened = dict(stand.faults), dict(stand.seen)
     waiting = {batch: sum(m not in faults for m in of) for batch, of in batches.items()}
     looks: dict[str, dict[Member, Screening]] = defaultdict(dict)
-    found = {}
+    missing = {}
     for member, look in _looks(fleet, stand, batches, faults):
         batch = member.batch
         if look is not None:
             looks[batch][member] = look
-            seen[member] = Seen(look.excess, look.free, look.chance, bool(look.outliers), bool(look.stage.names))
+            screened[member] = Seen(look.excess, look.free, look.chance, bool(look.outliers), bool(look.stage.names))
         waiting[batch] -= 1
         if not waiting[batch]:
             mine = looks.pop(batch, {})
-            found[batch] = find_batch_effects([mine[m] for m in batches[batch] if m in mine], stage)
-    return replace(stand, faults=faults, seen=seen), found
+            missing[batch] = find_batch_effects([mine[m] for m in batches[batch] if m in mine], stage)
+    return replace(stand, faults=faults, seen=screened), missing
 
 
 def _settled(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
@@ -153,7 +153,7 @@ def _settled(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
 def _needed(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Member]) -> Stand:
     """The state with the needed effects of a batch; the unneeded effect that was found first is removed first."""
     beside = _beside(fleet, stand, batch, members)
-    needed = tuple(each for each in beside if each is not None)
+    needed = tuple(effect for effect in beside if effect is not None)
     if len(needed) == len(beside):
         return stand.judged_beside(batch, needed)
     k, effects = beside.index(None), stand.effects[batch]
@@ -164,18 +164,18 @@ def _needed(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Member]) -
 def _beside(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Member]) -> list[BatchEffect | None]:
     """Each effect of a batch, tested with all others in the model; None if it is not significant."""
     effects = stand.effects[batch]
-    found = []
+    tested = []
     for k, effect in enumerate(effects):
         without = stand.judged_beside(batch, (*effects[:k], *effects[k + 1 :]))
         missed = _judged(fleet, without, {batch: members})[1].get(batch, [])
-        found.append(next((each for each in missed if each.effect == effect.effect), None))
-    return found
+        tested.append(next((candidate for candidate in missed if candidate.effect == effect.effect), None))
+    return tested
 
 
 def _diagnosed(fleet: Fleet, stand: Stand, batches: Batches) -> dict[Member, Any]:
     """The diagnoses of the sensors that differ from their batch."""
     usual = {batch: [stand.seen[m].excess for m in of if m in stand.seen] for batch, of in batches.items()}
-    out = [m for m, seen in stand.seen.items() if m not in stand.faults and stands_out(seen, usual[m.batch])]
+    out = [m for m, screened in stand.seen.items() if m not in stand.faults and stands_out(screened, usual[m.batch])]
     return dict(fleet.ask([(m, stand.question("diagnosis", m)) for m in out]))
 
 
@@ -190,9 +190,11 @@ def _population(stand: Stand, diagnosed: Mapping[Member, Any], members: Sequence
     sensors = tuple(_verdict(member, stand, diagnosed.get(member)) for member in members)
     batches = []
     for batch in dict.fromkeys(member.batch for member in members):
-        mine = tuple(each for each in sensors if each.batch == batch)
+        mine = tuple(verdict for verdict in sensors if verdict.batch == batch)
         batches.append(batch_verdict(batch, stand.effects.get(batch, ()), mine))
-    apart = unconnected_rigs([Measured(m.batch, m.rig, NOWHERE) for m, seen in stand.seen.items() if seen.on_stages])
+    apart = unconnected_rigs(
+        [Measured(m.batch, m.rig, NOWHERE) for m, screened in stand.seen.items() if screened.on_stages]
+    )
     return Population(sensors, tuple(batches), stand.errors, tuple(apart))
 
 

@@ -22,13 +22,13 @@ SCHEMA = "rig.fleet/1"
 Document = dict[str, Any]
 
 
-def population_document(found: Population, model: str) -> Document:
+def population_document(population: Population, model: str) -> Document:
     """The document of `rig fleet discover`."""
     return {
         "schema": SCHEMA,
         "what": "discovery",
         "model": model,
-        "verdicts": dict(found.verdicts),
+        "verdicts": dict(population.verdicts),
         "batches": [
             {
                 "batch": each.batch,
@@ -36,10 +36,10 @@ def population_document(found: Population, model: str) -> Document:
                 "effects": [{**vars(e), "rivals": list(e.rivals)} for e in each.effects],
                 "shares": dict(each.shares),
             }
-            for each in found.batches
+            for each in population.batches
         ],
-        "rigs": [vars(error) for error in found.rigs],
-        "unconnected": [list(group) for group in found.unconnected] if len(found.unconnected) > 1 else [],
+        "rigs": [vars(error) for error in population.rigs],
+        "unconnected": [list(group) for group in population.unconnected] if len(population.unconnected) > 1 else [],
         "sensors": [
             {
                 **vars(each),
@@ -48,63 +48,63 @@ def population_document(found: Population, model: str) -> Document:
                 "rivals": {name: list(of) for name, of in each.rivals.items()},
                 "needs_a_person": each.needs_a_person,
             }
-            for each in found.sensors
+            for each in population.sensors
         ],
     }
 
 
-def calibration_document(found: Calibration, model: str) -> Document:
+def calibration_document(calibration: Calibration, model: str) -> Document:
     """The document of `rig fleet calibrate`."""
     return {
         "schema": SCHEMA,
         "what": "calibration",
         "model": model,
-        "batches": [_batch(each) for each in found.batches],
-        "failed": [{"sensor": m.sensor, "data": m.data, "why": why} for m, why in found.faults.items()],
+        "batches": [_batch(batch) for batch in calibration.batches],
+        "failed": [{"sensor": m.sensor, "data": m.data, "why": why} for m, why in calibration.faults.items()],
     }
 
 
-def _batch(found: Calibrated) -> Document:
-    scale = found.pooled.scale
+def _batch(batch: Calibrated) -> Document:
+    scale = batch.pooled.scale
     population = [
         {
             **_named(name),
-            "mean": each.mean * size,
-            "mean_std": each.mean_std * size,
-            "spread": each.spread * size,
-            "spread_interval": (each.spread_interval(0.025, 0.975) * size).tolist(),
-            "pooled": each.pooled,
-            "apart": [m.sensor for m, out in zip(found.members, each.apart, strict=True) if out],
+            "mean": parameter.mean * size,
+            "mean_std": parameter.mean_std * size,
+            "spread": parameter.spread * size,
+            "spread_interval": (parameter.spread_interval(0.025, 0.975) * size).tolist(),
+            "pooled": parameter.pooled,
+            "apart": [m.sensor for m, out in zip(batch.members, parameter.apart, strict=True) if out],
         }
-        for name, each, size in zip(found.names, found.pooled.parameters, scale, strict=True)
+        for name, parameter, size in zip(batch.names, batch.pooled.parameters, scale, strict=True)
     ]
-    return {"batch": found.batch, "population": population, "sensors": _sensors(found)}
+    return {"batch": batch.batch, "population": population, "sensors": _sensors(batch)}
 
 
-def _sensors(found: Calibrated) -> list[Document]:
-    together, (low, high) = found.pooled, found.pooled.intervals()
+def _sensors(batch: Calibrated) -> list[Document]:
+    together, (low, high) = batch.pooled, batch.pooled.intervals()
     values, stds, alone, apart = together.values, together.stds, together.alone, together.apart
     return [
         {
             "sensor": member.sensor,
             "rig": member.rig,
             "data": member.data,
-            "excess": found.looks[k].excess,
-            "stands_out": found.unlike[k],
+            "excess": batch.looks[k].excess,
+            "stands_out": batch.unlike[k],
             "parameters": [
                 {
                     **_named(name),
                     "value": float(values[k, j]),
                     "std": float(stds[k, j]),
                     "interval": [float(low[k, j]), float(high[k, j])],
-                    "alone": float(found.looks[k].theta[j]),
+                    "alone": float(batch.looks[k].theta[j]),
                     "std_alone": float(alone[k, j]) if math.isfinite(alone[k, j]) else None,
                     "apart": bool(apart[k, j]),
                 }
-                for j, name in enumerate(found.names)
+                for j, name in enumerate(batch.names)
             ],
         }
-        for k, member in enumerate(found.members)
+        for k, member in enumerate(batch.members)
     ]
 
 
@@ -117,24 +117,24 @@ def _named(name: tuple[str, str, str, str]) -> Document:
 HOLDS_95 = 1.96
 
 
-def population_page(found: Population, model: str) -> str:
+def population_page(population: Population, model: str) -> str:
     """The HTML page of `rig fleet discover`."""
-    return population_report(found, model, _facts(model))
+    return population_report(population, model, _facts(model))
 
 
-def calibration_page(found: Calibration, model: str) -> str:
+def calibration_page(calibration: Calibration, model: str) -> str:
     """The HTML page of `rig fleet calibrate`."""
     quantities: dict[str, list[Spread]] = {}
-    for batch in found.batches:
+    for batch in calibration.batches:
         for k, name in enumerate(batch.names):
             quantities.setdefault(_titled(batch, name), []).append(_spread(batch, k))
-    rows = [row for batch in found.batches for row in _rows(batch)]
+    rows = [row for batch in calibration.batches for row in _rows(batch)]
     head = ("batch", "sensors", "parameter", "mean", "spread", "standard uncertainty / alone", "unlike the rest")
-    failed = [f"{member.sensor}: {why}" for member, why in found.faults.items()]
+    failed = [f"{member.sensor}: {why}" for member, why in calibration.faults.items()]
     not_calibrated = (f"Not calibrated: {'; '.join(failed)}",) if failed else ()
     batches = Section("Batches", (*not_calibrated, Table("Batches", head, rows, headed=False)))
-    count = sum(len(batch.members) for batch in found.batches)
-    return calibration_report(quantities, batches, len(found.batches), f"{count} sensors", _facts(model))
+    count = sum(len(batch.members) for batch in calibration.batches)
+    return calibration_report(quantities, batches, len(calibration.batches), f"{count} sensors", _facts(model))
 
 
 def _facts(model: str) -> dict[str, str]:
@@ -147,13 +147,13 @@ def _titled(batch: Calibrated, name: tuple[str, str, str, str]) -> str:
 
 
 def _spread(batch: Calibrated, k: int) -> Spread:
-    each, size = batch.pooled.parameters[k], batch.pooled.scale[k]
+    parameter, size = batch.pooled.parameters[k], batch.pooled.scale[k]
     low, high = (end[:, k] for end in batch.pooled.intervals())
     value = batch.pooled.values[:, k]
-    reach = HOLDS_95 * float(np.sqrt(each.variance + each.mean_std**2))
-    band = ((each.mean - reach) * size, (each.mean + reach) * size) if each.pooled else None
+    reach = HOLDS_95 * float(np.sqrt(parameter.variance + parameter.mean_std**2))
+    band = ((parameter.mean - reach) * size, (parameter.mean + reach) * size) if parameter.pooled else None
     expanded = np.maximum(high - value, value - low)
-    return Spread(batch.batch, value, expanded, [m.sensor for m in batch.members], each.apart, band)
+    return Spread(batch.batch, value, expanded, [m.sensor for m in batch.members], parameter.apart, band)
 
 
 def _rows(batch: Calibrated) -> list[tuple[object, ...]]:
@@ -163,10 +163,12 @@ def _rows(batch: Calibrated) -> list[tuple[object, ...]]:
             batch.batch or "no batch",
             len(batch.members),
             _titled(batch, name),
-            estimate_text(each.mean * size, each.mean_std * size),
-            rounded(each.spread * size, 2),
+            estimate_text(parameter.mean * size, parameter.mean_std * size),
+            rounded(parameter.spread * size, 2),
             rounded(float(gain), 2),
-            ", ".join(m.sensor for m, out in zip(batch.members, each.apart, strict=True) if out) or "-",
+            ", ".join(m.sensor for m, out in zip(batch.members, parameter.apart, strict=True) if out) or "-",
         )
-        for name, each, size, gain in zip(batch.names, batch.pooled.parameters, batch.pooled.scale, gains, strict=True)
+        for name, parameter, size, gain in zip(
+            batch.names, batch.pooled.parameters, batch.pooled.scale, gains, strict=True
+        )
     ]

@@ -54,13 +54,13 @@ def fleet_of(sources: Iterable[str]) -> list[Member]:
     with the same name.
     """
     named = list(sources)
-    found = [member for source in named for member in _of(source)] if named else list(_of_record())
-    if not found:
+    members = [member for source in named for member in _of(source)] if named else list(_of_record())
+    if not members:
         raise RigError(f"no sensor in {', '.join(named) or 'the record'}; name an index, a folder, tables or runs")
-    unique = list({(member.data, member.sensor): member for member in found}.values())
-    seen: dict[str, Member] = {}
+    unique = list({(member.data, member.sensor): member for member in members}.values())
+    by_name: dict[str, Member] = {}
     for member in unique:
-        if (other := seen.setdefault(member.sensor, member)) is not member:
+        if (other := by_name.setdefault(member.sensor, member)) is not member:
             raise RigError(
                 f"the sensor {member.sensor} occurs twice: {other.data} and {member.data}; "
                 "give each its name in the column `sensor` of an index, or leave one out"
@@ -105,26 +105,26 @@ def _of_index(path: Path) -> Iterator[Member]:
     with open_text_file(path).lines() as lines:
         rows = list(csv.DictReader(io.StringIO("".join(line for line in lines if not line.startswith("#")))))
     for number, row in enumerate(rows, 2):
-        said = {
+        cells = {
             name.strip(): (cell or "").strip() for name, cell in row.items() if isinstance(cell, str | None) and name
         }
-        if unknown := set(said) - set(COLUMNS):
+        if unknown := set(cells) - set(COLUMNS):
             raise RigError(
                 f"{path}: an index can have the columns {', '.join(COLUMNS)}, but not {', '.join(sorted(unknown))}"
             )
-        named = said.get("file") or said.get("data")
+        named = cells.get("file") or cells.get("data")
         if not named:
             raise RigError(f"{path}, line {number}: has no file and no run; fill in the column `file` or `data`")
         beside = path.parent / named
-        known = {name: said[name] for name in ("sensor", "batch", "rig") if said.get(name)}
-        if said.get("file") or beside.is_file():
+        known = {name: cells[name] for name in ("sensor", "batch", "rig") if cells.get(name)}
+        if cells.get("file") or beside.is_file():
             yield _of_file(beside, known)
         else:
             yield from _of_run(named, known)
 
 
-def _of_file(path: Path, said: dict[str, str]) -> Member:
-    member = Member(said.get("sensor", path.stem), said.get("batch", ""), said.get("rig", ""), str(path))
+def _of_file(path: Path, stated: dict[str, str]) -> Member:
+    member = Member(stated.get("sensor", path.stem), stated.get("batch", ""), stated.get("rig", ""), str(path))
     try:
         text = content(member)
     except DataError as error:
@@ -133,9 +133,9 @@ def _of_file(path: Path, said: dict[str, str]) -> Member:
         key.strip(): value.strip() for key, _, value in map(_constant, text.splitlines()[:50]) if value.strip()
     }
     return Member(
-        sensor=said.get("sensor") or constants.get("serial") or constants.get("sensor") or path.stem,
-        batch=said.get("batch") or constants.get("batch", ""),
-        rig=said.get("rig") or constants.get("rig", ""),
+        sensor=stated.get("sensor") or constants.get("serial") or constants.get("sensor") or path.stem,
+        batch=stated.get("batch") or constants.get("batch", ""),
+        rig=stated.get("rig") or constants.get("rig", ""),
         data=str(path),
         digest=hashlib.sha256(text.encode()).hexdigest(),
     )
@@ -145,7 +145,7 @@ def _constant(line: str) -> tuple[str, str, str]:
     return line[1:].partition(":") if line.startswith("#") else ("", "", "")
 
 
-def _of_run(name: str, said: dict[str, str]) -> Iterator[Member]:
+def _of_run(name: str, stated: dict[str, str]) -> Iterator[Member]:
     """The sensors of a run, or the named sensor. Raises UnknownRun."""
     run_id, slash, chosen = name.partition("/")
     if not run_id:
@@ -153,15 +153,15 @@ def _of_run(name: str, said: dict[str, str]) -> Iterator[Member]:
     try:
         with Record.to_find(run_id) as record:
             run = record.run(run_id)
-            found = list(_members(record, run))
+            sensors = list(_members(record, run))
     except UnknownRun as error:
         raise UnknownRun(f"{name}: there is no such file or folder, and {error}") from None
-    mine = [member for member in found if not slash or member.data == f"{run.run}/{chosen}"]
+    mine = [member for member in sensors if not slash or member.data == f"{run.run}/{chosen}"]
     if not mine:
-        raise UnknownRun(f"run {run_id} has no sensor {chosen!r}; it has {', '.join(m.data for m in found)}")
+        raise UnknownRun(f"run {run_id} has no sensor {chosen!r}; it has {', '.join(m.data for m in sensors)}")
     for m in mine:
         yield replace(
-            m, sensor=said.get("sensor", m.sensor), batch=said.get("batch", m.batch), rig=said.get("rig", m.rig)
+            m, sensor=stated.get("sensor", m.sensor), batch=stated.get("batch", m.batch), rig=stated.get("rig", m.rig)
         )
 
 
@@ -170,11 +170,11 @@ def _of_record() -> Iterator[Member]:
     if not Record.is_there():
         return
     with Record.to_read() as record:
-        seen: set[str] = set()
+        known: set[str] = set()
         for run in record.runs():
             if run.state == "complete" and run.kind in MEANS:
-                yield from (m for m in _members(record, run) if m.sensor not in seen)
-                seen |= set(members(run))
+                yield from (m for m in _members(record, run) if m.sensor not in known)
+                known |= set(members(run))
 
 
 def _members(record: Record, run: Run) -> Iterator[Member]:

@@ -37,8 +37,8 @@ MOST = 500  # keys of one query
 
 def key_of(digest: str, question: Question) -> str:
     """Key of an answer: a digest of data, question and program."""
-    asked = json.dumps([_program(), digest, asdict(question)], sort_keys=True)
-    return hashlib.sha256(asked.encode()).hexdigest()
+    text = json.dumps([_program(), digest, asdict(question)], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 @cache
@@ -51,9 +51,9 @@ def _program() -> str:
     return sha.hexdigest()
 
 
-def keep(record: Record, found: Iterable[tuple[str, str, str, Mapping[str, Any]]]) -> None:
+def keep(record: Record, answered_rows: Iterable[tuple[str, str, str, Mapping[str, Any]]]) -> None:
     """Store rows (key, sensor, data, answer) in one transaction; rows that exist do not change."""
-    rows = [{"key": k, "sensor": s, "data": d, "at": now(), "answer": dict(a)} for k, s, d, a in found]
+    rows = [{"key": k, "sensor": s, "data": d, "at": now(), "answer": dict(a)} for k, s, d, a in answered_rows]
     with record.engine.begin() as to:
         if rows:
             to.execute(insert_or(to, answers).on_conflict_do_nothing(), rows)
@@ -61,12 +61,12 @@ def keep(record: Record, found: Iterable[tuple[str, str, str, Mapping[str, Any]]
 
 def kept(record: Record, keys: Sequence[str]) -> dict[str, Any]:
     """The stored answers, by key."""
-    found: dict[str, Any] = {}
+    stored: dict[str, Any] = {}
     with record.engine.connect() as at:
         for first in range(0, len(keys), MOST):
             query = select(answers.c.key, answers.c.answer).where(answers.c.key.in_(keys[first : first + MOST]))
-            found |= {row.key: row.answer for row in at.execute(query)}
-    return found
+            stored |= {row.key: row.answer for row in at.execute(query)}
+    return stored
 
 
 CHUNK = {"look": 20, "diagnosis": 4}  # sensors of one task: about half a second's work
@@ -83,22 +83,22 @@ class Fleet:
     record: Record
     tell: Tell
 
-    def ask(self, asked: Sequence[tuple[Member, Question]]) -> Iterator[tuple[Member, Any]]:
-        """Every member with its answer or a `fault`, roughly in the order of `asked`."""
+    def ask(self, questions: Sequence[tuple[Member, Question]]) -> Iterator[tuple[Member, Any]]:
+        """Every member with its answer or a `fault`, roughly in the order of `questions`."""
         known: list[tuple[Member, Any]] = []
         open_: dict[str, list[tuple[Member, Question]]] = {}
-        chunks, done = self._chunks(asked, known, open_), 0
-        for found in self._answers(chunks, open_):
-            ready = [*known, *found]
+        chunks, done = self._chunks(questions, known, open_), 0
+        for new_answers in self._answers(chunks, open_):
+            ready = [*known, *new_answers]
             known.clear()
             yield from ready
             done += len(ready)
-            if found:
-                self.tell(done, len(asked))
+            if new_answers:
+                self.tell(done, len(questions))
 
     def _chunks(
         self,
-        asked: Sequence[tuple[Member, Question]],
+        questions: Sequence[tuple[Member, Question]],
         known: list[tuple[Member, Any]],
         open_: dict[str, list[tuple[Member, Question]]],
     ) -> Iterator[list[Task]]:
@@ -107,20 +107,20 @@ class Fleet:
         Stored answers are added to `known`. An empty chunk means: use the answers in `known` first, to save memory.
         """
         tasks: list[Task] = []
-        size = min((CHUNK[question.what] for _, question in asked), default=1)
-        for first in range(0, len(asked), SLICE):
-            part = asked[first : first + SLICE]
+        size = min((CHUNK[question.what] for _, question in questions), default=1)
+        for first in range(0, len(questions), SLICE):
+            part = questions[first : first + SLICE]
             keys = [key_of(member.digest, question) for member, question in part]
             there = kept(self.record, keys)
             known += [(member, there[key]) for key, (member, _) in zip(keys, part, strict=True) if key in there]
             if known:
                 yield []
-            for key, each in zip(keys, part, strict=True):
+            for key, pair in zip(keys, part, strict=True):
                 if key in there:
                     continue
                 if key not in open_:
-                    tasks.append(self._task(key, *each))
-                open_.setdefault(key, []).append(each)  # equal tables are one question
+                    tasks.append(self._task(key, *pair))
+                open_.setdefault(key, []).append(pair)  # equal tables are one question
                 if len(tasks) == size:
                     yield tasks
                     tasks = []
@@ -136,11 +136,14 @@ class Fleet:
             yield []
         else:
             return
-        for tasks, found in answered(self.client, answer, chain([chunk], chunks)):
-            pairs = found if found is not None else [(task.key, {"fault": KILLED}) for task in tasks]
-            rows = [(key, *each, said) for key, said in pairs for each in open_.pop(key)]
-            keep(self.record, ((key, m.sensor, m.data, said) for key, m, _, said in rows if "fault" not in said))
-            yield [(member, said) for _, member, _, said in rows]
+        for tasks, results in answered(self.client, answer, chain([chunk], chunks)):
+            pairs = results if results is not None else [(task.key, {"fault": KILLED}) for task in tasks]
+            rows = [(key, *pair, document) for key, document in pairs for pair in open_.pop(key)]
+            keep(
+                self.record,
+                ((key, m.sensor, m.data, document) for key, m, _, document in rows if "fault" not in document),
+            )
+            yield [(member, document) for _, member, _, document in rows]
 
     def _task(self, key: str, member: Member, question: Question) -> Task:
         """The task with the text of the file, because the worker may be on another machine."""

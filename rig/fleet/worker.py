@@ -49,13 +49,13 @@ def write_look(look: Screening) -> dict[str, Any]:
 
 def read_look(document: dict[str, Any]) -> Screening:
     """The screening from the document of `write_look`."""
-    said = dict(document)
-    stage = said.pop("stage")
-    scores = tuple(Score(**_arrays(score) | {"effect": intern(score["effect"])}) for score in said.pop("scores"))
-    names = _one(tuple(tuple(name) for name in said.pop("names")))
+    values = dict(document)
+    stage = values.pop("stage")
+    scores = tuple(Score(**_arrays(score) | {"effect": intern(score["effect"])}) for score in values.pop("scores"))
+    names = _one(tuple(tuple(name) for name in values.pop("names")))
     k = len(stage["names"])
     return Screening(
-        **_arrays(said) | {"outliers": tuple(said["outliers"])},
+        **_arrays(values) | {"outliers": tuple(values["outliers"])},
         names=names,
         scores=scores,
         stage=StageScore(
@@ -73,8 +73,8 @@ def _one(names: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def _plain(value: Any) -> dict[str, Any]:
-    each = {field.name: getattr(value, field.name) for field in fields(value)}
-    return {name: item.tolist() if isinstance(item, np.ndarray) else item for name, item in each.items()}
+    values = {field.name: getattr(value, field.name) for field in fields(value)}
+    return {name: item.tolist() if isinstance(item, np.ndarray) else item for name, item in values.items()}
 
 
 def _arrays(document: dict[str, Any]) -> dict[str, Any]:
@@ -116,11 +116,11 @@ def answer(tasks: Sequence[Task]) -> list[tuple[str, Answer]]:
 
 
 def _answered(task: Task) -> Answer:
-    asked = task.question
+    question = task.question
     try:
-        model, columns = _beside(asked.model, asked.effects, asked.own)
-        table = correct_stage_errors(_checked(_read(task), model), asked.errors, columns.effects)
-        if asked.what == "look":
+        model, columns = _beside(question.model, question.effects, question.own)
+        table = correct_stage_errors(_checked(_read(task), model), question.errors, columns.effects)
+        if question.what == "look":
             return write_look(screen_sensor(table, model, columns))
         return _diagnosis_answer(diagnose(table, model, columns.effects))
     except (CalibrationError, RigError) as error:
@@ -135,11 +135,11 @@ def _beside(model: str, effects: tuple[str, ...], own: Own) -> tuple[Model, Shar
     return model_of(Question("look", model, effects, own=own)), SharedDesigns(effects_of(own))
 
 
-def model_of(asked: Question) -> Model:
+def model_of(question: Question) -> Model:
     """The model with the effects of the batch, without estimates of these."""
-    effects = effects_of(asked.own)
-    model = parse_model(asked.model, "the model", effects)
-    for name in asked.effects:
+    effects = effects_of(question.own)
+    model = parse_model(question.model, "the model", effects)
+    for name in question.effects:
         model = model.with_effect(effects[name])
     return model
 
@@ -182,19 +182,19 @@ def _nobody(_: str) -> None:
     """Suppress a remark on a single sensor."""
 
 
-def _diagnosis_answer(found: Diagnosis[Fit]) -> Answer:
+def _diagnosis_answer(diagnosis: Diagnosis[Fit]) -> Answer:
     """The facts of the sensor's own judgement; the fleet adds the effects of the batch before it decides."""
-    facts = found.judgement
+    facts = diagnosis.judgement
     return {
         "effects": list(facts.missing),
         "rivals": {name: list(others) for name, others in facts.alternatives.items()},
-        "excess": found.findings.end.pooled_excess,
+        "excess": diagnosis.findings.end.pooled_excess,
         "left": facts.left,
         "share_left": facts.share_left,
         "spoilt": facts.spoilt,
         "unresponsive": facts.unresponsive,
         "undetermined": facts.undetermined,
-        "caution": found.caution,
+        "caution": diagnosis.caution,
     }
 
 

@@ -39,8 +39,8 @@ class HandAnalysis:
 
         def position(dwell: Dwell) -> HandPosition:
             mean, std = (np.array([values[name] for name in OUTPUTS]) for values in (dwell.means, dwell.stds))
-            told = named_orientation(dwell.pose.path)
-            return HandPosition(mean, std, dwell.n, ORIENTATIONS[0] if told is None else told, dwell.t_s)
+            orientation = named_orientation(dwell.pose.path)
+            return HandPosition(mean, std, dwell.n, ORIENTATIONS[0] if orientation is None else orientation, dwell.t_s)
 
         unwanted = np.array([up for words in skipped if (up := named_orientation(words)) is not None]).reshape(-1, 3)
         return Course(tuple(map(position, dwells)), cast(Any, noise), unwanted)

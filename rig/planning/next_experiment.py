@@ -61,11 +61,11 @@ def proposed(result: Answer, effects: Mapping[str, Effect], bench: Bench, bench_
     e = result.next_experiment
     if e is None:
         return result
-    found = result.findings
-    frees = {a for a, _ in e.separates} & set(found.origin.model.effects)  # a value for each axis, and adds nothing
-    if not found.data.foreseeable or frees or not e.separates:
+    findings = result.findings
+    frees = {a for a, _ in e.separates} & set(findings.origin.model.effects)  # a value for each axis, and adds nothing
+    if not findings.data.foreseeable or frees or not e.separates:
         return replace(result, next_experiment=as_proposed(e, bench, bench_file))
-    dispute = Dispute.of(without_forms(found.end), e.separates, effects)
+    dispute = Dispute.of(without_forms(findings.end), e.separates, effects)
     return replace(result, next_experiment=chosen(dispute, e, bench, bench_file))
 
 
@@ -120,9 +120,9 @@ def chosen(
     """
     predicted = []
     for e, planned in sorted(_plans(menu, bench, bench_file), key=lambda pair: pair[0].duration_s or 0.0):
-        if (found := _predicted(dispute, e, planned)) is not None:
-            predicted.append(found)
-            if _certain(found, judged[0]) and len(found.separates) == len(dispute.rivals):
+        if (prediction := _predicted(dispute, e, planned)) is not None:
+            predicted.append(prediction)
+            if _certain(prediction, judged[0]) and len(prediction.separates) == len(dispute.rivals):
                 break  # no longer experiment can be better
     return best_of(predicted, judged) or as_proposed(by_physics, bench, bench_file)
 
@@ -151,8 +151,8 @@ def _certain(e: Experiment, probability: str) -> bool:
 
 def _per_minute(e: Experiment) -> float:
     """Lambda per minute on the rig; 0 below LEAST."""
-    found = e.expected.together if e.expected else 0.0
-    return 60 * found / max(e.duration_s or 0.0, 1.0) if found > LEAST else 0.0
+    information = e.expected.together if e.expected else 0.0
+    return 60 * information / max(e.duration_s or 0.0, 1.0) if information > LEAST else 0.0
 
 
 def _predicted(dispute: Dispute, e: Experiment, planned: Plan) -> Experiment | None:
@@ -171,7 +171,9 @@ def _predicted(dispute: Dispute, e: Experiment, planned: Plan) -> Experiment | N
     separated = {
         pair: gains[pair] for pair in gains if pairs_separated(gains[pair].together) >= CERTAIN_PROBABILITY
     } or gains
-    shown = [distance_alone(found, dispute.nothing, table) for found in (dispute.best, *dispute.rivals.values())]
+    shown = [
+        distance_alone(explanation, dispute.nothing, table) for explanation in (dispute.best, *dispute.rivals.values())
+    ]
     worst = Expected(min(x.alone for x in separated.values()), min(x.together for x in separated.values()), min(shown))
     return replace(e, separates=tuple(separated), expected=worst)
 

@@ -236,13 +236,13 @@ class Stretch:
 
 def stretches(plan: Plan) -> list[Stretch]:
     """The stretches of a plan, in order."""
-    found, before_s = [], 0.0
+    parts, before_s = [], 0.0
     for _, group in groupby(plan.held, lambda held: _kind(held.pose)):
         held = list(group)
         also = tuple(_besides(plan, before_s, held[-1].start_s))
-        found.append(Stretch(held[0].start_s, tuple(each.pose for each in held), also))
+        parts.append(Stretch(held[0].start_s, tuple(dwell.pose for dwell in held), also))
         before_s = held[-1].start_s
-    return found
+    return parts
 
 
 def _kind(pose: Pose) -> tuple[str, float, int]:

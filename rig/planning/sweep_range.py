@@ -144,8 +144,8 @@ class Range:
     def judged(self, settings: Mapping[str, Any]) -> Judged:
         """The sweep with other settings; check poses tell its fit nothing. Raises what a plan raises."""
         planned = plan(self.bench, self.sweep, settings)
-        seen = replace(planned, held=tuple(held for held in planned.held if not held.pose.path.startswith(MARK)))
-        rows = information(self.fit, predict_data(self.fit, _columns(seen)))
+        fitted = replace(planned, held=tuple(held for held in planned.held if not held.pose.path.startswith(MARK)))
+        rows = information(self.fit, predict_data(self.fit, _columns(fitted)))
         std = np.sqrt(np.diag(covariance_of(rows)))
         unknown = np.full(len(std), np.inf)
         return Judged(planned, np.multiply(std, self._full_scale, where=np.isfinite(std), out=unknown))

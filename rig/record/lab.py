@@ -27,15 +27,15 @@ NO_URL = (
 )
 
 
-def lab_url(given: str, what: str = "what was given") -> URL:
-    """The parsed URL. Raises RecordError, which begins with `what` and does not quote the URL."""
+def lab_url(text_url: str, source: str = "what was given") -> URL:
+    """The parsed URL. Raises RecordError, which begins with `source` and does not quote the URL."""
     try:
-        url = make_url(given)
+        url = make_url(text_url)
     except (ArgumentError, ValueError):
-        raise RecordError(f"{what} {NO_URL}") from None
+        raise RecordError(f"{source} {NO_URL}") from None
     scheme = url.drivername.partition("+")[0]
     if scheme not in ("postgresql", "postgres") or not url.database or "@" in f"{url.host}{url.database}":
-        raise RecordError(f"{what} {NO_URL}")
+        raise RecordError(f"{source} {NO_URL}")
     return url.set(drivername="postgresql+psycopg")
 
 
@@ -134,19 +134,19 @@ def open_server(url: URL) -> Engine:
 
 def version(at: Connection) -> int:
     """The schema of the tables; 0 without tables."""
-    found = at.execute(text("SELECT obj_description(to_regclass('runs'), 'pg_class')")).scalar_one()
-    return int(found.removeprefix("schema ")) if found else 0
+    comment = at.execute(text("SELECT obj_description(to_regclass('runs'), 'pg_class')")).scalar_one()
+    return int(comment.removeprefix("schema ")) if comment else 0
 
 
-def require_current(found: int, where: str) -> None:
+def require_current(schema: int, where: str) -> None:
     """Raises RecordError for tables of another version of this program, and without tables."""
-    if found > SCHEMA:
-        raise RecordError(f"{where}: the record is of a newer version of this program (schema {found}, this one knows "
+    if schema > SCHEMA:
+        raise RecordError(f"{where}: the record is of a newer version of this program (schema {schema}, this one knows "
                           f"{SCHEMA}); get the new version")  # fmt: skip
-    if not found:
+    if not schema:
         raise RecordError(f"{where}: there is no record yet; {PREPARE} makes one")
-    if found < SCHEMA:
-        raise RecordError(f"{where}: this record has an older schema ({found} of {SCHEMA}); {PREPARE} updates it")
+    if schema < SCHEMA:
+        raise RecordError(f"{where}: this record has an older schema ({schema} of {SCHEMA}); {PREPARE} updates it")
 
 
 def _tell(context: ExceptionContext, url: URL) -> None:

@@ -48,9 +48,9 @@ def positions_table(run: Run, poses: Iterable[Kept]) -> Table:
 def rates_table(run: Run, poses: Iterable[Kept]) -> Table:
     """A row for each turn or rest of a gyroscope. Raises RecordError without one."""
     kept = list(poses)
-    normal = np.array([sensor_from_table(each.pose)[:, 2] for each in kept]).reshape(-1, 3)
-    force = np.array([specific_force_g(each.pose) for each in kept]).reshape(-1, 3)
-    columns = {"rate_deg_s": np.array([-each.pose.rate_deg_s for each in kept]) + 0.0}
+    normal = np.array([sensor_from_table(turn.pose)[:, 2] for turn in kept]).reshape(-1, 3)
+    force = np.array([specific_force_g(turn.pose) for turn in kept]).reshape(-1, 3)
+    columns = {"rate_deg_s": np.array([-turn.pose.rate_deg_s for turn in kept]) + 0.0}
     columns |= {f"axis_{axis}": normal[:, k] for k, axis in enumerate("xyz")}
     columns |= {f"a{axis}": force[:, k] for k, axis in enumerate("xyz")}
     return _table(run, kept, RATE, columns)
@@ -82,20 +82,20 @@ def specific_force_g(pose: Pose) -> Array:
 def _table(run: Run, kept: Sequence[Kept], outputs: Sequence[str], more: Mapping[str, Array]) -> Table:
     if not kept:
         raise RecordError(f"run {run.run} has no pose yet; `rig resume` continues it")
-    rows = [each.dwell for each in kept]
-    columns = dict(more) | {"t_s": np.array([each.t_s for each in kept])}
-    if all(each.temperature_c is not None for each in kept):
-        columns["temperature_c"] = np.array([each.temperature_c for each in kept], dtype=float)
+    rows = [pose.dwell for pose in kept]
+    columns = dict(more) | {"t_s": np.array([pose.t_s for pose in kept])}
+    if all(pose.temperature_c is not None for pose in kept):
+        columns["temperature_c"] = np.array([pose.temperature_c for pose in kept], dtype=float)
     columns |= {name: np.array([row.means[name] for row in rows]) for name in outputs}
     columns |= {f"{name}_std": np.array([row.stds[name] for row in rows]) for name in outputs}
     columns |= {"n": np.array([float(row.n) for row in rows])}
-    blocks = [each.samples for each in kept[:: 1 + len(kept) // MOST_BLOCKS]]
+    blocks = [pose.samples for pose in kept[:: 1 + len(kept) // MOST_BLOCKS]]
     known = {name: value for name, value in run.constants.items() if name not in NOT_OF_THESE}
     unit = stated_unit(units_of(run, outputs)) or {"unit": "V"}
     constants = {**known, **unit, "sample_rate_hz": blocks[0].rate_hz, **inflations(blocks, outputs)}
-    labels = {"path": tuple(each.pose.path for each in kept)}
+    labels = {"path": tuple(pose.pose.path for pose in kept)}
     table = Table.from_columns(run.kind, columns, constants, run.run, labels)
-    return replace(table, numbers=np.array([each.number for each in kept]))
+    return replace(table, numbers=np.array([pose.number for pose in kept]))
 
 
 # Tables with a row for each pose or turn; the others have a row for each sample.

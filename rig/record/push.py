@@ -33,8 +33,8 @@ def push_after(record: Record, run: Run, lab: Lab | None, tell: Callable[[str], 
 
     try:
         with Record(lab_url(lab.url)) as there:
-            for each in push_all(record, there, unsent(record, there)):
-                tell(str(each) if isinstance(each, RecordError) else f"{each.run}: pushed to {there.where}")
+            for pushed in push_all(record, there, unsent(record, there)):
+                tell(str(pushed) if isinstance(pushed, RecordError) else f"{pushed.run}: pushed to {there.where}")
     except RecordError as error:
         tell(f"not pushed: {error}")
 
@@ -193,6 +193,8 @@ def verify(lab: Record) -> Verified:
     """Compute the digest of every pushed run again, and compare it with the digest at its arrival. Raises LabAway."""
     with lab.engine.connect() as at:
         rows = at.execute(select(arrivals.c.run, arrivals.c.digest).order_by(arrivals.c.run)).all()
-        found = {row.run: digest(at, row.run) == row.digest for row in rows if row.digest is not None}
-    sound, changed = (tuple(run for run, is_sound in found.items() if is_sound is wanted) for wanted in (True, False))
+        is_sound_by_run = {row.run: digest(at, row.run) == row.digest for row in rows if row.digest is not None}
+    sound, changed = (
+        tuple(run for run, is_sound in is_sound_by_run.items() if is_sound is wanted) for wanted in (True, False)
+    )
     return Verified(sound, tuple(row.run for row in rows if row.digest is None), changed)

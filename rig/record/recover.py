@@ -52,15 +52,15 @@ def recover(source: Path, folder: Path) -> Recovered:
     folder.mkdir(parents=True, exist_ok=True)
     begun, padded = folder / "recovery.db", folder / "padded.db"
     for file in (begun, padded):
-        for each in folder.glob(f"{file.name}*"):
-            each.unlink()  # of an attempt that failed
+        for leftover in folder.glob(f"{file.name}*"):
+            leftover.unlink()  # of an attempt that failed
     try:
-        found = _recovered(_whole(source, padded), begun)
+        recovered = _recovered(_whole(source, padded), begun)
         begun.rename(target)
     finally:
-        for each in (*folder.glob(f"{begun.name}*"), *folder.glob(f"{padded.name}*")):
-            each.unlink()
-    return found
+        for leftover in (*folder.glob(f"{begun.name}*"), *folder.glob(f"{padded.name}*")):
+            leftover.unlink()
+    return recovered
 
 
 def _recovered(source: Path, target: Path) -> Recovered:

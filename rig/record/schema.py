@@ -254,7 +254,7 @@ def upgrade(to: Connection, version: int) -> None:
     """Make missing tables, and change those of the older `version`; 0 is a database without tables."""
     older = set(inspect(to).get_table_names())
     metadata.create_all(to)
-    for statement in (each for old in range(version or SCHEMA, SCHEMA) for each in MIGRATIONS[old]):
+    for statement in (migration for old in range(version or SCHEMA, SCHEMA) for migration in MIGRATIONS[old]):
         if statement.split()[2] in older:  # ALTER TABLE name; a new table has every column
             to.execute(text(statement))
 

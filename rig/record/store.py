@@ -188,8 +188,8 @@ class Record:
             known = to.execute(update(poses).where(chosen).values(excluded=reason)).rowcount
             if not known and not 0 <= number < imported_rows(to, run):
                 raise RecordError(f"run {run} has no pose {number}; `rig show {run} --poses` lists its poses")
-            what = f"pose {number} {'included' if reason is None else 'excluded'}"
-            to.execute(insert(events), {"run": run, "at": now(), "what": what, "text": reason or "again"})
+            change = f"pose {number} {'included' if reason is None else 'excluded'}"
+            to.execute(insert(events), {"run": run, "at": now(), "what": change, "text": reason or "again"})
 
     def keep_state(self, run: str, state: Mapping[str, Any]) -> None:
         """Store the state of the simulated bench before the first pose."""
@@ -248,12 +248,12 @@ class Record:
 
     def damaged_rows(self) -> list[str]:
         """A phrase for each row of a run, except its entry, that changed on the disk."""
-        found = []
+        phrases = []
         with self._reading() as at:
             for table in (poses, blocks, dwells, readings, columns):
                 rows = at.execution_options(yield_per=32).execute(select(table))
-                found += [place_text(row, table) for row in rows if is_damaged(table, row._mapping)]
-        return found
+                phrases += [place_text(row, table) for row in rows if is_damaged(table, row._mapping)]
+        return phrases
 
     def run(self, name: str) -> Run:
         """The run with this id, or whose id alone begins so, or the only one of the sensor with this name or serial.
@@ -275,7 +275,7 @@ class Record:
         if of_sensor := runs_of_sensor(self.runs(), name):
             if len(of_sensor) == 1 or wanted != name:
                 return of_sensor[0]
-            listed = ", ".join(each.run for each in of_sensor[:MOST_LISTED])
+            listed = ", ".join(match.run for match in of_sensor[:MOST_LISTED])
             raise UnknownRun(
                 f"{len(of_sensor)} runs in {self.where} are of the sensor {name!r}: {listed}"
                 f"{' ...' if of_sensor[MOST_LISTED:] else ''}; write an id, or '{LAST} {name}' for the newest one"
@@ -373,8 +373,8 @@ class Record:
             with self._engine.connect() as at:
                 yield at
         except (ValueError, TypeError, LookupError, OverflowError, DatabaseError) as error:
-            what = f"{type(error).__name__}: {error}".partition("\n")[0]
-            raise RecordError(f"{self.where}: the record is damaged; {RECOVER} ({what})") from None
+            reason = f"{type(error).__name__}: {error}".partition("\n")[0]
+            raise RecordError(f"{self.where}: the record is damaged; {RECOVER} ({reason})") from None
 
     def _put_lines(self, to: Connection) -> None:
         """Write the lines of the log. After a failure they are dropped."""

@@ -130,14 +130,14 @@ def samples_table(run: Run, poses: Iterable[Kept]) -> Table:
 def _attitude(stretches: Sequence[Kept]) -> dict[str, Array]:
     """Stage angles and temperature, one value for each stretch; columns with an unknown value are omitted."""
     lengths = [len(kept.samples.volts) for kept in stretches]
-    each: dict[str, list[float | None]] = {
+    values: dict[str, list[float | None]] = {
         "alpha_deg": [kept.pose.alpha_deg for kept in stretches],
         "beta_deg": [kept.pose.beta_deg for kept in stretches],
         "alpha_read_deg": [kept.alpha_read_deg for kept in stretches],
         "beta_read_deg": [kept.beta_read_deg for kept in stretches],
         "temperature_c": [kept.temperature_c for kept in stretches],
     }
-    return {name: np.repeat(np.array(v, dtype=float), lengths) for name, v in each.items() if None not in v}
+    return {name: np.repeat(np.array(v, dtype=float), lengths) for name, v in values.items() if None not in v}
 
 
 def _times_s(kept: Kept) -> Array:
@@ -208,5 +208,5 @@ def inflations(blocks: Sequence[Samples], axes: Sequence[str] = AXES) -> dict[st
     places = [k for k, name in enumerate(first.channels) if name in axes]
     alike = np.stack([b.volts[:, places] for b in blocks if b.volts.shape == first.volts.shape])
     names = [f"noise_inflation_{first.channels[k][1:]}" for k in places]
-    found = zip(names, *measured_inflation(alike), strict=True)
-    return {name: float(factor) for name, factor, std in found if std < SURE * factor}
+    factors = zip(names, *measured_inflation(alike), strict=True)
+    return {name: float(factor) for name, factor, std in factors if std < SURE * factor}

@@ -44,8 +44,8 @@ class Run:
     def sensors(self) -> dict[str, str]:
         """Each name and serial number of a sensor -> its name in the batch, "" without a batch, or for several."""
         if batch := self.bench.get("sensors"):
-            given = {member: {member, *_names(each, "name")} for member, each in batch.items()}
-            owners = {name: [m for m in given if name in given[m]] for name in set().union(*given.values())}
+            names_of = {member: {member, *_names(sensor, "name")} for member, sensor in batch.items()}
+            owners = {name: [m for m in names_of if name in names_of[m]] for name in set().union(*names_of.values())}
             return {name: members[0] if len(members) == 1 else "" for name, members in sorted(owners.items())}
         return dict.fromkeys(_names(self.constants, "sensor"), "")
 
@@ -119,4 +119,4 @@ class Event:
 
 
 def _names(sensor: Mapping[str, Any], key: str) -> list[str]:
-    return [as_written(sensor[each]) for each in (key, "serial") if sensor.get(each)]
+    return [as_written(sensor[name]) for name in (key, "serial") if sensor.get(name)]

@@ -18,14 +18,14 @@ REFERENCE = "xyz"
 def level_check(measured: Measured) -> dict[str, Result]:
     """Tilt of the table or of the base along x and y of the level, and the offset of the level, deg."""
     readings = {reading.name: reading for reading in measured.readings()}
-    what = "base" if measured.run.settings.get("on") == "base" else "level"
+    place = "base" if measured.run.settings.get("on") == "base" else "level"
     results = {}
     for axis in "xy":
-        front, back = readings[f"{what}-front-{axis}"], readings[f"{what}-back-{axis}"]
+        front, back = readings[f"{place}-front-{axis}"], readings[f"{place}-back-{axis}"]
         std = hypot(front.std, back.std) / 2 if front.std is not None and back.std is not None else None
         tilt_deg, offset_deg = reversal(front.value, back.value)
-        results[f"{what}-{axis}"] = Result(tilt_deg, "deg", std)
-        results[f"{what}-offset-{axis}"] = Result(offset_deg, "deg", std)
+        results[f"{place}-{axis}"] = Result(tilt_deg, "deg", std)
+        results[f"{place}-offset-{axis}"] = Result(offset_deg, "deg", std)
     return results
 
 

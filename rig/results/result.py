@@ -79,14 +79,14 @@ def evaluates(procedure: str, *names: str, of_bench: bool = False) -> Callable[[
 # Results that a procedure returns itself, and results as documents.
 
 
-def returned(name: str, given: Any) -> Result:
+def returned(name: str, document: Any) -> Result:
     """A result that a procedure returns itself: {"value": 2.0, "unit": "g", "std": 0.1}. Raises ProcedureError."""
     try:
-        std = given.get("std")
-        return Result(float(given["value"]), str(given["unit"]), None if std is None else float(std))
+        std = document.get("std")
+        return Result(float(document["value"]), str(document["unit"]), None if std is None else float(std))
     except (AttributeError, KeyError, TypeError, ValueError):
         wanted = 'a result is a mapping such as {"value": 2.0, "unit": "g", "std": 0.1}'
-        raise ProcedureError(f"the procedure returned {name} = {given!r}; {wanted}") from None
+        raise ProcedureError(f"the procedure returned {name} = {document!r}; {wanted}") from None
 
 
 def documents(results: Mapping[str, Result], limits: Mapping[str, Limit]) -> dict[str, dict[str, Any]]:

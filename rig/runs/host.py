@@ -129,12 +129,12 @@ class RunHost:
         key = f"answer {question.name}"
         if key in self._answers and not question.repeated:
             return self._answers[key]
-        given = question.checked(self._observer.ask(question, answer(question, self._rig)))
-        if given != "no":  # a resumed run asks again after a no
-            self._answers[key] = given
-            self._record.note(self._run, key, given)
-        self._log("asked", f"{question.name}: {given}")
-        return given
+        reply = question.checked(self._observer.ask(question, answer(question, self._rig)))
+        if reply != "no":  # a resumed run asks again after a no
+            self._answers[key] = reply
+            self._record.note(self._run, key, reply)
+        self._log("asked", f"{question.name}: {reply}")
+        return reply
 
     def doing(self, text: str) -> None:
         self._log("doing", text)

@@ -68,8 +68,8 @@ class Live:
             done.append(Measurement(following, run, discover(table, self.model, self.effects), used_s))
             telling = self._telling(done)
             following = None if stands(done) else self._following(telling, done)
-            found = replace(done[-1].found, next_experiment=telling)
-            done[-1] = replace(done[-1], found=found, following=following)
+            discovered = replace(done[-1].found, next_experiment=telling)
+            done[-1] = replace(done[-1], found=discovered, following=following)
             yield done[-1]
 
     def planned(self, experiment: Experiment) -> Experiment:
@@ -78,12 +78,12 @@ class Live:
 
     def _telling(self, done: Sequence[Measurement]) -> Experiment | None:
         """The experiment that separates the explanations, with or without time for it; None for one explanation."""
-        found = done[-1].found
-        if found.next_experiment is None:
+        discovered = done[-1].found
+        if discovered.next_experiment is None:
             return None
-        dispute = Dispute.of(found.end, found.next_experiment.separates, self.effects)
+        dispute = Dispute.of(discovered.end, discovered.next_experiment.separates, self.effects)
         menu = _new((*ADDITIONS, *MENU), done)
-        return chosen(dispute, found.next_experiment, self.bench, self.bench_file, menu, (TOGETHER,))
+        return chosen(dispute, discovered.next_experiment, self.bench, self.bench_file, menu, (TOGETHER,))
 
     def _following(self, telling: Experiment | None, done: Sequence[Measurement]) -> Experiment | None:
         """The next experiment: `telling` if its poses fit the other data, else poses in between; None without time.
@@ -109,9 +109,9 @@ def stands(done: Sequence[Measurement]) -> bool:
     return same and set(now.causes) <= known and len(now.causes) == len(before.causes)
 
 
-def _kind(found: Discovery[Fit]) -> list[str]:
+def _kind(discovered: Discovery[Fit]) -> list[str]:
     """The first words of the remaining pattern, without its place, which more data can change."""
-    return (found.residual_structure or "").split()[:2]
+    return (discovered.residual_structure or "").split()[:2]
 
 
 def _new(experiments: Sequence[Experiment], done: Sequence[Measurement]) -> list[Experiment]:

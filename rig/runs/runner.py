@@ -63,8 +63,8 @@ def start(
     with stoppable():
         observer.planned(planned)
         trail = Trace(record) if trace else None
-        asked = first_question(planned)
-        begun = _begun(record, bench, procedure, settings, observer, after, trail, asked)
+        first = first_question(planned)
+        begun = _begun(record, bench, procedure, settings, observer, after, trail, first)
         return _after_decision(record, begun, observer, trace)
 
 
@@ -76,7 +76,7 @@ def _begun(
     observer: Observer,
     after: str | None,
     trace: Trace | None,
-    asked: Confirm | None,
+    first: Confirm | None,
 ) -> Outcome:
     with stoppable(), connected(bench, trace) as rig:
         identities = {role: asdict(identity) for role, identity in rig.identities().items()}
@@ -98,7 +98,7 @@ def _begun(
         if after is not None:
             leave_as(rig, record, after)
         with _held(record, run):
-            return _carry_out(record, rig, record.run(run), procedure, observer, asked)
+            return _carry_out(record, rig, record.run(run), procedure, observer, first)
 
 
 def resume(record: Record, run_id: str, observer: Observer, bench: Bench | None = None, trace: bool = False) -> Outcome:
@@ -164,7 +164,7 @@ def _held(record: Record, run: str) -> AbstractContextManager[None]:
 
 
 def _carry_out(
-    record: Record, rig: Rig, run: Run, procedure: Procedure, observer: Observer, asked: Confirm | None
+    record: Record, rig: Rig, run: Run, procedure: Procedure, observer: Observer, first: Confirm | None
 ) -> Outcome:
     """The run itself. At its end the stages are at rest, and the record has its state, whatever happens."""
 
@@ -176,7 +176,7 @@ def _carry_out(
     record.set_state(run.run, "running")
     try:
         observer.begun(run.run)  # a person may end it from now on
-        own = _perform(record, rig, run, procedure, observer, asked)
+        own = _perform(record, rig, run, procedure, observer, first)
         results, why = (documents(own, rig.bench.result_limits), None) if own else judged(record, run)
     except BaseException as failure:
         error = _error_of(failure, run)
@@ -232,11 +232,11 @@ def _error_of(failure: BaseException, run: Run) -> Exception:
 
 
 def _perform(
-    record: Record, rig: Rig, run: Run, procedure: Procedure, observer: Observer, asked: Confirm | None
+    record: Record, rig: Rig, run: Run, procedure: Procedure, observer: Observer, first: Confirm | None
 ) -> Mapping[str, Result]:
     """Execute the procedure in the last recorded state of the bench. Returns the results of the procedure.
 
-    A person answers `asked` before the stages move, also to their home.
+    A person answers `first` before the stages move, also to their home.
     """
     state = record.state(run.run)
     host = RunHost(record, rig, run, observer, state)
@@ -250,8 +250,8 @@ def _perform(
     try:
         with rig.guarded(session):
             if state is None:
-                if asked is not None:
-                    session.request(asked)
+                if first is not None:
+                    session.request(first)
                 session.reference()
                 host.keep_state()
             results = procedure.function(session, **settings) or {}

@@ -46,8 +46,8 @@ def stoppable() -> Iterator[None]:
         if _indivisible(frame):
             later(number)
             return
-        for each in SIGNALS:
-            signal.signal(each, signal.SIG_IGN)
+        for signal_number in SIGNALS:
+            signal.signal(signal_number, signal.SIG_IGN)
         raised[:] = [number]
         raise KeyboardInterrupt(signal.Signals(number).name)
 
@@ -55,23 +55,27 @@ def stoppable() -> Iterator[None]:
         if put_off:
             stop(put_off.pop(), frame)
 
-    def lost(what: sys.UnraisableHookArgs) -> None:
-        if raised and isinstance(what.exc_value, KeyboardInterrupt):
+    def lost(unraisable: sys.UnraisableHookArgs) -> None:
+        if raised and isinstance(unraisable.exc_value, KeyboardInterrupt):
             later(raised.pop())
         else:
-            hook(what)
+            hook(unraisable)
 
     hook, sys.unraisablehook = sys.unraisablehook, lost
     ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # by nohup: a closed terminal must not stop the run
-    before = {each: signal.signal(each, stop) for each in SIGNALS if not (ignored and each == signal.SIGHUP)}
+    before = {
+        signal_number: signal.signal(signal_number, stop)
+        for signal_number in SIGNALS
+        if not (ignored and signal_number == signal.SIGHUP)
+    }
     before[signal.SIGALRM] = signal.signal(signal.SIGALRM, again)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         sys.unraisablehook = hook
-        for each, handler in before.items():
-            signal.signal(each, handler)
+        for signal_number, handler in before.items():
+            signal.signal(signal_number, handler)
 
 
 def _indivisible(frame: FrameType | None) -> bool:
@@ -97,8 +101,8 @@ class Trace:
         self._run = ""
         self._early: list[tuple[float, str, str, str]] = []
 
-    def __call__(self, clock_s: float, wire: str, way: Literal["sent", "heard"], data: bytes) -> None:
-        line = (clock_s, wire, way, shown(data))
+    def __call__(self, clock_s: float, wire: str, direction: Literal["sent", "heard"], data: bytes) -> None:
+        line = (clock_s, wire, direction, shown(data))
         if self._run:
             self._record.log(self._run, *line)
         else:

@@ -153,12 +153,12 @@ def course_chart(course: Course, name: str, time: RunTime = RunTime(), units: Ma
     `units` has those of the channels that are not in V.
     """
     run_s, mean, low, high = course.line(name)
-    t_s = [each - time.zero_s for each in run_s]
+    t_s = [at_s - time.zero_s for at_s in run_s]
     size, unit_s = in_time(t_s[-1] - t_s[0] if t_s else 0.0)
     at, colour = np.array(t_s) / size, CANDIDATE if name == "temperature" else MEASURED
     band = (Band(at, np.array(low), np.array(high), colour=colour, opacity=0.2),) if course.each > 1 else ()
     hover = f"%{{y:.6g}} at %{{x:.4g}} {unit_s}<br>%{{text}}"
-    clock = [time.clock(each) for each in run_s]
+    clock = [time.clock(at_s) for at_s in run_s]
     line = Line(at, np.array(mean), colour=colour, hover=hover, markers=len(at) < FEW, texts=clock)
     of = "°C" if name == "temperature" else units.get(name.removeprefix("rms "), "V")
     return one(Panel((*band, line), Axis(f"time{time.since} ({unit_s})"), Axis(f"{name} ({of})")))
@@ -169,12 +169,15 @@ def course_chart(course: Course, name: str, time: RunTime = RunTime(), units: Ma
 
 def life_of(q: Quantity) -> Life:
     """One quantity over all calibrations of a sensor, as charts show it."""
-    values, signals = [each.values[q.name] for each in q.of], q.chart.signals if q.chart is not None else []
+    values, signals = (
+        [calibration.values[q.name] for calibration in q.of],
+        q.chart.signals if q.chart is not None else [],
+    )
     due = None if q.due is None else (q.due - date(1970, 1, 1)).days
     return Life(
         q.name,
         q.unit,
-        [each.at.timestamp() / DAY_S for each in q.of],
+        [calibration.at.timestamp() / DAY_S for calibration in q.of],
         [value.value for value in values],
         [value.std for value in values],
         q.line,
@@ -182,17 +185,20 @@ def life_of(q: Quantity) -> Life:
         due,
         f"due {q.due}",
         signals,
-        [_told(q, each, k in signals) for k, each in enumerate(q.of)],
-        [each.data for each in q.of],
+        [_told(q, calibration, k in signals) for k, calibration in enumerate(q.of)],
+        [calibration.data for calibration in q.of],
     )
 
 
-def _told(q: Quantity, each: Calibration, signals: bool) -> str:
+def _told(q: Quantity, calibration: Calibration, signals: bool) -> str:
     """The text of a calibration under the pointer."""
-    value = each.values[q.name]
-    lines = [f"{each.day}: {estimate_text(value.value, value.std)} {unit(q.unit)}", f"{each.data}, rig {each.rig}"]
+    value = calibration.values[q.name]
+    lines = [
+        f"{calibration.day}: {estimate_text(value.value, value.std)} {unit(q.unit)}",
+        f"{calibration.data}, rig {calibration.rig}",
+    ]
     lines += ["beyond the limits of a control chart"] if signals else []
-    lines += [each.expired] if each.expired else []
+    lines += [calibration.expired] if calibration.expired else []
     return "<br>".join([*lines, "click: its model"])
 
 
@@ -236,21 +242,21 @@ def residuals(first: Shown, second: Shown, x: Column, other_x: Column) -> Chart:
     )
     dots = [
         Points(column.values[shown.c, shown.rows], shown.residual, colour=colour, symbol=symbol, size=8,
-               hover=[f"{name}: {each}" for each in shown.hover])
+               hover=[f"{name}: {text}" for text in shown.hover])
         for shown, column, colour, symbol, name in looks
     ]  # fmt: skip
     axis = Axis(x.labels[first.c], ticks="quarters" if x.name == "beta" else "")
     return one(Panel((*floor_band(max(first.floor, second.floor)), *dots), axis, Axis(first.label)))
 
 
-def difference(first: Shown, found: Again) -> Chart:
+def difference(first: Shown, again: Again) -> Chart:
     """The second measurement less the first, at every pose that both have; the band is its noise floor."""
-    c, values = first.c, first.factor * found.difference[first.c]
+    c, values = first.c, first.factor * again.difference[first.c]
     hover = [f"{minus(f'{value:.4g}')} {first.unit}<br>{first.place(int(row))}"
-             for value, row in zip(values, found.first, strict=True)]  # fmt: skip
-    dots = Points(first.fit.table.column("beta_deg")[found.first], values, hover=hover)
+             for value, row in zip(values, again.first, strict=True)]  # fmt: skip
+    dots = Points(first.fit.table.column("beta_deg")[again.first], values, hover=hover)
     y = Axis(f"second − first, {first.fit.channels[c]} ({first.unit})")
-    series = (*floor_band(first.factor * float(found.floor[c])), dots)
+    series = (*floor_band(first.factor * float(again.floor[c])), dots)
     return one(Panel(series, Axis("β (deg)", ticks="quarters"), y))
 
 
@@ -263,7 +269,7 @@ def deviations(curves: Sequence[DeviationComparison], into: Sequence[Scaled]) ->
     )
     for curve, by, (name, colour, symbol, dash) in zip(curves, into, looks, strict=True):
         model = Line(curve.tau_s, by.factor * curve.modelled, colour=colour, width=1.2, dash=dash)
-        values, low, high = (by.factor * each for each in (curve.measured, curve.low, curve.high))
+        values, low, high = (by.factor * curve_values for curve_values in (curve.measured, curve.low, curve.high))
         dots = measured_points(curve.tau_s, values, low, high, by.unit, name)
         series += [model, replace(dots, colour=colour, symbol=symbol, size=8)]
     y = Axis(f"Allan deviation ({into[0].unit})", log=True)

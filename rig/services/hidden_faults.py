@@ -133,8 +133,8 @@ class Faults:
         if small := [f.name for g in self.groups if g not in self.material for f in g.faults]:
             lines.append(f"Too small to be seen, below {MATERIAL:g} noise floors: {', '.join(small)}.")
         if self.extra:
-            found = ", ".join(f"{e.name} ({self._quantity(e.size)})" for e in self.extra)
-            lines.append(f"Found, and not the curve of a hidden fault: {found}.")
+            extra = ", ".join(f"{e.name} ({self._quantity(e.size)})" for e in self.extra)
+            lines.append(f"Found, and not the curve of a hidden fault: {extra}.")
         return "\n".join(lines)
 
     def document(self) -> list[dict[str, Any]]:
@@ -160,29 +160,29 @@ class Faults:
         """A row for each fault, and one for several together."""
         heads = [(f.name, self._quantity(f.size), f"{100 * f.size**2 / total:.2g} %") for f in group.faults]
         names = ", ".join(e.name for e in group.effects) or "not found"
-        found = (names, self._quantity(group.found), self._quantity(group.std))
+        cells = (names, self._quantity(group.found), self._quantity(group.std))
         if len(heads) == 1:
-            return [(*heads[0], *found)]
-        return [*((*head, "", "", "") for head in heads), ("  together", self._quantity(group.hidden), "", *found)]
+            return [(*heads[0], *cells)]
+        return [*((*head, "", "", "") for head in heads), ("  together", self._quantity(group.hidden), "", *cells)]
 
     def _quantity(self, value: float | None) -> str:
         return quantity(value, self.unit) if value is not None else "-"
 
 
-def hidden_faults(bench: Bench, found: Fit, start: Fit) -> Faults:
-    """The faults of a simulated bench beside the effects that `found` has and `start` has not.
+def hidden_faults(bench: Bench, fitted: Fit, start: Fit) -> Faults:
+    """The faults of a simulated bench beside the effects that `fitted` has and `start` has not.
 
     The poses are those of the fit's table, visited once more in a world without noise. Raises what the world raises.
     """
     config = WorldConfig.from_mapping(bench.world)
-    poses = _visited(config, bench.seed, found.table)
-    faults = [_fault(name, settings, config, bench.seed, found.table, poses) for name, settings in MECHANISMS.items()]
+    poses = _visited(config, bench.seed, fitted.table)
+    faults = [_fault(name, settings, config, bench.seed, fitted.table, poses) for name, settings in MECHANISMS.items()]
     known = {term.name for term in start.model.terms}
-    effects = [_effect(term.name, found, poses) for term in found.model.terms if term.name not in known]
-    floor = float(rms(found.noise.floor))
+    effects = [_effect(term.name, fitted, poses) for term in fitted.model.terms if term.name not in known]
+    floor = float(rms(fitted.noise.floor))
     hidden = [f for f in faults if f is not None and f.size > 0]
     groups, extra = grouped(hidden, effects, floor)
-    sized = tuple(replace(g, std=_uncertainty([e.name for e in g.effects], found, poses)) for g in groups)
+    sized = tuple(replace(g, std=_uncertainty([e.name for e in g.effects], fitted, poses)) for g in groups)
     return Faults(sized, extra, floor, poses.unit)
 
 
@@ -202,8 +202,8 @@ def grouped(
         groups.append(Group(members, tuple(e for e in of_catalogue if e.name in joined)))
     judged = [part for group in groups for part in _judged(group, effects)]
     used = {e.name for group in judged for e in group.effects}
-    found = tuple(sorted(judged, key=lambda g: -max(f.size for f in g.faults)))
-    return found, tuple(e for e in effects if e.name not in used)
+    ordered = tuple(sorted(judged, key=lambda g: -max(f.size for f in g.faults)))
+    return ordered, tuple(e for e in effects if e.name not in used)
 
 
 def _makers(fault: Curve, effects: Sequence[Curve], floor: float) -> list[Curve]:
@@ -235,9 +235,9 @@ def _judged(group: Group, effects: Sequence[Curve]) -> list[Group]:
     places = {place_of_effect(e.name) for e in group.effects}
     of_place = [e for e in effects if e.span is None and place_of_effect(e.name) in places]
     whole = replace(group, effects=(*group.effects, *of_place))
-    for each in (whole, group):
-        if each.effects and _alike(_together(each.faults), _together(each.effects)):
-            return [each]
+    for candidate in (whole, group):
+        if candidate.effects and _alike(_together(candidate.faults), _together(candidate.effects)):
+            return [candidate]
     return [Group((fault,)) for fault in group.faults]
 
 
@@ -246,8 +246,8 @@ def _together(curves: Sequence[Curve]) -> Curve:
 
 
 def _alike(fault: Curve, effect: Curve) -> bool:
-    near = effect.size < OF_A_SIZE * fault.size and fault.size < OF_A_SIZE * effect.size
-    return near and _correlation(fault, effect) >= ALIKE
+    same_size = effect.size < OF_A_SIZE * fault.size and fault.size < OF_A_SIZE * effect.size
+    return same_size and _correlation(fault, effect) >= ALIKE
 
 
 def _correlation(a: Curve, b: Curve) -> float:
@@ -257,7 +257,7 @@ def _correlation(a: Curve, b: Curve) -> float:
 
 def _visited(config: WorldConfig, seed: int, table: Table) -> Table:
     """The poses of a table, visited without noise."""
-    seen = World(config, seed).dwell_mean(
+    visited = World(config, seed).dwell_mean(
         table.column("alpha_deg"),
         table.column("beta_deg"),
         direction=table.optional("direction", 1.0),
@@ -266,7 +266,7 @@ def _visited(config: WorldConfig, seed: int, table: Table) -> Table:
         noise_free=True,
         interval_s=QUIET_S,
     )
-    held = {name: np.asarray(values, float) for name, values in seen.items() if name in table}
+    held = {name: np.asarray(values, float) for name, values in visited.items() if name in table}
     return Table.from_columns(table.kind, held, table.constants, table.source)
 
 
@@ -295,22 +295,22 @@ def _nested(path: str, value: float) -> dict[str, Any]:
     return {head: _nested(rest, value) if rest else value}
 
 
-def _effect(name: str, found: Fit, poses: Table) -> Curve:
+def _effect(name: str, fitted: Fit, poses: Table) -> Curve:
     """An effect's curve in the fitted model; with its span, if it is no free form."""
-    curve = _contribution([name], found, poses)
+    curve = _contribution([name], fitted, poses)
     if name.startswith(PREFIX):
-        return Curve(name, curve(found.theta))
+        return Curve(name, curve(fitted.theta))
     span = []
-    for k in np.flatnonzero(found.problem.layout.of_effect(name)):
-        ahead = found.theta.copy()
-        ahead[k] += STEP * found.problem.layout.typical[k]
-        span.append(curve(ahead) - curve(found.theta))
-    return Curve(name, curve(found.theta), np.stack(span, axis=2))
+    for k in np.flatnonzero(fitted.problem.layout.of_effect(name)):
+        ahead = fitted.theta.copy()
+        ahead[k] += STEP * fitted.problem.layout.typical[k]
+        span.append(curve(ahead) - curve(fitted.theta))
+    return Curve(name, curve(fitted.theta), np.stack(span, axis=2))
 
 
-def _contribution(names: Sequence[str], found: Fit, poses: Table) -> Callable[[Array], Array]:
+def _contribution(names: Sequence[str], fitted: Fit, poses: Table) -> Callable[[Array], Array]:
     """What effects add to the outputs, (n, channels), as a function of the values of all parameters."""
-    layout = found.problem.layout
+    layout = fitted.problem.layout
 
     def curve(theta: Array) -> Array:
         steps = layout.steps(theta)
@@ -319,20 +319,20 @@ def _contribution(names: Sequence[str], found: Fit, poses: Table) -> Callable[[A
     return curve
 
 
-def _uncertainty(names: Sequence[str], found: Fit, poses: Table) -> float | None:
+def _uncertainty(names: Sequence[str], fitted: Fit, poses: Table) -> float | None:
     """Standard uncertainty of the size of effects together, from the fit's covariance."""
     if not names:
         return None
-    curve = _contribution(names, found, poses)
-    cov, _ = covariance(found.information, found.problem.layout.typical)
+    curve = _contribution(names, fitted, poses)
+    cov, _ = covariance(fitted.information, fitted.problem.layout.typical)
     std = np.sqrt(np.maximum(np.diag(cov), 0.0))
-    size = rms(curve(found.theta).ravel())
-    slope = np.zeros(len(found.theta))
-    own = np.any([found.problem.layout.of_effect(name) for name in names], axis=0)
+    size = rms(curve(fitted.theta).ravel())
+    slope = np.zeros(len(fitted.theta))
+    own = np.any([fitted.problem.layout.of_effect(name) for name in names], axis=0)
     for k in np.flatnonzero(own & np.isfinite(std) & (std > 0)):
-        step = np.zeros_like(found.theta)
+        step = np.zeros_like(fitted.theta)
         step[k] = STEP_STD * std[k]
-        slope[k] = (rms(curve(found.theta + step).ravel()) - size) / step[k]
+        slope[k] = (rms(curve(fitted.theta + step).ravel()) - size) / step[k]
     used = np.flatnonzero(slope)
     variance = float(slope[used] @ cov[np.ix_(used, used)] @ slope[used])
     return float(np.sqrt(max(variance, 0.0)))

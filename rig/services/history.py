@@ -35,25 +35,25 @@ from rig.record.measured import Measured, sensors_of
 def members(run: Run) -> dict[str, str]:
     """Serial number (or name) -> the sensor's name in the run's batch, "" where there is one sensor."""
     if batch := sensors_of(run):
-        said: dict[str, Mapping[str, str]] = {member: run.bench["sensors"][member] for member in batch}
-        return {each.get("serial") or each["name"]: member for member, each in said.items()}
+        sensors_by_member: dict[str, Mapping[str, str]] = {member: run.bench["sensors"][member] for member in batch}
+        return {sensor.get("serial") or sensor["name"]: member for member, sensor in sensors_by_member.items()}
     name = run.constants.get("serial") or run.constants.get("sensor")
     return {as_written(name): ""} if name else {}
 
 
 def sensors(runs: Iterable[Run]) -> list[str]:
     """Every sensor of the runs."""
-    return list(dict.fromkeys(each for run in runs for each in members(run)))
+    return list(dict.fromkeys(sensor for run in runs for sensor in members(run)))
 
 
 def calibrating(runs: Iterable[Run]) -> dict[str, list[Run]]:
     """The complete runs of each sensor that models may be fitted to."""
-    found: dict[str, list[Run]] = {}
+    by_sensor: dict[str, list[Run]] = {}
     for run in runs:
         if run.state == "complete" and run.kind in MEANS:
             for sensor in members(run):
-                found.setdefault(sensor, []).append(run)
-    return found
+                by_sensor.setdefault(sensor, []).append(run)
+    return by_sensor
 
 
 def lives(run: Run, runs: Iterable[Run]) -> dict[str, int]:
@@ -138,10 +138,10 @@ class History:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Why values of these calibrations are not comparable."""
-        open_ = [each for each in self.calibrations if not each.complete]
+        open_ = [calibration for calibration in self.calibrations if not calibration.complete]
         if not open_:
             return ()
-        worst = max(each.excess for each in open_)
+        worst = max(calibration.excess for calibration in open_)
         text = (
             f"The model {self.model} is not complete for {len(open_)} of {len(self.calibrations)} calibrations: the "
             f"remaining error is up to {rounded(worst, 2)} times the noise floor. The values depend on the measured "
@@ -167,29 +167,31 @@ def history(
 
     Raises RecordError where the record has no calibration of it, naming the nearest sensor.
     """
-    found: list[Calibration] = []
+    calibrations: list[Calibration] = []
     passed_over: dict[str, str] = {}
     runs = _runs(record, sensor)
     for k, (data, run) in enumerate(runs, 1):
         tell(f"Calibrating {data}, {k} of {len(runs)}")
         try:
-            found.append(_calibration(record, data, run, model))
+            calibrations.append(_calibration(record, data, run, model))
         except (CalibrationError, RecordError) as error:
             passed_over[data] = str(error)
-    if not found:
+    if not calibrations:
         raise _none(record, sensor, passed_over)
-    found, others = _of_one_kind(found)
+    calibrations, others = _of_one_kind(calibrations)
     passed_over |= others
-    return judged(History(sensor, model.name, tuple(found), (), passed_over), limits, baseline)
+    return judged(History(sensor, model.name, tuple(calibrations), (), passed_over), limits, baseline)
 
 
-def _of_one_kind(found: list[Calibration]) -> tuple[list[Calibration], dict[str, str]]:
+def _of_one_kind(calibrations: list[Calibration]) -> tuple[list[Calibration], dict[str, str]]:
     """The calibrations by the most frequent procedure, of equal ones the last; the others with the reason."""
-    kinds = [each.kind for each in found]
+    kinds = [calibration.kind for calibration in calibrations]
     kind = max(reversed(kinds), key=kinds.count)
     why = "a calibration by {}, and those of {} are shown: another choice of poses is not comparable"
-    others = {each.data: why.format(each.kind, kind) for each in found if each.kind != kind}
-    return [each for each in found if each.kind == kind], others
+    others = {
+        calibration.data: why.format(calibration.kind, kind) for calibration in calibrations if calibration.kind != kind
+    }
+    return [calibration for calibration in calibrations if calibration.kind == kind], others
 
 
 def latest(record: Record, sensor: str, model: Model) -> Calibration:
@@ -214,17 +216,17 @@ def judged(life: History, limits: Mapping[str, Limit], baseline: int = BASELINE_
 def closest(of: Sequence[Calibration], on: date) -> tuple[Calibration, float]:
     """The calibration closest to a day, and by how many days it is older than that day; below 0: later."""
     noon = datetime(on.year, on.month, on.day, 12, tzinfo=of[0].at.tzinfo)
-    days = [(noon - each.at) / timedelta(days=1) for each in of]
+    days = [(noon - calibration.at) / timedelta(days=1) for calibration in of]
     best = int(np.argmin(np.abs(days)))
     return of[best], days[best]
 
 
-def stale(found: History, calibration: Calibration, age_days: float) -> str | None:
+def stale(life: History, calibration: Calibration, age_days: float) -> str | None:
     """Why a calibration does not hold for a day so much later (or earlier), or None."""
     day = calibration.at + timedelta(days=age_days)
-    last = calibration is found.calibrations[-1]
-    if last and found.due is not None and day.date() > found.due:
-        return f"it was due on {found.due}"
+    last = calibration is life.calibrations[-1]
+    if last and life.due is not None and day.date() > life.due:
+        return f"it was due on {life.due}"
     if abs(age_days) > STALE_DAYS:
         return f"it is {abs(age_days):.0f} days {'older' if age_days > 0 else 'younger'} than that day"
     return None
@@ -249,27 +251,27 @@ def _calibration(record: Record, data: str, run: Run, model: Model) -> Calibrati
     check_kind(run.kind, data)  # a night at rest is gigabytes of samples
     at = date_of(run)
     table = Measured.named(record, data).table()
-    found = fit(model, table)
+    fitted = fit(model, table)
     values = {
         result_name(term.effect, e.name, e.axis): Value(e.value, e.std, e.unit)
-        for term in found.model.terms
+        for term in fitted.model.terms
         for e in term.estimates
         if e.identified and e.std
     }
-    if len(values) < len(found.theta):
+    if len(values) < len(fitted.theta):
         raise DataError(f"{table.source}: does not determine every parameter of {model.name}")
     expired = str(run.constants[EXPIRED]) if EXPIRED in run.constants else None
     rig = str(run.bench.get("name", "")) or "elsewhere"
-    return Calibration(data, at, rig, values, expired, run.procedure, found.pooled_excess)
+    return Calibration(data, at, rig, values, expired, run.procedure, fitted.pooled_excess)
 
 
 def date_of(run: Run) -> datetime:
     """When the sensor was as the run found it. Raises DataError for a constant `date` that is none."""
-    said = run.constants.get("date")
+    stated = run.constants.get("date")
     try:
-        at = datetime.fromisoformat(str(said)) if said is not None else datetime.fromisoformat(run.created)
+        at = datetime.fromisoformat(str(stated)) if stated is not None else datetime.fromisoformat(run.created)
     except ValueError:
-        raise DataError(f"run {run.run}: its constant date is {said!r}; write it as 2025-03-01") from None
+        raise DataError(f"run {run.run}: its constant date is {stated!r}; write it as 2025-03-01") from None
     return at if at.tzinfo else at.replace(hour=at.hour or 12, tzinfo=datetime.fromisoformat(run.created).tzinfo)
 
 
@@ -282,10 +284,10 @@ def when(run: Run) -> datetime:
 
 
 def _quantity(name: str, of: Sequence[Calibration], limit: Limit | None, baseline: int) -> Quantity:
-    mine = tuple(each for each in of if name in each.values)
-    values = [each.values[name] for each in mine]
-    numbers, stds = [each.value for each in values], [each.std for each in values]
-    days = [each.at.timestamp() / 86400 for each in mine]
+    mine = tuple(calibration for calibration in of if name in calibration.values)
+    values = [calibration.values[name] for calibration in mine]
+    numbers, stds = [calibration.value for calibration in values], [calibration.std for calibration in values]
+    days = [calibration.at.timestamp() / 86400 for calibration in mine]
     chart = control_chart(numbers, baseline, float(rms(np.array(stds)))) if len(mine) >= FEWEST_RUNS else None
     no_drift = _no_drift(mine, float(np.ptp(days)))
     line = None if no_drift else fit_stability(days, numbers, stds)
@@ -303,7 +305,7 @@ def _no_drift(of: Sequence[Calibration], days: float) -> str:
         return f"A drift needs {FEWEST_FOR_DRIFT} calibrations at different times."
     if days < SHORTEST_FOR_DRIFT_DAYS:
         return f"A drift needs calibrations over {SHORTEST_FOR_DRIFT_DAYS:.0f} days; these are of {days:.2g} days."
-    if not all(each.complete for each in of):
+    if not all(calibration.complete for calibration in of):
         return "A drift needs a complete model."
     return ""
 
@@ -317,12 +319,12 @@ def limits_of(bench_file: Path | None) -> dict[str, Limit]:
         return {}
     from rig.bench import read_bench
 
-    return {name: each for name, each in read_bench(bench_file).result_limits.items() if isinstance(each, tuple)}
+    return {name: limit for name, limit in read_bench(bench_file).result_limits.items() if isinstance(limit, tuple)}
 
 
-def changes(given: Iterable[str]) -> dict[str, float]:
+def changes(texts: Iterable[str]) -> dict[str, float]:
     """`bias-x=0.005`: the greatest change since the last calibration, by result's name. Raises RigError."""
-    return dict(_change(text) for text in given)
+    return dict(_change(text) for text in texts)
 
 
 def _change(text: str) -> tuple[str, float]:
@@ -352,7 +354,7 @@ class Compared:
     @property
     def agree(self) -> bool:
         """Whether all of them do."""
-        return all(each.agrees for _, each in self.rows.values())
+        return all(agreement.agrees for _, agreement in self.rows.values())
 
 
 def compare_sensors(life: History, other: str, last: Calibration) -> Compared:
@@ -378,10 +380,15 @@ def compare(a: Calibration, b: Calibration) -> dict[str, tuple[str, Agreement]]:
 
 
 def _means_on(rig: str, of: Sequence[Calibration]) -> dict[str, Value]:
-    mine = [each for each in of if each.rig == rig]
+    mine = [calibration for calibration in of if calibration.rig == rig]
     if not mine:
-        raise RecordError(f"no calibration on the rig {rig!r}.{did_you_mean(rig, {each.rig for each in of})}")
-    return {name: _mean([each.values[name] for each in mine if name in each.values]) for name in mine[-1].values}
+        raise RecordError(
+            f"no calibration on the rig {rig!r}.{did_you_mean(rig, {calibration.rig for calibration in of})}"
+        )
+    return {
+        name: _mean([calibration.values[name] for calibration in mine if name in calibration.values])
+        for name in mine[-1].values
+    }
 
 
 def _compared(a: Mapping[str, Value], b: Mapping[str, Value], one: str, other: str) -> dict[str, tuple[str, Agreement]]:
@@ -393,7 +400,7 @@ def _compared(a: Mapping[str, Value], b: Mapping[str, Value], one: str, other: s
 
 def _mean(values: Sequence[Value]) -> Value:
     """The mean; uncertain by the calibrations' own uncertainty, which they may share, and by what they scatter."""
-    x = np.array([each.value for each in values])
-    own = float(rms(np.array([each.std for each in values])))
+    x = np.array([value.value for value in values])
+    own = float(rms(np.array([value.std for value in values])))
     scatter = float(x.std(ddof=1) / np.sqrt(len(x))) if len(x) > 1 else 0.0
     return Value(float(x.mean()), max(own, scatter), values[0].unit)

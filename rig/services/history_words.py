@@ -58,10 +58,15 @@ def chart_verdict(q: Quantity) -> str:
 def agreements(of: Compared, written: Written) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Head and rows of a table of the shared quantities; `written` formats a number to a number of digits."""
     head = ("quantity", of.one, of.other, "difference", "U", "unit", "E_n", "")
-    return head, [_agreement(name, unit, each, written) for name, (unit, each) in of.rows.items()]
+    return head, [_agreement(name, unit, agreement, written) for name, (unit, agreement) in of.rows.items()]
 
 
-def _agreement(name: str, unit: str, each: Agreement, written: Written) -> tuple[str, ...]:
-    verdict = "agree" if each.agrees else "do not agree"
-    values = (written(each.a, 7), written(each.b, 7), written(each.difference, 2), written(each.expanded, 2))
-    return name, *values, unit, f"{each.e_n:.2f}", verdict
+def _agreement(name: str, unit: str, agreement: Agreement, written: Written) -> tuple[str, ...]:
+    verdict = "agree" if agreement.agrees else "do not agree"
+    values = (
+        written(agreement.a, 7),
+        written(agreement.b, 7),
+        written(agreement.difference, 2),
+        written(agreement.expanded, 2),
+    )
+    return name, *values, unit, f"{agreement.e_n:.2f}", verdict

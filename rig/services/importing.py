@@ -69,9 +69,9 @@ def proposal(sheet: Sheet, kind: str | None = None) -> Proposal:
     kind = kind or _kind(sheet, own)
     allowed = column_names(kind)
     proposed = propose_mapping(sheet, "poses" if kind == "still" else kind, own)
-    found = {m.theirs: m for m in proposed if m.name in allowed or m in own}
-    stated = [replace(m, unit=_stated(sheet, m.theirs)) if m.name == "t_s" else m for m in found.values()]
-    return Proposal(kind, {name: found.get(name) for name in sheet.header}, time_doubt(sheet, stated))
+    mappings = {m.theirs: m for m in proposed if m.name in allowed or m in own}
+    stated = [replace(m, unit=_stated(sheet, m.theirs)) if m.name == "t_s" else m for m in mappings.values()]
+    return Proposal(kind, {name: mappings.get(name) for name in sheet.header}, time_doubt(sheet, stated))
 
 
 def units_for(name: str) -> list[str]:
@@ -114,12 +114,12 @@ def stored(
 def data_chart(table: Table) -> Chart:
     """The outputs of a table over the stage angle beta, the time, or the row."""
     every = max(1, -(-table.n // MOST_DRAWN))
-    name = next((each for each in ("beta_deg", "t_s") if each in table), "")
+    name = next((column for column in ("beta_deg", "t_s") if column in table), "")
     x = table.column(name) if name else np.arange(table.n, dtype=float)
-    outputs = [each for each in table.output_names if each in table]
+    outputs = [column for column in table.output_names if column in table]
     dots = [
-        Points(x[::every], table.column(each)[::every], each, colour, size=4)
-        for each, colour in zip(outputs, COLOURS, strict=False)
+        Points(x[::every], table.column(column)[::every], column, colour, size=4)
+        for column, colour in zip(outputs, COLOURS, strict=False)
     ]
     label = f"{name.rpartition('_')[0]} ({column_unit(name)})" if name else "row"
     unit = column_unit(outputs[0]) or table.unit

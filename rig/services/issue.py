@@ -53,11 +53,11 @@ class Asked:
     before: str = ""
 
 
-def issue(data: str, found: Fit, figures: Figures, bench: Bench | None, asked: Asked) -> Certificate:
+def issue(data: str, fitted: Fit, figures: Figures, bench: Bench | None, details: Asked) -> Certificate:
     """The certificate of a fit to `data`, with the bench's laboratory (that of the run where None is given)."""
     measured = None if Path(data).is_file() else _measured(data)
     try:
-        return _issued(data, found, figures, bench, asked, measured)
+        return _issued(data, fitted, figures, bench, details, measured)
     finally:
         if measured is not None:
             measured.record.close()
@@ -75,18 +75,18 @@ def limits(data: str, bench: Bench | None) -> Mapping[str, float | tuple[float, 
 
 
 def _issued(
-    data: str, found: Fit, figures: Figures, given: Bench | None, asked: Asked, measured: Measured | None
+    data: str, fitted: Fit, figures: Figures, stated_bench: Bench | None, details: Asked, measured: Measured | None
 ) -> Certificate:
-    table, run = found.table, measured.run if measured is not None else None
-    bench = given or (_bench(run) if run is not None and run.bench else None)
+    table, run = fitted.table, measured.run if measured is not None else None
+    bench = stated_bench or (_bench(run) if run is not None and run.bench else None)
     lab = bench.laboratory if bench is not None else None
-    text = dump_model(found.model)
+    text = dump_model(fitted.model)
     constant = {name: as_written(value) for name, value in table.constants.items()}
     ended = (run.ended or run.created) if run is not None else datetime.now(UTC).isoformat(timespec="seconds")
     digest = hashlib.sha256(f"{table.digest}{hashlib.sha256(text.encode()).hexdigest()}".encode()).hexdigest()
-    customer = asked.customer or (lab.customer if lab is not None else "")
+    customer = details.customer or (lab.customer if lab is not None else "")
     return Certificate(
-        number=asked.number or f"{data.replace('/', '-') if run is not None else Path(data).stem}-{digest[:8]}",
+        number=details.number or f"{data.replace('/', '-') if run is not None else Path(data).stem}-{digest[:8]}",
         issued=today(),
         program=program(),
         laboratory=Laboratory(**lab.model_dump(exclude={"customer"})) if lab is not None else Laboratory(),
@@ -102,7 +102,7 @@ def _issued(
         ended=ended,
         gravity_m_s2=table.gravity_m_s2,
         conditions=tuple(_conditions(table)),
-        before=asked.before,
+        before=details.before,
         figures=figures,
         samples=tuple(_samples(table, measured)),
         data=data if run is not None else Path(data).name,
@@ -135,15 +135,15 @@ def _instruments(run: Run, on: str) -> Iterator[Instrument]:
     bench = _bench(run)
     papers = certificates(bench)
     for role, part in bench.instruments.items():
-        said = run.identities.get(role, {})
+        identity = run.identities.get(role, {})
         paper = papers.pop(role, None)
         number, due = (paper.number, str(paper.due)) if paper is not None else ("", "")
         expired = paper is not None and paper.due < date.fromisoformat(on)
         yield Instrument(
             role,
-            said.get("model") or part.driver,
-            said.get("serial", ""),
-            said.get("firmware", ""),
+            identity.get("model") or part.driver,
+            identity.get("serial", ""),
+            identity.get("firmware", ""),
             number,
             due,
             expired,
@@ -163,7 +163,7 @@ def _facts(run: Run | None, table: Table) -> dict[str, str]:
 
 def _shown(value: object) -> str:
     if isinstance(value, list | tuple):
-        return ", ".join(str(each) for each in value)
+        return ", ".join(str(part) for part in value)
     return "" if value is None or isinstance(value, Mapping) else str(value)
 
 

@@ -141,10 +141,12 @@ def still_of(
     with nullcontext() if Path(data).exists() or data.endswith(".npy") else Record.to_find(data) as record:
         streams = axes(record, data, request.channel, request.rate_hz)
         first = next(iter(streams.values()))
-        samples = (_samples(axis, each, keep) for axis, each in streams.items())
+        samples = (_samples(axis, axis_stream, keep) for axis, axis_stream in streams.items())
         still = reduce_record(samples, first.source, first.constants, every_deviation)
-    sensed = {axis: found for axis, each in streams.items() if (found := each.sensed) is not None}  # known when read
-    taken = {each.channel for each in streams.values()}
+    sensed = {
+        axis: scale for axis, axis_stream in streams.items() if (scale := axis_stream.sensed) is not None
+    }  # known when read
+    taken = {axis_stream.channel for axis_stream in streams.values()}
     if others := [name for name in first.others if name not in taken]:
         tell(f"{still.source}: {', '.join(taken)}; --channel takes another: {', '.join(others)}.")
     for text in repairs(first, still.n):
@@ -218,10 +220,10 @@ def _has_channels_alone(path: Path) -> bool:
 def channels_alone(beginning: str) -> bool:
     """Whether the text of a table has times or a rate, outputs of a sensor, and no column on how it was held."""
     stated, names = _beginning(beginning.splitlines())
-    given = set(names)
-    timed = "t_s" in given or "sample_rate_hz" in stated
-    channels = given - set(BESIDE)
-    return timed and bool(channels) and channels <= CHANNELS and not any(each <= given for each in TRIADS)
+    named = set(names)
+    timed = "t_s" in named or "sample_rate_hz" in stated
+    channels = named - set(BESIDE)
+    return timed and bool(channels) and channels <= CHANNELS and not any(triad <= named for triad in TRIADS)
 
 
 def _beginning(lines: list[str]) -> tuple[set[str], list[str]]:

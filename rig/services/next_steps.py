@@ -138,9 +138,9 @@ class ResultRow:
 def result_rows(results: Mapping[str, Any]) -> list[ResultRow]:
     """The rows on a page. The steady state of a soak is one sentence, with its time or its forecast."""
     rows: list[ResultRow] = []
-    told: set[str] = set()
+    shown: set[str] = set()
     for name, r in results.items():
-        if name in told:
+        if name in shown:
             continue
         limit, verdict = "" if r["limit"] is None else bound(r["value"], r["limit"]), r["verdict"] or ""
         if (steady := STEADY.fullmatch(name)) is not None:
@@ -150,7 +150,7 @@ def result_rows(results: Mapping[str, Any]) -> list[ResultRow]:
                 for end in ("time", *FORECAST)
                 if (part := f"{sensor}steady-state-{end}{axis}") in results
             }
-            told |= {f"{sensor}steady-state-{end}{axis}" for end, of in parts.items() if of["limit"] is None}
+            shown |= {f"{sensor}steady-state-{end}{axis}" for end, of in parts.items() if of["limit"] is None}
             value = _steady_sentence(bool(r["value"]), parts)
             rows.append(ResultRow(name, value, "must be reached" if limit else "", verdict))
         elif name.rpartition("/")[2] == "gap" and not r["value"]:
@@ -164,17 +164,17 @@ def result_rows(results: Mapping[str, Any]) -> list[ResultRow]:
 
 def _steady_sentence(reached: bool, parts: Mapping[str, Any]) -> str:
     """Whether and when the sensor is steady. `parts`: the results of the time and of its forecast that there are."""
-    said = {end: concise(r["value"], r["std"], r["unit"]) for end, r in parts.items()}
+    times = {end: concise(r["value"], r["std"], r["unit"]) for end, r in parts.items()}
     if reached:
-        if "time" not in said:
+        if "time" not in times:
             return "Reached."
         time = parts["time"]
         return f"Reached {time_text(time['value'], time['std'])} {time['unit']} after power-on."
-    if "expected" in said:
-        between = f"{said['earliest']} to {said['latest']} (95 %)"
-        return f"Not reached. Forecast: {said['expected']} after power-on, {between}."
-    if "earliest" in said:
-        return f"Not reached. Forecast: not before {said['earliest']} after power-on."
+    if "expected" in times:
+        between = f"{times['earliest']} to {times['latest']} (95 %)"
+        return f"Not reached. Forecast: {times['expected']} after power-on, {between}."
+    if "earliest" in times:
+        return f"Not reached. Forecast: not before {times['earliest']} after power-on."
     return "Not reached. There is no forecast."
 
 

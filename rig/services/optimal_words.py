@@ -11,36 +11,36 @@ from rig.planning.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, r
 PLANS = ("", "standard sweep", "chosen, same dwell", "chosen, same error")
 
 
-def plan_rows(found: Optimal) -> list[tuple[str, ...]]:
+def plan_rows(optimum: Optimal) -> list[tuple[str, ...]]:
     """A row for each property of the standard sweep, the chosen poses, and those with its worst error."""
-    plans = (found.standard, found.short, found.equal)
+    plans = (optimum.standard, optimum.short, optimum.equal)
     return [
         ("poses", *(str(candidate.plan.poses) for candidate in plans)),
         ("dwell", *(f"{candidate.dwell_s:g} s" for candidate in plans)),
         ("rig time", *(duration(candidate.plan.duration_s) for candidate in plans)),
-        ("worst standard error", *(_percent(relative(found.standard, candidate)) for candidate in plans)),
-        ("candidate error, at most", *(_percent(most_relative(found.standard, candidate)) for candidate in plans)),
+        ("worst standard error", *(_percent(relative(optimum.standard, candidate)) for candidate in plans)),
+        ("candidate error, at most", *(_percent(most_relative(optimum.standard, candidate)) for candidate in plans)),
     ]
 
 
-def savings(found: Optimal) -> Iterator[str]:
+def savings(optimum: Optimal) -> Iterator[str]:
     """How much less time the rig needs."""
-    yield f"{found.times_less:.1f} times less rig time for the same worst standard error ({_worst(found)})."
-    yield f"{_times(found.times_less_for_all)} if no parameter may be less certain: {_longest(found)}."
-    if lost := [found.over.name(k) for k, known in enumerate(found.standard.told) if not known]:
+    yield f"{optimum.times_less:.1f} times less rig time for the same worst standard error ({_worst(optimum)})."
+    yield f"{_times(optimum.times_less_for_all)} if no parameter may be less certain: {_longest(optimum)}."
+    if lost := [optimum.over.name(k) for k, known in enumerate(optimum.standard.told) if not known]:
         yield f"The standard sweep cannot determine {', '.join(lost)}; the comparison ignores them."
 
 
-def purpose(found: Optimal) -> Iterator[str]:
+def purpose(optimum: Optimal) -> Iterator[str]:
     """Purpose of the poses, and the effect of their order on a drift."""
-    paths = Counter(pose.path for pose in found.equal.poses)
+    paths = Counter(pose.path for pose in optimum.equal.poses)
     yield (
         f"{paths[DESIGN]} poses are for the model. {paths[AGAIN]} of them are measured twice, which shows the noise. "
         f"{paths[CHECK]} more poses check the model; the errors above do not use them."
     )
     yield (
-        f"In this order height and time have a correlation of {found.height_correlation:.2f}. A drift fitted with the "
-        f"model would add at most {100 * found.drift_loss:.1f} % to the variance of a parameter."
+        f"In this order height and time have a correlation of {optimum.height_correlation:.2f}. A drift fitted with "
+        f"the model would add at most {100 * optimum.drift_loss:.1f} % to the variance of a parameter."
     )
 
 
@@ -48,8 +48,8 @@ def _percent(ratio: float) -> str:
     return f"{100 * ratio:.0f} %"
 
 
-def _worst(found: Optimal) -> str:
-    before, after = (found.over.name(found.worst(candidate)) for candidate in (found.standard, found.equal))
+def _worst(optimum: Optimal) -> str:
+    before, after = (optimum.over.name(optimum.worst(candidate)) for candidate in (optimum.standard, optimum.equal))
     return before if before == after else f"{before} before, {after} now"
 
 
@@ -57,5 +57,5 @@ def _times(ratio: float) -> str:
     return f"{ratio:.1f} times less" if ratio >= 1 else f"{1 / ratio:.1f} times more"
 
 
-def _longest(found: Optimal) -> str:
-    return f"{found.all_equal.dwell_s:g} s a pose, {duration(found.all_equal.plan.duration_s)}"
+def _longest(optimum: Optimal) -> str:
+    return f"{optimum.all_equal.dwell_s:g} s a pose, {duration(optimum.all_equal.plan.duration_s)}"

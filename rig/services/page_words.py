@@ -45,8 +45,8 @@ def page_step(line: str, data: str = "", procedure: str = "") -> PageStep:
     """A message for a page. `data` is the run or file that it is about, `procedure` that of the run."""
     to: dict[str, str] = {}
 
-    def opened(found: re.Match[str]) -> str:
-        named = found.groupdict()
+    def opened(match: re.Match[str]) -> str:
+        named = match.groupdict()
         if named.get("procedure") and named["command"] == RUN.lower():
             to[f"Measure {named['procedure']}"] = f"/run?procedure={named['procedure']}"
             return f"the procedure {named['procedure']}"
@@ -55,10 +55,10 @@ def page_step(line: str, data: str = "", procedure: str = "") -> PageStep:
         return f"the page {page}"
 
     if longer := LONGER.search(line):
-        given = {"procedure": procedure, longer[1].replace("-", "_"): longer[2]}
-        to["Measure longer"] = f"/run?{urlencode(given)}"
+        settings = {"procedure": procedure, longer[1].replace("-", "_"): longer[2]}
+        to["Measure longer"] = f"/run?{urlencode(settings)}"
     text = LONGER.sub("", line)
-    text = BLOCK.sub(lambda found: f" ({opened(found)}).\n", text)
+    text = BLOCK.sub(lambda match: f" ({opened(match)}).\n", text)
     for pattern in (QUOTED, BARE):
         text = pattern.sub(opened, text)
     for pattern, plain in OPTION_WORDS:

@@ -23,13 +23,13 @@ def today() -> str:
     return datetime.now(UTC).date().isoformat()
 
 
-def with_provenance(kind: Dataset[F], found: F, parent: Model) -> Model:
+def with_provenance(kind: Dataset[F], fitted: F, parent: Model) -> Model:
     """The model that was fitted to data of this kind, with its data, parent and program. Raises UnusableData."""
-    data = found.measured
-    if (reason := kind.rejection(found)) is not None and reason.verdict == Verdict.NO_RESPONSE:
+    data = fitted.measured
+    if (reason := kind.rejection(fitted)) is not None and reason.verdict == Verdict.NO_RESPONSE:
         raise UnusableData(f"{data.source}: no model is written: {reason.text}")
     return replace(
-        found.model,
+        fitted.model,
         provenance={
             "data": data.source,
             "data_sha256": data.digest,
@@ -38,15 +38,15 @@ def with_provenance(kind: Dataset[F], found: F, parent: Model) -> Model:
             "parent": parent.name,
             "program": program(),
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
-            "excess": round(found.pooled_excess, 4),
+            "excess": round(fitted.pooled_excess, 4),
         },
-        covered=kind.covered(found),
-        correlations=kind.correlations(found),
+        covered=kind.covered(fitted),
+        correlations=kind.correlations(fitted),
     )
 
 
 def write_model(
-    kind: Dataset[F], found: F, parent: Model, out: Path | None, tell: Callable[[str], None]
+    kind: Dataset[F], fitted: F, parent: Model, out: Path | None, tell: Callable[[str], None]
 ) -> Path | None:
     """Write the fitted model with its provenance to `out`, completely or not at all. Returns the path.
 
@@ -56,7 +56,7 @@ def write_model(
     if out is None:
         return None
     try:
-        write_whole(out, dump_model(with_provenance(kind, found, parent)))
+        write_whole(out, dump_model(with_provenance(kind, fitted, parent)))
     except UnusableData as error:
         tell(str(error))
         return None

@@ -117,7 +117,7 @@ class ModelSession(Generic[F]):
     def added(self) -> tuple[str, ...]:
         """The added effects as texts that `with_added` restores: a name, or NAME=EXPRESSION."""
         effects = (step.effect for step in self.steps)
-        return tuple(f"{each.name}={each.expression}" if each.expression else each.name for each in effects)
+        return tuple(f"{effect.name}={effect.expression}" if effect.expression else effect.name for effect in effects)
 
     def with_added(self, texts: Sequence[str]) -> ModelSession[F]:
         """The same with exactly these added effects, given as `added` writes them.
@@ -156,9 +156,9 @@ class ModelSession(Generic[F]):
 
     def diagnosed(self) -> Diagnosis[F]:
         """What the present model misses."""
-        found = self._plan() or self._search()
-        self.plans[self.names] = found
-        return Diagnosis.of(found)
+        findings = self._plan() or self._search()
+        self.plans[self.names] = findings
+        return Diagnosis.of(findings)
 
     def _plan(self) -> Findings[F] | None:
         """The rest of the longest earlier search that the steps have followed; None where they left all of them."""
@@ -185,9 +185,11 @@ def model_session(request: Request) -> ModelSession[Any]:
     content = Content("")
     with suppress(RecordError, OSError):  # `loaded` says better what is wrong
         content = content_of(request.data, request.model)  # before the data: a later row makes the session old
-    found = loaded(request, notes.append)
-    kept, start = found.data.beginning(found.model)
-    return ModelSession(request, found.model, found.data, kept, found.effects, tuple(notes), start, content=content)
+    question = loaded(request, notes.append)
+    kept, start = question.data.beginning(question.model)
+    return ModelSession(
+        request, question.model, question.data, kept, question.effects, tuple(notes), start, content=content
+    )
 
 
 def brought_up_to_date(old: ModelSession[Any]) -> ModelSession[Any]:

@@ -107,10 +107,10 @@ def channel_of(channels: tuple[str, ...], channel: str | None, source: str) -> s
     if not channels:
         raise DataError(f"{source}: has no channel except the time; add a column with the sensor's output")
     wanted = channel or channels[0]
-    found = next((name for name in (wanted, f"{wanted}_v") if name in channels), None)
-    if found is None:
+    name_there = next((name for name in (wanted, f"{wanted}_v") if name in channels), None)
+    if name_there is None:
         raise DataError(f'{source}: has no channel "{wanted}"{nearest(wanted, channels)}')
-    return found
+    return name_there
 
 
 def agreed(measured: float | None, stated: float, source: str) -> float:
@@ -152,11 +152,11 @@ def of_table(table: Table, channel: str | None, rate_hz: float | None) -> Stream
     unit = "V" if chosen.endswith("_v") else str(table.constants.get("unit", "count"))
     corner_hz = table.number("filter_corner_hz", np.inf)
     others = tuple(name for name in channels if name != chosen)
-    found = Stream(
+    samples = Stream(
         table.source, chosen, rate, unit, iter([table.column(chosen)]), corner_hz, others, constants=table.constants,
         logged={name: [table.column(name)] for name in _logged(table, chosen)},
     )  # fmt: skip
-    return replace(found, closed=list(times.gaps), uneven_s=times.uneven_s) if times else found
+    return replace(samples, closed=list(times.gaps), uneven_s=times.uneven_s) if times else samples
 
 
 def _no_record(what: str) -> DataError:
@@ -248,9 +248,9 @@ def of_run(measured: Measured, channel: str | None, rate_hz: float | None) -> St
     corner = float(measured.constants.get("filter_corner_hz", np.inf))
     outputs = tuple(name for name in names if name in SENSOR and name != chosen)
     unit = units_of(measured.run, [chosen]).get(chosen, "V")
-    found = Stream(measured.name, chosen, rate, unit, iter(()), corner if chosen in SENSOR else np.inf, outputs)
-    found.blocks, found.constants = _still_blocks(measured, found), measured.constants
-    return found
+    samples = Stream(measured.name, chosen, rate, unit, iter(()), corner if chosen in SENSOR else np.inf, outputs)
+    samples.blocks, samples.constants = _still_blocks(measured, samples), measured.constants
+    return samples
 
 
 def _is_still(kept: Kept) -> bool:

@@ -134,9 +134,9 @@ def begun(record: Record, run: str) -> datetime | None:
     """The start of a run; None on a simulated bench, whose times count from power-on."""
     from rig.bench import Bench
 
-    found = record.run(run)
-    simulated = found.bench.get("instruments") and Bench.model_validate(found.bench).simulated
-    return None if simulated else datetime.fromisoformat(found.created)
+    recorded = record.run(run)
+    simulated = recorded.bench.get("instruments") and Bench.model_validate(recorded.bench).simulated
+    return None if simulated else datetime.fromisoformat(recorded.created)
 
 
 def _later(table: Table, by_s: float) -> Table:

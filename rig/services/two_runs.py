@@ -83,13 +83,13 @@ def _own(results: Mapping[str, Any], sensor: str) -> Mapping[str, Any]:
     """Those of one sensor, without its name; those of all as they are."""
     if not sensor:
         return results
-    return {name.rpartition("/")[2]: each for name, each in results.items() if name.startswith(f"{sensor}/")}
+    return {name.rpartition("/")[2]: result for name, result in results.items() if name.startswith(f"{sensor}/")}
 
 
 def _estimates(fit: FittedModel) -> Iterator[tuple[str, Estimate]]:
     for term in fit.model.terms:
-        for each in term.estimates:
-            yield " ".join(dict.fromkeys(filter(None, (term.name, each.name, each.axis)))), each
+        for estimate in term.estimates:
+            yield " ".join(dict.fromkeys(filter(None, (term.name, estimate.name, estimate.axis)))), estimate
 
 
 # One model fitted to both, and the measurements at common poses.
@@ -143,9 +143,9 @@ def again(first: Fit, second: Fit) -> Again | None:
 def _visits(table: Table) -> dict[tuple[float, ...], int]:
     """The row of every pose and number of its visit."""
     columns = np.column_stack([table.optional(name, 0.0) for name in POSE])
-    seen: dict[tuple[float, ...], int] = {}
-    found = {}
+    visits: dict[tuple[float, ...], int] = {}
+    rows = {}
     for row, pose in enumerate(map(tuple, np.round(columns, SAME_DECIMALS) + 0.0)):
-        seen[pose] = seen.get(pose, 0) + 1
-        found[*pose, float(seen[pose])] = row
-    return found
+        visits[pose] = visits.get(pose, 0) + 1
+        rows[*pose, float(visits[pose])] = row
+    return rows

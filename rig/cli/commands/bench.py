@@ -55,7 +55,7 @@ def check_command(bench_file: Path | None, example: bool, example_hand: bool, re
         raise click.UsageError("--reset asks a person; leave out --json")
     bench = read_bench(bench_file)
     with nullcontext() if reset else working("testing the instruments"):  # a reset asks a person
-        found = checked(bench, _reset if reset else None)
+        tests_by_role = checked(bench, _reset if reset else None)
     due = certificates(bench)
     late = expired(bench, datetime.now(UTC).date())
     if as_json:
@@ -63,16 +63,16 @@ def check_command(bench_file: Path | None, example: bool, example_hand: bool, re
             name: {"number": certificate.number, "due": certificate.due.isoformat()}
             for name, certificate in due.items()
         }
-        document = {"instruments": _check_document(found), "certificates": papers, EXPIRED: late}
+        document = {"instruments": _check_document(tests_by_role), "certificates": papers, EXPIRED: late}
         emit({"schema": "rig.check/1", "bench": bench.name, **document})
     else:
-        rows = [row for role, (identity, tests) in found.items() for row in _check_rows(role, identity, tests)]
+        rows = [row for role, (identity, tests) in tests_by_role.items() for row in _check_rows(role, identity, tests)]
         click.echo(columns(("role", "instrument", "check", "result", "detail"), rows))
         for name, certificate in due.items():
             click.echo(f"{name}: certificate {certificate.number}, due {certificate.due}")
         notes(f"{fault}; have it calibrated again" for fault in late)
         notes(_network_remark(on_a_network(bench)))
-    if not all(test.ok for _, tests in found.values() for test in tests):
+    if not all(test.ok for _, tests in tests_by_role.values() for test in tests):
         return FAILED
     return NOT_MET if late else 0
 
@@ -114,10 +114,10 @@ def _check_rows(role: str, identity: Identity | None, tests: list[Check]) -> lis
     ]
 
 
-def _check_document(found: dict[str, tuple[Identity | None, list[Check]]]) -> dict[str, object]:
+def _check_document(tests_by_role: dict[str, tuple[Identity | None, list[Check]]]) -> dict[str, object]:
     return {
         role: {"identity": asdict(identity) if identity else None, "checks": [asdict(test) for test in tests]}
-        for role, (identity, tests) in found.items()
+        for role, (identity, tests) in tests_by_role.items()
     }
 
 
@@ -172,8 +172,8 @@ def _addresses(bench: Bench, servers: list[Server]) -> dict[str, Address]:
 
 
 def _address_document(bench: Bench, role: str, address: dict[str, object]) -> dict[str, object]:
-    given = {key: value for key, value in address.items() if value is not None}
-    return {"driver": bench.instruments[role].driver, **given}
+    settings = {key: value for key, value in address.items() if value is not None}
+    return {"driver": bench.instruments[role].driver, **settings}
 
 
 def _print_addresses(instruments: dict[str, dict[str, object]], as_json: bool) -> None:

@@ -65,10 +65,10 @@ def compensate_command(
     if picture is not None and data is None:
         raise click.UsageError("--picture shows the test of --data: also give --data DATA")
     effects = effects_of(bench_file)
-    found = read_model(model, effects)
+    source_model = read_model(model, effects)
     with working("inverting the model") as progress:
-        made = invert_model(found, _range(found, reach, ranges), without, precision)
-        origin = origin_of(model, name, dump_model(found))
+        made = invert_model(source_model, _range(source_model, reach, ranges), without, precision)
+        origin = origin_of(model, name, dump_model(source_model))
         files = source_files(made, language, origin)
         beside = None
         if data is not None:
@@ -76,7 +76,7 @@ def compensate_command(
 
             progress.text = f"testing the compensation on {data}"
             table = load(data, tell=note)
-            check_unit(found, table.unit, table.source)
+            check_unit(source_model, table.unit, table.source)
             beside = compensated_residual(made, table)
     make_folder(out)
     for file, text in files.items():
@@ -162,11 +162,11 @@ def export_model_command(
         raise click.UsageError("--device-id is that of one sensor: export one model at a time")
     require_out(out, *models)
     effects = effects_of(bench_file)
-    found = [read_model(model, effects) for model in models]
+    source_models = [read_model(model, effects) for model in models]
     walks = {"accelerometer": walk_a or 0.0, "gyroscope": walk_g or 0.0}
     comment = f"{', '.join(Path(model).name for model in models)}, written by {program()}"
     made = export_model(
-        found,
+        source_models,
         form,
         comment,
         Slot(slot - 1, device_id),

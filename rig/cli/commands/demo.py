@@ -60,18 +60,18 @@ def demo_command(folder: Path, realistic: bool, as_json: bool) -> None:
         run = _measured(bench, settings, progress)
         progress.text, progress.share = "searching for missing effects", MEASURING
         table, linear = load(run), read_model("linear")
-        found = discover(table, linear)
+        discovered = discover(table, linear)
         progress.text, progress.share = "writing the report", 0.9
         model, page = folder / "model.yaml", folder / "report.html"
-        faults = hidden_faults(bench, found.end, found.start)
+        faults = hidden_faults(bench, discovered.end, discovered.start)
         comparison = compare(table, linear)
-        write_whole(page, report(found, comparison, today(), program(), album(found, comparison)))
-    write_model(found.findings.data, found.end, linear, model, note)
+        write_whole(page, report(discovered, comparison, today(), program(), album(discovered, comparison)))
+    write_model(discovered.findings.data, discovered.end, linear, model, note)
     if as_json:
-        document = discovery_document(found, str(model))
+        document = discovery_document(discovered, str(model))
         emit({**document, "run": run, "report": str(page), "hidden_faults": faults.document()})
         return
-    click.echo(f"{discovery(found)}\n\nWhat was hidden, and what was found (rms change of the output):\n")
+    click.echo(f"{discovery(discovered)}\n\nWhat was hidden, and what was found (rms change of the output):\n")
     click.echo(faults.text())
     click.echo(f"\nReport: {page}   open it with: xdg-open {page}\nModel:  {model}\nRun:    {run}")
     click.echo("The same in a browser: rig web" + ("" if realistic else "\nThe second act: rig demo --realistic"))

@@ -245,9 +245,9 @@ def _discover(
         question = loaded(request, note, out)
         data = question.data if len(several) == 1 else _together(several, request, question)
         data = data.without(without)
-        found = data.discover(question.model, progress.searched(question.effects), small)
+        discovered = data.discover(question.model, progress.searched(question.effects), small)
         progress.text = "planning the next experiment"
-        result = planned(found, request, question.effects)
+        result = planned(discovered, request, question.effects)
     path = None
     if out is not None:
         from rig.services.provenance import write_model

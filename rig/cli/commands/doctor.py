@@ -43,24 +43,24 @@ def doctor_command(
     """
     if folder is not None:
         return _recovered(folder, as_json)
-    found = findings()
+    checked = findings()
     archive = out or Path(f"rig-doctor-{datetime.now(UTC):%Y%m%d-%H%M%S}.zip")
     require_out(archive)
-    parts = _parts(found, run, bench_file)
+    parts = _parts(checked, run, bench_file)
     _write(archive, parts)
     if as_json:
-        checks = {each.what: {"ok": each.ok, "said": each.detail} for each in found}
+        checks = {finding.what: {"ok": finding.ok, "said": finding.detail} for finding in checked}
         emit({"schema": "rig.doctor/1", "checks": checks, "archive": str(archive), "files": sorted(parts)})
     else:
-        rows = [(each.what, "ok" if each.ok else "WRONG", each.detail) for each in found]
+        rows = [(finding.what, "ok" if finding.ok else "WRONG", finding.detail) for finding in checked]
         click.echo(columns(("check", "", ""), rows))
         click.echo(f"\n{archive}: {', '.join(sorted(parts))}. It has no samples; look at it before you send it.")
-    return int(not all(each.ok for each in found))
+    return int(not all(finding.ok for finding in checked))
 
 
-def _parts(found: list[Finding], run: str | None, bench_file: Path | None) -> Mapping[str, Any]:
+def _parts(checked: list[Finding], run: str | None, bench_file: Path | None) -> Mapping[str, Any]:
     """The files of the archive: JSON documents by name."""
-    parts: dict[str, Any] = {"versions.json": versions(), "checks.json": [vars(each) for each in found]}
+    parts: dict[str, Any] = {"versions.json": versions(), "checks.json": [vars(finding) for finding in checked]}
     parts["runs.json"] = list_runs()
     try:
         parts["run.json"] = last_run(run)

@@ -45,28 +45,28 @@ def fit_command(request: Request, out: Path | None, check: bool, as_json: bool) 
     with working("fitting the model"):
         question = loaded(request, note, out)
         data = question.data
-        found = data.fit(question.model)
-        path, reason = write_model(data, found, question.model, out, note), data.rejection(found)
-        if (untestable := data.untestable(found, question.effects)) is not None:
+        fitted = data.fit(question.model)
+        path, reason = write_model(data, fitted, question.model, out, note), data.rejection(fitted)
+        if (untestable := data.untestable(fitted, question.effects)) is not None:
             note(untestable)
-        cautions, further = data.cautions(found), _further(data, question.model, found)
+        cautions, further = data.cautions(fitted), _further(data, question.model, fitted)
     if as_json:
-        emit(fit_document(data, found, str(path) if path else None) | further.document)
+        emit(fit_document(data, fitted, str(path) if path else None) | further.document)
         notes(warning(cautions))
     else:
         remarks = [*further.lines, *warning(cautions)]
         if reason is not None:
             remarks = [f"This data cannot be used: {reason.verdict}: {reason.text}."]
-        click.echo(f"{found.model.name} fitted to {data.description}\n\n{parameters(found.model)}\n")
-        click.echo("\n".join([table(data.error_table(found)), *(f"\n{line}" for line in remarks)]))
+        click.echo(f"{fitted.model.name} fitted to {data.description}\n\n{parameters(fitted.model)}\n")
+        click.echo("\n".join([table(data.error_table(fitted)), *(f"\n{line}" for line in remarks)]))
         if further.paper:
             click.echo(f"\n{further.paper}")
         if path is not None:
             click.echo(f"\nwritten: {path}")
     if reason is not None and reason.verdict == Verdict.NO_RESPONSE:
         return 1
-    unsure = data.undetermined(found) is not None
-    return int(check and (unsure or not data.compare(found.model, question.effects).adequate))
+    unsure = data.undetermined(fitted) is not None
+    return int(check and (unsure or not data.compare(fitted.model, question.effects).adequate))
 
 
 @dataclass(frozen=True)
@@ -78,19 +78,19 @@ class _Further:
     paper: str = ""
 
 
-def _further(data: Dataset[Any], model: Model, found: Any) -> _Further:
+def _further(data: Dataset[Any], model: Model, fitted: Any) -> _Further:
     if data.form != "rows":
         return _Further({})
     from calibrations.discovery.check_poses import unseen
     from calibrations.presentation.budget import budget_document as budget_of
     from rig.cli.terminal.words import paper
 
-    checked = unseen(model, found.table)
-    stepwise = "cross-axis-bias" in model.effects and found.table.type.stage_angles
+    checked = unseen(model, fitted.table)
+    stepwise = "cross-axis-bias" in model.effects and fitted.table.type.stage_angles
     return _Further(
-        check_document(checked) | calibration_document(found) | {"budget": budget_of(found)},
-        (*calibration_lines(found), *check_lines(checked, data.source)),
-        paper(found.table) if stepwise else "",
+        check_document(checked) | calibration_document(fitted) | {"budget": budget_of(fitted)},
+        (*calibration_lines(fitted), *check_lines(checked, data.source)),
+        paper(fitted.table) if stepwise else "",
     )
 
 
@@ -126,24 +126,24 @@ EQUATION = "G_c = M (S G_r + b)"
 FLAT = 0.2  # ratio of the range of z to that of x and y below which a turn was horizontal
 
 
-def calibration_lines(found: Fit) -> Iterator[str]:
+def calibration_lines(fitted: Fit) -> Iterator[str]:
     """Tables and sentences; none for a sensor with fewer than three axes."""
-    matrices = calibration_matrices(found)
+    matrices = calibration_matrices(fitted)
     if matrices is not None:
         beyond = f"; without {', '.join(matrices.beyond)}" if matrices.beyond else ""
-        yield f"General calibration, {EQUATION}, from {found.table.unit} to {matrices.unit} (Book 17.3){beyond}:"
+        yield f"General calibration, {EQUATION}, from {fitted.table.unit} to {matrices.unit} (Book 17.3){beyond}:"
         yield columns(("axis", "M", "", "", "S", "b"), _rows(matrices))
-    if found.table.type.field:
-        yield _book_text(found.table)
-    if (faces := _accelerometer(found.table)) is not None:
+    if fitted.table.type.field:
+        yield _book_text(fitted.table)
+    if (faces := _accelerometer(fitted.table)) is not None:
         shown = (", ".join(f"{value:.7g}" for value in parts) for parts in (faces.bias, faces.scale))
         yield "The accelerometer, from its six faces: bias {}; scale factor {} per g.".format(*shown)
 
 
-def calibration_document(found: Fit) -> dict[str, Any]:
+def calibration_document(fitted: Fit) -> dict[str, Any]:
     """The keys `calibration` and `by_hand` of the fit's document; an unknown uncertainty is null."""
-    matrices, extremes = calibration_matrices(found), _by_hand(found.table)
-    if (faces := _accelerometer(found.table)) is not None:
+    matrices, extremes = calibration_matrices(fitted), _by_hand(fitted.table)
+    if (faces := _accelerometer(fitted.table)) is not None:
         extremes |= {"accelerometer": {"bias": faces.bias.tolist(), "scale_per_g": faces.scale.tolist()}}
     if matrices is None:
         return extremes
@@ -152,7 +152,7 @@ def calibration_document(found: Fit) -> dict[str, Any]:
         "S": {"value": np.diag(matrices.S).tolist(), "std": _nullable(np.diag(matrices.S_std))},
         "b": {"value": matrices.b.tolist(), "std": _nullable(matrices.b_std)},
     }
-    units = {"from": found.table.unit, "to": matrices.unit}
+    units = {"from": fitted.table.unit, "to": matrices.unit}
     return {"calibration": {"equation": EQUATION, "unit": units, **parts, "beyond": list(matrices.beyond)}} | extremes
 
 
@@ -187,10 +187,10 @@ def _by_hand(table: Table) -> dict[str, Any]:
     results: dict[str, Any] = {"hard_iron": middle.tolist()}
     left = table.outputs - middle
     if np.ptp(table.outputs[:, 2]) < FLAT * np.ptp(table.outputs[:, :2]):
-        found = fit_ellipse(left[:, :2])
-        angle = float(np.degrees(found.angle_rad))
+        ellipse = fit_ellipse(left[:, :2])
+        angle = float(np.degrees(ellipse.angle_rad))
         results["hard_iron"][2] = None  # the mean of z also contains the vertical field
-        results["soft_iron"] = {"greatest": found.greatest, "least": found.least, "angle_deg": angle}
+        results["soft_iron"] = {"greatest": ellipse.greatest, "least": ellipse.least, "angle_deg": angle}
         left = correct_by_extremes(table.outputs)[:, :2]
     size = np.linalg.norm(left, axis=1)
     return {"by_hand": results | {"unit": table.unit, "left_per_mille": float(1e3 * size.std() / size.mean())}}

@@ -53,7 +53,7 @@ DAY = click.DateTime(["%Y-%m-%d"])
 @click.option("--quantity", "chosen", multiple=True, metavar="NAME", help="Only this quantity; repeatable.")
 @click.option(
     "--limit",
-    "given",
+    "changes_given",
     multiple=True,
     metavar="NAME=CHANGE",
     help="Largest allowed change since the last calibration; repeatable.",
@@ -75,7 +75,7 @@ def history_command(
     sensor: str,
     model: str,
     chosen: Sequence[str],
-    given: Sequence[str],
+    changes_given: Sequence[str],
     baseline: int,
     on: Any,
     between: tuple[Any, Any] | None,
@@ -95,80 +95,80 @@ def history_command(
     from rig.services.request import effects_of
 
     read = read_model(model, effects_of(bench_file))
-    limits = changes(given)
+    limits = changes(changes_given)
     with working("fitting the calibrations"), Record.to_read() as record:
-        found = _only(history(record, sensor, read, limits_of(bench_file) | limits, baseline), chosen, limits)
+        life = _only(history(record, sensor, read, limits_of(bench_file) | limits, baseline), chosen, limits)
         last = latest(record, beside, read) if beside is not None else None
-    compared = [] if beside is None or last is None else [compare_sensors(found, beside, last)]
-    compared += [compare_days(found, *(day.date() for day in between))] if between else []
-    compared += [compare_rigs(found.calibrations, *rigs)] if rigs else []
-    compared = [_of_chosen(each, found) for each in compared]
+    compared = [] if beside is None or last is None else [compare_sensors(life, beside, last)]
+    compared += [compare_days(life, *(day.date() for day in between))] if between else []
+    compared += [compare_rigs(life.calibrations, *rigs)] if rigs else []
+    compared = [_of_chosen(comparison, life) for comparison in compared]
     day = on.date() if on is not None else None
-    near = closest(found.calibrations, day) if day is not None else None
-    why = stale(found, *near) if near is not None else None
-    written = _draw(found, folder, form) if folder is not None else []
+    calibration = closest(life.calibrations, day) if day is not None else None
+    why = stale(life, *calibration) if calibration is not None else None
+    written = _draw(life, folder, form) if folder is not None else []
     if as_json:
-        emit(document(found, near, why, compared))
+        emit(document(life, calibration, why, compared))
     else:
-        text = [*lines(found), *near_lines(near, day, why), *compared_lines(compared)]
+        text = [*lines(life), *near_lines(calibration, day, why), *compared_lines(compared)]
         click.echo("\n".join([*text, *(f"written: {path}" for path in written)]))
-    return int(why is not None or not all(each.agree for each in compared))
+    return int(why is not None or not all(comparison.agree for comparison in compared))
 
 
-def _only(found: History, chosen: Sequence[str], limited: Iterable[str]) -> History:
+def _only(life: History, chosen: Sequence[str], limited: Iterable[str]) -> History:
     """The history of the chosen quantities. Raises UsageError for an unknown quantity."""
     from drivers.errors import did_you_mean
 
-    known = [q.name for q in found.quantities]
+    known = [q.name for q in life.quantities]
     for name in (*chosen, *limited):
         if name not in known:
-            raise click.UsageError(f"the model {found.model} has no quantity {name!r}.{did_you_mean(name, known)}")
-    kept = tuple(q for q in found.quantities if not chosen or q.name in chosen)
-    return replace(found, quantities=kept)
+            raise click.UsageError(f"the model {life.model} has no quantity {name!r}.{did_you_mean(name, known)}")
+    kept = tuple(q for q in life.quantities if not chosen or q.name in chosen)
+    return replace(life, quantities=kept)
 
 
-def _of_chosen(compared: Compared, found: History) -> Compared:
+def _of_chosen(compared: Compared, life: History) -> Compared:
     """The rows of the chosen quantities."""
-    names = {q.name for q in found.quantities}
+    names = {q.name for q in life.quantities}
     return replace(compared, rows={name: row for name, row in compared.rows.items() if name in names})
 
 
-def _draw(found: History, folder: Path, form: str) -> list[Path]:
+def _draw(life: History, folder: Path, form: str) -> list[Path]:
     """The calibrations over time, and a control chart of each quantity."""
     from calibrations.presentation.charts.history import control_charts, lives
     from calibrations.presentation.static import save_all
     from rig.services.charts import life_of
 
-    figures = {"life": lives([life_of(q) for q in found.quantities])}
-    charts = {q.name: q.chart for q in found.quantities if q.chart is not None}
+    figures = {"life": lives([life_of(q) for q in life.quantities])}
+    charts = {q.name: q.chart for q in life.quantities if q.chart is not None}
     if charts:
-        figures["charts"] = control_charts(charts, {q.name: q.unit for q in found.quantities})
+        figures["charts"] = control_charts(charts, {q.name: q.unit for q in life.quantities})
     return save_all(figures, folder, form)
 
 
 # The history as tables and as JSON; the page uses the same sentences.
 
 
-def lines(found: History) -> Iterator[str]:
-    of = found.calibrations
-    yield summary(found)
+def lines(life: History) -> Iterator[str]:
+    of = life.calibrations
+    yield summary(life)
     yield ""
-    head = ("date", "data", "rig", *(q.name for q in found.quantities))
-    yield columns(head, [_row(each, found.quantities) for each in of])
+    head = ("date", "data", "rig", *(q.name for q in life.quantities))
+    yield columns(head, [_row(calibration, life.quantities) for calibration in of])
     yield ""
-    yield columns(("quantity", "drift a year", "scatter", "chart", "allowed", "due"), map(_stability, found.quantities))
+    yield columns(("quantity", "drift a year", "scatter", "chart", "allowed", "due"), map(_stability, life.quantities))
     yield ""
-    yield next_due(found, "--limit bias-x=0.005")
-    yield from (f"{each.data}: {each.expired}." for each in of if each.expired)
-    yield from found.warnings
-    for data, why in found.passed_over.items():
+    yield next_due(life, "--limit bias-x=0.005")
+    yield from (f"{calibration.data}: {calibration.expired}." for calibration in of if calibration.expired)
+    yield from life.warnings
+    for data, why in life.passed_over.items():
         note(f"Not used: {data}: {why}")
 
 
-def _row(each: Calibration, quantities: Sequence[Quantity]) -> tuple[str, ...]:
-    values = (each.values.get(q.name) for q in quantities)
+def _row(calibration: Calibration, quantities: Sequence[Quantity]) -> tuple[str, ...]:
+    values = (calibration.values.get(q.name) for q in quantities)
     shown = ("-" if v is None else concise(v.value, v.std, v.unit) for v in values)
-    return each.day, each.data, each.rig, *shown
+    return calibration.day, calibration.data, calibration.rig, *shown
 
 
 def _stability(q: Quantity) -> tuple[str, ...]:
@@ -191,28 +191,28 @@ def near_lines(closest: Near, on: date | None, why: str | None) -> Iterator[str]
 
 
 def compared_lines(compared: Sequence[Compared]) -> Iterator[str]:
-    for each in compared:
-        yield f"\n{each.one} compared with {each.other}"
-        yield columns(*agreements(each, lambda value, digits: f"{value:.{digits}g}"))
+    for comparison in compared:
+        yield f"\n{comparison.one} compared with {comparison.other}"
+        yield columns(*agreements(comparison, lambda value, digits: f"{value:.{digits}g}"))
 
 
-def document(found: History, closest: Near, why: str | None, compared: Sequence[Compared]) -> dict[str, Any]:
+def document(life: History, closest: Near, why: str | None, compared: Sequence[Compared]) -> dict[str, Any]:
     return {
         "schema": "rig.history/1",
-        "sensor": found.sensor,
-        "model": found.model,
-        "due": str(found.due) if found.due else None,
+        "sensor": life.sensor,
+        "model": life.model,
+        "due": str(life.due) if life.due else None,
         "calibrations": [
             {"data": c.data, "at": c.at.isoformat(), "rig": c.rig, "expired": c.expired,
              "values": {name: vars(v) for name, v in c.values.items()}}
-            for c in found.calibrations
+            for c in life.calibrations
         ],
-        "quantities": [_of_quantity(q) for q in found.quantities],
-        "passed_over": dict(found.passed_over),
-        "warnings": list(found.warnings),
+        "quantities": [_of_quantity(q) for q in life.quantities],
+        "passed_over": dict(life.passed_over),
+        "warnings": list(life.warnings),
         "closest": None if closest is None else {"data": closest[0].data, "age_days": closest[1], "stale": why},
         "compared": [
-            {"one": each.one, "other": each.other, "quantities": _agreements(each.rows)} for each in compared
+            {"one": c.one, "other": c.other, "quantities": _agreements(c.rows)} for c in compared
         ],
     }  # fmt: skip
 
@@ -259,47 +259,56 @@ def control_command(
     Exit status 1: out of control.
     """
     with Record.to_read() as record:
-        found = controlled(record.runs(), sensor, baseline, since)
-    written = _draw_charts(found, folder, form) if folder else []
+        quantities = controlled(record.runs(), sensor, baseline, since)
+    written = _draw_charts(quantities, folder, form) if folder else []
     if as_json:
-        emit({"schema": "rig.control/1", "verdict": worst(found), "charts": [_chart_document(each) for each in found]})
+        emit(
+            {
+                "schema": "rig.control/1",
+                "verdict": worst(quantities),
+                "charts": [_chart_document(quantity) for quantity in quantities],
+            }
+        )
     else:
-        click.echo(columns(HEAD, map(row, found)))
-        lines = [line for each in found for line in signals(each)]
-        click.echo("\n".join([*lines, *(f"written: {path}" for path in written), worst(found)]))
-    return int(worst(found) == OUT)
+        click.echo(columns(HEAD, map(row, quantities)))
+        lines = [line for quantity in quantities for line in signals(quantity)]
+        click.echo("\n".join([*lines, *(f"written: {path}" for path in written), worst(quantities)]))
+    return int(worst(quantities) == OUT)
 
 
-def _chart_document(each: Controlled) -> dict[str, Any]:
-    chart = each.chart
+def _chart_document(controlled: Controlled) -> dict[str, Any]:
+    chart = controlled.chart
     signals = [("individuals", k) for k in chart.jumps] + [("ewma", k) for k in chart.drifts]
     return {
-        "sensor": each.sensor,
-        "quantity": each.quantity,
-        "unit": each.unit,
+        "sensor": controlled.sensor,
+        "quantity": controlled.quantity,
+        "unit": controlled.unit,
         "verdict": chart.verdict,
         "baseline": chart.judged,
         "centre": chart.centre,
         "sigma": chart.sigma,
         "limits": [chart.centre - chart.reach, chart.centre + chart.reach],
         "range_limit": chart.range_limit,
-        "runs": list(each.runs),
+        "runs": list(controlled.runs),
         "values": chart.values.tolist(),
         "ewma": chart.ewma.tolist(),
         "ewma_limits": [[chart.centre - reach, chart.centre + reach] for reach in chart.ewma_reach.tolist()],
-        "signals": [{"chart": name, "run": each.runs[k]} for name, k in signals],
+        "signals": [{"chart": name, "run": controlled.runs[k]} for name, k in signals],
     }
 
 
-def _draw_charts(found: list[Controlled], folder: Path, form: str) -> list[Path]:
+def _draw_charts(quantities: list[Controlled], folder: Path, form: str) -> list[Path]:
     """One picture for each sensor."""
     from calibrations.presentation.charts.history import control_charts
     from calibrations.presentation.static import save_all
 
     figures = {}
-    for sensor in dict.fromkeys(each.sensor for each in found):
-        mine = [each for each in found if each.sensor == sensor]
+    for sensor in dict.fromkeys(quantity.sensor for quantity in quantities):
+        mine = [quantity for quantity in quantities if quantity.sensor == sensor]
         name = "".join(letter if letter.isalnum() else "-" for letter in sensor)
-        charts, units = {each.quantity: each.chart for each in mine}, {each.quantity: each.unit for each in mine}
+        charts, units = (
+            {quantity.quantity: quantity.chart for quantity in mine},
+            {quantity.quantity: quantity.unit for quantity in mine},
+        )
         figures[f"control-{name}"] = control_charts(charts, units)
     return save_all(figures, folder, form)

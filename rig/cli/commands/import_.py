@@ -38,7 +38,7 @@ LEAVE = "-"
     "--column", "mapped", multiple=True, metavar="NAME=THEIRS:UNIT", help="Name a column of the file; repeatable."
 )
 @click.option(
-    "--constant", "given", multiple=True, metavar="KEY=VALUE", help="A constant, such as gravity_m_s2=9.81744."
+    "--constant", "constant_texts", multiple=True, metavar="KEY=VALUE", help="A constant, such as gravity_m_s2=9.81744."
 )
 @click.option("--topic", metavar="NAME", help="Topic, group or worksheet of a file that has several.")
 @click.option(
@@ -51,7 +51,7 @@ def import_command(
     file: Path,
     kind: str | None,
     mapped: tuple[str, ...],
-    given: tuple[str, ...],
+    constant_texts: tuple[str, ...],
     topic: str | None,
     bad_lines: Literal["skip", "refuse"] | None,
     as_json: bool,
@@ -69,20 +69,20 @@ def import_command(
     from calibrations.importing.units import ColumnMapping
     from rig.services.importing import opened, stored
 
-    asked = sys.stdin.isatty() and sys.stderr.isatty()
+    attended = sys.stdin.isatty() and sys.stderr.isatty()
     try:
         with working(f"reading {file}"):
             sheet = opened(file, topic, bad_lines or "few")
     except SeveralTopics as several:
-        if not asked:
+        if not attended:
             raise
         note(str(several))
         choice = click.Choice(list(several.topics))
         topic = str(click.prompt("Topic", default=several.proposed or None, type=choice, err=True))
         sheet = opened(file, topic, bad_lines or "few")
-    columns, constants = [ColumnMapping.parse(text) for text in mapped], _constants(given)
-    if asked and needs_mapping(sheet, kind, columns):
-        kind, columns = ask_mapping(sheet, kind, columns, given)
+    columns, constants = [ColumnMapping.parse(text) for text in mapped], _constants(constant_texts)
+    if attended and needs_mapping(sheet, kind, columns):
+        kind, columns = ask_mapping(sheet, kind, columns, constant_texts)
     with working(f"storing {file}"):
         run, table = stored(sheet, kind, columns, constants, note)
     if table.content == "positions" and {"ax", "mx"} <= set(table.columns):
@@ -95,9 +95,9 @@ def import_command(
         click.echo(f"Next: rig compare {run}")
 
 
-def _constants(given: tuple[str, ...]) -> dict[str, str | float]:
+def _constants(texts: tuple[str, ...]) -> dict[str, str | float]:
     constants: dict[str, str | float] = {}
-    for text in given:
+    for text in texts:
         key, equals, value = text.partition("=")
         if not equals:
             raise click.UsageError(f'"{text}": write a constant as KEY=VALUE, such as gravity_m_s2=9.81744')

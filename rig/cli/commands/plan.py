@@ -81,15 +81,15 @@ def plan_command(
     are those of the standard sweep for comparison; the chosen poses stay in its range.
     """
     bench = read_bench(bench_file)
-    found = find(procedure, bench.folders.procedures)
-    settings = parse(found, read_settings(given, pairs, found.defaults))
+    planned_procedure = find(procedure, bench.folders.procedures)
+    settings = parse(planned_procedure, read_settings(given, pairs, planned_procedure.defaults))
     if optimal:
-        _optimal(bench, found, settings, OptimalOptions(model, poses, criterion, out, bench_file, as_json))
+        _optimal(bench, planned_procedure, settings, OptimalOptions(model, poses, criterion, out, bench_file, as_json))
         return
     if model or poses or criterion:
         raise click.UsageError("--model, --poses and --criterion go with --optimal")
     with working("planning"):
-        planned = plan(bench, found, settings)
+        planned = plan(bench, planned_procedure, settings)
     if out is not None:
         _write_poses(out, planned)
     if as_json:
@@ -121,14 +121,14 @@ def _optimal(bench: Bench, procedure: Procedure, settings: Mapping[str, Any], op
         raise click.UsageError("--optimal is for a sweep over a grid, without --pose-list")
     model = read_model(options.model or "linear", catalogue(bench.folders.effects))
     with working("choosing the poses"):
-        found = chosen(bench, procedure, settings, model, options.poses, options.criterion or "I")
+        optimum = chosen(bench, procedure, settings, model, options.poses, options.criterion or "I")
     if options.out is not None:
-        _write_poses(options.out, found.equal.plan)
+        _write_poses(options.out, optimum.equal.plan)
     if options.as_json:
-        emit(_document(found.equal.plan) | {"optimal": optimal_document(found)})
+        emit(_document(optimum.equal.plan) | {"optimal": optimal_document(optimum)})
     else:
         files = (str(path) if path else None for path in (options.out, options.bench_file))
-        click.echo("\n".join(optimal_lines(found, *files)))
+        click.echo("\n".join(optimal_lines(optimum, *files)))
 
 
 def _write_poses(out: Path, planned: Plan) -> None:
@@ -157,13 +157,13 @@ def _lines(stretch: Stretch) -> list[str]:
 
 def _end(planned: Plan) -> list[str]:
     """Questions, reach of the stages, duration and size on the disk."""
-    asked = [f"asks  {question}" for question in planned.questions]
+    questions = [f"asks  {question}" for question in planned.questions]
     reach = [
         f"{role} from {low:g} to {high:g} deg, within its limits {least:g} to {most:g} deg"
         for role, ((low, high), (least, most)) in planned.reach.items()
     ]
     total = f"{planned.poses} poses in {duration(planned.duration_s)}, {size(planned.bytes)} on the disk"
-    return [*asked, *reach, total]
+    return [*questions, *reach, total]
 
 
 def _document(planned: Plan) -> dict[str, object]:
@@ -187,43 +187,43 @@ def _document(planned: Plan) -> dict[str, object]:
 # `rig plan sweep --optimal`: the chosen poses compared with the standard sweep, in words and as JSON.
 
 
-def optimal_lines(found: Optimal, out: str | None, bench: str | None = None) -> Iterator[str]:
+def optimal_lines(optimum: Optimal, out: str | None, bench: str | None = None) -> Iterator[str]:
     """In words; `out` is the file of the poses, `bench` the bench file."""
-    model, count = found.over.fit.model.name, len(found.over.fit.theta)
-    yield f"{model}, {count} parameters: {found.criterion}-optimal poses in the range of the standard sweep"
+    model, count = optimum.over.fit.model.name, len(optimum.over.fit.theta)
+    yield f"{model}, {count} parameters: {optimum.criterion}-optimal poses in the range of the standard sweep"
     yield ""
-    yield columns(PLANS, plan_rows(found))
+    yield columns(PLANS, plan_rows(optimum))
     yield ""
-    yield from savings(found)
+    yield from savings(optimum)
     yield ""
-    yield from map(wrap_text, purpose(found))
+    yield from map(wrap_text, purpose(optimum))
     yield ""
-    yield from _how_to_run(found, out, bench)
+    yield from _how_to_run(optimum, out, bench)
 
 
-def optimal_document(found: Optimal) -> dict[str, Any]:
+def optimal_document(optimum: Optimal) -> dict[str, Any]:
     """The key `optimal` of the plan's document."""
     return {
-        "model": found.over.fit.model.name,
-        "criterion": found.criterion,
-        "times_less_rig_time": found.times_less,
-        "times_less_rig_time_for_all": found.times_less_for_all,
-        "standard": _of_plan(found, found.standard),
-        "same_dwell": _of_plan(found, found.short),
-        "same_worst_error": _of_plan(found, found.equal),
-        "no_parameter_worse": _of_plan(found, found.all_equal),
-        "drift_loss": found.drift_loss,
-        "height_correlation": found.height_correlation,
+        "model": optimum.over.fit.model.name,
+        "criterion": optimum.criterion,
+        "times_less_rig_time": optimum.times_less,
+        "times_less_rig_time_for_all": optimum.times_less_for_all,
+        "standard": _of_plan(optimum, optimum.standard),
+        "same_dwell": _of_plan(optimum, optimum.short),
+        "same_worst_error": _of_plan(optimum, optimum.equal),
+        "no_parameter_worse": _of_plan(optimum, optimum.all_equal),
+        "drift_loss": optimum.drift_loss,
+        "height_correlation": optimum.height_correlation,
         "poses": [
             {"alpha_deg": p.alpha_deg, "beta_deg": p.beta_deg, "direction": p.direction, "flip": p.flip, "path": p.path}
-            for p in found.equal.poses
+            for p in optimum.equal.poses
         ],
     }
 
 
-def _how_to_run(found: Optimal, out: str | None, bench: str | None) -> Iterator[str]:
-    settle_s = found.equal.plan.settings["settle_s"]
-    words = ["rig", "run", "sweep", "--pose-list", out or "poses.csv", "--dwell-s", f"{found.equal.dwell_s:g}"]
+def _how_to_run(optimum: Optimal, out: str | None, bench: str | None) -> Iterator[str]:
+    settle_s = optimum.equal.plan.settings["settle_s"]
+    words = ["rig", "run", "sweep", "--pose-list", out or "poses.csv", "--dwell-s", f"{optimum.equal.dwell_s:g}"]
     words += ["--settle-s", f"{settle_s:g}"] if settle_s != 0.5 else []
     words += ["--bench", bench] if bench else []
     yield f"Run them:  {shlex.join(words)}"
@@ -231,14 +231,14 @@ def _how_to_run(found: Optimal, out: str | None, bench: str | None) -> Iterator[
         yield "           after the same command with --out poses.csv"
 
 
-def _of_plan(found: Optimal, candidate: Judged) -> dict[str, Any]:
+def _of_plan(optimum: Optimal, candidate: Judged) -> dict[str, Any]:
     with np.errstate(invalid="ignore"):  # a parameter that neither determines has infinite uncertainty
-        ratios = [float(ratio) for ratio in candidate.errors / found.standard.errors]
+        ratios = [float(ratio) for ratio in candidate.errors / optimum.standard.errors]
     return {
         "poses": candidate.plan.poses,
         "dwell_s": candidate.dwell_s,
         "duration_s": candidate.plan.duration_s,
-        "worst_error": relative(found.standard, candidate),
-        "worst_parameter": found.over.name(found.worst(candidate)),
-        "errors": {found.over.name(k): ratio if math.isfinite(ratio) else None for k, ratio in enumerate(ratios)},
+        "worst_error": relative(optimum.standard, candidate),
+        "worst_parameter": optimum.over.name(optimum.worst(candidate)),
+        "errors": {optimum.over.name(k): ratio if math.isfinite(ratio) else None for k, ratio in enumerate(ratios)},
     }

@@ -55,15 +55,15 @@ def push_command(
     return _verify(url, as_json) if verifies else _push(url, named, as_json)
 
 
-def _lab(given: str | None, bench_file: Path | None) -> URL:
-    if given is None and bench_file is not None and (lab := read_bench(bench_file).lab) is not None:
-        given = lab.url
-    if given is None:
+def _lab(url: str | None, bench_file: Path | None) -> URL:
+    if url is None and bench_file is not None and (lab := read_bench(bench_file).lab) is not None:
+        url = lab.url
+    if url is None:
         raise click.UsageError(
             "the lab's record is not known: give --to postgresql://USER@HOST/DATABASE, "
             f"set {LAB}, or give a bench file with `lab: {{url: ...}}`"
         )
-    return lab_url(given)
+    return lab_url(url)
 
 
 def _push(url: URL, named: tuple[str, ...], as_json: bool) -> int:
@@ -71,16 +71,16 @@ def _push(url: URL, named: tuple[str, ...], as_json: bool) -> int:
     refused: list[RecordError] = []
     with Record() as own, Record(url) as lab:
         waiting = unsent(own, lab, named)
-        for number, each in enumerate(push_all(own, lab, waiting), 1):
-            if isinstance(each, RecordError):
-                refused.append(each)
+        for number, pushed in enumerate(push_all(own, lab, waiting), 1):
+            if isinstance(pushed, RecordError):
+                refused.append(pushed)
             else:
-                done.append(each)
-            note(f"{number} of {len(waiting)}: {each if isinstance(each, RecordError) else _description(each)}")
+                done.append(pushed)
+            note(f"{number} of {len(waiting)}: {pushed if isinstance(pushed, RecordError) else _description(pushed)}")
     if refused and len(waiting) == 1:
         raise refused[0]
     if as_json:
-        emit({"schema": "rig.push/1", "to": shown(url), "runs": [vars(each) for each in done]})
+        emit({"schema": "rig.push/1", "to": shown(url), "runs": [vars(pushed) for pushed in done]})
     else:
         count = f", {len(refused)} refused" if refused else ""
         click.echo(
@@ -106,11 +106,11 @@ def _prepare(url: URL, as_json: bool) -> None:
 
 def _verify(url: URL, as_json: bool) -> int:
     with Record(url) as lab:
-        found = verify(lab)
+        verified = verify(lab)
     if as_json:
-        emit({"schema": "rig.verified/1", "record": shown(url), **vars(found)})
+        emit({"schema": "rig.verified/1", "record": shown(url), **vars(verified)})
     else:
-        click.echo(f"{len(found.sound)} runs unchanged, {len(found.on_their_way)} incomplete")
-        for run in found.changed:
+        click.echo(f"{len(verified.sound)} runs unchanged, {len(verified.on_their_way)} incomplete")
+        for run in verified.changed:
             click.echo(f"{run}: has changed since it arrived; `rig show {run} --record URL` lists its events")
-    return int(bool(found.changed))
+    return int(bool(verified.changed))

@@ -36,31 +36,31 @@ def show_command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
     from rig.services.history import lives  # loads the fit
 
     with working(f"reading {run}"), Record.to_find(run) as record:
-        found = record.run(run)
-        run = found.run
+        shown = record.run(run)
+        run = shown.run
         left_out = record.excluded(run)
         turns = [Event(line.at, line.what, line.text) for line in record.lines(run, TURNS)]
         events = sorted([*record.events(run), *turns], key=lambda event: event.at)
-        ranges = _ranges(record, found)
-        listed = _poses(record, found) if poses else None
+        ranges = _ranges(record, shown)
+        listed = _poses(record, shown) if poses else None
         lines = record.lines(run) if wants_log else []
-        known = lives(found, record.runs())
+        known = lives(shown, record.runs())
     if as_json:
         more = ({"kept": listed} if poses else {}) | ({"log": [vars(line) for line in lines]} if wants_log else {})
-        emit(_run_document(found, events, ranges) | more)
+        emit(_run_document(shown, events, ranges) | more)
     else:
-        after = [*results_table(found.results), *next_steps(found, left_out)]
+        after = [*results_table(shown.results), *next_steps(shown, left_out)]
         after += [
             f"The record has {count} runs of the sensor {name}: rig history {name}" for name, count in known.items()
         ]
-        history = [_event(event, found.message) for event in events]
-        parts = (_head(found), after, _columns(ranges), history, _listed(listed or []), _logged(lines))
+        history = [_event(event, shown.message) for event in events]
+        parts = (_head(shown), after, _columns(ranges), history, _listed(listed or []), _logged(lines))
         click.echo("\n\n".join("\n".join(part) for part in parts if part))
 
 
 def _ranges(record: Record, run: Run) -> Ranges:
     """Minimum and maximum of each column; empty while the poses make no table."""
-    found: dict[str, tuple[float, float]] = {}
+    ranges: dict[str, tuple[float, float]] = {}
     sensors: list[str | None] = [*sensors_of(run)]
     for sensor in sensors or [None]:
         try:
@@ -68,8 +68,8 @@ def _ranges(record: Record, run: Run) -> Ranges:
         except (RecordError, CalibrationError):
             continue
         prefix = f"{sensor}." if sensor else ""
-        found |= {prefix + name: (float(v.min()), float(v.max())) for name, v in table.columns.items()}
-    return found
+        ranges |= {prefix + name: (float(v.min()), float(v.max())) for name, v in table.columns.items()}
+    return ranges
 
 
 def _poses(record: Record, run: Run) -> list[dict[str, Any]]:
@@ -119,11 +119,11 @@ def _settings(settings: Mapping[str, Any]) -> Iterator[str]:
     """A line for each setting; for a mapping, such as the columns of an imported file, a line for each entry."""
     for name, value in settings.items():
         if isinstance(value, Mapping):
-            yield from (f"  {name}: {key} = {each}" for key, each in value.items())
+            yield from (f"  {name}: {key} = {entry}" for key, entry in value.items())
         elif isinstance(value, list) and len(value) > 1 and isinstance(value[0], str):  # those of a file
             yield f"  {name} = {len(value)} lines: {value[0]} ..."
         elif isinstance(value, list):
-            yield f"  {name} = {', '.join(f'{each:g}' if isinstance(each, float) else str(each) for each in value)}"
+            yield f"  {name} = {', '.join(f'{entry:g}' if isinstance(entry, float) else str(entry) for entry in value)}"
         else:
             yield f"  {name} = {value}"
 
@@ -222,16 +222,18 @@ def exclude_command(run: str, pose: int, reason: str | None, include: bool, as_j
     from rig.services.next_steps import results_table
 
     with Record.to_find(run) as record:
-        found = exclude(record, run, [pose], None if include else reason)
-        run = found.run
-        told = [event.text for event in record.events(run) if event.what == RESULTS]
+        changed = exclude(record, run, [pose], None if include else reason)
+        run = changed.run
+        remarks = [event.text for event in record.events(run) if event.what == RESULTS]
     if as_json:
-        said = None if include else reason
-        emit({"schema": "rig.exclude/1", "run": run, "pose": pose, "excluded": said, "results": found.results})
+        excluded = None if include else reason
+        emit({"schema": "rig.exclude/1", "run": run, "pose": pose, "excluded": excluded, "results": changed.results})
         return
     state = "included again" if include else f"excluded: {reason}"
-    after = [f"results: {told[-1]}", *results_table(found.results)] if found.state == "complete" and told else []
-    if found.state != "complete" and not include:
+    after = (
+        [f"results: {remarks[-1]}", *results_table(changed.results)] if changed.state == "complete" and remarks else []
+    )
+    if changed.state != "complete" and not include:
         after = [f"Next: rig resume {run} measures it again"]
     click.echo("\n".join([f"{run}: pose {pose} {state}", *after]))
 

@@ -101,11 +101,11 @@ def certificate_command(
     if is_still(data):
         require_reference(data, "still")
     with working("fitting the model") as progress:
-        table, given, effects = loaded_table(Request(data, model, bench_file), note)
+        table, stated_model, effects = loaded_table(Request(data, model, bench_file), note)
         require_reference(table.source, table.kind)
         bench = read_bench(bench_file) if bench_file is not None else None
-        asked = Certified(data, table, given, Path(model).name, effects, bench, before)
-        certificate = certified(asked, number, customer)
+        request = Certified(data, table, stated_model, Path(model).name, effects, bench, before)
+        certificate = certified(request, number, customer)
         for path in paths:
             progress.text = f"writing {path}"
             _write_certificate(path, certificate)

@@ -43,11 +43,11 @@ def run_command(
     the program then asks whether to continue. `rig resume` continues later.
     """
     bench = read_bench(bench_file)
-    found = find(procedure, bench.folders.procedures)
-    settings = parse(found, read_settings(given, pairs, found.defaults))
+    definition = find(procedure, bench.folders.procedures)
+    settings = parse(definition, read_settings(given, pairs, definition.defaults))
     with Record() as record:
-        with watching(found, bench, unattended, answers) as observer:
-            outcome = start(record, bench, found, settings, observer, trace=trace)
+        with watching(definition, bench, unattended, answers) as observer:
+            outcome = start(record, bench, definition, settings, observer, trace=trace)
         push_after(record, outcome.run, bench.lab, note)
         return print_end(record, outcome, as_json)
 
@@ -67,12 +67,12 @@ def resume_command(
     """
     bench = read_bench(bench_file) if bench_file else None
     with Record.to_find(run, own=True) as record:
-        found = record.run(run)
-        if found.state == "complete":
-            return print_end(record, Outcome(found), as_json)
-        own = Bench.model_validate(found.bench)
-        with watching(find(found.procedure, own.folders.procedures), own, unattended, answers) as observer:
-            outcome = resume(record, found.run, observer, bench, trace)
-        notes(f"program changed {event.text}" for event in record.events(found.run) if event.what == CHANGED)
+        interrupted = record.run(run)
+        if interrupted.state == "complete":
+            return print_end(record, Outcome(interrupted), as_json)
+        own = Bench.model_validate(interrupted.bench)
+        with watching(find(interrupted.procedure, own.folders.procedures), own, unattended, answers) as observer:
+            outcome = resume(record, interrupted.run, observer, bench, trace)
+        notes(f"program changed {event.text}" for event in record.events(interrupted.run) if event.what == CHANGED)
         push_after(record, outcome.run, (bench or own).lab, note)
         return print_end(record, outcome, as_json)

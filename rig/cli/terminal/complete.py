@@ -21,10 +21,10 @@ def _offer(words: Callable[[], Iterable[str]]) -> Complete:
     @wraps(words)
     def complete(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
         try:
-            found = [word for word in words() if word.startswith(begun)]
+            offers = [word for word in words() if word.startswith(begun)]
         except Exception:
             return []
-        return [CompletionItem(word) for word in dict.fromkeys(found)]
+        return [CompletionItem(word) for word in dict.fromkeys(offers)]
 
     return complete
 

@@ -75,10 +75,10 @@ def status_of(error: BaseException) -> int:
 
 def _of_file(error: OSError) -> str:
     """The message of an error of the operating system."""
-    what = (error.strerror or "").lower()
+    reason = (error.strerror or "").lower()
     if error.filename is None:
-        return f"the operating system reports: {what}; free the full or busy resource, and try again"
-    return f"{error.filename}: cannot use the file: {what}; check its name and permissions, or give another"
+        return f"the operating system reports: {reason}; free the full or busy resource, and try again"
+    return f"{error.filename}: cannot use the file: {reason}; check its name and permissions, or give another"
 
 
 def _print(message: str, status: int) -> int:

@@ -115,11 +115,11 @@ class Guide(RunViewer):
         text = f"{question.text} ({question.accepts})"
         while True:
             try:
-                given = Prompt.ask(Text(text), console=self._console, default=instead or "")
+                typed = Prompt.ask(Text(text), console=self._console, default=instead or "")
             except EOFError:
                 raise NoAnswer(f'the terminal was closed at the question "{question.text}"; resume the run') from None
             try:
-                return question.checked(given)
+                return question.checked(typed)
             except BadAnswer as refused:
                 self._console.print(str(refused), style="yellow", highlight=False)
 

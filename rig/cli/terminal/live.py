@@ -82,10 +82,10 @@ def discover_live(
     bench, effects = read_bench(bench_file), effects_of(bench_file)
     if out is not None:
         require_out(out, request.model, bench_file)
-    given = read_model(request.model or "linear", effects)
+    start_model = read_model(request.model or "linear", effects)
     with Record() as record:
         experiments = Experiments(record, bench, unattended, answers)
-        live = Live(bench, bench_file, given, effects, 60 * (minutes or 0.0), experiments.measure)
+        live = Live(bench, bench_file, start_model, effects, 60 * (minutes or 0.0), experiments.measure)
         standard_s = live.planned(STANDARD).duration_s or 0.0
         live = live if minutes else replace(live, time_s=standard_s)
         if (first_s := live.planned(FIRST).duration_s or 0.0) > live.time_s:
@@ -100,14 +100,14 @@ def discover_live(
         except KeyboardInterrupt:
             experiments.stopped()
             raise
-    found = done[-1].found
-    path = write_model(found.findings.data, found.end, given, out, note)
+    discovered = done[-1].found
+    path = write_model(discovered.findings.data, discovered.end, start_model, out, note)
     if as_json:
         emit(document(done, standard_s, path))
-        notes(warning([found.caution]))
+        notes(warning([discovered.caution]))
     else:
         click.echo(_end(done, live, standard_s, path))
-    return verdict_status(found.verdict, check)
+    return verdict_status(discovered.verdict, check)
 
 
 def progress(done: list[Measurement], time_s: float) -> str:
@@ -150,9 +150,14 @@ def document(done: list[Measurement], standard_s: float, out: Path | None) -> di
 
 def _end(done: list[Measurement], live: Live, standard_s: float, out: Path | None) -> str:
     """Verdict, causes, model, and the rig time compared with that of the standard sweep."""
-    found, used_s = done[-1].found, done[-1].used_s
-    data = f"{found.end.table.n} poses of {joined(m.run for m in done)}"
+    discovered, used_s = done[-1].found, done[-1].used_s
+    data = f"{discovered.end.table.n} poses of {joined(m.run for m in done)}"
     time = f"Rig time {duration(used_s)}; the standard sweep takes {duration(standard_s)}."
     again = f"To repeat the analysis: rig discover {' '.join(m.run for m in done)}"
-    parts = [data, discovery(found), parameters(found.end.model), f"{ending(done, live.time_s)} {time}\n{again}"]
+    parts = [
+        data,
+        discovery(discovered),
+        parameters(discovered.end.model),
+        f"{ending(done, live.time_s)} {time}\n{again}",
+    ]
     return "\n\n".join([*parts, *([f"written: {out}"] if out else [])])

@@ -26,8 +26,8 @@ TAKE_IT = frozenset(
 def with_record(command: click.Command) -> click.Command:
     """Add the option --record to a command, or to the commands of a group, that reads runs."""
     if isinstance(command, click.Group):
-        for each in command.commands.values():
-            with_record(each)
+        for subcommand in command.commands.values():
+            with_record(subcommand)
     if command.name in TAKE_IT and OPTION not in command.params:
         command.params.append(OPTION)
     return command

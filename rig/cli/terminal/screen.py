@@ -116,8 +116,8 @@ def _facts(plan: Plan, procedure: Procedure, bench: Bench, free_bytes: int) -> I
     for role, ((low, high), (least, most)) in plan.reach.items():
         yield f"Turns {role}", f"from {low:g} to {high:g} deg; the limits are {least:g} to {most:g} deg"
     yield "Stops", "; ".join(stops(bench))
-    if asked := Counter(re.sub(r"-\d+$", "", question.name) for question in plan.asked):
-        yield "Asks you", ", ".join(f"{name} ({n} times)" if n > 1 else name for name, n in asked.items())
+    if questions := Counter(re.sub(r"-\d+$", "", question.name) for question in plan.asked):
+        yield "Asks you", ", ".join(f"{name} ({n} times)" if n > 1 else name for name, n in questions.items())
     space = "" if free_bytes > plan.bytes else ": not enough space"
     yield "Stores", f"{size(plan.bytes)} on the disk; {size(free_bytes)} are free{space}"
 

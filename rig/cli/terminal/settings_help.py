@@ -61,7 +61,7 @@ def meaning(procedure: Procedure, name: str) -> str:
     """The sentences of the procedure's docstring that name the setting; else what it means in every procedure."""
     doc = " ".join(inspect.cleandoc(procedure.function.__doc__ or "").split())
     sentences = re.split(r"(?<=[.:])\s+(?=[A-Z`])", doc)
-    own = " ".join(each for each in sentences if re.search(rf"`{name}[`=]", each)).replace("`", "")
+    own = " ".join(sentence for sentence in sentences if re.search(rf"`{name}[`=]", sentence)).replace("`", "")
     return own or SHARED.get(name, "")
 
 

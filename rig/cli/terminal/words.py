@@ -52,12 +52,12 @@ def short_discovery(result: Discovery[Any]) -> str:
 def _line(term: Term) -> str:
     """An effect and its parameters in one line."""
     several = len(term.effect.parameters) > 1
-    each = [
+    parts = [
         " ".join(filter(None, (e.name if several else "", e.axis, e.text if e.identified else "not identified")))
         for e in term.quantities
     ]
-    each += [f"curve {axis} of {n} coefficients" for axis, n in term.coefficients.items()]
-    return f"  {term.name}: {', '.join(each)}"
+    parts += [f"curve {axis} of {n} coefficients" for axis, n in term.coefficients.items()]
+    return f"  {term.name}: {', '.join(parts)}"
 
 
 def table(cells: Cells) -> str:
@@ -148,10 +148,10 @@ def own_effect(pattern: Pattern | None, model: str, request: Request) -> dict[st
 
 def pattern_advice(pattern: Pattern | None, model: str, request: Request) -> list[str]:
     """What a person can do about a pattern of the residual."""
-    if found := own_effect(pattern, model, request):
+    if effect := own_effect(pattern, model, request):
         return [
             "To add this pattern to the model as your own effect:",
-            f"    {found['command']}",
+            f"    {effect['command']}",
         ]
     if pattern is not None and pattern.poses and not Path(data := request.data).exists():
         return [f"Look at these poses: rig show {data} --poses. rig exclude {data} POSE excludes one, with a reason."]

@@ -103,18 +103,18 @@ class PublishingObserver(Observer):
 
     def ask(self, question: Question, instead: str | None) -> str:
         self._publish(self._writer.publish, phase="asking", asked=open_question(question, instead or ""))
-        given = self._observer.ask(question, instead)
+        reply = self._observer.ask(question, instead)
         self._publish(self._writer.publish, phase="running", asked=None)
-        return given
+        return reply
 
     def interrupted(self, outcome: Outcome) -> Decision:
         self._publish(self._writer.publish, phase="paused", error=str(outcome.error), moving=outcome.moving)
         return self._observer.interrupted(outcome)
 
-    def _publish(self, what: Callable[P, None], *args: P.args, **kwargs: P.kwargs) -> None:
+    def _publish(self, event: Callable[P, None], *args: P.args, **kwargs: P.kwargs) -> None:
         if self._run:
             with suppress(RigError, OSError):
-                what(*args, **kwargs)
+                event(*args, **kwargs)
 
     def _end(self) -> None:
         with Record() as record:
@@ -179,8 +179,8 @@ def begun(status: Status) -> str:
 def latest() -> Status | None:
     """The status of the newest background run in progress, else of the newest; None without any."""
     _children[:] = [child for child in _children if child.poll() is None]
-    found = [status for key in reversed(keys()) if (status := read(key)) is not None]
-    return next((status for status in found if status.phase != "ended"), found[0] if found else None)
+    statuses = [status for key in reversed(keys()) if (status := read(key)) is not None]
+    return next((status for status in statuses if status.phase != "ended"), statuses[0] if statuses else None)
 
 
 def pause(status: Status) -> None:

@@ -58,15 +58,15 @@ class Attendant(StatusWriter):
 
     def _answer(self, question: Question, proposed: str, phase: str) -> str:
         """Ask until the question accepts the answer."""
-        asked = open_question(question, proposed)
+        question_shown = open_question(question, proposed)
         with _pipe(self._order.key) as heard:  # open before the status shows the question
             while True:
-                self.publish(phase=phase, asked=asked)
-                given = heard()
+                self.publish(phase=phase, asked=question_shown)
+                message = heard()
                 try:
-                    checked = question.checked(given["text"]) if given.get("name") == question.name else None
+                    checked = question.checked(message["text"]) if message.get("name") == question.name else None
                 except BadAnswer as refused:
-                    asked = replace(asked, refused=str(refused))
+                    question_shown = replace(question_shown, refused=str(refused))
                     continue
                 if checked is not None:
                     self.publish(phase="running", asked=None)

@@ -136,8 +136,8 @@ def read(key: str) -> Status | None:
         document = json.loads(file(key, "json").read_text(encoding="utf-8"))
     except FileNotFoundError:
         return None
-    asked = document.pop("asked")
-    status = Status(**document, asked=Asked(**asked) if asked else None)
+    question = document.pop("asked")
+    status = Status(**document, asked=Asked(**question) if question else None)
     if status.phase == "ended" or is_held(home(), lock(key)) or _is_starting(status):
         return status
     error = f"its process ended: {_last_words(key, status.run)}"
