@@ -47,6 +47,7 @@ class Kind:
     magnitude: bool = False  # whether only the magnitude of the sensed quantity is known
     field: bool = False  # whether that is a field, whose strength is a parameter
     same_pose: tuple[str, ...] = ()  # columns whose values make two rows the same pose
+    fewest_for_form: int = 24  # rows that can show a free form: the base of poses of two axes has ten parameters
     sequential: bool = True  # whether rows without times are taken as one second apart
 
 
@@ -139,6 +140,7 @@ class Motion(Kind):
         "models of the run's sweep with the displacement sensor. Those are not fitted to the motion, so their "
         "error also contains changes since the sweep and the error of the reference."
     )
+    fewest_for_form = 15  # stretches, each of which holds a mean and the parts of every line
     moving = True
     measurement_caption = "Output over a few periods without its mean: measured (dots) and model (lines) {}."
     failure_caption = (

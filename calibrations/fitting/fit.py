@@ -233,8 +233,9 @@ def refit(before: Fit, model: Model, start: Array | None = None) -> Fit:
     """
     if _requests(model):
         from calibrations.fitting.requested_forms import with_sizes
+        from calibrations.fitting.shown_forms import in_white_noise
 
-        model = with_sizes(model, before)
+        model, before = with_sizes(model, before), in_white_noise(before)
     problem = Problem.of(model, before.table)
     return _alternate(problem, before.noise, problem.layout.starts() if start is None else [start])
 

@@ -162,15 +162,21 @@ class Problem:
         if not np.isfinite(layout.prior).any():
             return {}
         steps = layout.steps(theta)
-        columns = Near(self.samples, [steps[i] for i in even]).columns
+        columns = self._near([steps[i] for i in even]).columns
         known: dict[int, Array] = {}
         for k, slot in enumerate(layout.slots):
             if slot.term in even and (of := columns.get(even.index(slot.term))) is not None:
                 chosen = [self.table.axes.index(slot.axis)] if slot.axis else slice(None)
-                column = np.zeros_like(of[slot.parameter.name])
-                column[:, chosen] = of[slot.parameter.name][:, chosen]
-                known[k] = self._reduced(-column)
-        return known
+                known[k] = np.zeros_like(of[slot.parameter.name])
+                known[k][:, chosen] = of[slot.parameter.name][:, chosen]
+        if not known:
+            return {}
+        shown = self.of_output(theta, np.stack(list(known.values()), axis=2))
+        return dict(zip(known, np.moveaxis(shown, 2, 0), strict=True))
+
+    def _near(self, steps: Sequence[Step]) -> Near:
+        """The chain with these values."""
+        return Near(self.samples, steps)
 
     def _errors_near(self, theta: Array, stairs: bool) -> Callable[[int, Array], Array]:
         """The residual, up to a constant, as a function of (entry changed, vector).
@@ -259,6 +265,10 @@ class PositionProblem(Problem):
         """As the model has it from the outputs."""
         steps = self.layout.steps(theta)
         return sensed(backward(self.table, steps), self.table, steps)
+
+    def _near(self, steps: Sequence[Step]) -> Near:
+        """From the outputs back to what is sensed."""
+        return Near(self.table, steps, backward(self.table, steps))
 
     def of_output(self, theta: Array, changes: Array) -> Array:
         """By how the magnitude follows each output."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from calibrations.effects import Effect
 from calibrations.errors import ModelError
+from calibrations.fitting.shown_forms import estimated_by_residual
 from calibrations.free_forms.bases import Harmonics, Line
 from calibrations.free_forms.chain import Given, State, base_size, start, state_at
 from calibrations.free_forms.components import Component, free
@@ -83,6 +84,8 @@ def estimated(before: Fit, effect: RequestedForm) -> Effect:
     table = before.table
     if (why := effect.excluded(table)) is not None:
         raise ModelError(f"{effect.name} {why} ({table.source})")
+    if not table.type.stage_angles:
+        return estimated_by_residual(before, effect.place)
     table = replace(table, left_out=())
     data, given = PoseData.of(table), beyond_base(before)
     first = state_at(data, given, start(data, given), ())

@@ -93,7 +93,7 @@ class FreeForm(Effect):
     Source    Wood (2017), 5.8; Patterson and Thompson (1971).
     """
 
-    kinds = ("poses",)
+    kinds = ("poses", "positions", "motion")
 
     def __init__(self, forms: tuple[Form, ...]) -> None:
         """Parameters are the coefficients of each form's columns, with the form's size as their prior."""

@@ -19,10 +19,10 @@ from calibrations.free_forms.place_names import PLACES, PREFIX
 from calibrations.geometry.stage_path import approached, last_turn
 from calibrations.table import Table
 
-FEWEST_POSES = 24  # the base of a fit of two axes has ten parameters
 FEWEST_VALUES = 8  # of what drives a curve
 FEWEST_TEMPERATURES = 4
 FEWEST_INCLINATIONS = 4
+OF_STAGES = ("stage-angle-alpha", "stage-angle-beta", "history")  # places that only poses of a rig can show
 COLUMN = "column:"
 KNOWN_AS = {"temperature_c": "temperature-bias", "t_s": "time-bias", "alpha_deg": "stage-angle-alpha",
             "beta_deg": "stage-angle-beta"}  # columns whose place has a name of its own  # fmt: skip
@@ -89,11 +89,19 @@ def named(name: str, effects: Mapping[str, Effect]) -> Effect:
 
 def shortage(place: str, table: Table) -> str | None:
     """What data would be needed for a free form at `place`, in words that follow its name; None where they suffice."""
-    if table.n < FEWEST_POSES:
-        return f"needs {FEWEST_POSES} poses or more, and the data has {table.n}; measure more poses"
+    fewest, rows = table.type.fewest_for_form, table.type.rows
+    if table.n < fewest:
+        return f"needs {fewest} {rows} or more, and the data has {table.n}; measure more {rows}"
     if place.startswith(COLUMN):
         return _short_column(place.removeprefix(COLUMN), table)
-    match DRIVERS[place].needs:
+    needs = DRIVERS[place].needs
+    if not table.type.stage_angles:
+        if place in OF_STAGES:
+            return f"needs a sweep of poses: stages move the sensor little, or not at all, in {table.type.name}"
+        needs = needs if needs in ("temperature", "time", "axes") else ""
+    match needs:
+        case "":
+            return None
         case "beta":
             return _few("angles beta", table, "beta_deg", FEWEST_VALUES, "use steps of 30 deg or less")
         case "inclinations":

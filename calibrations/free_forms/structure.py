@@ -162,17 +162,26 @@ class Structure:
         channels = 1 if form.shared else self.result.data.channels
         b = self.result.columns.shape[1] - 1 - len(self.result.gram.with_data)
         columns = self.result.columns[:, b + block.start : b + block.stop]
-        added = self.result.sizes.of(self.result.gram, name) ** 2 * np.sum(columns**2, axis=0)
-        size, at = float(np.sqrt(variance) / scale), 0
-        sizes, kept = [], []
-        for k in range(channels):
-            count = form.count(k)
-            rest = np.cumsum(added[at : at + count][::-1])[::-1] / self.result.data.n  # from each column on
-            whole = form.basis(k).kind in ("clips", "play", "products", "ramp")
-            sizes.append(size if count else 0.0)
-            kept.append(count if whole else max(min(count, 1), int(np.sum(rest > KEPT**2))))
-            at += count
-        return replace(form, sizes=tuple(sizes), kept=tuple(kept))
+        added = self.result.sizes.of(self.result.gram, name) ** 2 * np.sum(columns**2, axis=0) / self.result.data.n
+        return with_size(form, float(np.sqrt(variance) / scale), added, channels)
+
+
+def with_size(form: Form, size: float, added: Array, channels: int) -> Form:
+    """A form with its size, and with those columns of each axis that add something.
+
+    added     mean square of what each column adds, in noise floors, the axes one after another
+    channels  axes that have a function of their own; 1 where one is for all
+    """
+    at = 0
+    sizes, kept = [], []
+    for k in range(channels):
+        count = form.count(k)
+        rest = np.cumsum(added[at : at + count][::-1])[::-1]  # from each column on
+        whole = form.basis(k).kind in ("clips", "play", "products", "ramp")
+        sizes.append(size if count else 0.0)
+        kept.append(count if whole else max(min(count, 1), int(np.sum(rest > KEPT**2))))
+        at += count
+    return replace(form, sizes=tuple(sizes), kept=tuple(kept))
 
 
 def with_stairs(found: Structure, left: Array, stairs: Stairs, white: Array) -> Structure:

@@ -130,14 +130,18 @@ def _slope(output: Callable[[Array], Array], a: Array, h: float = 1e-4) -> Array
 
 @dataclass(frozen=True)
 class Near:
-    """The chain with the values of `steps`."""
+    """The chain with the values of `steps`.
+
+    `measured`: specific force along the reference axes, g, (n, 3), where the outputs and not the stages give it.
+    """
 
     table: Table
     steps: Sequence[Step]
+    measured: Array | None = None
 
     @cached_property
     def _static(self) -> Array:
-        return static_force(self.table, self.steps)
+        return static_force(self.table, self.steps) if self.measured is None else self.measured
 
     @cached_property
     def _sensed(self) -> Array:

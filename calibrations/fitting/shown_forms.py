@@ -1,0 +1,180 @@
+"""Free forms of rows that need no stage angles: positions and motion.
+
+The residual shows a form through the chain of the fitted model: of positions what it makes of the magnitude, of motion
+what each stretch holds of it. All parameters of the model are the base of the likelihood, as far as the rows determine
+them, and the sizes follow as those of poses do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibrations.effects import Effect
+from calibrations.fitting.fit import Fit
+from calibrations.free_forms.bases import Clips, Line, Products, Settling, spline
+from calibrations.free_forms.components import Component
+from calibrations.free_forms.effect import free_form
+from calibrations.free_forms.form import CROSS, Factor, Form
+from calibrations.free_forms.places import AGES, DEGREE, GENERAL, PRODUCT, THRESHOLDS_G
+from calibrations.free_forms.reml import Gram, Sizes, beside_base, eliminated, estimate, gains
+from calibrations.free_forms.selection import ENTER, select
+from calibrations.free_forms.structure import with_size
+from calibrations.geometry.orientation import out_of_plane
+from calibrations.means.noise import white_only
+from calibrations.table import Array, Table
+
+INTERVALS = {"own": 14, "cross": 10, "out-of-plane": 10, "temperature": 10, "time": 12, "output": 14}  # of a spline
+COLUMN_INTERVALS = 8
+OF_FORCE: Mapping[str, tuple[str, Factor]] = {
+    "own-response": ("own", ""),
+    "cross-response": ("cross", ""),
+    "z-response": ("out-of-plane", ""),
+    "scale-over-cross": ("cross", "force"),
+    "scale-over-z": ("out-of-plane", "force"),
+}
+OF_TABLE: Mapping[str, tuple[str, Factor]] = {
+    "temperature-bias": ("temperature", ""),
+    "temperature-scale": ("temperature", "force"),
+    "time-bias": ("time", ""),
+    "time-scale": ("time", "force"),
+}
+SMALLEST = 1e-3  # noise floors: what a form adds that the data do not show
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """Forms as a residual shows them: `gram` of their columns beside the model's parameters, and what made it.
+
+    columns  whitened [base, forms, residual], (rows, base + forms + 1)
+    """
+
+    fit: Fit
+    forms: Mapping[str, Form]
+    gram: Gram
+    columns: Array
+
+    @staticmethod
+    def of(fit: Fit, forms: Mapping[str, Form]) -> Shown:
+        """The forms by name, beside the parameters of a fit. Only forms that its rows can show are kept."""
+        base, blocks, parts, at = fit.whitened[:, 1:], {}, [], 0
+        for name, form in forms.items():
+            white = fit.noise.whiten(form_columns(fit, form))
+            parts.append(white)
+            blocks[name] = slice(at, at + white.shape[1])
+            at += white.shape[1]
+        X = np.hstack([base, *parts, fit.whitened[:, :1]])
+        g = _gram(fit, X, blocks, dict.fromkeys(blocks, 1.0))
+        X, scales = beside_base(X, g, base.shape[1])
+        return Shown(fit, forms, _gram(fit, X, blocks, scales), X)
+
+    def sized(self, name: str, sizes: Sizes) -> Form:
+        """A form with the size that was found, and the columns that add something."""
+        form, g = self.forms[name], self.gram
+        block, base = g.blocks[name], self.fit.jacobian.shape[2]
+        columns = self.columns[:, base + block.start : base + block.stop]
+        added = sizes.of(g, name) ** 2 * np.sum(columns**2, axis=0) / self.fit.table.n
+        size = float(np.sqrt(sizes.variances[name]) / g.scales[name])
+        channels = 1 if form.shared else len(self.fit.table.axes)
+        return with_size(form, size, added, channels)
+
+
+def form_columns(fit: Fit, form: Form) -> Array:
+    """d residual / d the coefficients of a form, of every axis in turn or shared by all, (channels, rows, m)."""
+    problem = fit.problem
+    samples, force = problem.samples, problem.sensed(fit.theta)
+    axes = len(samples.axes)
+    own = [form.columns(samples, force, samples.outputs[:, k], k) for k in range(axes)]
+    if form.shared:
+        return problem.of_output(fit.theta, np.stack(own, axis=1))
+    changes = np.zeros((samples.n, axes, sum(columns.shape[1] for columns in own)))
+    at = 0
+    for k, columns in enumerate(own):
+        changes[:, k, at : at + columns.shape[1]] = columns
+        at += columns.shape[1]
+    return problem.of_output(fit.theta, changes)
+
+
+def forms_at(place: str, fit: Fit) -> dict[str, Form]:
+    """The free forms of a place over the range of the fit's samples, by the names that they have in a search."""
+    table, force = fit.problem.samples, fit.problem.sensed(fit.theta)
+    return {f"{place}/{form.name}": form for form in _forms(place, table, force)}
+
+
+def in_white_noise(before: Fit) -> Fit:
+    """The fit in the white noise of its rows, where that is known: its slow noise took up what a form explains."""
+    problem = before.problem
+    if problem.white is None:
+        return before
+    return replace(before, noise=white_only(problem.white, problem.gap_s, len(problem.channels), problem.given))
+
+
+def estimated_by_residual(before: Fit, place: str) -> Effect:
+    """The free form of a place with the sizes that the residual of `before` shows.
+
+    One form is always kept, however small: a person asked for it, and at a size near zero it changes nothing.
+    """
+    before = in_white_noise(before)
+    shown = Shown.of(before, forms_at(place, before))
+    components = [_component(name, form) for name, form in shown.forms.items()]
+    by_name = {c.name: c for c in components}
+    sizes, _ = select(shown.gram, estimate(shown.gram, {}, {}), components, [by_name], {}, ENTER, True)
+    if not sizes.variances:
+        gained = gains(shown.gram, sizes, list(by_name))
+        best = max(gained, key=lambda name: gained[name][0])
+        sizes = estimate(shown.gram, {best: max(gained[best][1], SMALLEST**2)}, {best: SMALLEST**2})
+    return free_form(tuple(shown.sized(name, sizes) for name in sizes.variances))
+
+
+def _component(name: str, form: Form) -> Component:
+    price = GENERAL if form.driver == "force" else PRODUCT if form.factor else 0.0
+    return Component(name, form.place, "response", price=price, form=form)
+
+
+def _gram(fit: Fit, X: Array, blocks: Mapping[str, slice], scales: Mapping[str, float]) -> Gram:
+    """Products of the columns, with the priors of the model's own free forms."""
+    b = fit.jacobian.shape[2]
+    rows = fit.problem.layout.prior_rows
+    products = X.T @ X
+    products[:b, :b] += rows.T @ rows
+    products[:b, -1] += rows.T @ (rows @ fit.theta)
+    products[-1, :b] = products[:b, -1]
+    return eliminated(products, blocks, scales, b, len(X))
+
+
+def _forms(place: str, table: Table, force: Array) -> Sequence[Form]:
+    count = len(table.axes)
+    if place in OF_FORCE:
+        driver, factor = OF_FORCE[place]
+        over = {"own": force, "cross": force[:, list(CROSS)], "out-of-plane": out_of_plane(force)}[driver]
+        curve = tuple(spline(over[:, k], INTERVALS[driver]) for k in range(count))
+        found = [Form(place, "curve", driver, curve, factor)]
+        return [*found, Form(place, "thresholds", "own", (Clips(THRESHOLDS_G),))] if place == "own-response" else found
+    if place in OF_TABLE:
+        driver, factor = OF_TABLE[place]
+        x = table.column("temperature_c") if driver == "temperature" else table.time_s
+        ends = float(x.min()), float(x.max())
+        found = [Form(place, "line", driver, (Line(*ends),), factor)]
+        found.append(Form(place, "curve", driver, (spline(x, INTERVALS[driver]),), factor))
+        if driver == "time":
+            span = ends[1] - ends[0] or 1.0
+            found.append(Form(place, "settling", driver, (Settling(ends[0], span, span / len(x), AGES),), factor))
+        return found
+    if place == "output":
+        return [Form(place, "curve", "output", (spline(table.outputs.ravel(), INTERVALS[place]),), shared=True)]
+    if place == "force":
+        return [Form(place, "curve", "force", (Products(DEGREE),))]
+    if place == "column:std":
+        squares = [table.column(name) ** 2 for name in table.std_names]
+        lines = tuple(Line(float(q.min()), float(q.max())) for q in squares)
+        return [Form(place, "line", "variance", lines)]
+    x = table.column(place.removeprefix("column:"))
+    line, curve = (Line(float(x.min()), float(x.max())),), (spline(x, COLUMN_INTERVALS),)
+    return [
+        Form(place, "line", place, line),
+        Form(place, "curve", place, curve),
+        Form(place, "scale-line", place, line, "force"),
+        Form(place, "scale-curve", place, curve, "force"),
+    ]
