@@ -198,6 +198,35 @@ class Play:
 
 
 @dataclass(frozen=True)
+class Preisach:
+    """For each width, a spline over what follows x behind a play of that width, g: hysteresis that differs from place
+    to place.
+
+    Every superposition of relays is such a sum: the relays of one width that are closed are those below the play.
+    Source  Brokate and Sprekels, Hysteresis and Phase Transitions (1996), 2.4.
+    """
+
+    widths: tuple[float, ...]
+    low: float
+    high: float
+    intervals: int
+    kind: Literal["preisach"] = "preisach"
+
+    @property
+    def count(self) -> int:
+        """Number of columns."""
+        return len(self.widths) * self._over_play.count
+
+    @property
+    def _over_play(self) -> Spline:
+        return Spline(self.low, self.high, self.intervals, order=1)
+
+    def over(self, plays: Array) -> Array:
+        """Columns from what follows behind each play (n, widths), shape (n, count)."""
+        return np.column_stack([self._over_play(follower) for follower in plays.T])
+
+
+@dataclass(frozen=True)
 class Products:
     """Products of powers of two or three components of a vector on the sphere, up to a degree."""
 
@@ -238,4 +267,4 @@ class Ramp:
         return np.column_stack([np.ones(len(x)), np.abs(x), x])
 
 
-Basis = Spline | Harmonics | Waves | Line | Settling | Clips | Play | Products | Ramp
+Basis = Spline | Harmonics | Waves | Line | Settling | Clips | Play | Preisach | Products | Ramp

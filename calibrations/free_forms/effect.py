@@ -222,7 +222,7 @@ def _left_out(forms: tuple[Form, ...]) -> str:
         return "it follows the standard deviation of the samples of a mean"
     if any(form.driver == "temperature" and form.bases[0].kind == "play" for form in forms):
         return "it remembers earlier temperatures; add temperature-hysteresis in its stead"
-    if any(form.factor == "side" or form.bases[0].kind == "play" for form in forms):
+    if any(form.factor == "side" or form.bases[0].kind in ("play", "preisach") for form in forms):
         return "it follows the way of the stage to each pose"
     return ""
 

@@ -30,7 +30,7 @@ from pydantic import Field
 
 from calibrations.effects.kernels import play, slip_elements
 from calibrations.effects.thermometer import leading_temperature
-from calibrations.free_forms.bases import Basis, Play, Products, Spline
+from calibrations.free_forms.bases import Basis, Play, Preisach, Products, Spline
 from calibrations.free_forms.poses import side, way
 from calibrations.geometry.orientation import nominal_pose, other_in_plane, out_of_plane, specific_force
 from calibrations.table import Array, Table
@@ -104,6 +104,8 @@ class Form:
         if isinstance(basis, Products):
             x, y, z = force.T
             out = np.column_stack([x**i * y**j * z**m for i, j, m in basis.powers])
+        elif isinstance(basis, Preisach):
+            out = np.asarray(_hysteretic(table, basis, self.approach_deg)[k])
         elif isinstance(basis, Play):
             lagging = _lagging(table, basis, self.lead_s) if self.driver == "temperature" else None
             pressed = self.factor == "pressed"
@@ -155,7 +157,7 @@ def _of_table(form: Form, table: Table, k: int) -> Array:
     """Columns of axis k where a column of the table drives them, which no parameter of a model changes."""
     nothing = np.zeros((table.n, 3))
     basis = form.basis(k)
-    assert not isinstance(basis, (Play, Products))  # noqa: S101 forces drive these
+    assert not isinstance(basis, (Play, Preisach, Products))  # noqa: S101 forces drive these
     return basis(form.drive(table, nothing, nothing[:, 0], k))
 
 
@@ -164,6 +166,16 @@ def _lagging(table: Table, basis: Play, lead_s: float) -> Array:
     """What the temperature is ahead of itself behind plays of these widths, over the widths, shape (n, widths)."""
     temperature = leading_temperature(table, lead_s)
     return np.column_stack([(temperature - play(temperature, width)) / width for width in basis.widths])
+
+
+@lru_cache(maxsize=32)
+def _hysteretic(table: Table, basis: Preisach, approach_deg: float) -> Array:
+    """Columns of a Preisach hysteresis of the force along each axis, shape (3, n, count)."""
+    driver = specific_force(nominal_pose(table))
+    widths = np.array(basis.widths)
+    held = slip_elements(driver, way(table, approach_deg), np.ones_like(driver), widths, np.zeros(3))
+    plays = np.moveaxis(driver[:, None, :] - held, 2, 0)
+    return np.ascontiguousarray([basis.over(followers) for followers in plays])
 
 
 @lru_cache(maxsize=32)

@@ -179,7 +179,7 @@ def _needed(columns: Mapping[str, Array], curve: Array, total: float) -> tuple[t
 
 def _follows_many(comp: Component) -> bool:
     """Whether a cause's columns are of many widths, so that they take up a part of most curves."""
-    return comp.cause == "quantisation" or (comp.form is not None and comp.form.basis(0).kind in ("clips", "play"))
+    return comp.cause == "quantisation" or (comp.form is not None and comp.form.basis(0).kind in ("clips", "play", "preisach"))
 
 
 def _jumps(result: SearchResult, name: str) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 
 from calibrations.effects.kernels import play
 from calibrations.effects.thermometer import leading_temperature
-from calibrations.free_forms.bases import Clips, Harmonics, Line, Play, Products, Ramp, Settling, Waves, spline
+from calibrations.free_forms.bases import Clips, Harmonics, Line, Play, Preisach, Products, Ramp, Settling, Waves, spline
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import Basis, Columns, Component, Starts, free, per_axis
 from calibrations.free_forms.form import CROSS, Factor, Form
@@ -26,6 +26,8 @@ from calibrations.table import Array
 
 PRODUCT, GENERAL = 2.0, 8.0  # prices: simple before product before general force
 WIDTHS_G = tuple(np.geomspace(0.01, 1.8, 14).tolist())  # of slip elements
+LOOPS_G = (0.02, 0.06, 0.15, 0.35, 0.8)  # half widths of the loops of a Preisach hysteresis
+LOOP_INTERVALS = 8
 DEAD_G = (0.003, 0.012, 0.05)
 THRESHOLDS_G = tuple(np.geomspace(0.002, 0.2, 8).tolist())  # of dead zones that are not all of one width
 ENDS = (0.75, 0.9, 0.97, 0.99)  # of an axis's range, where saturation begins
@@ -265,6 +267,7 @@ def _history(data: PoseData, first: State) -> list[Component]:
     stated = "approach_deg" in data.table.constants
     begin = (AS_STATED if stated else LOGGED_DEG,)
     found = [_slipping(first, "slip", "", stated)(begin), _slipping(first, "pressed-slip", "pressed", stated)(begin)]
+    found.append(_loops(first, stated)(begin))
     cross, own = first.force[:, list(CROSS)], first.force
     for approach, turn in data.sides.items():
         if np.ptp(turn) == 0:
@@ -288,6 +291,19 @@ def _slipping(first: State, name: str, factor: Factor, stated: bool) -> Make:
         return free(form, first, "hysteresis", PRODUCT if factor else 0.0, shape=shape, step=(2.0,),
                     reshaped=None if stated else _slipping(first, name, factor, stated),
                     constants=(("approach_deg", approach),))  # fmt: skip
+
+    return at
+
+
+def _loops(first: State, stated: bool) -> Make:
+    """Hysteresis whose loops differ from place to place, by how many degrees before a pose its approach begins."""
+
+    def at(shape: tuple[float, ...]) -> Component:
+        approach = AS_STATED if stated else abs(shape[0])
+        reach = 1.05 * float(np.abs(first.force).max())
+        basis = Preisach(LOOPS_G, -reach, reach, LOOP_INTERVALS)
+        form = Form("history", "loops", "way", (basis,), approach_deg=approach)
+        return free(form, first, "hysteresis", GENERAL, constants=(("approach_deg", approach),))
 
     return at
 

@@ -177,7 +177,7 @@ def with_size(form: Form, size: float, added: Array, channels: int) -> Form:
     for k in range(channels):
         count = form.count(k)
         rest = np.cumsum(added[at : at + count][::-1])[::-1]  # from each column on
-        whole = form.basis(k).kind in ("clips", "play", "products", "ramp")
+        whole = form.basis(k).kind in ("clips", "play", "preisach", "products", "ramp")
         sizes.append(size if count else 0.0)
         kept.append(count if whole else max(min(count, 1), int(np.sum(rest > KEPT**2))))
         at += count
