@@ -10,6 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from calibrations.effects.logged import level
 from calibrations.table import Array, Table
 
 RATE = "temperature_rate_c_s"  # input of a product: how fast its thermometer's reading changes, C/s
@@ -41,8 +42,8 @@ def leading_temperature(table: Table, lead_s: float) -> Array:
     shown = table.column("temperature_c")
     if "t_s" not in table or not np.ptp(table.time_s) > 0:
         return shown
-    level, t = _level(table), table.time_s
-    return level + lead_s * _rate(level, t) if lead_s >= 0 else _lagging(level, t, -lead_s)
+    temperature, t = level(table, "temperature_c"), table.time_s
+    return temperature + lead_s * _rate(temperature, t) if lead_s >= 0 else _lagging(temperature, t, -lead_s)
 
 
 def _rate(x: Array, t: Array) -> Array:
@@ -52,21 +53,6 @@ def _rate(x: Array, t: Array) -> Array:
         return np.zeros_like(x)
     mean = np.bincount(row, x) / np.bincount(row)
     return np.asarray(np.gradient(mean, times)[row])
-
-
-@lru_cache(maxsize=16)
-def _level(table: Table) -> Array:
-    """The temperature without the scatter of its readings, (n,), rows in order.
-
-    The straight line is taken off first: the cosine transform continues a record as its mirror image, and the line
-    would have a corner there.
-    """
-    from calibrations.estimators.scatter import without_scatter  # scipy is slow to import, and a list needs none
-
-    shown, rows = table.column("temperature_c"), np.arange(table.n)
-    line = np.polyval(np.polyfit(rows, shown, 1), rows)
-    readings = 1 + int(np.count_nonzero(np.diff(shown)))
-    return np.asarray(line + without_scatter(shown - line, readings)[0])
 
 
 def _lagging(x: Array, t: Array, time_constant_s: float) -> Array:

@@ -10,6 +10,7 @@ Source  Carroll et al., Measurement Error in Nonlinear Models, chapter 4: regres
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.fft import dct, idct
@@ -25,23 +26,40 @@ CURVATURE_STEP = 0.1  # of the logarithm of a ratio: a step in which the likelih
 FLAT = 2.0  # least curvature: a ratio is known to a factor of e, or its likelihood is no parabola
 
 
-def without_scatter(read: Array, readings: int) -> tuple[Array, float]:
+class Level(NamedTuple):
+    """A level (m,), the relative doubt of a slope on it, and the rms errors of it and of its change from row to row."""
+
+    values: Array
+    doubt: float
+    error: float
+    change_error: float
+
+
+def without_scatter(read: Array, readings: int) -> Level:
     """The level beneath the scatter of a column's means (m,), of which each of so many `readings` holds until the next.
 
-    Also the doubt of a slope on it. Frequencies above those of the readings say nothing of their scatter, and are left
+    Frequencies above those of the readings say nothing of their scatter, and are left
     out.
     """
     m = len(read)
     k = np.arange(1, min(m, readings))
     if len(k) < FEWEST_ORDINATES:
-        return read, 0.0
+        return Level(read, 0.0, 0.0, 0.0)
     coefficients = dct(read, type=2, norm="ortho")[k]
     repeats, turn = max(1.0, m / readings), np.pi * k / (2 * m)
     power = (coefficients * repeats * np.sin(turn) / np.sin(repeats * turn)) ** 2  # as if none had been held
     share, doubt = _level_share(power, 2 * np.sin(turn), coefficients**2)
     smoothed = np.zeros(m)
     smoothed[k] = coefficients * share
-    return np.asarray(idct(smoothed, type=2, norm="ortho")), doubt
+    least = np.finfo(float).tiny
+    scatter = np.sum((coefficients * (1 - share)) ** 2) / max(float(np.sum(1 - share)), least)  # of one ordinate, squared
+    errors = scatter * share / m
+    return Level(
+        values=np.asarray(idct(smoothed, type=2, norm="ortho")),
+        doubt=doubt,
+        error=float(np.sqrt(np.sum(errors))),
+        change_error=float(np.sqrt(np.sum(errors * (np.pi * k / m) ** 2))),
+    )
 
 
 def _level_share(power: Array, frequency: Array, weight: Array) -> tuple[Array, float]:

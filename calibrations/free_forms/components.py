@@ -15,6 +15,7 @@ PLACES_OF_FORCE = (
     "own-response", "cross-response", "z-response", "scale-over-cross", "scale-over-z", "force", "history",
 )  # fmt: skip
 DRIFTS = ("temperature-scale", "time-scale")
+PRODUCT, GENERAL = 2.0, 8.0  # prices: simple before product before general force
 Columns = Callable[[State], Array]  # (channels, n, m)
 Starts = tuple[tuple[str, str, float], ...]
 Basis = Callable[[State, int], Array]  # (n, m) of one channel
@@ -34,6 +35,7 @@ class Component:
     constants by which the catalogue effect is the same function, such as the thermometer's lead
     starts    values of the effect's parameters, (parameter, axis or "", value), from the coefficients of the columns
     contains  the effect that its cause becomes where the shape vanishes
+    error     relative rms error of what drives it, a column without the scatter of its readings
     """
 
     name: str
@@ -53,6 +55,7 @@ class Component:
     constants: tuple[tuple[str, float], ...] = ()
     starts: Callable[[Array], Starts] | None = None
     contains: str = ""
+    error: float = 0.0
 
     @property
     def of_force(self) -> bool:
@@ -71,6 +74,9 @@ class Component:
             return np.asarray((by * state.gain)[:, :, None] * self.angle[None])
         assert self.columns is not None  # noqa: S101 every other component has columns
         return self.columns(state) if self.stage == "output" else self.columns(state) * state.gain[:, :, None]
+
+
+Make = Callable[[tuple[float, ...]], Component]  # a component of a shape
 
 
 def per_axis(basis: Basis) -> Columns:

@@ -29,6 +29,7 @@ import numpy as np
 from pydantic import Field
 
 from calibrations.effects.kernels import play, slip_elements
+from calibrations.effects.logged import level
 from calibrations.effects.thermometer import leading_temperature
 from calibrations.free_forms.bases import Basis, Play, Preisach, Products, Spline
 from calibrations.free_forms.poses import side, way
@@ -52,6 +53,7 @@ class Form:
     kept        number of columns that are used, from the smoothest on
     shared      whether all axes have one function (stage angles, output)
     approach_deg, lead_s  of the factor `side` and of slip elements; of the temperature
+    level       whether a logged column drives it without the scatter of its readings
     """
 
     place: str
@@ -64,6 +66,7 @@ class Form:
     shared: bool = False
     approach_deg: float = 0.0
     lead_s: float = 0.0
+    level: bool = False
 
     def basis(self, k: int) -> Basis:
         """The basis of axis k."""
@@ -140,9 +143,8 @@ class Form:
             return table.time_s
         if self.driver == "output":
             return response
-        if self.driver == "variance":
-            return table.column(table.std_names[k]) ** 2
-        return table.column(self.driver.removeprefix("column:"))
+        name, power = (table.std_names[k], 2) if self.driver == "variance" else (self.driver.removeprefix("column:"), 1)
+        return level(table, name, power) if self.level else table.column(name) ** power
 
     def _factor(self, table: Table, force: Array, k: int) -> Array:
         if self.factor == "force":

@@ -24,6 +24,7 @@ LEAST_UNKNOWN, LEAST_UNKNOWN_SHARE = 1.0, 0.05  # the same two of a place withou
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
 CLOSE = 10.0  # of -2 log likelihood: not told apart
 UNSEEN = 0.3  # noise floors: what an effect leaves of a curve, and a wider one does not, says nothing of the mechanism
+READING_ERRORS = 1.5  # times what the errors of noisy columns leave: their size is uncertain
 FORM_OF, MOSTLY = 0.25, 0.85  # size beside a larger place, and share of its gain that another form there takes up
 
 
@@ -78,14 +79,22 @@ def places(result: SearchResult) -> list[ActingPlace]:
     for place, names in by_place.items():
         causes, share = _named(result, place, names, curves[place], Q, b)
         gain, others = _rivals(result, names, {other for other in sizes if sizes[place] < FORM_OF * sizes[other]})
-        least = LEAST_UNKNOWN_SHARE if all("/walk-" in name for name in names) else LEAST_SHARE  # it follows anything
         own = float(np.sqrt(max(gain, 0.0) / len(result.columns)))  # in noise floors: what no other place could take up
-        material = own >= LEAST_SIZE and sizes[place] >= least * largest
+        least = LEAST_SHARE * largest
+        if all("/walk-" in name for name in names):  # it follows anything, the errors of readings too
+            least = max(LEAST_UNKNOWN_SHARE * largest, READING_ERRORS * _reading_errors(result, sizes))
+        material = own >= LEAST_SIZE and sizes[place] >= least
         curve = curves[place].reshape(result.white.shape) * result.white
         out.append(
             ActingPlace(place, sizes[place], largest, tuple(names), causes, share, material, gain, others, curve)
         )
     return sorted(out, key=lambda p: -p.size)
+
+
+def _reading_errors(result: SearchResult, sizes: Mapping[str, float]) -> float:
+    """What the errors of noisy columns leave of the places that they drive, rms over the noise."""
+    driven = {result.component(name).place: result.component(name).error for name in result.active}
+    return float(np.sqrt(sum((error * sizes[place]) ** 2 for place, error in driven.items())))
 
 
 def _part(result: SearchResult, name: str, b: int) -> Array:
@@ -179,7 +188,8 @@ def _needed(columns: Mapping[str, Array], curve: Array, total: float) -> tuple[t
 
 def _follows_many(comp: Component) -> bool:
     """Whether a cause's columns are of many widths, so that they take up a part of most curves."""
-    return comp.cause == "quantisation" or (comp.form is not None and comp.form.basis(0).kind in ("clips", "play", "preisach"))
+    many = ("clips", "play", "preisach")
+    return comp.cause == "quantisation" or (comp.form is not None and comp.form.basis(0).kind in many)
 
 
 def _jumps(result: SearchResult, name: str) -> bool:

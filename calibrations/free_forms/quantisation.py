@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import Component
-from calibrations.free_forms.places import saw
+from calibrations.free_forms.places_of_columns import saw
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.stairs import SAW
 from calibrations.table import Array

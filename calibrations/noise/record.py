@@ -55,7 +55,8 @@ def logged_column(blocks: Sequence[Array], n: int) -> Logged | None:
     if sum(map(len, blocks)) != n or np.ptp(read) == 0:
         return None
     mean = sum(float(np.sum(block)) for block in blocks) / n
-    return Logged(read, *without_scatter(read, readings), mean)
+    level = without_scatter(read, readings)
+    return Logged(read, level.values, level.doubt, mean)
 
 
 # A still record of any length, reduced in one pass to all that its noise is told from.

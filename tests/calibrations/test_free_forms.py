@@ -32,7 +32,7 @@ from calibrations.free_forms.bases import (
 )
 from calibrations.free_forms.effect import FreeForm, free_form, place_of
 from calibrations.free_forms.form import Form
-from calibrations.free_forms.places import _steps
+from calibrations.free_forms.places_of_columns import _steps
 from calibrations.free_forms.reml import gram
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.loop import dataset

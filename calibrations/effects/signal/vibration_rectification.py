@@ -4,6 +4,7 @@ import numpy as np
 import scipy  # its rooms are loaded where they are first entered: a list of effects needs none
 
 from calibrations.effects import Constant, Effect, Parameter, Values
+from calibrations.effects.logged import level
 from calibrations.motion.spectrum import find_records
 from calibrations.table import Array, Table
 
@@ -33,6 +34,7 @@ class VibrationRectification(Effect):
 
     coefficient = Parameter("{out}/g^2", typical=1.0, doc="shift per mean square of the acceleration")
     output_per_g = Constant(_output_per_g)
+    level = Constant(lambda _: 0.0)  # 1: the mean squares of poses without their own scatter; a search finds it
 
     def lacks(self, table: Table) -> str | None:
         if table.kind != "poses":
@@ -45,15 +47,15 @@ class VibrationRectification(Effect):
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
         if table.kind == "poses":
-            return np.asarray(_mean_squares_g2(table, float(p.output_per_g)) * p.coefficient)
+            return np.asarray(_mean_squares_g2(table, float(p.output_per_g), bool(p.level)) * p.coefficient)
         return np.outer(mean_square_g2(table), p.coefficient)
 
 
-def _mean_squares_g2(table: Table, output_per_g: float) -> Array:
+def _mean_squares_g2(table: Table, output_per_g: float, smooth: bool) -> Array:
     """Mean square of the samples of each axis about their mean, less the least of all rows, g^2, shape (n, 3)."""
     out = np.zeros((table.n, 3))
     for k, name in enumerate(table.std_names):
-        squares = (table.column(name) / output_per_g) ** 2
+        squares = (level(table, name, 2) if smooth else table.column(name) ** 2) / output_per_g**2
         out[:, k] = squares - squares.min()
     return out
 

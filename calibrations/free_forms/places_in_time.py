@@ -1,0 +1,194 @@
+"""Components that temperature and time drive: slow noise, thermometer and sensor, warm-up, drift."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from calibrations.effects.kernels import play
+from calibrations.effects.thermometer import leading_temperature
+from calibrations.free_forms.bases import Line, Play, Settling, Waves, spline
+from calibrations.free_forms.chain import State
+from calibrations.free_forms.components import GENERAL, PRODUCT, Columns, Component, Make, Starts, free, per_axis
+from calibrations.free_forms.form import Factor, Form
+from calibrations.free_forms.poses import PoseData
+from calibrations.table import Array
+
+WARMING = (0.04, 0.15, 0.6)  # of the record: time constants
+AGES = 8  # intervals of the logarithm of the time since the record's beginning
+SHORTEST_PART = 1e-3  # the same: shorter ones are over before the second pose
+LEADS_S = (0.0, -90.0, 90.0)  # by which the sensor is ahead of the thermometer
+LONG_LEADS_S = (-300.0, 300.0)  # the same at rest, where an oven warms a whole fixture
+WAVES, WALK_WAVES = 24, 160  # of slow noise, and of a random walk, whose roughness is never small
+PLAYS = (0.05, 0.15, 0.35)  # of the range of temperatures
+BRANCHES = (0.02, 0.035, 0.06, 0.1, 0.17, 0.28, 0.45)  # the same: plays that together are a hysteresis of any shape
+FEWEST_TIMED, FEWEST_NOISE = 12, 20  # rows that can show a function of time, and slow noise
+
+
+def slow_noise(data: PoseData) -> list[Component]:
+    """Flicker noise of each channel: never a cause, always in the model."""
+    if not data.timed or data.n < FEWEST_NOISE:
+        return []
+    basis = Waves(0.0, 1.0, min(WAVES, data.n // 6), 1.0)(data.since)
+    out = []
+    for k in range(data.channels):
+        columns = np.zeros((data.channels, *basis.shape))
+        columns[k] = basis
+        out.append(Component(f"noise/{data.axes[k]}", "noise", "response", columns=_fixed(columns), noise=True))
+    return out
+
+
+def _fixed(columns: Array) -> Columns:
+    return lambda _: columns
+
+
+def _timed(basis: Array) -> Columns:
+    """A function of the row alone, for each axis one."""
+    return per_axis(lambda *_: basis)
+
+
+def _times_force(basis: Array) -> Columns:
+    return per_axis(lambda state, k: state.force[:, k, None] * basis)
+
+
+def over_temperature(data: PoseData, first: State) -> list[Component]:
+    if "temperature_c" not in data.table or np.ptp(data.table.column("temperature_c")) == 0:
+        return []
+    found: list[Component] = []
+    leads = LEADS_S if data.timed else (0.0,)
+    if data.timed and data.at_rest:
+        leads = (*leads, *LONG_LEADS_S)
+    chosen = 2 * np.log(len(leads))
+    factors: tuple[tuple[str, Factor, float], ...] = (
+        ("temperature-bias", "", 0.0),
+        ("temperature-scale", "force", PRODUCT),
+    )
+    for place, factor, price in factors:
+        for lead in leads:
+            more = price + chosen if lead else price
+            found.append(_warmer(data, first, f"{place}/{place}@{lead:g}", place, factor, more)((lead,)))
+        found.append(_curve_over_temperature(data, first, place, factor, price)((0.0,)))
+    if data.timed:
+        temperature = leading_temperature(data.table, 0.0)
+        for part in PLAYS:
+            name = f"temperature-bias/temperature-hysteresis@{part}"
+            found.append(_behind_play(name, temperature)((part * float(np.ptp(temperature)),)))
+        widths = tuple(part * float(np.ptp(temperature)) for part in BRANCHES)
+        form = Form("temperature-bias", "branches", "temperature", (Play(widths),))
+        more = {"general": True, "contains": "temperature-bias", "starts": _middle_play(widths)}
+        found.append(
+            free(form, first, "temperature-hysteresis", GENERAL, **more)
+        )  # after transients: it settles as they do
+    return found
+
+
+def _middle_play(widths: tuple[float, ...]) -> Callable[[Array], Starts]:
+    """Where the fit of one play begins: the mean of the plays, by their weights."""
+
+    def starts(found: Array) -> Starts:
+        weights = np.abs(found.reshape(-1, len(widths))).sum(axis=0)
+        return (("play", "", float(weights @ widths / max(float(weights.sum()), np.finfo(float).tiny))),)
+
+    return starts
+
+
+def _behind_play(name: str, temperature: Array) -> Make:
+    """A line over the temperature behind a play, K."""
+
+    def at(shape: tuple[float, ...]) -> Component:
+        width = abs(shape[0])
+        return Component(
+            name, "temperature-bias", "response", "temperature-hysteresis", "temperature-bias/play", GENERAL,
+            _timed(play(temperature, width)[:, None]), contains="temperature-bias",
+            shape=shape, step=(0.05 * float(np.ptp(temperature)),), reshaped=_behind_play(name, temperature),
+            starts=lambda _: (("play", "", width),),
+        )  # fmt: skip
+
+    return at
+
+
+def _warmer(data: PoseData, first: State, name: str, place: str, factor: Factor, price: float) -> Make:
+    """A line over the temperature that the thermometer will show so many seconds later."""
+
+    def at(shape: tuple[float, ...]) -> Component:
+        T = leading_temperature(data.table, shape[0])
+        basis = (T - T.mean())[:, None]
+        return Component(
+            name, place, "response", place, f"{place}/line", price, _times_force(basis) if factor else _timed(basis),
+            shape=shape, step=(30.0,), constants=(("lead_s", shape[0]),),
+            reshaped=_warmer(data, first, name, place, factor, price) if data.timed else None,
+        )  # fmt: skip
+
+    return at
+
+
+def _curve_over_temperature(data: PoseData, first: State, place: str, factor: Factor, price: float) -> Make:
+    """A curve over the same."""
+
+    def at(shape: tuple[float, ...]) -> Component:
+        smooth = spline(leading_temperature(data.table, shape[0]), 8)
+        form = Form(place, "curve", "temperature", (smooth,), factor, lead_s=shape[0])
+        made = free(form, first, price=price, family=f"{place}/curve", shape=shape, step=(30.0,))
+        return (
+            replace(made, reshaped=_curve_over_temperature(data, first, place, factor, price)) if data.timed else made
+        )
+
+    return at
+
+
+def over_time(data: PoseData, first: State) -> list[Component]:
+    if not data.timed or data.n < FEWEST_TIMED:
+        return []
+    t, u = data.table.time_s, data.since
+    begin, span = float(t.min()), float(np.ptp(t)) or 1.0
+    found: list[Component] = []
+    places: tuple[tuple[str, Factor, str, str, float], ...] = (
+        ("time-bias", "", "warm-up-bias", "bias-drift", 0.0),
+        ("time-scale", "force", "warm-up-scale", "", PRODUCT),
+    )
+    for place, factor, cause, drift, price in places:
+        for tau in WARMING:
+            name = f"{place}/{cause}@{tau:.3f}"
+            more = price + 2 * np.log(len(WARMING))
+            found.append(_warming(data.axes, u, span, name, place, cause, more, factor)((tau,)))
+        line = Form(place, "line", "time", (Line(begin, begin + span),), factor)
+        found.append(free(line, first, drift, price))
+        found.append(free(Form(place, "curve", "time", (spline(t, 12),), factor), first, price=price))
+        settling = Settling(begin, span, span / data.n, AGES)
+        found.append(free(Form(place, "settling", "time", (settling,), factor), first, price=price))
+        if drift:
+            walk = Waves(begin, span, min(WALK_WAVES, data.n // 3), 2.0)
+            for k, axis in enumerate(data.axes):
+                kept = tuple(walk.count if j == k else 0 for j in range(data.channels))
+                found.append(
+                    free(
+                        Form(place, f"walk-{axis}", "time", (walk,), factor, kept=kept),
+                        first,
+                        drift,
+                        price,
+                        general=True,
+                    )
+                )
+    return found
+
+
+def _warming(
+    axes: Sequence[str], u: Array, span_s: float, name: str, place: str, cause: str, price: float, factor: Factor
+) -> Make:
+    """An exponential approach by its time constant, as a share of the record."""
+
+    def at(shape: tuple[float, ...]) -> Component:
+        part = max(shape[0], SHORTEST_PART)
+        left = np.exp(-u / part)[:, None]
+        return Component(
+            name, place, "response", cause, f"{place}/{cause}", price, _times_force(left) if factor else _timed(left),
+            shape=shape, step=(0.2 * shape[0],), reshaped=_warming(axes, u, span_s, name, place, cause, price, factor),
+            starts=lambda amplitudes: (
+                *(("amplitude", axis, float(a)) for axis, a in zip(axes, amplitudes, strict=True)),
+                ("time_constant", "", part * span_s),
+            ),
+        )  # fmt: skip
+
+    return at

@@ -1,0 +1,160 @@
+"""Components that the output and logged columns drive: converter, supply, vibration, any other column.
+
+A column with scatter in its readings is tried as logged, and as its level beneath the scatter.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibrations.effects.logged import level, reading_error
+from calibrations.free_forms.bases import Line, spline
+from calibrations.free_forms.chain import State
+from calibrations.free_forms.components import PRODUCT, Component, Starts, free, per_axis
+from calibrations.free_forms.form import Factor, Form
+from calibrations.free_forms.poses import PoseData
+from calibrations.table import Array, Table
+
+SMOOTH = 2 * math.log(2)  # price of the second of two readings of a column
+LEAST_SCATTER = 0.03  # of a level's rms: with less the readings of a column are its level
+
+
+def over_output(data: PoseData, first: State) -> list[Component]:
+    if data.channels < 2:
+        return []
+    low, high = float(data.outputs.min()), float(data.outputs.max())
+    middle, half = (low + high) / 2, (high - low) / 2 or 1.0
+
+    def powers(s: State) -> Array:
+        u = (s.response - middle) / half
+        return np.stack([u**2, u**3], axis=2)
+
+    return [
+        Component("output/adc-nonlinearity", "output", "output", "adc-nonlinearity", columns=powers),
+        free(Form("output", "curve", "output", (spline(data.outputs.ravel(), 22),), shared=True), first),
+    ]
+
+
+def saw(frequency: float, harmonics: int, price: float, step: float) -> Component:
+    """Quantisation: harmonics of a saw over the output, codes per unit of output; `step` of the frequency to try."""
+    name = f"output/quantisation@{frequency:.6g}"
+
+    def at(shape: tuple[float, ...]) -> Component:
+        def columns(s: State) -> Array:
+            turned = 2 * np.pi * shape[0] * s.response[:, :, None] * np.arange(1, harmonics + 1)
+            scale = 1.0 / np.arange(1, harmonics + 1)
+            return np.concatenate([np.sin(turned) * scale, np.cos(turned) * scale], axis=2)
+
+        return Component(
+            name, "output", "output", "quantisation", "output/quantisation", price, columns,
+            shape=shape, step=(step,), reshaped=at, starts=lambda found: _steps(shape[0], found[0], found[harmonics]),
+        )  # fmt: skip
+
+    return at((frequency,))
+
+
+def _steps(frequency: float, sine: float, cosine: float) -> Starts:
+    """Step, offset and noise of the quantiser whose saw has this first harmonic.
+
+    The saw of rounding is -(q / pi) exp(-2 (pi s / q)^2) sin(2 pi (V - o) / q) and harmonics (Widrow and Kollar, 2008).
+    """
+    step = 1 / frequency
+    fraction = np.clip(np.pi * np.hypot(sine, cosine) / step, 1e-6, 1.0)
+    noise = step / np.pi * np.sqrt(-np.log(fraction) / 2)
+    offset = step / (2 * np.pi) * np.arctan2(cosine, -sine)
+    return ("step", "", step), ("offset", "", float(offset)), ("noise", "", float(noise))
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """Values of a column, or of a column an axis, (n,) each: as logged, or their level, with its relative rms error."""
+
+    values: tuple[Array, ...]
+    is_level: bool = False
+    error: float = 0.0
+
+    @property
+    def price(self) -> float:
+        """What a component must gain more if this reading drives it."""
+        return SMOOTH * self.is_level
+
+    @property
+    def constants(self) -> tuple[tuple[str, float], ...]:
+        """Constants of a catalogue effect that this reading drives."""
+        return (("level", float(self.is_level)),)
+
+    def named(self, name: str) -> str:
+        """The name of a component that this reading drives."""
+        return f"{name}-of-level" if self.is_level else name
+
+
+def _readings(table: Table, names: Sequence[str], power: int = 1) -> list[Reading]:
+    """Columns to a power as logged, and as their level where scatter is a part of them."""
+    logged = tuple(table.column(name) ** power for name in names)
+    levels = tuple(level(table, name, power) for name in names)
+    scatter = max(float(np.std(x - y) / (np.std(y) or 1.0)) for x, y in zip(logged, levels, strict=True))
+    if scatter < LEAST_SCATTER:
+        return [Reading(logged)]
+    error = max(reading_error(table, name, power) for name in names)
+    return [Reading(logged, error=float(np.hypot(scatter, error))), Reading(levels, True, error)]
+
+
+def over_columns(data: PoseData, first: State) -> list[Component]:
+    """Components of the supply, of the scatter of the samples, and of every other column that changes."""
+    table = data.table
+    made: list[Component] = []
+    if "supply_v" in table and np.ptp(table.column("supply_v")) > 0:
+        for supply in _readings(table, ("supply_v",)):
+            made += [_supplied(supply), *_over_column("column:supply_v", supply, first)]
+    if data.spread is not None and np.all(np.ptp(data.spread, axis=1) > 0):
+        for squares in _readings(table, table.std_names, power=2):
+            made += _vibrating(squares, first)
+    for name in data.logged:
+        for reading in _readings(table, (name,)):
+            made += _over_column(f"column:{name}", reading, first)
+    return made
+
+
+def _supplied(supply: Reading) -> Component:
+    """The output in proportion to the supply."""
+    place, cause = "column:supply_v", "supply-sensitivity"
+    (volts,) = supply.values
+    more = (volts / volts.mean() - 1)[:, None]
+    columns = per_axis(lambda state, k: state.response[k, :, None] * more)
+    return Component(
+        supply.named(f"{place}/{cause}"), place, "output", cause, f"{place}/{cause}", supply.price, columns,
+        constants=supply.constants, error=supply.error,
+    )  # fmt: skip
+
+
+def _vibrating(squares: Reading, first: State) -> list[Component]:
+    """A bias over the mean square of the samples of each axis."""
+    place, cause = "column:std", "vibration-rectification"
+    columns = per_axis(lambda _, k: (squares.values[k] - squares.values[k].mean())[:, None])
+    curves = tuple(spline(q, 6) for q in squares.values)
+    curve = Form(place, squares.named("curve"), "variance", curves, level=squares.is_level)
+    return [
+        Component(
+            squares.named(f"{place}/{cause}"), place, "response", cause, f"{place}/{cause}", squares.price, columns,
+            constants=squares.constants, error=squares.error,
+        ),
+        free(curve, first, price=squares.price, family=f"{place}/curve", error=squares.error),
+    ]  # fmt: skip
+
+
+def _over_column(place: str, reading: Reading, first: State) -> list[Component]:
+    """Bias and scale factor over a logged column, as a line and as a curve."""
+    (x,) = reading.values
+    line, curve = (Line(float(x.min()), float(x.max())),), (spline(x, 8),)
+    factors: tuple[tuple[str, Factor, float], ...] = (("", "", 0.0), ("scale-", "force", PRODUCT))
+    made = []
+    for prefix, factor, price in factors:
+        for kind, bases in (("line", line), ("curve", curve)):
+            form = Form(place, reading.named(f"{prefix}{kind}"), place, bases, factor, level=reading.is_level)
+            family = f"{place}/{prefix}{kind}"
+            made.append(free(form, first, price=price + reading.price, family=family, error=reading.error))
+    return made
