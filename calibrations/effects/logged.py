@@ -19,15 +19,16 @@ def level(table: Table, name: str, power: int = 1) -> Array:
     return _without_scatter(table, name, power)[0]
 
 
-def reading_error(table: Table, name: str, power: int = 1) -> float:
-    """Rms error of that level over its rms about its mean, as the scatter of the readings leaves it."""
-    values, error = _without_scatter(table, name, power)
-    return error / (float(np.std(values)) or 1.0)
+def reading_error(table: Table, name: str, power: int = 1, lead_s: float = 0.0) -> float:
+    """Rms error of that level and of `lead_s` times its rate over its rms, as the scatter of the readings leaves it."""
+    values, error, change = _without_scatter(table, name, power)
+    row_s = float(np.ptp(table.time_s)) / max(table.n - 1, 1) or np.inf
+    return float(np.hypot(error, lead_s * change / row_s)) / (float(np.std(values)) or 1.0)
 
 
 @lru_cache(maxsize=32)
-def _without_scatter(table: Table, name: str, power: int) -> tuple[Array, float]:
-    """Level and rms error, in the column's unit to the power.
+def _without_scatter(table: Table, name: str, power: int) -> tuple[Array, float, float]:
+    """Level, its rms error and that of its change from row to row, in the column's unit to the power.
 
     The straight line is taken off first: the cosine transform continues a record as its mirror image, and the line
     would have a corner there.
@@ -37,5 +38,5 @@ def _without_scatter(table: Table, name: str, power: int) -> tuple[Array, float]
     read, rows = table.column(name) ** power, np.arange(table.n)
     line = np.polyval(np.polyfit(rows, read, 1), rows)
     readings = 1 + int(np.count_nonzero(np.diff(read)))
-    found = without_scatter(read - line, readings)
-    return np.asarray(line + found.values), found.error * float(np.sqrt(np.mean(found.values**2)))
+    smooth = without_scatter(read - line, readings)
+    return np.asarray(line + smooth.values), smooth.error, smooth.change_error

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2, kurtosis
 
 from calibrations.free_forms.chain import base_size
 from calibrations.free_forms.components import Component
-from calibrations.free_forms.reml import gains, without
+from calibrations.free_forms.reml import Sizes, gains, without
 from calibrations.free_forms.search import SearchResult, climb
 from calibrations.table import Array
 
@@ -25,6 +25,8 @@ JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process
 CLOSE = 10.0  # of -2 log likelihood: not told apart
 UNSEEN = 0.3  # noise floors: what an effect leaves of a curve, and a wider one does not, says nothing of the mechanism
 READING_ERRORS = 1.5  # times what the errors of noisy columns leave: their size is uncertain
+FOLLOWS = 0.97  # of the variance of a curve over time that a line over a column takes up: no two clocks agree so well
+FOLLOWERS = {"time-bias": ("temperature-bias", "column:std"), "time-scale": ("temperature-scale",)}
 FORM_OF, MOSTLY = 0.25, 0.85  # size beside a larger place, and share of its gain that another form there takes up
 
 
@@ -45,6 +47,7 @@ class ActingPlace:
     gain: float
     inseparable_from: tuple[str, ...]
     curve: Array  # (channels, n), in the output's unit, freed of what the base takes up
+    constants: tuple[tuple[str, float], ...] = ()  # of the cause, where it is that of another place
 
     @property
     def rms(self) -> float:
@@ -78,17 +81,55 @@ def places(result: SearchResult) -> list[ActingPlace]:
     out = []
     for place, names in by_place.items():
         causes, share = _named(result, place, names, curves[place], Q, b)
+        followed = _followed(result, curves, place, Q) if set(causes) <= {"bias-drift"} else None
+        if followed is not None:
+            causes, share = (followed[0].cause,), followed[1]
         gain, others = _rivals(result, names, {other for other in sizes if sizes[place] < FORM_OF * sizes[other]})
-        own = float(np.sqrt(max(gain, 0.0) / len(result.columns)))  # in noise floors: what no other place could take up
         least = LEAST_SHARE * largest
         if all("/walk-" in name for name in names):  # it follows anything, the errors of readings too
             least = max(LEAST_UNKNOWN_SHARE * largest, READING_ERRORS * _reading_errors(result, sizes))
-        material = own >= LEAST_SIZE and sizes[place] >= least
+        material = _own_size(result, gain) >= LEAST_SIZE and sizes[place] >= least
         curve = curves[place].reshape(result.white.shape) * result.white
-        out.append(
-            ActingPlace(place, sizes[place], largest, tuple(names), causes, share, material, gain, others, curve)
-        )
-    return sorted(out, key=lambda p: -p.size)
+        constants = followed[0].constants if followed else ()
+        acting = tuple(names), causes, share, material, gain, others, curve, constants
+        out.append(ActingPlace(place, sizes[place], largest, *acting))
+    return _with_substitutes(result, sorted(out, key=lambda p: -p.size))
+
+
+def _own_size(result: SearchResult, gain: float) -> float:
+    """Size of what no other place could take up, from what it gains, in noise floors."""
+    return float(np.sqrt(max(gain, 0.0) / len(result.columns)))
+
+
+def _with_substitutes(result: SearchResult, acting: Sequence[ActingPlace]) -> list[ActingPlace]:
+    """The places, the larger of two material of which each can take up the other, and neither is so alone.
+
+    The smaller one is what the data cannot separate from it.
+    """
+    out = list(acting)
+    for i, place in enumerate(out):
+        if place.material or place.size < max(LEAST_SIZE, LEAST_SHARE * place.largest):
+            continue
+        for other in (o for o in out[i + 1 :] if not o.material):
+            gain = _lost(result, (*place.components, *other.components))
+            if _own_size(result, gain) >= LEAST_SIZE:
+                names = other.causes or (other.name,)
+                others = tuple(sorted({*place.inseparable_from, *names} - set(place.causes)))
+                out[i] = replace(place, material=True, gain=gain, inseparable_from=others)
+                break
+    return out
+
+
+def _lost(result: SearchResult, names: Sequence[str]) -> float:
+    """What the fit loses without some components, of twice the log-likelihood."""
+    return _without(result, names).deviance - result.sizes.deviance
+
+
+def _without(result: SearchResult, names: Sequence[str]) -> Sizes:
+    sizes = result.sizes
+    for name in names:
+        sizes = without(result.gram, sizes, name)
+    return sizes
 
 
 def _reading_errors(result: SearchResult, sizes: Mapping[str, float]) -> float:
@@ -125,21 +166,30 @@ def _named(
     if all(result.component(name).form is None for name in names):
         needed, share = _needed({cause: columns[cause][0] for cause in acting}, curve, total)
         return _one_name(result, names, needed, curve, Q), share
-    chosen: list[str] = []
+    chosen: dict[str, Array] = {}
     share = 0.0
+    walks = {result.component(name).cause for name in names if "/walk-" in name}
+    first = [cause for cause in acting if cause and cause not in walks] if walks else []  # a walk follows anything
     while True:
         full = len(set(chosen) - acting.keys()) >= MOST_FORMS
-        tried = {}
-        for cause in columns:
+        tried: dict[str, tuple[float, Array]] = {}
+        for cause in first or columns:
             if cause in chosen or (full and cause not in acting):
                 continue
-            tried[cause] = max(1 - _left([*(columns[c][0] for c in chosen), X], curve) / total for X in columns[cause])
-        best = max(tried, key=lambda c: tried[c], default="")
-        if not best or tried[best] - share < (NEXT_FORM if chosen else 0.2):
-            break
-        chosen.append(best)
-        share = tried[best]
-    found = _one_name(result, names, chosen, curve, Q)
+            beside = list(chosen.values())
+            options = columns[cause]
+            if cause not in acting:
+                options = [*options, *_at_best_shapes(result, forms[cause], curve, beside, Q)]
+            left, X = min(((_left([*beside, X], curve), X) for X in options), key=lambda option: option[0])
+            tried[cause] = 1 - left / total, X
+        best = max(tried, key=lambda c: tried[c][0], default="")
+        if not best or tried[best][0] - share < (NEXT_FORM if chosen else 0.2):
+            if not first:
+                break
+            first = []
+            continue
+        share, chosen[best] = tried[best]
+    found = _one_name(result, names, tuple(chosen), curve, Q)
     enough = NAMED if len(set(found) - acting.keys()) < MOST_FORMS else NAMED_TOGETHER
     return (found, share) if share >= enough else ((), share)
 
@@ -154,23 +204,60 @@ def _one_name(
     told = dict.fromkeys(chosen)
     for outer in (comp for comp in map(result.component, names) if comp.contains):
         alone = [c for c in result.components if c.cause == outer.contains and c.place == outer.place and not c.form]
-        left = min((_left_at_best(result, c, curve, Q) for c in alone), default=np.inf)
+        left = min((_left_at_best(result, c, curve, Q)[0] for c in alone), default=np.inf)
         name = outer.cause if np.sqrt(left / len(curve)) > UNSEEN else outer.contains
         told = dict.fromkeys(name if cause in (outer.cause, outer.contains) else cause for cause in told)
     return tuple(told)
 
 
-def _left_at_best(result: SearchResult, comp: Component, curve: Array, Q: Array) -> float:
-    """What a component leaves of a curve, sum of squares, at the shape that leaves least."""
+def _followed(
+    result: SearchResult, curves: Mapping[str, Array], place: str, Q: Array
+) -> tuple[Component, float] | None:
+    """The line over a temperature or a logged column that a curve over time follows, and its share of the variance.
+
+    A smooth curve over time has no scatter of a reader, and is likelier than a column that has, however well it follows
+    the column. None where it follows none, or is not over time.
+    """
+    if place not in FOLLOWERS:
+        return None
+    curve = curves[place] + sum(curves[other] for other in FOLLOWERS[place] if other in curves)
+    total, least = float(curve @ curve) or 1.0, 1 - FOLLOWS
+    best = None
+    for comp in result.components:
+        if comp.cause and comp.place in FOLLOWERS[place] and comp.form is None and not comp.contains:
+            left, shaped = _left_at_best(result, comp, curve, Q)
+            if left / total < least:
+                best, least = shaped, left / total
+    return None if best is None else (best, 1 - least)
+
+
+def _left_at_best(
+    result: SearchResult, comp: Component, curve: Array, Q: Array, beside: Sequence[Array] = ()
+) -> tuple[float, Component]:
+    """What a component leaves of a curve, sum of squares, at the shape that leaves least, and in that shape."""
 
     def left(shape: tuple[float, ...]) -> float:
         made = comp.reshaped(shape) if comp.reshaped is not None else comp
-        X = made.jacobian(result.state) / result.white[:, :, None]
-        return _left([_freed(Q, X.reshape(-1, X.shape[2]))], curve)
+        return _left([*beside, _columns_of(result, made, Q)], curve)
 
     if comp.reshaped is None:
-        return left(comp.shape)
-    return left(climb(lambda shape: -left(shape), comp.shape, comp.step))
+        return left(comp.shape), comp
+    best = climb(lambda shape: -left(shape), comp.shape, comp.step)
+    return left(best), comp.reshaped(best)
+
+
+def _at_best_shapes(
+    result: SearchResult, comps: Sequence[Component], curve: Array, beside: Sequence[Array], Q: Array
+) -> list[Array]:
+    """Columns of the components of one cause that have one value of shape, each at the shape that leaves least."""
+    shaped = [c for c in comps if c.reshaped is not None and len(c.shape) == 1 and c.form is None]
+    return [_columns_of(result, _left_at_best(result, c, curve, Q, beside)[1], Q) for c in shaped]
+
+
+def _columns_of(result: SearchResult, comp: Component, Q: Array) -> Array:
+    """Columns of a component over the noise, freed of what the base takes up, (channels * n, m)."""
+    X = comp.jacobian(result.state) / result.white[:, :, None]
+    return _freed(Q, X.reshape(-1, X.shape[2]))
 
 
 def _needed(columns: Mapping[str, Array], curve: Array, total: float) -> tuple[tuple[str, ...], float]:
@@ -228,9 +315,7 @@ def _rivals(result: SearchResult, names: Sequence[str], larger: set[str]) -> tup
     Of one component those that gain nearly as much. At a `larger` place that acts, also a form that gains most of it:
     the form of a mechanism is never quite that of the catalogue.
     """
-    others = result.sizes
-    for name in names:
-        others = without(result.gram, others, name)
+    others = _without(result, names)
     lost = others.deviance - result.sizes.deviance
     acting = [result.component(name) for name in names]
     rest = [c for c in result.components if c.name not in result.sizes.variances and c.place != acting[0].place]

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from calibrations.effects.kernels import play
+from calibrations.effects.logged import reading_error
 from calibrations.effects.thermometer import leading_temperature
 from calibrations.free_forms.bases import Line, Play, Settling, Waves, spline
 from calibrations.free_forms.chain import State
@@ -119,6 +120,7 @@ def _warmer(data: PoseData, first: State, name: str, place: str, factor: Factor,
             name, place, "response", place, f"{place}/line", price, _times_force(basis) if factor else _timed(basis),
             shape=shape, step=(30.0,), constants=(("lead_s", shape[0]),),
             reshaped=_warmer(data, first, name, place, factor, price) if data.timed else None,
+            error=reading_error(data.table, "temperature_c", lead_s=shape[0]) if data.timed else 0.0,
         )  # fmt: skip
 
     return at
@@ -128,9 +130,10 @@ def _curve_over_temperature(data: PoseData, first: State, place: str, factor: Fa
     """A curve over the same."""
 
     def at(shape: tuple[float, ...]) -> Component:
+        error = reading_error(data.table, "temperature_c", lead_s=shape[0]) if data.timed else 0.0
         smooth = spline(leading_temperature(data.table, shape[0]), 8)
         form = Form(place, "curve", "temperature", (smooth,), factor, lead_s=shape[0])
-        made = free(form, first, price=price, family=f"{place}/curve", shape=shape, step=(30.0,))
+        made = free(form, first, price=price, family=f"{place}/curve", shape=shape, step=(30.0,), error=error)
         return (
             replace(made, reshaped=_curve_over_temperature(data, first, place, factor, price)) if data.timed else made
         )

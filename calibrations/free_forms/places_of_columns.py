@@ -20,6 +20,7 @@ from calibrations.free_forms.poses import PoseData
 from calibrations.table import Array, Table
 
 SMOOTH = 2 * math.log(2)  # price of the second of two readings of a column
+MOST_ERROR = 0.5  # of a level's rms: with more it follows the scatter, which may resemble anything
 LEAST_SCATTER = 0.03  # of a level's rms: with less the readings of a column are its level
 
 
@@ -100,7 +101,8 @@ def _readings(table: Table, names: Sequence[str], power: int = 1) -> list[Readin
     if scatter < LEAST_SCATTER:
         return [Reading(logged)]
     error = max(reading_error(table, name, power) for name in names)
-    return [Reading(logged, error=float(np.hypot(scatter, error))), Reading(levels, True, error)]
+    raw = Reading(logged, error=float(np.hypot(scatter, error)))
+    return [raw, Reading(levels, True, error)] if error < MOST_ERROR else [raw]
 
 
 def over_columns(data: PoseData, first: State) -> list[Component]:

@@ -120,6 +120,8 @@ class Structure:
     def constants(self, cause: str) -> dict[str, float]:
         """Constants by which a catalogue effect is the function that was found."""
         for place in self.places:
+            if cause in place.causes and place.constants:
+                return dict(place.constants)
             for name in place.components:
                 component = self.result.component(name)
                 if component.cause == cause and component.constants:

@@ -139,7 +139,7 @@ def _off(seed: int, scatter: float, n: int = 3000) -> tuple[float, float]:
     tones = random.standard_normal(n - 1) / np.sqrt(np.sin(np.pi * np.arange(1, n) / (2 * n)))
     true = idct(np.concatenate([[0.0], tones]), norm="ortho")
     read = true + scatter * true.std() * random.standard_normal(n)
-    level, doubt, _ = without_scatter(read - read.mean(), n)
+    level, doubt, *_ = without_scatter(read - read.mean(), n)
     slope = true @ level / (level @ level)
     std = np.std(true - slope * level) / np.linalg.norm(level)
     return (slope - 1) / np.hypot(std, doubt * slope), (slope - 1) / std
