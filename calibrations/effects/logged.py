@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
 
+from calibrations.geometry.smooth import smooth_columns
 from calibrations.table import Array, Table
 
 
@@ -24,6 +26,27 @@ def reading_error(table: Table, name: str, power: int = 1, lead_s: float = 0.0) 
     values, error, change = _without_scatter(table, name, power)
     row_s = float(np.ptp(table.time_s)) / max(table.n - 1, 1) or np.inf
     return float(np.hypot(error, lead_s * change / row_s)) / (float(np.std(values)) or 1.0)
+
+
+def follows_level(table: Table, names: Sequence[str], power: int = 1) -> float:
+    """1.0 where the outputs of poses follow the level of a column, one or one an axis, more closely than its readings.
+
+    Else 0.0. Smooth functions of where gravity points are beside it, as whatever else the sensor has may follow those.
+    """
+    if table.kind != "poses" or any(name not in table for name in names):
+        return 0.0
+    smooth = np.column_stack([np.ones(table.n), smooth_columns(table)])
+
+    def left(columns: Sequence[Array]) -> float:
+        total = 0.0
+        for k, output in enumerate(table.outputs.T):
+            X = np.column_stack([smooth, columns[k % len(columns)]])
+            X /= np.maximum(np.linalg.norm(X, axis=0), np.finfo(float).tiny)
+            total += float(np.sum((output - X @ np.linalg.lstsq(X, output, rcond=1e-9)[0]) ** 2))
+        return total
+
+    readings = [table.column(name) ** power for name in names]
+    return float(left([level(table, name, power) for name in names]) < left(readings))
 
 
 @lru_cache(maxsize=32)

@@ -14,6 +14,7 @@ from scipy.interpolate import BSpline
 
 from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
+from calibrations.effects import kernels
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import ModelError
 from calibrations.fitting.fit import Fit, evaluate, fit, refit
@@ -24,6 +25,7 @@ from calibrations.free_forms.bases import (
     Harmonics,
     Line,
     Play,
+    Preisach,
     Products,
     Settling,
     Spline,
@@ -69,6 +71,28 @@ def with_curve(size: float, table: Table) -> Fit:
     form = Form("own-response", "curve", "own", (over, over), sizes=(size, size))
     start = fit(read_model("linear"), table)
     return refit(start, start.model.with_effect(free_form((form,))))
+
+
+def test_relays_at_any_place_are_a_sum_of_functions_of_plays() -> None:
+    """2,000 relays with centres on one side, along a path with minor loops."""
+    random = np.random.default_rng(4)
+    path = np.interp(np.arange(400) / 40, np.arange(11), random.uniform(-1, 1, 11))
+    centre, half = random.normal(0.4, 0.15, 2000), random.uniform(0.05, 0.6, 2000)
+    closed, output = path[0] > centre, np.empty(len(path))
+    for i, x in enumerate(path):
+        closed = np.where(x > centre + half, True, np.where(x < centre - half, False, closed))
+        output[i] = np.mean(closed)
+    widths = tuple(np.linspace(0.05, 0.6, 6))
+    plays = np.column_stack([kernels.play(path, width) for width in widths])
+    columns = np.column_stack([np.ones(len(path)), Preisach(widths, -1.05, 1.05, 8).over(plays)])
+    slips = np.column_stack([np.ones(len(path)), path, path[:, None] - plays])
+
+    def left(X: Array) -> float:
+        return float(np.std(output - X @ np.linalg.lstsq(X, output, rcond=1e-9)[0]) / np.std(output))
+
+    assert columns.shape[1] == 1 + Preisach(widths, -1.05, 1.05, 8).count
+    assert left(columns) < 0.02
+    assert left(slips) > 5 * left(columns)
 
 
 def test_columns_of_a_spline_have_unit_roughness_and_are_independent() -> None:

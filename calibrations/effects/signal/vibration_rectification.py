@@ -4,7 +4,7 @@ import numpy as np
 import scipy  # its rooms are loaded where they are first entered: a list of effects needs none
 
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.effects.logged import level
+from calibrations.effects.logged import follows_level, level
 from calibrations.motion.spectrum import find_records
 from calibrations.table import Array, Table
 
@@ -34,7 +34,7 @@ class VibrationRectification(Effect):
 
     coefficient = Parameter("{out}/g^2", typical=1.0, doc="shift per mean square of the acceleration")
     output_per_g = Constant(_output_per_g)
-    level = Constant(lambda _: 0.0)  # 1: the mean squares of poses without their own scatter; a search finds it
+    level = Constant(lambda table: follows_level(table, table.std_names, 2))  # 1: mean squares without their scatter
 
     def lacks(self, table: Table) -> str | None:
         if table.kind != "poses":
