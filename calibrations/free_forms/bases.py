@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 import scipy  # its room of interpolation is loaded where it is first entered
+from numpy.typing import NDArray
 
 from calibrations.table import Array
 
@@ -44,16 +45,25 @@ class Spline:
 
     def __call__(self, x: Array) -> Array:
         """Columns at x (n,), shape (n, count)."""
-        inside = np.clip(x, self.low, self.high - 1e-12 * (self.high - self.low))
-        knots, turn = _turned(self.low, self.high, self.intervals, self.order)
-        return np.asarray(scipy.interpolate.BSpline.design_matrix(inside, knots, DEGREE).toarray() @ turn)
+        numbers, weights = self._weights(x)
+        splines = np.zeros((len(x), self.intervals + DEGREE))
+        np.put_along_axis(splines, numbers, weights, axis=1)
+        return np.asarray(splines @ self.on_splines)
 
     def summed(self, x: Array, coefficients: Array) -> Array:
         """The sum of the first columns with these coefficients at x (n,), shape (n,): faster than its columns."""
-        inside = np.clip(x, self.low, self.high - 1e-12 * (self.high - self.low))
-        knots, turn = _turned(self.low, self.high, self.intervals, self.order)
-        on_splines = turn[:, : len(coefficients)] @ coefficients
-        return np.asarray(scipy.interpolate.BSpline(knots, on_splines, DEGREE)(inside))
+        numbers, weights = self._weights(x)
+        on_splines = self.on_splines[:, : len(coefficients)] @ coefficients
+        return np.asarray(np.sum(on_splines[numbers] * weights, axis=1))
+
+    def _weights(self, x: Array) -> tuple[NDArray[np.intp], Array]:
+        """Numbers and values of the four B-splines that are not 0 at x (n,), shape (n, 4) each."""
+        at = np.clip((x - self.low) * (self.intervals / (self.high - self.low)), 0.0, self.intervals * (1 - 1e-12))
+        first = at.astype(np.intp)
+        t = at - first
+        s = 1 - t
+        weights = np.stack([s**3, 4 - 3 * t * t * (2 - t), 4 - 3 * s * s * (2 - s), t**3], axis=1) / 6
+        return first[:, None] + np.arange(DEGREE + 1), weights
 
 
 @lru_cache(maxsize=256)
@@ -249,6 +259,12 @@ class Products:
     def count(self) -> int:
         """Number of products."""
         return len(self.powers)
+
+    def __call__(self, a: Array) -> Array:
+        """Columns at vectors a (n, 3), shape (n, count)."""
+        i, j, m = np.array(self.powers).T
+        x, y = (np.vander(component, self.degree + 1, increasing=True) for component in a.T[:2])
+        return np.asarray(x[:, i] * y[:, j] * np.where(m, a[:, 2:], 1.0))
 
 
 @dataclass(frozen=True)

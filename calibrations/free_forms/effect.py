@@ -116,37 +116,56 @@ class FreeForm(Effect):
             self._names[k] = [(_name(form, j), form.shared) for form in self.forms for j in range(form.count(k))]
         return np.array([float(p[name] if shared else p[name][k]) for name, shared in self._names[k]])
 
-    def _columns(self, table: Table, force: Array, response: Array, k: int) -> Array:
-        """Columns of all forms for axis k, shape (n, count). Those of the last table alone are kept."""
+    def _columns(self, table: Table, force: Array, k: int) -> Array:
+        """Columns of all forms for axis k, shape (n, count)."""
+        return np.hstack([self._columns_of(i, table, force, k) for i in range(len(self.forms))])
+
+    def _columns_of(self, i: int, table: Table, force: Array, k: int) -> Array:
+        """Columns of one form for axis k, shape (n, count). Those that follow from the last table alone are kept."""
+        form = self.forms[i]
+        if not form.of_table:
+            return form.columns(table, force, np.zeros(len(force)), k)
         if self._of_table is None or self._of_table[0] is not table:
             self._of_table = (table, {})
         kept = self._of_table[1]
-        blocks = []
+        if (i, k) not in kept:
+            kept[i, k] = form.columns(table, force, np.zeros(len(force)), k)
+        return kept[i, k]
+
+    def _summed(self, table: Table, force: Array, response: Array, k: int, coefficients: Array) -> Array:
+        """The sum of all columns for axis k with these coefficients, shape (n,)."""
+        out, at = np.zeros(len(force)), 0
         for i, form in enumerate(self.forms):
-            if form.of_table and (i, k) in kept:
-                blocks.append(kept[i, k])
-                continue
-            blocks.append(form.columns(table, force, response, k))
+            own = coefficients[at : at + form.count(k)]
+            at += len(own)
             if form.of_table:
-                kept[i, k] = blocks[-1]
-        return np.hstack(blocks)
+                out += self._columns_of(i, table, force, k) @ own
+            else:
+                out += form.summed(table, force, response, k, own)
+        return out
 
     def _kept_columns(self, table: Table, force: Array) -> list[Array]:
         """Columns of each axis. Those of the last force are kept: a jacobian asks for them once a parameter."""
-        if self._last is None or self._last[0] is not table or self._last[1] is not force:
-            nothing = np.zeros(len(force))
-            columns = [self._columns(table, force, nothing, k) for k in range(len(table.axes))]
-            self._last = (table, force, columns)
+        if self._last is None or not self._has_columns(table, force):
+            self._last = (table, force, [self._columns(table, force, k) for k in range(len(table.axes))])
         return self._last[2]
+
+    def _has_columns(self, table: Table, force: Array) -> bool:
+        return self._last is not None and self._last[0] is table and self._last[1] is force
 
 
 class _OnResponse(FreeForm):
     """Adds to the output of each axis, (n, 3)."""
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
-        out = np.zeros(a.shape)
-        for k, columns in enumerate(self._kept_columns(table, a)):
-            out[:, k] = columns @ self._coefficients(p, k)
+        out, nothing = np.zeros(a.shape), np.zeros(len(a))
+        known = self._has_columns(table, a)
+        for k in range(len(table.axes)):
+            coefficients = self._coefficients(p, k)
+            if known:
+                out[:, k] = self._kept_columns(table, a)[k] @ coefficients
+            else:
+                out[:, k] = self._summed(table, a, nothing, k, coefficients)
         return out
 
     def columns(self, a: Array, table: Table) -> dict[str, Array]:
@@ -164,11 +183,7 @@ class _AtOutput(FreeForm):
     def output(self, v: Array, table: Table, p: Values) -> Array:
         out = v.copy()
         for k in range(len(table.axes)):
-            coefficients, at = self._coefficients(p, k), 0
-            for form in self.forms:
-                own = coefficients[at : at + form.count(k)]
-                out[:, k] += form.summed(table, v, v[:, k], k, own)
-                at += len(own)
+            out[:, k] += self._summed(table, v, v[:, k], k, self._coefficients(p, k))
         return out
 
 

@@ -105,8 +105,7 @@ class Form:
         """
         basis, kept = self.basis(k), self.count(k)
         if isinstance(basis, Products):
-            x, y, z = force.T
-            out = np.column_stack([x**i * y**j * z**m for i, j, m in basis.powers])
+            out = basis(force)
         elif isinstance(basis, Preisach):
             out = np.asarray(_hysteretic(table, basis, self.approach_deg)[k])
         elif isinstance(basis, Play):
@@ -123,8 +122,9 @@ class Form:
     def summed(self, table: Table, force: Array, response: Array, k: int, coefficients: Array) -> Array:
         """The sum of the columns of axis k with these coefficients, shape (n,)."""
         basis = self.basis(k)
-        if isinstance(basis, Spline) and self.driver in MODELLED and not self.factor:
-            return basis.summed(self.drive(table, force, response, k), coefficients)
+        if isinstance(basis, Spline) and self.driver in MODELLED:
+            out = basis.summed(self.drive(table, force, response, k), coefficients)
+            return out * self._factor(table, force, k) if self.factor else out
         return np.asarray(self.columns(table, force, response, k) @ coefficients)
 
     def drive(self, table: Table, force: Array, response: Array, k: int) -> Array:

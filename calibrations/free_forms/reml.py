@@ -27,6 +27,7 @@ NOTHING = 1e-9  # of the largest base column: a smaller one is rounding, as the 
 LEAST_BESIDE = 1e-3  # of a component's squares: less beside the base is not magnified
 ROUNDS = 40
 SETTLED = 0.02  # of a variance
+REACH = 20.0  # times what a step gains: a deviance that is farther is out of reach
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,8 +199,17 @@ def _root(K: Array) -> tuple[Array, bool]:
             more = max(100 * more, 1e-12 * float(np.max(np.diag(K))))
 
 
-def estimate(g: Gram, variances: Mapping[str, float], most: Mapping[str, float], rounds: int = ROUNDS) -> Sizes:
-    """Variances of greatest restricted likelihood, none above `most`, by Fellner-Schall steps with extrapolation."""
+def estimate(
+    g: Gram,
+    variances: Mapping[str, float],
+    most: Mapping[str, float],
+    rounds: int = ROUNDS,
+    wanted: float = np.inf,
+) -> Sizes:
+    """Variances of greatest restricted likelihood, none above `most`, by Fellner-Schall steps with extrapolation.
+
+    The steps end early where the deviance will not fall to `wanted`: each gains less than the one before.
+    """
     present = {name: min(v, most.get(name, np.inf)) for name, v in variances.items()}
     products = _Products.of(g, list(present))
     fit = products.solved(present)
@@ -222,7 +232,7 @@ def estimate(g: Gram, variances: Mapping[str, float], most: Mapping[str, float],
         if gained < -0.5:
             break
         present, fit = changed, after
-        if moved < SETTLED or abs(gained) < 0.01:
+        if moved < SETTLED or abs(gained) < 0.01 or fit.deviance - REACH * gained > wanted:
             break
     return fit.sizes
 

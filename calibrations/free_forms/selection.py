@@ -171,7 +171,7 @@ def _exchanged(
         others = without(g, sizes, name)
         beside = acting_places(others.variances, by_name)
         own = price(by_name[name], beside)
-        alone = estimate(g, others.variances, most, 12)
+        alone = estimate(g, others.variances, most, 12, sizes.deviance + own + LEAVE)
         if alone.deviance - sizes.deviance - own <= LEAVE:  # the others take its part
             steps.append(f"-{name}")
             sizes = alone

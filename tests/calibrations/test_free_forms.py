@@ -14,7 +14,7 @@ from scipy.interpolate import BSpline
 
 from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
-from calibrations.effects import kernels
+from calibrations.effects import Values, kernels
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import ModelError
 from calibrations.fitting.fit import Fit, evaluate, fit, refit
@@ -35,7 +35,7 @@ from calibrations.free_forms.bases import (
 from calibrations.free_forms.effect import FreeForm, free_form, place_of
 from calibrations.free_forms.form import Form
 from calibrations.free_forms.places_of_columns import _steps
-from calibrations.free_forms.reml import gram
+from calibrations.free_forms.reml import estimate, gram
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.loop import dataset
 from calibrations.model.file import dump_model, parse_model, read_model
@@ -108,6 +108,41 @@ def test_columns_of_a_spline_have_unit_roughness_and_are_independent() -> None:
 @pytest.mark.parametrize("basis", [Spline(0.0, 1.0, 5), Harmonics(2, 4), Waves(0.0, 1.0, 6, 2.0), Line(0.0, 1.0)])
 def test_a_basis_has_as_many_columns_as_it_counts(basis: Spline | Harmonics | Waves | Line) -> None:
     assert basis(np.linspace(0.0, 1.0, 30)).shape == (30, basis.count)
+
+
+def test_columns_of_a_spline_are_cubic_b_splines_that_end_constant() -> None:
+    basis = Spline(-1.0, 1.0, 8)
+    knots, turn = bases._turned(basis.low, basis.high, basis.intervals, basis.order)
+    x = np.linspace(-1.0, 1.0, 401)[:-1]
+    np.testing.assert_allclose(basis(x), BSpline(knots, turn, DEGREE)(x), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(basis(np.array([-3.0, 3.0])), basis(np.array([-1.0, 1.0])), rtol=0, atol=1e-12)
+
+
+def test_products_are_products_of_powers() -> None:
+    a = np.random.default_rng(2).standard_normal((20, 3))
+    x, y, z = a.T
+    expected = np.column_stack([x**i * y**j * z**m for i, j, m in Products(4).powers])
+    np.testing.assert_allclose(Products(4)(a), expected, rtol=1e-12)
+
+
+def test_a_free_form_adds_the_same_whether_its_columns_are_kept_or_not() -> None:
+    over, table, a = (
+        spline(np.linspace(-1.0, 1.0, 50), 12),
+        poses(np.zeros((len(forces_of_sweep()), 2))),
+        forces_of_sweep(),
+    )
+    forms = (
+        Form("scale-over-cross", "curve", "cross", (over,), "force", sizes=(1.0, 1.0)),
+        Form("scale-over-cross", "line", "cross", (Line(-1.0, 1.0),), sizes=(1.0, 1.0)),
+    )
+    effect = free_form(forms)
+    rng = np.random.default_rng(3)
+    p = Values({q.name: np.append(rng.standard_normal(2), 0.0) for q in effect.parameters})
+    summed = effect.transduction(a, table, p)
+    columns = effect.columns(a, table)
+    assert columns is not None
+    np.testing.assert_allclose(summed, sum(columns[name] * p[name] for name in p), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(effect.transduction(a, table, p), summed, rtol=0, atol=1e-12)
 
 
 def test_the_sum_of_a_spline_is_that_of_its_columns() -> None:
@@ -270,6 +305,18 @@ def test_forces_of_the_chain_drive_the_form() -> None:
 def test_in_few_poses_effects_are_searched_without_places() -> None:
     found = discover(poses(1e-3 * forces_of_sweep()[:, :2] ** 3).rows(np.arange(8)))
     assert found.findings.places == ()
+
+
+@pytest.mark.parametrize("beyond", [-50.0, -0.1, 0.1, 50.0])
+def test_sizes_that_end_early_decide_as_those_that_do_not(beyond: float) -> None:
+    rng = np.random.default_rng(4)
+    X = rng.standard_normal((200, 13))
+    X[:, 12] += X[:, 2:12] @ np.repeat([1.0, 0.03], 5)
+    g = gram(X, {"large": slice(0, 5), "small": slice(5, 10)}, {"large": 1.0, "small": 1.0}, 2)
+    variances = {"large": 1e-3, "small": 1e-1}
+    whole = estimate(g, variances, {})
+    early = estimate(g, variances, {}, wanted=whole.deviance + beyond)
+    assert (early.deviance <= whole.deviance + beyond) is (beyond > 0)
 
 
 def test_a_base_column_of_rounding_takes_up_nothing() -> None:
