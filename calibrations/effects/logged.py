@@ -10,14 +10,17 @@ import numpy as np
 from calibrations.geometry.smooth import smooth_columns
 from calibrations.table import Array, Table
 
+UNKNOWN_LEVEL = 0.5  # error of a level over its rms: with more it follows the scatter, which may resemble anything
+EVIDENT = 10.0  # gain of -2 log likelihood by which outputs follow a level, and not its readings
+
 
 def level(table: Table, name: str, power: int = 1) -> Array:
     """A column to a power of 1 or 2 without the scatter of its readings, shape (n,), rows in order of time.
 
     As logged where no time changes, as in a single row: the scatter is known from the neighbours.
     """
-    if "t_s" not in table or not np.ptp(table.time_s) > 0:
-        return np.asarray(table.column(name) ** power)
+    if not timed(table):
+        return table.column(name) if power == 1 else table.column(name) ** power
     return _without_scatter(table, name, power)[0]
 
 
@@ -28,12 +31,22 @@ def reading_error(table: Table, name: str, power: int = 1, lead_s: float = 0.0) 
     return float(np.hypot(error, lead_s * change / row_s)) / (float(np.std(values)) or 1.0)
 
 
+def level_is_known(table: Table, name: str, power: int = 1) -> bool:
+    """Whether the readings show a level beneath their scatter, and not scatter alone."""
+    return timed(table) and reading_error(table, name, power) < UNKNOWN_LEVEL
+
+
+def timed(table: Table) -> bool:
+    """Whether the rows have a time that changes."""
+    return table.n > 1 and "t_s" in table and bool(np.ptp(table.time_s) > 0)
+
+
 def follows_level(table: Table, names: Sequence[str], power: int = 1) -> float:
     """1.0 where the outputs of poses follow the level of a column, one or one an axis, more closely than its readings.
 
     Else 0.0. Smooth functions of where gravity points are beside it, as whatever else the sensor has may follow those.
     """
-    if table.kind != "poses" or any(name not in table for name in names):
+    if table.kind != "poses" or any(name not in table or not level_is_known(table, name, power) for name in names):
         return 0.0
     smooth = np.column_stack([np.ones(table.n), smooth_columns(table)])
 
@@ -46,7 +59,8 @@ def follows_level(table: Table, names: Sequence[str], power: int = 1) -> float:
         return total
 
     readings = [table.column(name) ** power for name in names]
-    return float(left([level(table, name, power) for name in names]) < left(readings))
+    levels = [level(table, name, power) for name in names]
+    return float(table.n * np.log(left(readings) / left(levels)) > EVIDENT)
 
 
 @lru_cache(maxsize=32)

@@ -52,7 +52,9 @@ def without_scatter(read: Array, readings: int) -> Level:
     smoothed = np.zeros(m)
     smoothed[k] = coefficients * share
     least = np.finfo(float).tiny
-    scatter = np.sum((coefficients * (1 - share)) ** 2) / max(float(np.sum(1 - share)), least)  # of one ordinate, squared
+    scatter = np.sum((coefficients * (1 - share)) ** 2) / max(
+        float(np.sum(1 - share)), least
+    )  # of one ordinate, squared
     errors = scatter * share / m
     return Level(
         values=np.asarray(idct(smoothed, type=2, norm="ortho")),

@@ -15,10 +15,11 @@ import numpy as np
 from calibrations.effects import Effect
 from calibrations.fitting.fit import Fit
 from calibrations.free_forms.bases import Clips, Line, Products, Settling, spline
-from calibrations.free_forms.components import Component
+from calibrations.free_forms.components import GENERAL, PRODUCT, Component
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.form import CROSS, Factor, Form
-from calibrations.free_forms.places import AGES, DEGREE, GENERAL, PRODUCT, THRESHOLDS_G
+from calibrations.free_forms.places import DEGREE, THRESHOLDS_G
+from calibrations.free_forms.places_in_time import AGES
 from calibrations.free_forms.reml import Gram, Sizes, beside_base, eliminated, estimate, gains
 from calibrations.free_forms.selection import ENTER, select
 from calibrations.free_forms.structure import with_size

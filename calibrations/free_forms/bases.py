@@ -213,7 +213,7 @@ class Preisach:
     to place.
 
     Every superposition of relays is such a sum: the relays of one width that are closed are those below the play.
-    Source  Brokate and Sprekels, Hysteresis and Phase Transitions (1996), 2.4.
+    Source  Brokate and Sprekels, Hysteresis (1996), 2.4.
     """
 
     widths: tuple[float, ...]

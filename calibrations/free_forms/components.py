@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibrations.free_forms.bases import Preisach
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.form import ANGLES, Form
 from calibrations.table import Array
@@ -56,6 +57,11 @@ class Component:
     starts: Callable[[Array], Starts] | None = None
     contains: str = ""
     error: float = 0.0
+
+    @property
+    def has_loops(self) -> bool:
+        """Whether it is a hysteresis whose loops differ from place to place."""
+        return self.form is not None and isinstance(self.form.bases[0], Preisach)
 
     @property
     def of_force(self) -> bool:

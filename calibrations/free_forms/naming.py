@@ -250,7 +250,7 @@ def _at_best_shapes(
     result: SearchResult, comps: Sequence[Component], curve: Array, beside: Sequence[Array], Q: Array
 ) -> list[Array]:
     """Columns of the components of one cause that have one value of shape, each at the shape that leaves least."""
-    shaped = [c for c in comps if c.reshaped is not None and len(c.shape) == 1 and c.form is None]
+    shaped = [c for c in comps if c.reshaped and len(c.shape) == 1 and c.form is None and not c.contains]
     return [_columns_of(result, _left_at_best(result, c, curve, Q, beside)[1], Q) for c in shaped]
 
 

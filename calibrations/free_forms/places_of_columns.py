@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibrations.effects.logged import level, reading_error
+from calibrations.effects.logged import level, level_is_known, reading_error
 from calibrations.free_forms.bases import Line, spline
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import PRODUCT, Component, Starts, free, per_axis
@@ -20,7 +20,6 @@ from calibrations.free_forms.poses import PoseData
 from calibrations.table import Array, Table
 
 SMOOTH = 2 * math.log(2)  # price of the second of two readings of a column
-MOST_ERROR = 0.5  # of a level's rms: with more it follows the scatter, which may resemble anything
 LEAST_SCATTER = 0.03  # of a level's rms: with less the readings of a column are its level
 
 
@@ -102,7 +101,8 @@ def _readings(table: Table, names: Sequence[str], power: int = 1) -> list[Readin
         return [Reading(logged)]
     error = max(reading_error(table, name, power) for name in names)
     raw = Reading(logged, error=float(np.hypot(scatter, error)))
-    return [raw, Reading(levels, True, error)] if error < MOST_ERROR else [raw]
+    known = all(level_is_known(table, name, power) for name in names)
+    return [raw, Reading(levels, True, error)] if known else [raw]
 
 
 def over_columns(data: PoseData, first: State) -> list[Component]:

@@ -87,25 +87,35 @@ class SearchResult:
 
 
 def search(data: PoseData, white: Array, given: Given, general: bool = True) -> SearchResult:
-    """Places that act, with their sizes, from two beginnings: the likelier end counts.
+    """Places that act, with their sizes, from several beginnings: the likeliest end counts.
 
     First forms of the catalogue begin, and free forms follow; where that leaves more than noise, or many components,
-    all begin together. What is not smooth is found by the one, what has another form by the other.
+    all begin together. What is not smooth is found by the one, what has another form by the other. Where the history
+    acts, loops that differ from place to place are tried too; without one they resemble most curves with a corner.
 
     white    standard deviation of each mean, (channels, n)
     general  whether components that can follow almost anything are tried
     """
-    by_name = _descent(data, white, given, general, catalogue_first=True)
+
+    def descent(catalogue_first: bool, loops: bool = False) -> SearchResult:
+        return _descent(data, white, given, general, catalogue_first, loops)
+
+    by_name = descent(catalogue_first=True)
     if by_name.ratio < NOISE_ALONE and len(by_name.active) <= FEW:
         return by_name
-    return min(by_name, _descent(data, white, given, general, catalogue_first=False), key=lambda end: end.criterion)
+    best = min(by_name, descent(catalogue_first=False), key=lambda end: end.criterion)
+    if any(best.component(name).place == "history" for name in best.active):
+        return min(best, descent(catalogue_first=True, loops=True), key=lambda end: end.criterion)
+    return best
 
 
-def _descent(data: PoseData, white: Array, given: Given, general: bool, catalogue_first: bool) -> SearchResult:
+def _descent(
+    data: PoseData, white: Array, given: Given, general: bool, catalogue_first: bool, loops: bool
+) -> SearchResult:
     """Rounds of selection and Gauss-Newton steps from the base."""
     values = start(data, given)
     state = state_at(data, given, values, ())
-    components = [c for c in all_components(data, state) if general or not c.general]
+    components = [c for c in all_components(data, state) if (general or not c.general) and (loops or not c.has_loops)]
     scales: dict[str, float] = {}
     noise = [c.name for c in components if c.noise]
     floor = float(np.sqrt(np.mean(white**2)))
