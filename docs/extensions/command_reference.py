@@ -11,7 +11,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from rig.cli import GROUPS, Commands
+from rig.cli import SECTIONS, Commands
 from rig.cli import rig as group
 
 
@@ -26,15 +26,12 @@ def reference() -> Iterator[str]:
     """Markdown of the whole reference, line by line."""
     context = click.Context(group, info_name="rig")
     commands = Commands()
-    names = commands.list_commands(context)
-    known = {name for members in GROUPS.values() for name in members}
-    for title, members in {**GROUPS, "Other": tuple(name for name in names if name not in known)}.items():
-        if members:
-            yield f"## {title}\n"
+    for title, members in SECTIONS.items():
+        yield f"## {title}\n"
         for name in members:
             command = commands.get_command(context, name)
             if command is None:
-                raise ValueError(f"rig.cli.GROUPS names {name}, which is no command")
+                raise ValueError(f"rig.cli.SECTIONS names {name}, which is no command")
             yield from section(command, click.Context(command, info_name=name, parent=context), "###")
 
 
