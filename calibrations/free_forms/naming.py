@@ -81,12 +81,14 @@ def places(result: SearchResult) -> list[ActingPlace]:
     out = []
     for place, names in by_place.items():
         causes, share = _named(result, place, names, curves[place], Q, b)
-        followed = _followed(result, curves, place, Q) if set(causes) <= {"bias-drift"} else None
+        walks = all("/walk-" in name for name in names)  # they follow anything, the errors of readings too
+        curved = walks or not any(result.component(name).cause for name in names)  # no form of the catalogue acts
+        followed = _followed(result, curves, place, Q, 0.0 if walks else share) if curved else None
         if followed is not None:
             causes, share = (followed[0].cause,), followed[1]
         gain, others = _rivals(result, names, {other for other in sizes if sizes[place] < FORM_OF * sizes[other]})
         least = LEAST_SHARE * largest
-        if all("/walk-" in name for name in names):  # it follows anything, the errors of readings too
+        if walks:
             least = max(LEAST_UNKNOWN_SHARE * largest, READING_ERRORS * _reading_errors(result, sizes))
         material = _own_size(result, gain) >= LEAST_SIZE and sizes[place] >= least
         curve = curves[place].reshape(result.white.shape) * result.white
@@ -189,9 +191,9 @@ def _named(
             first = []
             continue
         share, chosen[best] = tried[best]
-    found = _one_name(result, names, tuple(chosen), curve, Q)
-    enough = NAMED if len(set(found) - acting.keys()) < MOST_FORMS else NAMED_TOGETHER
-    return (found, share) if share >= enough else ((), share)
+    causes = _one_name(result, names, tuple(chosen), curve, Q)
+    enough = NAMED if len(set(causes) - acting.keys()) < MOST_FORMS else NAMED_TOGETHER
+    return (causes, share) if share >= enough else ((), share)
 
 
 def _one_name(
@@ -201,27 +203,27 @@ def _one_name(
 
     It is the wider one where the other, at its best shape, leaves a part of the curve that can be seen.
     """
-    told = dict.fromkeys(chosen)
+    causes = dict.fromkeys(chosen)
     for outer in (comp for comp in map(result.component, names) if comp.contains):
         alone = [c for c in result.components if c.cause == outer.contains and c.place == outer.place and not c.form]
         left = min((_left_at_best(result, c, curve, Q)[0] for c in alone), default=np.inf)
         name = outer.cause if np.sqrt(left / len(curve)) > UNSEEN else outer.contains
-        told = dict.fromkeys(name if cause in (outer.cause, outer.contains) else cause for cause in told)
-    return tuple(told)
+        causes = dict.fromkeys(name if cause in (outer.cause, outer.contains) else cause for cause in causes)
+    return tuple(causes)
 
 
 def _followed(
-    result: SearchResult, curves: Mapping[str, Array], place: str, Q: Array
+    result: SearchResult, curves: Mapping[str, Array], place: str, Q: Array, share: float
 ) -> tuple[Component, float] | None:
     """The line over a temperature or a logged column that a curve over time follows, and its share of the variance.
 
     A smooth curve over time has no scatter of a reader, and is likelier than a column that has, however well it follows
-    the column. None where it follows none, or is not over time.
+    the column. None where it follows none, takes up no more than the `share` of its own causes, or is not over time.
     """
     if place not in FOLLOWERS:
         return None
     curve = curves[place] + sum(curves[other] for other in FOLLOWERS[place] if other in curves)
-    total, least = float(curve @ curve) or 1.0, 1 - FOLLOWS
+    total, least = float(curve @ curve) or 1.0, 1 - max(FOLLOWS, share)
     best = None
     for comp in result.components:
         if comp.cause and comp.place in FOLLOWERS[place] and comp.form is None and not comp.contains:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.benchmark.foreign.__main__ import STRENGTHS
 from tests.benchmark.foreign.causes import CATALOGUE, UNKNOWN, Cause
 from tests.benchmark.foreign.sensor import table
 from tests.benchmark.hidden import Score, score, shipped
@@ -51,3 +52,25 @@ def test_where_all_effects_at_once_lead_the_fit_astray_they_are_added_one_by_one
     assert answer.held_out is not None
     assert answer.held_out < 10
     assert {"supply-sensitivity", "saturation", "scale-factor-asymmetry"} <= set(answer.causes)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("number", "reason"),
+    [
+        (9, "a converter and an own response that can take up each other"),
+        (63, "hysteresis of relays, whose loops differ from place to place"),
+        (110, "a noisy thermometer that lags by two minutes"),
+        (111, "the same of the scale factor, beside a curve over time"),
+        (112, "errors of the thermometer that resemble a random walk"),
+        (122, "errors of the estimate of vibration that resemble a random walk"),
+    ],
+)
+def test_what_the_readings_or_the_form_leave_gets_no_second_name(tmp_path: Path, number: int, reason: str) -> None:
+    floors, cause = STRENGTHS[number // len(CATALOGUE)], CATALOGUE[number % len(CATALOGUE)]
+    random = np.random.default_rng([77, number])
+    path = tmp_path / f"{number}.csv"
+    slow = float(random.uniform(0.0, 0.6))
+    path.write_text(table(random, [cause], [floors], slow))
+    found = score(path.stem, [cause.name], shipped(path), 0.0)
+    assert found.exact, (reason, found.answer)
