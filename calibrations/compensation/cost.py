@@ -15,7 +15,7 @@ import numpy as np
 
 from calibrations.compensation.forward import FORCES, INVERTED, Forward, steps_of
 from calibrations.compensation.program import Program
-from calibrations.effects.thermometer import RATE
+from calibrations.effects.logged import RATE
 from calibrations.errors import CalibrationError
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.geometry.stage_path import turning_points

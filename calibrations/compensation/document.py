@@ -26,7 +26,7 @@ from calibrations.compensation.graph import evaluate_nodes
 from calibrations.compensation.inverse import Compensation
 from calibrations.compensation.program import Line
 from calibrations.documents import parameters_document
-from calibrations.effects.thermometer import RATE
+from calibrations.effects.logged import RATE
 from calibrations.model import Estimate
 from calibrations.model.correlations import Correlations
 from calibrations.table import Array

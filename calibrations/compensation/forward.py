@@ -21,7 +21,7 @@ from calibrations.compensation.graph import Node, variable, variable_names
 from calibrations.compensation.tables import trace_free_form
 from calibrations.compensation.trace import NotTraced, RunTime, Traced, as_traced, trace_expression
 from calibrations.effects import Effect, Values
-from calibrations.effects.thermometer import RATE
+from calibrations.effects.logged import RATE
 from calibrations.errors import ModelError
 from calibrations.free_forms.effect import FreeForm
 from calibrations.model import Model, Term

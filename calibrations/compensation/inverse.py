@@ -23,7 +23,7 @@ from calibrations.compensation.forward import (
 )
 from calibrations.compensation.graph import variable_names
 from calibrations.compensation.program import Program, write_program
-from calibrations.effects.thermometer import RATE, temperature_rate_c_s
+from calibrations.effects.logged import RATE, temperature_rate_c_s
 from calibrations.errors import DataError, ModelError
 from calibrations.fitting.fit import fit
 from calibrations.means.noise import rms

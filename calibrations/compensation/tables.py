@@ -19,7 +19,7 @@ import numpy as np
 from calibrations.compensation.graph import ONE, ZERO, Node, number, power, tabulated
 from calibrations.compensation.trace import NotTraced, RunTime, Traced, as_nodes, as_traced
 from calibrations.effects import Values
-from calibrations.effects.thermometer import sensor_temperature_c
+from calibrations.effects.logged import sensor_temperature_c
 from calibrations.free_forms.bases import Clips, Line, Products, Ramp, Spline
 from calibrations.free_forms.effect import FreeForm, coefficients_of
 from calibrations.free_forms.form import CROSS, Form

@@ -12,7 +12,7 @@ from calibrations.compensation.document import error_text
 from calibrations.compensation.forward import FORCES, INVERTED, LEFT_OUT, trace_model
 from calibrations.compensation.graph import evaluate_nodes, variable_names
 from calibrations.compensation.inverse import Range, invert_model
-from calibrations.effects.thermometer import RATE
+from calibrations.effects.logged import RATE
 from calibrations.errors import ModelError
 from calibrations.model import Model
 from calibrations.table import AXES, STANDARD_GRAVITY, Array

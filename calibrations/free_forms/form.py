@@ -29,8 +29,7 @@ import numpy as np
 from pydantic import Field
 
 from calibrations.effects.kernels import play, slip_elements
-from calibrations.effects.logged import level
-from calibrations.effects.thermometer import leading_temperature
+from calibrations.effects.logged import leading_temperature, level
 from calibrations.free_forms.bases import Basis, Play, Preisach, Products, Spline
 from calibrations.free_forms.poses import side, way
 from calibrations.geometry.orientation import nominal_pose, other_in_plane, out_of_plane, specific_force

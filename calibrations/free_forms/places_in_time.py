@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from calibrations.effects.kernels import play
-from calibrations.effects.logged import reading_error
-from calibrations.effects.thermometer import leading_temperature
+from calibrations.effects.logged import leading_temperature, reading_error
 from calibrations.free_forms.bases import Line, Play, Settling, Waves, spline
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import GENERAL, PRODUCT, Columns, Component, Make, Starts, free, per_axis

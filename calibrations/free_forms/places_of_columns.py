@@ -14,7 +14,7 @@ import numpy as np
 from calibrations.effects.logged import level, level_is_known, reading_error
 from calibrations.free_forms.bases import Line, spline
 from calibrations.free_forms.chain import State
-from calibrations.free_forms.components import PRODUCT, Component, Starts, free, per_axis
+from calibrations.free_forms.components import PRODUCT, Component, free, per_axis
 from calibrations.free_forms.form import Factor, Form
 from calibrations.free_forms.poses import PoseData
 from calibrations.table import Array, Table
@@ -37,36 +37,6 @@ def over_output(data: PoseData, first: State) -> list[Component]:
         Component("output/adc-nonlinearity", "output", "output", "adc-nonlinearity", columns=powers),
         free(Form("output", "curve", "output", (spline(data.outputs.ravel(), 22),), shared=True), first),
     ]
-
-
-def saw(frequency: float, harmonics: int, price: float, step: float) -> Component:
-    """Quantisation: harmonics of a saw over the output, codes per unit of output; `step` of the frequency to try."""
-    name = f"output/quantisation@{frequency:.6g}"
-
-    def at(shape: tuple[float, ...]) -> Component:
-        def columns(s: State) -> Array:
-            turned = 2 * np.pi * shape[0] * s.response[:, :, None] * np.arange(1, harmonics + 1)
-            scale = 1.0 / np.arange(1, harmonics + 1)
-            return np.concatenate([np.sin(turned) * scale, np.cos(turned) * scale], axis=2)
-
-        return Component(
-            name, "output", "output", "quantisation", "output/quantisation", price, columns,
-            shape=shape, step=(step,), reshaped=at, starts=lambda found: _steps(shape[0], found[0], found[harmonics]),
-        )  # fmt: skip
-
-    return at((frequency,))
-
-
-def _steps(frequency: float, sine: float, cosine: float) -> Starts:
-    """Step, offset and noise of the quantiser whose saw has this first harmonic.
-
-    The saw of rounding is -(q / pi) exp(-2 (pi s / q)^2) sin(2 pi (V - o) / q) and harmonics (Widrow and Kollar, 2008).
-    """
-    step = 1 / frequency
-    fraction = np.clip(np.pi * np.hypot(sine, cosine) / step, 1e-6, 1.0)
-    noise = step / np.pi * np.sqrt(-np.log(fraction) / 2)
-    offset = step / (2 * np.pi) * np.arctan2(cosine, -sine)
-    return ("step", "", step), ("offset", "", float(offset)), ("noise", "", float(noise))
 
 
 @dataclass(frozen=True, eq=False)

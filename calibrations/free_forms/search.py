@@ -11,7 +11,6 @@ from calibrations.free_forms.chain import Coefficients, Given, State, base_size,
 from calibrations.free_forms.components import Component
 from calibrations.free_forms.places import components as all_components
 from calibrations.free_forms.poses import PoseData
-from calibrations.free_forms.quantisation import find_saw
 from calibrations.free_forms.reml import (
     Gram,
     Sizes,
@@ -24,6 +23,7 @@ from calibrations.free_forms.reml import (
     without,
 )
 from calibrations.free_forms.selection import ENTER, pools_of, prices, select
+from calibrations.free_forms.stairs import find_saw
 from calibrations.table import Array
 
 COARSE = (1e-3, 2e-5)  # of the misfit, at each linearisation: less may be a second-order remainder

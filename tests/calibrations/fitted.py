@@ -31,6 +31,7 @@ REFERENCES = {
     "turned_y": 1.0,
     "turned_z": 1.0,
     "assumed": 1.0,
+    "level": 0.0,
 }
 
 

@@ -15,7 +15,7 @@ from calibrations.compensation.document import header_lines, make_vectors
 from calibrations.compensation.forward import INVERTED, LEFT_OUT, steps_of, trace_model
 from calibrations.compensation.inverse import Range, compensated_residual, invert_model
 from calibrations.compensation.tables import CubicTable, spline_table
-from calibrations.effects.thermometer import RATE
+from calibrations.effects.logged import RATE
 from calibrations.free_forms.bases import Basis, Clips, Line, Play, Products, Ramp, Spline, Waves
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.form import Form

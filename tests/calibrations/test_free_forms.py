@@ -34,8 +34,8 @@ from calibrations.free_forms.bases import (
 )
 from calibrations.free_forms.effect import FreeForm, free_form, place_of
 from calibrations.free_forms.form import Form
-from calibrations.free_forms.places_of_columns import _steps
 from calibrations.free_forms.reml import estimate, gram
+from calibrations.free_forms.stairs import _steps
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.loop import dataset
 from calibrations.model.file import dump_model, parse_model, read_model

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.effects.thermometer import RATE, leading_temperature, sensor_temperature_c, temperature_rate_c_s
+from calibrations.effects.logged import RATE, leading_temperature, sensor_temperature_c, temperature_rate_c_s
 from calibrations.table import Array, Table
 
 STEP_S = 8.0

@@ -1,7 +1,7 @@
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.effects.thermometer import sensor_temperature_c
+from calibrations.effects.logged import sensor_temperature_c
 from calibrations.table import Array, Table
 
 

@@ -30,16 +30,17 @@ trace_option = click.option("--trace", is_flag=True, help="Log every message to 
 class Quiet(Observer):
     """An unattended run. Answers come from the file, or from the simulated technician of a simulated bench.
 
-    Standard error has the forecast of a soak after every reversal, and for other runs the result so far after every
-    path.
+    With the name of its procedure, standard error has the forecast of a soak after every reversal, and for other runs
+    the result so far after every path.
     """
 
     def __init__(self, answers: Mapping[str, str], procedure: str = "") -> None:
-        self._answers, self._estimates = answers, live_estimates(procedure)
+        self._answers, self._estimates = answers, live_estimates(procedure) if procedure else None
 
     def begun(self, run: str) -> None:
         note(f"run {run}")
-        self._estimates.begun(run)
+        if self._estimates:
+            self._estimates.begun(run)
 
     def guide(self, guidance: Guidance) -> None:
         note(guidance.text)
@@ -48,7 +49,7 @@ class Quiet(Observer):
         note(f"{total - done} of {total} poses remain")
 
     def kept(self, kept: Kept) -> None:
-        if report := self._estimates.report(kept):
+        if self._estimates and (report := self._estimates.report(kept)):
             note(report)
 
     def ask(self, question: Question, instead: str | None) -> str:
