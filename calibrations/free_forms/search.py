@@ -22,7 +22,7 @@ from calibrations.free_forms.reml import (
     whitened,
     without,
 )
-from calibrations.free_forms.selection import ENTER, pools_of, prices, select
+from calibrations.free_forms.selection import ENTER, SPILL, pools_of, prices, select
 from calibrations.free_forms.stairs import find_saw
 from calibrations.table import Array
 
@@ -91,7 +91,8 @@ def search(data: PoseData, white: Array, given: Given, general: bool = True) -> 
 
     First forms of the catalogue begin, and free forms follow; where that leaves more than noise, or many components,
     all begin together. What is not smooth is found by the one, what has another form by the other. Where the history
-    acts, loops that differ from place to place are tried too; without one they resemble most curves with a corner.
+    acts, loops that differ from place to place are tried too; without one they resemble most curves with a corner,
+    and where they gain little they take up part of what acts elsewhere.
 
     white    standard deviation of each mean, (channels, n)
     general  whether components that can follow almost anything are tried
@@ -105,7 +106,8 @@ def search(data: PoseData, white: Array, given: Given, general: bool = True) -> 
         return by_name
     best = min(by_name, descent(catalogue_first=False), key=lambda end: end.criterion)
     if any(best.component(name).place == "history" for name in best.active):
-        return min(best, descent(catalogue_first=True, loops=True), key=lambda end: end.criterion)
+        looped = descent(catalogue_first=True, loops=True)
+        return looped if looped.criterion < best.criterion - SPILL * abs(best.criterion) else best
     return best
 
 

@@ -125,6 +125,8 @@ def test_the_realistic_demonstration_tells_what_it_did_not_find(rig: Callable[..
     assert (
         named
         <= set(document["causes"])
-        <= named | {"z-axis-bias", "cross-axis-bias", "quadratic-nonlinearity", "axis-nonorthogonality"}
+        <= named
+        | {"z-axis-bias", "cross-axis-bias", "quadratic-nonlinearity", "axis-nonorthogonality"}
+        | {"stage-eccentricity", "supply-sensitivity"}  # wobble of the stages, wandering supply: 2 and 3 noise floors
     )
     assert document["places"]
