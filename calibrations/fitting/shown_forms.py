@@ -47,7 +47,7 @@ SMALLEST = 1e-3  # noise floors: what a form adds that the data do not show
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """Forms as a residual shows them: `gram` of their columns beside the model's parameters, and what made it.
+    """The forms that a residual can show: products of their columns with the model's own (`gram`), and the inputs.
 
     columns  whitened [base, forms, residual], (rows, base + forms + 1)
     """

@@ -99,7 +99,7 @@ def places(result: SearchResult) -> list[ActingPlace]:
 
 
 def _own_size(result: SearchResult, gain: float) -> float:
-    """Size of what no other place could take up, from what it gains, in noise floors."""
+    """Size of the part that only this place explains, from its gain in likelihood, in noise floors."""
     return float(np.sqrt(max(gain, 0.0) / len(result.columns)))
 
 

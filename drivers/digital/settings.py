@@ -1,4 +1,4 @@
-"""Outputs of a digital sensor, and what the settings of each such sensor have."""
+"""Outputs of a digital sensor, and the settings that all digital sensors have in common."""
 
 from __future__ import annotations
 

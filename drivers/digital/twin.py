@@ -227,7 +227,7 @@ class FramedTwin(DigitalTwin):
 
 
 def talking_port(listen: str) -> Port:
-    """A port for a sensor that sends by itself: the system keeps little of what nobody reads."""
+    """A port for a sensor that sends without requests. The system buffers only little unread data."""
     return Port(listen, held=HELD)
 
 
