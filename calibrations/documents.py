@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calibrations.discovery.dataset import Dataset
+from calibrations.discovery.findings import Candidate, F, Step
 from calibrations.discovery.plausibility import Finding
-from calibrations.discovery.results import Candidate, Comparison, Diagnosis, Discovery, F, Step
+from calibrations.discovery.results import Comparison, Diagnosis, Discovery
 from calibrations.discovery.summary import step_shares, summary_lines
 from calibrations.model import Model
 from calibrations.table import Array

@@ -11,6 +11,8 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import TypeGuard
 
+Cells = tuple[Sequence[str], Sequence[Sequence[str]]]  # head and rows of a table of text
+
 SMALL, LARGE = -4, 6  # powers of ten beyond which a number is written with one
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 PREFIXED = ("V", "g", "deg", "K", "h", "s")  # units that take a prefix

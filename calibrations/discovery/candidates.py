@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from calibrations.criteria import INSEPARABLE, MATERIAL, MOST_BY_FORM, SAME_SHAPE, SIGNIFICANT
-from calibrations.discovery.results import Candidate, Step
+from calibrations.discovery.findings import Candidate, Step
 from calibrations.discovery.significance import Screen, Search, of_search, twice_log_likelihood
 from calibrations.effects import Effect
 from calibrations.fitting.fit import Fit, refit

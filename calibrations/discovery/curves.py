@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from calibrations.discovery.results import Findings
+from calibrations.discovery.findings import Findings
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.identifiability import covariance
 from calibrations.free_forms.form import CROSS

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Generic
 
+from calibrations.discovery.findings import Candidate, F, Findings, Place, Step
 from calibrations.discovery.plausibility import Finding
-from calibrations.discovery.results import Candidate, Comparison, Diagnosis, Discovery, F, Findings, Place, Step
+from calibrations.discovery.results import Comparison, Diagnosis, Discovery
 from calibrations.effects import Effect
 from calibrations.errors import ModelError
 from calibrations.model import Model
@@ -16,9 +17,6 @@ from calibrations.model import Model
 if TYPE_CHECKING:
     from calibrations.discovery.enough import Enough
     from calibrations.model.correlations import Correlations
-    from calibrations.presentation.chart import Chart, Picture
-
-Cells = tuple[Sequence[str], Sequence[Sequence[str]]]  # head and rows of a table of text
 
 
 class Dataset(ABC, Generic[F]):
@@ -160,14 +158,6 @@ class Dataset(ABC, Generic[F]):
         return False
 
     @abstractmethod
-    def figures(self, found: F) -> dict[str, str]:
-        """The three numbers to remember of a fit, by their names."""
-
-    @abstractmethod
-    def facts(self, candidate: Candidate, result: Diagnosis[F]) -> dict[str, str]:
-        """What a candidate does to the error, by name."""
-
-    @abstractmethod
     def errors_document(self, found: F) -> dict[str, Any]:
         """Errors and noise by axis, for the JSON documents."""
 
@@ -190,38 +180,6 @@ class Dataset(ABC, Generic[F]):
     @abstractmethod
     def require_allowed(self, effect: Effect) -> None:
         """Raises ModelError where the effect is not defined for these data."""
-
-    @abstractmethod
-    def error_table(self, found: F) -> Cells:
-        """The error of each channel, as text."""
-
-    def comparison_table(self, result: Comparison[F]) -> Cells | None:  # noqa: ARG002
-        """Further numbers of a comparison, as text; None where there are none."""
-        return None
-
-    @abstractmethod
-    def step_table(self, found: Discovery[F]) -> Cells:
-        """The error after each step, as text."""
-
-    @abstractmethod
-    def candidate_table(self, result: Diagnosis[F], candidates: Sequence[Candidate]) -> Cells:
-        """The candidates, as text."""
-
-    @abstractmethod
-    def fit_chart(self, found: F) -> Chart:
-        """A fit beside these data."""
-
-    @abstractmethod
-    def steps_chart(self, found: Discovery[F]) -> Chart:
-        """The error after each step."""
-
-    @abstractmethod
-    def fit_album(self, found: F) -> list[Picture]:
-        """The pictures of a fit beside these data, with captions."""
-
-    @abstractmethod
-    def steps_album(self, found: Discovery[F]) -> list[Picture]:
-        """The pictures of a discovery, with captions."""
 
     def remarks(self, found: F) -> list[str]:  # noqa: ARG002
         """Sentences on an error that cannot be right."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibrations.discovery.results import Findings
+from calibrations.discovery.findings import Findings
 from calibrations.errors import ModelError
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.sensed import in_milli

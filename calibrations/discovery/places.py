@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from calibrations.criteria import MATERIAL, MOST_SLOW_NOISE, ONE_SIDED, SIGNIFICANT, STANDS_OUT
-from calibrations.discovery.results import Place
+from calibrations.discovery.findings import Place
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.sensed import axis_of, milli_unit, scales
 from calibrations.means.noise import rms

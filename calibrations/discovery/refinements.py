@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from calibrations.criteria import FORM_PART, REFINEMENT, SIGNIFICANT
-from calibrations.discovery.results import Step
+from calibrations.discovery.findings import Step
 from calibrations.discovery.search import cost, first_order
 from calibrations.discovery.significance import chance, of_search
 from calibrations.fitting.fit import Fit

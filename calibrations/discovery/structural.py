@@ -27,7 +27,7 @@ from calibrations.discovery.additions import (
     together,
 )
 from calibrations.discovery.candidates import RowCandidate, candidates, with_planned, with_rivals
-from calibrations.discovery.results import Step
+from calibrations.discovery.findings import Step
 from calibrations.discovery.search import first_order
 from calibrations.discovery.significance import chance
 from calibrations.effects import Effect

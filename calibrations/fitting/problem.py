@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +25,11 @@ from calibrations.model import Model
 from calibrations.model.chain import Near, Step, backward, force, forward, sensed
 from calibrations.model.parameters import Layout
 from calibrations.motion.spectrum import sample_output
-from calibrations.motion.stretches import Stretches, make_stretches
 from calibrations.table import Array, Table
 from calibrations.tables import FITTED
+
+if TYPE_CHECKING:
+    from calibrations.motion.stretches import Stretches
 
 STRENGTH = "field-strength"
 SMALL = 1e-6  # of an output's range: the step of a derivative
@@ -326,6 +328,8 @@ class MotionProblem(Problem):
     @staticmethod
     def prepared(table: Table) -> Table:
         """A row for each stretch."""
+        from calibrations.motion.stretches import make_stretches  # other kinds need no spectra
+
         return make_stretches(table)
 
     @property

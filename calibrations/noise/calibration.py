@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from calibrations.design.experiment import Experiment
-from calibrations.discovery.results import Candidate, Step
+from calibrations.discovery.findings import Candidate, Step
 from calibrations.effects import Effect
 from calibrations.model import Model, Term
 from calibrations.noise.doubts import CAUSES, experiment_for_pattern

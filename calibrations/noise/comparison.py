@@ -26,7 +26,7 @@ from scipy.fft import dct
 from scipy.special import chdtr, chdtrc, digamma, polygamma
 
 from calibrations.criteria import FEWEST_LEVEL_ORDINATES, FILTER_PERIODS, NEGLIGIBLE, SIGNIFICANT
-from calibrations.discovery.results import Place
+from calibrations.discovery.findings import Place
 from calibrations.errors import DataError
 from calibrations.model import Model
 from calibrations.noise.deviations import Curve
@@ -120,6 +120,16 @@ def compare_deviations(fit: ChannelFit, curve: Curve) -> DeviationComparison:
     return DeviationComparison(tau_s, measured, curve.low[judged], curve.high[judged], modelled, edf, chance)
 
 
+def compared_deviations(fit: NoiseFit) -> dict[str, DeviationComparison]:
+    """The deviations of each channel, by axis, after the removal of the model's signal."""
+    return {pair.channel.axis: compare_deviations(pair, fit.still.allan[pair.channel.axis]) for pair in fit.channels}
+
+
+def mismatch(fit: NoiseFit) -> dict[str, float]:
+    """Rms of the logarithm of measured over modelled Allan deviation, by axis."""
+    return {axis: curve.mismatch for axis, curve in compared_deviations(fit).items()}
+
+
 def deviation(fit: ChannelFit, tau_s: Array) -> Array:
     """Of all effects and lines, shape of `tau_s`."""
     total = sum(variance_parts(fit, tau_s).values(), np.zeros(len(tau_s)))
@@ -206,7 +216,7 @@ TIME, FREQUENCY = "averaging time", "frequency"
 
 def places(fit: NoiseFit) -> tuple[Place, ...]:
     """Where a noise model fails: surest first, times before frequencies of the same channel."""
-    curves = tuple(compare_deviations(channel, fit.still.allan[channel.channel.axis]) for channel in fit.channels)
+    curves = tuple(compared_deviations(fit).values())
     return tuple(_failures(fit, curves))
 
 

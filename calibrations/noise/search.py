@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from calibrations.criteria import AT_LONGEST_TIME, IDENTIFIED, INSEPARABLE, MOST_PATTERNS
-from calibrations.discovery.results import Candidate
+from calibrations.discovery.findings import Candidate
 from calibrations.effects import Effect
 from calibrations.model import Model
 from calibrations.noise.fit import (

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibrations.discovery.results import Findings
+from calibrations.discovery.findings import Findings
 from calibrations.effects import Effect, Values
 from calibrations.errors import DataError
 from calibrations.fitting.fit import Fit

@@ -10,6 +10,7 @@ import numpy as np
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
 from calibrations.discovery.summary import summary_lines, sure
 from calibrations.documents import places_document, why
+from calibrations.presentation.views import view_of
 from calibrations.text import columns, quantity
 
 MOST_CANDIDATES = 6
@@ -18,9 +19,9 @@ SELF_JUDGED = "The noise is known from this residual only, so that the error alo
 
 def comparison_text(result: Comparison[Any]) -> str:
     """The error of each channel, and the places where the model fails."""
-    data = result.data
-    parts = [f"{result.fit.model.name} on {data.description}", columns(*data.error_table(result.fit))]
-    if (further := data.comparison_table(result)) is not None:
+    data, view = result.data, view_of(result.data)
+    parts = [f"{result.fit.model.name} on {data.description}", columns(*view.error_table(result.fit))]
+    if (further := view.comparison_table(result)) is not None:
         parts.append(columns(*further))
     if result.rejection is not None:
         parts.append(f"This data cannot be used: {result.rejection.verdict}: {result.rejection.text}.")
@@ -38,7 +39,7 @@ def diagnosis_text(result: Diagnosis[Any], model: str = "") -> str:
     data = result.findings.data
     parts = [f"{model or result.fit.model.name} on {data.description}", result.judgement.text]
     if shown := result.candidates[:MOST_CANDIDATES]:
-        parts.append(columns(*data.candidate_table(result, shown)))
+        parts.append(columns(*view_of(data).candidate_table(result, shown)))
     if result.missing:
         best = result.candidates[0]
         parts += [
@@ -51,7 +52,7 @@ def diagnosis_text(result: Diagnosis[Any], model: str = "") -> str:
 def discovery_text(result: Discovery[Any], experiment: Iterable[str] = ()) -> str:
     """The error after each step and the verdict. `experiment`: lines on the next one."""
     data = result.findings.data
-    parts = [columns(*data.step_table(result)), discovery_verdict(result, experiment)]
+    parts = [columns(*view_of(data).step_table(result)), discovery_verdict(result, experiment)]
     if data.form == "rows" and (summary := _summary(result)):
         parts[1:1] = filter(None, [summary, unknown_text(result)])
     return "\n\n".join(parts)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from calibrations.noise.deviations import minimum_s
 from calibrations.noise.record import Sensed
 from calibrations.noise.samples import COARSE
 from calibrations.noise.telegraph import TWO_LEVELS
-from calibrations.text import PREFIXED, columns, concise, duration, prefix, rounded, sentence
+from calibrations.text import PREFIXED, Cells, columns, concise, duration, prefix, rounded, sentence
 
 MEANS = {
     "white-noise": "velocity or angle random walk",
@@ -22,7 +22,6 @@ MEANS = {
     "gauss-markov-noise": "standard deviation",
 }
 NOISE = (COARSE, TWO_LEVELS)  # noise that the coefficients alone do not describe
-Cells = tuple[Sequence[str], Sequence[tuple[str, ...]]]  # head and rows
 
 
 def summary(analysis: NoiseAnalysis) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.discovery.results import FittedModel
+from calibrations.discovery.findings import FittedModel
 from calibrations.fitting.budget import make_budget, normalised, parameter_correlation
 from calibrations.fitting.fit import Fit, cautiously
 from calibrations.fitting.identifiability import covariance

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from calibrations.discovery.dataset import Dataset
-from calibrations.discovery.results import F
+from calibrations.discovery.findings import F
 from calibrations.discovery.verdict import Verdict
 from calibrations.errors import UnusableData
 from calibrations.model import Model

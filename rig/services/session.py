@@ -13,7 +13,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Generic
 
 from calibrations.discovery.dataset import Dataset
-from calibrations.discovery.results import Comparison, Diagnosis, F, Findings, Step
+from calibrations.discovery.findings import F, Findings, Step
+from calibrations.discovery.results import Comparison, Diagnosis
 from calibrations.effects import Effect
 from calibrations.errors import CalibrationError, ModelError
 from calibrations.free_forms.place_names import PREFIX

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.discovery.dataset import Dataset
-from calibrations.discovery.results import FittedModel
+from calibrations.discovery.findings import FittedModel
 from calibrations.fitting.fit import Fit
 from calibrations.model import Estimate
 from calibrations.table import Array, Table

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibrations.discovery.results import Discovery, Step
+from calibrations.discovery.findings import Step
+from calibrations.discovery.results import Discovery
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit, fit
 from calibrations.fitting.sensed import pooled_milli

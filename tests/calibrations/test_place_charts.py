@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.discovery.results import Step
+from calibrations.discovery.findings import Step
 from calibrations.fitting.fit import Fit, fit
 from calibrations.model.file import read_model
 from calibrations.presentation.chart import Band, Bars, Line

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.discovery.results import Step
+from calibrations.discovery.findings import Step
 from calibrations.discovery.rows import Rows
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import CalibrationError

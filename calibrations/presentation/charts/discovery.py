@@ -9,7 +9,8 @@ from math import log10
 import numpy as np
 
 from calibrations.analyses.motion import MotionResult
-from calibrations.discovery.results import Comparison, Discovery, Step
+from calibrations.discovery.findings import Step
+from calibrations.discovery.results import Comparison, Discovery
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.sensed import milli_unit, pooled_milli
 from calibrations.presentation.chart import (

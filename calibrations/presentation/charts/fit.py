@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.discovery.results import Step
+from calibrations.discovery.findings import Step
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.sensed import scales
 from calibrations.means.noise import rms

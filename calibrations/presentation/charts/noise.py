@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibrations.criteria import COVERAGE
-from calibrations.discovery.results import Discovery, Step
+from calibrations.discovery.findings import Step
+from calibrations.discovery.results import Discovery
 from calibrations.noise.analysis import ChannelNoise, NoiseAnalysis
-from calibrations.noise.comparison import DeviationComparison, deviation, variance_parts
-from calibrations.noise.dataset import mismatch
+from calibrations.noise.comparison import DeviationComparison, deviation, mismatch, variance_parts
 from calibrations.noise.deviations import Curve
 from calibrations.noise.fit import NoiseFit
 from calibrations.noise.likelihood import ChannelFit

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from calibrations.discovery.curves import PlaceCurve, place_curve
-from calibrations.discovery.results import Step
+from calibrations.discovery.findings import Step
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import CalibrationError

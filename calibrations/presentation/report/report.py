@@ -14,7 +14,8 @@ from calibrations.analyses.motion import MotionResult
 from calibrations.criteria import CERTAIN_PROBABILITY, SIGNIFICANT
 from calibrations.design.expected import pairs_separated
 from calibrations.design.experiment import Experiment
-from calibrations.discovery.results import Candidate, Comparison, Discovery
+from calibrations.discovery.findings import Candidate
+from calibrations.discovery.results import Comparison, Discovery
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.sensed import in_milli, milli_unit, pooled_milli
 from calibrations.model import Model, Term

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from calibrations.discovery.results import Comparison, Discovery
-from calibrations.noise.dataset import CLEANED, mismatch
+from calibrations.noise.comparison import mismatch
 from calibrations.noise.fit import NoiseFit
 from calibrations.noise.record import of_record
 from calibrations.presentation.chart import Picture
@@ -13,6 +13,7 @@ from calibrations.presentation.document import Block, Code, Items, Page, Remark,
 from calibrations.presentation.page import html
 from calibrations.presentation.report.parameters import estimate_cells
 from calibrations.presentation.report.report import model_facts
+from calibrations.presentation.views.still import CLEANED
 from calibrations.text import capital, joined, probability, rounded
 
 MISMATCH = (

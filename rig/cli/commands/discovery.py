@@ -227,7 +227,6 @@ def _discover(
     check: bool,
     as_json: bool,
 ) -> int:
-    from calibrations.discovery.enough import parse_enough
     from calibrations.documents import discovery_document
     from rig.cli.terminal.words import (
         discovery,
@@ -240,7 +239,11 @@ def _discover(
     )
     from rig.services.load import loaded
 
-    small = parse_enough(enough) if enough else None
+    small = None
+    if enough:
+        from calibrations.discovery.enough import parse_enough
+
+        small = parse_enough(enough)
     with working("fitting the model") as progress:
         question = loaded(request, note, out)
         data = question.data if len(several) == 1 else _together(several, request, question)

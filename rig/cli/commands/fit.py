@@ -38,6 +38,7 @@ def fit_command(request: Request, out: Path | None, check: bool, as_json: bool) 
     """Estimate the parameters of a model from DATA (a file or a run), with standard uncertainties."""
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import fit_document
+    from calibrations.presentation.views import view_of
     from rig.cli.terminal.words import parameters, table, warning
     from rig.services.load import loaded
     from rig.services.provenance import write_model
@@ -58,7 +59,7 @@ def fit_command(request: Request, out: Path | None, check: bool, as_json: bool) 
         if reason is not None:
             remarks = [f"This data cannot be used: {reason.verdict}: {reason.text}."]
         click.echo(f"{fitted.model.name} fitted to {data.description}\n\n{parameters(fitted.model)}\n")
-        click.echo("\n".join([table(data.error_table(fitted)), *(f"\n{line}" for line in remarks)]))
+        click.echo("\n".join([table(view_of(data).error_table(fitted)), *(f"\n{line}" for line in remarks)]))
         if further.paper:
             click.echo(f"\n{further.paper}")
         if path is not None:

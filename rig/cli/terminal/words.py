@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from calibrations.criteria import CERTAIN_PROBABILITY
-from calibrations.design.experiment import Experiment
-from calibrations.discovery.dataset import Cells
 from calibrations.discovery.patterns import Pattern
 from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
@@ -19,7 +17,7 @@ from calibrations.errors import DataError
 from calibrations.model import Model, Term
 from calibrations.presentation.answers import discovery_text, discovery_verdict
 from calibrations.table import Table
-from calibrations.text import columns, duration, quantity
+from calibrations.text import Cells, columns, duration, quantity
 from rig.cli.terminal.output import note
 from rig.services import next_experiment
 from rig.services.next_experiment import Answer
@@ -27,6 +25,7 @@ from rig.services.request import Request
 
 if TYPE_CHECKING:
     from calibrations.design.expected import Expected
+    from calibrations.design.experiment import Experiment
 
 
 def parameters(model: Model) -> str:

@@ -11,7 +11,7 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from calibrations.fitting.fit import Fit
-from calibrations.noise.comparison import compare_deviations
+from calibrations.noise.comparison import compared_deviations
 from calibrations.noise.fit import NoiseFit
 from calibrations.presentation.chart import Chart
 from calibrations.presentation.charts.noise import scaled, units
@@ -102,15 +102,13 @@ def _of_rows(first: Fit, second: Fit) -> Comparison:
 def _of_noise(first: NoiseFit, second: NoiseFit) -> Comparison:
     """Allan deviations of both records."""
     axes = [axis for axis in first.still.axes if axis in second.still.axes]
-    there = [{each.channel.axis: each for each in found.channels} for found in (first, second)]
+    curves = [compared_deviations(fit) for fit in (first, second)]
     offered = units(first.still) if units(first.still) == units(second.still) else {False: first.still.unit}
 
     def draw(c: int, in_sensed: bool) -> Sequence[Chart]:
         axis = axes[c]
-        pairs = zip(there, (first, second), strict=True)
-        curves = [compare_deviations(channels[axis], fit.still.allan[axis]) for channels, fit in pairs]
         into = (scaled(first.still, axis, in_sensed), scaled(second.still, axis, in_sensed))
-        return [deviations(curves, into)]
+        return [deviations([by_axis[axis] for by_axis in curves], into)]
 
     return Comparison(axes, offered, [ALLAN], draw)
 

@@ -12,6 +12,7 @@ from fastapi import Request
 from nicegui import ui
 
 from calibrations.discovery.verdict import Verdict
+from calibrations.presentation.views import view_of
 from calibrations.text import rounded
 from rig.errors import RecordError
 from rig.services.content import Content, content_of
@@ -30,7 +31,8 @@ from rig.web.pages.model_pictures import Pictures
 from rig.web.parts import box, div, failed, for_page, message, noted, off_loop, state, words
 
 if TYPE_CHECKING:
-    from calibrations.discovery.results import Comparison, Diagnosis, Place, Step
+    from calibrations.discovery.findings import Place, Step
+    from calibrations.discovery.results import Comparison, Diagnosis
     from rig.services.session import ModelSession
 
 
@@ -344,7 +346,7 @@ class VerdictBox:
         """Show the error and where it is largest, before the diagnosis."""
         self.numbers.clear()
         with self.numbers:
-            for name, value in session.data.figures(compared.fit).items():
+            for name, value in view_of(session.data).figures(compared.fit).items():
                 with div("figure"):
                     words(value, "value")
                     words(name, "quiet small")

@@ -12,12 +12,14 @@ from calibrations.criteria import SIGNIFICANT
 from calibrations.discovery.verdict import Verdict
 from calibrations.presentation.formula import formula_html
 from calibrations.presentation.report.report import next_takes, next_words
+from calibrations.presentation.views import view_of
 from calibrations.text import capital, probability, rounded
 from rig.web.parts import box, div, facts, failed, message, off_loop, waiting, words
 
 if TYPE_CHECKING:
+    from calibrations.discovery.findings import Candidate, Step
     from calibrations.discovery.patterns import Pattern
-    from calibrations.discovery.results import Candidate, Diagnosis, Step
+    from calibrations.discovery.results import Diagnosis
     from rig.services.search import Counted
     from rig.services.session import ModelSession
     from rig.web.pages.model import Workbench
@@ -225,7 +227,7 @@ class Card:
         facts(
             {
                 "Symptom": capital(c.effect.symptom),
-                **result.findings.data.facts(c, result),
+                **view_of(result.findings.data).facts(c, result),
                 "Probability": chances(c),
                 "Cannot be separated from": rivals or "nothing in the catalogue",
                 "Source": c.effect.source or "–",

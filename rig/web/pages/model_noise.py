@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from nicegui import ui
 
-from calibrations.noise.comparison import compare_deviations
+from calibrations.noise.comparison import compared_deviations
 from calibrations.presentation.chart import one
 from calibrations.presentation.charts.noise import (
     Drawn,
@@ -25,7 +25,8 @@ from rig.web.parts import box, div, words
 from rig.web.pictures import downloads, draw, empty_plot
 
 if TYPE_CHECKING:
-    from calibrations.discovery.results import Comparison, Place, Step
+    from calibrations.discovery.findings import Place, Step
+    from calibrations.discovery.results import Comparison
     from calibrations.noise.fit import NoiseFit
     from rig.services.session import ModelSession
 
@@ -84,7 +85,7 @@ class NoisePictures:
             return
         c, still = int(self.axis.value or 0), self.compared.fit.still
         found = self.compared.fit.channels[c]
-        curve = compare_deviations(found, still.allan[found.channel.axis])
+        curve = compared_deviations(self.compared.fit)[found.channel.axis]
         into = scaled(still, found.channel.axis, bool(self.unit.value))
         models = [Drawn(found, "model")]
         if self.step is not None:

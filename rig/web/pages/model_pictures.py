@@ -22,7 +22,8 @@ from rig.web.parts import box, div, redraw, words
 from rig.web.pictures import downloads, draw, empty_plot, remember
 
 if TYPE_CHECKING:
-    from calibrations.discovery.results import Comparison, Place, Step
+    from calibrations.discovery.findings import Place, Step
+    from calibrations.discovery.results import Comparison
     from calibrations.fitting.fit import Fit
     from rig.services.session import ModelSession
 

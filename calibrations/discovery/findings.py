@@ -1,0 +1,258 @@
+"""What a search in data of any kind finds.
+
+FittedModel  a model fitted to data, as the loop needs it
+Place        a place where a model fails
+Candidate    one effect on top of a model
+Step         one effect added
+Findings     all that one search found
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
+
+from calibrations.criteria import LIKELY, NOTEWORTHY
+from calibrations.discovery.verdict import Closest, Judgement
+from calibrations.effects import Effect
+from calibrations.model import Model
+
+if TYPE_CHECKING:
+    from calibrations.design.experiment import Experiment
+    from calibrations.discovery.dataset import Dataset
+    from calibrations.discovery.patterns import Pattern
+    from calibrations.free_forms.naming import ActingPlace
+
+
+class Measured(Protocol):
+    """Data as provenance names them."""
+
+    @property
+    def source(self) -> str:
+        """File or run."""
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the data."""
+
+    @property
+    def n(self) -> int:
+        """Rows, or samples of a channel."""
+
+    @property
+    def constants(self) -> Mapping[str, str | float]:
+        """What is known of the sensor."""
+
+
+class FittedModel(Protocol):
+    """A model fitted to data of any kind."""
+
+    @property
+    def model(self) -> Model:
+        """The model with its values."""
+
+    @property
+    def pooled_excess(self) -> float:
+        """Error over the noise floor, all channels together."""
+
+    @property
+    def held_out_excess(self) -> float:
+        """Error over the noise floor on data that the fit did not use."""
+
+    @property
+    def measured(self) -> Measured:
+        """The data that it was fitted to."""
+
+    def share_left(self, start: Self) -> float:
+        """Part of the excess variance of `start` that this fit does not explain."""
+
+
+F = TypeVar("F", bound=FittedModel)
+
+
+@dataclass(frozen=True)
+class Place:
+    """A stretch `low`..`high` of a column where one channel's error is `excess` times the noise floor."""
+
+    where: str
+    low: float
+    high: float
+    axis: str
+    excess: float
+    text: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """One effect on top of a model. `gain` is twice the gain in log-likelihood; `p_value` is over the whole search."""
+
+    effect: Effect
+    gain: float
+    p_value: float
+    probability: float
+    excess_after: float
+    held_out_after: float
+    indistinguishable_from: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The effect's name."""
+        return self.effect.name
+
+
+@dataclass(frozen=True)
+class Step(Generic[F]):
+    """One effect added: the fits without and with it.
+
+    `alone`: the log-likelihood that the final model loses without this effect alone; None where it is not computed.
+    """
+
+    name: str
+    before: F
+    after: F
+    alone: float | None = None
+
+    @property
+    def effect(self) -> Effect:
+        """The added effect. The model keeps its effects in the order of the signal chain: it need not be the last."""
+        return next(term.effect for term in self.after.model.terms if term.effect.name == self.name)
+
+    @property
+    def held_out_before(self) -> float:
+        """Error on unseen data without the effect."""
+        return self.before.held_out_excess
+
+    @property
+    def held_out_after(self) -> float:
+        """Error on unseen data with it."""
+        return self.after.held_out_excess
+
+
+@dataclass(frozen=True, kw_only=True)
+class Findings(Generic[F]):
+    """All that one search found. Diagnosis and discovery are two views of it, so that they cannot disagree.
+
+    data          the data
+    start         the given model
+    origin        the model that the search began with: an earlier one where a person added effects one by one
+    baseline      the given model on data without disturbances
+    added         effects that a person added before the given model
+    steps         the effects that it misses, in the order in which they are added
+    tried         the steps of the search, where none is kept
+    candidates    every effect alone on top of the baseline; the effect of the first step comes first
+    causes        effects of the steps named as causes; the others refine the form of a cause
+    alternatives  by effect, those that the data cannot separate from it
+    places        places of the signal chain that act, the largest first, where the search has found them
+    left          unexplained part of the residual, in words; `pattern` holds it as an expression
+    spoilt        whether that makes every effect doubtful; `unresponsive`, whether an output does not follow the poses
+    searched      whether further effects were searched for after the last step
+    enough        whether the steps end at an error that is as small as was asked
+    undetermined  why the data do not determine the given model, and the final model
+    set_aside     rows that the search left out, and why; `outliers` are their numbers
+    reason        why the data cannot decide, in words
+    disturbances  what is not noise in a still record, as documents
+    separations   by effect, the experiment that separates it from its alternatives
+    further       the experiment for anything else in doubt
+    settled       whether the effects were tested against each other
+    """
+
+    data: Dataset[F]
+    start: F
+    origin: F
+    baseline: F
+    added: tuple[str, ...] = ()
+    steps: tuple[Step[F], ...] = ()
+    tried: tuple[Step[F], ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    causes: tuple[str, ...] = ()
+    alternatives: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    places: tuple[ActingPlace, ...] = ()
+    left: str | None = None
+    pattern: Pattern | None = None
+    spoilt: bool = False
+    unresponsive: bool = False
+    searched: bool = True
+    enough: bool = False
+    undetermined: tuple[str | None, str | None] = (None, None)
+    set_aside: str | None = None
+    outliers: tuple[int, ...] = ()
+    reason: str | None = None
+    disturbances: tuple[Mapping[str, Any], ...] = ()
+    separations: Mapping[str, Experiment] = field(default_factory=dict)
+    further: Experiment | None = None
+    settled: bool = True
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effects of the steps, in order."""
+        return tuple(step.name for step in self.steps)
+
+    @property
+    def refinements(self) -> tuple[str, ...]:
+        """Effects of the steps that are not named as causes."""
+        return tuple(name for name in self.names if name not in self.causes)
+
+    @property
+    def end(self) -> F:
+        """The fit of the final model."""
+        return self.steps[-1].after if self.steps else self.baseline
+
+    @cached_property
+    def given(self) -> Judgement:
+        """The judgement on the given model; on the one before the added effects where no further one is missing."""
+        begun = self.origin if self.added and not self._lacking else self.start
+        return Judgement(
+            model=begun.model.name, missing=self._lacking, added=self.added, undetermined=self.undetermined[0],
+            closest=self._closest, provisional=not self.settled, **self._common,
+        )  # fmt: skip
+
+    @cached_property
+    def final(self) -> Judgement:
+        """The judgement on the final model."""
+        return Judgement(
+            model=self.start.model.name, added=self.causes, refinements=self.refinements,
+            undetermined=self.undetermined[1], closest=self._closest, **self._common,
+        )  # fmt: skip
+
+    @property
+    def _lacking(self) -> tuple[str, ...]:
+        """The effects of the steps; curves at unknown places are told by their places."""
+        unknown = any(place.unknown for place in self.places)
+        return tuple(name for name in self.names if not (unknown and name.startswith("free:")))
+
+    @property
+    def _common(self) -> dict[str, Any]:
+        return {
+            "alternatives": self.alternatives,
+            "unknown": tuple(place.name for place in self.places if place.unknown),
+            "left": self.left,
+            "share_left": self.end.share_left(self.origin),
+            "spoilt": self.spoilt,
+            "unresponsive": self.unresponsive,
+            "searched": self.searched,
+            "enough": self.enough,
+            "set_aside": self.set_aside,
+            "error": self.end.pooled_excess,
+            "floor": self.data.floor,
+            "remarks": self.remarks,
+        }
+
+    @property
+    def _closest(self) -> Closest | None:
+        """The best candidate where nothing is significant, if chance alone seldom shows as much."""
+        best = next(iter(self.candidates), None)
+        if self.steps or best is None or best.held_out_after >= self.baseline.held_out_excess:
+            return None
+        near = best.p_value < NOTEWORTHY or best.probability > LIKELY
+        return Closest(best.name, best.p_value) if near else None
+
+    def experiment(self, names: tuple[str, ...]) -> Experiment | None:
+        """The experiment for the first of these effects that is in doubt, or for anything else in doubt."""
+        return next((self.separations[name] for name in names if name in self.separations), self.further)
+
+    def without_steps(self) -> Self:
+        """The same, with no effect named: the residual makes all of them doubtful."""
+        return replace(self, steps=(), tried=self.steps, causes=(), alternatives={}, separations={}, settled=True)

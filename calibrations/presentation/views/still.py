@@ -1,0 +1,140 @@
+"""Still records: mismatch of the spectrum and of the Allan deviation beside what chance leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from calibrations.discovery.dataset import Dataset
+from calibrations.discovery.findings import Candidate
+from calibrations.discovery.results import Comparison, Diagnosis, Discovery
+from calibrations.noise.comparison import compared_deviations, mismatch
+from calibrations.noise.fit import NoiseFit
+from calibrations.presentation.views import View
+from calibrations.text import Cells, quantity, rounded
+
+if TYPE_CHECKING:
+    from calibrations.presentation.chart import Chart, Picture
+
+HEAD = (
+    "model", "log-likelihood gained", "lost without it alone", "mismatch / chance", "other half",
+    "mismatch of the Allan deviation",
+)  # fmt: skip
+LOST = 2  # a column that one step alone does not need
+CLEANED = "without non-noise signals"  # the given model on the record without disturbances
+
+
+@dataclass(frozen=True)
+class StillView(View[NoiseFit]):
+    """Results of a still record."""
+
+    data: Dataset[NoiseFit]
+
+    def figures(self, fit: NoiseFit) -> dict[str, str]:
+        """Mismatch of the spectrum, also on the other half, and of the Allan deviation."""
+        return {
+            "mismatch / chance": f"{rounded(fit.pooled_excess)} ×",
+            "on the other half": f"{rounded(fit.held_out_excess)} ×",
+            "Allan deviation is off by": ", ".join(f"{100 * value:.2g} %" for value in mismatch(fit).values()),
+        }
+
+    def facts(self, candidate: Candidate, diagnosis: Diagnosis[NoiseFit]) -> dict[str, str]:
+        """Mismatch of the spectrum, and the gain in log-likelihood."""
+        before, held_out = diagnosis.excess_before, diagnosis.held_out_before
+        return {
+            "Mismatch of the spectrum": f"{rounded(before)} → {rounded(candidate.excess_after)} × chance",
+            "On the other half": f"{rounded(held_out)} → {rounded(candidate.held_out_after)} × chance",
+            "Log-likelihood": f"+{rounded(candidate.gain / 2)}",
+        }
+
+    def error_table(self, fit: NoiseFit) -> Cells:
+        """Mismatch of the spectrum and of the Allan deviation, beside those by chance."""
+        rows = []
+        curves = compared_deviations(fit)
+        for channel in fit.channels:
+            axis = channel.channel.axis
+            shares = (channel.mismatch, channel.floor), (curves[axis].mismatch, curves[axis].by_chance)
+            (spectrum, by_chance), (allan, allan_by_chance) = (
+                (f"{100 * a:.3g} %", f"{100 * b:.3g} %") for a, b in shares
+            )
+            rows.append((axis, spectrum, by_chance, f"{channel.excess:.2f}", allan, allan_by_chance))
+        head = ("axis", "mismatch of the spectrum", "by chance", "ratio", "of the Allan deviation", "by chance")
+        return head, rows
+
+    def comparison_table(self, comparison: Comparison[NoiseFit]) -> Cells:
+        """Measured and modelled Allan deviations."""
+        unit, rows = self.data.unit, []
+        for axis, curve in compared_deviations(comparison.fit).items():
+            for k, tau in enumerate(curve.tau_s):
+                shown = [quantity(float(x[k]), unit) for x in (curve.measured, curve.low, curve.high, curve.modelled)]
+                off = f"{curve.deviations[k]:+.1f}" if abs(curve.deviations[k]) >= 0.05 else "0"
+                rows.append((axis, f"{tau:.4g}", shown[0], f"{shown[1]} .. {shown[2]}", shown[3], off))
+        return ("axis", "time (s)", "Allan deviation", "95 % interval", "model", "deviations off"), rows
+
+    def step_table(self, discovery: Discovery[NoiseFit]) -> Cells:
+        """Gains that add up, and the mismatch after each step."""
+        several = len(discovery.steps) > 1
+        chosen = [k for k in range(len(HEAD)) if k != LOST or several]
+        rows = [[row[k] for k in chosen] for row in _rows(discovery, several)]
+        return tuple(HEAD[k] for k in chosen), [tuple(row) for row in rows]
+
+    def candidate_table(self, diagnosis: Diagnosis[NoiseFit], candidates: Sequence[Candidate]) -> Cells:
+        """Held-out mismatch, gain, chance and probability of each candidate."""
+        rows = [
+            (
+                c.name,
+                f"{diagnosis.held_out_before:.3g} -> {c.held_out_after:.3g}",
+                f"{c.gain / 2:.4g}" if c.gain > 1e-6 else "0",
+                f"{c.p_value:.1g}",
+                f"{c.probability:.3f}",
+                ", ".join(c.indistinguishable_from) or "-",
+            )
+            for c in candidates
+        ]
+        head = (
+            "candidate", f"mismatch on {self.data.unseen} / chance", "log-likelihood", "p-value", "probability",
+            "cannot be separated from",
+        )  # fmt: skip
+        return head, rows
+
+    def fit_chart(self, fit: NoiseFit) -> Chart:
+        """Measured and modelled Allan deviations."""
+        from calibrations.presentation.charts.noise import fit_chart  # text needs no charts
+
+        return fit_chart(fit)
+
+    def steps_chart(self, discovery: Discovery[NoiseFit]) -> Chart:
+        """Error by model."""
+        from calibrations.presentation.charts.noise import steps_chart
+
+        return steps_chart(discovery.start, discovery.steps)
+
+    def fit_album(self, fit: NoiseFit) -> list[Picture]:
+        """Allan deviation and spectrum."""
+        from calibrations.presentation.charts.noise import still_album
+
+        return still_album(fit, fit)
+
+    def steps_album(self, discovery: Discovery[NoiseFit]) -> list[Picture]:
+        """Error by model, Allan deviation and spectrum of the given and of the final model."""
+        from calibrations.presentation.charts.noise import steps_picture, still_album
+
+        return [steps_picture(discovery), *still_album(discovery.end, discovery.start)]
+
+
+def _rows(discovery: Discovery[NoiseFit], several: bool) -> Iterator[tuple[str, ...]]:
+    start, baseline = discovery.start, discovery.findings.baseline
+    yield _row(start.model.name, start)
+    if baseline is not start:
+        yield _row(CLEANED, baseline, baseline.log_likelihood - start.log_likelihood)
+    for s in discovery.steps:
+        gained = s.after.log_likelihood - s.before.log_likelihood
+        yield _row(f"+ {s.name}", s.after, gained, s.alone if several else None)
+
+
+def _row(name: str, fit: NoiseFit, gained: float | None = None, lost: float | None = None) -> tuple[str, ...]:
+    """In the order of HEAD. A gain depends on the rows above, and gains add up; losses do not."""
+    off = ", ".join(f"{100 * value:.3g} %" for value in mismatch(fit).values())
+    shown = ["" if value is None else f"{value:+.5g}" for value in (gained, None if lost is None else -lost)]
+    return name, *shown, f"{fit.pooled_excess:.2f}", f"{fit.held_out_excess:.2f}", off
