@@ -1,7 +1,8 @@
 """Checksums of the record's rows: a row that changed on the disk is refused, not used.
 
 SQLite checks its own structure, and not the values. So each row of a run has the CRC-32 of its values. Rows of older
-programs have none (NULL); they are readable, and only undecodable values are found in them.
+programs have none (NULL); they are readable, and only undecodable values are found in them. If the entry of a run has
+one, its other rows need one too: a changed length in the head of a row can hide the checksum.
 """
 
 from __future__ import annotations
@@ -38,13 +39,16 @@ def with_checksum(table: Table, values: Mapping[str, Any]) -> dict[str, Any]:
     return {**values, "checksum": _checksum(table, values)}
 
 
-def is_damaged(table: Table, row: Mapping[Any, Any]) -> bool:
-    """Whether a row of `table`, by column, has an undecodable value or another checksum than at its insertion."""
+def is_damaged(table: Table, row: Mapping[Any, Any], required: bool = False) -> bool:
+    """Whether a row of `table`, by column, has an undecodable value or another checksum than at its insertion, or none
+    where one is `required`.
+    """
     values = {column.name: row[column] for column in table.c if column in row}
     if any(value is DAMAGED or (isinstance(value, str) and not _is_text(value)) for value in values.values()):
         return True
-    expected = values.get("checksum")
-    return expected is not None and expected != _checksum(table, values)
+    if (expected := values.get("checksum")) is None:
+        return required and any(value is not None for value in values.values())  # else an outer join found no row
+    return bool(expected != _checksum(table, values))
 
 
 def _checksum(table: Table, values: Mapping[str, Any]) -> int:

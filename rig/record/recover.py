@@ -1,10 +1,12 @@
 """Recovery of a damaged record: copies every readable row into a new record, and reports the losses.
 
 SQLite stores rows in pages, so damage at one place loses some rows of one table. Each table is read from both ends up
-to the damage. A row with another checksum than at its insertion is not copied, and a pose without its samples neither.
+to the damage. A row with another checksum than at its insertion is not copied, and a pose without its samples, or
+samples without their pose, neither.
 A run with a damaged or lost entry gets a new one, with the parts that are readable, so that its poses are in reach.
 
-A file that lost its end is read from a copy that is filled up with zeros.
+A file that lost its end is read from a copy that is filled up with zeros, and one with a damaged schema from a copy
+with a new one.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ import shutil
 import sqlite3
 import struct
 from collections.abc import Iterator, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,9 +26,8 @@ from rig.errors import RecordError
 from rig.record import codec
 from rig.record.checksum import COVERED, is_damaged
 from rig.record.file import FILE, decoded, open_file
+from rig.record.repair import UNREADABLE, is_sound, rewrite_schema
 from rig.record.schema import DAMAGED, blocks, metadata, poses, readings, runs
-
-UNREADABLE = (sqlite3.Error, UnicodeDecodeError)  # the second: SQLite quotes unreadable bytes in its messages
 
 
 @dataclass(frozen=True)
@@ -77,8 +78,9 @@ def _recovered(source: Path, target: Path) -> Recovered:
         new.commit()
         changed = tuple(_checked(target))
         spoilt = tuple(_spoilt(new))
-        new.execute("DELETE FROM poses WHERE NOT EXISTS (SELECT 1 FROM blocks WHERE blocks.run = poses.run "
-                    "AND blocks.number = poses.number)")  # fmt: skip
+        for table, other in (("poses", "blocks"), ("blocks", "poses"), ("dwells", "poses")):
+            same = f"{other}.run = {table}.run AND {other}.number = {table}.number"
+            new.execute(f"DELETE FROM {table} WHERE NOT EXISTS (SELECT 1 FROM {other} WHERE {same})")  # noqa: S608
         new.commit()
         new.execute("PRAGMA journal_mode = DELETE")  # all is in one file, which gets its name now
         new.close()
@@ -89,20 +91,25 @@ _HEADER = struct.Struct(">16x H 10x I")  # of SQLite's file: bytes of a page, nu
 
 
 def _whole(source: Path, padded: Path) -> Path:
-    """The file, or a copy that is filled up with zeros if the end is missing."""
+    """The file, or a copy that is filled up with zeros if the end is missing, and has a sound schema."""
     with source.open("rb") as file:
         head = file.read(_HEADER.size)
     if len(head) < _HEADER.size or not head.startswith(b"SQLite format 3"):
         return source  # is refused when it is opened
     page, pages = _HEADER.unpack(head)
     size = (65536 if page == 1 else page) * pages
-    if source.stat().st_size >= size:
+    whole, sound = source.stat().st_size >= size, is_sound(source)
+    if whole and sound:
         return source
     shutil.copyfile(source, padded)
     if (log := source.with_name(f"{source.name}-wal")).exists():
         shutil.copyfile(log, padded.with_name(f"{padded.name}-wal"))
-    with padded.open("r+b") as file:
-        file.truncate(size)
+    if not whole:
+        with padded.open("r+b") as file:
+            file.truncate(size)
+    if not sound:
+        with suppress(*UNREADABLE):  # else nothing is readable, which is said when it is opened
+            rewrite_schema(padded)
     return padded
 
 
@@ -111,11 +118,16 @@ def _checked(target: Path) -> Iterator[str]:
     engine = open_file(target)
     try:
         with engine.begin() as to:
+            checked = set(to.execute(select(runs.c.run).where(runs.c.checksum.is_not(None))).scalars())
             for table in (table for table in COVERED if table is not runs):
                 place = "name" if "name" in table.c else "number"
                 key = (table.c.run, table.c[place])
                 rows = to.execute(select(table))
-                bad = [(row.run, getattr(row, place)) for row in rows if is_damaged(table, row._mapping)]
+                bad = [
+                    (row.run, getattr(row, place))
+                    for row in rows
+                    if is_damaged(table, row._mapping, row.run in checked)
+                ]
                 for run, which in bad:
                     to.execute(delete(table).where(key[0] == run, key[1] == which))
                     yield f"run {run}, {table.name}: {which}"

@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import Connection, Integer, Row, Select, exists, false, func, select
+from sqlalchemy import (
+    Connection,
+    Integer,
+    Row,
+    Select,
+    String,
+    cast,
+    exists,
+    false,
+    func,
+    literal_column,
+    select,
+    union_all,
+)
 from sqlalchemy import Table as SqlTable
 
 from procedures.session import Dwell, Pose
@@ -13,7 +27,7 @@ from rig.errors import RecordError
 from rig.record import codec
 from rig.record.checksum import is_damaged
 from rig.record.file import RECOVER
-from rig.record.schema import arrivals, columns, insert_or, newest_first, poses, readings, runs, states
+from rig.record.schema import arrivals, blocks, columns, insert_or, newest_first, poses, readings, runs, states
 from rig.record.values import Block, Event, Kept, Run
 
 LAST = "last"  # the newest run, in the place of an id
@@ -79,9 +93,14 @@ def pose_of(row: Row[Any]) -> Pose:
     return Pose(**{name: row._mapping[poses.c[name]] for name in POSE})
 
 
-def sound(row: Row[Any], *tables: SqlTable) -> Row[Any]:
-    """The row of `tables`. Raises RecordError if it changed on the disk."""
-    damaged = next((table for table in tables if is_damaged(table, row._mapping)), None)
+def has_checksums(at: Connection, run: str) -> bool:
+    """Whether every row of a run has a checksum: the entry of the run has one."""
+    return at.execute(select(runs.c.checksum).where(runs.c.run == run)).scalar_one_or_none() is not None
+
+
+def sound(row: Row[Any], *tables: SqlTable, required: bool) -> Row[Any]:
+    """The row of `tables`. Raises RecordError if it changed on the disk. `required`: it has a checksum."""
+    damaged = next((table for table in tables if is_damaged(table, row._mapping, required)), None)
     if damaged is None:
         return row
     if damaged in (readings, columns):
@@ -96,6 +115,61 @@ def place_text(row: Row[Any], table: SqlTable) -> str:
     """The phrase about a row that changed on the disk."""
     which = f" {table.name[:-1]} {row.name!r}" if "name" in table.c else f" pose {row.number}"
     return f"run {row.run},{which}: its values changed on the disk ({table.name})"
+
+
+def require_whole(at: Connection, run: str) -> set[int]:
+    """The numbers of the poses without the excluded ones.
+
+    Raises RecordError if a pose has no samples, if samples have no pose, or if a number occurs twice. A bit that
+    changed in an index of SQLite hides rows, and no checksum of a row shows it; each table has its own index.
+    """
+    for number in _incomplete(at, run):
+        raise lost(run, number)
+    return set(at.execute(select(poses.c.number).where(poses.c.run == run, poses.c.excluded.is_(None))).scalars())
+
+
+def lost(run: str, number: int) -> RecordError:
+    """The error of a pose that the record holds only in part."""
+    return RecordError(f"{_lost_text(run, number)}; {RECOVER}")
+
+
+def lost_rows(at: Connection) -> list[str]:
+    """A phrase for each incomplete pose of all runs."""
+    known = at.execute(select(runs.c.run)).scalars().all()
+    return [_lost_text(run, number) for run in known for number in _incomplete(at, run)]
+
+
+def _incomplete(at: Connection, run: str) -> list[int]:
+    """The numbers of poses that are not exactly once in both tables, without the excluded ones. One statement, so that
+    a run in progress is seen at one instant.
+    """
+    parts = [
+        select(literal_column(str(k)).label("place"), table.c.number).where(table.c.run == run)
+        for k, table in enumerate((poses, blocks))
+    ]
+    places: tuple[list[int], list[int]] = ([], [])
+    for place, number in at.execute(union_all(*parts)):
+        places[place].append(number)
+    there, sampled = map(Counter, places)
+    wrong = {number for number in there.keys() | sampled.keys() if (there[number], sampled[number]) != (1, 1)}
+    if not wrong:
+        return []
+    excluded = at.execute(select(poses.c.number).where(poses.c.run == run, poses.c.excluded.is_not(None))).scalars()
+    return sorted(wrong - set(excluded))
+
+
+def _lost_text(run: str, number: int) -> str:
+    return f"run {run}, pose {number}: a part of it is lost on the disk"
+
+
+def require_rows(at: Connection, table: SqlTable, run: str) -> None:
+    """Raises RecordError if the index of SQLite hides a row of a run in a small table."""
+    by_index = select(func.count()).where(table.c.run == run).scalar_subquery()
+    other = cast(list(table.c)[2], String)  # is not in the index, so that this count reads the rows themselves
+    by_table = select(func.count(other)).where(table.c.run.concat("") == run).scalar_subquery()
+    indexed, there = at.execute(select(by_index, by_table)).one()
+    if indexed != there:
+        raise RecordError(f"run {run}: a row of its {table.name} is lost on the disk; {RECOVER}")
 
 
 def damage_text(run: str) -> str:

@@ -37,12 +37,17 @@ from rig.record.rows import (
     damage_text,
     dwell_of,
     excluded_rows,
+    has_checksums,
     imported_rows,
     kept_of,
+    lost,
+    lost_rows,
     place_text,
     pose_of,
     put,
     put_state,
+    require_rows,
+    require_whole,
     run_of,
     runs_of_sensor,
     select_beginning,
@@ -247,12 +252,15 @@ class Record:
         return [damage_text(row.run) for row in rows if is_damaged(runs, row._mapping)]
 
     def damaged_rows(self) -> list[str]:
-        """A phrase for each row of a run, except its entry, that changed on the disk."""
-        phrases = []
+        """A phrase for each row of a run, except its entry, that changed on the disk or is lost."""
         with self._reading() as at:
+            phrases = lost_rows(at)
+            checked = set(at.execute(select(runs.c.run).where(runs.c.checksum.is_not(None))).scalars())
             for table in (poses, blocks, dwells, readings, columns):
                 rows = at.execution_options(yield_per=32).execute(select(table))
-                phrases += [place_text(row, table) for row in rows if is_damaged(table, row._mapping)]
+                phrases += [
+                    place_text(row, table) for row in rows if is_damaged(table, row._mapping, row.run in checked)
+                ]
         return phrases
 
     def run(self, name: str) -> Run:
@@ -287,7 +295,8 @@ class Record:
         chosen = (poses.c.run == run) & poses.c.excluded.is_(None)
         query = select(poses).where(chosen).order_by(poses.c.number)
         with self._reading() as at:
-            return [pose_of(sound(row, poses)) for row in at.execute(query)]
+            required = has_checksums(at, run)
+            return [pose_of(sound(row, poses, required=required)) for row in at.execute(query)]
 
     def excluded(self, run: str) -> dict[int, str]:
         """The reason of each excluded pose, or row of an imported table, by its number."""
@@ -314,7 +323,9 @@ class Record:
         """The run's readings, in the order of their names."""
         query = select(readings).where(readings.c.run == run).order_by(readings.c.name)
         with self._reading() as at:
-            rows = [sound(row, readings) for row in at.execute(query)]
+            require_rows(at, readings, run)
+            required = has_checksums(at, run)
+            rows = [sound(row, readings, required=required) for row in at.execute(query)]
         return [Reading(row.name, row.value, row.unit, row.std) for row in rows]
 
     def kept(self, run: str) -> Iterator[Kept]:
@@ -322,10 +333,17 @@ class Record:
         same = (poses.c.run == blocks.c.run) & (poses.c.number == blocks.c.number)
         query = select(poses, blocks).join_from(poses, blocks, same).where(poses.c.run == run)
         with self._reading() as at:
+            left = require_whole(at, run)
+            required = has_checksums(at, run)
             options = at.execution_options(yield_per=32)
             for row in options.execute(query.order_by(poses.c.number)):
-                if row.excluded is None or not any(is_damaged(table, row._mapping) for table in (poses, blocks)):
-                    yield kept_of(sound(row, poses, blocks))
+                left.discard(row.number)
+                if row.excluded is None or not any(
+                    is_damaged(table, row._mapping, required) for table in (poses, blocks)
+                ):
+                    yield kept_of(sound(row, poses, blocks, required=required))
+            for number in sorted(left):
+                raise lost(run, number)
 
     def dwells(self, run: str, after: int = -1) -> list[tuple[int, Dwell]]:
         """Means and scatter of every pose with a number above `after`, without the excluded ones.
@@ -336,7 +354,12 @@ class Record:
         query = select(poses, dwells).join_from(poses, dwells, same, isouter=True)
         chosen = (poses.c.run == run) & (poses.c.number > after) & poses.c.excluded.is_(None)
         with self._reading() as at:
-            rows = [sound(row, poses, dwells) for row in at.execute(query.where(chosen).order_by(poses.c.number))]
+            left = require_whole(at, run) if after < 0 else set()
+            required = has_checksums(at, run)
+            found = at.execute(query.where(chosen).order_by(poses.c.number))
+            rows = [sound(row, poses, dwells, required=required) for row in found]
+        for number in sorted(left - {row.number for row in rows}):
+            raise lost(run, number)
         older = {kept.number: kept.dwell for kept in self.kept(run)} if any(row.n is None for row in rows) else {}
         return [(row.number, older.get(row.number) or dwell_of(row)) for row in rows]
 
@@ -362,7 +385,9 @@ class Record:
         """The columns of an imported table: numbers, and texts, by name."""
         query = select(columns).where(columns.c.run == run).order_by(columns.c.position)
         with self._reading() as at:
-            rows = [sound(row, columns) for row in at.execute(query)]
+            require_rows(at, columns, run)
+            required = has_checksums(at, run)
+            rows = [sound(row, columns, required=required) for row in at.execute(query)]
         numbers = {row.name: np.frombuffer(row.numbers, "<f8") for row in rows if row.numbers is not None}
         return numbers, {row.name: tuple(row.texts) for row in rows if row.numbers is None}
 

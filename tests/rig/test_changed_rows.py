@@ -34,6 +34,22 @@ def flip(folder: Path, column: str, run: str, at: int = 4) -> None:
         connection.execute(f"UPDATE runs SET {column} = CAST(? AS TEXT) WHERE run = ?", (bytes(data), run))  # noqa: S608
 
 
+def hide(folder: Path, table: str, which: str) -> None:
+    """Remove a row from the index of the table's key, and leave the row itself: as a changed bit in the index does."""
+    path, other = folder / "record.db", folder / "other.db"
+    shutil.copyfile(path, other)
+    with closing(sqlite3.connect(other)) as connection, connection:
+        connection.execute(f"DELETE FROM {table} WHERE {which}")  # noqa: S608
+        name = f"sqlite_autoindex_{table}_1"
+        (root,) = connection.execute("SELECT rootpage FROM sqlite_master WHERE name = ?", (name,)).fetchone()
+    with closing(sqlite3.connect(other)) as connection:
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    page = slice((root - 1) * PAGE, root * PAGE)
+    data = bytearray(path.read_bytes())
+    data[page] = other.read_bytes()[page]
+    path.write_bytes(data)
+
+
 def two_runs(folder: Path) -> tuple[str, str]:
     return recorded(folder, 3), recorded(folder, 3)
 
@@ -71,6 +87,7 @@ def test_a_number_that_changed_in_a_document_is_noticed(tmp_path: Path) -> None:
         "UPDATE poses SET beta_deg = 65.0 WHERE number = 1",
         "UPDATE blocks SET rate_hz = 1001.0 WHERE number = 1",
         "UPDATE blocks SET start_s = 2.0 WHERE number = 1",
+        "UPDATE poses SET up = 'y', checksum = NULL WHERE number = 1",
     ],
 )
 def test_a_changed_pose_is_named_until_it_is_excluded(tmp_path: Path, statement: str) -> None:
@@ -141,3 +158,66 @@ def test_poses_without_the_entry_of_their_run_are_in_reach(tmp_path: Path) -> No
     assert recover(tmp_path / "old" / "record.db", tmp_path / "new").changed
     with Record(tmp_path / "new") as record:
         assert (record.run(run).state, table_of(record, run).n) == ("failed", 2)
+
+
+@pytest.mark.parametrize("table", ["poses", "blocks"])
+def test_a_row_that_an_index_hides_is_named(tmp_path: Path, table: str) -> None:
+    run = recorded(tmp_path, 4)
+    hide(tmp_path, table, "number = 2")
+    with Record(tmp_path) as record:
+        for read in (lambda: list(record.kept(run)), lambda: record.dwells(run), lambda: table_of(record, run)):
+            with pytest.raises(RecordError, match=f"run {run}, pose 2: a part of it is lost on the disk"):
+                read()
+        assert record.damaged_rows() == [f"run {run}, pose 2: a part of it is lost on the disk"]
+    recover(tmp_path / "record.db", tmp_path / "new")
+    with Record(tmp_path / "new") as record:
+        assert [kept.number for kept in record.kept(run)] == [0, 1, 2, 3], "the row itself is sound"
+
+
+def test_readings_and_columns_that_an_index_hides_are_named(tmp_path: Path) -> None:
+    run = recorded(tmp_path, 1)
+    with Record(tmp_path) as record:
+        whole = table_of(record, run)
+        imported = record.add_table(whole)
+    hide(tmp_path, "readings", "1")
+    hide(tmp_path, "columns", "name = 'vx_v'")
+    with Record(tmp_path) as record:
+        with pytest.raises(RecordError, match="a row of its readings is lost"):
+            record.readings(run)
+        with pytest.raises(RecordError, match="a row of its columns is lost"):
+            record.columns(imported)
+    recover(tmp_path / "record.db", tmp_path / "new")
+    with Record(tmp_path / "new") as record:
+        assert table_of(record, imported).digest == whole.digest
+        assert len(record.readings(run)) == 1
+
+
+def test_samples_whose_pose_is_lost_are_not_recovered(tmp_path: Path) -> None:
+    run = recorded(tmp_path, 3)
+    change(tmp_path, "DELETE FROM poses WHERE number = 1")
+    recover(tmp_path / "record.db", tmp_path / "new")
+    with Record(tmp_path / "new") as record:
+        assert [kept.number for kept in record.kept(run)] == [0, 2]
+        assert record.damaged_rows() == []
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        (b"CREATE TABLE poses", b"CREATE TABLE poqes"),
+        (b"poses", b"poqes"),
+        (b"alpha_deg FLOAT", b"alpha_dfg FLOAT"),
+        (b"sqlite_autoindex_runs_1", b"sqlite_autoindey_runs_1"),
+    ],
+)
+def test_a_damaged_schema_costs_no_row(tmp_path: Path, right: bytes, wrong: bytes) -> None:
+    run = recorded(tmp_path, 3)
+    with Record(tmp_path) as record:
+        whole = table_of(record, run).digest
+    path = tmp_path / "record.db"
+    data = path.read_bytes()
+    assert right in data[:PAGE]
+    path.write_bytes(data[:PAGE].replace(right, wrong, 1) + data[PAGE:])
+    assert not recover(path, tmp_path / "new").changed
+    with Record(tmp_path / "new") as record:
+        assert table_of(record, run).digest == whole

@@ -23,6 +23,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from calibrations.discovery.fit_doubts import fit_doubts
 from calibrations.discovery.plausibility import doubt, rejection
 from calibrations.discovery.structure import unexplained_scatter
 from calibrations.errors import ModelError, UnusableData
@@ -233,8 +234,9 @@ def _size(of: Fit, c: int, unit_of: Fit) -> tuple[float, float]:
 
 
 def _remarks(fit: Fit) -> Iterator[str]:
-    if (why := doubt(fit.table)) is not None:
-        yield f"Check: {why}."
+    for why in (doubt(fit.table), *fit_doubts(fit)):
+        if why is not None:
+            yield f"Check: {why}."
     if fit.birge > MISFIT:
         yield (
             f"The residual is larger than the noise (Birge ratio {fit.birge:.2f}). The uncertainties are multiplied "
