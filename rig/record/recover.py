@@ -78,9 +78,9 @@ def _recovered(source: Path, target: Path) -> Recovered:
         new.commit()
         changed = tuple(_checked(target))
         spoilt = tuple(_spoilt(new))
-        for table, other in (("poses", "blocks"), ("blocks", "poses"), ("dwells", "poses")):
-            same = f"{other}.run = {table}.run AND {other}.number = {table}.number"
-            new.execute(f"DELETE FROM {table} WHERE NOT EXISTS (SELECT 1 FROM {other} WHERE {same})")  # noqa: S608
+        for name, other in (("poses", "blocks"), ("blocks", "poses"), ("dwells", "poses")):
+            same = f"{other}.run = {name}.run AND {other}.number = {name}.number"
+            new.execute(f"DELETE FROM {name} WHERE NOT EXISTS (SELECT 1 FROM {other} WHERE {same})")  # noqa: S608
         new.commit()
         new.execute("PRAGMA journal_mode = DELETE")  # all is in one file, which gets its name now
         new.close()

@@ -205,3 +205,12 @@ def test_normal_gravity_is_that_of_the_reference_system() -> None:
     assert normal_gravity(90) == pytest.approx(9.8321863685, abs=1e-7)
     assert normal_gravity(-45) == pytest.approx(9.806199203, abs=1e-7)
     assert normal_gravity(45) - normal_gravity(45, 100) == pytest.approx(3.086e-4, rel=1e-3)
+
+
+def test_a_doubt_about_the_stated_noise_is_remarked() -> None:
+    """In the same words as of the comparison."""
+    rows = table()
+    columns = {name: values * (40.0 if "_std" in name else 1.0) for name, values in rows.columns.items()}
+    remarks = figures(fit(read_model("linear"), replace(rows, columns=columns)), None, {}, trials=200).remarks
+    assert any(remark.startswith("Check: the error of x, y is only") for remark in remarks)
+    assert not any("noise floor" in remark for remark in certificate().figures.remarks)
