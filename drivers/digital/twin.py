@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.digital.settings import FIELDS, FORCES, RATES, VOLTAGES, DigitalSettings
+from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
-from drivers.transport.server import Connection, Port, Twin
-from drivers.world.digital import Trim
+from drivers.transport.server import Connection, Port, Server, Twin
+from drivers.world.digital import Trim, trims
 
 Floats = NDArray[np.float64]
 G_M_S2 = 9.80665
@@ -57,6 +58,10 @@ class WarmWorld(World, Protocol):
     """The same, with the temperature of the sensor."""
 
     def thermometer_c(self) -> float: ...
+
+
+W = TypeVar("W", bound=World)
+S = TypeVar("S", bound=DigitalSettings)
 
 
 @dataclass
@@ -229,6 +234,20 @@ class FramedTwin(DigitalTwin):
 def talking_port(listen: str) -> Port:
     """A port for a sensor that sends without requests. The system buffers only little unread data."""
     return Port(listen, held=HELD)
+
+
+def serve_sensors(
+    sensor: Callable[[W, S, Port], DigitalTwin], world: W, roles: Mapping[str, tuple[int, S]], listen: str
+) -> Server:
+    """A link with a sensor for each role: role -> (unit id, which such a sensor has not, settings).
+
+    Raises UnknownInput for an output that the simulated sensor does not have.
+    """
+    for _, settings in roles.values():
+        trims(list(settings.wired), world.trims)
+    ports = {role: talking_port(listen) for role in roles}
+    twins = {role: sensor(world, roles[role][1], port) for role, port in ports.items()}
+    return Server(list(ports.values()), twins, {role: Address(port.url) for role, port in ports.items()})
 
 
 def factors(settings: DigitalSettings) -> Floats:

@@ -8,12 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.digital.settings import FIELDS, FORCES, RATES, VOLTAGES
-from drivers.digital.twin import DigitalTwin, Floats, World, common_faults, talking_port
+from drivers.digital.twin import DigitalTwin, Floats, World, common_faults, serve_sensors
 from drivers.imu_lines.driver import WRAP, Settings
 from drivers.imu_lines.lines import TIME, checksum
-from drivers.transport.address import Address
 from drivers.transport.server import Port, Server
-from drivers.world.digital import trims
 
 LISTEN = "pty:?baud=115200"
 FAULTS = common_faults("line")
@@ -69,12 +67,5 @@ def line_of(values: Mapping[str, float], settings: Settings) -> bytes:
 
 
 def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
-    """A line with a sensor for each role: role -> (unit id, which such a sensor has not, settings).
-
-    Raises UnknownInput for a column that the simulated sensor does not have.
-    """
-    for _, settings in roles.values():
-        trims(list(settings.wired), world.trims)
-    ports = {role: talking_port(listen) for role in roles}
-    twins = {role: Talker(world, roles[role][1], port) for role, port in ports.items()}
-    return Server(list(ports.values()), twins, {role: Address(port.url) for role, port in ports.items()})
+    """A sensor for each role. Raises UnknownInput for an output that the simulated sensor does not have."""
+    return serve_sensors(Talker, world, roles, listen)

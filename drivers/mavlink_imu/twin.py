@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 
 from drivers.digital.frames import Frames, Ints
 from drivers.digital.settings import OUTPUTS
-from drivers.digital.twin import FRAME_FAULTS, Floats, FramedTwin, WarmWorld, common_faults, talking_port
+from drivers.digital.twin import FRAME_FAULTS, Floats, FramedTwin, WarmWorld, common_faults, serve_sensors
 from drivers.mavlink_imu import messages as mav
 from drivers.mavlink_imu.driver import END, UPDATED, Settings
-from drivers.transport.address import Address
 from drivers.transport.faults import Kind
 from drivers.transport.server import Connection, Port, Server
-from drivers.world.digital import trims
 
 LISTEN = "tcp://127.0.0.1:0"
 SYSTEM, COMPONENT, QUADROTOR, PX4 = 1, 1, 2, 12
@@ -126,12 +124,5 @@ class Autopilot(FramedTwin):
 
 
 def serve(world: WarmWorld, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
-    """A link with a flight controller for each role: role -> (unit id, which it has not, settings).
-
-    Raises UnknownInput for an output that the simulated sensor does not have.
-    """
-    for _, settings in roles.values():
-        trims(list(settings.wired), world.trims)
-    ports = {role: talking_port(listen) for role in roles}
-    twins = {role: Autopilot(world, roles[role][1], port) for role, port in ports.items()}
-    return Server(list(ports.values()), twins, {role: Address(port.url) for role, port in ports.items()})
+    """A flight controller for each role. Raises UnknownInput for an output that the simulated sensor does not have."""
+    return serve_sensors(Autopilot, world, roles, listen)

@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 
 from drivers.digital.frames import Frames
 from drivers.digital.settings import FIELDS
-from drivers.digital.twin import FRAME_FAULTS, Floats, FramedTwin, WarmWorld, common_faults, talking_port
-from drivers.transport.address import Address
+from drivers.digital.twin import FRAME_FAULTS, Floats, FramedTwin, WarmWorld, common_faults, serve_sensors
 from drivers.transport.faults import Kind
 from drivers.transport.server import Connection, Port, Server
-from drivers.world.digital import trims
 from drivers.xsens_mti import messages as xbus
 from drivers.xsens_mti.driver import TICK_S, TRIADS, Settings
 
@@ -129,12 +127,5 @@ class MotionTracker(FramedTwin):
 
 
 def serve(world: WarmWorld, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
-    """A line with a tracker for each role: role -> (unit id, which it has not, settings).
-
-    Raises UnknownInput for an output that the simulated sensor does not have.
-    """
-    for _, settings in roles.values():
-        trims(list(settings.wired), world.trims)
-    ports = {role: talking_port(listen) for role in roles}
-    twins = {role: MotionTracker(world, roles[role][1], port) for role, port in ports.items()}
-    return Server(list(ports.values()), twins, {role: Address(port.url) for role, port in ports.items()})
+    """A tracker for each role. Raises UnknownInput for an output that the simulated sensor does not have."""
+    return serve_sensors(MotionTracker, world, roles, listen)

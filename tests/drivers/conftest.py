@@ -22,6 +22,7 @@ from drivers.transport.server import Server
 from drivers.world import positioner
 from drivers.world.kernel import record
 from drivers.world.stage import Trajectory, at_rest
+from tests.drivers.digital import DigitalSensors
 
 STAGE = oriental_az.Settings(limits_deg=(-400.0, 400.0), speed_deg_s=20.0, acceleration_deg_s2=40.0)
 CONVERTER = labjack_t7.Settings(channels={"time": 2, "noise": 0, "supply": 5}, rate_hz=1000.0, power_dio=3)
@@ -157,3 +158,11 @@ def bench(make_bench: Callable[..., SmallBench]) -> SmallBench:
 @pytest.fixture
 def small_world() -> SmallWorld:
     return SmallWorld()
+
+
+@pytest.fixture
+def digital() -> Iterator[DigitalSensors]:
+    """Simulated digital sensors, closed at the end of the test."""
+    sensors = DigitalSensors()
+    yield sensors
+    sensors.close()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import closing
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,14 +12,13 @@ import pytest
 from drivers.clock import SimulatedClock, WallClock
 from drivers.errors import LinkRefused, LinkTimeout
 from drivers.imu_lines import driver as imu_lines
-from drivers.imu_lines import twin
 from drivers.transport import Links
-from drivers.transport.faults import Fault, faults_of
+from drivers.transport.faults import Fault
 from drivers.transport.server import Connection, Port, Server
-from tests.drivers.sensed import Ramp
+from tests.drivers.digital import DigitalSensors
 
 SETTINGS = imu_lines.Settings({"time": 1, "ax": 2, "ay": 3, "az": 4}, rate_hz=500.0)
-Start = Callable[..., tuple[imu_lines.LineSensor, SimulatedClock]]
+Start = Callable[..., imu_lines.LineSensor]
 
 
 def free_port() -> int:
@@ -31,38 +29,28 @@ def free_port() -> int:
 
 
 @pytest.fixture
-def sensor() -> Iterator[Start]:
-    opened: list[Any] = []
+def sensor(digital: DigitalSensors) -> Start:
+    def start(*faults: Fault) -> imu_lines.LineSensor:
+        listen = f"udpout://127.0.0.1:{free_port()}"
+        line: imu_lines.LineSensor = digital.connect("imu_lines", SETTINGS, *faults, listen=listen)
+        return line
 
-    def start(*faults: Fault) -> tuple[imu_lines.LineSensor, SimulatedClock]:
-        server = twin.serve(Ramp(), {"adc": (1, SETTINGS)}, f"udpout://127.0.0.1:{free_port()}")
-        if faults:
-            server.afflict("adc", faults_of("imu_lines", faults))
-        clock = SimulatedClock()
-        clock.attach(server)
-        links = Links(clock)
-        opened.extend([links, server])
-        assert server.addresses["adc"].url.startswith("udpin://")
-        return imu_lines.connect(server.addresses["adc"], links, SETTINGS, "adc"), clock
-
-    yield start
-    for one in opened:
-        one.close()
+    return start
 
 
 def test_lines_in_datagrams_are_read_without_a_loss(sensor: Start) -> None:
-    adc, clock = sensor()
+    adc = sensor()
     for _ in range(3):
         samples = adc.acquire(4.0)
         assert len(samples.volts) == 2000
         assert np.diff(samples.volts[:, 0]) == pytest.approx(1e-3 / 500, abs=1.1e-6)
-        clock.sleep(120.0)  # longer than the system keeps datagrams: the old ones are dropped
+        adc._clock.sleep(120.0)  # longer than the system keeps datagrams: the old ones are dropped
     assert adc.tally()["samples-lost"] == (0.0, "")
     assert adc.self_test()[0].ok
 
 
 def test_lost_and_doubled_datagrams_are_counted(sensor: Start) -> None:
-    adc, _ = sensor(Fault("lost-line", probability=0.003, seed=5), Fault("merged", probability=0.01))
+    adc = sensor(Fault("lost-line", probability=0.003, seed=5), Fault("merged", probability=0.01))
     samples = adc.acquire(8.0)
     counts = {name: value for name, (value, _) in adc.tally().items()}
     steps = np.rint(np.diff(samples.volts[:, 0]) / 1e-3 * 500)
@@ -72,7 +60,7 @@ def test_lost_and_doubled_datagrams_are_counted(sensor: Start) -> None:
 
 
 def test_nobody_sends(sensor: Start) -> None:
-    adc, _ = sensor(Fault("silence"))
+    adc = sensor(Fault("silence"))
     with pytest.raises(LinkTimeout, match="no line came on udpin://"):
         adc.acquire(1.0)
 

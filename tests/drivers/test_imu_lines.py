@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
-from drivers.clock import SimulatedClock
 from drivers.errors import BadFrame, LimitError, LinkTimeout, OverRange, SensorFault, StreamError
 from drivers.imu_lines import driver as imu_lines
 from drivers.imu_lines import twin
 from drivers.imu_lines.lines import Assembly, checksum, fields
 from drivers.imu_lines.proposal import proposed_settings
-from drivers.transport import Links
-from drivers.transport.faults import Fault, faults_of
-from tests.drivers.sensed import Ramp
+from drivers.transport.faults import Fault
+from tests.drivers.digital import DigitalSensors
 
 NUMBERED = {"time": 1, "ax": 3, "ay": 4, "az": 5}
 NAMED = {"time": "t", "ax": "x", "ay": "y", "az": "z"}
@@ -27,23 +25,13 @@ Connect = Callable[..., imu_lines.LineSensor]
 
 
 @pytest.fixture
-def connect() -> Iterator[Connect]:
-    opened: list[Any] = []
-
+def connect(digital: DigitalSensors) -> Connect:
     def make(*faults: Fault | None, sends: imu_lines.Settings | None = None, **keys: Any) -> imu_lines.LineSensor:
         settings = imu_lines.Settings(**({"columns": NUMBERED} | keys))
-        server = twin.serve(Ramp(), {"adc": (1, sends or settings)})
-        if given := [fault for fault in faults if fault is not None]:
-            server.afflict("adc", faults_of("imu_lines", given))
-        clock = SimulatedClock()
-        clock.attach(server)
-        links = Links(clock)
-        opened.extend([links, server])
-        return imu_lines.connect(server.addresses["adc"], links, settings, "adc")
+        sensor: imu_lines.LineSensor = digital.connect("imu_lines", settings, *filter(None, faults), sends=sends)
+        return sensor
 
-    yield make
-    for each in opened:
-        each.close()
+    return make
 
 
 @pytest.mark.parametrize(

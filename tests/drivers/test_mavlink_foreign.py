@@ -15,7 +15,7 @@ from drivers.mavlink_imu import driver as mavlink_imu
 from drivers.mavlink_imu import twin
 from drivers.transport.address import Url
 from drivers.transport.server import Server
-from tests.drivers.sensed import Ramp
+from tests.drivers.digital import Ramp
 from tests.drivers.test_datagrams import free_port
 
 UNSUPPORTED, DENIED = 3, 2

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
-from drivers.clock import SimulatedClock
 from drivers.digital.settings import FIELDS, FORCES, RATES
 from drivers.errors import BadFrame, DriverError, LimitError, LinkTimeout, OverRange, Refused, SensorFault, StreamError
 from drivers.mavlink_imu import driver as mavlink_imu
 from drivers.mavlink_imu import twin
-from drivers.transport import Links
-from drivers.transport.faults import Fault, faults_of
-from drivers.world.config import WorldConfig
-from drivers.world.world import World
-from tests.drivers.sensed import LEVEL, Ramp
+from drivers.transport.faults import Fault
+from tests.drivers.digital import LEVEL, DigitalSensors
 
 G = 9.80665
 PER = {"HIGHRES_IMU": (G, np.radians(1.0), 0.01), "SCALED_IMU": (1.0, np.radians(1.0), 0.01)}  # of g, deg/s, uT
@@ -27,23 +22,15 @@ Connect = Callable[..., mavlink_imu.FlightController]
 
 
 @pytest.fixture
-def connect() -> Iterator[Connect]:
-    opened: list[Any] = []
+def connect(digital: DigitalSensors) -> Connect:
+    def make(*faults: Fault, listen: str = "", sends: Any = None, **keys: Any) -> mavlink_imu.FlightController:
+        settings = mavlink_imu.Settings(**keys)
+        autopilot: mavlink_imu.FlightController = digital.connect(
+            "mavlink_imu", settings, *faults, listen=listen, sends=sends
+        )
+        return autopilot
 
-    def make(*faults: Fault, listen: str = twin.LISTEN, sends: Any = None, **keys: Any) -> mavlink_imu.FlightController:
-        world, settings = keys.pop("world", None) or Ramp(), mavlink_imu.Settings(**keys)
-        server = twin.serve(world, {"adc": (1, sends or settings)}, listen)
-        if faults:
-            server.afflict("adc", faults_of("mavlink_imu", faults))
-        clock = SimulatedClock()
-        clock.attach(server)
-        links = Links(clock)
-        opened.extend([links, server])
-        return mavlink_imu.connect(server.addresses["adc"], links, settings, "adc")
-
-    yield make
-    for one in opened:
-        one.close()
+    return make
 
 
 @pytest.mark.parametrize("listen", [twin.LISTEN, "pty:?baud=921600", "udpin://127.0.0.1:0"])
@@ -136,44 +123,12 @@ def test_damaged_messages_are_counted_and_skipped(connect: Connect) -> None:
     assert counts["samples-lost"] == pytest.approx(counts["messages-damaged"], abs=2)  # some are heartbeats
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("message", ["HIGHRES_IMU", "SCALED_IMU"])
-def test_the_gain_of_the_clock_is_measured_over_all_records(connect: Connect, message: str) -> None:
-    adc = connect(Fault("clock-drift", size=80.0), message=message)
-    for _ in range(3):
-        adc.acquire(2.0)
-        adc._clock.sleep(3000.0)
-    adc.acquire(2.0)
-    assert adc.tally()["sensor-clock-gain"][0] == pytest.approx(80.0, abs=2.0)
-    assert adc.tally()["sensor-restarts"] == (0.0, "")
-
-
-def test_after_a_restart_the_next_record_requests_the_message_again(connect: Connect) -> None:
-    adc = connect(Fault("restart", at_s=20.0))
-    adc.acquire(2.0)
-    adc._clock.sleep(60.0)
-    assert len(adc.acquire(2.0).volts) == 200
-    assert adc.tally()["sensor-restarts"] == (1.0, "")
-
-
 @pytest.mark.parametrize("listen", ["tcp://127.0.0.1:0", "udpin://127.0.0.1:0"])
 def test_a_fast_stream_loses_nothing(connect: Connect, listen: str) -> None:
     adc = connect(rate_hz=1000.0, outputs=("ax", "ay"), listen=listen)
     values = adc.acquire(30.0).volts
     assert np.diff(values[:, 0]) == pytest.approx(np.full(29_999, 1e-6 * G), abs=2e-7)
     assert adc.tally()["samples-lost"] == (0.0, "")
-
-
-@pytest.mark.slow
-def test_an_hour_of_a_thousand_samples_a_second_loses_nothing_and_takes_20_s(connect: Connect) -> None:
-    adc = connect(rate_hz=1000.0, outputs=("ax", "ay"), world=World(WorldConfig.adxl203(), seed=1))
-    begun_s, n = time.process_time(), 0
-    for block in adc.stream(3600.0, 60.0):
-        n += len(block.volts)
-    assert time.process_time() - begun_s < 20.0
-    assert n == 3_600_000
-    counts = {name: value for name, (value, _) in adc.tally().items()}
-    assert (counts["samples"], counts["samples-lost"], counts["samples-doubled"]) == (n, 0, 0)
 
 
 @pytest.mark.parametrize(

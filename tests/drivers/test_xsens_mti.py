@@ -2,46 +2,30 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
-from drivers.clock import SimulatedClock
 from drivers.digital.settings import FIELDS, FORCES, RATES
 from drivers.errors import BadFrame, DriverError, LinkTimeout, OverRange, Refused, SensorFault, StreamError
-from drivers.transport import Links
-from drivers.transport.faults import Fault, faults_of
-from drivers.world.config import WorldConfig
-from drivers.world.world import World
+from drivers.transport.faults import Fault
 from drivers.xsens_mti import driver as xsens_mti
 from drivers.xsens_mti import twin
-from tests.drivers.sensed import LEVEL, Ramp
+from tests.drivers.digital import LEVEL, DigitalSensors
 
 G = 9.80665
 Connect = Callable[..., xsens_mti.Tracker]
 
 
 @pytest.fixture
-def connect() -> Iterator[Connect]:
-    opened: list[Any] = []
+def connect(digital: DigitalSensors) -> Connect:
+    def make(*faults: Fault, listen: str = "", **keys: Any) -> xsens_mti.Tracker:
+        tracker: xsens_mti.Tracker = digital.connect("xsens_mti", xsens_mti.Settings(**keys), *faults, listen=listen)
+        return tracker
 
-    def make(*faults: Fault, listen: str = twin.LISTEN, world: Any = None, **keys: Any) -> xsens_mti.Tracker:
-        settings = xsens_mti.Settings(**keys)
-        server = twin.serve(world or Ramp(), {"adc": (1, settings)}, listen)
-        if faults:
-            server.afflict("adc", faults_of("xsens_mti", faults))
-        clock = SimulatedClock()
-        clock.attach(server)
-        links = Links(clock)
-        opened.extend([links, server])
-        return xsens_mti.connect(server.addresses["adc"], links, settings, "adc")
-
-    yield make
-    for one in opened:
-        one.close()
+    return make
 
 
 @pytest.mark.parametrize("listen", [twin.LISTEN, "tcp://127.0.0.1:0"])
@@ -127,37 +111,6 @@ def test_lost_doubled_and_damaged_messages_are_counted(connect: Connect) -> None
     assert 10 < counts["samples-doubled"] < 80
     assert 15 < counts["messages-damaged"] < 70
     assert counts["samples"] == 4000
-
-
-@pytest.mark.slow
-def test_the_gain_of_the_clock_is_measured_over_all_records(connect: Connect) -> None:
-    adc = connect(Fault("clock-drift", size=80.0))
-    for _ in range(3):
-        adc.acquire(2.0)
-        adc._clock.sleep(3000.0)
-    adc.acquire(2.0)
-    assert adc.tally()["sensor-clock-gain"][0] == pytest.approx(80.0, abs=2.0)
-    assert adc.tally()["sensor-restarts"] == (0.0, "")
-
-
-def test_after_a_restart_the_next_record_configures_the_tracker_again(connect: Connect) -> None:
-    adc = connect(Fault("restart", at_s=10.0), rate_hz=200.0)
-    adc.acquire(2.0)
-    adc._clock.sleep(60.0)
-    assert len(adc.acquire(2.0).volts) == 400
-    assert adc.tally()["sensor-restarts"] == (1.0, "")
-
-
-@pytest.mark.slow
-def test_an_hour_of_a_thousand_samples_a_second_loses_nothing_and_takes_20_s(connect: Connect) -> None:
-    adc = connect(rate_hz=1000.0, outputs=("ax", "ay"), world=World(WorldConfig.adxl203(), seed=1))
-    begun_s, n = time.process_time(), 0
-    for block in adc.stream(3600.0, 60.0):
-        n += len(block.volts)
-    assert time.process_time() - begun_s < 20.0
-    assert n == 3_600_000
-    counts = {name: value for name, (value, _) in adc.tally().items()}
-    assert (counts["samples"], counts["samples-lost"], counts["samples-doubled"]) == (n, 0, 0)
 
 
 @pytest.mark.parametrize("rate_hz", [0.0, 99.5, 2500.0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,8 @@ from rig.cli.terminal.progress import working
 
 if TYPE_CHECKING:
     from calibrations.discovery.dataset import Dataset
-    from calibrations.discovery.results import Diagnosis
+    from calibrations.discovery.patterns import Pattern
+    from calibrations.discovery.results import Diagnosis, Discovery
     from calibrations.effects import Effect
     from rig.services.load import Loaded
     from rig.services.request import Request
@@ -214,29 +216,51 @@ def discover_command(
         return discover_live(request, out, minutes, unattended, answers, check, as_json)
     if not several:
         raise click.UsageError("give DATA (a file or a run), or --live to measure")
-    return _discover(request, several, out, without, enough, every, check, as_json)
+    from rig.cli.terminal.words import warning
+
+    answer = _discover(request, several, out, without, enough)
+    if as_json:
+        emit(answer.document)
+        notes(warning([answer.discovery.caution]))
+    else:
+        click.echo(answer.text(every))
+    return verdict_status(answer.discovery.verdict, check)
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """A discovery, the file with its model, and what an effect of your own needs: pattern, model and data."""
+
+    discovery: Discovery[Any]
+    path: Path | None
+    own: tuple[Pattern | None, str, Request]
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """`rig.discovery/1`."""
+        from calibrations.documents import discovery_document
+        from rig.cli.terminal.words import own_effect
+
+        return discovery_document(self.discovery, str(self.path) if self.path else None) | {
+            "own_effect": own_effect(*self.own)
+        }
+
+    def text(self, every: bool) -> str:
+        """For a terminal; of a still record only the short form, or with `every` all of it."""
+        from rig.cli.terminal.words import discovery, parameters, pattern_advice, short_discovery
+
+        data = self.discovery.findings.data
+        written = [f"written: {self.path}"] if self.path else []
+        if data.form == "samples" and not every:
+            return "\n".join([data.description, short_discovery(self.discovery), *written])
+        lines = "\n".join([discovery(self.discovery), *pattern_advice(*self.own)])
+        return "\n\n".join([data.description, lines, parameters(self.discovery.end.model), *written])
 
 
 def _discover(
-    request: Request,
-    several: tuple[str, ...],
-    out: Path | None,
-    without: tuple[str, ...],
-    enough: str | None,
-    every: bool,
-    check: bool,
-    as_json: bool,
-) -> int:
-    from calibrations.documents import discovery_document
-    from rig.cli.terminal.words import (
-        discovery,
-        own_effect,
-        parameters,
-        pattern_advice,
-        planned,
-        short_discovery,
-        warning,
-    )
+    request: Request, several: tuple[str, ...], out: Path | None, without: tuple[str, ...], enough: str | None
+) -> _Answer:
+    from rig.cli.terminal.words import planned
     from rig.services.load import loaded
 
     small = None
@@ -257,20 +281,7 @@ def _discover(
 
         path = write_model(data, result.end, question.model, out, note)
     reached = str(path) if path else request.model or question.model.name
-    own = (result.pattern if len(several) == 1 else None, reached, request)
-    if as_json:
-        emit(discovery_document(result, str(path) if path else None) | {"own_effect": own_effect(*own)})
-        notes(warning([result.caution]))
-    else:
-        short = data.form == "samples" and not every
-        if short:
-            click.echo(f"{data.description}\n{short_discovery(result)}")
-        else:
-            lines = "\n".join([discovery(result), *pattern_advice(*own)])
-            click.echo(f"{data.description}\n\n{lines}\n\n{parameters(result.end.model)}")
-        if path is not None:
-            click.echo(f"written: {path}" if short else f"\nwritten: {path}")
-    return verdict_status(result.verdict, check)
+    return _Answer(result, path, (result.pattern if len(several) == 1 else None, reached, request))
 
 
 def _together(several: tuple[str, ...], request: Request, question: Loaded) -> Dataset[Any]:

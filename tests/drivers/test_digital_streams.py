@@ -1,0 +1,65 @@
+"""What holds for every digital sensor that streams frames: the gain of its clock, a restart, an hour without a loss."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import pytest
+
+from drivers.mavlink_imu import driver as mavlink_imu
+from drivers.transport.faults import Fault
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
+from drivers.xsens_mti import driver as xsens_mti
+from tests.drivers.digital import DigitalSensors
+
+SETTINGS = {"mavlink_imu": mavlink_imu.Settings, "xsens_mti": xsens_mti.Settings}
+
+
+def connect(digital: DigitalSensors, driver: str, *faults: Fault, world: Any = None, **keys: Any) -> Any:
+    return digital.connect(driver, SETTINGS[driver](**keys), *faults, world=world)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("driver", "keys"),
+    [("mavlink_imu", {"message": "HIGHRES_IMU"}), ("mavlink_imu", {"message": "SCALED_IMU"}), ("xsens_mti", {})],
+)
+def test_the_gain_of_the_clock_is_measured_over_all_records(
+    digital: DigitalSensors, driver: str, keys: dict[str, str]
+) -> None:
+    adc = connect(digital, driver, Fault("clock-drift", size=80.0), **keys)
+    for _ in range(3):
+        adc.acquire(2.0)
+        adc._clock.sleep(3000.0)
+    adc.acquire(2.0)
+    assert adc.tally()["sensor-clock-gain"][0] == pytest.approx(80.0, abs=2.0)
+    assert adc.tally()["sensor-restarts"] == (0.0, "")
+
+
+@pytest.mark.parametrize(("driver", "rate_hz", "at_s"), [("mavlink_imu", 100.0, 20.0), ("xsens_mti", 200.0, 10.0)])
+def test_after_a_restart_the_next_record_configures_the_sensor_again(
+    digital: DigitalSensors, driver: str, rate_hz: float, at_s: float
+) -> None:
+    adc = connect(digital, driver, Fault("restart", at_s=at_s), rate_hz=rate_hz)
+    adc.acquire(2.0)
+    adc._clock.sleep(60.0)
+    assert len(adc.acquire(2.0).volts) == 2 * rate_hz
+    assert adc.tally()["sensor-restarts"] == (1.0, "")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("driver", list(SETTINGS))
+def test_an_hour_of_a_thousand_samples_a_second_loses_nothing_and_takes_20_s(
+    digital: DigitalSensors, driver: str
+) -> None:
+    world = World(WorldConfig.adxl203(), seed=1)
+    adc = connect(digital, driver, rate_hz=1000.0, outputs=("ax", "ay"), world=world)
+    begun_s, n = time.process_time(), 0
+    for block in adc.stream(3600.0, 60.0):
+        n += len(block.volts)
+    assert time.process_time() - begun_s < 20.0
+    assert n == 3_600_000
+    counts = {name: value for name, (value, _) in adc.tally().items()}
+    assert (counts["samples"], counts["samples-lost"], counts["samples-doubled"]) == (n, 0, 0)
