@@ -1,21 +1,14 @@
-"""Parts that pages are made of: boxes, tables, messages, states, progress of a search, work in a thread."""
+"""Parts that pages are made of: boxes, tables, messages, states."""
 
 from __future__ import annotations
 
-import asyncio
 import logging
-import os
 import re
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from contextvars import copy_context
 from dataclasses import dataclass
 from functools import partial
-from threading import Thread
-from typing import Any, ParamSpec, TypeVar
-from weakref import WeakSet
+from typing import Any
 
 from nicegui import ui
 from nicegui.element import Element
@@ -32,8 +25,6 @@ from rig.services.page_words import PageStep, page_step
 LINKED = """<q-td :props="props">
   <a v-if="props.row.to" :href="props.row.to" @click.stop>{{ props.value }}</a><span v-else>{{ props.value }}</span>
 </q-td>"""
-P = ParamSpec("P")
-R = TypeVar("R")
 
 
 def box(classes: str = "") -> Element:
@@ -132,41 +123,6 @@ def redraw(plot: ui.plotly, figure: dict[str, Any]) -> None:
     """Update a plot only if its figure changed: an unchanged plot keeps its zoom and its selection."""
     if figure != plot.figure:
         plot.update_figure(figure)
-
-
-_CALCULATIONS = WeakSet[Thread]()
-
-
-async def off_loop(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-    """Call in a thread, so that the page stays responsive. The server does not wait for the thread when it ends."""
-    future = Future[R]()
-    work = partial(copy_context().run, call, *args, **kwargs)
-    thread = Thread(target=_settled, args=(future, work), name=call.__name__, daemon=True)
-    _CALCULATIONS.add(thread)
-    thread.start()
-    return await asyncio.wrap_future(future)
-
-
-def leave_calculations() -> None:
-    """End the process at once, with status 0, if a calculation still runs.
-
-    The interpreter would end its thread at the next line of Python; inside of C++ that aborts the whole process.
-    """
-    if any(thread.is_alive() for thread in _CALCULATIONS):
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(0)
-
-
-def _settled(future: Future[R], work: Callable[[], R]) -> None:
-    """Set the result or the error of the work, even if no page waits for it."""
-    if future.set_running_or_notify_cancel():
-        try:
-            result = work()
-        except BaseException as error:
-            future.set_exception(error)
-        else:
-            future.set_result(result)
 
 
 # Messages. An error of the user or of an instrument says what, where and what to do; any other error is called a fault

@@ -12,7 +12,8 @@ from nicegui import ui
 
 from calibrations.presentation.chart import Chart
 from calibrations.presentation.interactive import figure
-from rig.web.parts import message, off_loop, redraw
+from rig.web.calculations import off_loop
+from rig.web.parts import message, redraw
 
 _CHARTS: WeakKeyDictionary[ui.plotly, Chart] = WeakKeyDictionary()
 

@@ -15,11 +15,11 @@ from fastapi import FastAPI
 from nicegui import run, ui
 
 from rig.errors import RigError
+from rig.web.calculations import leave_calculations
 from rig.web.desk import Desk
 from rig.web.frame import TITLE
 from rig.web.guard import TOKEN, Guard, names
 from rig.web.pages import register
-from rig.web.parts import leave_calculations
 
 PORT = 8473  # preferred, so that an open page finds a restarted server
 

@@ -16,9 +16,9 @@ from rig.bench import DEFAULT
 from rig.services.report import reported
 from rig.services.request import Request
 from rig.services.search import Cancelled, Counted
+from rig.web.calculations import Visit
 from rig.web.desk import Desk
 from rig.web.pages import register
-from rig.web.visit import Visit
 from tests.browser.measured import two_faults
 
 SEARCH = "diagnosed"  # the thread of a search has the name of what it computes

@@ -22,9 +22,10 @@ from rig.record import Record
 from rig.services.charts import deviations, difference, differences, residuals
 from rig.services.request import Request
 from rig.services.two_runs import Pair, again, both, parameters_of, results_of
+from rig.web.calculations import off_loop
 from rig.web.desk import Desk, models
 from rig.web.frame import Key, frame
-from rig.web.parts import box, div, failed, noted, off_loop, table, waiting, words
+from rig.web.parts import box, div, failed, noted, table, waiting, words
 from rig.web.pictures import downloads, draw, empty_plot, remember
 
 # Pictures of one axis: for two tables, or for two still records.

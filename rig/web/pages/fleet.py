@@ -13,11 +13,11 @@ from calibrations.model.file import dump_model, read_model
 from rig.fleet.members import Member, fleet_of
 from rig.record import Record
 from rig.services.search import Cancelled
+from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk, models
 from rig.web.frame import frame
 from rig.web.pages.run_report import framed
-from rig.web.parts import box, div, failed, off_loop, state, waiting, words
-from rig.web.visit import Visit
+from rig.web.parts import box, div, failed, state, waiting, words
 
 WHY = (
     "A fleet is the last complete run of every sensor in the record, or the tables of a folder or of an index with the "

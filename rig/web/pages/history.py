@@ -25,6 +25,7 @@ from rig.services.history import (
 )
 from rig.services.request import effects_of
 from rig.services.search import Cancelled
+from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk, models, runs
 from rig.web.frame import Key, frame
 from rig.web.pages.check_standards import CheckStandards
@@ -38,8 +39,7 @@ from rig.web.pages.history_results import (
     quantities_table,
     summary_of,
 )
-from rig.web.parts import LINKED, box, div, failed, off_loop, state, waiting, words
-from rig.web.visit import Visit
+from rig.web.parts import LINKED, box, div, failed, state, waiting, words
 
 # The list of sensors.
 

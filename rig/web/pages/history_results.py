@@ -33,7 +33,8 @@ from rig.services.history import (
 )
 from rig.services.history_words import agreements, but_stale, chart_verdict, near, next_due, significance, summary
 from rig.services.provenance import today
-from rig.web.parts import Link, box, div, failed, for_page, off_loop, table, words
+from rig.web.calculations import off_loop
+from rig.web.parts import Link, box, div, failed, for_page, table, words
 from rig.web.pictures import downloads, draw, empty_plot
 
 MODEL = "linear"

@@ -17,9 +17,10 @@ from calibrations.table import Constant
 from rig.files import home
 from rig.services.importing import Preview, data_chart, lacking, opened, preview, proposal, stored, units_for
 from rig.services.page_words import IMPORT, address
+from rig.web.calculations import off_loop
 from rig.web.desk import FILES, Desk
 from rig.web.frame import frame
-from rig.web.parts import box, div, facts, failed, message, noted, off_loop, waiting, words
+from rig.web.parts import box, div, facts, failed, message, noted, waiting, words
 from rig.web.pictures import downloads, draw, empty_plot
 
 MOST_BYTES = 200_000_000

@@ -20,6 +20,7 @@ from rig.services.exclusion import numbered_run
 from rig.services.page_words import IMPORT, address
 from rig.services.search import Cancelled, Counted
 from rig.web.address import ModelState, parse_state
+from rig.web.calculations import off_loop
 from rig.web.desk import Desk, runs
 from rig.web.frame import Key, frame
 from rig.web.pages import run_record
@@ -28,7 +29,7 @@ from rig.web.pages.model_missing import Missing
 from rig.web.pages.model_noise import NoisePictures
 from rig.web.pages.model_parameters import ParametersBox
 from rig.web.pages.model_pictures import Pictures
-from rig.web.parts import box, div, failed, for_page, message, noted, off_loop, state, words
+from rig.web.parts import box, div, failed, for_page, message, noted, state, words
 
 if TYPE_CHECKING:
     from calibrations.discovery.findings import Place, Step

@@ -13,10 +13,10 @@ from rig.errors import RigError
 from rig.files import home
 from rig.services.importing import asks, opened
 from rig.services.page_words import IMPORT, address
+from rig.web.calculations import Visit, off_loop
 from rig.web.desk import MODELS, models, noise_models, runs, saved_models
 from rig.web.pages.import_file import upload
-from rig.web.parts import box, message, off_loop, words
-from rig.web.visit import Visit
+from rig.web.parts import box, message, words
 
 if TYPE_CHECKING:
     from rig.services.session import ModelSession

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
+from rig.web.calculations import off_loop
 from rig.web.desk import models
-from rig.web.parts import div, for_page, message, off_loop, words
+from rig.web.parts import div, for_page, message, words
 
 if TYPE_CHECKING:
     from calibrations.compensation.inverse import Range

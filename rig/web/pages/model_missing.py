@@ -14,7 +14,8 @@ from calibrations.presentation.formula import formula_html
 from calibrations.presentation.report.report import next_takes, next_words
 from calibrations.presentation.views import view_of
 from calibrations.text import capital, probability, rounded
-from rig.web.parts import box, div, facts, failed, message, off_loop, waiting, words
+from rig.web.calculations import off_loop
+from rig.web.parts import box, div, facts, failed, message, waiting, words
 
 if TYPE_CHECKING:
     from calibrations.discovery.findings import Candidate, Step

@@ -14,8 +14,9 @@ from calibrations.noise.dataset import NoiseFindings
 from calibrations.presentation.noise_text import coefficient_table, density
 from calibrations.presentation.parameter_table import HEAD, STRONG, correlations, parameter_rows, tab_separated
 from calibrations.text import minus, unit
+from rig.web.calculations import off_loop
 from rig.web.pages.model_documents import CertificateDialog, CompensationDialog
-from rig.web.parts import box, div, for_page, message, off_loop, table, words
+from rig.web.parts import box, div, for_page, message, table, words
 
 if TYPE_CHECKING:
     from calibrations.discovery.results import Diagnosis

@@ -22,24 +22,13 @@ from rig.errors import RigError
 from rig.instruments.instruments import checked
 from rig.planning.plan import Plan, plan, stretches
 from rig.runs.background import control
+from rig.web.calculations import off_loop
 from rig.web.desk import Desk, lab_read
 from rig.web.frame import Key, frame
 from rig.web.pages.run_begin import BeginDialog, before_start, plan_facts
 from rig.web.pages.run_live import Live
 from rig.web.pages.run_optimal import OptimalDialog
-from rig.web.parts import (
-    box,
-    div,
-    facts,
-    failed,
-    message,
-    off_loop,
-    setting_label,
-    setting_text,
-    table,
-    waiting,
-    words,
-)
+from rig.web.parts import box, div, facts, failed, message, setting_label, setting_text, table, waiting, words
 
 MOST_STRETCHES = 12
 DEFAULT_PROCEDURE = "sweep"

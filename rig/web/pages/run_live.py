@@ -16,10 +16,11 @@ from rig.drawings import Attitude, page, strip
 from rig.runs.background import control
 from rig.runs.background.status import NOT_BEGUN, Asked, Status
 from rig.runs.signals import STOPPED_BY
+from rig.web.calculations import off_loop
 from rig.web.frame import control_run
 from rig.web.pages.run_begin import BeginDialog, before_resume
 from rig.web.pages.run_record import OverTime
-from rig.web.parts import box, div, failed, for_page, off_loop, table, words
+from rig.web.parts import box, div, failed, for_page, table, words
 
 LOOK_S = 0.4
 PHASES = {

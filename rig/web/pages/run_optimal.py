@@ -16,8 +16,9 @@ from rig.bench import Bench
 from rig.files import home, write_whole
 from rig.planning.optimal import Optimal, optimal
 from rig.services.optimal_words import PLANS, plan_rows, purpose, savings
+from rig.web.calculations import off_loop
 from rig.web.desk import FILES, models
-from rig.web.parts import div, failed, off_loop, setting_text, table, waiting, words
+from rig.web.parts import div, failed, setting_text, table, waiting, words
 
 CRITERIA = {"I": "I: error of the prediction", "D": "D: joint uncertainty of the parameters"}
 Use = Callable[[Mapping[str, str]], None]

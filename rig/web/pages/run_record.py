@@ -24,6 +24,7 @@ from rig.services.next_steps import page_steps, result_rows
 from rig.services.report import reported
 from rig.services.request import Request
 from rig.services.search import Cancelled
+from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk
 from rig.web.frame import frame
 from rig.web.pages.history_results import HistoryRequest
@@ -35,7 +36,6 @@ from rig.web.parts import (
     failed,
     for_page,
     message,
-    off_loop,
     setting_label,
     setting_text,
     step_row,
@@ -43,7 +43,6 @@ from rig.web.parts import (
     words,
 )
 from rig.web.pictures import downloads, empty_plot, remember
-from rig.web.visit import Visit
 
 MOST_NAMED = 8
 

@@ -13,9 +13,9 @@ from rig.services.content import content_of
 from rig.services.report import reported
 from rig.services.request import Request
 from rig.services.search import Cancelled
+from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk
-from rig.web.parts import box, div, failed, off_loop, waiting, words
-from rig.web.visit import Visit
+from rig.web.parts import box, div, failed, waiting, words
 
 # the frame is as high as the report; a report has no scripts, and the page's policy lets it load nothing
 FITTED = (
