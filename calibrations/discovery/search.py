@@ -93,7 +93,7 @@ def is_complete(path: Path) -> bool:
 def grown(path: Path, effects: Mapping[str, Effect], most: int = MOST_EFFECTS) -> Path:
     """Continue the forward search from the last model."""
     present, steps = path.end, list(path.steps)
-    found = candidates(present, effects)
+    found = list(path.left) or candidates(present, effects)
     while len(steps) < most:
         step = _next(present, found)
         if step is None:
