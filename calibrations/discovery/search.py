@@ -93,7 +93,7 @@ def is_complete(path: Path) -> bool:
 def grown(path: Path, effects: Mapping[str, Effect], most: int = MOST_EFFECTS) -> Path:
     """Continue the forward search from the last model."""
     present, steps = path.end, list(path.steps)
-    found = list(path.left) or candidates(present, effects)
+    found = candidates(present, effects)
     while len(steps) < most:
         step = _next(present, found)
         if step is None:
@@ -104,6 +104,12 @@ def grown(path: Path, effects: Mapping[str, Effect], most: int = MOST_EFFECTS) -
             break
         found = candidates(present, effects)
     return Path(path.start, tuple(steps), tuple(found), path.outliers)
+
+
+def continued(path: Path, effects: Mapping[str, Effect]) -> Path:
+    """The forward search from the last model of a path that has ended after its first step."""
+    done = not path.steps or path.end.share_left(path.start) <= 0
+    return path if done else recounted(further := grown(path, effects), further.end)
 
 
 def recounted(path: Path, end: Fit) -> Path:
