@@ -34,12 +34,13 @@ from calibrations.effects import Effect
 from calibrations.fitting.fit import Fit, fit, refit
 from calibrations.fitting.problem import Problem
 from calibrations.fitting.requested_forms import beyond_base
-from calibrations.free_forms.geometry import GEOMETRY
+from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
 from calibrations.free_forms.place_names import PREFIX
 from calibrations.free_forms.stairs import before_stairs, find_stairs, fitted_stairs
 from calibrations.free_forms.structure import FloorSource, Structure, find_structure, with_stairs
 from calibrations.means.noise import with_white
 from calibrations.model import Estimate
+from calibrations.model.chain import force
 from calibrations.table import Array
 
 STAIRS = "quantisation"
@@ -214,15 +215,24 @@ def _first(start: Fit, steps: list[Step[Fit]], found: list[RowCandidate]) -> tup
 
 def structure(start: Fit, effects: Mapping[str, Effect]) -> Structure:
     """The places that act beyond the model of `start`."""
-    problem = start.problem
-    has = {term.name for term in start.model.terms}
-    geometries = {name: _derivatives(start, effects[name]) for name in GEOMETRY if name in effects}
-    return find_structure(start.table, problem.white, beyond_base(start), geometries, has & set(GEOMETRY))
+    geometry = _geometry_effects(start, effects)
+    return find_structure(start.table, start.problem.white, beyond_base(start), geometry)
 
 
-def _derivatives(start: Fit, effect: Effect) -> Array:
-    """d output / d parameters of an effect at 0, in the model of `start`, (channels, n, m)."""
-    model = start.model if start.model.holds(effect.name) else start.model.with_effect(effect)
-    problem = Problem.of(model, start.table)
-    theta = problem.layout.starts()[0]
-    return -problem.jacobian(theta, of=problem.layout.of_effect(effect.name))
+def _geometry_effects(start: Fit, effects: Mapping[str, Effect]) -> GeometryEffects:
+    """The effects of the geometry, with the forces that they give on the rows of `start`."""
+    model = start.model
+    for name in GEOMETRY:
+        if name in effects and not model.holds(name):
+            model = model.with_effect(effects[name])
+    layout = Problem.of(model, start.table).layout
+    own = {name: layout.of_effect(name) for name in GEOMETRY if model.holds(name)}
+
+    def forces(values: Mapping[str, Array]) -> Array:
+        theta = layout.starts()[0]
+        for name, value in values.items():
+            theta[own[name]] = value
+        return force(start.table, [step for step in layout.steps(theta) if step[0].name in values])
+
+    counts = {name: int(mask.sum()) for name, mask in own.items()}
+    return GeometryEffects(counts, forces, frozenset(name for name in own if start.model.holds(name)))

@@ -1,21 +1,24 @@
 """Geometry: which of misalignment, non-orthogonality, stage zeros and base tilt the linear parts need.
 
-The linear parts of the fit are a vector q of small angles with a covariance. Each effect of the geometry is a linear
-map into it, from its own derivatives. A place that acts over another axis may have a linear part of its own, as large
+The linear parts of the fit are a vector q of small angles with a covariance. Each effect of the geometry turns the
+forces by its own equations, which are exact: of angles of 1 deg the second order is many standard uncertainties. Its
+parameters are fitted to q by Gauss-Newton steps. A place that acts over another axis may have a linear part of its own, as large
 as the odd part of its curve: so much is added to the covariance before anything is asked, so that no mechanism's linear
 part names a second cause. An even curve, such as that of z-axis-bias, has a small one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import combinations
 
 import numpy as np
 
 from calibrations.criteria import FORM_PART
-from calibrations.free_forms.chain import own_base_size
+from calibrations.free_forms.chain import Coefficients, Given, own_base_size, state_at
 from calibrations.free_forms.form import CROSS
 from calibrations.free_forms.search import SearchResult
 from calibrations.geometry.orientation import out_of_plane
@@ -30,8 +33,23 @@ EVEN, ODD = (2, 4, 6), (3, 5)  # powers of the driver
 LEAST_LINE = 0.3  # noise floors: a smaller linear part is left out
 SEEN = 3.5  # standard uncertainties: a smaller linear part may be noise
 IMMATERIAL = 0.15  # noise floors: a smaller angle is no matter
+STEPS = 4  # of Gauss-Newton: angles of some degrees need three
+SMALL_DEG = 1e-3  # of a numerical derivative
 OVER_CROSS = ("cross-response", "scale-over-cross", "force")
 OVER_Z = ("z-response", "scale-over-z", "force", "stage-angle-alpha")
+
+
+@dataclass(frozen=True)
+class GeometryEffects:
+    """The effects of the geometry: number of parameters by name, and the forces that their values give.
+
+    forces  specific force along the sensing axes, g, (n, 3), by values in deg of some of the effects
+    given   those in the given model: they cost nothing
+    """
+
+    parameters: Mapping[str, int]
+    forces: Callable[[Mapping[str, Array]], Array]
+    given: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -51,14 +69,10 @@ class Geometry:
     lines: Mapping[str, float] = field(default_factory=dict)
 
 
-def geometry(
-    result: SearchResult, curves: Mapping[str, Array], effects: Mapping[str, Array], has: set[str]
-) -> Geometry:
+def geometry(result: SearchResult, curves: Mapping[str, Array], effects: GeometryEffects) -> Geometry:
     """The geometry that the linear parts show.
 
     curves   what each acting place adds, (channels, n), in the output's unit
-    effects  d output / d parameters of each effect of the geometry, (channels, n, m)
-    has      effects of the geometry that the given model has: they cost nothing
     """
     data, c, g = result.data, result.data.channels, result.gram
     gain = np.array([result.values.base[c + 3 * k + k] for k in range(c)])
@@ -67,29 +81,52 @@ def geometry(
         return Geometry()
     pick, over = _angles(result, gain)
     b = own_base_size(data)
-    active = g.indices(result.sizes.variances)
-    cross = g.base_inverse @ g.base_products[:, active]
     sizes = {place: float(np.sqrt(np.mean(curve**2))) for place, curve in curves.items()}
     linear = {place: _linear_part(result, place, curve) for place, curve in curves.items()}
-    covariance = (g.base_inverse + cross @ result.sizes.inverse @ cross.T + _of_forms(result, sizes))[:b, :b]
-    q = pick @ result.values.base[:b]
-    C = pick @ covariance @ pick.T
-    C += np.diag(np.full(len(q), (IMMATERIAL * floor / mean_gain) ** 2))
+    shift, covariance = _beside_forms(result, sizes)
+    C = pick @ covariance[:b, :b] @ pick.T
+    C += np.diag(np.full(len(pick), (IMMATERIAL * floor / mean_gain) ** 2))
     own = [2 * max((linear.get(place, 0.0) for place in places), default=0.0) / mean_gain for places in over]
-    whole = g.base_inverse.shape[0]
-    base = result.columns[:, :whole]
-    maps = {
-        name: pick @ (g.base_inverse @ (base.T @ (J / result.white[:, :, None]).reshape(len(base), -1)))[:b]
-        for name, J in effects.items()
+    outputs = partial(_linear_outputs, result, effects)
+    angles_left = partial(_angles_left, result, pick, pick @ shift[:b], outputs)
+    values, alternatives, _ = _chosen(angles_left, C + np.diag(np.square(own)), effects, effects.given)
+    sizes_of = {
+        name: float(np.sqrt(np.mean((outputs(values) - outputs(_without(values, name))) ** 2))) / floor
+        for name in values
     }
-    values, alternatives, _ = _chosen(q, C + np.diag(np.square(own)), maps, has)
-    sizes_of = {name: float(np.sqrt(np.mean((effects[name] @ v) ** 2))) / floor for name, v in values.items()}
-    refinements, _, left = _chosen(q, C, maps, has | values.keys())
+    refinements, _, left = _chosen(angles_left, C, effects, effects.given | values.keys())
     lines: dict[str, float] = {}
     for places, angle, uncertainty in zip(over, left, np.sqrt(np.diag(C)), strict=True):
         if places and abs(angle) > max(LEAST_LINE * floor / mean_gain, SEEN * uncertainty):
             lines[places[0]] = max(lines.get(places[0], 0.0), float(abs(angle)) * mean_gain)
     return Geometry(tuple(values), sizes_of, tuple(refinements), alternatives, lines)
+
+
+def _linear_outputs(result: SearchResult, effects: GeometryEffects, values: Mapping[str, Array]) -> Array:
+    """Outputs of a linear sensor with this geometry, (channels, n), in their unit."""
+    c = result.data.channels
+    base = result.values.base
+    scale = np.linalg.norm(base[c : 4 * c].reshape(c, 3), axis=1) * np.sign(base[c : 4 * c].reshape(c, 3).diagonal())
+    return np.asarray(base[:c, None] + scale[:, None] * effects.forces(values)[:, :c].T)
+
+
+def _angles_left(
+    result: SearchResult,
+    pick: Array,
+    shift: Array,
+    outputs: Callable[[Mapping[str, Array]], Array],
+    values: Mapping[str, Array],
+) -> Array:
+    """The angles that a geometry leaves of those of the fit, which differ by `shift` from those of `result`, rad."""
+    g, base = result.gram, result.columns[:, : result.gram.base_inverse.shape[0]]
+    own = Coefficients(result.values.base[: own_base_size(result.data)], {})
+    linear = state_at(result.data, Given.nothing(result.data), own, ())
+    missed = ((linear.predicted - outputs(values)) / result.white).ravel()
+    return np.asarray(pick @ (g.base_inverse @ (base.T @ missed))[: pick.shape[1]] + shift)
+
+
+def _without(values: Mapping[str, Array], name: str) -> dict[str, Array]:
+    return {other: value for other, value in values.items() if other != name}
 
 
 def _linear_part(result: SearchResult, place: str, curve: Array) -> float:
@@ -109,19 +146,27 @@ def _linear_part(result: SearchResult, place: str, curve: Array) -> float:
     return float(np.sqrt(LINEAR_PART**2 * (whole - even) + EVEN_PART**2 * even))
 
 
-def _of_forms(result: SearchResult, sizes: Mapping[str, float]) -> Array:
-    """Covariance of the base, (b, b), that another form of each place that acts would cause."""
-    g, active = result.gram, result.sizes.variances.keys()
+def _beside_forms(result: SearchResult, sizes: Mapping[str, float]) -> tuple[Array, Array]:
+    """The base where each place that acts may have another form: by how much it differs, (b,), and covariance, (b, b).
+
+    Such a form has a tenth of the place's size before the data are asked, and what they leave of it afterwards.
+    """
+    g, variances = result.gram, dict(result.sizes.variances)
     floor = float(np.sqrt(np.mean(result.white**2)))
-    total = np.zeros(g.base_inverse.shape)
+    b = len(g.base_inverse)
     for component in result.components:
-        if component.place in sizes and component.form is not None and component.name not in active:
+        if component.place in sizes and component.form is not None and component.name not in variances:
             block = g.blocks[component.name]
-            columns = result.columns[:, len(total) + block.start : len(total) + block.stop]
+            columns = result.columns[:, b + block.start : b + block.stop]
             adds = floor * np.sqrt(np.sum(columns**2) / len(columns))  # to the output, for coefficients of 1
-            leak = g.base_inverse @ g.base_products[:, block]
-            total += (FORM_PART * sizes[component.place] / adds) ** 2 * leak @ leak.T
-    return total
+            variances[component.name] = (FORM_PART * sizes[component.place] / adds) ** 2
+    rows = g.indices(variances)
+    std = np.sqrt(np.repeat(list(variances.values()), [g.blocks[n].stop - g.blocks[n].start for n in variances]))
+    K = std[:, None] * g.products[np.ix_(rows, rows)] * std + np.eye(len(rows))
+    leak = g.base_inverse @ g.base_products[:, rows] * std
+    base = g.base_inverse @ g.base_with_data - leak @ np.linalg.solve(K, std * g.with_data[rows])
+    covariance = g.base_inverse + leak @ np.linalg.solve(K, leak.T)
+    return base - result.values.base, covariance * max(1.0, result.ratio**2)
 
 
 def _angles(result: SearchResult, gain: Array) -> tuple[Array, list[tuple[str, ...]]]:
@@ -145,33 +190,51 @@ def _angles(result: SearchResult, gain: Array) -> tuple[Array, list[tuple[str, .
 
 
 def _chosen(
-    q: Array, C: Array, maps: Mapping[str, Array], has: set[str]
+    angles_left: Callable[[Mapping[str, Array]], Array], C: Array, effects: GeometryEffects, free: AbstractSet[str]
 ) -> tuple[dict[str, Array], dict[str, tuple[str, ...]], Array]:
-    """The cheapest effects that explain the angles q, of covariance C, by their parameters; their rivals; the rest.
+    """The cheapest effects that explain the angles, of covariance C, by their values; their rivals; the angles left.
 
-    `maps`: d q / d parameters of each effect; `has`: effects that cost nothing.
+    `free`: effects that cost nothing, and are not among those that are returned.
     """
     root = np.linalg.cholesky(C)
-    q = np.linalg.solve(root, q)
-    maps = {name: np.linalg.solve(root, part) for name, part in maps.items()}
-    free = [maps[name] for name in maps if name in has]
-    others = [name for name in maps if name not in has]
-    scored: list[tuple[float, tuple[str, ...], Array, Array]] = []
+
+    def scaled_angles(values: Mapping[str, Array]) -> Array:
+        return np.linalg.solve(root, angles_left(values))
+
+    own = [name for name in effects.parameters if name in free]
+    others = [name for name in effects.parameters if name not in free]
+    scored: list[tuple[float, tuple[str, ...], Array, dict[str, Array]]] = []
     for count in range(len(others) + 1):
         for names in combinations(others, count):
-            parts = [*free, *(maps[name] for name in names)]
-            A = np.hstack([np.zeros((len(q), 0)), *parts])
-            solved, _, rank, _ = np.linalg.lstsq(A, q, rcond=1e-7)
-            answer = np.asarray(solved, dtype=float)
-            left = q - A @ answer
-            price = CAUSE_PRICE * count + PARAMETER_PRICE * int(rank)
-            scored.append((float(left @ left) + price, names, left, answer))
+            values, left, rank = _fitted(scaled_angles, {n: effects.parameters[n] for n in (*own, *names)})
+            price = CAUSE_PRICE * count + PARAMETER_PRICE * rank
+            scored.append((float(left @ left) + price, names, left, values))
     scored.sort(key=lambda s: s[0])
-    best, chosen, left, answer = scored[0]
+    best, chosen, left, values = scored[0]
     close = [names for score, names, *_ in scored[1:] if score < best + CLOSE and len(names) <= len(chosen)]
     rivals = {name for names in close for name in names} - set(chosen)
-    ends = np.cumsum([part.shape[1] for part in free] + [maps[name].shape[1] for name in chosen])
-    values = {
-        name: answer[end - maps[name].shape[1] : end] for name, end in zip(chosen, ends[len(free) :], strict=True)
-    }
-    return values, {name: tuple(sorted(rivals)) for name in chosen if rivals}, root @ left
+    return (
+        {name: values[name] for name in chosen},
+        {name: tuple(sorted(rivals)) for name in chosen if rivals},
+        root @ left,
+    )
+
+
+def _fitted(
+    angles_left: Callable[[Mapping[str, Array]], Array], counts: Mapping[str, int]
+) -> tuple[dict[str, Array], Array, int]:
+    """Values of effects by least squares, the angles that they leave, and the number of values that these show."""
+    ends = np.cumsum(list(counts.values()), dtype=int)
+
+    def by_effect(p: Array) -> dict[str, Array]:
+        return dict(zip(counts, np.split(p, ends[:-1]), strict=True)) if counts else {}
+
+    p = np.zeros(ends[-1] if counts else 0)
+    left, rank = angles_left(by_effect(p)), 0
+    for _ in range(STEPS if counts else 0):
+        ways = [(angles_left(by_effect(p - e)), angles_left(by_effect(p + e))) for e in SMALL_DEG * np.eye(len(p))]
+        A = np.column_stack([(before - after) / (2 * SMALL_DEG) for before, after in ways])
+        answer, _, rank, _ = np.linalg.lstsq(A, left, rcond=1e-6)
+        p = p + answer
+        left = angles_left(by_effect(p))
+    return by_effect(p), left, int(rank)

@@ -8,11 +8,13 @@ from enum import StrEnum
 
 import numpy as np
 from scipy.optimize import nnls
+from scipy.stats import chi2
 
+from calibrations.criteria import SIGNIFICANT
 from calibrations.free_forms.bases import Line
 from calibrations.free_forms.chain import Coefficients, Given, state_at
 from calibrations.free_forms.form import CROSS, Form
-from calibrations.free_forms.geometry import LINEAR_PART, Geometry, geometry
+from calibrations.free_forms.geometry import LINEAR_PART, Geometry, GeometryEffects, geometry
 from calibrations.free_forms.naming import ActingPlace, places
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import NOISE_ALONE, SearchResult, search
@@ -205,13 +207,13 @@ def with_stairs(found: Structure, left: Array, stairs: Stairs, white: Array) -> 
 
 
 def find_structure(
-    table: Table, white: Array | None, given: Given, geometries: Mapping[str, Array], has: set[str]
+    table: Table, white: Array | None, given: Given, effects: GeometryEffects
 ) -> Structure:
     """Places that act in poses, rows in order of time.
 
-    white       standard deviation of each mean, (channels, n); None where it is not known
-    given       effects of the given model beyond bias, scale factor and geometry
-    geometries  derivatives of the effects of the geometry, (channels, n, m); `has`: those in the given model
+    white    standard deviation of each mean, (channels, n); None where it is not known
+    given    effects of the given model beyond bias, scale factor and geometry
+    effects  those of the geometry
     """
     data = PoseData.of(table)
     source = FloorSource.SAMPLES
@@ -227,7 +229,7 @@ def find_structure(
     white = result.white
     result, factor = _in_larger_noise(result, given)
     found = places(result)
-    shape = geometry(result, {place.name: place.curve for place in found}, geometries, has)
+    shape = geometry(result, {place.name: place.curve for place in found}, effects)
     acting = [replace(p, size=p.size * factor, largest=p.largest * factor) for p in found]
     return Structure(result, tuple(acting), shape, white, source)
 
@@ -292,11 +294,24 @@ def _scatter(result: SearchResult, source: FloorSource, alike: bool) -> Array | 
     """
     left = result.residual
     ratio = result.ratio
-    if ratio > TOO_SMALL and (source is FloorSource.SAMPLES or ratio < 1 / TOO_SMALL):
+    agrees = ratio > TOO_SMALL and not _noisy_rows_contradict(result)
+    if agrees and (source is FloorSource.SAMPLES or ratio < 1 / TOO_SMALL):
         return None
     r = left.reshape(result.white.shape) * result.white
     white = np.stack([_rows_noise(result, k, row, alike) for k, row in enumerate(r)])
     return white * np.sqrt(left.size / result.freedom) if np.all(white > 0) else None
+
+
+def _noisy_rows_contradict(result: SearchResult) -> bool:
+    """Whether rows with more noise than the rms of all rows have a clearly smaller residual than their noise.
+
+    A misfit of the other rows, which weigh more, hides this in the ratio of all rows.
+    """
+    white, left = result.white, result.residual.reshape(result.white.shape)
+    noisy = white > np.sqrt(np.mean(white**2, axis=1, keepdims=True))
+    rows = int(noisy.sum())
+    squares = float(np.sum(left[noisy] ** 2)) * left.size / result.freedom
+    return rows > 0 and squares < min(TOO_SMALL**2 * rows, float(chi2.ppf(SIGNIFICANT, rows)))
 
 
 def _rows_noise(result: SearchResult, k: int, residual: Array, alike: bool) -> Array:
