@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -16,6 +16,7 @@ from calibrations.free_forms.chain import Coefficients, Given, state_at
 from calibrations.free_forms.form import CROSS, Form
 from calibrations.free_forms.geometry import LINEAR_PART, Geometry, GeometryEffects, geometry
 from calibrations.free_forms.naming import ActingPlace, places
+from calibrations.free_forms.place_names import place_of_effect
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import NOISE_ALONE, SearchResult, search
 from calibrations.free_forms.selection import ENTER
@@ -229,9 +230,18 @@ def find_structure(
     white = result.white
     result, factor = _in_larger_noise(result, given)
     found = places(result)
-    shape = geometry(result, {place.name: place.curve for place in found}, effects)
+    shape = geometry(result, _curves(found), effects)
     acting = [replace(p, size=p.size * factor, largest=p.largest * factor) for p in found]
     return Structure(result, tuple(acting), shape, white, source)
+
+
+def _curves(found: Sequence[ActingPlace]) -> dict[str, Array]:
+    """The curve of each place that acts, and of each place at which an inseparable effect may act in its stead."""
+    curves = {place.name: place.curve for place in found}
+    for place in found:
+        for other in filter(None, map(place_of_effect, place.inseparable_from)):
+            curves.setdefault(other, place.curve)
+    return curves
 
 
 def _searched(data: PoseData, white: Array, given: Given, source: FloorSource) -> tuple[SearchResult, FloorSource]:

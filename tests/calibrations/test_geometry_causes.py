@@ -1,0 +1,45 @@
+"""Which effects of the geometry are causes, beside larger effects of the response and the stages."""
+
+import numpy as np
+import pytest
+
+from calibrations.discovery.results import Discovery
+from calibrations.effects.catalogue import catalogue
+from calibrations.fitting.fit import Fit
+from calibrations.loop import dataset
+from calibrations.model.file import read_model
+from calibrations.table import Array
+from tests.calibrations import synthetic
+
+TURN = synthetic.turns((90, 30, 150, 60, 120), step_deg=10)
+
+
+def forces(alpha_deg: float = 0.0, beta_deg: Array | float = 0.0, tilt_deg: float = 0.0) -> Array:
+    """Specific force, g, (n, 3), at angles that differ from the stages' readings by these; `tilt_deg` about x."""
+    alpha, beta = np.radians(TURN["alpha_deg"] + alpha_deg), np.radians(TURN["beta_deg"] + beta_deg)
+    tilt = np.radians(tilt_deg)
+    x, y, z = np.sin(alpha) * np.cos(tilt), -np.sin(tilt), np.cos(alpha) * np.cos(tilt)
+    return np.column_stack([np.cos(beta) * x - np.sin(beta) * y, np.sin(beta) * x + np.cos(beta) * y, z + 0 * beta])
+
+
+def discover(sensed: Array, added: Array | float = 0.0) -> Discovery[Fit]:
+    """The answer on outputs of two axes that sense these forces, (n, 2), and add something, V."""
+    outputs = np.array([2.5, 2.52]) + sensed * [1.0, 0.97] + added
+    table = synthetic.poses(TURN, outputs[:, 0], outputs[:, 1])
+    return dataset(table).discover(read_model("linear"), catalogue())
+
+
+def test_zeros_of_the_stages_of_1_deg_are_no_misalignment_beside_a_large_nonlinearity() -> None:
+    force = forces(alpha_deg=-0.8, beta_deg=1.0, tilt_deg=0.06)[:, :2]
+    found = discover(force, 6e-3 * force**3 + 2e-3 * force**2)
+    assert {"stage-zero-offset", "base-tilt"} <= set(found.causes)
+    assert "axis-misalignment" not in found.causes
+    assert found.end.params["stage-zero-offset.beta"].value == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_backlash_of_its_own_form_leaves_non_orthogonality_its_name() -> None:
+    side = np.where(np.diff(TURN["beta_deg"], prepend=TURN["beta_deg"][0] - 1) >= 0, 1.0, -1.0)
+    force = forces(beta_deg=0.3 * side)
+    sheared = np.column_stack([force[:, 0], force[:, 1] - np.sin(np.radians(0.13)) * force[:, 0]])
+    found = discover(sheared, 5e-3 * force[:, :2] ** 3)
+    assert {"stage-backlash", "axis-nonorthogonality", "cubic-nonlinearity"} <= set(found.causes)
