@@ -2,9 +2,9 @@
 
 The linear parts of the fit are a vector q of small angles with a covariance. Each effect of the geometry turns the
 forces by its own equations, which are exact: of angles of 1 deg the second order is many standard uncertainties. Its
-parameters are fitted to q by Gauss-Newton steps. A place that acts over another axis may have a linear part of its own, as large
-as the odd part of its curve: so much is added to the covariance before anything is asked, so that no mechanism's linear
-part names a second cause. An even curve, such as that of z-axis-bias, has a small one.
+parameters are fitted to q by Gauss-Newton steps. A place that acts over another axis may have a linear part of its own,
+as large as the odd part of its curve: so much is added to the covariance before anything is asked, so that no
+mechanism's linear part names a second cause. An even curve, such as that of z-axis-bias, has a small one.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def geometry(result: SearchResult, curves: Mapping[str, Array], effects: Geometr
 
     curves   what each acting place adds, (channels, n), in the output's unit
     """
-    data, c, g = result.data, result.data.channels, result.gram
+    data, c = result.data, result.data.channels
     gain = np.array([result.values.base[c + 3 * k + k] for k in range(c)])
     floor, mean_gain = float(np.sqrt(np.mean(result.white**2))), float(np.mean(np.abs(gain)))
     if not mean_gain > 0:
@@ -222,7 +222,7 @@ def _chosen(
 
 def _fitted(
     angles_left: Callable[[Mapping[str, Array]], Array], counts: Mapping[str, int]
-) -> tuple[dict[str, Array], Array, int]:
+) -> tuple[dict[str, Array], Array, float]:
     """Values of effects by least squares, the angles that they leave, and the number of values that these show."""
     ends = np.cumsum(list(counts.values()), dtype=int)
 
@@ -230,11 +230,11 @@ def _fitted(
         return dict(zip(counts, np.split(p, ends[:-1]), strict=True)) if counts else {}
 
     p = np.zeros(ends[-1] if counts else 0)
-    left, rank = angles_left(by_effect(p)), 0
+    left, rank = angles_left(by_effect(p)), 0.0
     for _ in range(STEPS if counts else 0):
         ways = [(angles_left(by_effect(p - e)), angles_left(by_effect(p + e))) for e in SMALL_DEG * np.eye(len(p))]
         A = np.column_stack([(before - after) / (2 * SMALL_DEG) for before, after in ways])
-        answer, _, rank, _ = np.linalg.lstsq(A, left, rcond=1e-6)
-        p = p + answer
+        answer, _, shown, _ = np.linalg.lstsq(A, left, rcond=1e-6)
+        p, rank = p + answer, float(shown)
         left = angles_left(by_effect(p))
-    return by_effect(p), left, int(rank)
+    return by_effect(p), left, rank

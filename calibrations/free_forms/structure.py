@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -207,9 +207,7 @@ def with_stairs(found: Structure, left: Array, stairs: Stairs, white: Array) -> 
     return replace(found, places=tuple(sorted(places, key=lambda p: -p.size)), white=white)
 
 
-def find_structure(
-    table: Table, white: Array | None, given: Given, effects: GeometryEffects
-) -> Structure:
+def find_structure(table: Table, white: Array | None, given: Given, effects: GeometryEffects) -> Structure:
     """Places that act in poses, rows in order of time.
 
     white    standard deviation of each mean, (channels, n); None where it is not known
