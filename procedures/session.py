@@ -21,8 +21,7 @@ from procedures.questions import EDGES, Confirm, Mounting, Number, Question
 
 Read = TypeVar("Read")
 SHORTEST_APPROACH_DEG = 0.5  # a shorter move does not take up the gear play
-
-
+LONGEST_DWELL_S = 3600.0  # its samples are in memory at once; longer is a mistyped setting, or a soak in blocks
 MOST_POSES = 50_000  # of a plan: about a week on a rig; more is a mistyped setting
 
 
@@ -256,7 +255,12 @@ class Session:
         self.host.doing(f"holding alpha {pose.alpha_deg:g}, beta {pose.beta_deg:g} deg")
 
     def hold(self, pose: Pose, dwell_s: float, settle_s: float) -> None:
-        """Move to `pose`, wait `settle_s`, record `dwell_s` seconds, and the temperature in the middle of them."""
+        """Move to `pose`, wait `settle_s`, record `dwell_s` seconds, and the temperature in the middle of them.
+
+        Raises SettingError above LONGEST_DWELL_S, before anything moves.
+        """
+        if dwell_s > LONGEST_DWELL_S:
+            raise SettingError(f"a dwell of {dwell_s:g} s is longer than {LONGEST_DWELL_S:g} s; give a shorter dwell_s")
         self.move_to(pose)
         self.wait(settle_s)
         samples, temperature_c = self.adc.acquire_with(dwell_s, self.oven.temperature_c)

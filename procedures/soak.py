@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from itertools import groupby
+from itertools import groupby, repeat
 
 from drivers.errors import LimitError
 from procedures.errors import SettingError
@@ -75,7 +75,7 @@ def schedule(duration_s: float, interval_s: float, block_s: float) -> Iterator[P
     while remaining > 0:
         blocks = min(remaining, longest, max(1, longest >> max(0, DOUBLINGS - number)))
         yield from tumble(f"{REVERSAL} {number}")
-        yield from [Pose(0.0, 0.0, 0, f"{HOLD} {number}")] * blocks
+        yield from repeat(Pose(0.0, 0.0, 0, f"{HOLD} {number}"), blocks)
         remaining, number = remaining - blocks, number + 1
     yield from tumble(f"{REVERSAL} {number}")
 

@@ -26,6 +26,8 @@ from rig.record.values import Block
 LEVEL_S = 1.0  # a reading of the level
 ROOM_C = 25.0
 MOST_STEPS = 10 * MOST_POSES
+DAY_S = 86_400.0
+MOST_S = 400 * DAY_S  # a stability test takes a year; more is a mistyped setting
 EXCHANGE_S = 0.05  # time of commands and polls for each move or recording
 
 
@@ -69,6 +71,10 @@ class Ledger:
             )
         self.steps.append(Step(self.now_s, duration_s, what))
         self.now_s += duration_s
+        if not self.now_s < MOST_S:
+            raise PlanError(
+                f"the plan has more than {MOST_S / DAY_S:.0f} days; give a shorter time, or fewer repetitions"
+            )
 
 
 class StageSettings(Protocol):

@@ -1,8 +1,9 @@
 """How often 95 % intervals hold the truth: `python -m tests.benchmark.coverage_kinds [INTERVALS]`, else 200 of each.
 
-Bias and scale factor of every kind of data, under flicker of 0, 0.7 and 1.7 times the white noise of a mean; of poses
-also after a discovery has chosen the model, from the linear one, for a sensor with one hidden cause. Sensors are drawn
-from plain laws written out here or in `tests.hidden`; none of their formulas is the library's.
+Bias and scale factor of every kind of data, under flicker of 0, 0.7 and 1.7 times the white noise of a mean (of motion:
+of a mean of one second); of poses also after a discovery has chosen the model, from the linear one, for a sensor with
+one hidden cause. A still record has neither; `tests.benchmark.noise` has the intervals of its coefficients. Sensors are
+drawn from plain laws written out here or in `tests`; none of their formulas is the library's.
 
 The truth after a discovery is what the chosen model has on the same data without noise: the meaning of a bias depends
 on the model that it is in.
@@ -13,7 +14,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -23,6 +24,7 @@ from calibrations.fitting.fit import Fit, fit
 from calibrations.loop import discover
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
+from tests.benchmark import shaking
 from tests.hidden import sampled
 from tests.hidden.intervals import EVERY, FLOOR_V, SLOW, SUFFICIENT
 
@@ -122,6 +124,17 @@ def poses(seed: int, times: float) -> Made:
     return fit(read_model("linear"), table), _values(fit(read_model("linear"), exact))
 
 
+def motion(seed: int, times: float) -> Made:
+    """A linear sensor on a shaker, in six attitudes, each with a rest."""
+    table = shaking.measured((), "rests and levels", seed)
+    grid_s = np.arange(table.column("t_s")[0], table.column("t_s")[-1] + 0.1, 0.1)
+    slow = shaking.NOISE_V / np.sqrt(2.0) * times * SLOW["flicker"](grid_s, np.random.default_rng([seed, 6]))
+    added = {f"v{axis}_v": np.interp(table.column("t_s"), grid_s, slow[:, k]) for k, axis in enumerate("xy")}
+    columns = {name: values + added.get(name, 0.0) for name, values in table.columns.items()}
+    truth = {("bias", "x"): 2.51, ("bias", "y"): 2.48, ("scale-factor", "x"): 1.0, ("scale-factor", "y"): 1.02}
+    return fit(read_model("linear"), replace(table, columns=columns)), truth
+
+
 def _bent(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
     """Each axis bends by 3 mV at 1 g, and hears the square of the other one."""
     return v + 3e-3 * poses.a**2 * np.array([1.0, -1.0]) + 2e-3 * poses.a[:, ::-1] ** 2
@@ -142,6 +155,7 @@ KINDS: dict[str, Callable[[int, float], Made]] = {
     "positions": positions,
     "rates": rates,
     "fields": fields,
+    "motion": motion,
     "poses, discovered": discovered,
 }
 

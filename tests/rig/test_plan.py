@@ -99,6 +99,8 @@ def test_an_oven_is_planned_too(tmp_path: Path) -> None:
         ("noise-floor", "--duration-s", "1e9", "--block-s", "1"),
         ("motion", "--still-s", "1e9", "--block-s", "1"),
         ("soak", "--duration-s", "1e9"),
+        ("soak", "--block-s", "1e-9"),
+        ("temperature-cycle", "--soak-s", "1e300"),
         ("repeat", "--times", "1000000000"),
         ("temperature-cycle", "--cycles", "1000000000"),
     ],
@@ -106,6 +108,12 @@ def test_an_oven_is_planned_too(tmp_path: Path) -> None:
 def test_a_plan_without_bound_is_refused_before_it_is_built(rig: Callable[..., Any], words: tuple[str, ...]) -> None:
     ended = rig("plan", *words)
     assert (ended.status, "the plan has more than" in ended.err) == (2, True), ended.err
+
+
+@pytest.mark.parametrize("name", ["sweep", "misalignment", "repeat"])
+def test_a_dwell_that_no_memory_holds_is_refused(rig: Callable[..., Any], name: str) -> None:
+    ended = rig("plan", name, "--dwell-s", "1e7")
+    assert (ended.status, "give a shorter dwell_s" in ended.err) == (2, True), ended.err
 
 
 def test_the_help_of_a_procedure_shows_its_settings_with_units_and_meaning() -> None:
