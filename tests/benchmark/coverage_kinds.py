@@ -1,7 +1,7 @@
 """How often 95 % intervals hold the truth: `python -m tests.benchmark.coverage_kinds [INTERVALS]`, else 200 of each.
 
 Bias and scale factor of every kind of data, under flicker of 0, 0.7 and 1.7 times the white noise of a mean (of motion:
-of a mean of one second); of poses also after a discovery has chosen the model, from the linear one, for a sensor with
+of the mean of a stretch); of poses also after a discovery has chosen the model, from the linear one, for a sensor with
 one hidden cause. A still record has neither; `tests.benchmark.noise` has the intervals of its coefficients. Sensors are
 drawn from plain laws written out here or in `tests`; none of their formulas is the library's.
 
@@ -31,6 +31,7 @@ from tests.hidden.intervals import EVERY, FLOOR_V, SLOW, SUFFICIENT
 TIMES_WHITE = (0.0, 0.7, 1.7)
 LEAST, MOST = 0.92, 0.98
 DWELL_S, PERIOD_S, SAMPLES = 5.0, 12.0, 500
+STRETCH_S = 2.0  # of a record of motion: the fit takes the means of its four quarters
 WANTED = {"bias", "scale-factor", "gyro-bias", "gyro-scale-factor", "hard-iron", "field-strength"}
 Made = tuple[Fit, dict[tuple[str, str], float]]  # a fit, and the truth by effect and axis
 
@@ -128,7 +129,7 @@ def motion(seed: int, times: float) -> Made:
     """A linear sensor on a shaker, in six attitudes, each with a rest."""
     table = shaking.measured((), "rests and levels", seed)
     grid_s = np.arange(table.column("t_s")[0], table.column("t_s")[-1] + 0.1, 0.1)
-    slow = shaking.NOISE_V / np.sqrt(2.0) * times * SLOW["flicker"](grid_s, np.random.default_rng([seed, 6]))
+    slow = shaking.NOISE_V / np.sqrt(2 * STRETCH_S) * times * SLOW["flicker"](grid_s, np.random.default_rng([seed, 6]))
     added = {f"v{axis}_v": np.interp(table.column("t_s"), grid_s, slow[:, k]) for k, axis in enumerate("xy")}
     columns = {name: values + added.get(name, 0.0) for name, values in table.columns.items()}
     truth = {("bias", "x"): 2.51, ("bias", "y"): 2.48, ("scale-factor", "x"): 1.0, ("scale-factor", "y"): 1.02}

@@ -16,12 +16,14 @@ from rig.errors import RecordError
 from rig.record import Kept, Record
 from rig.record.measured import table_of
 from rig.record.recover import recover
+from rig.record.repair import is_sound
 from tests.rig.test_doctor import PAGE, recorded
 from tests.rig.test_store import begin, block
 
 
-def change(record: Path, statement: str, *values: object) -> None:
+def change(record: Path, statement: str, *values: object, schema: bool = False) -> None:
     with closing(sqlite3.connect(record / "record.db")) as connection, connection:
+        connection.execute(f"PRAGMA writable_schema = {'ON' if schema else 'OFF'}")
         assert connection.execute(statement, values).rowcount == 1
 
 
@@ -221,3 +223,14 @@ def test_a_damaged_schema_costs_no_row(tmp_path: Path, right: bytes, wrong: byte
     assert not recover(path, tmp_path / "new").changed
     with Record(tmp_path / "new") as record:
         assert table_of(record, run).digest == whole
+
+
+def test_a_sound_schema_stays_as_it_is(tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "new" / "folder"
+    run = recorded(folder, 1)
+    path = folder / "record.db"
+    assert is_sound(path)
+    with Record(folder) as record:
+        assert record.run(run).rows == 1
+    change(folder, "UPDATE sqlite_master SET name = 'poqes' WHERE name = 'poses'", schema=True)
+    assert not is_sound(path)
