@@ -81,9 +81,9 @@ class Budget:
     @cached_property
     def freedom(self) -> Array:
         """Effective degrees of freedom of each parameter."""
-        each = np.array([[line.freedom] for line in self.given])
+        freedoms = np.array([[line.freedom] for line in self.given])
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(self.combined**4 / np.sum(self._variances**2 / each, axis=0))
+            return np.asarray(self.combined**4 / np.sum(self._variances**2 / freedoms, axis=0))
 
     @cached_property
     def coverage(self) -> Array:
@@ -97,38 +97,38 @@ class Budget:
         return self.coverage * self.combined
 
 
-def make_budget(found: Fit, inputs: Iterable[Contribution]) -> Budget:
+def make_budget(fit: Fit, inputs: Iterable[Contribution]) -> Budget:
     """The budget of a fit to poses or positions, from its own noise and from `inputs` that were not fitted."""
-    cautious = cautiously(found)
+    cautious = cautiously(fit)
     G = row_gains(cautious)
-    of_inputs = [_of_type_b(found, G, c) for c in inputs]
-    own = _of_type_a(cautious, G, sum(seen for _, seen in of_inputs))
+    of_inputs = [_of_type_b(fit, G, c) for c in inputs]
+    own = _of_type_a(cautious, G, sum(square for _, square in of_inputs))
     return Budget((*own, *(line for line, _ in of_inputs)))
 
 
-def row_gains(found: Fit) -> Array:
+def row_gains(fit: Fit) -> Array:
     """How far each error of a row moves each parameter, shape (p, channels, n)."""
-    channels, n = found.residual.shape
-    rows = np.vstack([found.whitened[:, 1:], found.problem.layout.prior_rows])
-    inverse = gain(rows, found.problem.layout.typical)[:, : channels * n].reshape(-1, channels, n)
+    channels, n = fit.residual.shape
+    rows = np.vstack([fit.whitened[:, 1:], fit.problem.layout.prior_rows])
+    inverse = gain(rows, fit.problem.layout.typical)[:, : channels * n].reshape(-1, channels, n)
     G = np.empty_like(inverse)
     for first in range(0, n, CHUNK):
         unit = np.eye(n)[:, first : first + CHUNK]
-        white = found.noise.whiten(np.broadcast_to(unit, (channels, *unit.shape))).reshape(channels, n, -1)
+        white = fit.noise.whiten(np.broadcast_to(unit, (channels, *unit.shape))).reshape(channels, n, -1)
         G[:, :, first : first + CHUNK] = np.einsum("pcn,cnk->pck", inverse, white)
     return G
 
 
-def _of_type_a(found: Fit, G: Array, seen: float) -> list[Line]:
-    """The fit's own covariance, in its parts; what the inputs leave in the residual, `seen`, is no noise."""
-    noise, rows = found.noise, found.residual.size - len(found.theta)
-    everything = np.array([np.nan if e.std is None else e.std for e in found.params.values()]) ** 2
-    by_noise = everything / found.birge**2
+def _of_type_a(fit: Fit, G: Array, square: float) -> list[Line]:
+    """The fit's own covariance, in its parts; what the inputs leave in the residual, `square`, is no noise."""
+    noise, rows = fit.noise, fit.residual.size - len(fit.theta)
+    everything = np.array([np.nan if e.std is None else e.std for e in fit.params.values()]) ** 2
+    by_noise = everything / fit.birge**2
     white = np.minimum(np.einsum("pcn,cn->p", G**2, noise.white**2), by_noise)
     scatter = np.minimum(np.einsum("pcn,c->p", G**2, noise.scatter**2), by_noise - white)
     slow, misfit = by_noise - white - scatter, everything - by_noise
-    beyond = float(np.sum(found.residual**2) - np.sum(noise.white**2))
-    share = min(max(1 - seen / beyond, 0.0), 1.0) if seen and beyond > 0 else 1.0
+    beyond = float(np.sum(fit.residual**2) - np.sum(noise.white**2))
+    share = min(max(1 - square / beyond, 0.0), 1.0) if square and beyond > 0 else 1.0
     parts = [
         ("white noise of the dwells", white, float(rows)),
         ("scatter from row to row", share * scatter, float(rows)),
@@ -142,41 +142,41 @@ def _of_type_a(found: Fit, G: Array, seen: float) -> list[Line]:
     ]
 
 
-def _of_type_b(found: Fit, G: Array, c: Contribution) -> tuple[Line, float]:
+def _of_type_b(fit: Fit, G: Array, c: Contribution) -> tuple[Line, float]:
     """One input that is not fitted, and the sum of squares that its errors leave in the residual."""
     if c.std is None:
         return Line(c.source, "B", c.unit, None, None, None, c.freedom), 0.0
-    shown, number = _shown(found, c), c.shared(found.table)
-    each = input_effects(found, G, c)
-    sensitivity = each[0] if len(each) == 1 else np.sqrt(np.sum(each**2, axis=0))
+    shown, number = _shown(fit, c), c.shared(fit.table)
+    by_error = input_effects(fit, G, c)
+    sensitivity = by_error[0] if len(by_error) == 1 else np.sqrt(np.sum(by_error**2, axis=0))
     line = Line(c.source, "B", c.unit, c.std, sensitivity, np.abs(sensitivity) * c.std, c.freedom)
-    return line, c.std**2 * _remaining_square(shown, found.jacobian, each, number)
+    return line, c.std**2 * _remaining_square(shown, fit.jacobian, by_error, number)
 
 
-def input_effects(found: Fit, G: Array, c: Contribution) -> Array:
+def input_effects(fit: Fit, G: Array, c: Contribution) -> Array:
     """What each error of an input, shared by its rows, does to each parameter, shape (errors, p)."""
-    number = c.shared(found.table)
-    each = np.zeros((int(number.max()) + 1, len(G)))
-    np.add.at(each, number, np.einsum("pcn,cn->np", G, _shown(found, c)))
-    return each
+    number = c.shared(fit.table)
+    by_error = np.zeros((int(number.max()) + 1, len(G)))
+    np.add.at(by_error, number, np.einsum("pcn,cn->np", G, _shown(fit, c)))
+    return by_error
 
 
-def _shown(found: Fit, c: Contribution) -> Array:
+def _shown(fit: Fit, c: Contribution) -> Array:
     """Which error of the rows looks like one of an input, shape (channels, n).
 
     The residual is measured less predicted: a parameter follows an input against what the residual does.
     """
-    return -c.derivative(found.problem, found.theta)
+    return -c.derivative(fit.problem, fit.theta)
 
 
-def _remaining_square(shown: Array, jacobian: Array, each: Array, number: NDArray[np.intp]) -> float:
-    """Sum of squares of what errors (channels, n) leave of themselves when the parameters follow them by `each`.
+def _remaining_square(shown: Array, jacobian: Array, by_error: Array, number: NDArray[np.intp]) -> float:
+    """Sum of squares of what errors (channels, n) leave of themselves when the parameters follow them by `by_error`.
 
-    One error for each `number`; the jacobian (channels, n, p) takes `each` (numbers, p) back to the rows.
+    One error for each `number`; the jacobian (channels, n, p) takes `by_error` (numbers, p) back to the rows.
     """
-    crossed = np.einsum("cnp,np->cn", jacobian, each[number])
+    crossed = np.einsum("cnp,np->cn", jacobian, by_error[number])
     normal = np.einsum("cnp,cnq->pq", jacobian, jacobian)
-    return float(np.sum(shown**2) - 2 * np.sum(shown * crossed) + np.sum((each @ normal) * each))
+    return float(np.sum(shown**2) - 2 * np.sum(shown * crossed) + np.sum((by_error @ normal) * by_error))
 
 
 def slow_freedom(noise: Noise) -> float:
@@ -201,17 +201,17 @@ def slow_freedom(noise: Noise) -> float:
 # Whoever computes something from several results needs both (GUM 5.2, H.2).
 
 
-def parameter_correlation(found: Fit, drawn: Budget, inputs: Iterable[Contribution]) -> Array:
-    """Shape (p, p), 1 on the diagonal, for the budget `drawn` of `found`; NaN where a parameter is not determined."""
-    cautious = cautiously(found)
+def parameter_correlation(fit: Fit, drawn: Budget, inputs: Iterable[Contribution]) -> Array:
+    """Shape (p, p), 1 on the diagonal, for the budget `drawn` of `fit`; NaN where a parameter is not determined."""
+    cautious = cautiously(fit)
     G = row_gains(cautious)
-    by_noise, _ = covariance(cautious.information, found.problem.layout.typical)
+    by_noise, _ = covariance(cautious.information, fit.problem.layout.typical)
     own = np.sqrt(sum((line.std**2 for line in drawn.given if line.kind == "A" and line.std is not None), np.zeros(1)))
     joint = normalised(by_noise) * np.outer(own, own)
     for c in inputs:
         if c.std:
-            each = input_effects(found, G, c)
-            joint = joint + c.std**2 * each.T @ each
+            by_error = input_effects(fit, G, c)
+            joint = joint + c.std**2 * by_error.T @ by_error
     return normalised(joint)
 
 

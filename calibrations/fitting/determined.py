@@ -30,14 +30,14 @@ from calibrations.table import Array
 ROUNDING = 1e-9  # of a leverage
 
 
-def leverages(found: Fit) -> Array:
+def leverages(fit: Fit) -> Array:
     """The diagonal of the hat matrix, shape (channels, n): 1 where the fit goes through a value, whatever it is."""
-    jacobian = np.vstack([found.whitened[:, 1:], found.problem.layout.prior_rows])
+    jacobian = np.vstack([fit.whitened[:, 1:], fit.problem.layout.prior_rows])
     size = np.linalg.norm(jacobian, axis=0)
     columns = jacobian[:, size > 0] / size[size > 0]
     basis, singular, _ = np.linalg.svd(columns, full_matrices=False)
-    kept = basis[:, singular > 1e-8 * singular[0]] if singular.size else basis[:, :0]
-    return np.asarray(np.sum(kept**2, axis=1))[: found.residual.size].reshape(found.residual.shape)
+    spanned = basis[:, singular > 1e-8 * singular[0]] if singular.size else basis[:, :0]
+    return np.asarray(np.sum(spanned**2, axis=1))[: fit.residual.size].reshape(fit.residual.shape)
 
 
 def unseen_variance(leverage: Array) -> float:
@@ -45,31 +45,31 @@ def unseen_variance(leverage: Array) -> float:
     return float(np.mean(1 / np.maximum(1 - leverage, 1e-12)))
 
 
-def undetermined(found: Fit) -> str | None:
+def undetermined(fit: Fit) -> str | None:
     """Why a small residual is no proof on this data, in words; None where the data determine the model."""
-    if why := magnetometer_coverage_warning(found.table):
+    if why := magnetometer_coverage_warning(fit.table):
         return why
-    leverage = leverages(found)
+    leverage = leverages(fit)
     variance, lone = unseen_variance(leverage), leverage > 1 - ROUNDING
     if variance <= MOST_UNCERTAIN:
         return None
     if lone.any() and not lone.all() and unseen_variance(leverage[~lone]) <= MOST_UNCERTAIN:
-        return _unchecked(found, lone)
-    rows = "positions" if found.table.type.magnitude else "rows"
+        return _unchecked(fit, lone)
+    rows = "positions" if fit.table.type.magnitude else "rows"
     times = f"{np.sqrt(variance):.1f}" if variance < 1e4 else "many"
     return (
-        f"the {len(found.theta)} parameters are not identifiable from {found.table.n} {rows}: the prediction of "
+        f"the {len(fit.theta)} parameters are not identifiable from {fit.table.n} {rows}: the prediction of "
         f"another one is {times} times less certain than one measurement; measure at more orientations"
     )
 
 
-def _unchecked(found: Fit, lone: NDArray[np.bool_]) -> str:
+def _unchecked(fit: Fit, lone: NDArray[np.bool_]) -> str:
     """That some rows, `lone` in shape (channels, n), have parameters to themselves."""
     rows = np.flatnonzero(lone.any(axis=0))
-    paths = found.table.labels.get("path")
-    which = [paths[k] for k in rows] if paths else [f"row {number}" for number in found.table.numbered(rows)]
+    paths = fit.table.labels.get("path")
+    which = [paths[k] for k in rows] if paths else [f"row {number}" for number in fit.table.numbered(rows)]
     return (
-        f"the fit cannot check all of the {len(found.theta)} parameters: {lone.sum()} of the {lone.size} measured "
+        f"the fit cannot check all of the {len(fit.theta)} parameters: {lone.sum()} of the {lone.size} measured "
         "values "
         f"({', '.join(which)}) each determine one parameter alone; repeat these measurements"
     )
@@ -86,38 +86,38 @@ def lets_go(before: Fit, after: Fit) -> bool:
     return any(key in identified and not e.identified for key, e in after.params.items())
 
 
-def blind_to(found: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:
+def blind_to(fit: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:
     """The effects, of the model or not, that this table has the columns for and whose parameters it leaves unknown."""
-    return tuple(name for name, effect in effects.items() if _hidden(found, effect))
+    return tuple(name for name, effect in effects.items() if _hidden(fit, effect))
 
 
-def _hidden(found: Fit, effect: Effect) -> bool:
+def _hidden(fit: Fit, effect: Effect) -> bool:
     if effect.incidental:
         return False
-    if found.table.content in effect.kinds and effect.lacks(found.table) is not None:
+    if fit.table.content in effect.kinds and effect.lacks(fit.table) is not None:
         return True
-    return _can_be_asked(found, effect) and not _shows(found, effect)
+    return _can_be_asked(fit, effect) and not _shows(fit, effect)
 
 
-def _can_be_asked(found: Fit, effect: Effect) -> bool:
+def _can_be_asked(fit: Fit, effect: Effect) -> bool:
     """Whether there is a column for all that it needs, and a row for each parameter."""
-    if effect.excluded(found.table) is not None:
+    if effect.excluded(fit.table) is not None:
         return False
-    return found.residual.size > len(Layout.of(found.model.with_effect(effect), found.table).slots)
+    return fit.residual.size > len(Layout.of(fit.model.with_effect(effect), fit.table).slots)
 
 
-def _shows(found: Fit, effect: Effect) -> bool:
+def _shows(fit: Fit, effect: Effect) -> bool:
     """Whether a parameter of the effect is determined, from any of its starts."""
-    model = found.model if found.model.holds(effect.name) else found.model.with_effect(effect)
-    problem = Problem.of(model, found.table)
+    model = fit.model if fit.model.holds(effect.name) else fit.model.with_effect(effect)
+    problem = Problem.of(model, fit.table)
     mine, typical = problem.layout.of_effect(effect.name), problem.layout.typical
-    starts = [found.theta] if model is found.model else problem.layout.starts()
-    return any(_determined(found, problem.jacobian(theta), mine, typical) for theta in starts)
+    starts = [fit.theta] if model is fit.model else problem.layout.starts()
+    return any(_determined(fit, problem.jacobian(theta), mine, typical) for theta in starts)
 
 
-def _determined(found: Fit, jacobian: Array, mine: NDArray[np.bool_], typical: Array) -> bool:
+def _determined(fit: Fit, jacobian: Array, mine: NDArray[np.bool_], typical: Array) -> bool:
     if not np.any(jacobian[:, :, mine]):
         return False
-    cov, null = covariance(found.noise.whiten(jacobian), typical)
+    cov, null = covariance(fit.noise.whiten(jacobian), typical)
     std, free = np.sqrt(np.diag(cov)), np.sum(null**2, axis=0)
     return bool(np.any((free[mine] <= UNDETERMINED) & (std[mine] < typical[mine])))

@@ -104,10 +104,10 @@ class Fit(Result):
         NaN in the rows and columns of parameters that the data do not determine.
         """
         cautious = cautiously(self)
-        found = covariance(cautious.information, self.problem.layout.typical)[0]
+        matrix = covariance(cautious.information, self.problem.layout.typical)[0]
         wider = _wider(cautious)
         known = np.array([e.std is not None for e in self.params.values()])
-        return np.where(np.outer(known, known), np.outer(wider, wider) * found, np.nan)
+        return np.where(np.outer(known, known), np.outer(wider, wider) * matrix, np.nan)
 
     @property
     def correlation(self) -> Array:
@@ -245,10 +245,10 @@ def _alternate(problem: Problem, noise: Noise, starts: list[Array]) -> Fit:
     theta = min((_minimise(problem, noise, start) for start in starts), key=lambda t: t[1])[0]
     # with smooth columns set aside the noise hardly depends on the parameters, and one round is enough
     for _ in range(1 if problem.smooth.size else ROUNDS):
-        found = estimate(noise, problem.residual(theta), _free(problem, problem.jacobian(theta)), problem.smooth)
-        if found.is_like(noise):
+        estimated = estimate(noise, problem.residual(theta), _free(problem, problem.jacobian(theta)), problem.smooth)
+        if estimated.is_like(noise):
             break
-        noise = found
+        noise = estimated
         theta, _ = _minimise(problem, noise, theta)
     return _result(problem, theta, noise)
 
@@ -329,10 +329,10 @@ def _at_once(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
     theta = start + typical * step
     if np.any(theta < low) or np.any(theta > high):
         return None
-    left = np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
-    if np.linalg.norm(before + J @ step - left) > STRAIGHT * np.linalg.norm(left):
+    after = np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
+    if np.linalg.norm(before + J @ step - after) > STRAIGHT * np.linalg.norm(after):
         return None
-    return theta, float(left @ left) / 2
+    return theta, float(after @ after) / 2
 
 
 def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
@@ -345,27 +345,27 @@ def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, fl
     def white(theta: Array) -> Array:
         return np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
 
-    theta, left = start, white(start)
+    theta, residual = start, white(start)
     stairs = False
     for _ in range(NEWTON_STEPS):
         J = np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), rows]) * typical
         low, high = ((bound - theta) / typical for bound in _reach(problem, theta))
         # a rotation of the rows changes no step, and leaves as many rows as columns for every damping
-        rotated = qr(np.column_stack([J, left]), mode="r", overwrite_a=True, check_finite=False)[0]
+        rotated = qr(np.column_stack([J, residual]), mode="r", overwrite_a=True, check_finite=False)[0]
         R: Array = np.asarray(rotated[: J.shape[1] + 1], dtype=np.float64)
         for damping in DAMPINGS:
             after = theta + typical * _step(R[:, :-1], R[:, -1], damping, low, high)
             least = white(after)
-            gain = float(left @ left - least @ least)
+            gain = float(residual @ residual - least @ least)
             if gain > 0:
                 break
         if gain > 0:
-            theta, left = after, least
-        if gain < SMALL_GAIN * max(1.0, float(left @ left) / len(left)):
+            theta, residual = after, least
+        if gain < SMALL_GAIN * max(1.0, float(residual @ residual) / len(residual)):
             if stairs or not problem.rounds:
                 break
             stairs = True
-    return theta, float(left @ left) / 2
+    return theta, float(residual @ residual) / 2
 
 
 def _reach(problem: Problem, theta: Array) -> tuple[Array, Array]:
@@ -381,12 +381,12 @@ def _reach(problem: Problem, theta: Array) -> tuple[Array, Array]:
     )
 
 
-def _step(J: Array, left: Array, damping: float, low: Array, high: Array) -> Array:
+def _step(J: Array, residual: Array, damping: float, low: Array, high: Array) -> Array:
     """The damped step within bounds: an entry that a step takes beyond its bound goes there, and no farther."""
     step = np.zeros(J.shape[1])
     free = np.ones(len(step), dtype=bool)
     for _ in range(BOUND_ROUNDS):
-        columns, side = J[:, free], left + J[:, ~free] @ step[~free]
+        columns, side = J[:, free], residual + J[:, ~free] @ step[~free]
         size = np.linalg.norm(columns, axis=0)
         most = size.max(initial=0.0) or 1.0
         damped = np.vstack([columns / most, np.diag(np.sqrt(damping) * size / most)]) if damping else columns / most
@@ -404,10 +404,10 @@ def _step(J: Array, left: Array, damping: float, low: Array, high: Array) -> Arr
 def _result(problem: Problem, theta: Array, noise: Noise) -> Fit:
     residual, jacobian = problem.residual(theta), problem.jacobian(theta)
     model = replace(problem.layout.model, unit=problem.table.unit)
-    found = Fit(model, problem, theta, noise, residual, jacobian)
-    cautious = cautiously(found)
+    result = Fit(model, problem, theta, noise, residual, jacobian)
+    cautious = cautiously(result)
     known = estimates(model, problem.layout, theta, cautious.information, _wider(cautious))
-    return replace(found, model=known, all_noise=cautious.noise)
+    return replace(result, model=known, all_noise=cautious.noise)
 
 
 def _wider(cautious: Fit) -> Array:
@@ -422,22 +422,22 @@ def _wider(cautious: Fit) -> Array:
         from calibrations.fitting.slow_outputs import widening_of_magnitudes  # positions alone need it
 
         axes = problem.table.outputs.shape[1]
-        each = np.broadcast_to(np.eye(axes), (problem.table.n, axes, axes))
-        by_output = problem.of_output(cautious.theta, each)
+        identity = np.broadcast_to(np.eye(axes), (problem.table.n, axes, axes))
+        by_output = problem.of_output(cautious.theta, identity)
         wider[free] = widening_of_magnitudes(cautious.noise, cautious.residual, jacobian, by_output, typical)
     else:
         wider[free] = widening(cautious.noise, cautious.residual, jacobian, typical)
     return wider
 
 
-def cautiously(found: Fit) -> Fit:
+def cautiously(result: Fit) -> Fit:
     """The fit under all the noise that its residual shows, from which standard uncertainties are taken.
 
     Here nothing is set aside: where inclinations follow each other in time, smooth functions of the angles take up slow
     noise as well, and parameters would look more certain than they are.
     """
-    if found.all_noise is not None:
-        return replace(found, noise=found.all_noise)
-    jacobian = _free(found.problem, found.jacobian)
-    noise = estimate(found.noise, found.residual, jacobian, np.zeros((found.table.n, 0)))
-    return replace(found, noise=noise.prolonged())
+    if result.all_noise is not None:
+        return replace(result, noise=result.all_noise)
+    jacobian = _free(result.problem, result.jacobian)
+    noise = estimate(result.noise, result.residual, jacobian, np.zeros((result.table.n, 0)))
+    return replace(result, noise=noise.prolonged())

@@ -51,15 +51,15 @@ def estimates(model: Model, layout: Layout, theta: Array, jacobian: Array, wider
         return model
     cov, null = covariance(jacobian, layout.typical)
     std, free = wider * np.sqrt(np.diag(cov)), null.T @ null
-    found: list[list[Estimate]] = [[] for _ in model.terms]
+    by_term: list[list[Estimate]] = [[] for _ in model.terms]
     for k, slot in enumerate(layout.slots):
         why = _why_not(k, layout, std, free)
         unit = slot.parameter.unit.replace("{out}", layout.unit)
         uncertainty = None if free[k, k] > UNDETERMINED else float(std[k])
-        found[slot.term].append(
+        by_term[slot.term].append(
             Estimate(slot.parameter.name, slot.axis, float(theta[k]), uncertainty, unit, why is None, why)
         )
-    terms = tuple(replace(term, estimates=tuple(e)) for term, e in zip(model.terms, found, strict=True))
+    terms = tuple(replace(term, estimates=tuple(e)) for term, e in zip(model.terms, by_term, strict=True))
     return replace(model, terms=terms, correlations=None)  # those of earlier values
 
 

@@ -92,8 +92,8 @@ def step_derivative(effect: Effect, step: float) -> Derivative:
 def input_contributions(table: Table) -> tuple[Contribution, ...]:
     """Every input that this kind of table has. Raises DataError for a constant that is no number."""
     own = {"poses": _of_poses, "rates": _of_rates}.get(table.kind, list)
-    made = [*_of_any(table), *own()]
-    return tuple(replace(c, std=_given(table, constant)) for constant, c in made)
+    contributions = [*_of_any(table), *own()]
+    return tuple(replace(c, std=_given(table, constant)) for constant, c in contributions)
 
 
 def _of_poses() -> list[tuple[str, Contribution]]:
@@ -133,13 +133,13 @@ def _faster(problem: Problem, theta: Array) -> Array:
 
 
 def _of_any(table: Table) -> list[tuple[str, Contribution]]:
-    found = [("gain_std", _common("gain of the converter", "1", step_derivative(_Input("output", _times), 1e-4)))]
+    sources = [("gain_std", _common("gain of the converter", "1", step_derivative(_Input("output", _times), 1e-4)))]
     if table.input_unit == "g":
         stronger = step_derivative(_Input("force", _stronger(table.gravity_m_s2)), 1e-3)
-        found.insert(0, ("gravity_std_m_s2", _common("gravity at the place", "m/s^2", stronger)))
+        sources.insert(0, ("gravity_std_m_s2", _common("gravity at the place", "m/s^2", stronger)))
     if "temperature_c" in table:
-        found.append(("temperature_std_c", _common("thermometer", "K", column_derivative("temperature_c", 1e-2))))
-    return found
+        sources.append(("temperature_std_c", _common("thermometer", "K", column_derivative("temperature_c", 1e-2))))
+    return sources
 
 
 def _given(table: Table, constant: str) -> float | None:

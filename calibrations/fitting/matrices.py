@@ -50,27 +50,27 @@ class CalibrationMatrices:
         return np.asarray((raw * self.S + self.b) @ self.M.T)
 
 
-def calibration_matrices(found: Fit) -> CalibrationMatrices | None:
+def calibration_matrices(fit: Fit) -> CalibrationMatrices | None:
     """The matrices of a fitted model; None without three axes, and for a motion."""
-    if len(found.table.axes) < 3 or found.table.type.moving:
+    if len(fit.table.axes) < 3 or fit.table.type.moving:
         return None
-    M, S, b = _parts(_stacked(found, found.theta))
+    M, S, b = _parts(_stacked(fit, fit.theta))
     if not np.isfinite(M).all() or not np.isfinite(S).all():
         return None
-    typical = STEP * found.problem.layout.typical
-    ahead, behind = ([_stacked(found, found.theta + side * step) for step in np.diag(typical)] for side in (1, -1))
+    typical = STEP * fit.problem.layout.typical
+    ahead, behind = ([_stacked(fit, fit.theta + side * step) for step in np.diag(typical)] for side in (1, -1))
     slopes = (np.array(ahead) - np.array(behind)) / (2 * typical[:, None])
-    deviations = _parts(_deviation(slopes, _covariance(found)))
-    beyond = tuple(name for name in found.model.effects if name not in LINEAR_EFFECTS)
-    return CalibrationMatrices(M, S, b, *deviations, found.table.input_unit, beyond)
+    deviations = _parts(_deviation(slopes, _covariance(fit)))
+    beyond = tuple(name for name in fit.model.effects if name not in LINEAR_EFFECTS)
+    return CalibrationMatrices(M, S, b, *deviations, fit.table.input_unit, beyond)
 
 
-def _stacked(found: Fit, theta: Array) -> Array:
+def _stacked(fit: Fit, theta: Array) -> Array:
     """M, S and b of the linear effects with the values `theta`, one after another, shape (15,)."""
-    steps = [step for step in found.problem.layout.steps(theta) if step[0].name in LINEAR_EFFECTS]
-    axes = sensed(np.eye(3), found.table, steps).T
-    zero = respond(np.zeros((1, 3)), found.table, steps)[0]
-    scale = np.diag(respond(np.eye(3), found.table, steps) - zero)
+    steps = [step for step in fit.problem.layout.steps(theta) if step[0].name in LINEAR_EFFECTS]
+    axes = sensed(np.eye(3), fit.table, steps).T
+    zero = respond(np.zeros((1, 3)), fit.table, steps)[0]
+    scale = np.diag(respond(np.eye(3), fit.table, steps) - zero)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.concatenate([np.linalg.inv(axes).ravel(), 1 / scale, -zero / scale]) + 0.0  # no negative zero
 
@@ -79,11 +79,11 @@ def _parts(stacked: Array) -> tuple[Array, Array, Array]:
     return stacked[:9].reshape(3, 3), stacked[9:12], stacked[12:]
 
 
-def _covariance(found: Fit) -> Array:
+def _covariance(fit: Fit) -> Array:
     """Covariance of the parameters with the standard uncertainties that the model states; NaN where it has none."""
-    cautious = cautiously(found)
-    cov, _ = covariance(cautious.information, found.problem.layout.typical)
-    std = np.array([np.nan if e.std is None else e.std for e in found.params.values()])
+    cautious = cautiously(fit)
+    cov, _ = covariance(cautious.information, fit.problem.layout.typical)
+    std = np.array([np.nan if e.std is None else e.std for e in fit.params.values()])
     size = np.sqrt(np.diag(cov))
     ratio = std / np.where(size > 0, size, 1.0)
     return np.asarray(cov * np.outer(ratio, ratio))

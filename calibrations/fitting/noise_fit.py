@@ -46,12 +46,12 @@ def products(
     slow, tau_s  (g, m) as in `whiten`, of which the first `processes` (g,) count
     """
     k = columns.shape[1]
-    found, logdets = np.zeros((len(slow), k, k)), np.empty(len(slow))
+    grams, logdets = np.zeros((len(slow), k, k)), np.empty(len(slow))
     for g in range(len(slow)):
         m = processes[g]
         out, logdets[g] = whiten(columns, gap_s, white, slow[g, :m].copy(), tau_s[g, :m].copy())
-        found[g] = out.T @ out
-    return found, logdets
+        grams[g] = out.T @ out
+    return grams, logdets
 
 
 @njit(cache=True, nogil=True)
@@ -225,13 +225,13 @@ class NoiseSearch:
         free, shape = group / self.noise.fast[:, :, None], (self.residual.size, group.shape[2])
         size = np.linalg.norm(free.reshape(shape), axis=0)
         free = np.stack([free[c] - Q @ (Q.T @ free[c]) for c, Q in enumerate(smooth)]).reshape(shape)
-        kept = first
+        basis = first
         for k in range(free.shape[1]):
-            column = free[:, k] - kept @ (kept.T @ free[:, k])
-            column -= kept @ (kept.T @ column)
+            column = free[:, k] - basis @ (basis.T @ free[:, k])
+            column -= basis @ (basis.T @ column)
             if np.linalg.norm(column) > NOT_SHOWN * size[k] > 0:
-                kept = np.column_stack([kept, column / np.linalg.norm(column)])
-        return kept[:, first.shape[1] :]
+                basis = np.column_stack([basis, column / np.linalg.norm(column)])
+        return basis[:, first.shape[1] :]
 
     @cached_property
     def least(self) -> Array:
@@ -247,8 +247,8 @@ class NoiseSearch:
         smooth = np.broadcast_to(self.smooth, (len(basis), *self.smooth.shape))
         columns = np.concatenate([smooth, basis, self.residual[:, :, None]], axis=2)
         fast, gap_s, k = self.noise.fast, self.noise.gap_s, self.smooth.shape[1]
-        given = self.noise.given or ((),) * len(basis)
-        return [_grams(gap_s, fast[c], columns[c], self.grid, k, given[c]) for c in range(len(basis))]
+        known = self.noise.given or ((),) * len(basis)
+        return [_grams(gap_s, fast[c], columns[c], self.grid, k, known[c]) for c in range(len(basis))]
 
     @cached_property
     def _flickers(self) -> NDArray[np.bool_]:
@@ -288,8 +288,8 @@ class NoiseSearch:
         size = np.sqrt(np.maximum(np.diag(total)[:-1], np.finfo(float).tiny))  # channels may differ by many decades
         theta = np.linalg.lstsq(total[:-1, :-1] / np.outer(size, size), total[:-1, -1] / size, rcond=1e-10)[0]
         ratio, taus_s = zip(*(self.grid[k] for k in pick), strict=True)
-        left = float(total[-1, -1] - total[:-1, -1] / size @ theta)
-        return Best(np.array(ratio), taus_s, scale, deviance + left, tuple(pick))
+        square = float(total[-1, -1] - total[:-1, -1] / size @ theta)
+        return Best(np.array(ratio), taus_s, scale, deviance + square, tuple(pick))
 
 
 @dataclass(frozen=True)
@@ -306,12 +306,12 @@ class Grams:
         return replace(self, gram=np.ascontiguousarray(self.gram[:, keep[:, None], keep]))
 
 
-def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[Point], k: int, given: Processes) -> Grams:
+def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[Point], k: int, known: Processes) -> Grams:
     """Gram matrices over the grid; the first `k` columns are set aside (Schur complement)."""
     w = float(rms(fast))
-    each = [processes(ratio * w, taus, given) for ratio, taus in grid]
-    counts = np.array([len(of) for of in each])
-    padded = np.array([(*of, *((0.0, 1.0),) * (counts.max() - len(of))) for of in each])
+    by_point = [processes(ratio * w, taus, known) for ratio, taus in grid]
+    counts = np.array([len(of) for of in by_point])
+    padded = np.array([(*of, *((0.0, 1.0),) * (counts.max() - len(of))) for of in by_point])
     gram, logdet = products(np.ascontiguousarray(columns), gap_s, fast, padded[..., 0], padded[..., 1], counts)
     if not k:
         return Grams(gram, logdet, np.zeros(len(grid)))
@@ -373,8 +373,8 @@ def _mean(search: NoiseSearch, turned: Array) -> Array:
         weight = np.exp(-(score - score.min()) / 2) * np.append(len(score) - 1, np.ones(len(score) - 1))
         weight /= weight.sum()
         some = weight > LEAST_WEIGHT
-        each = _variance(g.gram[some, :-1, :-1] / scale[some, None, None] ** 2 + rest, turned)
-        mean += weight[some] @ each - weight[some].sum() * together
+        variances = _variance(g.gram[some, :-1, :-1] / scale[some, None, None] ** 2 + rest, turned)
+        mean += weight[some] @ variances - weight[some].sum() * together
     return np.asarray(mean)
 
 

@@ -69,14 +69,14 @@ class Problem:
                 "lists others"
             )
         layout = Layout.of(model, table)
-        found = problem(table, layout)
+        instance = problem(table, layout)
         free = int(np.sum(~np.isfinite(layout.prior)))
-        if table.n * len(found.channels) <= free:
+        if table.n * len(instance.channels) <= free:
             raise TooFewRows(
                 f"{table.source}: {table.n} rows cannot determine the {free} parameters of {model.name}; "
                 "measure more poses, or take a smaller model"
             )
-        return found
+        return instance
 
     def on(self, table: Table) -> Problem:
         """The same model on another table of this kind."""
@@ -188,12 +188,12 @@ class Problem:
         samples = self.samples
         steps = self.layout.steps(theta)
         even = [i for i, (effect, _) in enumerate(steps) if stairs or not effect.rounds]
-        near, beside_stairs = Near(samples, steps), Near(samples, [steps[i] for i in even])
+        by_all, beside_stairs = Near(samples, steps), Near(samples, [steps[i] for i in even])
 
         def error(k: int, vector: Array) -> Array:
             term = self.layout.slots[k].term
             values = self.layout.values(term, vector)
-            output = beside_stairs.output(even.index(term), values) if term in even else near.output(term, values)
+            output = beside_stairs.output(even.index(term), values) if term in even else by_all.output(term, values)
             return self._reduced(-output)
 
         return error
@@ -274,13 +274,15 @@ class PositionProblem(Problem):
 
     def of_output(self, theta: Array, changes: Array) -> Array:
         """By how the magnitude follows each output."""
-        outputs, found = self.table.outputs, np.zeros((self.table.n, changes.shape[2]))
+        outputs, change = self.table.outputs, np.zeros((self.table.n, changes.shape[2]))
         for k, axis in enumerate(np.eye(outputs.shape[1])):
             little = SMALL * float(np.ptp(outputs[:, k]))
-            near = (self.on(self.table.with_outputs(outputs + s * little * axis)).residual(theta) for s in (1.0, -1.0))
-            ahead, behind = near
-            found -= ((ahead - behind)[0] / (2 * little))[:, None] * changes[:, k]
-        return found[None]
+            residuals = (
+                self.on(self.table.with_outputs(outputs + s * little * axis)).residual(theta) for s in (1.0, -1.0)
+            )
+            ahead, behind = residuals
+            change -= ((ahead - behind)[0] / (2 * little))[:, None] * changes[:, k]
+        return change[None]
 
     @property
     def adds(self) -> bool:

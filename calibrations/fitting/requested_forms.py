@@ -123,9 +123,9 @@ def _estimated(
         result = _sized(data, given, white, noise, forms)
         if stated is not None:
             break
-        found = white * result.ratio
+        scaled = white * result.ratio
         settled = abs(result.ratio - 1) < FLOOR_KNOWN
-        white = found
+        white = scaled
         if settled:
             break
     return result

@@ -12,15 +12,15 @@ from calibrations.geometry.orientation import one_orientation
 from calibrations.table import MILLI, Array
 
 
-def scales(found: Fit) -> Array:
+def scales(fit: Fit) -> Array:
     """Output per g, or deg/s, of each channel; 1 for a residual in what is sensed, or where that is not known."""
-    if found.table.type.magnitude:
+    if fit.table.type.magnitude:
         return np.ones(1)
-    if one_orientation(found.table):
-        return np.ones(len(found.channels))
-    effect = "gyro-scale-factor" if found.table.type.turning else "scale-factor"
-    axes, nominal = [axis_of(channel) for channel in found.channels], found.problem.layout.nominal
-    return np.abs([found.model.value(f"{effect}.{axis}", nominal) for axis in axes])
+    if one_orientation(fit.table):
+        return np.ones(len(fit.channels))
+    effect = "gyro-scale-factor" if fit.table.type.turning else "scale-factor"
+    axes, nominal = [axis_of(channel) for channel in fit.channels], fit.problem.layout.nominal
+    return np.abs([fit.model.value(f"{effect}.{axis}", nominal) for axis in axes])
 
 
 def axis_of(channel: str) -> str:

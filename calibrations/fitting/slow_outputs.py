@@ -65,8 +65,8 @@ def _score(K: Array, r: Array, J: Array, least: float) -> tuple[float, float]:
     solved = cho_solve(factor, np.column_stack([Q, r]))
     normal = Q.T @ solved[:, :-1]
     side = Q.T @ solved[:, -1]
-    left = float(r @ solved[:, -1] - side @ np.linalg.solve(normal, side))
+    square = float(r @ solved[:, -1] - side @ np.linalg.solve(normal, side))
     free = len(r) - Q.shape[1]
-    level = max(left / free, least, np.finfo(float).tiny)
+    level = max(square / free, least, np.finfo(float).tiny)
     logdet = 2 * float(np.sum(np.log(np.abs(np.diag(factor[0]))))) + float(np.linalg.slogdet(normal)[1])
-    return logdet + left / level + free * float(np.log(level)), level
+    return logdet + square / level + free * float(np.log(level)), level

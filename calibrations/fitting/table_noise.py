@@ -57,11 +57,11 @@ def slow_processes(model: Model, axis: str, table: Table) -> Processes:
     gap_s, span_s = float(np.median(gaps_s)), float(np.sum(gaps_s))
     walk = model.value(f"rate-random-walk.coefficient.{axis}")
     slowest_s = BEYOND * span_s
-    found = [*_flicker(model.value(f"flicker-noise.coefficient.{axis}"), gap_s / 2, slowest_s)]
-    found += [(walk * np.sqrt(slowest_s / 2), slowest_s)]
+    processes = [*_flicker(model.value(f"flicker-noise.coefficient.{axis}"), gap_s / 2, slowest_s)]
+    processes += [(walk * np.sqrt(slowest_s / 2), slowest_s)]
     sigma, time_s = (model.value(f"gauss-markov-noise.{name}.{axis}") for name in ("sigma", "time_constant"))
-    found += [(sigma, time_s)]
-    return tuple((float(std), float(tau_s)) for std, tau_s in found if std > 0)
+    processes += [(sigma, time_s)]
+    return tuple((float(std), float(tau_s)) for std, tau_s in processes if std > 0)
 
 
 def _flicker(coefficient: float, fastest_s: float, slowest_s: float) -> Processes:
@@ -77,8 +77,8 @@ def scatter(table: Table) -> Array | None:
 
     None where rows are too few, and for a kind that has no widest form.
     """
-    found = WIDEST[table.content](table) if table.content in WIDEST else None
-    return None if found is None or not np.all(found > 0) else np.tile(found[:, None], (1, table.n))
+    std = WIDEST[table.content](table) if table.content in WIDEST else None
+    return None if std is None or not np.all(std > 0) else np.tile(std[:, None], (1, table.n))
 
 
 def scatter_remark(table: Table) -> str | None:
@@ -113,8 +113,8 @@ def beyond_ellipsoid(table: Table) -> Array:
     A = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     away = m + np.linalg.solve(A, linear) / 2
     size = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", away, A, away), 0.0))
-    left = size / size.mean() - 1
-    return np.sqrt([left @ left / (table.n - 9)])
+    departure = size / size.mean() - 1
+    return np.sqrt([departure @ departure / (table.n - 9)])
 
 
 def _of_rates(table: Table) -> Array | None:

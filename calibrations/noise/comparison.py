@@ -188,12 +188,12 @@ def stretches(fit: ChannelFit, most: int = 3) -> list[Stretch]:
     sums = [np.concatenate([[0.0], np.cumsum(x)]) for x in (nu, power)]
     tried = []
     for length in (size for size in LENGTHS if size <= len(f)):
-        freedom, got = (x[length:] - x[:-length] for x in sums)
-        chance = 2 * np.minimum(chdtr(freedom, got), chdtrc(freedom, got))
-        chance = np.where(np.abs(got / freedom - 1) < NEGLIGIBLE, 1.0, chance)
+        freedom, scaled = (x[length:] - x[:-length] for x in sums)
+        chance = 2 * np.minimum(chdtr(freedom, scaled), chdtrc(freedom, scaled))
+        chance = np.where(np.abs(scaled / freedom - 1) < NEGLIGIBLE, 1.0, chance)
         tried += [
             (float(p), k, k + length, float(g / n))
-            for k, (p, g, n) in enumerate(zip(chance, got, freedom, strict=True))
+            for k, (p, g, n) in enumerate(zip(chance, scaled, freedom, strict=True))
         ]
     tried.sort(key=lambda stretch: (stretch[0], -abs(np.log(stretch[3])) * (sums[0][stretch[2]] - sums[0][stretch[1]])))
     chosen: list[tuple[float, int, int, float]] = []

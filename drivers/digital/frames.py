@@ -84,13 +84,13 @@ class Frames:
         text = self.rest + data
         array = np.frombuffer(text, dtype=np.uint8)
         self.unread += len(data)
-        found: list[tuple[Ints, ...]] = []
+        frames: list[tuple[Ints, ...]] = []
         at, whole = 0, False
         while not whole:
             starts, lengths, gaps, end, gap = self._walk(text, array, at)
             verdicts = self._judged(array, starts, lengths)
             n = self._accepted(gaps, verdicts)
-            found.append((starts[:n], lengths[:n], verdicts[:n]))
+            frames.append((starts[:n], lengths[:n], verdicts[:n]))
             if whole := n == len(starts):
                 self.rest = text[end:]
                 self._inside = self._inside and not self._missed(gap)
@@ -99,7 +99,7 @@ class Frames:
                 self.misfits += int(follows)
                 self._inside = self._inside and not self._missed(True)
                 at = int(starts[n]) + 1
-        starts, lengths, verdicts = (np.concatenate(column) for column in zip(*found, strict=True))
+        starts, lengths, verdicts = (np.concatenate(column) for column in zip(*frames, strict=True))
         if len(good := np.flatnonzero(verdicts == GOOD)):
             self.unread = len(text) - int(starts[good[-1]] + lengths[good[-1]])
         return Found(array, starts, lengths, verdicts == GOOD)

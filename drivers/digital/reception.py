@@ -127,14 +127,14 @@ class Reception:
 
     def pull(self, n: int) -> Floats:
         """The next `n` samples, which are not kept any longer, shape (n, outputs)."""
-        taken: list[Floats] = []
+        parts: list[Floats] = []
         while n > 0:
             values = self._waiting.popleft()
             if len(values) > n:
                 self._waiting.appendleft(values[n:])
-            taken.append(values[:n])
-            n -= len(taken[-1])
-        return np.concatenate(taken)
+            parts.append(values[:n])
+            n -= len(parts[-1])
+        return np.concatenate(parts)
 
     @property
     def length_s(self) -> float:

@@ -140,21 +140,21 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         rate_hz, names = self.settings.rate_hz, tuple(self.settings.channels)
         total, block = self.scans(duration_s), self.scans(block_s)
         self._begin()
-        decoder, reception, given = self._decoder(), self._reception(), 0
+        decoder, reception, sent = self._decoder(), self._reception(), 0
         begun_s, quiet_s = self._clock.now(), max(QUIET_S, 10 / rate_hz)
         try:
-            while given < total:
-                wanted = min(block, total - given)
-                while reception.count < given + wanted:
+            while sent < total:
+                due = min(block, total - sent)
+                while reception.count < sent + due:
                     self._pause(reception, total)
                     reception.take(self._listen(decoder, quiet_s), self._clock.now())
                     if self._clock.now() - (reception.end_s if reception.count else begun_s) > quiet_s:
                         raise self._silence(quiet_s)
                 self._require_complete(reception, decoder)
-                values = reception.pull(wanted)
+                values = reception.pull(due)
                 self._require_alive(values, names, reception)
-                yield Samples(values, names, rate_hz, reception.start_s + given / rate_hz)
-                given += wanted
+                yield Samples(values, names, rate_hz, reception.start_s + sent / rate_hz)
+                sent += due
         finally:
             self._tally.add(reception, decoder.damaged)
 

@@ -102,20 +102,20 @@ class Level:
             LinkTimeout, BadFrame: it is silent, or what comes are no readings.
         """
         self._silence()
-        deadline, taken = self._clock.now() + self.settings.patience_s, [self._one()]
-        while not self._settled(taken, deadline):
+        deadline, readings = self._clock.now() + self.settings.patience_s, [self._one()]
+        while not self._settled(readings, deadline):
             self._clock.sleep(self.settings.interval_s)
-            taken.append(self._one())
-        return self._mean(taken[-self.settings.readings :])
+            readings.append(self._one())
+        return self._mean(readings[-self.settings.readings :])
 
-    def _mean(self, taken: list[tuple[float, float]]) -> Reading:
-        x_deg, y_deg = np.mean(taken, axis=0)
-        std_deg = max(_std_deg(taken) / math.sqrt(len(taken)), RESOLUTION_DEG / math.sqrt(12))
-        return Reading(float(x_deg), float(y_deg), std_deg, len(taken), self.settings.accuracy_deg)
+    def _mean(self, readings: list[tuple[float, float]]) -> Reading:
+        x_deg, y_deg = np.mean(readings, axis=0)
+        std_deg = max(_std_deg(readings) / math.sqrt(len(readings)), RESOLUTION_DEG / math.sqrt(12))
+        return Reading(float(x_deg), float(y_deg), std_deg, len(readings), self.settings.accuracy_deg)
 
-    def _settled(self, taken: list[tuple[float, float]], deadline: float) -> bool:
+    def _settled(self, readings: list[tuple[float, float]], deadline: float) -> bool:
         """Whether the last readings make a mean; raises once they should. One and the same is not settled but stuck."""
-        recent = taken[-self.settings.readings :]
+        recent = readings[-self.settings.readings :]
         if len(recent) < self.settings.readings:
             return False
         if (scatter_deg := _std_deg(recent)) > self.settings.unrest_deg:
@@ -125,8 +125,8 @@ class Level:
                 f"{self.name}: after {self.settings.patience_s:g} s readings still scatter by {scatter_deg:.3f} deg",
                 "Wait until the plate is at rest, and keep machines that shake it away",
             )
-        if len(taken) >= self.settings.frozen and len(set(taken[-self.settings.frozen :])) == 1:
-            raise self._stuck(*taken[-1])
+        if len(readings) >= self.settings.frozen and len(set(readings[-self.settings.frozen :])) == 1:
+            raise self._stuck(*readings[-1])
         return len(recent) == 1 or len(set(recent)) > 1
 
     def _stuck(self, x_deg: float, y_deg: float) -> InstrumentError:
@@ -157,9 +157,9 @@ class Level:
         for _ in range(ATTEMPTS):
             self._link.discard()  # a late answer, or output of a level that did not receive the stop
             self._link.write(command)
-            heard, found = self._listen(answer)
-            if found:
-                return found[1].decode(), found[2].decode()
+            heard, match = self._listen(answer)
+            if match:
+                return match[1].decode(), match[2].decode()
         where = f"{self.name}: asking for its {what} ({command.decode()}) on {self._link.url}"
         if heard:
             raise BadFrame(f"{where}: {len(heard)} bytes came that are none ({heard[:24]!r})", REMEDY)
@@ -170,14 +170,14 @@ class Level:
         heard, deadline = b"", self._clock.now() + TIMEOUT_S
         while (left_s := deadline - self._clock.now()) > 0 and (more := self._link.read(left_s)):
             heard += more
-            if found := answer.search(heard):
-                return heard, found
+            if match := answer.search(heard):
+                return heard, match
         return heard, None
 
 
-def _std_deg(taken: list[tuple[float, float]]) -> float:
+def _std_deg(readings: list[tuple[float, float]]) -> float:
     """Standard deviation of single readings, both axes pooled; 0 for one reading."""
-    return float(np.sqrt(np.var(taken, axis=0, ddof=1).mean())) if len(taken) > 1 else 0.0
+    return float(np.sqrt(np.var(readings, axis=0, ddof=1).mean())) if len(readings) > 1 else 0.0
 
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> Level:

@@ -222,9 +222,9 @@ class MotorRecord:
         """Write a field that has another value, and read it back: the record keeps it within limits of its own."""
         if math.isclose(state[field].value, value, rel_tol=CLOSE):
             return
-        if not math.isclose(found := self._records.written(field, value), value, rel_tol=CLOSE):
+        if not math.isclose(written := self._records.written(field, value), value, rel_tol=CLOSE):
             raise Interlocked(
-                f"{self.name}: the record has not accepted {value:g} in {field.strip('.')}; it is {found:g}",
+                f"{self.name}: the record has not accepted {value:g} in {field.strip('.')}; it is {written:g}",
                 "Compare speed_deg_s and acceleration_deg_s2 in the bench file with the record's VBAS and VMAX",
             )
 

@@ -100,15 +100,15 @@ class Script:
         segments = [asdict(s) | {"end_s": None if math.isinf(s.end_s) else s.end_s} for s in self.segments]
         return {"wanted": self._wanted.tolist(), "table": self._table.tolist(), "segments": segments}
 
-    def restore(self, kept: dict[str, Any]) -> None:
+    def restore(self, state: dict[str, Any]) -> None:
         """Continue from what `state` gave."""
-        self._wanted, self._table = np.array(kept["wanted"]), np.array(kept["table"])
+        self._wanted, self._table = np.array(state["wanted"]), np.array(state["table"])
         self.segments = [
             Segment(
                 s["start_s"], math.inf if s["end_s"] is None else s["end_s"], tuple(s["before"]), tuple(s["after"]),
                 s["tremor"], s["bumps"],
             )
-            for s in kept["segments"]
+            for s in state["segments"]
         ]  # fmt: skip
 
     def _plan_until(self, t_s: float) -> None:
@@ -120,18 +120,18 @@ class Script:
         """Pick the sensor up after `reaction_s`, turn it, put it down, let it go, and leave it for a while."""
         hand, random = self._hand, self._random
         chance, size = random.random(3), random.standard_normal(2)
-        there = self._aimed(chance[0])
-        turn_s = math.degrees(_angle(here, there)) / hand.turning_deg_s + 0.5
+        target = self._aimed(chance[0])
+        turn_s = math.degrees(_angle(here, target)) / hand.turning_deg_s + 0.5
         self._add(now_s, reaction_s, here, here)
-        self._add(self._end(now_s), turn_s, here, there, 1.0)
+        self._add(self._end(now_s), turn_s, here, target, 1.0)
         clings_s = hand.clings_s * math.exp(0.3 * size[0]) if chance[1] < hand.clings else 0.0
-        self._add(self._end(now_s), hand.letting_go_s + clings_s, there, there, 0.3)
+        self._add(self._end(now_s), hand.letting_go_s + clings_s, target, target, 0.3)
         slips = chance[2] < hand.slips
         patience_s = hand.patience_s * math.exp(0.4 * size[1])
-        self._add(self._end(now_s), 1.0 if slips else patience_s, there, there, 0.0, True)
+        self._add(self._end(now_s), 1.0 if slips else patience_s, target, target, 0.0, True)
         if slips:
-            slipped = _near(there, hand.slip_deg, random)
-            self._add(self._end(now_s), SLIP_S, there, slipped)
+            slipped = _near(target, hand.slip_deg, random)
+            self._add(self._end(now_s), SLIP_S, target, slipped)
             self._add(self._end(now_s), patience_s, slipped, slipped)
 
     def _add(
@@ -144,17 +144,17 @@ class Script:
 
     def _aimed(self, chance: float) -> Floats:
         """Where the hand puts the sensor: near the wanted orientation, or a wrong one."""
-        wanted = self._wanted
+        direction = self._wanted
         if chance < self._hand.errs:
-            wanted = np.roll(wanted, 1) * np.array([1.0, -1.0, 1.0])
-        return self._on_table(wanted)
+            direction = np.roll(direction, 1) * np.array([1.0, -1.0, 1.0])
+        return self._on_table(direction)
 
-    def _on_table(self, wanted: Floats) -> Floats:
+    def _on_table(self, direction: Floats) -> Floats:
         hand = self._hand
-        leaning = np.abs(wanted).max() < 0.99
-        placed = _near(wanted, hand.aim_deg if leaning else hand.side_deg, self._random)
+        leaning = np.abs(direction).max() < 0.99
+        placed = _near(direction, hand.aim_deg if leaning else hand.side_deg, self._random)
         tilt = self._table - np.array([0.0, 0.0, 1.0])
-        return _unit(placed + np.roll(tilt, int(np.argmax(np.abs(wanted))) + 1))
+        return _unit(placed + np.roll(tilt, int(np.argmax(np.abs(direction))) + 1))
 
     def _within(self, segment: Segment, times_s: Floats) -> Floats:
         hand, force = self._hand, _turned(segment, times_s)

@@ -91,10 +91,10 @@ class HandheldWorld(World):
         noise = {"memory": self._memory.tolist(), "wander": self._wander.tolist()}
         return {**super().state(), "hand": {"script": self.script.state(), "generators": generators, **noise}}
 
-    def restore(self, kept: dict[str, Any]) -> None:
+    def restore(self, state: dict[str, Any]) -> None:
         """Continue from what `state` gave."""
-        super().restore(kept)
-        hand = kept["hand"]
+        super().restore(state)
+        hand = state["hand"]
         self.script.restore(hand["script"])
         self._memory, self._wander = np.array(hand["memory"]), np.array(hand["wander"])
         for generator, where in zip((self._hand_random, self._noise_random), hand["generators"], strict=True):

@@ -124,11 +124,11 @@ class LineSensor(DigitalSensor[Settings, LineDecoder]):
         assembly = decoder.assembly
         while (left_s := begun_s + TEST_S - self._clock.now()) > 0 and (data := self._link.read(left_s)):
             assembly.take(data)
-        found = proposed_settings(assembly.shown, max(self._clock.now() - begun_s, 1 / self.settings.rate_hz))
-        if found is None:
+        proposal = proposed_settings(assembly.shown, max(self._clock.now() - begun_s, 1 / self.settings.rate_hz))
+        if proposal is None:
             return []
-        columns = ", ".join(f"{name}: {column}" for name, column in found["columns"].items())
-        others = ", ".join(f"{name}: {value}" for name, value in found.items() if name != "columns")
+        columns = ", ".join(f"{name}: {column}" for name, column in proposal["columns"].items())
+        others = ", ".join(f"{name}: {value}" for name, value in proposal.items() if name != "columns")
         text = f"the lines fit {{columns: {{{columns}}}, {others}}} in the sensor's settings, if it is at rest"
         return [Check("proposal", False, text)]
 
@@ -140,14 +140,14 @@ class LineSensor(DigitalSensor[Settings, LineDecoder]):
 
     def _unreadable(self, decoder: LineDecoder) -> DriverError:
         assembly = decoder.assembly
-        wanted = ", ".join(f"{name}: {column}" for name, column in self.settings.columns.items())
+        columns = ", ".join(f"{name}: {column}" for name, column in self.settings.columns.items())
         if not assembly.damaged:
             return LinkTimeout(
                 f"{self.name}: no whole line came on {self._link.url}", "Check baud rate, power and cable"
             )
         if assembly.unread.isascii() and assembly.unread.isprintable():
             return BadFrame(
-                f"{self.name}: lines such as {assembly.unread!r} are not {self.settings.format} with columns {wanted}",
+                f"{self.name}: lines such as {assembly.unread!r} are not {self.settings.format} with columns {columns}",
                 "Correct format and columns in the sensor's settings",
             )
         return BadFrame(

@@ -52,8 +52,8 @@ def _number(text: str) -> float | None:
 
 
 def _checked(line: str) -> str:
-    text, star, given = line.removeprefix("$").partition("*")
-    if not (line.startswith("$") and star and int(given, 16) == checksum(text)):
+    text, star, stated = line.removeprefix("$").partition("*")
+    if not (line.startswith("$") and star and int(stated, 16) == checksum(text)):
         raise ValueError(f"{line!r} has a wrong checksum")
     return text
 
@@ -95,27 +95,27 @@ class Assembly:
         if len(self.shown) < MOST_SHOWN:
             self.shown.append(line)
         try:
-            found = fields(line, self.style)
+            values = fields(line, self.style)
         except ValueError:
             self._bad(line)
             return None
-        self.seen = tuple(dict.fromkeys([*self.seen, *found])) if self.style == "teleplot" else tuple(found)
-        wanted = set(self.columns.values())
+        self.seen = tuple(dict.fromkeys([*self.seen, *values])) if self.style == "teleplot" else tuple(values)
+        columns = set(self.columns.values())
         if self.style == "teleplot":
-            if not wanted & found.keys():
+            if not columns & values.keys():
                 return None
-            if found.keys() & self._pending.keys():  # the rest of the earlier sample is lost
+            if values.keys() & self._pending.keys():  # the rest of the earlier sample is lost
                 self._pending.clear()
                 self.damaged += 1
-            found = self._pending = self._pending | found
-            if not wanted <= found.keys():
+            values = self._pending = self._pending | values
+            if not columns <= values.keys():
                 return None
             self._pending = {}
-        if not wanted <= found.keys() or not all(math.isfinite(found[each]) for each in wanted):
+        if not columns <= values.keys() or not all(math.isfinite(values[each]) for each in columns):
             self._bad(line)
             return None
         self.good += 1
-        return {name: found[column] for name, column in self.columns.items()}
+        return {name: values[column] for name, column in self.columns.items()}
 
     def _bad(self, line: str) -> None:
         self.damaged += 1

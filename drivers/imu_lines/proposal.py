@@ -42,11 +42,11 @@ def proposed_settings(lines: Sequence[str], length_s: float) -> dict[str, Any] |
     force = [values[names[name]] for name in ("ax", "ay", "az") if name in names]
     if len(force) < 3:
         return None
-    found: dict[str, Any] = {"format": style, "columns": names, "unit": _fit(force)[1], "rate_hz": rate_hz}
+    settings: dict[str, Any] = {"format": style, "columns": names, "unit": _fit(force)[1], "rate_hz": rate_hz}
     if TIME in names:
         step = float(np.median(np.diff(values[names[TIME]])))
-        found["time_unit_s"] = min((1.0, 1e-3, 1e-6, 1e-9), key=lambda size: abs(np.log(step * size * rate_hz)))
-    return found
+        settings["time_unit_s"] = min((1.0, 1e-3, 1e-6, 1e-9), key=lambda size: abs(np.log(step * size * rate_hz)))
+    return settings
 
 
 def _style(lines: Sequence[str]) -> str:
@@ -71,26 +71,26 @@ def _columns(lines: Sequence[str], style: str) -> Mapping[Column, NDArray[np.flo
 
 def _by_name(values: Mapping[Column, NDArray[np.float64]]) -> dict[str, Column]:
     """Our name for each known column."""
-    found: dict[str, Column] = {}
+    columns: dict[str, Column] = {}
     for column in values:
         match = next((m for pattern, _ in NAMES if (m := re.match(pattern, str(column).lower()))), None)
         ours = next((ours for pattern, ours in NAMES if re.match(pattern, str(column).lower())), "")
         if match and ours:
-            found.setdefault(ours if ours == TIME else f"{ours}{match[2]}", column)
-    return found
+            columns.setdefault(ours if ours == TIME else f"{ours}{match[2]}", column)
+    return columns
 
 
 def _by_value(values: Mapping[Column, NDArray[np.float64]]) -> dict[str, Column]:
     """Time and accelerometer by their values, then the triads behind it by custom."""
-    clock = next((column for column, each in values.items() if _grows_evenly(each)), None)
-    left = [column for column in values if column != clock]
-    fits = [(_fit([values[column] for column in left[k : k + 3]])[0], k) for k in range(len(left) - 2)]
+    clock = next((column for column, series in values.items() if _grows_evenly(series)), None)
+    others = [column for column in values if column != clock]
+    fits = [(_fit([values[column] for column in others[k : k + 3]])[0], k) for k in range(len(others) - 2)]
     misfit, start = min(fits, default=(1.0, 0))
     if misfit > NEAR:
         return {}
     names = {} if clock is None else {TIME: clock}
-    for sensor, first in zip("agm", range(start, len(left) - 2, 3), strict=False):
-        names |= {f"{sensor}{axis}": left[first + k] for k, axis in enumerate("xyz")}
+    for sensor, first in zip("agm", range(start, len(others) - 2, 3), strict=False):
+        names |= {f"{sensor}{axis}": others[first + k] for k, axis in enumerate("xyz")}
     return names
 
 
@@ -103,7 +103,7 @@ def _grows_evenly(values: NDArray[np.float64]) -> bool:
 def _fit(force: Sequence[NDArray[np.float64]]) -> tuple[float, str]:
     """How far the norm of a force at rest is from 1 g, as a share of it, and in which unit; only counts are whole."""
     norm = float(np.median(np.linalg.norm(np.stack(force), axis=0)))
-    whole = all(np.array_equal(each, np.rint(each)) for each in force)
+    whole = all(np.array_equal(axis, np.rint(axis)) for axis in force)
     sizes = ((size, unit) for unit, sizes in ONE_G.items() for size in sizes if whole == (unit == "count"))
     return min((abs(norm / size - 1), unit) for size, unit in sizes)
 

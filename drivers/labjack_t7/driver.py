@@ -86,12 +86,12 @@ class T7(Recorder[Settings]):
         """The test register, the model, the calibration."""
         test, product = int(self._unit.read(t7.TEST)), self._unit.read(t7.PRODUCT_ID)
         c, contacts = self._calibration, self._open_interlocks() if self.settings.interlocks else None
-        told = f"open: {', '.join(contacts)}" if contacts else "closed"
+        relays = f"open: {', '.join(contacts)}" if contacts else "closed"
         return [
             Check("registers", test == t7.TEST_VALUE, f"TEST reads 0x{test:08X}"),
             Check("model", product == 7.0, f"product {product:g}"),
             Check("calibration", c.plausible, f"{c.positive_slope * 1e6:.3f} uV a code, center {c.center:.1f}"),
-            *([] if contacts is None else [Check("interlocks", not contacts, told)]),
+            *([] if contacts is None else [Check("interlocks", not contacts, relays)]),
         ]
 
     def read_volts(self, name: str) -> float:

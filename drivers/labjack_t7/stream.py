@@ -77,9 +77,9 @@ class Packets:
         fields = ("protocol", "length", "unit", "function", "kind")
         for field, value in zip(fields, expected, strict=True):
             if (wrong := np.flatnonzero(packets[field] != value)).size:
-                found = f"packet {self._seen + wrong[0]} has {field} {packets[field][wrong[0]]} instead of {value}"
+                fault = f"packet {self._seen + wrong[0]} has {field} {packets[field][wrong[0]]} instead of {value}"
                 raise StreamError(
-                    f"{self._name}: {found}", "Close other programs that use the device's stream, then repeat"
+                    f"{self._name}: {fault}", "Close other programs that use the device's stream, then repeat"
                 )
 
     def _require_no_loss(self, packets: NDArray[np.void]) -> None:
@@ -162,8 +162,8 @@ class Reception:
         if (missing := samples - len(self._codes)) > 0:
             self._codes = np.concatenate([self._codes, self._decode(-(-missing // self._per_packet))])
             self._require_in_time()
-        taken, self._codes = self._codes[:samples], self._codes[samples:]
-        return taken.reshape(scans, self._channels)
+        codes, self._codes = self._codes[:samples], self._codes[samples:]
+        return codes.reshape(scans, self._channels)
 
     def _decode(self, packets: int) -> NDArray[np.uint16]:
         """The samples of the next `packets` packets, fetched a good many at a time."""
@@ -177,15 +177,15 @@ class Reception:
 
     def _fetch(self, packets: int) -> None:
         """Wait until `packets` packets are there."""
-        clock, wanted = self._link.clock, packets * self._size
+        clock, size = self._link.clock, packets * self._size
         due_s = self._start_s + (self._decoded + packets) * self._packet_s
         clock.sleep(due_s - clock.now())
         asked_s = max(due_s, clock.now())  # who asks late has not been kept waiting
         deadline = clock.now() + PATIENCE_S + self._drift_s()
-        while len(self._data) < wanted:
+        while len(self._data) < size:
             more = self._link.read(deadline - clock.now())
             if not more:
-                self._complain(wanted)
+                self._complain(size)
             self._data += more
             self._late_s = clock.now() - asked_s
 
@@ -200,10 +200,10 @@ class Reception:
                 "Check whether its clock stopped or it skipped scans, and whether network or computer are overloaded",
             )
 
-    def _complain(self, wanted: int) -> None:
+    def _complain(self, size: int) -> None:
         self._packets.codes(self._data)  # the status of the received packets may contain the reason
         before = self._decoded * self._size
         raise LinkTimeout(
-            f"{self._name}: the stream stopped after {before + len(self._data)} of {before + wanted} bytes",
+            f"{self._name}: the stream stopped after {before + len(self._data)} of {before + size} bytes",
             "Check network and power of the device, and that no other program uses its stream",
         )

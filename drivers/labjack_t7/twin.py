@@ -304,8 +304,8 @@ class Converter(Twin):
 
     def _range_v(self, number: int) -> float:
         """The least range that holds the one asked for; 0 asks for the widest."""
-        asked = self._value(t7.ain_range(number))
-        return min((r for r in t7.RANGES_V if r >= round(asked, 6) > 0), default=t7.RANGES_V[0])
+        range_v = self._value(t7.ain_range(number))
+        return min((r for r in t7.RANGES_V if r >= round(range_v, 6) > 0), default=t7.RANGES_V[0])
 
     def _fail(self, detail: int) -> None:
         """Decline, and leave the reason where a client looks for it."""

@@ -56,8 +56,8 @@ class Hand:
     def read_deg(self) -> float:
         """The mark of the dial that seems nearest."""
         angle_deg = self._world.motor_angle_deg(self._axis)
-        seen = angle_deg / self._mark_deg + READING * self._normal(angle_deg)
-        return round(seen) * self._mark_deg
+        reading_deg = angle_deg / self._mark_deg + READING * self._normal(angle_deg)
+        return round(reading_deg) * self._mark_deg
 
     def _normal(self, place: float) -> float:
         """A normal number that belongs to a time or an angle."""

@@ -99,17 +99,17 @@ class SampleDecoder(FrameDecoder):
         self._numbers = Numbers(256)
 
     def take(self, data: bytes) -> Batch:
-        found = self.stream.take(data)
-        heads = mav.heads(found)
+        messages = self.stream.take(data)
+        heads = mav.heads(messages)
         for number, of in groups(heads.number):
             self.seen[mav.MESSAGES[number].name if number in mav.MESSAGES else f"{number}"] += len(heads.number[of])
         own = np.flatnonzero((heads.system == self._target[0]) & (heads.component == self._target[1]))
-        samples = own[found.known[own] & (heads.number[own] == self._message.number)]
+        samples = own[messages.known[own] & (heads.number[own] == self._message.number)]
         gaps = self._numbers.gaps(heads.sequence[own], np.searchsorted(own, samples))
-        content = mav.contents(found, heads, self._message, samples)
+        content = mav.contents(messages, heads, self._message, samples)
         if "id" in (self._message.dtype.names or ()) and len(samples):
-            wanted = content["id"] == self._settings.imu
-            content, gaps = content[wanted], gaps[wanted]
+            of_imu = content["id"] == self._settings.imu
+            content, gaps = content[of_imu], gaps[of_imu]
         return self._batch(content, gaps)
 
     def _batch(self, content: NDArray[np.void], gaps: Ints) -> Batch:
@@ -183,22 +183,22 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
         """
         self._link.discard()
         self._send(mav.HEARTBEAT, type=mav.GROUND_STATION, autopilot=mav.INVALID, status=4, version=3)
-        stream, begun_s, seen = Frames(mav.Mavlink()), self._clock.now(), 0
+        stream, begun_s, count = Frames(mav.Mavlink()), self._clock.now(), 0
         while (left_s := begun_s + HEARTBEAT_S - self._clock.now()) > 0:
-            found = stream.take(self._link.read(left_s))
-            heads = mav.heads(found)
-            beats = np.flatnonzero((heads.number == mav.HEARTBEAT.number) & found.known)
-            for k, beat in zip(beats, mav.contents(found, heads, mav.HEARTBEAT, beats), strict=True):
+            messages = stream.take(self._link.read(left_s))
+            heads = mav.heads(messages)
+            beats = np.flatnonzero((heads.number == mav.HEARTBEAT.number) & messages.known)
+            for k, beat in zip(beats, mav.contents(messages, heads, mav.HEARTBEAT, beats), strict=True):
                 if beat["autopilot"] != mav.INVALID and beat["type"] not in mav.NOT_VEHICLES:
                     name = mav.AUTOPILOTS.get(int(beat["autopilot"]), f"autopilot {beat['autopilot']}")
                     self._autopilot = int(heads.system[k]), int(heads.component[k]), name, int(heads.version[k])
                     return self._autopilot
-            seen += len(found.starts)
+            count += len(messages.starts)
         if stream.unread and not stream.good:
             raise self._no_frames(stream)
         raise LinkTimeout(
             f"{self.name}: no heartbeat of an autopilot on {self._link.url} within {HEARTBEAT_S:g} s "
-            f"({seen} other messages)",
+            f"({count} other messages)",
             "Check power and cable, that MAVLink is on at this port of the autopilot, and the address",
         )
 
@@ -206,8 +206,8 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
         """Send a command; the last of `parameters` is the number of the attempt."""
         assert self._autopilot  # noqa: S101 - a request follows the heartbeat
         system, component = self._autopilot[:2]
-        *given, attempt = parameters
-        seven = [*given, *[0.0] * (7 - len(given))]
+        *numbers, attempt = parameters
+        seven = [*numbers, *[0.0] * (7 - len(numbers))]
         self._send(
             mav.COMMAND_LONG,
             parameters=seven,
@@ -227,10 +227,10 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
         """The result of a command; None without an answer in time."""
         stream, begun_s = Frames(mav.Mavlink()), self._clock.now()
         while (left_s := begun_s + ACK_S - self._clock.now()) > 0 and (data := self._link.read(left_s)):
-            found = stream.take(data)
-            heads = mav.heads(found)
-            answers = np.flatnonzero((heads.number == mav.COMMAND_ACK.number) & found.known)
-            for answer in mav.contents(found, heads, mav.COMMAND_ACK, answers):
+            messages = stream.take(data)
+            heads = mav.heads(messages)
+            answers = np.flatnonzero((heads.number == mav.COMMAND_ACK.number) & messages.known)
+            for answer in mav.contents(messages, heads, mav.COMMAND_ACK, answers):
                 if answer["command"] == command and mav.RESULTS.get(int(answer["result"])) != "in progress":
                     return int(answer["result"])
         return None

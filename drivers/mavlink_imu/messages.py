@@ -137,8 +137,8 @@ class Mavlink:
         for kind, of in groups(2 * _numbers(frames) + signed):
             if (message := MESSAGES.get(kind >> 1)) is not None:
                 rows = frames[of, : frames.shape[1] - SIGNATURE * (kind & 1)]
-                given = rows[:, -2] + 256 * rows[:, -1].astype(np.uint16)
-                verdicts[of] = np.where(given == checksum(rows[:, 1:-2], message.extra), GOOD, BAD)
+                stated = rows[:, -2] + 256 * rows[:, -1].astype(np.uint16)
+                verdicts[of] = np.where(stated == checksum(rows[:, 1:-2], message.extra), GOOD, BAD)
         return verdicts
 
 

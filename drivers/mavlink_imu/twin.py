@@ -70,11 +70,11 @@ class Autopilot(FramedTwin):
 
     def _answer(self, connection: Connection, now_s: float) -> None:
         """Act on the commands in what has arrived."""
-        found = self._heard.setdefault(connection.key, Frames(mav.Mavlink())).take(bytes(connection.inbox))
+        messages = self._heard.setdefault(connection.key, Frames(mav.Mavlink())).take(bytes(connection.inbox))
         connection.inbox.clear()
-        heads = mav.heads(found)
-        commands = np.flatnonzero((heads.number == mav.COMMAND_LONG.number) & found.known)
-        for command in mav.contents(found, heads, mav.COMMAND_LONG, commands):
+        heads = mav.heads(messages)
+        commands = np.flatnonzero((heads.number == mav.COMMAND_LONG.number) & messages.known)
+        for command in mav.contents(messages, heads, mav.COMMAND_LONG, commands):
             if command["system"] not in (0, SYSTEM):
                 continue
             acknowledgement = mav.fields(

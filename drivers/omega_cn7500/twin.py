@@ -77,10 +77,10 @@ class Controller(Twin):
             SET_POINT.address: SET_POINT.encode(self._set_point_c),
             CONTROL_METHOD.address: [0],
         }
-        wanted = range(address, address + count)
-        if not set(wanted) <= set(words):
+        addresses = range(address, address + count)
+        if not set(addresses) <= set(words):
             raise Refusal(ILLEGAL_ADDRESS)
-        return [words[a][0] for a in wanted]
+        return [words[a][0] for a in addresses]
 
     def write_words(self, address: int, values: Sequence[int], now_s: float) -> None:
         if address == SET_POINT.address:

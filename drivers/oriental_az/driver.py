@@ -269,10 +269,10 @@ class RotaryStage:
         if self._limited:
             return
         low, high = (round(deg * self.settings.steps_per_turn / 360) for deg in self.settings.limits_deg)
-        wanted = (az.BRAKE_AND_ALARM, high, low)
-        self._unit.write_block(*zip(az.OWN_LIMITS, wanted, strict=True))
-        if (found := self._unit.read_block(*az.OWN_LIMITS)) != list(wanted):
-            shown = ", ".join(f"{value:g} in {register}" for register, value in zip(az.OWN_LIMITS, found, strict=True))
+        limits = (az.BRAKE_AND_ALARM, high, low)
+        self._unit.write_block(*zip(az.OWN_LIMITS, limits, strict=True))
+        if (stored := self._unit.read_block(*az.OWN_LIMITS)) != list(limits):
+            shown = ", ".join(f"{value:g} in {register}" for register, value in zip(az.OWN_LIMITS, stored, strict=True))
             raise Interlocked(
                 f"{self.name}: has not accepted its limits of {low} .. {high} steps: it shows {shown}",
                 "Compare the addresses with the drive's manual, or take own_limits out of the bench file",
@@ -354,12 +354,12 @@ class RotaryStage:
         return outputs
 
     def _poll_until(
-        self, wanted: int, timeout_s: float, complaint: str, outputs: Callable[[], int] | None = None
+        self, outputs_on: int, timeout_s: float, complaint: str, outputs: Callable[[], int] | None = None
     ) -> int:
-        """The outputs at a standstill with the `wanted` ones on; an alarm ends it unless `outputs` passes over it."""
+        """The outputs at a standstill with `outputs_on`; an alarm ends it unless `outputs` passes over it."""
         deadline = self._clock.now() + timeout_s
         while True:
-            if _stands(now := (outputs or self._status)(), wanted):
+            if _stands(now := (outputs or self._status)(), outputs_on):
                 return now
             if self._clock.now() >= deadline:
                 remedy = "Look at the stage: is it blocked? Then home it and repeat"
@@ -367,9 +367,9 @@ class RotaryStage:
             self._clock.sleep(POLL_S)
 
 
-def _stands(outputs: int, wanted: int) -> bool:
-    """Whether it is at rest with the `wanted` outputs on."""
-    return not outputs & az.MOVE and outputs & wanted == wanted
+def _stands(outputs: int, outputs_on: int) -> bool:
+    """Whether it is at rest with `outputs_on`."""
+    return not outputs & az.MOVE and outputs & outputs_on == outputs_on
 
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> RotaryStage:

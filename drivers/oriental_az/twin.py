@@ -140,13 +140,13 @@ class Drive(Twin):
 
     def _outputs(self, now_s: float) -> int:
         moving = now_s < self._plan.end_s or self.faults.size("busy", now_s) is not None
-        near = abs(self._world.motor_angle_deg(self._axis) - self._plan.angle_deg(now_s)) <= IN_POSITION_DEG
+        in_position = abs(self._world.motor_angle_deg(self._axis) - self._plan.angle_deg(now_s)) <= IN_POSITION_DEG
         return (
             az.HOME_END * self._referenced
             | az.READY * (not moving and not self._alarm and not self._held(now_s))
             | az.ALARM_ON * (self._alarm != 0)
             | az.MOVE * moving
-            | az.IN_POSITION * (near and not moving)
+            | az.IN_POSITION * (in_position and not moving)
         )
 
     def _inputs(self, rising: int, now_s: float) -> None:
@@ -180,8 +180,8 @@ class Drive(Twin):
             az.FROM_FEEDBACK: self._angle_deg,
         }
         if kind == az.CONTINUOUS and speed != 0 and rate > 0:
-            there = self._angle_deg() + math.copysign(FOR_EVER_DEG, speed)
-            self._turn(Trajectory(now_s, self._angle_deg(), there, abs(speed), rate))
+            target_deg = self._angle_deg() + math.copysign(FOR_EVER_DEG, speed)
+            self._turn(Trajectory(now_s, self._angle_deg(), target_deg, abs(speed), rate))
         elif kind not in origins or speed <= 0 or rate <= 0:
             self._fail(az.BAD_OPERATION_DATA, now_s)
         elif kind == az.ABSOLUTE and not self._referenced:

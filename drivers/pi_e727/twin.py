@@ -129,10 +129,10 @@ class Controller(Twin):
         self._identified(groups(arguments, 3))
         raise Refusal(OUT_OF_RANGE)
 
-    def _identified(self, asked: Sequence[Sequence[str]]) -> list[tuple[str, str, int]]:
+    def _identified(self, requests: Sequence[Sequence[str]]) -> list[tuple[str, str, int]]:
         items = {"1", *self._axes.ids}  # the controller itself is item 1, whatever its axes are called
-        found = [(one_of(item, items, e727.BAD_AXIS), text) for item, text, *_ in asked]
-        known = [(item, text, whole(text, 0, math.inf)) for item, text in found]
+        pairs = [(one_of(item, items, e727.BAD_AXIS), text) for item, text, *_ in requests]
+        known = [(item, text, whole(text, 0, math.inf)) for item, text in pairs]
         if any(parameter not in PARAMETERS for *_, parameter in known):
             raise Refusal(e727.UNKNOWN_PARAMETER)
         return known
@@ -145,7 +145,7 @@ def _described() -> Iterable[str]:
 
 def _bits(on: Iterable[bool]) -> str:
     """Hexadecimal; the first is the lowest bit."""
-    return f"{sum(1 << k for k, each in enumerate(on) if each):X}"
+    return f"{sum(1 << k for k, bit in enumerate(on) if bit):X}"
 
 
 def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:

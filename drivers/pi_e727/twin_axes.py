@@ -79,10 +79,10 @@ class Axes:
 
     def targets(self, arguments: Sequence[str]) -> dict[str, float]:
         """Places by axis, all of which can be gone to; else nothing moves."""
-        given = {one_of(axis, self.ids, e727.BAD_AXIS): number(text) for axis, text in groups(arguments, 2)}
-        for axis, um in given.items():
+        positions = {one_of(axis, self.ids, e727.BAD_AXIS): number(text) for axis, text in groups(arguments, 2)}
+        for axis, um in positions.items():
             self.require(axis, um, um)
-        return given
+        return positions
 
     def require(self, axis: str, low_um: float, high_um: float) -> None:
         """Refuse a motion between two places, unless the servo is on and both are within the travel."""

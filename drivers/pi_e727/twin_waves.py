@@ -73,11 +73,11 @@ class Recorder:
         """Record all that is due; the axes have followed their present commands since the last time."""
         interval_s = self._rate * CYCLE_S
         for place, (axis, option) in self._what.items():
-            taken = self._count(place)
-            if option and now_s >= self._start_s and taken < e727.RECORD_POINTS:
+            count = self._count(place)
+            if option and now_s >= self._start_s and count < e727.RECORD_POINTS:
                 due = min(math.floor((now_s - self._start_s) / interval_s + 1e-7) + 1, e727.RECORD_POINTS)
-                if due > taken:
-                    times_s = self._start_s + interval_s * np.arange(taken, due, dtype=np.float64)
+                if due > count:
+                    times_s = self._start_s + interval_s * np.arange(count, due, dtype=np.float64)
                     self._data[place].append(self._values(axis, option, times_s))
 
     def _values(self, axis: str, option: int, times_s: Floats) -> Floats:
@@ -101,8 +101,8 @@ class Recorder:
     def _set_triggers(self, arguments: Sequence[str], now_s: float) -> None:
         for place, source, _value in groups(arguments, 3):
             trigger = int(one_of(source, map(str, TRIGGERS), OUT_OF_RANGE))
-            for each in TABLES if place == "0" else [one_of(place, TABLES, OUT_OF_RANGE)]:
-                self._triggers[each] = trigger
+            for place_id in TABLES if place == "0" else [one_of(place, TABLES, OUT_OF_RANGE)]:
+                self._triggers[place_id] = trigger
         self.trigger(now_s, e727.AT_ONCE)
 
     def _set_rate(self, arguments: Sequence[str]) -> None:
@@ -224,7 +224,7 @@ class Waves:
             raise Refusal(PARAMETER_COUNT)
         place, sine = one_of(arguments[0], TABLES, OUT_OF_RANGE), written(arguments[1:])
         tables = self._tables | {place: sine}
-        if sum(each.points for each in tables.values()) > e727.WAVE_POINTS:
+        if sum(table.points for table in tables.values()) > e727.WAVE_POINTS:
             raise Refusal(e727.WAVE_MEMORY)
         self._tables = tables
 

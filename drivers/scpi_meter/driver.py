@@ -123,12 +123,12 @@ class Meter(Recorder[Settings]):
 
     def self_test(self) -> list[Check]:
         """Whether the instrument takes the settings of the bench file."""
-        asked = f"{', '.join(self.settings.channels)} at {self.settings.rate_hz:g} Hz, {self.settings.range_v:g} V"
+        scan = f"{', '.join(self.settings.channels)} at {self.settings.rate_hz:g} Hz, {self.settings.range_v:g} V"
         try:
             self._configure(1)
         except Refused as refused:
             return [Check("settings", False, refused.what)]
-        return [Check("settings", True, asked)]
+        return [Check("settings", True, scan)]
 
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         """Record all channels for `duration_s` without a gap, and hand it out in blocks of `block_s`.
@@ -182,18 +182,18 @@ class Meter(Recorder[Settings]):
     def _until_measured(self, count: int, end_s: float) -> None:
         """Wait until `count` readings are in the memory, the last of them due at `end_s`."""
         self._clock.sleep(end_s - self._clock.now())
-        while (found := self._points()) < count:
+        while (count_now := self._points()) < count:
             if self._clock.now() > end_s + self.settings.timeout_s:
                 self._require_no_error("while it measured")
                 raise StreamError(
-                    f"{self.name}: has {found} of {count} readings {self.settings.timeout_s:g} s after the last "
+                    f"{self.name}: has {count_now} of {count} readings {self.settings.timeout_s:g} s after the last "
                     "was due",
                     "Check that nobody has pressed a key at it; lower rate_hz or nplc in the bench file",
                 )
             self._clock.sleep(POLL_S)
-        if found >= self.settings.memory:
+        if count_now >= self.settings.memory:
             raise StreamError(
-                f"{self.name}: its memory of {found} readings is full, and readings may be lost",
+                f"{self.name}: its memory of {count_now} readings is full, and readings may be lost",
                 "Lower rate_hz in the bench file, or keep other programs from this computer",
             )
 
@@ -268,12 +268,12 @@ class Meter(Recorder[Settings]):
 
     def _error(self) -> tuple[int, str]:
         answer = self._ask("SYST:ERR?")
-        if not (found := ERROR.fullmatch(answer)):
+        if not (match := ERROR.fullmatch(answer)):
             raise BadFrame(
                 f"{self.name}: the answer to 'SYST:ERR?' is {answer[:60]!r}, not a number and a text",
                 "Switch the instrument off and on, and keep other programs from it",
             )
-        return int(found[1]), found[2] or "no text"
+        return int(match[1]), match[2] or "no text"
 
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> Meter:

@@ -114,7 +114,7 @@ class Scanner(Twin):
         self._list(rest)
 
     def _list(self, rest: str) -> None:
-        self._numbers = sorted(int(k) for k in found[1].split(",")) if (found := LIST.search(rest)) else [0]
+        self._numbers = sorted(int(k) for k in match[1].split(",")) if (match := LIST.search(rest)) else [0]
 
     def _set_rate(self, rest: str) -> None:
         self._rate_hz = 1 / float(rest)

@@ -105,9 +105,9 @@ class Url:
         if self.scheme == "udpin":
             return f"udp port {port}"
         if self.scheme == "visa":
-            if not (found := VISA_SOCKET.fullmatch(self.path)):
+            if not (match := VISA_SOCKET.fullmatch(self.path)):
                 return f"visa:{self.path.upper()}"
-            host, port = found[1].rstrip("."), int(found[2])
+            host, port = match[1].rstrip("."), int(match[2])
         udp = "udp " if self.scheme == "udpout" else ""
         try:
             address = ipaddress.ip_address("127.0.0.1" if host == "localhost" else host)

@@ -75,18 +75,18 @@ class Circuit:
         """Open the channels of these fields that are not open yet. Raises LinkRefused, LinkTimeout."""
         if missing := [name for name in names if name not in self._channels]:
             self._begin()
-            asked = {name: self._ca.ClientChannel(name, self._circuit) for name in missing}
-            self._send(*(channel.create() for channel in asked.values()))
+            channels = {name: self._ca.ClientChannel(name, self._circuit) for name in missing}
+            self._send(*(channel.create() for channel in channels.values()))
 
             def complete(_command: object) -> bool:
-                states = {name: channel.states[self._ca.CLIENT] for name, channel in asked.items()}
+                states = {name: channel.states[self._ca.CLIENT] for name, channel in channels.items()}
                 if absent := [name for name, state in states.items() if state is self._ca.FAILED]:
                     more = f", and {len(absent) - 1} more are not there" if absent[1:] else ""
                     raise LinkRefused(f"{who}: the server {self.link.url} has no {absent[0]}{more}", ELSEWHERE)
                 return all(state is self._ca.CONNECTED for state in states.values())
 
             self._until(complete, missing[0], who, timeout_s)
-            self._channels |= asked
+            self._channels |= channels
 
     def read(self, names: Sequence[str], who: str, timeout_s: float) -> list[Reading]:
         """The values of these fields, all asked for at once. Raises LinkTimeout, LinkRefused, Refused, BadFrame."""
@@ -112,17 +112,17 @@ class Circuit:
 
     def _asked(self, names: Sequence[str], kind: Any, who: str, timeout_s: float) -> list[Any]:
         self.open(names, who, timeout_s)
-        asked = [self._channels[name].read(data_type=kind, data_count=1) for name in names]
-        self._send(*asked)
+        requests = [self._channels[name].read(data_type=kind, data_count=1) for name in names]
+        self._send(*requests)
         heard: dict[int, Any] = {}
 
         def complete(command: Any) -> bool:
             if isinstance(command, self._ca.ReadNotifyResponse):
                 heard[command.ioid] = command
-            return all(request.ioid in heard for request in asked)
+            return all(request.ioid in heard for request in requests)
 
         self._until(complete, names[0], who, timeout_s)
-        answers = [heard[request.ioid] for request in asked]
+        answers = [heard[request.ioid] for request in requests]
         for name, answer in zip(names, answers, strict=True):
             if not (status := self._decoded(_status, answer, who)).success:
                 code = int(status.code_with_severity)
@@ -186,9 +186,9 @@ class Circuit:
 
     def _not_ours(self, what: str, who: str, error: Exception) -> BadFrame:
         self._forget()
-        said = str(error) or type(error).__name__
+        reason = str(error) or type(error).__name__
         return BadFrame(
-            f"{who}: {what} from {self.link.url} cannot be read as Channel Access ({said})",
+            f"{who}: {what} from {self.link.url} cannot be read as Channel Access ({reason})",
             "Check that the address is that of an EPICS server",
         )
 
@@ -251,9 +251,9 @@ def found_server(record: str, who: str, timeout_s: float) -> tuple[str, int]:
             unreachable = [error for address in addresses if (error := _sent(udp, question, address))]
             if answer := _answer(udp, broadcaster, number, time.monotonic() + timeout_s / SEARCHES):
                 return answer
-    asked = ", ".join(f"{host}:{port}" for host, port in addresses)
+    places = ", ".join(f"{host}:{port}" for host, port in addresses)
     why = f"; {unreachable[0]}" if unreachable else ""
-    raise LinkRefused(f"{who}: no EPICS server has {record} (asked {asked} for {timeout_s:g} s{why})", ELSEWHERE)
+    raise LinkRefused(f"{who}: no EPICS server has {record} (asked {places} for {timeout_s:g} s{why})", ELSEWHERE)
 
 
 def _sent(udp: socket.socket, question: bytes, address: tuple[str, int]) -> OSError | None:

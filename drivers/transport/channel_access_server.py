@@ -80,12 +80,12 @@ class Session:
         """What the server says to these bytes of its client. Raises ValueError for what is not Channel Access."""
         try:
             commands, _ = self._circuit.recv(data)
-            said = bytearray()
+            sent = bytearray()
             for command in commands:
                 self._circuit.process_command(command)
                 for answer in self._answers(command, now_s):
-                    said += b"".join(bytes(part) for part in self._circuit.send(answer))
-            return bytes(said)
+                    sent += b"".join(bytes(part) for part in self._circuit.send(answer))
+            return bytes(sent)
         except Exception as error:  # caproto has many, and those of struct and ctypes
             raise ValueError(f"not Channel Access: {error}") from error
 

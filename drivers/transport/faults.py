@@ -55,14 +55,14 @@ class Fault:
         draw = f"{self.what} {self.seed} {moment}"
         return self.probability == 1 or Random(draw).random() < self.probability  # noqa: S311 - nothing is secret
 
-    def has_begun(self, now_s: float, asked: int) -> bool:
-        """Whether it is there by `now_s`, when its instrument has been asked `asked` times."""
-        return now_s >= self.at_s and (self.after == 0 or asked > self.after)
+    def has_begun(self, now_s: float, requests: int) -> bool:
+        """Whether it acts by `now_s`, after so many `requests` to its instrument."""
+        return now_s >= self.at_s and (self.after == 0 or requests > self.after)
 
-    def has_ended(self, now_s: float, asked: int) -> bool:
+    def has_ended(self, now_s: float, requests: int) -> bool:
         """Whether it has gone by then."""
         in_time = self.for_s is None or now_s < self.at_s + self.for_s
-        return not (in_time and (self.times is None or asked <= self.after + self.times))
+        return not (in_time and (self.times is None or requests <= self.after + self.times))
 
 
 @dataclass(frozen=True)
@@ -112,8 +112,8 @@ class Faults:
     def size(self, what: str, now_s: float) -> float | None:
         """The size of a fault that is there now; None where it is not."""
         for fault, size in self._faults:
-            there = fault.has_begun(now_s, self._asked) and not fault.has_ended(now_s, self._asked)
-            if fault.what == what and there and fault.happens(now_s, self._asked):
+            active = fault.has_begun(now_s, self._asked) and not fault.has_ended(now_s, self._asked)
+            if fault.what == what and active and fault.happens(now_s, self._asked):
                 return size
         return None
 
@@ -179,67 +179,67 @@ def nothing(_said: Said, _size: float, _wire: Wire) -> list[Said]:
     return []
 
 
-def the_end(said: Said, _size: float, _wire: Wire) -> list[Said]:
+def the_end(sent: Said, _size: float, _wire: Wire) -> list[Said]:
     """The connection closes in place of the answer."""
-    return [Said(END, said.due_s)]
+    return [Said(END, sent.due_s)]
 
 
-def later(said: Said, size: float, _wire: Wire) -> list[Said]:
+def later(sent: Said, size: float, _wire: Wire) -> list[Said]:
     """The same, `size` s later."""
-    return [Said(said.data, said.due_s + size)]
+    return [Said(sent.data, sent.due_s + size)]
 
 
-def noise(said: Said, size: float, _wire: Wire) -> list[Said]:
+def noise(sent: Said, size: float, _wire: Wire) -> list[Said]:
     """So many other bytes; the same ones for the same message."""
-    return [Said(Random(said.data).randbytes(int(size)), said.due_s)]  # noqa: S311 - nothing is secret
+    return [Said(Random(sent.data).randbytes(int(size)), sent.due_s)]  # noqa: S311 - nothing is secret
 
 
-def babble(said: Said, size: float, wire: Wire) -> list[Said]:
+def babble(sent: Said, size: float, wire: Wire) -> list[Said]:
     """A byte of noise every `size` s."""
-    (long,) = noise(said, BABBLE_S / size, wire)
-    return [Said(long.data[k : k + 1], said.due_s + k * size) for k in range(len(long.data))]
+    (long,) = noise(sent, BABBLE_S / size, wire)
+    return [Said(long.data[k : k + 1], sent.due_s + k * size) for k in range(len(long.data))]
 
 
-def truncated(said: Said, size: float, _wire: Wire) -> list[Said]:
+def truncated(sent: Said, size: float, _wire: Wire) -> list[Said]:
     """The first `size` bytes of it."""
-    return [Said(said.data[: int(size)], said.due_s)]
+    return [Said(sent.data[: int(size)], sent.due_s)]
 
 
-def merged(said: Said, _size: float, _wire: Wire) -> list[Said]:
+def merged(sent: Said, _size: float, _wire: Wire) -> list[Said]:
     """The message and its copy in one piece."""
-    return [Said(2 * said.data, said.due_s)]
+    return [Said(2 * sent.data, sent.due_s)]
 
 
-def trickled(said: Said, size: float, _wire: Wire) -> list[Said]:
+def trickled(sent: Said, size: float, _wire: Wire) -> list[Said]:
     """Byte by byte, one every `size` s; a long one in MOST_PIECES equal pieces."""
-    step = -(-len(said.data) // MOST_PIECES)
-    starts = range(0, len(said.data), step)
-    return [Said(said.data[k : k + step], said.due_s + place * size) for place, k in enumerate(starts)]
+    step = -(-len(sent.data) // MOST_PIECES)
+    starts = range(0, len(sent.data), step)
+    return [Said(sent.data[k : k + step], sent.due_s + place * size) for place, k in enumerate(starts)]
 
 
-def after_noise(said: Said, size: float, wire: Wire) -> list[Said]:
+def after_noise(sent: Said, size: float, wire: Wire) -> list[Said]:
     """The message behind so many other bytes, in one piece."""
-    return [Said(noise(said, size, wire)[0].data + said.data, said.due_s)]
+    return [Said(noise(sent, size, wire)[0].data + sent.data, sent.due_s)]
 
 
-def before_noise(said: Said, size: float, wire: Wire) -> list[Said]:
+def before_noise(sent: Said, size: float, wire: Wire) -> list[Said]:
     """The message before so many other bytes, in one piece."""
-    return [Said(said.data + noise(said, size, wire)[0].data, said.due_s)]
+    return [Said(sent.data + noise(sent, size, wire)[0].data, sent.due_s)]
 
 
-def flipped(said: Said, size: float, wire: Wire) -> list[Said]:
+def flipped(sent: Said, size: float, wire: Wire) -> list[Said]:
     """One bit turned over; on TCP the segment comes again."""
     if wire.mends:
-        return later(said, MENDED_S, wire)
-    byte, bit = divmod(int(size) % (8 * len(said.data)), 8)
-    data = bytearray(said.data)
+        return later(sent, MENDED_S, wire)
+    byte, bit = divmod(int(size) % (8 * len(sent.data)), 8)
+    data = bytearray(sent.data)
     data[byte] ^= 1 << bit
-    return [Said(bytes(data), said.due_s)]
+    return [Said(bytes(data), sent.due_s)]
 
 
-def other_unit(said: Said, size: float, wire: Wire) -> list[Said]:
+def other_unit(sent: Said, size: float, wire: Wire) -> list[Said]:
     """The message of another unit; on a wire with one instrument, one about something else."""
-    return [Said(wire.of_unit(said.data, (wire.unit_of(said.data) or 0) + int(size)), said.due_s)]
+    return [Said(wire.of_unit(sent.data, (wire.unit_of(sent.data) or 0) + int(size)), sent.due_s)]
 
 
 EFFECTS: dict[str, tuple[Kind, Effect]] = {
@@ -265,12 +265,12 @@ EFFECTS: dict[str, tuple[Kind, Effect]] = {
 }
 
 
-def disturbed(said: Said, faults: Faults, wire: Wire) -> list[Said]:
+def disturbed(sent: Said, faults: Faults, wire: Wire) -> list[Said]:
     """What becomes of a message."""
-    messages = [said]
+    messages = [sent]
     for what, (_, effect) in EFFECTS.items() if faults else ():
-        if (size := faults.size(what, said.due_s)) is not None:
-            messages = [each for message in messages for each in _effect(effect, message, size, wire)]
+        if (size := faults.size(what, sent.due_s)) is not None:
+            messages = [part for message in messages for part in _effect(effect, message, size, wire)]
     return messages
 
 

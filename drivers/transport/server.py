@@ -250,8 +250,8 @@ class Port:
             connection.inbox.clear()
         return bool(connection.inbox)
 
-    def _leaving(self, said: Said) -> list[Said]:
-        return disturbed(said, self._faults_of(said.data), self.wire)
+    def _leaving(self, sent: Said) -> list[Said]:
+        return disturbed(sent, self._faults_of(sent.data), self.wire)
 
     def _faults_of(self, message: bytes) -> Faults:
         """Those of the unit that a message is to or from; on a wire of one instrument, its own."""
@@ -289,16 +289,16 @@ class Port:
 
     def _open_pty(self) -> str:
         """A raw pseudo-terminal; its far end stays open, so that clients can reconnect."""
-        near, far = pty.openpty()
+        inner, far = pty.openpty()
         tty.setraw(far)
-        os.set_blocking(near, False)
+        os.set_blocking(inner, False)
         path = os.ttyname(far)
 
         def close() -> None:
-            os.close(near)
+            os.close(inner)
             os.close(far)
 
-        self.connections[near] = Connection(near, path, close, self._leaving)
+        self.connections[inner] = Connection(inner, path, close, self._leaving)
         return f"serial:{path}"
 
 
@@ -347,7 +347,7 @@ class Server:
 
     def progress(self, key: str) -> tuple[int, int] | None:
         connections = [connection for port in self._ports for connection in port.connections.values()]
-        return next((found for connection in connections if (found := connection.progress(key))), None)
+        return next((progress_now for connection in connections if (progress_now := connection.progress(key))), None)
 
     def state(self) -> dict[str, Any]:
         """The twins' states by role, and those of their faults, JSON-able; taken between exchanges."""

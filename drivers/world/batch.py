@@ -109,10 +109,10 @@ class Batch:
         """All that the worlds remember, as JSON."""
         return {name: world.state() for name, world in self._worlds.items()}
 
-    def restore(self, kept: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from what `state` gave."""
         for name, world in self._worlds.items():
-            world.restore(kept[name])
+            world.restore(state[name])
 
     def _sensor(self, wired: str) -> str:
         """Whose output an input is wired to; what belongs to no sensor is seen by the first."""

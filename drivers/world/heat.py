@@ -73,10 +73,10 @@ def heater_power(warmth: Warmth, oven: Oven, step_s: float) -> float:
         warmth.oven_integral = 0.0
         return 0.0
     error = warmth.oven_set_c - warmth.thermocouple_c
-    wanted = oven.gain_per_k * error + warmth.oven_integral
-    if 0 <= wanted <= 1:
+    power = oven.gain_per_k * error + warmth.oven_integral
+    if 0 <= power <= 1:
         warmth.oven_integral += oven.gain_per_k * error * step_s / oven.integral_s
-    return min(max(wanted, 0.0), 1.0)
+    return min(max(power, 0.0), 1.0)
 
 
 @kernel

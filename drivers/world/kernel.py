@@ -32,11 +32,11 @@ def kernel(function: Function) -> Function:
 
     The compiler alone would notice a change in the function's own file, but not in those it calls.
     """
-    kept, settings.CACHE_DIR = settings.CACHE_DIR, _cache_folder()  # type: ignore[attr-defined]
+    folder, settings.CACHE_DIR = settings.CACHE_DIR, _cache_folder()  # type: ignore[attr-defined]
     try:
         return cast(Function, numba.njit(cache=True, error_model="numpy")(function))
     finally:
-        settings.CACHE_DIR = kept  # type: ignore[attr-defined]
+        settings.CACHE_DIR = folder  # type: ignore[attr-defined]
 
 
 def shared(function: Function) -> Function:
@@ -83,8 +83,8 @@ def lagged(value: float, target: float, step_s: float, lag_s: float) -> float:
 @kernel
 def wandered(value: float, rms: float, time_s: float, step_s: float, normal: float) -> float:
     """An Ornstein-Uhlenbeck process, one exact step on: correlation time `time_s`, stationary `rms`."""
-    kept = math.exp(-step_s / time_s)
-    return kept * value + rms * math.sqrt(1 - kept * kept) * normal
+    memory = math.exp(-step_s / time_s)
+    return memory * value + rms * math.sqrt(1 - memory * memory) * normal
 
 
 def mean_variance(rms: float, time_s: float, interval_s: float, n: int) -> float:

@@ -95,20 +95,20 @@ def following(positioner: Positioner, pieces: Floats, command: Command) -> tuple
 
 def _settled(positioner: Positioner, command: Command) -> tuple[float, ...]:
     """What the loop follows a command with, once its beginning is forgotten: later, weaker, turned in phase."""
-    own, asked = 2 * math.pi * positioner.servo_hz, 2 * math.pi * command.frequency_hz
-    answer = own**2 / complex(own**2 - asked**2, 2 * positioner.damping_fraction * own * asked)
+    own, driven = 2 * math.pi * positioner.servo_hz, 2 * math.pi * command.frequency_hz
+    answer = own**2 / complex(own**2 - driven**2, 2 * positioner.damping_fraction * own * driven)
     late_s = 2 * positioner.damping_fraction / own
     phase = command.phase_rad + math.atan2(answer.imag, answer.real)
     place = command.at_um - late_s * command.rate_um_s
-    return command.start_s, place, command.rate_um_s, command.amplitude_um * abs(answer), asked, phase
+    return command.start_s, place, command.rate_um_s, command.amplitude_um * abs(answer), driven, phase
 
 
 def _begin(positioner: Positioner, piece: Floats, before: Floats) -> None:
     """Set the exponential of `piece` so that place and speed go on where `before` is at its start."""
     decay, swing = _poles(positioner)
-    there, here = (motion(positioner, pieces, piece[0]) for pieces in (before, piece[None, :]))
-    piece[6] = there[0] - here[0]
-    piece[7] = (there[1] - here[1] + decay * piece[6]) / swing
+    before_move, here = (motion(positioner, pieces, piece[0]) for pieces in (before, piece[None, :]))
+    piece[6] = before_move[0] - here[0]
+    piece[7] = (before_move[1] - here[1] + decay * piece[6]) / swing
 
 
 @kernel
@@ -124,18 +124,18 @@ def motion(positioner: Positioner, pieces: Floats, t_s: float) -> tuple[float, f
     k = len(pieces) - 1
     while k > 0 and t_s < pieces[k, 0]:
         k -= 1
-    start, place, rate, amplitude, asked, phase, a, b = pieces[k]
+    start, place, rate, amplitude, driven, phase, a, b = pieces[k]
     decay, swing = _poles(positioner)
     t = max(0.0, t_s - start)
-    turned = asked * t + phase
-    left = math.exp(-decay * t)
-    c, s = left * math.cos(swing * t), left * math.sin(swing * t)
+    turned = driven * t + phase
+    decayed = math.exp(-decay * t)
+    c, s = decayed * math.cos(swing * t), decayed * math.sin(swing * t)
     a1, b1 = swing * b - decay * a, -swing * a - decay * b  # of the first derivative of a c + b s
     a2, b2 = swing * b1 - decay * a1, -swing * a1 - decay * b1
     return (
         place + rate * t + amplitude * math.sin(turned) + a * c + b * s,
-        rate + amplitude * asked * math.cos(turned) + a1 * c + b1 * s,
-        -amplitude * asked**2 * math.sin(turned) + a2 * c + b2 * s,
+        rate + amplitude * driven * math.cos(turned) + a1 * c + b1 * s,
+        -amplitude * driven**2 * math.sin(turned) + a2 * c + b2 * s,
     )
 
 

@@ -73,8 +73,8 @@ class Trajectory:
         elif t < ramp + cruise:
             travelled = a * ramp * (t - ramp / 2)
         else:
-            left = 2 * ramp + cruise - t
-            travelled = abs(self.target_deg - self.start_deg) - a * left * left / 2
+            remaining_s = 2 * ramp + cruise - t
+            travelled = abs(self.target_deg - self.start_deg) - a * remaining_s * remaining_s / 2
         return self.start_deg + self.direction * travelled
 
     def angle_deg(self, t_s: float) -> float:
@@ -91,8 +91,8 @@ class Trajectory:
         if self.stop_s is None or t_s <= self.stop_s:
             return self._planned_rate(t_s)
         rate = self._planned_rate(self.stop_s)
-        left = abs(rate) - self.acceleration_deg_s2 * (t_s - self.stop_s)
-        return math.copysign(max(0.0, left), rate)
+        speed = abs(rate) - self.acceleration_deg_s2 * (t_s - self.stop_s)
+        return math.copysign(max(0.0, speed), rate)
 
     def pieces(self) -> list[tuple[float, float, float, float]]:
         """The move as pieces of constant acceleration: (start in s, angle, rate, acceleration); the last is rest."""

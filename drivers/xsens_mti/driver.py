@@ -82,9 +82,9 @@ class Settings(DigitalSettings):
             RATES: xbus.RATE_HR if fast else xbus.RATE,
             FIELDS: xbus.FIELD,
         }
-        wanted = {kind: round(self.rate_hz) for names, kind in triads.items() if set(names) & set(self.channels)}
+        rates = {kind: round(self.rate_hz) for names, kind in triads.items() if set(names) & set(self.channels)}
         with_each = dict.fromkeys((xbus.COUNTER, xbus.TIME, xbus.STATUS), xbus.WITH_EACH)
-        return with_each | {xbus.TEMPERATURE: 1} | wanted
+        return with_each | {xbus.TEMPERATURE: 1} | rates
 
     def chosen(self, outputs: Sequence[str]) -> Settings:
         return replace(self, outputs=tuple(name for name in self.outputs if name in outputs))
@@ -101,11 +101,11 @@ class SampleDecoder(FrameDecoder):
         self.kinds: set[int] = set()
 
     def take(self, data: bytes) -> Batch:
-        found = self.stream.take(data)
-        n = len(found.starts)
+        messages = self.stream.take(data)
+        n = len(messages.starts)
         values = np.full((n, len(self._names)), np.nan)
         counter, time, status = np.full(n, -1), np.zeros(n), np.zeros(n, dtype=np.int64)
-        for places, rows, packets in xbus.of_one_layout(found):
+        for places, rows, packets in xbus.of_one_layout(messages):
             for packet in packets:
                 self.kinds.add(packet.kind)
                 if packet.number == xbus.COUNTER:
@@ -187,11 +187,11 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
         """Set the outputs. Raises Refused, StreamError for a rate that the tracker does not have."""
         answer = self._asked(xbus.OUTPUT_CONFIGURATION, xbus.configuration(self.settings.packets))
         try:
-            given = xbus.pairs(answer)
+            configured = xbus.pairs(answer)
         except ValueError as error:
             raise BadFrame(f"{self.name}: the answer to SetOutputConfiguration: {error}", "Check the line") from error
         for kind in (kind for kind in self.settings.packets if kind in TRIADS):
-            if (rate_hz := given.get(kind, 0)) != self.settings.rate_hz:
+            if (rate_hz := configured.get(kind, 0)) != self.settings.rate_hz:
                 raise StreamError(
                     f"{self.name}: the tracker sends {NAMES[kind]} at {rate_hz} Hz, and rate_hz is "
                     f"{self.settings.rate_hz:g}",
@@ -232,8 +232,8 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
         return f"{decoder.good} messages with {names}{warm}"
 
     def _silence(self, timeout_s: float) -> DriverError:
-        wanted = ", ".join(NAMES[kind] for kind in self.settings.packets if kind in NAMES)
-        return no_samples(self.name, self._link.url, timeout_s, f"MTData2 with {wanted}")
+        outputs = ", ".join(NAMES[kind] for kind in self.settings.packets if kind in NAMES)
+        return no_samples(self.name, self._link.url, timeout_s, f"MTData2 with {outputs}")
 
     def _unreadable(self, decoder: SampleDecoder) -> DriverError:
         return self._no_frames(decoder.stream) if decoder.unread else self._silence(2.0)

@@ -70,10 +70,10 @@ def message(number: int, data: bytes = b"") -> bytes:
     return bytes([PREAMBLE]) + body + bytes([-sum(body) % 256])
 
 
-def messages(found: Found) -> Iterator[tuple[int, bytes]]:
+def messages(frames: Found) -> Iterator[tuple[int, bytes]]:
     """The identifier and the data of each message."""
-    text = found.data.tobytes()
-    for start, length in zip(found.starts.tolist(), found.lengths.tolist(), strict=True):
+    text = frames.data.tobytes()
+    for start, length in zip(frames.starts.tolist(), frames.lengths.tolist(), strict=True):
         begin = 6 if text[start + 3] == 0xFF else 4
         yield text[start + 2], text[start + begin : start + length - 1]
 
@@ -157,18 +157,18 @@ def data_messages(columns: Sequence[tuple[int, NDArray[np.generic]]]) -> list[by
     return [text[k * length : (k + 1) * length] for k in range(n)]
 
 
-def of_one_layout(found: Found) -> Iterator[tuple[Ints, Bytes, list[Packet]]]:
+def of_one_layout(frames: Found) -> Iterator[tuple[Ints, Bytes, list[Packet]]]:
     """The MTData2 messages in groups of one layout: their places among the frames, the messages, and the packets.
 
     Messages whose packets do not fill them are left out.
     """
-    data = np.flatnonzero(found.heads(3)[:, 2] == DATA)
-    for length, of in groups(found.lengths[data]):
-        left = data[of]
-        while len(left):
-            rows = found.data[found.starts[left, None] + np.arange(length)]
+    data = np.flatnonzero(frames.heads(3)[:, 2] == DATA)
+    for length, of in groups(frames.lengths[data]):
+        rest = data[of]
+        while len(rest):
+            rows = frames.data[frames.starts[rest, None] + np.arange(length)]
             packets = layout(rows[0].tobytes())
             same = alike(rows, packets) if packets else np.arange(len(rows)) == 0
             if packets:
-                yield left[same], rows[same], packets
-            left = left[~same]
+                yield rest[same], rows[same], packets
+            rest = rest[~same]

@@ -58,9 +58,9 @@ class MotionTracker(FramedTwin):
 
     def _answer(self, connection: Connection, now_s: float) -> None:
         """Act on the messages in what has arrived."""
-        found = self._heard.setdefault(connection.key, Frames(xbus.Xbus())).take(bytes(connection.inbox))
+        messages = self._heard.setdefault(connection.key, Frames(xbus.Xbus())).take(bytes(connection.inbox))
         connection.inbox.clear()
-        for number, data in xbus.messages(found):
+        for number, data in xbus.messages(messages):
             if self.faults and self.faults.size("deaf", now_s) is not None:
                 continue
             connection.send(self._checked(self._reply(number, data, now_s), now_s), now_s + ANSWER_S)
@@ -90,12 +90,12 @@ class MotionTracker(FramedTwin):
     def _configured(self, data: bytes) -> bytes:
         """Take over the rates that it has, the highest where more is wanted: its answer."""
         try:
-            wanted = xbus.pairs(data)
+            requested = xbus.pairs(data)
         except ValueError:
             return xbus.message(xbus.ERROR, b"\x21")
-        given = {kind: min(rate_hz, FASTEST_HZ.get(kind, rate_hz)) for kind, rate_hz in wanted.items()}
-        self._rates = {kind: rate_hz for kind, rate_hz in given.items() if kind in FASTEST_HZ and rate_hz}
-        return xbus.message(xbus.OUTPUT_CONFIGURATION + 1, xbus.configuration(given))
+        granted = {kind: min(rate_hz, FASTEST_HZ.get(kind, rate_hz)) for kind, rate_hz in requested.items()}
+        self._rates = {kind: rate_hz for kind, rate_hz in granted.items() if kind in FASTEST_HZ and rate_hz}
+        return xbus.message(xbus.OUTPUT_CONFIGURATION + 1, xbus.configuration(granted))
 
     def _messages(self, values: Floats, ticks: NDArray[np.int64]) -> list[bytes]:
         time = np.rint(self._sensor_s(ticks) / TICK_S).astype(np.int64)
@@ -112,8 +112,8 @@ class MotionTracker(FramedTwin):
         out = [b""] * len(ticks)
         for of, more in ((~warm, []), (warm, [(xbus.TEMPERATURE, temperature)])):
             if of.any():
-                made = xbus.data_messages([(kind, column[of]) for kind, column in (*more, *columns)])
-                for place, data in zip(np.flatnonzero(of).tolist(), made, strict=True):
+                messages = xbus.data_messages([(kind, column[of]) for kind, column in (*more, *columns)])
+                for place, data in zip(np.flatnonzero(of).tolist(), messages, strict=True):
                     out[place] = data
         return out
 

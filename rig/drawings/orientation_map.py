@@ -36,6 +36,6 @@ def _marks(guidance: Guidance) -> dict[tuple[int, int, int], str]:
     marks = {}
     for up, known in zip(ORIENTATIONS, has, strict=True):
         x, y, z = (int(part) for part in np.sign(np.round(up, 6)))
-        wanted = guidance.moves and bool(up @ np.array(guidance.up) > 1 - 1e-6)
-        marks[x, y, z] = WANTED if wanted else TAKEN if known else LACKING
+        is_target = guidance.moves and bool(up @ np.array(guidance.up) > 1 - 1e-6)
+        marks[x, y, z] = WANTED if is_target else TAKEN if known else LACKING
     return marks

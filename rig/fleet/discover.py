@@ -116,9 +116,9 @@ def _looks(
 def _grown(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
     """The state with the missing effects of every batch, added one after another."""
     open_ = batches
-    for left in reversed(range(MOST_ROUNDS + 1)):
+    for rounds_left in reversed(range(MOST_ROUNDS + 1)):
         stand, missing = _judged(fleet, stand, open_)
-        open_ = {batch: batches[batch] for batch, effects in missing.items() if effects and left}
+        open_ = {batch: batches[batch] for batch, effects in missing.items() if effects and rounds_left}
         for batch in open_:
             stand = stand.judged_beside(batch, (*stand.effects.get(batch, ()), missing[batch][0]))
     return stand
@@ -192,10 +192,10 @@ def _population(stand: Stand, diagnosed: Mapping[Member, Any], members: Sequence
     for batch in dict.fromkeys(member.batch for member in members):
         mine = tuple(verdict for verdict in sensors if verdict.batch == batch)
         batches.append(batch_verdict(batch, stand.effects.get(batch, ()), mine))
-    apart = unconnected_rigs(
+    unconnected = unconnected_rigs(
         [Measured(m.batch, m.rig, NOWHERE) for m, screened in stand.seen.items() if screened.on_stages]
     )
-    return Population(sensors, tuple(batches), stand.errors, tuple(apart))
+    return Population(sensors, tuple(batches), stand.errors, tuple(unconnected))
 
 
 def _verdict(member: Member, stand: Stand, diagnosis: Any | None) -> SensorVerdict:

@@ -111,12 +111,12 @@ class Fleet:
         for first in range(0, len(questions), SLICE):
             part = questions[first : first + SLICE]
             keys = [key_of(member.digest, question) for member, question in part]
-            there = kept(self.record, keys)
-            known += [(member, there[key]) for key, (member, _) in zip(keys, part, strict=True) if key in there]
+            stored = kept(self.record, keys)
+            known += [(member, stored[key]) for key, (member, _) in zip(keys, part, strict=True) if key in stored]
             if known:
                 yield []
             for key, pair in zip(keys, part, strict=True):
-                if key in there:
+                if key in stored:
                     continue
                 if key not in open_:
                     tasks.append(self._task(key, *pair))

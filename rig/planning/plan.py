@@ -203,10 +203,10 @@ def _require_known_angles(bench: Bench, poses: Sequence[Pose]) -> None:
 
 def _parts(bench: Bench, ledger: Ledger) -> dict[str, Any]:
     """The planned instruments by role, with the settings of the real ones."""
-    made: dict[str, Any] = {role: absent(role) for role in ROLES}
+    parts: dict[str, Any] = {role: absent(role) for role in ROLES}
     for role, instrument in bench.instruments.items():
-        made[role] = PLANNED[role](role, instrument.typed_settings(), ledger)
-    return made
+        parts[role] = PLANNED[role](role, instrument.typed_settings(), ledger)
+    return parts
 
 
 # A plan in a few lines: the poses of one path are a stretch; other steps than moves and recordings are listed.

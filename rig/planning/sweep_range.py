@@ -32,14 +32,14 @@ def columns(planned: Plan, data: Table) -> dict[str, Array]:
     """The columns of a planned run's poses: angles, side, mounting, time after `data`, temperature, length."""
     poses = [held.pose for held in planned.held]
     names = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")
-    made = {name: np.array([getattr(pose, name) for pose in poses], dtype=float) for name in names}
+    columns = {name: np.array([getattr(pose, name) for pose in poses], dtype=float) for name in names}
     dwell_s = np.array([_dwell_s(planned.settings, pose.path) for pose in poses])
     since_s = np.array([held.start_s for held in planned.held]) + dwell_s / 2
-    made["t_s"] = float(data.time_s.max()) + PAUSE_S + since_s
+    columns["t_s"] = float(data.time_s.max()) + PAUSE_S + since_s
     if "temperature_c" in data and {"oven_c", "temperatures_c"} & {k for k, v in planned.settings.items() if v}:
         last_c = float(data.column("temperature_c")[data.order[-1]])
-        made["temperature_c"] = _temperature_c(planned, last_c, since_s)
-    return made | ({"dwell_s": dwell_s} if "sample_rate_hz" in data.constants else {})
+        columns["temperature_c"] = _temperature_c(planned, last_c, since_s)
+    return columns | ({"dwell_s": dwell_s} if "sample_rate_hz" in data.constants else {})
 
 
 def _dwell_s(settings: Mapping[str, Any], path: str) -> float:

@@ -32,9 +32,9 @@ def push_after(record: Record, run: Run, lab: Lab | None, tell: Callable[[str], 
     from rig.record.lab import lab_url  # only a rig with a lab needs the database driver
 
     try:
-        with Record(lab_url(lab.url)) as there:
-            for pushed in push_all(record, there, unsent(record, there)):
-                tell(str(pushed) if isinstance(pushed, RecordError) else f"{pushed.run}: pushed to {there.where}")
+        with Record(lab_url(lab.url)) as lab_record:
+            for pushed in push_all(record, lab_record, unsent(record, lab_record)):
+                tell(str(pushed) if isinstance(pushed, RecordError) else f"{pushed.run}: pushed to {lab_record.where}")
     except RecordError as error:
         tell(f"not pushed: {error}")
 

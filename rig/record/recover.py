@@ -150,8 +150,8 @@ def _mend_runs(to: Connection) -> Iterator[str]:
             }
             to.execute(update(runs).where(runs.c.run == row.run).values(mended))
             yield f"run {row.run}: {lost}"
-    there = union(*[select(table.c.run) for table in (poses, blocks, readings)]).subquery()
-    for run in to.execute(select(there.c.run).where(there.c.run.not_in(select(runs.c.run)))).scalars().all():
+    numbers = union(*[select(table.c.run) for table in (poses, blocks, readings)]).subquery()
+    for run in to.execute(select(numbers.c.run).where(numbers.c.run.not_in(select(runs.c.run)))).scalars().all():
         documents: dict[str, Any] = {name: {} for name in ("settings", "bench", "identities", "constants", "results")}
         procedure = (*run.split("-"), "", "", "unknown")[2] or "unknown"
         to.execute(insert(runs), {

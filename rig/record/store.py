@@ -279,16 +279,16 @@ class Record:
         if rows:
             listed = ", ".join(sorted(row.run for row in rows)[:MOST_LISTED])
             raise UnknownRun(f"{len(rows)} runs in {self.where} begin with {name!r}: {listed}; write more of the id")
-        wanted = name.removeprefix(f"{LAST} ")
+        sensor = name.removeprefix(f"{LAST} ")
         if of_sensor := runs_of_sensor(self.runs(), name):
-            if len(of_sensor) == 1 or wanted != name:
+            if len(of_sensor) == 1 or sensor != name:
                 return of_sensor[0]
             listed = ", ".join(match.run for match in of_sensor[:MOST_LISTED])
             raise UnknownRun(
                 f"{len(of_sensor)} runs in {self.where} are of the sensor {name!r}: {listed}"
                 f"{' ...' if of_sensor[MOST_LISTED:] else ''}; write an id, or '{LAST} {name}' for the newest one"
             )
-        raise UnknownRun(f"no run {name!r} in {self.where}.{did_you_mean(wanted, list(dict.fromkeys(known))[-20:])}")
+        raise UnknownRun(f"no run {name!r} in {self.where}.{did_you_mean(sensor, list(dict.fromkeys(known))[-20:])}")
 
     def poses(self, run: str) -> list[Pose]:
         """The poses in order, without the excluded ones."""
@@ -333,16 +333,16 @@ class Record:
         same = (poses.c.run == blocks.c.run) & (poses.c.number == blocks.c.number)
         query = select(poses, blocks).join_from(poses, blocks, same).where(poses.c.run == run)
         with self._reading() as at:
-            left = require_whole(at, run)
+            excluded = require_whole(at, run)
             required = has_checksums(at, run)
             options = at.execution_options(yield_per=32)
             for row in options.execute(query.order_by(poses.c.number)):
-                left.discard(row.number)
+                excluded.discard(row.number)
                 if row.excluded is None or not any(
                     is_damaged(table, row._mapping, required) for table in (poses, blocks)
                 ):
                     yield kept_of(sound(row, poses, blocks, required=required))
-            for number in sorted(left):
+            for number in sorted(excluded):
                 raise lost(run, number)
 
     def dwells(self, run: str, after: int = -1) -> list[tuple[int, Dwell]]:
@@ -354,11 +354,11 @@ class Record:
         query = select(poses, dwells).join_from(poses, dwells, same, isouter=True)
         chosen = (poses.c.run == run) & (poses.c.number > after) & poses.c.excluded.is_(None)
         with self._reading() as at:
-            left = require_whole(at, run) if after < 0 else set()
+            excluded = require_whole(at, run) if after < 0 else set()
             required = has_checksums(at, run)
             found = at.execute(query.where(chosen).order_by(poses.c.number))
             rows = [sound(row, poses, dwells, required=required) for row in found]
-        for number in sorted(left - {row.number for row in rows}):
+        for number in sorted(excluded - {row.number for row in rows}):
             raise lost(run, number)
         older = {kept.number: kept.dwell for kept in self.kept(run)} if any(row.n is None for row in rows) else {}
         return [(row.number, older.get(row.number) or dwell_of(row)) for row in rows]

@@ -101,8 +101,8 @@ def constants(run: Run, sensor: str | None) -> dict[str, str | float]:
     if bench.d63 is None:
         return {}
     adc, prefix = bench.instruments["adc"].typed_settings(), f"{sensor}." if sensor else ""
-    there = {axis: f"{prefix}{axis}" for axis in AXES if f"{prefix}{axis}" in adc.channels}
-    skews = {f"skew_{axis[1]}_s": round(adc.lag_s(channel) - adc.lag_s(D63), 9) for axis, channel in there.items()}
+    channels = {axis: f"{prefix}{axis}" for axis in AXES if f"{prefix}{axis}" in adc.channels}
+    skews = {f"skew_{axis[1]}_s": round(adc.lag_s(channel) - adc.lag_s(D63), 9) for axis, channel in channels.items()}
     return {"d63_serial": bench.d63.curve.serial, "d63_calibrated": bench.d63.curve.date, **skews}
 
 

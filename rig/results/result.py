@@ -85,8 +85,8 @@ def returned(name: str, document: Any) -> Result:
         std = document.get("std")
         return Result(float(document["value"]), str(document["unit"]), None if std is None else float(std))
     except (AttributeError, KeyError, TypeError, ValueError):
-        wanted = 'a result is a mapping such as {"value": 2.0, "unit": "g", "std": 0.1}'
-        raise ProcedureError(f"the procedure returned {name} = {document!r}; {wanted}") from None
+        form = 'a result is a mapping such as {"value": 2.0, "unit": "g", "std": 0.1}'
+        raise ProcedureError(f"the procedure returned {name} = {document!r}; {form}") from None
 
 
 def documents(results: Mapping[str, Result], limits: Mapping[str, Limit]) -> dict[str, dict[str, Any]]:

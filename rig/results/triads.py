@@ -89,12 +89,12 @@ def rate_turn(measured: Measured) -> dict[str, Result | Missing]:
     scales = {e.axis: e for e in fit.model.estimates("gyro-scale-factor")}
     results |= {f"gyro-scale-{axis}": result(scale) for axis, scale in scales.items()}
     results |= {f"gyro-misalignment-{e.name}": result(e) for e in fit.model.estimates("gyro-misalignment")}
-    left = dict(zip(fit.channels, rms(fit.residual), strict=True))
+    residuals = dict(zip(fit.channels, rms(fit.residual), strict=True))
     for axis, scale in scales.items():
         if scale.identified and scale.value:
             for e in (e for e in fit.model.estimates("gyro-g-sensitivity") if e.axis == axis):
                 results[f"gyro-g-sensitivity-{axis}{e.name}"] = result(e, "(deg/s)/g", scale.value)
-            results[f"rate-residual-{axis}"] = Result(abs(float(left[axis]) / scale.value), "deg/s")
+            results[f"rate-residual-{axis}"] = Result(abs(float(residuals[axis]) / scale.value), "deg/s")
     whole = measured.run.settings["mounts"] == len(EDGES)
     return {name: value for name, value in results.items() if whole or isinstance(value, Result)}
 

@@ -119,8 +119,8 @@ class Progress:
         if gone <= 0 or self.done == self.first:
             return None
         end = self.end_s if self.at_s else float(self.total)
-        left = (end - self._work(self.done)) * (self.kept_s - self.began_s) / gone
-        return max(0.0, left - (now_s - self.kept_s))
+        remaining_s = (end - self._work(self.done)) * (self.kept_s - self.began_s) / gone
+        return max(0.0, remaining_s - (now_s - self.kept_s))
 
     def _work(self, done: int) -> float:
         """The work of `done` poses: seconds of the plan, or poses without a plan."""

@@ -96,10 +96,10 @@ class Course:
 
     def line(self, name: str) -> tuple[list[float], list[float], list[float], list[float]]:
         """(time in s, mean, least, greatest) of each part that has it."""
-        there = [part for part in self.parts if name in part.sums]
-        times = [part.t_s / part.n for part in there]
-        means = [part.sums[name] / part.n for part in there]
-        return times, means, [part.low[name] for part in there], [part.high[name] for part in there]
+        parts = [part for part in self.parts if name in part.sums]
+        times = [part.t_s / part.n for part in parts]
+        means = [part.sums[name] / part.n for part in parts]
+        return times, means, [part.low[name] for part in parts], [part.high[name] for part in parts]
 
 
 def kind_of(dwell: Dwell) -> str:

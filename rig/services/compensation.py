@@ -34,9 +34,9 @@ def origin_of(model: str, name: str | None, text: str) -> Origin:
     return Origin(identifier(name or path.stem), path.name, digest, program(), today())
 
 
-def source_files(made: Compensation, language: str, origin: Origin) -> dict[str, str]:
+def source_files(compensation: Compensation, language: str, origin: Origin) -> dict[str, str]:
     """The files by name. `language`: one of `LANGUAGES`."""
-    return _writer(language)(made, origin, make_vectors(made))
+    return _writer(language)(compensation, origin, make_vectors(compensation))
 
 
 def identifier(name: str) -> str:
@@ -55,16 +55,17 @@ def how_to_test(language: str, folder: str, name: str) -> list[str]:
     return []
 
 
-def compensation_lines(made: Compensation) -> list[str]:
+def compensation_lines(compensation: Compensation) -> list[str]:
     """Method, proof and remaining errors, in words."""
-    bound, costs = made.bound, made.costs
-    method = f"{steps_text(made)}, {operations_text(made)}; each step reduces the error to {bound.q:.2g} of it or less"
-    lines = [f"{made.model.name}: {method}, proved for +-{made.range.reach:g} {made.unit}."]
-    for fate in made.forward.fates:
+    bound, costs, unit = compensation.bound, compensation.costs, compensation.unit
+    work = f"{steps_text(compensation)}, {operations_text(compensation)}"
+    method = f"{work}; each step reduces the error to {bound.q:.2g} of it or less"
+    lines = [f"{compensation.model.name}: {method}, proved for +-{compensation.range.reach:g} {unit}."]
+    for fate in compensation.forward.fates:
         if fate.how == LEFT_OUT:
             size = costs.left_out[fate.effect]
             cost = (
-                f"error {error_text(size.rms, made.unit)} rms, {error_text(size.most, made.unit)} at most"
+                f"error {error_text(size.rms, unit)} rms, {error_text(size.most, unit)} at most"
                 if size
                 else "error unknown"
             )
@@ -72,22 +73,22 @@ def compensation_lines(made: Compensation) -> list[str]:
     if costs.out_of_gravity is not None:
         lines.append(
             "az is not measured; its value from gravity has an error of "
-            f"{error_text(costs.out_of_gravity.most, made.unit)} at most."
+            f"{error_text(costs.out_of_gravity.most, unit)} at most."
         )
-    return [*lines, uncertainty_text(made), coverage_text(made)]
+    return [*lines, uncertainty_text(compensation), coverage_text(compensation)]
 
 
-def export_lines(made: Exported) -> list[str]:
+def export_lines(exported: Exported) -> list[str]:
     """Errors, losses and remarks of a file for another program, in words."""
     lines = [
         f"{sensor}: the file's outputs differ from the model's by {error_text(rms, unit)} rms, "
         f"{error_text(most, unit)} at most."
-        for sensor, rms, most, unit in made.errors
+        for sensor, rms, most, unit in exported.errors
     ]
-    return [*lines, *(loss.text for loss in made.losses), *made.notes]
+    return [*lines, *(loss.text for loss in exported.losses), *exported.notes]
 
 
-def export_document(made: Exported, form: str, models: Sequence[str], out: Path) -> dict[str, Any]:
+def export_document(exported: Exported, form: str, models: Sequence[str], out: Path) -> dict[str, Any]:
     """The JSON document `rig.export-model/1`."""
     return {
         "schema": "rig.export-model/1",
@@ -95,13 +96,13 @@ def export_document(made: Exported, form: str, models: Sequence[str], out: Path)
         "models": list(models),
         "file": str(out),
         "errors": [
-            {"sensor": sensor, "rms": rms, "largest": most, "unit": unit} for sensor, rms, most, unit in made.errors
+            {"sensor": sensor, "rms": rms, "largest": most, "unit": unit} for sensor, rms, most, unit in exported.errors
         ],
         "lost": [
             {"effect": loss.effect, "why": loss.why, "rms": loss.rms, "largest": loss.most, "unit": loss.unit}
-            for loss in made.losses
+            for loss in exported.losses
         ],
-        "notes": list(made.notes),
+        "notes": list(exported.notes),
     }
 
 

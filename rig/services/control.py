@@ -60,9 +60,9 @@ def controlled(
 # In words, for the command and the page.
 
 
-def worst(found: Iterable[Controlled]) -> str:
+def worst(charts: Iterable[Controlled]) -> str:
     """The worst verdict of all charts."""
-    verdicts = {each.chart.verdict for each in found}
+    verdicts = {chart.chart.verdict for chart in charts}
     return next(verdict for verdict in (OUT, "in control", "baseline") if verdict in verdicts)
 
 
@@ -108,8 +108,8 @@ def _points(run: Run) -> Iterator[_Point]:
     """The results of a run, each under its sensor's serial number; those of a batch are named `a1/bias-x`."""
     for name, result in run.results.items():
         member, _, quantity = name.rpartition("/")
-        said = run.bench["sensors"][member] if member else run.bench["sensor"]
-        yield _Point(said.get("serial") or said["name"], quantity, run.run, result)
+        sensor = run.bench["sensors"][member] if member else run.bench["sensor"]
+        yield _Point(sensor.get("serial") or sensor["name"], quantity, run.run, result)
 
 
 def _controlled(sensor: str, quantity: str, points: list[_Point], baseline: int) -> Controlled:

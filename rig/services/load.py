@@ -146,9 +146,9 @@ def still_of(
     sensed = {
         axis: scale for axis, axis_stream in streams.items() if (scale := axis_stream.sensed) is not None
     }  # known when read
-    taken = {axis_stream.channel for axis_stream in streams.values()}
-    if others := [name for name in first.others if name not in taken]:
-        tell(f"{still.source}: {', '.join(taken)}; --channel takes another: {', '.join(others)}.")
+    channels = {axis_stream.channel for axis_stream in streams.values()}
+    if others := [name for name in first.others if name not in channels]:
+        tell(f"{still.source}: {', '.join(channels)}; --channel takes another: {', '.join(others)}.")
     for text in repairs(first, still.n):
         tell(text)
     if np.isfinite(first.corner_hz):

@@ -56,15 +56,15 @@ def night_of(data: str, date: str, program: str) -> Page | None:
         from rig.results.soak import foreseen_of, night
 
         measured = Measured.named(record, data)
-        found, foreseen = night(measured), foreseen_of(measured)
-    pictures, facts = soak_album(found, foreseen), _facts(measured, date, program)
-    return pictures, lambda: soak_report(found, measured.run.results, facts, pictures, foreseen)
+        result, foreseen = night(measured), foreseen_of(measured)
+    pictures, facts = soak_album(result, foreseen), _facts(measured, date, program)
+    return pictures, lambda: soak_report(result, measured.run.results, facts, pictures, foreseen)
 
 
 def _facts(measured: Measured, date: str, program: str) -> Mapping[str, str]:
     run = measured.run
     sensor = [str(measured.constants[name]) for name in ("sensor", "serial") if name in measured.constants]
-    said = {
+    texts = {
         role: " ".join(str(part) for part in identity.values() if part) for role, identity in run.identities.items()
     }
     return {
@@ -73,7 +73,7 @@ def _facts(measured: Measured, date: str, program: str) -> Mapping[str, str]:
         "begun": run.created,
         "ended": run.ended or "–",
         "settings": ", ".join(f"{name} {value}" for name, value in run.settings.items()),
-        **said,
+        **texts,
         "program": program,
         "date": date,
     }
@@ -99,17 +99,17 @@ def _on_a_model(request: Request, question: Loaded, tell: Callable[[str], None],
     beside = question.data.compare(question.model)
     if (reason := beside.rejection) is not None and reason.verdict == Verdict.NO_RESPONSE:
         raise UnusableData(f"{question.data.source}: no report is written: {reason.verdict}: {reason.text}")
-    found = question.data.discover(question.model, searched(question.effects))
-    found = planned(found, request, question.effects, tell)
+    discovery = question.data.discover(question.model, searched(question.effects))
+    discovery = planned(discovery, request, question.effects, tell)
     if question.data.form == "samples":
         from calibrations.presentation.charts.noise import still_album
         from calibrations.presentation.report.still import still_report
 
-        pictures = still_album(found.end, beside.fit)
-        return pictures, lambda: still_report(found, beside, today(), program(), pictures)
+        pictures = still_album(discovery.end, beside.fit)
+        return pictures, lambda: still_report(discovery, beside, today(), program(), pictures)
     from calibrations.presentation.charts.discovery import album
     from calibrations.presentation.report.report import report
 
     shaken = shaken_of(request.data)
-    pictures = album(found, beside, shaken)
-    return pictures, lambda: report(found, beside, today(), program(), pictures, shaken)
+    pictures = album(discovery, beside, shaken)
+    return pictures, lambda: report(discovery, beside, today(), program(), pictures, shaken)

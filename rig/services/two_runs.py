@@ -131,8 +131,8 @@ def again(first: Fit, second: Fit) -> Again | None:
     """The poses that both have; None where there are none, or the orientations are not known."""
     if not first.table.type.stage_angles or first.channels != second.channels:
         return None
-    there = _visits(second.table)
-    rows = [(row, there[visit]) for visit, row in _visits(first.table).items() if visit in there]
+    visits = _visits(second.table)
+    rows = [(row, visits[visit]) for visit, row in _visits(first.table).items() if visit in visits]
     if not rows:
         return None
     one, other = (np.array(side) for side in zip(*rows, strict=True))

@@ -29,8 +29,8 @@ class ModelState:
     def address(self) -> str:
         """The address, without what is empty. No added effect at all is an empty `add`."""
         added = list(self.added) or [""] if self.added is not None else []
-        given = [("data", self.data), ("model", self.model), ("select", ranges(self.selected)), ("noise", self.noise)]
-        query = urlencode([*((name, value) for name, value in given if value), *(("add", text) for text in added)])
+        fields = [("data", self.data), ("model", self.model), ("select", ranges(self.selected)), ("noise", self.noise)]
+        query = urlencode([*((name, value) for name, value in fields if value), *(("add", text) for text in added)])
         return f"/?{query}" if query else "/"
 
 

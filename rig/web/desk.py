@@ -101,15 +101,15 @@ def kept_effects(data: str, model: str, noise: str = "") -> list[str]:
 
 def keep_effects(data: str, model: str, added: Sequence[str], noise: str = "") -> None:
     """Store the added effects of a session. Where this is not possible, a restart forgets them."""
-    kept = _kept()
+    names = _kept()
     name = _name(data, model, noise)
-    if kept.get(name, []) == list(added):
+    if names.get(name, []) == list(added):
         return
-    kept.pop(name, None)
+    names.pop(name, None)
     if added:
-        kept[name] = list(added)
+        names[name] = list(added)
     with suppress(OSError):
-        write_whole(home() / SESSIONS, json.dumps(dict(list(kept.items())[-MOST_KEPT:]), indent=1))
+        write_whole(home() / SESSIONS, json.dumps(dict(list(names.items())[-MOST_KEPT:]), indent=1))
 
 
 def _name(data: str, model: str, noise: str) -> str:

@@ -49,8 +49,8 @@ class Strip:
     def look(self) -> None:
         """Show the present status."""
         status = control.latest()
-        if self.begun and status is not None and (said := news(self.before, status)) is not None:
-            ui.run_javascript(f"if (window.tellRig) tellRig({json.dumps(said[0])}, {json.dumps(said[1])})")
+        if self.begun and status is not None and (text := news(self.before, status)) is not None:
+            ui.run_javascript(f"if (window.tellRig) tellRig({json.dumps(text[0])}, {json.dumps(text[1])})")
         self.before, self.begun = status, True
         active = status is not None and status.phase != "ended"
         self.box.set_visibility(active)

@@ -74,15 +74,15 @@ class Guard:
         host, origin = headers.get("host", ""), headers.get("origin")
         return host in self.hosts and origin in (None, f"http://{host}")
 
-    def _fits(self, given: str) -> bool:
-        return hmac.compare_digest(given.encode(), self.token.encode())
+    def _fits(self, token: str) -> bool:
+        return hmac.compare_digest(token.encode(), self.token.encode())
 
     async def _let_in(self, scope: Scope, send: Send, query: Mapping[str, str]) -> None:
         """Move the token from the address to a cookie, because addresses are stored and passed on."""
         place = scope["path"] + (f"?{urlencode(query)}" if query else "")
         cookie = f"{self.cookie}={self.token}; HttpOnly; SameSite=Strict; Path=/"
-        given = [(b"location", place.encode()), (b"set-cookie", cookie.encode()), (b"content-length", b"0")]
-        await send({"type": "http.response.start", "status": 303, "headers": [*given, *HEADERS]})
+        headers = [(b"location", place.encode()), (b"set-cookie", cookie.encode()), (b"content-length", b"0")]
+        await send({"type": "http.response.start", "status": 303, "headers": [*headers, *HEADERS]})
         await send({"type": "http.response.body", "body": b""})
 
 
@@ -94,7 +94,7 @@ def names(host: str, port: int) -> frozenset[str]:
 
 def _cookies(headers: Mapping[str, str]) -> Mapping[str, str]:
     """Cookies by name. All programs of this host share them: one that is not well formed must not hide ours."""
-    pairs = (each.partition("=") for each in headers.get("cookie", "").split(";"))
+    pairs = (cookie.partition("=") for cookie in headers.get("cookie", "").split(";"))
     return {name.strip(): value.strip() for name, _, value in pairs}
 
 

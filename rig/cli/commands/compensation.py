@@ -67,9 +67,9 @@ def compensate_command(
     effects = effects_of(bench_file)
     source_model = read_model(model, effects)
     with working("inverting the model") as progress:
-        made = invert_model(source_model, _range(source_model, reach, ranges), without, precision)
+        compensation = invert_model(source_model, _range(source_model, reach, ranges), without, precision)
         origin = origin_of(model, name, dump_model(source_model))
-        files = source_files(made, language, origin)
+        files = source_files(compensation, language, origin)
         beside = None
         if data is not None:
             from rig.services.tables import load
@@ -77,7 +77,7 @@ def compensate_command(
             progress.text = f"testing the compensation on {data}"
             table = load(data, tell=note)
             check_unit(source_model, table.unit, table.source)
-            beside = compensated_residual(made, table)
+            beside = compensated_residual(compensation, table)
     make_folder(out)
     for file, text in files.items():
         write_whole(out / file, text)
@@ -88,12 +88,12 @@ def compensate_command(
         save(compensated(beside), picture)
     paths = [*(str(out / file) for file in files), *([str(picture)] if picture else [])]
     if as_json:
-        emit(summary(made, origin) | {"files": paths, "residual": beside.document() if beside else None})
+        emit(summary(compensation, origin) | {"files": paths, "residual": beside.document() if beside else None})
     else:
         click.echo(
             "\n".join(
                 [
-                    *compensation_lines(made),
+                    *compensation_lines(compensation),
                     *(beside.lines() if beside else []),
                     *(f"written: {path}" for path in paths),
                     *how_to_test(language, str(out), origin.name),
@@ -165,7 +165,7 @@ def export_model_command(
     source_models = [read_model(model, effects) for model in models]
     walks = {"accelerometer": walk_a or 0.0, "gyroscope": walk_g or 0.0}
     comment = f"{', '.join(Path(model).name for model in models)}, written by {program()}"
-    made = export_model(
+    exported = export_model(
         source_models,
         form,
         comment,
@@ -174,8 +174,8 @@ def export_model_command(
         reach,
         dict(map(input_range, ranges)),
     )
-    write_whole(out, made.text)
+    write_whole(out, exported.text)
     if as_json:
-        emit(export_document(made, form, models, out))
+        emit(export_document(exported, form, models, out))
     else:
-        click.echo("\n".join([*export_lines(made), f"written: {out}"]))
+        click.echo("\n".join([*export_lines(exported), f"written: {out}"]))

@@ -111,7 +111,7 @@ def completion_command(shell: str) -> None:
 
     The Tab key then completes commands, options, procedures, effects, runs, sensors and files.
     """
-    made = get_completion_class(shell)
-    if made is None:
+    completion = get_completion_class(shell)
+    if completion is None:
         raise click.UsageError(f"click has no completion for {shell}")
-    click.echo(made(rig, {}, "rig", COMPLETE).source())
+    click.echo(completion(rig, {}, "rig", COMPLETE).source())

@@ -186,14 +186,14 @@ def _by_hand(table: Table) -> dict[str, Any]:
         return {}
     middle = estimate_hard_iron(table.outputs)
     results: dict[str, Any] = {"hard_iron": middle.tolist()}
-    left = table.outputs - middle
+    deviations = table.outputs - middle
     if np.ptp(table.outputs[:, 2]) < FLAT * np.ptp(table.outputs[:, :2]):
-        ellipse = fit_ellipse(left[:, :2])
+        ellipse = fit_ellipse(deviations[:, :2])
         angle = float(np.degrees(ellipse.angle_rad))
         results["hard_iron"][2] = None  # the mean of z also contains the vertical field
         results["soft_iron"] = {"greatest": ellipse.greatest, "least": ellipse.least, "angle_deg": angle}
-        left = correct_by_extremes(table.outputs)[:, :2]
-    size = np.linalg.norm(left, axis=1)
+        deviations = correct_by_extremes(table.outputs)[:, :2]
+    size = np.linalg.norm(deviations, axis=1)
     return {"by_hand": results | {"unit": table.unit, "left_per_mille": float(1e3 * size.std() / size.mean())}}
 
 

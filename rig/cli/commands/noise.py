@@ -92,6 +92,6 @@ def _record(data: str, channel: str | None, rate_hz: float | None, tau_s: tuple[
 def rounded_times(tau_s: Iterable[float], analysis: NoiseAnalysis) -> Iterable[str]:
     """Which of the given averaging times are not whole numbers of samples."""
     taken_s = next(iter(analysis.channels.values())).allan.tau_s.tolist()
-    for stated, taken in zip(tau_s, taken_s, strict=False):
-        if not np.isclose(stated, taken):
-            yield f"An averaging time of {stated:g} s is not a whole number of samples: {taken:g} s is used."
+    for stated, used in zip(tau_s, taken_s, strict=False):
+        if not np.isclose(stated, used):
+            yield f"An averaging time of {stated:g} s is not a whole number of samples: {used:g} s is used."

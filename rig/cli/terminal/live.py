@@ -115,8 +115,8 @@ def progress(done: list[Measurement], time_s: float) -> str:
     now = done[-1]
     lines = [f"{now.run}: {now.found.end.table.n} poses in {duration(now.used_s)} so far. {now.found.judgement.text}"]
     if now.following is not None:
-        e, left = now.following, duration(time_s - now.used_s)
-        lines.append(f"Next, {duration(e.duration_s or 0.0)} of the remaining {left}: {e.command}\n    {e.why}")
+        e, remaining = now.following, duration(time_s - now.used_s)
+        lines.append(f"Next, {duration(e.duration_s or 0.0)} of the remaining {remaining}: {e.command}\n    {e.why}")
     return "\n".join(lines)
 
 

@@ -203,7 +203,7 @@ class StatusWriter(RunViewer):
     def publish(self, **changes: Any) -> None:
         """Write the present status."""
         view, self._written_s = self.view, time.monotonic()
-        progress, left = view.progress, view.left(self._written_s)
+        progress, remaining = view.progress, view.left(self._written_s)
         values_now = [{**asdict(value), "near": value.near} for value in values(view)]
         attitude = {name: getattr(view.kept.pose, name) for name in ATTITUDE} if view.kept else {}
         self._status = replace(
@@ -211,7 +211,7 @@ class StatusWriter(RunViewer):
             now=view.now,
             done=progress.done,
             total=progress.total,
-            left=left,
+            left=remaining,
             values=values_now,
             attitude=attitude,
             **changes,

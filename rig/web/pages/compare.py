@@ -87,12 +87,12 @@ class Pictures:
 def _of_rows(first: Fit, second: Fit) -> Comparison:
     """Residuals, and the difference of the measurements at common poses."""
     shared = again(first, second)
-    columns, there = choices(first), choices(second)
-    x, _ = first_choices([name for name in columns if name in there])
+    columns, second_choices = choices(first), choices(second)
+    x, _ = first_choices([name for name in columns if name in second_choices])
 
     def draw(c: int, in_sensed: bool) -> Sequence[Chart]:
         one, other = Shown(first, c, in_sensed), Shown(second, c, in_sensed)
-        made = [residuals(one, other, columns[x], there[x])]
+        made = [residuals(one, other, columns[x], second_choices[x])]
         return made if shared is None else [*made, difference(one, shared)]
 
     titles = [RESIDUALS] if shared is None else [RESIDUALS, DIFFERENCE]

@@ -150,8 +150,8 @@ class HistoryPage:
                 on_change=self._other_baseline,
             ).props("dense debounce=300")
         self.fields = (self.quantity, self.limit, self.baseline)
-        for each in self.fields:
-            each.disable()
+        for field in self.fields:
+            field.disable()
 
     def _go(self, request: HistoryRequest) -> None:
         if request.sensor and (request.sensor, request.model) != (self.request.sensor, self.request.model):
@@ -193,47 +193,47 @@ class HistoryPage:
         with Record.to_read() as record:
             return latest(record, sensor, model)
 
-    def _lay_out(self, found: History) -> None:
+    def _lay_out(self, history: History) -> None:
         self.body.clear()
         with self.body:
             self.summary_box = div("")
             self.pictures = HistoryPictures(self.request.model)
             with div("two beside"):
                 self.closest = ClosestBox(self.request, self._other_day)
-                CompareBox(found, self.sensors, self.request.model, self._last_of)
+                CompareBox(history, self.sensors, self.request.model, self._last_of)
             self.tables = div("stack")
-            if found.passed_over:
-                with ui.expansion(f"{len(found.passed_over)} runs not used").props("dense").classes("box"):
-                    for data, why in found.passed_over.items():
+            if history.passed_over:
+                with ui.expansion(f"{len(history.passed_over)} runs not used").props("dense").classes("box"):
+                    for data, why in history.passed_over.items():
                         words(f"{data}: {why}", "small")
         self.keys["q"] = Key("next quantity", self._next_quantity)
         self.keys["d"] = Key("calibration closest to a day", self.closest.focus)
 
-    def _offer(self, found: History) -> None:
+    def _offer(self, history: History) -> None:
         """Offer the quantities; select the requested one, or the first."""
-        names = [q.name for q in found.quantities]
+        names = [q.name for q in history.quantities]
         self.request = replace(
             self.request, quantity=self.request.quantity if self.request.quantity in names else names[0]
         )
         self.quantity.set_options(names, value=self.request.quantity)
-        for each in self.fields:
-            each.enable()
+        for field in self.fields:
+            field.enable()
 
     def show(self) -> None:
         """Show the calibrations with the present limits and quantity."""
         assert self.found is not None  # noqa: S101 the fields are disabled before
-        found = judged(self.found, {**self.limits, **self.request.limits}, self.request.baseline)
-        q = next(each for each in found.quantities if each.name == self.request.quantity)
+        history = judged(self.found, {**self.limits, **self.request.limits}, self.request.baseline)
+        q = next(quantity for quantity in history.quantities if quantity.name == self.request.quantity)
         self._label(q)
         self.pictures.show(q)
-        self.closest.show(found)
+        self.closest.show(history)
         for place in (self.summary_box, self.tables):
             place.clear()
         with self.summary_box:
-            summary_of(found, q)
+            summary_of(history, q)
         with self.tables:
-            quantities_table(found)
-            calibrations_table(found, self.request.model)
+            quantities_table(history)
+            calibrations_table(history, self.request.model)
 
     def _label(self, q: Quantity) -> None:
         """Label the field of the limit with the shown quantity."""

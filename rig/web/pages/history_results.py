@@ -111,7 +111,7 @@ class CompareBox:
         self.life, self.model, self.last_of = life, model, last_of
         self.two: list[ui.date_input] | list[ui.select] = []
         self.others = [sensor for sensor in sensors if sensor != life.sensor]
-        self.rigs = list(dict.fromkeys(each.rig for each in life.calibrations))
+        self.rigs = list(dict.fromkeys(calibration.rig for calibration in life.calibrations))
         possible = {DAYS: len(life.calibrations) > 1, SENSOR: bool(self.others), RIGS: len(self.rigs) > 1}
         kinds = [kind for kind, can in possible.items() if can]
         with box("stack"):
@@ -142,9 +142,9 @@ class CompareBox:
 
     async def compare(self) -> None:
         """Compare the shared quantities."""
-        said = [str(each.value) for each in self.two]
+        days = [str(field.value) for field in self.two]
         try:
-            found = await off_loop(self._compared, said)
+            compared = await off_loop(self._compared, days)
         except Exception as error:
             self.result.clear()
             with self.result:
@@ -152,27 +152,27 @@ class CompareBox:
             return
         self.result.clear()
         with self.result:
-            _show(found, self.model)
+            _show(compared, self.model)
 
-    def _compared(self, said: Sequence[str]) -> Compared:
+    def _compared(self, days: Sequence[str]) -> Compared:
         if self.kind.value == SENSOR:
-            return compare_sensors(self.life, said[0], self.last_of(said[0]))
+            return compare_sensors(self.life, days[0], self.last_of(days[0]))
         if self.kind.value == RIGS:
-            return compare_rigs(self.life.calibrations, said[0], said[1])
-        return compare_days(self.life, day(said[0]), day(said[1]))
+            return compare_rigs(self.life.calibrations, days[0], days[1])
+        return compare_days(self.life, day(days[0]), day(days[1]))
 
 
-def _show(found: Compared, model: str) -> None:
+def _show(compared: Compared, model: str) -> None:
     """Show a comparison in numbers; two runs have a link to the compare page."""
-    apart = [name for name, (_, each) in found.rows.items() if not each.agrees]
+    differing = [name for name, (_, each) in compared.rows.items() if not each.agrees]
     with div("row-of"):
-        words("do not agree" if apart else "agree", f"chip {'bad' if apart else 'good'}")
-        words(", ".join(apart) or "in every quantity", "small grow")
-        if found.data is not None:
-            first, second = found.data
-            given = urlencode({"first": first, "second": second, "model": model})
-            ui.link("One model fitted to both, in pictures", f"/compare?{given}").classes("small")
-    head, rows = agreements(found, rounded)
+        words("do not agree" if differing else "agree", f"chip {'bad' if differing else 'good'}")
+        words(", ".join(differing) or "in every quantity", "small grow")
+        if compared.data is not None:
+            first, second = compared.data
+            query = urlencode({"first": first, "second": second, "model": model})
+            ui.link("One model fitted to both, in pictures", f"/compare?{query}").classes("small")
+    head, rows = agreements(compared, rounded)
     table(head, [(*row[:5], unit(row[5]), minus(row[6]), row[7]) for row in rows])
     words(E_N, "quiet small")
 
@@ -261,19 +261,21 @@ def _legend(q: Quantity) -> str:
 LIMIT_IS_GIVEN = "the largest change, in the field above"
 
 
-def summary_of(found: History, q: Quantity) -> None:
+def summary_of(history: History, q: Quantity) -> None:
     """The date of the next calibration, quantities out of control, and numbers of the shown quantity."""
-    out = [each.name for each in found.quantities if each.chart is not None and each.chart.verdict == OUT]
-    overdue = found.due is not None and str(found.due) < today()
-    good = found.due is not None and not out and not overdue
+    out = [
+        quantity.name for quantity in history.quantities if quantity.chart is not None and quantity.chart.verdict == OUT
+    ]
+    overdue = history.due is not None and str(history.due) < today()
+    good = history.due is not None and not out and not overdue
     with box(f"verdict {'bad' if out or overdue else 'good' if good else ''}").props("role=status aria-live=polite"):
         with div("grow standing"):
             with div("row-of"):
-                words(for_page(next_due(found, LIMIT_IS_GIVEN)), "headline")
+                words(for_page(next_due(history, LIMIT_IS_GIVEN)), "headline")
                 if overdue:
                     words("overdue", "chip bad")
-            words(for_page(f"{summary(found)}."), "quiet small")
-            for warning in found.warnings:
+            words(for_page(f"{summary(history)}."), "quiet small")
+            for warning in history.warnings:
                 words(for_page(warning), "fault")
             if out:
                 words(f"{OUT.capitalize()}: {', '.join(out)}.", "small")
@@ -306,13 +308,13 @@ class ClosestBox:
         """Move the focus to the field."""
         self.input.run_method("focus")
 
-    def show(self, found: History) -> None:
+    def show(self, history: History) -> None:
         """Show the closest calibration with the present limits."""
         self.text_box.clear()
         if self.day is None:
             return
-        calibration, age_days = closest(found.calibrations, self.day)
-        why = stale(found, calibration, age_days)
+        calibration, age_days = closest(history.calibrations, self.day)
+        why = stale(history, calibration, age_days)
         with self.text_box:
             words(near(calibration, age_days, self.day), "small")
             if why is not None:
@@ -321,20 +323,23 @@ class ClosestBox:
             ui.link("Open its model", model_of(calibration.data, self.model)).classes("small")
 
 
-def quantities_table(found: History) -> None:
+def quantities_table(history: History) -> None:
     """Table of quantities: last value, drift, scatter, control charts, limits, due date."""
     head = ("quantity", "last", "drift a year", "scatter", "control charts", "allowed", "due")
     with box("stack wide-table"):
         words("All quantities", "title")
-        table(head, [_row(q) for q in found.quantities])
+        table(head, [_row(q) for q in history.quantities])
 
 
-def calibrations_table(found: History, model: str) -> None:
+def calibrations_table(history: History, model: str) -> None:
     """Table of calibrations: run with a link to its model, rig, values."""
-    titles = [f"{q.name} ({unit(q.unit)})" if q.unit != "1" else q.name for q in found.quantities]
+    titles = [f"{q.name} ({unit(q.unit)})" if q.unit != "1" else q.name for q in history.quantities]
     with box("stack wide-table"):
         words("All calibrations", "title")
-        table(("date", "run", "rig", *titles, ""), [_calibration(each, found, model) for each in found.calibrations])
+        table(
+            ("date", "run", "rig", *titles, ""),
+            [_calibration(calibration, history, model) for calibration in history.calibrations],
+        )
 
 
 def _row(q: Quantity) -> tuple[str, ...]:
@@ -352,7 +357,13 @@ def _drift(q: Quantity) -> str:
     return f"{slope} {unit(q.unit)}{significance(q.line)}"
 
 
-def _calibration(each: Calibration, found: History, model: str) -> tuple[str | Link, ...]:
-    values = (each.values.get(q.name) for q in found.quantities)
+def _calibration(calibration: Calibration, history: History, model: str) -> tuple[str | Link, ...]:
+    values = (calibration.values.get(q.name) for q in history.quantities)
     shown = ("—" if value is None else estimate_text(value.value, value.std) for value in values)
-    return each.day, Link(each.data, model_of(each.data, model)), each.rig, *shown, each.expired or ""
+    return (
+        calibration.day,
+        Link(calibration.data, model_of(calibration.data, model)),
+        calibration.rig,
+        *shown,
+        calibration.expired or "",
+    )

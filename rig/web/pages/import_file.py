@@ -273,8 +273,8 @@ class ImportPage:
     @property
     def constants(self) -> dict[str, Constant]:
         """The constants as typed; numbers where they are numbers."""
-        given = {name: str(field.value or "").strip() for name, field in self.fields.items() if field.visible}
-        return {name: _number(text) if name.count("_") else text for name, text in given.items() if text}
+        texts = {name: str(field.value or "").strip() for name, field in self.fields.items() if field.visible}
+        return {name: _number(text) if name.count("_") else text for name, text in texts.items() if text}
 
     def look(self) -> None:
         """Show what would be imported with the present choices."""
@@ -293,13 +293,13 @@ class ImportPage:
             self._say("", f"Still needed: {', '.join(lacks)}. Choose the columns that hold them.")
             return
         try:
-            found = await off_loop(preview, self.sheet, kind, chosen, self.constants)
+            shown = await off_loop(preview, self.sheet, kind, chosen, self.constants)
         except Exception as error:
             if turn == self.turn:
                 self._say("This cannot be imported yet", error)
             return
         if turn == self.turn:
-            self._show(found)
+            self._show(shown)
 
     def _say(self, title: str, why: str | Exception) -> None:
         self.button.disable()
@@ -311,18 +311,18 @@ class ImportPage:
             else:
                 failed(title, message(why))
 
-    def _show(self, found: Preview) -> None:
+    def _show(self, preview_of: Preview) -> None:
         """The picture and the table's first values; the import is possible."""
         self.fault.clear()
         self.result.clear()
-        table = found.table
+        table = preview_of.table
         draw(self.plot, data_chart(table), "import")
         with self.result:
             words(f"{table.n} rows of {table.kind}", "title")
             ranges = {name: f"{values.min():.6g} to {values.max():.6g} {column_unit(name)}".rstrip()
                       for name, values in table.columns.items()}  # fmt: skip
             facts(ranges)
-            for note in found.notes:
+            for note in preview_of.notes:
                 noted(note)
         self.button.set_enabled(not self.asked)
 

@@ -52,9 +52,9 @@ def register(desk: Desk) -> None:
 class Workbench:
     """One open page: data, model session, pictures, candidates."""
 
-    def __init__(self, desk: Desk, given: ModelState) -> None:
-        self.desk, self.given = desk, given
-        self.data, self.model, self.noise = given.data, given.model, given.noise
+    def __init__(self, desk: Desk, address: ModelState) -> None:
+        self.desk, self.given = desk, address
+        self.data, self.model, self.noise = address.data, address.model, address.noise
         self.address = ""
         self.session: ModelSession[Any] | None = None
         self.search = Counted({})
@@ -153,8 +153,11 @@ class Workbench:
         for note in session.notes:
             with self.notes:
                 noted(note, self.data)
-        if found := run_record.left_out(self.data):
-            with self.notes, ui.expansion(f"{len(found)} excluded from every analysis").props("dense").classes("box"):
+        if excluded := run_record.left_out(self.data):
+            with (
+                self.notes,
+                ui.expansion(f"{len(excluded)} excluded from every analysis").props("dense").classes("box"),
+            ):
                 run_record.listed(self.data, self.afresh)
         ui.timer(LOOK_S, self._look_for_changes)
         await self.show(session)
@@ -269,9 +272,9 @@ class Workbench:
         finally:
             self.discovering = False
             self.missing.discovered()
-        left = self.diagnoses.get(self.session.names) if self.session is not None else None
-        if left is not None and left.missing:  # stopped: offer the rest again
-            await self.missing.show(left)
+        diagnosis = self.diagnoses.get(self.session.names) if self.session is not None else None
+        if diagnosis is not None and diagnosis.missing:  # stopped: offer the rest again
+            await self.missing.show(diagnosis)
 
     async def remove(self, name: str) -> None:
         """Remove one of the added effects; the later ones are fitted again."""
@@ -286,7 +289,7 @@ class Workbench:
         for note in session.notes[len(self.session.notes) :]:
             with self.notes:
                 noted(note, self.data)
-        self.diagnoses = {key: found for key, found in self.diagnoses.items() if name not in key}
+        self.diagnoses = {key: diagnosis for key, diagnosis in self.diagnoses.items() if name not in key}
         await self.show(session)
 
     async def add(self, step: Step[Any]) -> None:
@@ -300,7 +303,7 @@ class Workbench:
         """Remove the last effect."""
         if self.session is not None and self.session.steps:
             last = self.session.steps[-1].name
-            self.diagnoses = {key: found for key, found in self.diagnoses.items() if last not in key}
+            self.diagnoses = {key: diagnosis for key, diagnosis in self.diagnoses.items() if last not in key}
             await self.show(self.session.undone())
 
 

@@ -91,11 +91,11 @@ class CertificateDialog(Asking):
             read_bench(self.bench_file) if self.bench_file is not None else None,
             str(self.before.value) or None,
         )
-        found = certified(of, str(self.number.value or "").strip(), str(self.customer.value or "").strip())
-        failed = failed_results(found)
-        lines = [certificate_head(found), *found.figures.remarks, *found.remarks]
+        document = certified(of, str(self.number.value or "").strip(), str(self.customer.value or "").strip())
+        failed = failed_results(document)
+        lines = [certificate_head(document), *document.figures.remarks, *document.remarks]
         lines += [f"Beyond its limit: {name}" for name in failed]
-        return written(found, form), f"{found.number}{form}", lines
+        return written(document, form), f"{document.number}{form}", lines
 
 
 class CompensationDialog(Asking):

@@ -154,14 +154,14 @@ class Missing:
             words("Next experiment", "title")
             hint = waiting("Planning on the bench")
         try:
-            found = await off_loop(page.session.with_next, result, notes.append)
+            planned = await off_loop(page.session.with_next, result, notes.append)
             if hint.is_deleted:  # the page shows another model by now
                 return
-            experiment = found.next_experiment
+            experiment = planned.next_experiment
             assert experiment is not None  # noqa: S101 it had one before
             hint.set_text(" ".join([next_words(experiment), next_takes(experiment), *notes]))
-            given = {name: _written(value) for name, value in experiment.settings.items()}
-            to = f"/run?{urlencode({'procedure': experiment.procedure, **given})}"
+            settings = {name: _written(value) for name, value in experiment.settings.items()}
+            to = f"/run?{urlencode({'procedure': experiment.procedure, **settings})}"
             with hint.parent_slot.parent:  # type: ignore[union-attr]
                 ui.button("Prepare this run", icon="science", on_click=lambda: ui.navigate.to(to)).props(
                     "outline dense"

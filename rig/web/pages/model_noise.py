@@ -84,20 +84,20 @@ class NoisePictures:
         if self.compared is None or self.session is None:
             return
         c, still = int(self.axis.value or 0), self.compared.fit.still
-        found = self.compared.fit.channels[c]
-        curve = compared_deviations(self.compared.fit)[found.channel.axis]
-        into = scaled(still, found.channel.axis, bool(self.unit.value))
-        models = [Drawn(found, "model")]
+        channel = self.compared.fit.channels[c]
+        curve = compared_deviations(self.compared.fit)[channel.channel.axis]
+        into = scaled(still, channel.channel.axis, bool(self.unit.value))
+        models = [Drawn(channel, "model")]
         if self.step is not None:
             models.append(candidate(self.step.after.channels[c], self.step.name))
         panels = {
             "allan": allan(curve, into, models),
-            "spectrum": spectrum(found, into, models),
+            "spectrum": spectrum(channel, into, models),
             "ratio": ratio(curve),
-            "record": record(found.channel, into),
+            "record": record(channel.channel, into),
         }
         for name, panel in panels.items():
-            draw(self.plots[name], one(panel), f"{name} {found.channel.axis} {into.unit}")
+            draw(self.plots[name], one(panel), f"{name} {channel.channel.axis} {into.unit}")
         draw(self.plots["waterfall"], steps_chart(self.session.start, self.session.steps), "waterfall", False)
 
     def next_axis(self) -> None:

@@ -71,7 +71,7 @@ class ParametersBox:
         self.noise.clear()
         self.pairs.clear()
         try:
-            found = await off_loop(correlations, session.end)
+            pairs = await off_loop(correlations, session.end)
         except Exception as error:
             with self.pairs:
                 words(f"No correlations: {message(error)}", "quiet small")
@@ -79,7 +79,7 @@ class ParametersBox:
         if turn == self.turn:
             self.pairs.clear()
             with self.pairs:
-                _pairs(found)
+                _pairs(pairs)
 
     def diagnosed(self, result: Diagnosis[Any]) -> None:
         """Show the noise coefficients of a still record: those of `rig noise`, from the search that has just ended."""
@@ -161,17 +161,19 @@ def _written(text: str) -> str:
     return re.sub(r"\bu(?=[Vg]\b)", "µ", unit(for_page(text)))
 
 
-def _pairs(found: list[Correlated]) -> None:
-    if not found:
+def _pairs(correlated: list[Correlated]) -> None:
+    if not correlated:
         words(f"No two parameters are correlated by {STRONG:g} or more.", "quiet small")
         return
-    strongest = found[0]
-    title = f"{len(found)} correlations of {STRONG:g} or more; strongest: {_number(strongest.coefficient)}"
+    strongest = correlated[0]
+    title = f"{len(correlated)} correlations of {STRONG:g} or more; strongest: {_number(strongest.coefficient)}"
     with ui.expansion(title).props("dense").classes("small"):
-        rows = [(pair.first, pair.second, _number(pair.coefficient)) for pair in found[:MOST_PAIRS]]
+        rows = [(pair.first, pair.second, _number(pair.coefficient)) for pair in correlated[:MOST_PAIRS]]
         table(("parameter", "and", "correlation"), rows)
-        if len(found) > MOST_PAIRS:
-            words(f"{len(found) - MOST_PAIRS} more are weaker; the certificate has the whole matrix.", "quiet small")
+        if len(correlated) > MOST_PAIRS:
+            words(
+                f"{len(correlated) - MOST_PAIRS} more are weaker; the certificate has the whole matrix.", "quiet small"
+            )
 
 
 def _number(value: float) -> str:

@@ -222,8 +222,8 @@ class Pictures:
         axes = [axis_of(channel) for channel in self.fit.channels]
         if place.axis in axes:
             self.axis.set_value(axes.index(place.axis))
-        there = rows_at(self.fit, place)
-        self.select(np.flatnonzero(np.isin(self.shown.rows, there)).tolist())
+        rows = rows_at(self.fit, place)
+        self.select(np.flatnonzero(np.isin(self.shown.rows, rows)).tolist())
 
     def _brushed(self, event: events.GenericEventArguments) -> None:
         self.select(event.args if isinstance(event.args, list) else [])

@@ -55,7 +55,7 @@ def register(desk: Desk) -> None:
 class Runs:
     """The table: a click opens a run; two selected runs can be compared."""
 
-    def __init__(self, found: list[Run]) -> None:
+    def __init__(self, listed: list[Run]) -> None:
         with box("stack"):
             with div("row-of"):
                 search = ui.input("Search: run, procedure, sensor, file").props("dense clearable").classes("grow")
@@ -65,8 +65,8 @@ class Runs:
                 )
                 self.together = ui.button("One model", icon="insights", on_click=self._model).props("outline")
                 self.compare = ui.button("Compare", icon="compare_arrows", on_click=self._compare)
-            known = calibrating(found)
-            rows = [row for run in found for row in _rows(run, known)]
+            known = calibrating(listed)
+            rows = [row for run in listed for row in _rows(run, known)]
             self.table = ui.table(
                 rows=rows, columns=COLUMNS, row_key="name", selection="multiple", pagination=PAGE,
                 on_select=self._marked,

@@ -143,14 +143,14 @@ def _where(url: str) -> str:
 class Planning:
     """The form of a procedure and its settings; every change makes a new plan."""
 
-    def __init__(self, bench_file: Path | None, bench: Bench, given: Mapping[str, str]) -> None:
+    def __init__(self, bench_file: Path | None, bench: Bench, settings: Mapping[str, str]) -> None:
         self.bench_file, self.bench = bench_file, bench
-        self.given = {name: value for name, value in given.items() if name != "procedure"}
+        self.given = {name: value for name, value in settings.items() if name != "procedure"}
         self.started: Callable[[], Awaitable[None]] | None = None
         self.turn = 0
         self.planned: Plan | None = None
         names = {name: f"{name}: {summary(path)}" for name, path in paths(bench.folders.procedures).items()}
-        chosen = given.get("procedure", DEFAULT_PROCEDURE)
+        chosen = settings.get("procedure", DEFAULT_PROCEDURE)
         with box():
             words("Measure", "title")
             self.name = ui.select(names, label="Procedure", value=chosen if chosen in names else DEFAULT_PROCEDURE)

@@ -115,18 +115,18 @@ class BeginDialog:
         """Enable Begin if every check is ticked and the sensor has a name or a serial number."""
         if not hasattr(self, "button"):
             return
-        left = sum(not box.value for box in self.boxes)
+        open_boxes = sum(not box.value for box in self.boxes)
         unnamed = bool(self.inputs) and not any(self.sensor.values())
-        self.button.set_enabled(not left and not unnamed)
-        text = f"{left} of {len(self.boxes)} checks to do" if left else "Nothing has moved yet."
+        self.button.set_enabled(not open_boxes and not unnamed)
+        text = f"{open_boxes} of {len(self.boxes)} checks to do" if open_boxes else "Nothing has moved yet."
         self.hint.set_text("Give the name or the serial number of the sensor." if unnamed else text)
 
     async def _begin(self) -> None:
         self.button.disable()
         self.fault.set_text("")
-        given = {name: text for name, text in self.sensor.items() if text or name == "serial"}
+        sensor = {name: text for name, text in self.sensor.items() if text or name == "serial"}
         try:
-            await self.begin(given, self.content.answers)
+            await self.begin(sensor, self.content.answers)
         except Exception as error:
             self.fault.set_text(message(error))
             self._look()

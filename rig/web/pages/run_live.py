@@ -167,29 +167,29 @@ class Live:
             elif status.error:
                 failed("Reason for the pause" if status.phase == "paused" else "Reason for the end", status.error)
 
-    def _ask(self, asked: Asked | None, here: bool) -> None:
+    def _ask(self, question: Asked | None, here: bool) -> None:
         self.question.clear()
-        if asked is None:
+        if question is None:
             return
         with self.question, box("question"):
-            words(asked.text, "title")
-            if asked.attitude is not None:
+            words(question.text, "title")
+            if question.attitude is not None:
                 with div("attitude"):
-                    ui.html(_drawn(asked.attitude), sanitize=False)
-            if asked.refused:
-                words(asked.refused, "fault")
+                    ui.html(_drawn(question.attitude), sanitize=False)
+            if question.refused:
+                words(question.refused, "fault")
             if here:
-                self._answers(asked)
+                self._answers(question)
             else:
                 words("Answer this question in the terminal of the run.", "quiet")
 
-    def _answers(self, asked: Asked) -> None:
+    def _answers(self, question: Asked) -> None:
         """A button for each choice, or a field."""
         with div("row-of"):
-            for choice in asked.choices:
+            for choice in question.choices:
                 ui.button(choice, on_click=partial(self.decide, choice))
-            if not asked.choices:
-                typed = ui.input(asked.accepts, value=asked.proposed).props("dense autofocus")
+            if not question.choices:
+                typed = ui.input(question.accepts, value=question.proposed).props("dense autofocus")
                 typed.on("keydown.enter", lambda: self.decide(str(typed.value)))
                 ui.button("Answer", on_click=lambda: self.decide(str(typed.value)))
 

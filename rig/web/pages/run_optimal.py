@@ -89,9 +89,9 @@ class OptimalDialog:
                 failed("The poses cannot be stored", error)
             return
         settings: Mapping[str, Any] = choice.equal.plan.settings
-        kept = {name: setting_text(settings[name]) for name in ("dwell_s", "settle_s")}
+        fixed = {name: setting_text(settings[name]) for name in ("dwell_s", "settle_s")}
         self.close()
-        self.use({"pose_list": path, **kept})
+        self.use({"pose_list": path, **fixed})
 
     def close(self) -> None:
         """Close the dialog and forget it."""

@@ -185,11 +185,11 @@ class OverTime:
 def _new(run: str, after: int) -> tuple[list[tuple[int, Any]], RunTime, dict[str, str]]:
     """New dwells with their numbers, the time axis, and the units of channels that are not in V."""
     with Record.to_read() as record:
-        found = record.dwells(run, after)
-        if not found:
-            return found, RunTime(), {}
+        dwells = record.dwells(run, after)
+        if not dwells:
+            return dwells, RunTime(), {}
         begun = record.run(run)
-        return found, RunTime.of(record, begun), units_of(begun, found[0][1].means)
+        return dwells, RunTime.of(record, begun), units_of(begun, dwells[0][1].means)
 
 
 # The page of one run: settings, results, notes, export and report.
@@ -292,11 +292,11 @@ class OneRun:
 
     def _show_events(self) -> None:
         with Record.to_read() as record:
-            found = record.events(self.run.run)
+            events = record.events(self.run.run)
         self.events.clear()
         with self.events:
-            if found:
-                table(("time (UTC)", "event", ""), [_event(event) for event in found])
+            if events:
+                table(("time (UTC)", "event", ""), [_event(event) for event in events])
             else:
                 words("No events.", "quiet small")
 

@@ -68,9 +68,9 @@ class RunReport:
         with self.place:
             ui.html(framed(f"Report on {data}", text), sanitize=False)
         self.headline.clear()
-        if found := HEADLINE.search(text):
+        if headline := HEADLINE.search(text):
             with self.headline, box("row-of verdict").props("role=status"):
-                words(html.unescape(re.sub(r"<[^>]*>", "", found[1])).strip(), "headline grow")
+                words(html.unescape(re.sub(r"<[^>]*>", "", headline[1])).strip(), "headline grow")
                 ui.button("Report below", icon="south", on_click=self.see).props("flat dense")
 
     def see(self) -> None:
