@@ -88,7 +88,8 @@ class Curve:
             return
         worst = float(volts.ravel()[off[0]])
         where = f"reading {off[0]} of {volts.size}" if volts.size > 1 else "the reading"
-        what = f"D63 {self.serial}: {where}, {worst:.4f} V, is not on the {side} side of its curve of {self.date}"
+        curve = f"the {side} side of the calibration curve of {self.date}"
+        what = f"D63 {self.serial}: {where}, {worst:.4f} V, is outside {curve}"
         if worst > high:
             raise SensorFault(f"{what}: above {high:g} V it is on the optical peak", REMEDIES[side])
         raise SensorFault(

@@ -52,7 +52,7 @@ def with_noise(table: Table, model: Model) -> Table:
 def slow_processes(model: Model, axis: str, table: Table) -> Processes:
     """Those of one axis on the times of a table."""
     if not any(e.axis == axis for e in model.params.values()):
-        raise ModelError(f"{model.name}: has no values for the axis {axis} of {table.source}")
+        raise ModelError(f"{model.name}: the noise model has no values for the axis {axis}, which {table.source} has")
     gaps_s = np.diff(np.sort(table.time_s))
     gap_s, span_s = float(np.median(gaps_s)), float(np.sum(gaps_s))
     walk = model.value(f"rate-random-walk.coefficient.{axis}")

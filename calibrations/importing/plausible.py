@@ -133,7 +133,7 @@ def _voltage(values: Array) -> Doubt | None:
 
 def _length(values: Array) -> Doubt | None:
     longest = float(np.max(np.abs(values)))
-    return (f"reaches {longest:.6g} m; this not plausible for a stage", "um") if longest > LONGEST_M else None
+    return (f"reaches {longest:.6g} m; this is not plausible for a stage", "um") if longest > LONGEST_M else None
 
 
 def _temperature(values: Array) -> Doubt | None:
@@ -141,7 +141,7 @@ def _temperature(values: Array) -> Doubt | None:
     if low >= COLDEST_C and high <= HOTTEST_C:
         return None
     unit = "K" if low - 273.15 >= COLDEST_C and high - 273.15 <= HOTTEST_C else ""
-    return f"runs from {low:.6g} to {high:.6g} degC; this not plausible for a sensor", unit
+    return f"runs from {low:.6g} to {high:.6g} degC; this is not plausible for a sensor", unit
 
 
 UNIT_CHECKS: Mapping[str, Callable[[Array], Doubt | None]] = {

@@ -48,7 +48,8 @@ class Settings:
     def way_of_turn(self, name: str, rate_deg_s: float, first_deg: float, last_deg: float) -> NoReturn:
         """Raises LimitError: no hand turns at a constant rate."""
         raise LimitError(
-            f"{name}: is turned by hand, not at a constant {rate_deg_s:g} deg/s from {first_deg:g} to {last_deg:g} deg",
+            f"{name}: a person turns this stage; it cannot turn from {first_deg:g} to {last_deg:g} deg "
+            f"at {rate_deg_s:g} deg/s",
             "Use a stage with a motor for this procedure",
         )
 

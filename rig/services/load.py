@@ -153,8 +153,8 @@ def still_of(
         tell(text)
     if np.isfinite(first.corner_hz):
         tell(
-            f"The coefficients are those before the {first.corner_hz:g} Hz low-pass of the output, "
-            f"fitted below {first.corner_hz / 2:.3g} Hz."
+            f"The coefficients describe the noise before the {first.corner_hz:g} Hz low-pass of the output. "
+            f"The fit uses frequencies below {first.corner_hz / 2:.3g} Hz."
         )
     return replace(still, sensed=sensed)
 

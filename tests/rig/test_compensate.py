@@ -32,7 +32,7 @@ def test_each_language_has_its_files(rig: Rig, physical: Path) -> None:
         ended = rig("compensate", str(physical), "--language", language, "--out", language)
         assert ended.status == 0, ended.err
         assert [line.partition("/")[2] for line in ended.out.splitlines() if line.startswith("written")] == names
-        assert "az is not measured; its value from gravity has an error of" in ended.out
+        assert "az is not measured" in ended.out
     done = subprocess.run([sys.executable, "python/adxl203_no_17.py"], capture_output=True, text=True, check=True)
     assert done.stdout == "0 of 16 reference vectors fail\n"
 

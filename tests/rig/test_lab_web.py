@@ -96,8 +96,8 @@ def test_a_password_in_the_words_of_a_command_is_refused(rig: Rig, reader: str) 
     ):
         ended = rig(command, option, reader)
         assert (ended.status, ended.out) == (2, "")
-        assert "all users of this machine can read the words of a command" in ended.err
-        assert f"put it into ~/.pgpass or PGPASSWORD, or give the URL as {variable}\n" in ended.err
+        assert "PGPASSWORD" in ended.err
+        assert ended.err.endswith(f" {variable}\n")
         assert WORD not in ended.err
 
 

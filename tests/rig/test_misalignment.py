@@ -57,7 +57,7 @@ def test_its_plan_is_a_rehearsal_on_twins() -> None:
     assert planned.reach["beta"] == ((-180, 270), (-400, 400))
     whats = [step.what for step in planned.steps]
     assert whats[:2] == ["alpha seeks its home", "beta seeks its home"]
-    assert whats.count("adc records vx, vy, supply, d63 for 1 s") == planned.poses
+    assert sum(what.startswith("adc records") and "d63" in what for what in whats) == planned.poses
     assert "level is read" in whats
     assert planned.questions[0].startswith("mounting: ")
 

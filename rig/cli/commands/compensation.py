@@ -159,7 +159,7 @@ def export_model_command(
     if form in NOISES and rate_hz is None:
         raise click.UsageError(f"--for {form} needs the number of measurements a second: give --rate HZ")
     if device_id is not None and len(models) > 1:
-        raise click.UsageError("--device-id is that of one sensor: export one model at a time")
+        raise click.UsageError("--device-id names one sensor; export one model at a time")
     require_out(out, *models)
     effects = effects_of(bench_file)
     source_models = [read_model(model, effects) for model in models]

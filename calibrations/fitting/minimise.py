@@ -1,0 +1,139 @@
+"""Least squares under given noise: at once where the model is linear, else by damped steps within bounds."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy  # its room of optimization is loaded where it is first entered
+from scipy.linalg import lstsq, qr
+
+from calibrations.fitting.identifiability import RELATIVE_RANK
+from calibrations.fitting.problem import Problem
+from calibrations.means.noise import Noise
+from calibrations.table import Array
+
+NEWTON_STEPS = 20
+DAMPINGS = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # of each column's squares
+BOUND_ROUNDS = 3
+LARGEST_FACTOR = 2.0  # by which one step changes a parameter that is positive by its meaning
+STRAIGHT = 1e-6  # of what is left: a step that foretells it better is a linear model's
+SMALL_GAIN = 3e-3  # of the mean square of what is left, or of the noise: it moves a parameter by 0.05 uncertainties
+
+
+def minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
+    """(parameters, cost) of least squares under `noise`."""
+    if not len(start):
+        return start, 0.0
+    if problem.keeps_starts or len(problem.layout.prior_rows):
+        return _determined(problem, noise, start)
+    at_once = _at_once(problem, noise, start) if problem.adds else None
+    if at_once is not None:
+        return at_once
+
+    rows = problem.layout.prior_rows
+
+    def residual(theta: Array) -> Array:
+        return np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
+
+    def descended(start: Array, stairs: bool) -> scipy.optimize.OptimizeResult:
+        def jacobian(theta: Array) -> Array:
+            return np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), rows])
+
+        return scipy.optimize.least_squares(
+            residual,
+            start,
+            jac=jacobian,
+            bounds=problem.layout.bounds,
+            x_scale=problem.layout.typical,
+            ftol=1e-9,
+            xtol=1e-9,
+            gtol=1e-12,
+            max_nfev=60,
+        )
+
+    answer = descended(start, stairs=False)
+    if problem.rounds:
+        answer = descended(answer.x, stairs=True)
+    return answer.x, float(answer.cost)
+
+
+def _at_once(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float] | None:
+    """As `minimise`, where one step of Gauss and Newton's gets there: the model is linear. None where it is not."""
+    typical, (low, high) = problem.layout.typical, problem.layout.bounds
+    columns = np.concatenate([problem.residual(start)[:, :, None], problem.jacobian(start)], axis=2)
+    rows = problem.layout.prior_rows
+    white = np.vstack([noise.whiten(columns), np.column_stack([rows @ start, rows])])
+    J, before = white[:, 1:] * typical, white[:, 0]
+    step = np.linalg.lstsq(J, -before, rcond=None)[0]
+    theta = start + typical * step
+    if np.any(theta < low) or np.any(theta > high):
+        return None
+    after = np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
+    if np.linalg.norm(before + J @ step - after) > STRAIGHT * np.linalg.norm(after):
+        return None
+    return theta, float(after @ after) / 2
+
+
+def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
+    """As `minimise`, by the shortest steps of Gauss and Newton, damped where they fail (Levenberg and Marquardt).
+
+    What the data do not determine stays as it began.
+    """
+    typical, rows = problem.layout.typical, problem.layout.prior_rows
+
+    def white(theta: Array) -> Array:
+        return np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
+
+    theta, residual = start, white(start)
+    stairs = False
+    for _ in range(NEWTON_STEPS):
+        J = np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), rows]) * typical
+        low, high = ((bound - theta) / typical for bound in _reach(problem, theta))
+        # a rotation of the rows changes no step, and leaves as many rows as columns for every damping
+        rotated = qr(np.column_stack([J, residual]), mode="r", overwrite_a=True, check_finite=False)[0]
+        R: Array = np.asarray(rotated[: J.shape[1] + 1], dtype=np.float64)
+        for damping in DAMPINGS:
+            after = theta + typical * _step(R[:, :-1], R[:, -1], damping, low, high)
+            least = white(after)
+            gain = float(residual @ residual - least @ least)
+            if gain > 0:
+                break
+        if gain > 0:
+            theta, residual = after, least
+        if gain < SMALL_GAIN * max(1.0, float(residual @ residual) / len(residual)):
+            if stairs or not problem.rounds:
+                break
+            stairs = True
+    return theta, float(residual @ residual) / 2
+
+
+def _reach(problem: Problem, theta: Array) -> tuple[Array, Array]:
+    """The least and greatest values that one step may give.
+
+    What is positive by its meaning, such as a time constant, changes by a factor. Derivatives hold within a small one.
+    """
+    low, high = problem.layout.bounds
+    positive = (low > 0) & (theta > 0)
+    return (
+        np.where(positive, np.maximum(low, theta / LARGEST_FACTOR), low),
+        np.where(positive, np.minimum(high, theta * LARGEST_FACTOR), high),
+    )
+
+
+def _step(J: Array, residual: Array, damping: float, low: Array, high: Array) -> Array:
+    """The damped step within bounds: an entry that a step takes beyond its bound goes there, and no farther."""
+    step = np.zeros(J.shape[1])
+    free = np.ones(len(step), dtype=bool)
+    for _ in range(BOUND_ROUNDS):
+        columns, side = J[:, free], residual + J[:, ~free] @ step[~free]
+        size = np.linalg.norm(columns, axis=0)
+        most = size.max(initial=0.0) or 1.0
+        damped = np.vstack([columns / most, np.diag(np.sqrt(damping) * size / most)]) if damping else columns / most
+        # by orthogonal factors: singular values need not converge on free forms of hundreds of columns
+        side = np.append(-side / most, np.zeros(len(damped) - len(side)))
+        step[free] = lstsq(damped, side, cond=RELATIVE_RANK, lapack_driver="gelsy", check_finite=False)[0]
+        beyond = free & ((step < low) | (step > high))
+        if not beyond.any():
+            break
+        step = np.clip(step, low, high)
+        free &= ~beyond
+    return np.asarray(np.clip(step, low, high))
