@@ -51,7 +51,7 @@ def test_the_shape_is_that_of_the_volts(curve: Curve) -> None:
         (4.01, "far", r"above 4 V it is on the optical peak. Move the tip away"),
         (0.49, "near", r"is outside the near side of the calibration curve of 2026-03-01: 0.5 .. 4 V. Check lamp"),
         ([1.0, 2.0, 9.0], "near", r"D63 4711: reading 2 of 3, 9.0000 V"),
-        (math.nan, "near", r"nan V, is not on the near side"),
+        (math.nan, "near", r"nan V, is outside the near side"),
     ],
 )
 def test_a_reading_off_the_curve_is_no_number(curve: Curve, volts: Any, side: Any, words: str) -> None:

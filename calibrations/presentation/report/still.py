@@ -13,7 +13,7 @@ from calibrations.presentation.document import Block, Code, Items, Page, Remark,
 from calibrations.presentation.page import html
 from calibrations.presentation.report.parameters import estimate_cells
 from calibrations.presentation.report.report import model_facts
-from calibrations.presentation.views.still import CLEANED
+from calibrations.presentation.views.still import gains
 from calibrations.text import capital, joined, probability, rounded
 
 MISMATCH = (
@@ -60,7 +60,9 @@ def _sections(
         "model", "log-likelihood gained", "lost without this effect", "mismatch / chance", "other half of the record",
         "mismatch of the Allan deviation",
     )  # fmt: skip
-    steps = Table("Mismatch by model, values", head, list(_steps(discovery)), range(1, 6), headed=False)
+    steps = Table(
+        "Mismatch by model, values", head, [_step(*row) for row in gains(discovery)], range(1, 6), headed=False
+    )
     yield Section("Mismatch by model", (steps, Remark(MISMATCH)))
     yield Section("Measurement and model", pictures)
     fails = [capital(place.text) for place in comparison.fails]
@@ -126,17 +128,7 @@ def _figures(discovery: Discovery[NoiseFit]) -> list[tuple[str, str, str]]:
     return shown
 
 
-def _steps(discovery: Discovery[NoiseFit]) -> Iterable[tuple[str, ...]]:
-    """Rows of the steps: the gains, which add up, and the loss of the whole without each effect alone."""
-    start, baseline = discovery.start, discovery.findings.baseline
-    yield _step(start.model.name, start)
-    if baseline is not start:
-        yield _step(CLEANED, baseline, baseline.log_likelihood - start.log_likelihood)
-    for step in discovery.steps:
-        yield _step(f"+ {step.name}", step.after, step.after.log_likelihood - step.before.log_likelihood, step.alone)
-
-
-def _step(name: str, fit: NoiseFit, gained: float | None = None, alone: float | None = None) -> tuple[str, ...]:
+def _step(name: str, gained: float | None, alone: float | None, fit: NoiseFit) -> tuple[str, ...]:
     likelihoods = ("–" if value is None else rounded(value) for value in (gained, alone))
     return name, *likelihoods, rounded(fit.pooled_excess), rounded(fit.held_out_excess), _off(fit)
 

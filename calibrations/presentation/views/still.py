@@ -74,10 +74,9 @@ class StillView(View[NoiseFit]):
 
     def step_table(self, discovery: Discovery[NoiseFit]) -> Cells:
         """Gains that add up, and the mismatch after each step."""
-        several = len(discovery.steps) > 1
-        chosen = [k for k in range(len(HEAD)) if k != LOST or several]
-        rows = [[row[k] for k in chosen] for row in _rows(discovery, several)]
-        return tuple(HEAD[k] for k in chosen), [tuple(row) for row in rows]
+        chosen = [k for k in range(len(HEAD)) if k != LOST or len(discovery.steps) > 1]
+        rows = (_row(*row) for row in gains(discovery))
+        return tuple(HEAD[k] for k in chosen), [tuple(row[k] for k in chosen) for row in rows]
 
     def candidate_table(self, diagnosis: Diagnosis[NoiseFit], candidates: Sequence[Candidate]) -> Cells:
         """Held-out mismatch, gain, chance and probability of each candidate."""
@@ -123,18 +122,21 @@ class StillView(View[NoiseFit]):
         return [steps_picture(discovery), *still_album(discovery.end, discovery.start)]
 
 
-def _rows(discovery: Discovery[NoiseFit], several: bool) -> Iterator[tuple[str, ...]]:
+def gains(discovery: Discovery[NoiseFit]) -> Iterator[tuple[str, float | None, float | None, NoiseFit]]:
+    """By model: name, log-likelihood gained over the row above, log-likelihood lost without the effect alone, fit.
+
+    Gains add up; losses do not. None where there is nothing to compare with.
+    """
     start, baseline = discovery.start, discovery.findings.baseline
-    yield _row(start.model.name, start)
+    yield start.model.name, None, None, start
     if baseline is not start:
-        yield _row(CLEANED, baseline, baseline.log_likelihood - start.log_likelihood)
-    for s in discovery.steps:
-        gained = s.after.log_likelihood - s.before.log_likelihood
-        yield _row(f"+ {s.name}", s.after, gained, s.alone if several else None)
+        yield CLEANED, baseline.log_likelihood - start.log_likelihood, None, baseline
+    for step in discovery.steps:
+        yield f"+ {step.name}", step.after.log_likelihood - step.before.log_likelihood, step.alone, step.after
 
 
-def _row(name: str, fit: NoiseFit, gained: float | None = None, lost: float | None = None) -> tuple[str, ...]:
-    """In the order of HEAD. A gain depends on the rows above, and gains add up; losses do not."""
+def _row(name: str, gained: float | None, alone: float | None, fit: NoiseFit) -> tuple[str, ...]:
+    """In the order of HEAD."""
     off = ", ".join(f"{100 * value:.3g} %" for value in mismatch(fit).values())
-    shown = ["" if value is None else f"{value:+.5g}" for value in (gained, None if lost is None else -lost)]
+    shown = ["" if value is None else f"{value:+.5g}" for value in (gained, None if alone is None else -alone)]
     return name, *shown, f"{fit.pooled_excess:.2f}", f"{fit.held_out_excess:.2f}", off
