@@ -245,8 +245,10 @@ class Table:
 def time_origin(table: Table) -> tuple[float, str]:
     """(zero of a time axis on the clock of the table in s, its name): power-on of a soak, else the run's first row.
 
-    The times of a file are taken as they are.
+    A motion has the time of its first sample, also in a file. The times of another file are taken as they are.
     """
+    if table.type.moving:
+        return float(table.time_s[0]), " since the first stretch"
     if table.numbers is None:
         return 0.0, ""
     if any(path.startswith(HOLD) for path in table.labels.get("path", ())):

@@ -48,6 +48,26 @@ def estimate_text(value: float, std: float | None) -> str:
     return minus(concise(value / 10.0**power, std / 10.0**power)) + times_ten_to(power)
 
 
+def concise_in_prefix(value: float, std: float | None, of: str) -> str:
+    """`concise` in the prefix that reads best: `785.5(73) uV`, `0.00(16) mV`, `0.98510(25) V/g`."""
+    factor, spelt = in_prefix(value, std, of)
+    return concise(value * factor, None if std is None else std * factor, spelt.replace("µ", "u"))
+
+
+def estimate_in_prefix(value: float, std: float | None, of: str) -> str:
+    """`estimate_text` with its unit, in the prefix that reads best: `785.5(73) µV`, `−1.0(16) mV/g²`."""
+    factor, spelt = in_prefix(value, std, of)
+    return f"{estimate_text(value * factor, None if std is None else std * factor)} {unit(spelt)}".rstrip()
+
+
+def in_prefix(value: float, std: float | None, of: str) -> tuple[float, str]:
+    """Factor and unit of an output or a rate of it. The unit itself stays down to a tenth of it."""
+    if of.partition("/")[0] not in ("V", "g"):
+        return 1.0, of
+    reach = max(abs(value), 10 * (std or 0.0))
+    return (1.0, of) if reach >= 0.1 or reach == 0 else prefixed(of, reach)
+
+
 def time_text(value: float, std: float | None) -> str:
     """A time since a beginning: `2.86(42)`, or `at most 7.7` where it cannot be told from the beginning (k = 2)."""
     if _known(std) and value < 2 * std:

@@ -20,6 +20,8 @@ from enum import Enum, StrEnum
 from calibrations.criteria import MATERIAL, MOST_BY_FORM, MOST_UNEXPLAINED, SIGNIFICANT
 from calibrations.text import joined
 
+MOST_NAMED = 4  # missing effects in a short sentence
+
 
 class Verdict(StrEnum):
     """The verdict on a model; the value is that of the JSON documents."""
@@ -101,6 +103,12 @@ class Judgement:
     def headline(self) -> str:
         """The first sentence of the text."""
         return headline(self)
+
+    @property
+    def summary(self) -> str:
+        """The first sentence; in place of many missing effects it gives their number."""
+        many = len(self.missing) > MOST_NAMED and self.verdict in (Verdict.EFFECT_MISSING, Verdict.AMBIGUOUS)
+        return f"The model {self.model} misses {len(self.missing)} effects." if many else self.headline
 
 
 class Residual(Enum):

@@ -84,5 +84,5 @@ def _why_not(k: int, layout: Layout, std: Array, free: Array) -> str | None:
 
 
 def _label(layout: Layout, slot: Slot) -> str:
-    name = layout.model.terms[slot.term].name
-    return f"{name} {slot.parameter.name}{f' {slot.axis}' if slot.axis else ''}"
+    parts = (layout.model.terms[slot.term].name, slot.parameter.name, slot.axis)
+    return " ".join(dict.fromkeys(filter(None, parts)))

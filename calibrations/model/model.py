@@ -17,7 +17,7 @@ from calibrations.errors import UnknownParameter, nearest
 from calibrations.frames import data_frame, html_table
 from calibrations.result import Shown
 from calibrations.table import Table
-from calibrations.text import columns, concise, minus, rounded, unit, value_text
+from calibrations.text import columns, concise_in_prefix, minus, rounded, unit, value_text
 
 if TYPE_CHECKING:
     from calibrations.model.correlations import Correlations
@@ -40,7 +40,7 @@ class Estimate:
     @property
     def text(self) -> str:
         """Value, uncertainty and unit for people; the reason, where the data does not identify it."""
-        return concise(self.value, self.std, self.unit) if self.identified else f"not identified: {self.why}"
+        return concise_in_prefix(self.value, self.std, self.unit) if self.identified else f"not identified: {self.why}"
 
     def __repr__(self) -> str:
         return f"<{' '.join(filter(None, (self.name, self.axis)))}: {self.text}>"

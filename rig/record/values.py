@@ -54,6 +54,8 @@ class Run:
         """The number of poses, rows or turns, as text. A record without gaps consists of many blocks."""
         if not self.bench:
             return f"{self.rows} rows"
+        if not self.rows:
+            return "no poses"
         return {
             "poses": f"{self.rows} poses",
             "positions": f"{self.rows} positions",

@@ -29,7 +29,7 @@ from calibrations.presentation.charts.history import Life
 from calibrations.presentation.charts.noise import TIME, Scaled, measured_points
 from calibrations.presentation.residual import Column, Shown
 from calibrations.table import in_time
-from calibrations.text import estimate_text, labelled, minus, prefixed, unit
+from calibrations.text import estimate_in_prefix, estimate_text, labelled, minus, prefixed, unit
 from procedures.session import Dwell
 from rig.record import Record, Run
 from rig.record.measured import Measured
@@ -228,7 +228,7 @@ def _differences(pairs: Sequence[Pair]) -> Panel:
         symbol=["diamond" if pair.differ else "circle" for pair in pairs],
         size=8,
         reach=np.array([DIFFERENT * factor * (pair.std or 0.0) for pair in pairs]),
-        hover=[f"{pair.name}: {estimate_text(pair.difference, pair.std)} {unit(pair.unit)}" for pair in pairs],
+        hover=[f"{pair.name}: {estimate_in_prefix(pair.difference, pair.std, pair.unit)}" for pair in pairs],
     )
     y = Axis(low=-0.5, high=len(pairs) - 0.5, names=names, reverse=True)
     return Panel((Rule(0.0, "x", width=1.2), dots), Axis(labelled("difference", spelt)), y)

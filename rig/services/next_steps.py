@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from calibrations.tables import FITTED
-from calibrations.text import bound, columns, concise, estimate_text, joined, time_text, unit
+from calibrations.text import (
+    bound,
+    columns,
+    concise_in_prefix,
+    estimate_in_prefix,
+    in_prefix,
+    joined,
+    rounded,
+    time_text,
+    unit,
+)
 from rig.record import Run
 from rig.services.page_words import PageStep, page_step
 
-SPREADS = re.compile("tolerance|wander")  # uncertainties themselves: two digits
+SPREADS = re.compile("tolerance|wander")  # uncertainties themselves
+SPREAD_DIGITS, TIME_DIGITS = 2, 3
 # By the name of a result that is beyond its limit: what to look at. The first that fits counts.
 REMEDIES = {
     r"level-offset": "the half turn removes the offset of the level from the tilt; have the level adjusted",
@@ -112,14 +123,12 @@ def results_table(results: Mapping[str, Any]) -> list[str]:
     """A table of the results of a run, none where it has none."""
     if not results:
         return []
-    rows = [
-        (name, _result_value(name, r), _limit(r["value"], r["limit"]), r["verdict"] or "")
-        for name, r in results.items()
-    ]
-    return columns(("result", "value", "limit", "verdict"), rows).splitlines()
+    rows = result_rows(results, _value_in_terminal)
+    cells = [(row.name, row.value, row.limit.replace("−", "-") or "-", row.verdict) for row in rows]
+    return columns(("result", "value", "limit", "verdict"), cells).splitlines()
 
 
-# The rows of the table on a page: what is yes or no, and a forecast, is a sentence.
+# The rows of the table: what is yes or no, and a forecast, is a sentence.
 
 STEADY = re.compile(r"(?P<sensor>.*/)?steady-state(?P<axis>-\w)?")
 FORECAST = ("earliest", "expected", "latest")
@@ -135,8 +144,20 @@ class ResultRow:
     verdict: str
 
 
-def result_rows(results: Mapping[str, Any]) -> list[ResultRow]:
-    """The rows on a page. The steady state of a soak is one sentence, with its time or its forecast."""
+def _value_on_page(name: str, result: Mapping[str, Any]) -> str:
+    if (digits := _digits(name, result)) is not None:
+        value, _, of = _in_digits(result, digits).partition(" ")
+        return f"{value} {unit(of)}".rstrip()
+    return estimate_in_prefix(result["value"], result["std"], result["unit"])
+
+
+def result_rows(
+    results: Mapping[str, Any], value_text: Callable[[str, Mapping[str, Any]], str] = _value_on_page
+) -> list[ResultRow]:
+    """The rows on a page. The steady state of a soak is one sentence, with its time or its forecast.
+
+    `value_text` writes a result by its name.
+    """
     rows: list[ResultRow] = []
     shown: set[str] = set()
     for name, r in results.items():
@@ -156,35 +177,39 @@ def result_rows(results: Mapping[str, Any]) -> list[ResultRow]:
         elif name.rpartition("/")[2] == "gap" and not r["value"]:
             rows.append(ResultRow(name, "none", limit, verdict))
         else:
-            value = estimate_text(r["value"], r["std"])
-            value = f"{r['value']:.2g}" if SPREADS.search(name) else value
-            rows.append(ResultRow(name, f"{value} {unit(r['unit'])}".rstrip(), limit, verdict))
+            rows.append(ResultRow(name, value_text(name, r), limit, verdict))
     return rows
 
 
 def _steady_sentence(reached: bool, parts: Mapping[str, Any]) -> str:
     """Whether and when the sensor is steady. `parts`: the results of the time and of its forecast that there are."""
-    times = {end: concise(r["value"], r["std"], r["unit"]) for end, r in parts.items()}
+    times = {end: _in_digits(r, TIME_DIGITS) for end, r in parts.items()}
     if reached:
         if "time" not in times:
             return "Reached."
         time = parts["time"]
         return f"Reached {time_text(time['value'], time['std'])} {time['unit']} after power-on."
     if "expected" in times:
-        between = f"{times['earliest']} to {times['latest']} (95 %)"
-        return f"Not reached. Forecast: {times['expected']} after power-on, {between}."
+        between = f", {times['earliest']} to {times['latest']} (95 %)" if times["earliest"] != times["latest"] else ""
+        return f"Not reached. Forecast: {times['expected']} after power-on{between}."
     if "earliest" in times:
         return f"Not reached. Forecast: not before {times['earliest']} after power-on."
     return "Not reached. There is no forecast."
 
 
-def _result_value(name: str, result: Mapping[str, Any]) -> str:
+def _value_in_terminal(name: str, result: Mapping[str, Any]) -> str:
+    if (digits := _digits(name, result)) is not None:
+        return _in_digits(result, digits).replace("µ", "u").replace("−", "-")
+    return concise_in_prefix(result["value"], result["std"], result["unit"])
+
+
+def _digits(name: str, result: Mapping[str, Any]) -> int | None:
+    """The digits of a spread, and of a time without an uncertainty; None for a result that its uncertainty rounds."""
     if SPREADS.search(name):
-        return f"{result['value']:.2g} {result['unit']}"
-    return concise(result["value"], result["std"], result["unit"])
+        return SPREAD_DIGITS
+    return TIME_DIGITS if result["unit"] == "h" and not result["std"] else None
 
 
-def _limit(value: float, limit: Any) -> str:
-    if limit is None:
-        return "-"
-    return bound(value, limit).replace("−", "-")
+def _in_digits(result: Mapping[str, Any], digits: int) -> str:
+    factor, of = in_prefix(result["value"], None, result["unit"])
+    return f"{rounded(result['value'] * factor, digits)} {of}".rstrip()

@@ -105,6 +105,15 @@ ANSWERS = {
 }
 
 
+# NiceGUI resizes a picture also in the moment in which the page removes it; Plotly then rejects a promise that nobody
+# reads, which the console would show as an error.
+RESIZED = """<script>
+window.addEventListener("unhandledrejection", event => {
+  if (String(event.reason?.message ?? event.reason).startsWith("Resize must be passed")) event.preventDefault();
+});
+</script>"""
+
+
 def _bell() -> None:
     """The button that asks the browser to allow notifications."""
     button = ui.button(icon="notifications").props("flat round dense aria-label='Notify me when a run asks or ends'")
@@ -163,7 +172,7 @@ def frame(desk: Desk, here: str) -> Iterator[dict[str, Key]]:
     keys = {
         str(k): Key(f"go to {title}", partial(ui.navigate.to, to)) for k, (to, title) in enumerate(PAGES.items(), 1)
     }
-    ui.add_head_html(f'<link rel="stylesheet" href="/static/workbench.css">{TELL}')
+    ui.add_head_html(f'<link rel="stylesheet" href="/static/workbench.css">{TELL}{RESIZED}')
     ui.colors(primary="#0067a3", negative="#b3261e")
     with ui.element("header").classes("bar"):
         with ui.element("h1").classes("name"):

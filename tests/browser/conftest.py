@@ -32,7 +32,6 @@ from playwright.sync_api import (
 SIZE = {"width": 1280, "height": 720}
 TABLET = {"width": 768, "height": 1024}
 PATIENCE_MS = 30_000
-TOO_LATE = "Resize must be passed a displayed plot"  # NiceGUI resizes a picture that was just taken away
 LEFT = "net::ERR_ABORTED"  # the page was left, or the answer is a download
 LOCAL = ("http://127.0.0.", "ws://127.0.0.", "data:", "blob:")  # addresses on this computer
 expect.set_options(timeout=PATIENCE_MS)
@@ -60,8 +59,7 @@ class Watch:
         self.faults = kept
 
     def _failed(self, error: str) -> None:
-        if not error.startswith(TOO_LATE):
-            self.faults.append(f"an error in the page: {error}")
+        self.faults.append(f"an error in the page: {error}")
 
     def _written(self, message: ConsoleMessage) -> None:
         if message.type == "error":

@@ -24,6 +24,8 @@ from calibrations.presentation.chart import Chart, Panel, Picture
 from calibrations.presentation.report.report import next_takes, next_words, report, summary
 from calibrations.table import Table
 from calibrations.text import (
+    concise_in_prefix,
+    estimate_in_prefix,
     estimate_text,
     expanded_text,
     interval,
@@ -171,7 +173,7 @@ def test_it_holds_every_parameter_with_its_uncertainty() -> None:
     text = Page(page()).text
     for term in warm().end.model.terms:
         for e in term.estimates:
-            assert f"{e.name} {e.axis} {estimate_text(e.value, e.std)} {unit(e.unit)}" in text
+            assert f"{e.name} {e.axis} {estimate_in_prefix(e.value, e.std, e.unit)}" in text
     reference = warm().end.model.terms[-1].constants["reference_c"]
     assert f"{rounded(reference, 6)} (a reference value, not fitted)" in text
 
@@ -295,6 +297,24 @@ def test_names_are_joined() -> None:
 )
 def test_values_are_rounded_to_two_digits_of_their_uncertainty(value: float, std: float | None, shown: str) -> None:
     assert estimate_text(value, std) == shown
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "of", "shown"),
+    [
+        (7.855e-4, 7.3e-6, "V", "785.5(73) uV"),
+        (0.0, 1.6e-4, "V", "0.00(16) mV"),
+        (0.98510, 2.5e-4, "V/g", "0.98510(25) V/g"),
+        (-0.0010, 0.0016, "V/g^2", "-1.0(16) mV/g^2"),
+        (0.0023, None, "g", "2.3 mg"),
+        (0.00234, 1e-5, "deg", "0.002340(10) deg"),
+        (0.0, None, "V", "0 V"),
+    ],
+)
+def test_outputs_are_in_the_prefix_that_reads_best(value: float, std: float | None, of: str, shown: str) -> None:
+    assert concise_in_prefix(value, std, of) == shown
+    typographic = shown.replace("-", "−").replace("uV", "µV").replace("^2", "²")
+    assert estimate_in_prefix(value, std, of) == typographic
 
 
 @pytest.mark.parametrize(

@@ -91,9 +91,20 @@ def test_results_are_a_table() -> None:
         ["b", "1.00(10)", "V", "0", "to", "2", "pass"],
         ["c", "1.00(10)", "V", "-"],
         ["d", "-1.00(10)", "V", "at", "least", "-1", "fail"],
-        ["d-tolerance", "0.0012", "V", "-"],
+        ["d-tolerance", "1.2", "mV", "-"],
     ]
     assert results_table({}) == []
+
+
+def test_the_steady_state_is_a_sentence_with_times_of_three_digits() -> None:
+    time = {"std": None, "unit": "h", "limit": None, "verdict": None}
+    not_reached = {"steady-state": {**time, "value": 0.0, "unit": ""}}
+    forecast = {f"steady-state-{end}": {**time, "value": 2.35022} for end in ("earliest", "expected", "latest")}
+    assert results_table(not_reached | forecast)[1:] == [
+        "steady-state  Not reached. Forecast: 2.35 h after power-on.  -",
+    ]
+    wider = forecast | {"steady-state-latest": {**time, "value": 3.1}}
+    assert "2.35 h to 3.10 h (95 %)" in results_table(not_reached | wider)[1]
 
 
 @pytest.mark.parametrize("remedy", REMEDIES.values())

@@ -70,7 +70,8 @@ def measurement(shown: Shown) -> Panel:
     texts = [f"{y:.5g} at {x:.3f} s" for x, y in zip(wave.at, shown.factor * wave.measured, strict=True)]
     line = Line(wave.at, shown.factor * wave.model, "model", hover="model: %{y:.5g}")
     dots = Points(wave.at, shown.factor * wave.measured, "measured", size=5, hover=texts)
-    return Panel((line, dots), Axis("time (s)"), Axis(f"{axis} − mean ({shown.unit})"), f"axis {axis}")
+    time = Axis("time since the first sample (s)")
+    return Panel((line, dots), time, Axis(f"{axis} − mean ({shown.unit})"), f"axis {axis}")
 
 
 def failure(shown: Shown) -> Panel:
@@ -97,7 +98,7 @@ def _axis(shown: Shown) -> str:
 
 @dataclass(frozen=True)
 class Waveform:
-    """A few periods of one axis: time (s), and outputs less the model's mean, in the table's unit."""
+    """A few periods of one axis: time since the first sample (s), outputs less the model's mean in the table's unit."""
 
     at: Array
     measured: Array
@@ -111,7 +112,7 @@ def waveform(fit: Fit, axis: str) -> Waveform:
     start = int(np.searchsorted(t, table.time_s[len(table.time_s) // 2]))
     rows = slice(start, int(np.searchsorted(t, t[start] + SHOWN_S)))
     model = _predicted(fit)[rows, c]
-    return Waveform(t[rows], table.samples.outputs[rows, c] - model.mean(), model - model.mean())
+    return Waveform(t[rows] - t[0], table.samples.outputs[rows, c] - model.mean(), model - model.mean())
 
 
 @dataclass(frozen=True)

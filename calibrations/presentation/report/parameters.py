@@ -11,7 +11,7 @@ from calibrations.fitting.matrices import calibration_matrices
 from calibrations.model import Estimate
 from calibrations.presentation.document import Remark, Section, Table
 from calibrations.table import AXES
-from calibrations.text import estimate_text, unit
+from calibrations.text import estimate_text, in_prefix, unit
 
 GENERAL = Markup(
     "G<sub>c</sub> = M (S G<sub>r</sub> + b): from raw outputs G<sub>r</sub> in {raw} to G<sub>c</sub> in "
@@ -25,7 +25,8 @@ def estimate_cells(e: Estimate, without_std: str = "") -> tuple[str, str]:
     if not e.identified:
         return f"not identified: {e.why}", ""
     remark = f" ({without_std})" if without_std and not e.std else ""
-    return estimate_text(e.value, e.std) + remark, unit(e.unit)
+    factor, of = in_prefix(e.value, e.std, e.unit)
+    return estimate_text(e.value * factor, e.std * factor if e.std else None) + remark, unit(of)
 
 
 def matrices_section(fit: Fit) -> Section | None:

@@ -107,7 +107,8 @@ def _headline(soak: Soak, forecasts: Mapping[str, ForecastHistory]) -> str:
         return shown
     low, value, high = (rounded(time_s / HOUR_S, 2) for time_s in bounds)
     if np.isfinite(bounds.high):
-        return f"{shown} Forecast: {value} h after power-on, {low} to {high} h (95 %)."
+        between = f", {low} to {high} h (95 %)" if low != high else ""
+        return f"{shown} Forecast: {value} h after power-on{between}."
     return f"{shown} Forecast: later than {low} h after power-on."
 
 

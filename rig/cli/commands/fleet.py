@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from calibrations.fleet.batch import BatchEffect, Population, SensorVerdict
-from calibrations.text import columns, concise, joined, percent
+from calibrations.text import columns, concise, concise_in_prefix, joined, percent
 from rig.cli.terminal.complete import complete_model
 from rig.cli.terminal.output import FILE, FOLDER, bench_option, emit, json_option, note
 from rig.fleet.calibrate import Calibrated, Calibration
@@ -193,7 +193,7 @@ def _rigs(result: Population) -> Iterator[str]:
     if beyond:
         yield ""
         yield "Errors of rigs relative to their median; the poses were corrected for them:"
-        rows = [(e.rig, e.effect, concise(e.value, e.std, e.unit), e.parameter, e.sensors) for e in beyond]
+        rows = [(e.rig, e.effect, concise_in_prefix(e.value, e.std, e.unit), e.parameter, e.sensors) for e in beyond]
         yield columns(("rig", "effect", "value", "parameter", "sensors"), rows)
     rigs = {rig for group in result.unconnected for rig in group}
     if len(rigs) == 1:

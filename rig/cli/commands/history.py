@@ -12,7 +12,7 @@ import click
 
 from calibrations.analyses.stability import YEAR_DAYS, Agreement
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
-from calibrations.text import columns, concise
+from calibrations.text import columns, concise_in_prefix
 from rig.cli.terminal.complete import complete_model, complete_sensor
 from rig.cli.terminal.output import bench_option, emit, json_option, note, picture_options
 from rig.cli.terminal.progress import working
@@ -167,7 +167,7 @@ def lines(life: History) -> Iterator[str]:
 
 def _row(calibration: Calibration, quantities: Sequence[Quantity]) -> tuple[str, ...]:
     values = (calibration.values.get(q.name) for q in quantities)
-    shown = ("-" if v is None else concise(v.value, v.std, v.unit) for v in values)
+    shown = ("-" if v is None else concise_in_prefix(v.value, v.std, v.unit) for v in values)
     return calibration.day, calibration.data, calibration.rig, *shown
 
 
@@ -175,7 +175,7 @@ def _stability(q: Quantity) -> tuple[str, ...]:
     line, verdict = q.line, chart_verdict(q) or "-"
     if line is None:
         return q.name, "-", "-", verdict, _allowed(q), "-"
-    drift = f"{concise(YEAR_DAYS * line.slope, YEAR_DAYS * line.slope_std, q.unit)}{significance(line)}"
+    drift = f"{concise_in_prefix(YEAR_DAYS * line.slope, YEAR_DAYS * line.slope_std, q.unit)}{significance(line)}"
     return q.name, drift, f"{line.scatter:.2g} {q.unit}", verdict, _allowed(q), str(q.due or "-")
 
 

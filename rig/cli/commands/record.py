@@ -108,7 +108,7 @@ def _pose(number: int, kept: Kept, units: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _head(run: Run) -> list[str]:
-    ended = f"{run.state} {run.ended or ''}".strip()
+    ended = f"{run.state} {run.ended[:19].replace('T', ' ')} UTC" if run.ended else run.state
     head = [f"{run.run}: {run.procedure}, {ended}, {run.extent}, a table of {run.kind}", f"from {run.source}"]
     why = [run.message] if run.message else []
     why += [f"Remark: {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []

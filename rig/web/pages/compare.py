@@ -17,7 +17,7 @@ from calibrations.presentation.chart import Chart
 from calibrations.presentation.charts.noise import scaled, units
 from calibrations.presentation.interactive import figure, height_px
 from calibrations.presentation.residual import Shown, choices, first_choices, residual_units
-from calibrations.text import estimate_text, rounded, unit
+from calibrations.text import estimate_in_prefix, rounded
 from rig.record import Record
 from rig.services.charts import deviations, difference, differences, residuals
 from rig.services.request import Request
@@ -210,12 +210,11 @@ def _parameters(model: str, pairs: list[Pair]) -> None:
 
 
 def _row(pair: Pair) -> tuple[str, ...]:
-    label = unit(pair.unit)
     times = "unknown" if pair.deviations is None else rounded(pair.deviations, 2)
     return (
         pair.name,
-        f"{estimate_text(pair.first, pair.first_std)} {label}",
-        f"{estimate_text(pair.second, pair.second_std)} {label}",
-        f"{estimate_text(pair.difference, pair.std)} {label}",
+        estimate_in_prefix(pair.first, pair.first_std, pair.unit),
+        estimate_in_prefix(pair.second, pair.second_std, pair.unit),
+        estimate_in_prefix(pair.difference, pair.std, pair.unit),
         f"{times}{'  ← differs' if pair.differ else ''}",
     )

@@ -15,7 +15,7 @@ from calibrations.analyses.stability import YEAR_DAYS
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
 from calibrations.presentation.chart import Chart, Panel, one
 from calibrations.presentation.charts.history import EWMA, INDIVIDUALS, RANGES, control_panels, life
-from calibrations.text import estimate_text, minus, rounded, unit
+from calibrations.text import estimate_in_prefix, estimate_text, minus, rounded, unit
 from rig.errors import RigError
 from rig.services.charts import life_of
 from rig.services.control import OUT
@@ -346,15 +346,15 @@ def _row(q: Quantity) -> tuple[str, ...]:
     spelt = unit(q.unit)
     allowed = "—" if q.allowed is None else minus(f"{q.allowed[0]:.6g} to {q.allowed[1]:.6g} {spelt}")
     scatter = "—" if q.line is None else f"{rounded(q.line.scatter, 2)} {spelt}"
-    last = f"{estimate_text(q.last.value, q.last.std)} {spelt}"
+    last = estimate_in_prefix(q.last.value, q.last.std, q.unit)
     return q.name, last, _drift(q), scatter, chart_verdict(q) or "—", allowed, str(q.due or "—")
 
 
 def _drift(q: Quantity) -> str:
     if q.line is None:
         return "—"
-    slope = estimate_text(YEAR_DAYS * q.line.slope, YEAR_DAYS * q.line.slope_std)
-    return f"{slope} {unit(q.unit)}{significance(q.line)}"
+    slope = estimate_in_prefix(YEAR_DAYS * q.line.slope, YEAR_DAYS * q.line.slope_std, q.unit)
+    return f"{slope}{significance(q.line)}"
 
 
 def _calibration(calibration: Calibration, history: History, model: str) -> tuple[str | Link, ...]:

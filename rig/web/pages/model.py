@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 
 LOOK_S = 2.0
+FIRST_LINES = 200  # characters of the details that every width shows
 LONGEST_ADDRESS = 4000  # characters; a longer one keeps the last state that fits
 
 
@@ -338,12 +339,13 @@ class VerdictBox:
     """The box with the verdict and its numbers."""
 
     def __init__(self) -> None:
+        self.described = ""  # the model and the data
         with box("verdict").props("role=status aria-live=polite") as self.box:
             with div("grow"):
                 self.headline = words("", "headline")
                 self.detail = words("", "detail quiet small")
-                with self.detail:
-                    self.whole = ui.tooltip("").props("max-width=640px")
+                self.more = ui.button("Whole verdict", on_click=self._unfold).props("flat dense size=sm")
+                self.more.set_visibility(False)
             self.numbers = div("row-of numbers")
 
     def error(self, compared: Comparison[Any], session: ModelSession[Any]) -> None:
@@ -354,7 +356,8 @@ class VerdictBox:
                 with div("figure"):
                     words(value, "value")
                     words(name, "quiet small")
-        self._show(_failing(compared))
+        self.described = _failing(compared)
+        self._show(self.described)
 
     def wait(self, what: str) -> None:
         """Show that the verdict is not known yet."""
@@ -363,9 +366,11 @@ class VerdictBox:
 
     def found(self, result: Diagnosis[Any]) -> None:
         """Show the verdict."""
-        self.headline.set_text(for_page(result.judgement.text))
-        if result.caution:
-            self._show(f"Caution: {result.caution}. {self.detail.text}")
+        judgement = result.judgement
+        self.headline.set_text(for_page(judgement.summary))
+        rest = judgement.text if judgement.summary != judgement.headline else judgement.text[len(judgement.headline) :]
+        caution = f"Caution: {result.caution}." if result.caution else ""
+        self._show(" ".join(filter(None, (caution, rest.strip(), self.described))))
         self.box.classes(remove="good bad doubt", add=LOOKS[result.verdict])
 
     def cancelled(self) -> None:
@@ -374,9 +379,14 @@ class VerdictBox:
         self.box.classes(remove="good bad doubt")
 
     def _show(self, text: str) -> None:
-        """Show a line, with the complete text as a tooltip."""
+        """Show the first lines of a text, and a button that shows the others."""
         self.detail.set_text(for_page(text))
-        self.whole.set_text(self.detail.text)
+        self.detail.classes(remove="whole")
+        self.more.set_visibility(len(self.detail.text) > FIRST_LINES)
+
+    def _unfold(self) -> None:
+        self.detail.classes(add="whole")
+        self.more.set_visibility(False)
 
 
 def _failing(compared: Comparison[Any]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
@@ -58,9 +59,13 @@ class Missing:
             hint = waiting(counted.text)
             bar = ui.linear_progress(0.0, show_value=False).props("aria-label='progress of the round'")
 
+            begun_s = monotonic()
+
             def tell() -> None:
-                hint.set_text(counted.text)
+                hint.set_text(f"{counted.text}, {monotonic() - begun_s:.0f} s")
                 bar.set_value(counted.share)
+                compares = counted.share == 1  # of unknown length
+                bar.props(add="indeterminate" if compares else "", remove="" if compares else "indeterminate")
 
             ui.timer(PROGRESS_S, tell)
             ui.button("Cancel", icon="close", on_click=self.page.cancel).props("dense flat")

@@ -195,7 +195,7 @@ def _new(run: str, after: int) -> tuple[list[tuple[int, Any]], RunTime, dict[str
 # The page of one run: settings, results, notes, export and report.
 
 LOOKS = {"pass": "good", "fail": "bad", "marginal": "doubt"}
-FORMATS = {"csv": "csv", "event-model": "jsonl"}
+FORMATS = {"csv": ("CSV", "csv"), "event-model": ("Event model", "jsonl")}  # label, and ending of the file
 SHOWN = 200  # characters of a setting
 
 
@@ -224,25 +224,18 @@ class OneRun:
         self._head()
         headline = div("")
         with div("two"):
+            with div("stack"), box("stack"):
+                words("Results", "title")
+                _results(run)
+                for step in page_steps(run, excluded):
+                    step_row(step, "quiet small")
+                for sensor, count in known.items():
+                    ui.link(f"{count} runs of the sensor {sensor}: history", HistoryRequest(sensor).address).classes(
+                        "small"
+                    )
             with div("stack"):
-                with box("stack"):
-                    words("Results", "title")
-                    _results(run)
-                    for step in page_steps(run, excluded):
-                        step_row(step, "quiet small")
-                    for sensor, count in known.items():
-                        ui.link(
-                            f"{count} runs of the sensor {sensor}: history", HistoryRequest(sensor).address
-                        ).classes("small")
-                with box("stack"):
-                    words("Settings", "title")
-                    facts({name: value[:SHOWN] for name, value in _made(run).items() if value})
-            with div("stack"):
-                with box("stack"):
-                    words("Over time", "title")
-                    self.over_time = OverTime()
-                    if run.bench:
-                        self.over_time.lay_out()
+                if run.bench and run.rows:
+                    self._over_time()
                 if excluded:
                     with box("stack"):
                         words("Excluded poses", "title")
@@ -251,7 +244,18 @@ class OneRun:
                     self._notes()
         if run.state == "complete" and run.rows:
             RunReport(desk, run, headline)
-        ui.timer(0.0, lambda: self.over_time.follow(run.run), once=True)
+        with box("stack"):
+            words("Settings", "title")
+            with div("two three"):
+                for part in _made(run):
+                    facts({name: value[:SHOWN] for name, value in part.items() if value})
+
+    def _over_time(self) -> None:
+        with box("stack"):
+            words("Over time", "title")
+            over_time = OverTime()
+            over_time.lay_out()
+        ui.timer(0.0, partial(over_time.follow, self.run.run), once=True)
 
     def _head(self) -> None:
         run = self.run
@@ -259,15 +263,16 @@ class OneRun:
             words(run.run, "title")
             words(run.state, f"chip {'good' if run.state == 'complete' else 'doubt'}")
             words(f"{run.extent}, {run.created[:19].replace('T', ' ')} UTC", "quiet grow")
-            for data in [f"{run.run}/{sensor}" for sensor in run.bench.get("sensors", {})] or [run.run]:
+            of_sensors = [f"{run.run}/{sensor}" for sensor in run.bench.get("sensors", {})] or [run.run]
+            for data in of_sensors if run.rows else ():
                 to = f"/?{urlencode({'data': data})}"
                 ui.button(f"Model of {data.rpartition('/')[2]}" if "/" in data else "Model", icon="insights",
                           on_click=lambda to=to: ui.navigate.to(to)).props("dense")  # fmt: skip
                 ui.button("Report", icon="description", on_click=lambda data=data: self._report(data)).props(
                     "dense outline"
                 )
-            for kind in FORMATS:
-                ui.button(kind, icon="download", on_click=lambda kind=kind: self._export(kind)).props("dense outline")
+            for kind, (label, _) in FORMATS.items() if run.rows else ():
+                ui.button(label, icon="download", on_click=lambda kind=kind: self._export(kind)).props("dense outline")
 
     def _notes(self) -> None:
         words("Events and notes", "title")
@@ -304,7 +309,7 @@ class OneRun:
         """Download the run in a format."""
         try:
             with TemporaryDirectory() as folder:
-                path = Path(folder) / f"{self.run.run}.{FORMATS[kind]}"
+                path = Path(folder) / f"{self.run.run}.{FORMATS[kind][1]}"
                 await off_loop(export, self.run.run, kind, path)
                 ui.download.content(path.read_bytes(), path.name)
         except Exception as error:
@@ -328,7 +333,8 @@ class OneRun:
 
 def _results(run: Run) -> None:
     if not run.results:
-        words("This procedure has no results." if run.state == "complete" else "The run is not complete.", "quiet")
+        where = "The results are in the report below." if run.rows else "There are no results."
+        words(where if run.state == "complete" else "The run is not complete.", "quiet")
         return
     with ui.element("table").classes("plain-table"):
         for row in result_rows(run.results):
@@ -341,14 +347,15 @@ def _results(run: Run) -> None:
                         words(row.verdict, f"chip {LOOKS[row.verdict]}")
 
 
-def _made(run: Run) -> dict[str, str]:
+def _made(run: Run) -> tuple[dict[str, str], ...]:
+    """The run and its settings, the instruments, the constants of sensor and rig."""
     identities = {
         role: " ".join(str(part) for part in identity.values() if part) for role, identity in run.identities.items()
     }
     why = {"message": run.message} if run.message else {}
     settings = {setting_label(name): setting_text(value) for name, value in run.settings.items()}
     known = {setting_label(name): setting_text(value) for name, value in run.constants.items()}
-    return {"procedure": run.procedure, "bench or file": run.source, **why, **settings, **identities, **known}
+    return {"procedure": run.procedure, "bench or file": run.source, **why, **settings}, identities, known
 
 
 def _event(event: Event) -> tuple[str, str, str]:
