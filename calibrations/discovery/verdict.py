@@ -106,9 +106,9 @@ class Judgement:
 
     @property
     def summary(self) -> str:
-        """The first sentence; in place of many missing effects it gives their number."""
+        """The text; where many effects are missing, a sentence with their number."""
         many = len(self.missing) > MOST_NAMED and self.verdict in (Verdict.EFFECT_MISSING, Verdict.AMBIGUOUS)
-        return f"The model {self.model} misses {len(self.missing)} effects." if many else self.headline
+        return f"The model {self.model} misses {len(self.missing)} effects." if many else self.text
 
 
 class Residual(Enum):

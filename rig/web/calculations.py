@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import ctypes
 import os
 import sys
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from contextvars import copy_context
+from dataclasses import dataclass
 from functools import partial
 from threading import Thread
-from typing import ParamSpec, TypeVar
+from typing import Any, Generic, ParamSpec, TypeVar
 from weakref import WeakSet
 
 from nicegui import ui
@@ -21,6 +23,7 @@ from rig.services.search import Cancelled, Counted
 P = ParamSpec("P")
 R = TypeVar("R")
 
+
 class Visit:
     """One visit to a page: analyses for it end when the page is closed. A run is a process of its own and goes on.
 
@@ -30,6 +33,7 @@ class Visit:
     def __init__(self) -> None:
         self.closed = False
         self.search = Counted({})
+        self.calculations: list[Calculation[Any]] = []
         ui.context.client.on_delete(self.close)
 
     def searched(self, effects: Mapping[str, Effect]) -> Counted:
@@ -43,22 +47,57 @@ class Visit:
         if self.closed:
             raise Cancelled
 
+    async def work(self, call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+        """Call in a thread that ends with the visit. Raises Cancelled at its end, and what `call` raises."""
+        self.check()
+        calculation = begin(call, *args, **kwargs)
+        self.calculations.append(calculation)
+        try:
+            return await asyncio.wrap_future(calculation.future)
+        finally:
+            self.calculations.remove(calculation)
+
+    def cancel(self) -> None:
+        """Cancel the present analyses of this visit; it may start others."""
+        self.search.cancelled = True
+        for calculation in self.calculations:
+            calculation.cancel()
+
     def close(self) -> None:
         """End the analyses of this visit."""
-        self.closed = self.search.cancelled = True
+        self.closed = True
+        self.cancel()
 
 
 _CALCULATIONS = WeakSet[Thread]()
 
 
-async def off_loop(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-    """Call in a thread, so that the page stays responsive. The server does not wait for the thread when it ends."""
+@dataclass(frozen=True)
+class Calculation(Generic[R]):
+    """Work in a thread, and its result."""
+
+    thread: Thread
+    future: Future[R]
+
+    def cancel(self) -> None:
+        """Raise Cancelled in the thread at its next line of Python."""
+        if not self.future.done() and (number := self.thread.ident) is not None:
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(number), ctypes.py_object(Cancelled))
+
+
+def begin(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> Calculation[R]:
+    """Call in a thread. The server does not wait for the thread when it ends."""
     future = Future[R]()
     work = partial(copy_context().run, call, *args, **kwargs)
     thread = Thread(target=_settled, args=(future, work), name=call.__name__, daemon=True)
     _CALCULATIONS.add(thread)
     thread.start()
-    return await asyncio.wrap_future(future)
+    return Calculation(thread, future)
+
+
+async def off_loop(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+    """Call in a thread, so that the page stays responsive."""
+    return await asyncio.wrap_future(begin(call, *args, **kwargs).future)
 
 
 def leave_calculations() -> None:
@@ -74,10 +113,14 @@ def leave_calculations() -> None:
 
 def _settled(future: Future[R], work: Callable[[], R]) -> None:
     """Set the result or the error of the work, even if no page waits for it."""
-    if future.set_running_or_notify_cancel():
-        try:
-            result = work()
-        except BaseException as error:
-            future.set_exception(error)
-        else:
-            future.set_result(result)
+    try:
+        if future.set_running_or_notify_cancel():
+            try:
+                result = work()
+            except BaseException as error:
+                future.set_exception(error)
+            else:
+                future.set_result(result)
+    except Cancelled as late:  # it came after the end of the work
+        if not future.done():
+            future.set_exception(late)

@@ -97,7 +97,7 @@ def test_what_is_of_two_kinds_is_not_compared_and_why(workbench: Workbench, runs
 def test_a_run_is_exported_and_reported(workbench: Workbench, runs: list[str], tmp_path: Path) -> None:
     page = workbench.visit(f"/record/{runs[0]}")
     with page.expect_download() as csv:
-        page.get_by_role("button", name="csv").click()
+        page.get_by_role("button", name="CSV").click()
     csv.value.save_as(tmp_path / "exported.csv")
     assert read_csv(tmp_path / "exported.csv").n == 518
     with page.expect_download() as report:

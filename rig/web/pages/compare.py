@@ -21,11 +21,12 @@ from calibrations.text import estimate_in_prefix, rounded
 from rig.record import Record
 from rig.services.charts import deviations, difference, differences, residuals
 from rig.services.request import Request
+from rig.services.search import Cancelled
 from rig.services.two_runs import Pair, again, both, parameters_of, results_of
-from rig.web.calculations import off_loop
+from rig.web.calculations import Visit
 from rig.web.desk import Desk, models
 from rig.web.frame import Key, frame
-from rig.web.parts import box, div, failed, noted, table, waiting, words
+from rig.web.parts import box, div, failed, noted, state, table, waiting, words
 from rig.web.pictures import downloads, draw, empty_plot, remember
 
 # Pictures of one axis: for two tables, or for two still records.
@@ -131,13 +132,22 @@ def register(desk: Desk) -> None:
             with box("stack"):
                 _results(first, second)
 
+        visit = Visit()
+
         async def fit() -> None:
             with fitted:
-                waiting("Fitting one model to both")
+                with box("row-of"):
+                    waiting("Fitting one model to both")
+                    ui.button("Cancel", icon="close", on_click=visit.cancel).props("dense flat")
                 notes: list[str] = []
                 one, other = (Request(data, model or None, desk.bench_file) for data in (first, second))
                 try:
-                    data, *found = await off_loop(both, one, other, notes.append)
+                    data, *found = await visit.work(both, one, other, notes.append)
+                except Cancelled:
+                    fitted.clear()
+                    with state("The comparison was cancelled"):
+                        ui.button("Compare again", icon="refresh", on_click=ui.navigate.reload)
+                    return
                 except Exception as error:
                     fitted.clear()
                     failed("Cannot fit one model to both", error)

@@ -20,7 +20,7 @@ from rig.services.exclusion import numbered_run
 from rig.services.page_words import IMPORT, address
 from rig.services.search import Cancelled, Counted
 from rig.web.address import ModelState, parse_state
-from rig.web.calculations import off_loop
+from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk, runs
 from rig.web.frame import Key, frame
 from rig.web.pages import run_record
@@ -59,6 +59,7 @@ class Workbench:
         self.address = ""
         self.session: ModelSession[Any] | None = None
         self.search = Counted({})
+        self.visit = Visit()
         self.turn = 0  # results of older requests are ignored
         self.diagnoses: dict[tuple[str, ...], Diagnosis[Any]] = {}
         self.seen: tuple[bool, Content] | None = None
@@ -140,8 +141,12 @@ class Workbench:
     async def open(self) -> None:
         """Read the data, fit the model, and show the session."""
         self.verdict.wait(f"Reading {self.data} and fitting the model")
+        self.verdict.offer_cancel(self.visit.cancel)
         try:
-            session = await off_loop(self.desk.open, self.data, self.model, self.given.added, self.noise)
+            session = await self.visit.work(self.desk.open, self.data, self.model, self.given.added, self.noise)
+        except Cancelled:
+            self._cancelled()
+            return
         except Exception as error:
             self.body.clear()
             with self.body:
@@ -162,6 +167,14 @@ class Workbench:
                 run_record.listed(self.data, self.afresh)
         ui.timer(LOOK_S, self._look_for_changes)
         await self.show(session)
+
+    def _cancelled(self) -> None:
+        """The person cancelled the fit: nothing is shown."""
+        if self.visit.closed:
+            return
+        self.body.clear()
+        with self.body, state("The analysis was cancelled", f"{self.data} is unchanged."):
+            ui.button("Analyse again", icon="refresh", on_click=partial(self.go, self.data, self.model, self.noise))
 
     def _show_places(self, compared: Comparison[Any]) -> None:
         """The places where the model fails; a click selects their poses."""
@@ -210,7 +223,10 @@ class Workbench:
         turn = self.turn
         self.session = session
         self.desk.keep(self.data, self.model, session, self.noise)
-        compared = await off_loop(session.compared)
+        try:
+            compared = await self.visit.work(session.compared)
+        except Cancelled:
+            return
         if turn != self.turn:
             return
         self.pictures.show(compared, session)
@@ -223,13 +239,14 @@ class Workbench:
 
     async def _diagnose(self, session: ModelSession[Any], turn: int) -> None:
         self.search.cancelled = True  # the result of the previous search is not needed
+        self.visit.cancel()
         key = session.names
         if key not in self.diagnoses:
             self.search = Counted(session.effects)
             self.missing.wait(self.search)
             self.verdict.wait("Searching for missing effects")
             try:
-                self.diagnoses[key] = await off_loop(session.among(self.search).diagnosed)
+                self.diagnoses[key] = await self.visit.work(session.among(self.search).diagnosed)
             except Cancelled:
                 return
             except Exception as error:
@@ -246,6 +263,7 @@ class Workbench:
         self.discovering = False
         self.turn += 1
         self.search.cancelled = True
+        self.visit.cancel()
 
     def cancel(self) -> None:
         """Cancel the search for missing effects."""
@@ -283,7 +301,9 @@ class Workbench:
             return
         self.verdict.wait(f"Removing {name} and fitting the others")
         try:
-            session = await off_loop(self.session.removed, name)
+            session = await self.visit.work(self.session.removed, name)
+        except Cancelled:
+            return
         except Exception as error:
             ui.notify(message(error), type="negative", multi_line=True)
             return
@@ -348,6 +368,11 @@ class VerdictBox:
                 self.more.set_visibility(False)
             self.numbers = div("row-of numbers")
 
+    def offer_cancel(self, cancel: Callable[[], None]) -> None:
+        """A button that cancels the first fit, in place of the numbers."""
+        with self.numbers:
+            ui.button("Cancel", icon="close", on_click=cancel).props("dense flat")
+
     def error(self, compared: Comparison[Any], session: ModelSession[Any]) -> None:
         """Show the error and where it is largest, before the diagnosis."""
         self.numbers.clear()
@@ -368,9 +393,9 @@ class VerdictBox:
         """Show the verdict."""
         judgement = result.judgement
         self.headline.set_text(for_page(judgement.summary))
-        rest = judgement.text if judgement.summary != judgement.headline else judgement.text[len(judgement.headline) :]
+        rest = "" if judgement.summary == judgement.text else judgement.text
         caution = f"Caution: {result.caution}." if result.caution else ""
-        self._show(" ".join(filter(None, (caution, rest.strip(), self.described))))
+        self._show(" ".join(filter(None, (caution, rest, self.described))))
         self.box.classes(remove="good bad doubt", add=LOOKS[result.verdict])
 
     def cancelled(self) -> None:

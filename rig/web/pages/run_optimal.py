@@ -16,7 +16,8 @@ from rig.bench import Bench
 from rig.files import home, write_whole
 from rig.planning.optimal import Optimal, optimal
 from rig.services.optimal_words import PLANS, plan_rows, purpose, savings
-from rig.web.calculations import off_loop
+from rig.services.search import Cancelled
+from rig.web.calculations import Visit, off_loop
 from rig.web.desk import FILES, models
 from rig.web.parts import div, failed, setting_text, table, waiting, words
 
@@ -29,6 +30,7 @@ class OptimalDialog:
 
     def __init__(self, bench: Bench, sweep: Procedure, settings: Mapping[str, str], use: Use) -> None:
         self.bench, self.sweep, self.settings, self.use = bench, sweep, settings, use
+        self.visit = Visit()
         with ui.dialog().props("persistent") as self.dialog, ui.card().classes("optimal"):
             words("Choose poses for a model", "title")
             words(
@@ -55,8 +57,15 @@ class OptimalDialog:
         self.place.clear()
         with self.place:
             waiting("Choosing the poses; nothing moves. This takes up to some minutes.")
+            ui.button("Stop choosing", icon="close", on_click=self.visit.cancel).props("dense flat")
         try:
-            choice = await off_loop(self._optimal)
+            choice = await self.visit.work(self._optimal)
+        except Cancelled:
+            if self.dialog.is_deleted:
+                return
+            self.place.clear()
+            with self.place:
+                words("Stopped; no poses are chosen.", "quiet")
         except Exception as error:
             self.place.clear()
             with self.place:
@@ -94,7 +103,8 @@ class OptimalDialog:
         self.use({"pose_list": path, **fixed})
 
     def close(self) -> None:
-        """Close the dialog and forget it."""
+        """Close the dialog and forget it, and the choice in progress."""
+        self.visit.cancel()
         self.dialog.close()
         self.dialog.delete()
 
