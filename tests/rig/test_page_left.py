@@ -16,7 +16,7 @@ from rig.bench import DEFAULT
 from rig.services.report import reported
 from rig.services.request import Request
 from rig.services.search import Cancelled, Counted
-from rig.web.calculations import Visit
+from rig.web.calculations import Visit, begin
 from rig.web.desk import Desk
 from rig.web.pages import register
 from tests.browser.measured import two_faults
@@ -44,7 +44,7 @@ def test_a_closed_page_ends_its_search(closed: bool, tmp_path: Path, monkeypatch
             register(desk)
             try:
                 client = await user.open(f"/?data={quote(data)}&model=linear")
-                await user.should_see("Cancel", retries=200)
+                await user.should_see("Searching for missing effects", retries=200)
                 [search] = searches()
                 if closed:
                     client.delete()
@@ -57,6 +57,24 @@ def test_a_closed_page_ends_its_search(closed: bool, tmp_path: Path, monkeypatch
     assert not searches()
     (session,) = desk.sessions.values()
     assert bool(session.plans) is not closed
+
+
+def test_a_cancelled_calculation_ends_at_its_next_line() -> None:
+    begun = threading.Event()
+
+    def endless() -> None:
+        begun.set()
+        while True:
+            pass
+
+    calculation = begin(endless)
+    assert begun.wait(60)
+    calculation.cancel()
+    with pytest.raises(Cancelled):
+        calculation.future.result(60)
+    calculation.thread.join(60)
+    assert not calculation.thread.is_alive()
+    calculation.cancel()  # after the end: nothing happens
 
 
 def test_a_visit_ends_its_searches_and_its_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
