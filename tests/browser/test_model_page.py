@@ -140,7 +140,7 @@ def test_a_search_is_told_cancelled_and_begun_again(
     context.request.get(said["url"])
     page = context.new_page()
     page.goto(f"{said['url'].partition('/?')[0]}/?data={quote(thousand(tmp_path))}")
-    page.get_by_role("button", name="Cancel").click()
+    page.locator(".side").get_by_role("button", name="Cancel").click()
     expect(page.get_by_text("The search was cancelled.")).to_be_visible()
     expect(page.locator(".verdict .headline").first).to_have_text("Not diagnosed")
     (tmp_path / "go").touch()
