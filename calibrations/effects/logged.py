@@ -72,12 +72,26 @@ def follows_level(table: Table, names: Sequence[str], power: int = 1) -> float:
 def _without_scatter(table: Table, name: str, power: int) -> tuple[Array, float, float]:
     """Level, its rms error and that of its change from row to row, in the column's unit to the power.
 
+    A standard deviation scatters in proportion to itself, so that its logarithm is smoothed.
+    """
+    read = table.column(name)
+    if name in table.std_names and np.all(read > 0):
+        exponent, error, change = _smoothed(power * np.log(read))
+        values = np.exp(exponent)
+        size = float(np.sqrt(np.mean(values**2)))
+        return values, error * size, change * size
+    return _smoothed(read**power)
+
+
+def _smoothed(read: Array) -> tuple[Array, float, float]:
+    """The level of readings (n,), its rms error and that of its change from row to row.
+
     The straight line is taken off first: the cosine transform continues a record as its mirror image, and the line
     would have a corner there.
     """
     from calibrations.estimators.scatter import without_scatter  # scipy is slow to import, and a list needs none
 
-    read, rows = table.column(name) ** power, np.arange(table.n)
+    rows = np.arange(len(read))
     line = np.polyval(np.polyfit(rows, read, 1), rows)
     readings = 1 + int(np.count_nonzero(np.diff(read)))
     smooth = without_scatter(read - line, readings)

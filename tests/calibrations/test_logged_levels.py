@@ -75,6 +75,23 @@ def test_a_level_is_nearer_to_the_vibration_than_its_estimate() -> None:
     assert 0 < reading_error(table, "vx_std_v", 2) < 0.3
 
 
+def test_peaks_of_a_standard_deviation_do_not_spoil_its_level_in_quiet_rows() -> None:
+    """The estimate of a standard deviation scatters in proportion to itself; its stated error is large enough, 10 records."""
+    off, quiet_off, stated = [], [], []
+    for seed in range(10):
+        random = np.random.default_rng(seed)
+        true = 1e-3 * np.exp(0.8 * wandering(random, rows(), 15.0))
+        read = true * random.normal(1, 1 / np.sqrt(2 * SAMPLES), rows())
+        table = sweep(np.zeros((rows(), 2)), {"vx_std_v": read, "vy_std_v": read})
+        found = level(table, "vx_std_v", 2)
+        relative = found / true**2 - 1
+        quiet_off.append(np.mean(relative[true < np.median(true)] ** 2))
+        off.append(np.mean((found - true**2) ** 2) / np.var(true**2))
+        stated.append(reading_error(table, "vx_std_v", 2) ** 2)
+    assert np.sqrt(np.mean(quiet_off)) < 0.1
+    assert 0.9 < np.sqrt(np.mean(stated) / np.mean(off)) < 1.8
+
+
 def test_vibration_of_a_noisy_estimate_has_one_name_and_its_whole_size() -> None:
     found = discover(vibrating(20 * synthetic.NOISE_V))
     assert found.causes == ("vibration-rectification",)
