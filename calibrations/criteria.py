@@ -166,6 +166,7 @@ LARGEST_MISFIT = 0.06  # of an output's variation: effects of a sensor leave les
 MUCH_MORE_THAN_NOISE = 3.0  # times the noise floor, without any pattern: the floor is wrong
 FEWEST_EQUAL = 3  # rows with exactly one value, where nearly all others differ
 EQUAL_SHARE = 0.02  # of the rows
+TIMES_NEXT = 2  # as often as any other value
 DISTINCT_SHARE = 0.8  # of the other rows: readings of a fine converter hardly ever agree
 FAR_FROM_OTHERS = 10.0  # robust standard deviations: no temperature of one run
 VISIBLE_STEP = 3.0  # standard deviations by rounding over the noise floor

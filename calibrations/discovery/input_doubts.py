@@ -22,6 +22,7 @@ from calibrations.criteria import (
     FEWEST_EQUAL,
     FEWEST_RESPONSE_ROWS,
     RATE_AGREES,
+    TIMES_NEXT,
     VISIBLE_STEP,
 )
 from calibrations.estimators.robust import robust_std
@@ -87,6 +88,8 @@ def _equal_values(table: Table) -> Iterator[str]:
             continue
         most = int(np.argmax(counts))
         count, value = int(counts[most]), float(each[most])
+        if count < TIMES_NEXT * np.delete(counts, most).max():
+            continue  # a coarse reading repeats many values by chance
         others = table.n - count
         if count < max(FEWEST_EQUAL, EQUAL_SHARE * table.n) or len(each) - 1 < DISTINCT_SHARE * others:
             continue
@@ -99,7 +102,7 @@ def _equal_values(table: Table) -> Iterator[str]:
                 f"{place}: at its {end} value the output or the converter is saturated; take a wider range, or leave "
                 "these rows out"
             )
-        elif away < 0 or abs(value - np.median(rest)) > FAR_FROM_OTHERS * robust_std(rest):
+        elif away < 0 or abs(value - np.median(rest)) > FAR_FROM_OTHERS * robust_std(rest - np.median(rest)):
             yield f"{place}: it may stand for a missing reading, or a stuck one; leave these rows out"
 
 

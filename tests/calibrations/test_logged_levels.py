@@ -76,7 +76,7 @@ def test_a_level_is_nearer_to_the_vibration_than_its_estimate() -> None:
 
 
 def test_peaks_of_a_standard_deviation_do_not_spoil_its_level_in_quiet_rows() -> None:
-    """The estimate of a standard deviation scatters in proportion to itself; its stated error is large enough, 10 records."""
+    """Its estimate scatters in proportion to itself, and its stated error is large enough; 10 records."""
     off, quiet_off, stated = [], [], []
     for seed in range(10):
         random = np.random.default_rng(seed)
