@@ -112,11 +112,12 @@ def fitted(base: Fit, end: Fit, added: list[Addition]) -> list[Fit]:
     return [*fits, end] if added else []
 
 
-def gradually(base: Fit, added: list[Addition]) -> tuple[list[Addition], list[Fit]]:
+def gradually(base: Fit, added: list[Addition], end: Fit | None = None) -> tuple[list[Addition], list[Fit]]:
     """The additions that make the error no larger, each beside those before it, and the fits, the first of them `base`.
 
     An effect far from the truth can lead the fit of all to a place from which no way leads back. One that does not help
-    yet, such as a quantiser beside a drift that is missing, is tried again beside the others.
+    yet, such as a quantiser beside a drift that is missing, is tried again beside the others. `end` is the fit of all
+    where that is known.
     """
     taken: list[Addition] = []
     fits = [base]
@@ -124,7 +125,8 @@ def gradually(base: Fit, added: list[Addition]) -> tuple[list[Addition], list[Fi
     while waiting:
         postponed: list[Addition] = []
         for addition in waiting:
-            larger = refit(fits[-1], addition.to(fits[-1].model))
+            is_last = end is not None and len(taken) == len(added) - 1
+            larger = end if end is not None and is_last else refit(fits[-1], addition.to(fits[-1].model))
             if larger.pooled_excess <= NO_WORSE * fits[-1].pooled_excess:
                 taken.append(addition)
                 fits.append(larger)

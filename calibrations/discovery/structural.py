@@ -105,13 +105,12 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     if needed != basic:
         base = _freed(start, needed, effects)
         end = together(base, chosen)
-    fits = [base, *fitted(base, end, chosen)]
-    if any(later.pooled_excess > NO_WORSE * earlier.pooled_excess for earlier, later in pairwise(fits)):
-        names = [a.effect.name for a in chosen]
-        taken, falling = gradually(base, sorted([*causes, *forms], key=lambda a: names.index(a.effect.name)))
-        if falling[-1].pooled_excess < NO_WORSE * end.pooled_excess:
-            chosen, fits, end = taken, falling, falling[-1]
-            forms = [a for a in chosen if a.effect.name.startswith(PREFIX)]
+    taken, fits = gradually(base, chosen, end)
+    if fits[-1].pooled_excess < NO_WORSE * end.pooled_excess:
+        chosen, end = taken, fits[-1]
+        forms = [a for a in chosen if a.effect.name.startswith(PREFIX)]
+    else:
+        fits = [base, *fitted(base, end, chosen)]
     steps = _steps(start, needed, base, effects)
     steps += [Step(a.effect.name, *pair) for a, pair in zip(chosen, pairwise(fits), strict=True)]
     tried = _first(start, steps, candidates(start, effects))
