@@ -15,13 +15,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.special import ndtr
 
 from calibrations.criteria import INSEPARABLE, NAMED_GAIN
 from calibrations.design.optimal_design import noise_on_rows
 from calibrations.errors import DataError, MissingColumn
 from calibrations.fitting.fit import Fit
+from calibrations.fitting.minimise import newton_step
 from calibrations.fitting.problem import Problem
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.joined import joined
@@ -31,7 +31,7 @@ from calibrations.model.chain import forward
 from calibrations.model.parameters import Layout
 from calibrations.table import AXES, Array, Constant, Table
 
-ROUNDS, CLOSE_GAIN = 12, 1e-2  # evaluations, and the relative change of lambda at which they end
+ROUNDS, CLOSE_GAIN = 12, 1e-2  # steps, and the change of lambda, relative or at least absolute, at which they end
 
 
 @dataclass(frozen=True)
@@ -105,6 +105,8 @@ def _distance(right: Fit, wrong: Fit, table: Table) -> Callable[[bool], float]:
     mistaken = wrong.problem.on(all_data)
     noise = noise_on_rows(right.noise, right.problem.on(table))
 
+    errors, slopes = mistaken.residual(wrong.theta) - truth, mistaken.jacobian(wrong.theta)
+
     def least(together: bool) -> float:
         def white(columns: Array) -> Array:
             """(channels, n, k) -> (rows, k)."""
@@ -114,12 +116,14 @@ def _distance(right: Fit, wrong: Fit, table: Table) -> Callable[[bool], float]:
         def distance(theta: Array) -> Array:
             return white((mistaken.residual(theta) - truth)[:, :, None])[:, 0]
 
-        def slope(theta: Array) -> Array:
-            return white(mistaken.jacobian(theta))
-
-        size, bounds = mistaken.layout.typical, mistaken.layout.bounds
-        solution = least_squares(distance, wrong.theta, slope, bounds, x_scale=size, ftol=CLOSE_GAIN, max_nfev=ROUNDS)
-        return 2 * float(solution.cost)
+        theta, left, slope = wrong.theta, white(errors[:, :, None])[:, 0], white(slopes)
+        for _ in range(ROUNDS):
+            before = float(left @ left)
+            theta, left = newton_step(mistaken.layout, distance, theta, left, slope)
+            if before - float(left @ left) < CLOSE_GAIN * max(float(left @ left), 1.0):
+                break
+            slope = white(mistaken.jacobian(theta))
+        return float(left @ left)
 
     return least
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy  # its room of optimization is loaded where it is first entered
 from scipy.linalg import lstsq, qr
@@ -9,6 +11,7 @@ from scipy.linalg import lstsq, qr
 from calibrations.fitting.identifiability import RELATIVE_RANK
 from calibrations.fitting.problem import Problem
 from calibrations.means.noise import Noise
+from calibrations.model.parameters import Layout
 from calibrations.table import Array
 
 NEWTON_STEPS = 20
@@ -78,7 +81,7 @@ def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, fl
 
     What the data do not determine stays as it began.
     """
-    typical, rows = problem.layout.typical, problem.layout.prior_rows
+    rows = problem.layout.prior_rows
 
     def white(theta: Array) -> Array:
         return np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
@@ -86,19 +89,10 @@ def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, fl
     theta, residual = start, white(start)
     stairs = False
     for _ in range(NEWTON_STEPS):
-        J = np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), rows]) * typical
-        low, high = ((bound - theta) / typical for bound in _reach(problem, theta))
-        # a rotation of the rows changes no step, and leaves as many rows as columns for every damping
-        rotated = qr(np.column_stack([J, residual]), mode="r", overwrite_a=True, check_finite=False)[0]
-        R: Array = np.asarray(rotated[: J.shape[1] + 1], dtype=np.float64)
-        for damping in DAMPINGS:
-            after = theta + typical * _step(R[:, :-1], R[:, -1], damping, low, high)
-            least = white(after)
-            gain = float(residual @ residual - least @ least)
-            if gain > 0:
-                break
-        if gain > 0:
-            theta, residual = after, least
+        slope = np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), rows])
+        after, least = newton_step(problem.layout, white, theta, residual, slope)
+        gain = float(residual @ residual - least @ least)
+        theta, residual = after, least
         if gain < SMALL_GAIN * max(1.0, float(residual @ residual) / len(residual)):
             if stairs or not problem.rounds:
                 break
@@ -106,12 +100,32 @@ def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, fl
     return theta, float(residual @ residual) / 2
 
 
-def _reach(problem: Problem, theta: Array) -> tuple[Array, Array]:
+def newton_step(
+    layout: Layout, white: Callable[[Array], Array], theta: Array, residual: Array, slope: Array
+) -> tuple[Array, Array]:
+    """Parameters (p,) with a smaller residual, and this residual (rows,); both as given where no step makes it smaller.
+
+    white  the residual as a function of the parameters; `residual` and its derivatives `slope` (rows, p) are at `theta`
+    """
+    typical, J = layout.typical, slope * layout.typical
+    low, high = ((bound - theta) / typical for bound in _reach(layout, theta))
+    # a rotation of the rows changes no step, and leaves as many rows as columns for every damping
+    rotated = qr(np.column_stack([J, residual]), mode="r", overwrite_a=True, check_finite=False)[0]
+    R: Array = np.asarray(rotated[: J.shape[1] + 1], dtype=np.float64)
+    for damping in DAMPINGS:
+        after = theta + typical * _step(R[:, :-1], R[:, -1], damping, low, high)
+        least = white(after)
+        if float(residual @ residual - least @ least) > 0:
+            return after, least
+    return theta, residual
+
+
+def _reach(layout: Layout, theta: Array) -> tuple[Array, Array]:
     """The least and greatest values that one step may give.
 
     What is positive by its meaning, such as a time constant, changes by a factor. Derivatives hold within a small one.
     """
-    low, high = problem.layout.bounds
+    low, high = layout.bounds
     positive = (low > 0) & (theta > 0)
     return (
         np.where(positive, np.maximum(low, theta / LARGEST_FACTOR), low),
