@@ -82,13 +82,18 @@ def geometry(result: SearchResult, curves: Mapping[str, Array], effects: Geometr
     pick, over = _angles(result, gain)
     b = own_base_size(data)
     sizes = {place: float(np.sqrt(np.mean(curve**2))) for place, curve in curves.items()}
-    linear = {place: _linear_part(result, place, curve) for place, curve in curves.items()}
+    lines_of = {place: _linear_part(result, place, curve) for place, curve in curves.items()}
     shift, covariance = _beside_forms(result, sizes)
     C = pick @ covariance[:b, :b] @ pick.T
     C += np.diag(np.full(len(pick), (IMMATERIAL * floor / mean_gain) ** 2))
-    own = [2 * max((linear.get(place, 0.0) for place in places), default=0.0) / mean_gain for places in over]
+    own = [2 * max((lines_of.get(place, 0.0) for place in places), default=0.0) / mean_gain for places in over]
     outputs = partial(_linear_outputs, result, effects)
-    angles_left = partial(_angles_left, result, pick, pick @ shift[:b], outputs)
+    linear = state_at(data, Given.nothing(data), Coefficients(result.values.base[:b], {}), ()).predicted
+    to_angles = pick @ (result.gram.base_inverse @ result.columns[:, : len(covariance)].T)[:b]
+
+    def angles_left(values: Mapping[str, Array]) -> Array:
+        return np.asarray(to_angles @ ((linear - outputs(values)) / result.white).ravel() + pick @ shift[:b])
+
     values, alternatives, _ = _chosen(angles_left, C + np.diag(np.square(own)), effects, effects.given)
     sizes_of = {
         name: float(np.sqrt(np.mean((outputs(values) - outputs(_without(values, name))) ** 2))) / floor
@@ -108,21 +113,6 @@ def _linear_outputs(result: SearchResult, effects: GeometryEffects, values: Mapp
     base = result.values.base
     scale = np.linalg.norm(base[c : 4 * c].reshape(c, 3), axis=1) * np.sign(base[c : 4 * c].reshape(c, 3).diagonal())
     return np.asarray(base[:c, None] + scale[:, None] * effects.forces(values)[:, :c].T)
-
-
-def _angles_left(
-    result: SearchResult,
-    pick: Array,
-    shift: Array,
-    outputs: Callable[[Mapping[str, Array]], Array],
-    values: Mapping[str, Array],
-) -> Array:
-    """The angles that a geometry leaves of those of the fit, which differ by `shift` from those of `result`, rad."""
-    g, base = result.gram, result.columns[:, : result.gram.base_inverse.shape[0]]
-    own = Coefficients(result.values.base[: own_base_size(result.data)], {})
-    linear = state_at(result.data, Given.nothing(result.data), own, ())
-    missed = ((linear.predicted - outputs(values)) / result.white).ravel()
-    return np.asarray(pick @ (g.base_inverse @ (base.T @ missed))[: pick.shape[1]] + shift)
 
 
 def _without(values: Mapping[str, Array], name: str) -> dict[str, Array]:
