@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from calibrations.analyses.motion import MotionResult
 from calibrations.discovery.verdict import Verdict
@@ -23,16 +23,17 @@ if TYPE_CHECKING:
     from calibrations.presentation.chart import Picture
 
 
-def shaken_of(data: str) -> MotionResult | None:
-    """Both models beside the displacement sensor; None where `data` is a file, or a run of something else.
+def of_run(data: str) -> tuple[MotionResult | None, Mapping[str, Any]]:
+    """Both models beside the displacement sensor, None where the run is of something else, and the run's results.
 
-    Raises SensorFault, RecordError, DataError.
+    (None, {}) where `data` is a file. Raises SensorFault, RecordError, DataError.
     """
     if Path(data).exists():
-        return None
+        return None, {}
     with Record.to_find(data) as record:
         measured = Measured.named(record, data)
-        return beside_displacement(measured) if measured.run.procedure == "motion" else None
+        motion = beside_displacement(measured) if measured.run.procedure == "motion" else None
+        return motion, measured.run.results
 
 
 # The page on a soak, for `rig report RUN` without --model.
@@ -110,6 +111,6 @@ def _on_a_model(request: Request, question: Loaded, tell: Callable[[str], None],
     from calibrations.presentation.charts.discovery import album
     from calibrations.presentation.report.report import report
 
-    shaken = shaken_of(request.data)
-    pictures = album(discovery, beside, shaken)
-    return pictures, lambda: report(discovery, beside, today(), program(), pictures, shaken)
+    motion, results = of_run(request.data)
+    pictures = album(discovery, beside, motion)
+    return pictures, lambda: report(discovery, beside, today(), program(), pictures, motion, results)

@@ -201,6 +201,18 @@ def _with_model(fit: object, model: Model) -> object:
     return replace(fit, model=model)  # type: ignore[type-var]
 
 
+def test_it_holds_the_results_that_have_a_limit() -> None:
+    results = {
+        "rmse-linear-x": {"value": 12.5, "std": 0.3, "unit": "mm/s2", "limit": [0, 10], "verdict": "fail"},
+        "amplitude": {"value": 2.0, "std": None, "unit": "m/s2", "limit": None, "verdict": None},
+    }
+    text = report(warm(), beside(), "2026-07-31", "rig 1", blank(), results=results)
+    (row,) = [part for part in text.split("<tr>") if "rmse-linear-x" in part]
+    assert all(part in row for part in ("12.50(30)", "fail"))
+    assert "amplitude" not in text
+    assert "Verdicts" not in page()
+
+
 def test_it_holds_the_noise() -> None:
     text = Page(page()).text
     noise = warm().end.noise

@@ -27,7 +27,7 @@ from rig.record import Kept, Record
 from rig.record.measured import Measured
 from rig.results.evaluate import names
 from rig.runs.runner import Outcome, resume, start
-from rig.services.report import shaken_of
+from rig.services.report import of_run
 from tests.rig.rigging import Onlooker
 from tests.slow import first_fast
 
@@ -290,5 +290,5 @@ def test_an_imported_motion_has_no_sweep_to_be_judged_by(rig_home: Path) -> None
     with Record() as record:
         outcome = shaken(record, bench(QUIET), **BRIEF)
         imported = record.add_table(Measured.named(record, outcome.run.run).table())
-    assert shaken_of(imported) is None
-    assert shaken_of(outcome.run.run) is not None
+    assert of_run(imported)[0] is None
+    assert of_run(outcome.run.run)[0] is not None

@@ -1,8 +1,10 @@
-"""Parts that several reports have: estimates as cells, the general calibration M, S and b, and names of files."""
+"""Parts that several reports have: estimates as cells, results beside limits, matrices M, S and b, names of files."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from pathlib import PurePath, PureWindowsPath
+from typing import Any
 
 from markupsafe import Markup
 
@@ -11,7 +13,7 @@ from calibrations.fitting.matrices import calibration_matrices
 from calibrations.model import Estimate
 from calibrations.presentation.document import Remark, Section, Table
 from calibrations.table import AXES
-from calibrations.text import estimate_text, in_prefix, unit
+from calibrations.text import bound, estimate_text, in_prefix, minus, unit
 
 GENERAL = Markup(
     "G<sub>c</sub> = M (S G<sub>r</sub> + b): from raw outputs G<sub>r</sub> in {raw} to G<sub>c</sub> in "
@@ -56,3 +58,16 @@ def name_of_file(source: str) -> str:
     if PurePath(source).is_absolute() or PureWindowsPath(source).is_absolute():
         return PureWindowsPath(source).name
     return source
+
+
+def verdicts(results: Mapping[str, Any]) -> Iterable[Section]:
+    """The results of a run that have a limit, by name, each with value, std, unit, limit and verdict; none without."""
+    if rows := [_verdict(name, result) for name, result in results.items() if result["limit"] is not None]:
+        head = ("result", "value", "limit", "verdict")
+        yield Section("Verdicts", (Table("Verdicts", head, rows, (1, 2), headed=False),))
+
+
+def _verdict(name: str, result: Mapping[str, Any]) -> tuple[str, ...]:
+    value, std = result["value"], result["std"]
+    shown = estimate_text(value, std) if std else minus(f"{value:.3g}")
+    return name, f"{shown} {result['unit']}", bound(value, result["limit"]), result["verdict"]

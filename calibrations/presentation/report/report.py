@@ -6,6 +6,8 @@ Every uncertain number has its uncertainty, or states that it is unknown.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -26,7 +28,7 @@ from calibrations.presentation.document import Block, Code, Items, Page, Remark,
 from calibrations.presentation.formula import formula_html
 from calibrations.presentation.page import html
 from calibrations.presentation.report.motion import motion_page
-from calibrations.presentation.report.parameters import estimate_cells, matrices_section, name_of_file
+from calibrations.presentation.report.parameters import estimate_cells, matrices_section, name_of_file, verdicts
 from calibrations.table import Array
 from calibrations.text import capital, estimate_text, joined, minus, probability, rounded, unbroken
 
@@ -144,10 +146,12 @@ def report(
     program: str,
     pictures: Iterable[Picture] | None = None,
     motion: MotionResult | None = None,
+    results: Mapping[str, Any] = MappingProxyType({}),
 ) -> str:
     """The page as HTML text. `comparison` is that of the given model with the data; `pictures` are those of `album`.
 
-    `motion` is the comparison with the displacement sensor, for a run of that procedure.
+    `motion` is the comparison with the displacement sensor, for a run of that procedure. `results` are those of a run,
+    by name, each with value, std, unit, limit and verdict.
     `date` and `program` (name and version) go into the provenance: the same arguments give the same page.
     """
     album_of_all = album(discovery, comparison, motion) if pictures is None else pictures
@@ -159,7 +163,7 @@ def report(
         subject=f"Calibration report, model {comparison.fit.model.name}",
         summary=unbroken(summary(discovery)),
         figures=key_figures(discovery),
-        sections=list(_sections(discovery, comparison, shown)),
+        sections=[*verdicts(results), *_sections(discovery, comparison, shown)],
         provenance=_provenance(discovery, date, program),
     )
     return html(page if motion is None else motion_page(page, motion, shown["evaluation"]))

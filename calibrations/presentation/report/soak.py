@@ -14,7 +14,8 @@ from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.soak import soak_album
 from calibrations.presentation.document import Items, Page, Remark, Section, Table
 from calibrations.presentation.page import html
-from calibrations.text import bound, estimate_text, in_milli, joined, minus, rounded, time_text
+from calibrations.presentation.report.parameters import verdicts
+from calibrations.text import estimate_text, in_milli, joined, minus, rounded, time_text
 
 WANDERED_K = 1.0  # peak to peak; ambient that changes by more is not constant
 TOLERANCE = (
@@ -53,7 +54,7 @@ def soak_report(
                 Section("Course", list(shown)),
                 _courses(soak),
                 *_forecasts(forecasts, soak.table.unit),
-                *_verdicts(results),
+                *verdicts(results),
                 _gaps(soak),
             ],
             provenance=facts,
@@ -76,12 +77,6 @@ def _forecasts(forecasts: Mapping[str, ForecastHistory], unit: str) -> Iterable[
         head = ("quantity", "axis", "final value", "unit", "known after (h)")
         rows = [_outlook(name, history, unit) for name, history in forecasts.items()]
         yield Section("Forecasts", (Table("Forecasts", head, rows, (2, 4), headed=False), Remark(FORECAST)))
-
-
-def _verdicts(results: Mapping[str, Any]) -> Iterable[Section]:
-    if rows := [_verdict(name, result) for name, result in results.items() if result["limit"] is not None]:
-        head = ("result", "value", "limit", "verdict")
-        yield Section("Verdicts", (Table("Verdicts", head, rows, (1, 2), headed=False),))
 
 
 def _gaps(soak: Soak) -> Section:
@@ -182,12 +177,6 @@ def _outlook(name: str, history: ForecastHistory, of: str) -> tuple[str, ...]:
         value = f"not known: {rounded(factor * final.low, 6)} to {rounded(factor * final.high, 6)}"
     known_after = "–" if known_s is None else rounded(known_s / HOUR_S)
     return quantity.replace("scale", "scale factor"), axis, value, unit, known_after
-
-
-def _verdict(name: str, result: Mapping[str, Any]) -> tuple[str, ...]:
-    value, std = result["value"], result["std"]
-    shown = estimate_text(value, std) if std else minus(f"{value:.3g}")
-    return name, f"{shown} {result['unit']}", bound(value, result["limit"]), result["verdict"]
 
 
 def _gap(gap: RecordGap) -> str:
