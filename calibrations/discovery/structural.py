@@ -225,7 +225,8 @@ def _geometry_effects(start: Fit, effects: Mapping[str, Effect]) -> GeometryEffe
         if name in effects and not model.holds(name):
             model = model.with_effect(effects[name])
     layout = Problem.of(model, start.table).layout
-    own = {name: layout.of_effect(name) for name in GEOMETRY if model.holds(name)}
+    masks = {name: layout.of_effect(name) for name in GEOMETRY if model.holds(name)}
+    own = {name: mask for name, mask in masks.items() if mask.any()}  # one axis has no angle to another
 
     def forces(values: Mapping[str, Array]) -> Array:
         theta = layout.starts()[0]

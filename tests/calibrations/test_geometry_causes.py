@@ -8,7 +8,7 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit
 from calibrations.loop import dataset
 from calibrations.model.file import read_model
-from calibrations.table import Array
+from calibrations.table import Array, Table
 from tests.calibrations import synthetic
 
 TURN = synthetic.turns((90, 30, 150, 60, 120), step_deg=10)
@@ -43,3 +43,12 @@ def test_a_backlash_of_its_own_form_leaves_non_orthogonality_its_name() -> None:
     sheared = np.column_stack([force[:, 0], force[:, 1] - np.sin(np.radians(0.13)) * force[:, 0]])
     found = discover(sheared, 5e-3 * force[:, :2] ** 3)
     assert {"stage-backlash", "axis-nonorthogonality", "cubic-nonlinearity"} <= set(found.causes)
+
+
+def test_one_axis_has_stage_zeros_and_no_angle_to_another_axis() -> None:
+    force = forces(alpha_deg=-0.8, tilt_deg=0.3)[:, 0]
+    both = synthetic.poses(TURN, 2.5 + force + 5e-3 * force**3, 2.5 + force)
+    columns = {name: both.column(name) for name in both.columns if not name.startswith("vy")}
+    found = dataset(Table.from_columns("poses", columns)).discover(read_model("linear"), catalogue())
+    assert "cubic-nonlinearity" in found.causes
+    assert {"stage-zero-offset", "base-tilt"} & set(found.causes)

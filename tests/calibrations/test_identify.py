@@ -56,7 +56,7 @@ def test_bias_and_the_three_squares_are_one_too_many() -> None:
         assert not e.identified
         assert e.std is None
         assert "on this data it cannot be separated from" in str(e.why)
-        others = {"bias bias x", "quadratic-nonlinearity square x", "cross-axis-bias square x", "z-axis-bias square x"}
+        others = {"bias x", "quadratic-nonlinearity square x", "cross-axis-bias square x", "z-axis-bias square x"}
         assert sum(other in str(e.why) for other in others) == 3
         assert " y" not in str(e.why)
     assert found["scale-factor", "x"].identified
