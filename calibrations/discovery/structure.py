@@ -25,7 +25,7 @@ from calibrations.criteria import (
     SIGNIFICANT,
 )
 from calibrations.discovery.outliers import told
-from calibrations.discovery.patterns import Pattern, at_attitudes, one_sided, patterns, per_channel
+from calibrations.discovery.patterns import Pattern, one_sided, patterns, per_channel
 from calibrations.discovery.plausibility import UNEXPLAINED, Finding
 from calibrations.discovery.significance import Screen, Search
 from calibrations.fitting.fit import Fit
@@ -145,16 +145,15 @@ def plainer(begin: Fit, end: Fit, named: Fit | None = None) -> Pattern | None:
 
     Both are compared by likelihood under the noise without its slow part, which would take up either; a parameter
     costs log(rows), and so does the choice among the patterns. In a motion, whose rows repeat each other, a step at the
-    beginning is an effect that is always there: only an offset at one attitude competes. `named`: the effects without
-    free forms, which follow any pattern and tell nothing of its cause.
+    beginning is an effect that is always there: nothing competes. `named`: the effects without free forms, which follow
+    any pattern and tell nothing of its cause.
     """
-    if end is begin:
+    if end is begin or begin.table.type.moving:
         return None
     start = without_slow(begin)
     screen = Screen(start)
     price = float(np.log(start.residual.size))
-    of_kind = at_attitudes if start.table.type.moving else patterns
-    tried = [(worth(p, screen) - price, p) for p in of_kind(start.table, start.channels)]
+    tried = [(worth(p, screen) - price, p) for p in patterns(start.table, start.channels)]
     best, pattern = max(tried, key=lambda each: each[0], default=(-np.inf, None))
     if (
         pattern is None
