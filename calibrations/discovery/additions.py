@@ -125,8 +125,8 @@ def gradually(base: Fit, added: list[Addition], end: Fit | None = None) -> tuple
     while waiting:
         postponed: list[Addition] = []
         for addition in waiting:
-            is_last = end is not None and len(taken) == len(added) - 1
-            larger = end if end is not None and is_last else refit(fits[-1], addition.to(fits[-1].model))
+            whole = end if len(taken) == len(added) - 1 else None
+            larger = whole if whole is not None else refit(fits[-1], addition.to(fits[-1].model))
             if larger.pooled_excess <= NO_WORSE * fits[-1].pooled_excess:
                 taken.append(addition)
                 fits.append(larger)

@@ -219,7 +219,7 @@ class Findings(Generic[F]):
 
     @property
     def _lacking(self) -> tuple[str, ...]:
-        """The effects of the steps; curves at unknown places are told by their places."""
+        """The effects of the steps. A curve at an unknown place has the name of its place."""
         unknown = any(place.unknown for place in self.places)
         return tuple(name for name in self.names if not (unknown and name.startswith("free:")))
 

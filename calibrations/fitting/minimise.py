@@ -18,8 +18,8 @@ NEWTON_STEPS = 20
 DAMPINGS = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # of each column's squares
 BOUND_ROUNDS = 3
 LARGEST_FACTOR = 2.0  # by which one step changes a parameter that is positive by its meaning
-STRAIGHT = 1e-6  # of what is left: a step that foretells it better is a linear model's
-SMALL_GAIN = 3e-3  # of the mean square of what is left, or of the noise: it moves a parameter by 0.05 uncertainties
+STRAIGHT = 1e-6  # of the residual: the model is linear where one step predicts the residual better
+SMALL_GAIN = 3e-3  # of the mean square of the residual or the noise: a parameter moves by 0.05 uncertainties
 
 
 def minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:

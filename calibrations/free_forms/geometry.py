@@ -139,7 +139,7 @@ def _linear_part(result: SearchResult, place: str, curve: Array) -> float:
 def _beside_forms(result: SearchResult, sizes: Mapping[str, float]) -> tuple[Array, Array]:
     """The base where each place that acts may have another form: by how much it differs, (b,), and covariance, (b, b).
 
-    Such a form has a tenth of the place's size before the data are asked, and what they leave of it afterwards.
+    The prior size of such a form is a tenth of the place's size. The data reduce it to the posterior.
     """
     g, variances = result.gram, dict(result.sizes.variances)
     floor = float(np.sqrt(np.mean(result.white**2)))

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from datetime import date
 
 from calibrations.analyses.stability import Agreement, Stability
-from rig.services.history import Calibration, Compared, History, Quantity
+from rig.services.history import Calibration, History, Quantity
+from rig.services.history_comparison import Compared
 
 Written = Callable[[float, int], str]
 

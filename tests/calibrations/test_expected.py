@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -55,6 +57,17 @@ def test_what_is_identical_stays_so_and_what_turns_with_the_sensor_does_not() ->
     assert pairs_separated(down.together) > 0.999
     assert down.deviations == pytest.approx(np.sqrt(down.together))
     assert pairs_separated(down.alone) < 0.1, "face down alone it is as face up alone: only both faces tell"
+
+
+def test_squares_of_three_axes_are_not_separated_wherever_the_search_for_the_distance_begins() -> None:
+    """They add up to a constant. A search that ends early promises an experiment that separates nothing."""
+    table = measured(0.05, 4, (0,))[0]
+    best, rival = (
+        fit(model("quadratic-nonlinearity").with_effect(catalogue()[name]), table)
+        for name in ("z-axis-bias", "cross-axis-bias")
+    )
+    far = replace(rival, theta=rival.theta + 1e3 * rival.problem.layout.typical)
+    assert pairs_separated(expected_gain(best, far, planned(best, 0.0)).together) < 0.1
 
 
 def test_it_is_the_gain_in_likelihood_that_the_experiment_then_brings() -> None:

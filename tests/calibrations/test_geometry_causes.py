@@ -29,12 +29,13 @@ def discover(sensed: Array, added: Array | float = 0.0) -> Discovery[Fit]:
     return dataset(table).discover(read_model("linear"), catalogue())
 
 
-def test_zeros_of_the_stages_of_1_deg_are_no_misalignment_beside_a_large_nonlinearity() -> None:
-    force = forces(alpha_deg=-0.8, beta_deg=1.0, tilt_deg=0.06)[:, :2]
+@pytest.mark.parametrize("beta_deg", [1.0, 5.0])
+def test_zeros_of_the_stages_are_no_misalignment_beside_a_large_nonlinearity(beta_deg: float) -> None:
+    force = forces(alpha_deg=-0.8 * beta_deg, beta_deg=beta_deg, tilt_deg=0.06)[:, :2]
     found = discover(force, 6e-3 * force**3 + 2e-3 * force**2)
     assert {"stage-zero-offset", "base-tilt"} <= set(found.causes)
     assert "axis-misalignment" not in found.causes
-    assert found.end.params["stage-zero-offset.beta"].value == pytest.approx(1.0, abs=0.01)
+    assert found.end.params["stage-zero-offset.beta"].value == pytest.approx(beta_deg, abs=0.01)
 
 
 def test_a_backlash_of_its_own_form_leaves_non_orthogonality_its_name() -> None:

@@ -17,16 +17,8 @@ from calibrations.model.file import read_model
 from calibrations.table import Table
 from rig.errors import RecordError
 from rig.record import Record
-from rig.services.history import (
-    Calibration,
-    History,
-    Value,
-    _of_one_kind,
-    compare_rigs,
-    history,
-    judged,
-    latest,
-)
+from rig.services.history import Calibration, History, Value, _of_one_kind, history, judged, latest
+from rig.services.history_comparison import compare_rigs
 from tests.rig.lives import COLUMNS, calibrated
 
 Rig = Callable[..., Any]

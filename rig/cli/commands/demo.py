@@ -71,7 +71,7 @@ def demo_command(folder: Path, realistic: bool, as_json: bool) -> None:
         document = discovery_document(discovered, str(model))
         emit({**document, "run": run, "report": str(page), "hidden_faults": faults.document()})
         return
-    click.echo(f"{discovery(discovered)}\n\nHidden faults, and what the search found (rms change of the output):\n")
+    click.echo(f"{discovery(discovered)}\n\nHidden faults and named causes (rms change of the output):\n")
     click.echo(faults.text())
     click.echo(f"\nReport: {page}   open it with: xdg-open {page}\nModel:  {model}\nRun:    {run}")
     click.echo("The same in a browser: rig web" + ("" if realistic else "\nThe second act: rig demo --realistic"))

@@ -18,21 +18,8 @@ from rig.cli.terminal.output import bench_option, emit, json_option, note, pictu
 from rig.cli.terminal.progress import working
 from rig.record import Record
 from rig.services.control import HEAD, OUT, Controlled, controlled, row, signals, worst
-from rig.services.history import (
-    Calibration,
-    Compared,
-    History,
-    Quantity,
-    changes,
-    closest,
-    compare_days,
-    compare_rigs,
-    compare_sensors,
-    history,
-    latest,
-    limits_of,
-    stale,
-)
+from rig.services.history import Calibration, History, Quantity, changes, closest, history, latest, limits_of, stale
+from rig.services.history_comparison import Compared, compare_days, compare_rigs, compare_sensors
 from rig.services.history_words import agreements, but_stale, chart_verdict, near, next_due, significance, summary
 
 Near = tuple[Calibration, float] | None  # the calibration closest to a day, and its age on that day in days

@@ -19,18 +19,8 @@ from calibrations.text import estimate_in_prefix, estimate_text, minus, rounded,
 from rig.errors import RigError
 from rig.services.charts import life_of
 from rig.services.control import OUT
-from rig.services.history import (
-    Calibration,
-    Compared,
-    History,
-    Quantity,
-    changes,
-    closest,
-    compare_days,
-    compare_rigs,
-    compare_sensors,
-    stale,
-)
+from rig.services.history import Calibration, History, Quantity, changes, closest, stale
+from rig.services.history_comparison import Compared, compare_days, compare_rigs, compare_sensors
 from rig.services.history_words import agreements, but_stale, chart_verdict, near, next_due, significance, summary
 from rig.services.provenance import today
 from rig.web.calculations import off_loop

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Any
 from fastapi import Request
 from nicegui import ui
 
-from calibrations.discovery.verdict import Verdict
-from calibrations.presentation.views import view_of
 from calibrations.text import rounded
 from rig.errors import RecordError
 from rig.services.content import Content, content_of
@@ -29,6 +27,7 @@ from rig.web.pages.model_missing import Missing
 from rig.web.pages.model_noise import NoisePictures
 from rig.web.pages.model_parameters import ParametersBox
 from rig.web.pages.model_pictures import Pictures
+from rig.web.pages.model_verdict import VerdictBox
 from rig.web.parts import box, div, failed, for_page, message, noted, state, words
 
 if TYPE_CHECKING:
@@ -38,7 +37,6 @@ if TYPE_CHECKING:
 
 
 LOOK_S = 2.0
-FIRST_LINES = 200  # characters of the details that every width shows
 LONGEST_ADDRESS = 4000  # characters; a longer one keeps the last state that fits
 
 
@@ -341,81 +339,3 @@ def _nothing() -> None:
 def _newest() -> str:
     """The newest run of one sensor; "" without one."""
     return next((run.run for run in runs() if run.rows and not run.bench.get("sensors")), "")
-
-
-# The verdict: one sentence and its numbers.
-
-
-LOOKS = {
-    Verdict.ADEQUATE: "good",
-    Verdict.EFFECT_MISSING: "bad",
-    Verdict.AMBIGUOUS: "doubt",
-    Verdict.UNEXPLAINED: "doubt",
-    Verdict.NO_RESPONSE: "bad",
-}
-
-
-class VerdictBox:
-    """The box with the verdict and its numbers."""
-
-    def __init__(self) -> None:
-        self.described = ""  # the model and the data
-        with box("verdict").props("role=status aria-live=polite") as self.box:
-            with div("grow"):
-                self.headline = words("", "headline")
-                self.detail = words("", "detail quiet small")
-                self.more = ui.button("Whole verdict", on_click=self._unfold).props("flat dense size=sm")
-                self.more.set_visibility(False)
-            self.numbers = div("row-of numbers")
-
-    def offer_cancel(self, cancel: Callable[[], None]) -> None:
-        """A button that cancels the first fit, in place of the numbers."""
-        with self.numbers:
-            ui.button("Cancel", icon="close", on_click=cancel).props("dense flat")
-
-    def error(self, compared: Comparison[Any], session: ModelSession[Any]) -> None:
-        """Show the error and where it is largest, before the diagnosis."""
-        self.numbers.clear()
-        with self.numbers:
-            for name, value in view_of(session.data).figures(compared.fit).items():
-                with div("figure"):
-                    words(value, "value")
-                    words(name, "quiet small")
-        self.described = _failing(compared)
-        self._show(self.described)
-
-    def wait(self, what: str) -> None:
-        """Show that the verdict is not known yet."""
-        self.headline.set_text(f"{what} ...")
-        self.box.classes(remove="good bad doubt")
-
-    def found(self, result: Diagnosis[Any]) -> None:
-        """Show the verdict."""
-        judgement = result.judgement
-        self.headline.set_text(for_page(judgement.summary))
-        rest = "" if judgement.summary == judgement.text else judgement.text
-        caution = f"Caution: {result.caution}." if result.caution else ""
-        self._show(" ".join(filter(None, (caution, rest, self.described))))
-        self.box.classes(remove="good bad doubt", add=LOOKS[result.verdict])
-
-    def cancelled(self) -> None:
-        """Show that the search was cancelled."""
-        self.headline.set_text("Not diagnosed")
-        self.box.classes(remove="good bad doubt")
-
-    def _show(self, text: str) -> None:
-        """Show the first lines of a text, and a button that shows the others."""
-        self.detail.set_text(for_page(text))
-        self.detail.classes(remove="whole")
-        self.more.set_visibility(len(self.detail.text) > FIRST_LINES)
-
-    def _unfold(self) -> None:
-        self.detail.classes(add="whole")
-        self.more.set_visibility(False)
-
-
-def _failing(compared: Comparison[Any]) -> str:
-    """The model and the data; the places where it fails have a row of their own."""
-    what = f"{compared.fit.model.name} on {compared.data.description}."
-    text = what if compared.fails else f"{what} No place fails."
-    return " ".join(filter(None, (text, compared.data.note)))

@@ -1,0 +1,81 @@
+"""Comparison of two calibrations: of two days, two sensors, or two rigs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
+
+import numpy as np
+
+from calibrations.analyses.stability import Agreement, compare_values
+from calibrations.errors import DataError
+from calibrations.means.noise import rms
+from drivers.errors import did_you_mean
+from rig.errors import RecordError
+from rig.services.history import Calibration, History, Value, closest
+
+
+@dataclass(frozen=True)
+class Compared:
+    """`one` and `other` for people; unit and agreement of every quantity that both have, by its name. `data`: the two
+    runs, None of means over several."""
+
+    one: str
+    other: str
+    rows: Mapping[str, tuple[str, Agreement]]
+    data: tuple[str, str] | None = None
+
+    @property
+    def agree(self) -> bool:
+        """Whether all of them do."""
+        return all(agreement.agrees for _, agreement in self.rows.values())
+
+
+def compare_sensors(life: History, other: str, last: Calibration) -> Compared:
+    """The last calibration of a life beside that of another sensor. Raises DataError, see `compare`."""
+    mine = life.calibrations[-1]
+    return Compared(f"{life.sensor}, {mine.day}", f"{other}, {last.day}", compare(mine, last), (mine.data, last.data))
+
+
+def compare_days(life: History, one: date, other: date) -> Compared:
+    """The calibrations closest to two days. Raises DataError, see `compare`."""
+    a, b = (closest(life.calibrations, day)[0] for day in (one, other))
+    return Compared(a.day, b.day, compare(a, b), (a.data, b.data))
+
+
+def compare_rigs(of: Sequence[Calibration], one: str, other: str) -> Compared:
+    """The means of all calibrations on two rigs. Raises RecordError for a rig that has none."""
+    return Compared(one, other, _compared(_means_on(one, of), _means_on(other, of), one, other))
+
+
+def compare(a: Calibration, b: Calibration) -> dict[str, tuple[str, Agreement]]:
+    """Two calibrations, by the names that both have: unit and agreement. Raises DataError where there is none."""
+    return _compared(a.values, b.values, a.data, b.data)
+
+
+def _means_on(rig: str, of: Sequence[Calibration]) -> dict[str, Value]:
+    mine = [calibration for calibration in of if calibration.rig == rig]
+    if not mine:
+        raise RecordError(
+            f"no calibration on the rig {rig!r}.{did_you_mean(rig, {calibration.rig for calibration in of})}"
+        )
+    return {
+        name: _mean([calibration.values[name] for calibration in mine if name in calibration.values])
+        for name in mine[-1].values
+    }
+
+
+def _compared(a: Mapping[str, Value], b: Mapping[str, Value], one: str, other: str) -> dict[str, tuple[str, Agreement]]:
+    shared = [name for name in a if name in b and a[name].unit == b[name].unit]
+    if not shared:
+        raise DataError(f"{one} and {other} have no quantity in common; take a model that both determine")
+    return {n: (a[n].unit, compare_values((a[n].value, a[n].std), (b[n].value, b[n].std))) for n in shared}
+
+
+def _mean(values: Sequence[Value]) -> Value:
+    """The mean; uncertain by the calibrations' own uncertainty, which they may share, and by what they scatter."""
+    x = np.array([value.value for value in values])
+    own = float(rms(np.array([value.std for value in values])))
+    scatter = float(x.std(ddof=1) / np.sqrt(len(x))) if len(x) > 1 else 0.0
+    return Value(float(x.mean()), max(own, scatter), values[0].unit)

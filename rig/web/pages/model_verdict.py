@@ -1,0 +1,91 @@
+"""The verdict on the Model page: one sentence and its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from nicegui import ui
+
+from calibrations.discovery.verdict import Verdict
+from calibrations.presentation.views import view_of
+from rig.web.parts import box, div, for_page, words
+
+if TYPE_CHECKING:
+    from calibrations.discovery.results import Comparison, Diagnosis
+    from rig.services.session import ModelSession
+
+FIRST_LINES = 200  # characters of the details that every width shows
+LOOKS = {
+    Verdict.ADEQUATE: "good",
+    Verdict.EFFECT_MISSING: "bad",
+    Verdict.AMBIGUOUS: "doubt",
+    Verdict.UNEXPLAINED: "doubt",
+    Verdict.NO_RESPONSE: "bad",
+}
+
+
+class VerdictBox:
+    """The box with the verdict and its numbers."""
+
+    def __init__(self) -> None:
+        self.described = ""  # the model and the data
+        with box("verdict").props("role=status aria-live=polite") as self.box:
+            with div("grow"):
+                self.headline = words("", "headline")
+                self.detail = words("", "detail quiet small")
+                self.more = ui.button("Whole verdict", on_click=self._unfold).props("flat dense size=sm")
+                self.more.set_visibility(False)
+            self.numbers = div("row-of numbers")
+
+    def offer_cancel(self, cancel: Callable[[], None]) -> None:
+        """A button that cancels the first fit, in place of the numbers."""
+        with self.numbers:
+            ui.button("Cancel", icon="close", on_click=cancel).props("dense flat")
+
+    def error(self, compared: Comparison[Any], session: ModelSession[Any]) -> None:
+        """Show the error and where it is largest, before the diagnosis."""
+        self.numbers.clear()
+        with self.numbers:
+            for name, value in view_of(session.data).figures(compared.fit).items():
+                with div("figure"):
+                    words(value, "value")
+                    words(name, "quiet small")
+        self.described = _failing(compared)
+        self._show(self.described)
+
+    def wait(self, what: str) -> None:
+        """Show that the verdict is not known yet."""
+        self.headline.set_text(f"{what} ...")
+        self.box.classes(remove="good bad doubt")
+
+    def found(self, result: Diagnosis[Any]) -> None:
+        """Show the verdict."""
+        judgement = result.judgement
+        self.headline.set_text(for_page(judgement.summary))
+        rest = "" if judgement.summary == judgement.text else judgement.text
+        caution = f"Caution: {result.caution}." if result.caution else ""
+        self._show(" ".join(filter(None, (caution, rest, self.described))))
+        self.box.classes(remove="good bad doubt", add=LOOKS[result.verdict])
+
+    def cancelled(self) -> None:
+        """Show that the search was cancelled."""
+        self.headline.set_text("Not diagnosed")
+        self.box.classes(remove="good bad doubt")
+
+    def _show(self, text: str) -> None:
+        """Show the first lines of a text, and a button that shows the others."""
+        self.detail.set_text(for_page(text))
+        self.detail.classes(remove="whole")
+        self.more.set_visibility(len(self.detail.text) > FIRST_LINES)
+
+    def _unfold(self) -> None:
+        self.detail.classes(add="whole")
+        self.more.set_visibility(False)
+
+
+def _failing(compared: Comparison[Any]) -> str:
+    """The model and the data; the places where it fails have a row of their own."""
+    what = f"{compared.fit.model.name} on {compared.data.description}."
+    text = what if compared.fails else f"{what} No place fails."
+    return " ".join(filter(None, (text, compared.data.note)))
