@@ -3,6 +3,7 @@
 import signal
 import sys
 import time
+from collections.abc import Iterator
 from threading import Event
 from types import FunctionType
 
@@ -16,6 +17,14 @@ def twice(number: signal.Signals) -> None:
         signal.raise_signal(number)
     finally:
         signal.raise_signal(number)
+
+
+@pytest.fixture(autouse=True)
+def not_ignored() -> Iterator[None]:
+    """SIGHUP ends a program, also where these tests run under nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
 
 
 @pytest.mark.parametrize("number", SIGNALS)
