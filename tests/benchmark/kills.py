@@ -1,7 +1,7 @@
 """Kills at random moments that runs survived: `python -m tests.benchmark.kills [KILLS] [SEED]`; 500 take some minutes.
 
 A third of them come to a sweep, the rest to a soak and a motion, which are records without gaps, to a misalignment,
-which chooses its poses by what it measured, and to positions by hand.
+which chooses its poses by what it measured, to positions by hand, to imports, and to pushes to a server of PostgreSQL.
 
 Each is checked as in tests/rig/test_kill.py; the first that costs more than the pose in flight ends it with an error.
 """
@@ -15,20 +15,40 @@ from collections import Counter
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from rig.record.lab import lab_url, prepare
 from tests.rig.killing import HANDS, MISALIGNMENT, MOTION, RUN, SOAK, many, undisturbed
+from tests.rig.killing_transfers import kills_of_a_push, kills_of_imports
 from tests.rig.nursery import Nursery
+from tests.rig.postgres import serving
+
+RUNS = ((RUN, 0.32), (SOAK, 0.14), (MOTION, 0.14), (MISALIGNMENT, 0.14), (HANDS, 0.14))  # and shares of the kills
+IMPORTS, PUSHES = 0.06, 0.06
+A_PUSH = 6  # kills, until it is let through
 
 
 def main(kills: int = 500, seed: int = 1000) -> None:
-    with TemporaryDirectory() as folder, Nursery() as nursery:
-        began, kinds, procedures = time.perf_counter(), Counter[str](), {}
-        for words, share in ((RUN, 0.36), (SOAK, 0.16), (MOTION, 0.16), (MISALIGNMENT, 0.16), (HANDS, 0.16)):
-            place = Path(folder) / words[1]
-            survived = many(nursery, place, undisturbed(nursery, place, words), seed, round(share * kills))
-            procedures[words[1]] = survived.total()
-            kinds += survived
+    with TemporaryDirectory() as temporary, Nursery() as nursery:
+        folder, began, survived = Path(temporary), time.perf_counter(), dict[str, Counter[str]]()
+        for words, share in RUNS:
+            place = folder / words[1]
+            survived[words[1]] = many(nursery, place, undisturbed(nursery, place, words), seed, round(share * kills))
+        survived["import"] = kills_of_imports(nursery, folder / "imports", seed, round(IMPORTS * kills))
+        survived["push"] = pushes(nursery, folder / "pushes", seed, round(PUSHES * kills))
         seconds = time.perf_counter() - began
-    print(json.dumps({"seconds": [seconds], "kills": kinds.total(), "kinds": dict(kinds), "procedures": procedures}))
+    kinds = sum(survived.values(), Counter[str]())
+    counts = {name: count.total() for name, count in survived.items()}
+    print(json.dumps({"seconds": [seconds], "kills": kinds.total(), "kinds": dict(kinds), "procedures": counts}))
+
+
+def pushes(nursery: Nursery, folder: Path, seed: int, kills: int) -> Counter[str]:
+    """Kill pushes, to a new lab after every A_PUSH kills."""
+    survived = Counter[str]()
+    with serving() as server:
+        while survived.total() < kills:
+            url, round_seed = server.url(server.new_database()), seed + survived.total()
+            prepare(lab_url(url))
+            survived += kills_of_a_push(nursery, url, folder / str(round_seed), round_seed, A_PUSH)
+    return survived
 
 
 if __name__ == "__main__":

@@ -18,18 +18,15 @@ from pathlib import Path
 import pytest
 
 from rig.record import Record
-from rig.record.lab import lab_url
-from rig.record.measured import table_of
 from tests.rig.killing import MOTION, RUN, SOAK, Story, Undisturbed, finished, inspected, many, measured, undisturbed
+from tests.rig.killing_transfers import kills_of_a_push, kills_of_imports
 from tests.rig.nursery import Harm, Nursery
 from tests.rig.postgres import Server
-from tests.rig.pushing import a_run, held
 from tests.rig.rigging import in_own_process, signal_at
 from tests.slow import first_fast
 
 pytestmark = pytest.mark.sockets
 KILLS = 10  # of each seed
-DATA = Path(__file__).parents[1] / "golden" / "files" / "good.csv"
 
 
 @pytest.fixture(scope="module")
@@ -109,39 +106,9 @@ def test_a_signal_ends_the_process_with_status_4_and_resume_finishes_the_run(
 
 @pytest.mark.slow
 def test_kills_of_an_import(nursery: Nursery, tmp_path: Path) -> None:
-    """Half of a table is never there: the run is whole, or there is none."""
-    luck, file, whole = random.Random(5), str(DATA), tmp_path / "whole"
-    words = ("import", file, "--json")
-    reach = nursery.run(whole, *words).points["sql"]
-    with Record(whole) as record:
-        digest = table_of(record, record.runs()[0].run).digest
-    for number in range(12):
-        home = tmp_path / str(number)
-        killed = nursery.run(home, *words, harm=Harm("sql", luck.randint(1, reach)))
-        assert killed.status == -signal.SIGKILL
-        with Record(home) as record:
-            assert [table_of(record, run.run).digest for run in record.runs()] in ([], [digest])
-        again = nursery.run(home, *words)
-        assert again.status == 0, again.said
-        with Record(home) as record:
-            assert {table_of(record, run.run).digest for run in record.runs()} == {digest}
+    assert kills_of_imports(nursery, tmp_path, 5, 12).total() >= 12
 
 
 @pytest.mark.slow
 def test_kills_of_a_push(nursery: Nursery, server: Server, database: str, tmp_path: Path) -> None:
-    """Whatever was sent already, each run is in the lab once at the end, to the last bit."""
-    luck, home = random.Random(6), tmp_path / "own"
-    with Record(home) as own:
-        runs = [a_run(own, seed) for seed in range(3)]
-        expected = [held(own, run) for run in runs]
-    words = ("push", "--to", server.url(database))
-    killed = [nursery.run(home, *words, harm=Harm("sql", luck.randint(1, 90))).status < 0 for _ in range(12)]
-    assert sum(killed) >= 6
-    ended = nursery.run(home, *words)
-    assert ended.status == 0, ended.said
-    with Record(lab_url(server.url(database))) as lab:
-        there = sorted(lab.runs(), key=lambda run: run.created)
-        assert len(there) == len(runs)
-        found = [held(lab, run.run) for run in there]
-    assert [each["kept"] for each in found] == [each["kept"] for each in expected]
-    assert [each["readings"] for each in found] == [each["readings"] for each in expected]
+    assert kills_of_a_push(nursery, server.url(database), tmp_path, 6, 6).total() >= 6
