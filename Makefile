@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: demo test test-all setup bench docs lint audit clean
 
 demo: setup
-	$(BIN)/rig demo --folder out/demo
+	$(BIN)/rig demo --folder out/demo --force
 
 # Worksteal: neighbours in a file run in one process, which then works out only once what they share.
 test: setup lint

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
 
@@ -20,6 +21,12 @@ def require_out(out: Path, *inputs: str | Path | None) -> None:
     for file in inputs:
         if file is not None and Path(file).exists() and out.exists() and out.samefile(file):
             raise OutputError(f"{out}: this would overwrite the input file {file}; give another file")
+
+
+def require_new(*paths: Path) -> None:
+    """Raises OutputError for a file that exists."""
+    if there := next((path for path in paths if path.exists()), None):
+        raise OutputError(f"{there}: this file exists; give another file, or replace this one with --force")
 
 
 def _require_regular(out: Path) -> None:
@@ -37,15 +44,26 @@ def make_folder(folder: Path) -> None:
 
 def write_whole(out: Path, content: str | bytes) -> None:
     """Write a file completely or not at all, and never in the place of a device. Raises OutputError."""
+    with draft_of(out) as draft:
+        draft.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+@contextmanager
+def draft_of(out: Path) -> Iterator[Path]:
+    """A file in the same folder to write to; it takes the place of `out` at the end of the block.
+
+    A process that is killed leaves `out` as it was. Raises OutputError for a device, and if the file cannot be written.
+    """
     _require_regular(out)
     draft = out.with_name(f".{out.name}.{os.getpid()}")
     try:
-        draft.write_bytes(content.encode() if isinstance(content, str) else content)
+        yield draft
         draft.replace(out)
     except OSError as error:
+        raise OutputError(f"{out}: cannot write the file: {error.strerror}; give another file") from None
+    finally:
         with suppress(OSError):
             draft.unlink(missing_ok=True)
-        raise OutputError(f"{out}: cannot write the file: {error.strerror}; give another file") from None
 
 
 def program() -> str:

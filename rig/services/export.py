@@ -19,7 +19,7 @@ from uuid import NAMESPACE_URL, uuid5
 from calibrations.importing.foreign import write_csv
 from calibrations.table import Table
 from rig.errors import ExportError
-from rig.files import require_out
+from rig.files import draft_of, require_out
 from rig.record import Record, Run
 from rig.record.measured import table_of
 from rig.services.tables import load
@@ -30,15 +30,13 @@ UNITS = {"deg": "deg", "v": "V", "s": "s", "c": "degC"}
 def export(data: str, kind: str, path: Path) -> int:
     """Write `data` (a run or a file) to `path`, completely or not at all. Returns the number of rows.
 
-    Raises ExportError for an unknown format, or a format that needs a run; OutputError without a folder.
+    Raises ExportError for an unknown format, or a format that needs a run; OutputError if `path` cannot be written.
     """
     if kind in ("parquet", "hdf5"):
         raise ExportError(f"this version does not write {kind}; use --format csv, which {kind} programs also read")
     require_out(path)
-    draft = path.with_name(f".{path.name}.part")
-    rows = _write_events(data, draft) if kind == "event-model" else _write_csv(data, draft)
-    draft.replace(path)
-    return rows
+    with draft_of(path) as draft:
+        return _write_events(data, draft) if kind == "event-model" else _write_csv(data, draft)
 
 
 def _write_csv(data: str, path: Path) -> int:

@@ -27,7 +27,6 @@ from calibrations.model import Model
 from calibrations.model.file import read_model
 from calibrations.table import Table
 from rig.errors import UnknownRun
-from rig.files import require_out
 from rig.services.request import Request, effects_of
 from rig.services.tables import BESIDE, load
 
@@ -50,13 +49,12 @@ class Loaded:
     effects: Mapping[str, Effect]
 
 
-def loaded(request: Request, tell: Tell, out: Path | None = None) -> Loaded:
+def loaded(request: Request, tell: Tell) -> Loaded:
     """Data, model (by default that of the kind of data) and effects; `tell` receives remarks for a person.
 
     The data are a still record if their kind is still, if they are an array, or if a noise model is named.
-    Raises DataError, RecordError, ModelError, UnknownName; OutputError if `out` cannot be written.
+    Raises DataError, RecordError, ModelError, UnknownName.
     """
-    require_output(request, out)
     effects = effects_of(request.bench_file)
     chosen = read_model(request.model, effects) if request.model is not None else None
     data = (
@@ -65,12 +63,6 @@ def loaded(request: Request, tell: Tell, out: Path | None = None) -> Loaded:
     if chosen is not None:
         check_unit(chosen, data.unit, data.source)
     return Loaded(data, chosen or read_model(data.default_model, effects), effects)
-
-
-def require_output(request: Request, out: Path | None) -> None:
-    """Raises OutputError if the folder of `out` is missing, or if `out` is an input of the request."""
-    if out is not None:
-        require_out(out, request.data, request.model, request.bench_file)
 
 
 def loaded_table(request: Request, tell: Tell) -> tuple[Table, Model, Mapping[str, Effect]]:

@@ -70,7 +70,7 @@ def discovered(
     """What `rig fleet discover` says of it; after the first time out of the record."""
     monkeypatch.setenv("RIG_HOME", str(home))
     address = cluster.scheduler_address
-    ended = rig("fleet", "discover", str(folder), "--scheduler", address, "--out", str(home / "guide"),
+    ended = rig("fleet", "discover", str(folder), "--scheduler", address, "--force", "--out", str(home / "guide"),
                 "--report", str(home / "fleet.html"), "--json")  # fmt: skip
     assert ended.status == 0, ended.err
     return dict(json.loads(ended.out))

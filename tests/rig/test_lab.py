@@ -58,8 +58,8 @@ def test_an_imported_table_reads_the_same_from_the_lab(
         "show": (table,),
         "compare": (table,),
         "history": ("17",),
-        "certificate": (table, "--model", "mine.yaml", "--out", "c.html"),
-        "export": (table, "--out", "x.csv"),
+        "certificate": (table, "--model", "mine.yaml", "--out", "c.html", "--force"),
+        "export": (table, "--out", "x.csv", "--force"),
     }
     own = {name: rig(name, *words, "--json") for name, words in asked.items()}
     exported = (work / "x.csv").read_bytes()

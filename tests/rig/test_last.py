@@ -73,10 +73,10 @@ def test_an_empty_record_has_no_last_run() -> None:
     [
         ("show",),
         ("compare",),
-        ("fit", "--out", "fitted.yaml"),
+        ("fit", "--force", "--out", "fitted.yaml"),
         ("noise",),
         ("diagnose",),
-        ("export", "--out", "out.csv"),
+        ("export", "--force", "--out", "out.csv"),
     ],
     ids=lambda command: command[0],
 )

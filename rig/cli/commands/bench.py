@@ -24,7 +24,7 @@ from drivers.transport.server import Server
 from rig.bench import DEFAULT, Bench, read_bench
 from rig.bench.certificates import EXPIRED, certificates, expired
 from rig.bench.file import HAND
-from rig.cli.terminal.output import FILE, bench_option, emit, json_option, note, notes
+from rig.cli.terminal.output import bench_option, emit, json_option, note, notes, out_option
 from rig.cli.terminal.progress import working
 from rig.errors import BenchError
 from rig.instruments.instruments import checked
@@ -202,12 +202,7 @@ def _finite(context: click.Context, parameter: click.Parameter, deg: float) -> f
 @click.option("--beta", default=0.0, callback=_finite, metavar="DEG", help="Angle of beta, which turns the table.")
 @click.option("--mount", default=0.0, callback=_finite, metavar="DEG", help="Rotation of the sensor about its z axis.")
 @click.option("--flip", default=0, type=click.IntRange(0, 1), help="1: the sensor is mounted face down.")
-@click.option(
-    "--out",
-    type=FILE,
-    callback=_svg,
-    help="Write the drawing to this file, FILE.svg.",
-)
+@out_option("Write the drawing to this file, FILE.svg.", callback=_svg)
 @json_option
 def draw_command(alpha: float, beta: float, mount: float, flip: int, out: Path | None, as_json: bool) -> None:
     """Draw the stages and the mounting of the sensor, and print its specific force at rest.

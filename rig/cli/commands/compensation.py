@@ -10,7 +10,17 @@ import click
 
 from rig.cli.terminal.complete import complete_data, complete_model
 from rig.cli.terminal.options import input_range
-from rig.cli.terminal.output import FILE, FOLDER, Positive, bench_option, emit, json_option, note, range_option
+from rig.cli.terminal.output import (
+    FOLDER,
+    Positive,
+    bench_option,
+    emit,
+    json_option,
+    note,
+    out_option,
+    range_option,
+    require_outputs,
+)
 from rig.cli.terminal.progress import working
 
 if TYPE_CHECKING:
@@ -32,7 +42,7 @@ if TYPE_CHECKING:
     shell_complete=complete_data,
     help="Test the compensation on these poses, compared with a linear model fitted to them.",
 )
-@click.option("--picture", type=FILE, help="Write a picture of the test to this file.")
+@out_option("Write a picture of the test to this file.", "--picture")
 @bench_option
 @json_option
 def compensate_command(
@@ -79,6 +89,7 @@ def compensate_command(
             check_unit(source_model, table.unit, table.source)
             beside = compensated_residual(compensation, table)
     make_folder(out)
+    require_outputs(*(out / file for file in files))
     for file, text in files.items():
         write_whole(out / file, text)
     if picture is not None and beside is not None:
@@ -116,7 +127,7 @@ FORMATS = ("px4", "ardupilot", "imu_calib", "imu_tk", "imucal", "kalibr", "openv
 @click.command("export-model")
 @click.argument("models", metavar="MODEL...", nargs=-1, required=True, shell_complete=complete_model)
 @click.option("--for", "form", type=click.Choice(FORMATS), required=True, help="The program that reads the file.")
-@click.option("--out", type=FILE, required=True, help="The file.")
+@out_option("The file.", required=True)
 @click.option("--slot", type=click.IntRange(1, 3), default=1, show_default=True, help="Number of the sensor there.")
 @click.option("--device-id", type=int, help="As the autopilot reports it; for one model.")
 @click.option("--range", "reach", type=Positive(), help="Size of the input, g or deg/s. Default: 1 g, 300 deg/s.")
@@ -152,7 +163,7 @@ def export_model_command(
     from calibrations.exporting.formats import NOISES, export_model
     from calibrations.exporting.noise_files import Stream
     from calibrations.model.file import read_model
-    from rig.files import program, require_out, write_whole
+    from rig.files import program, write_whole
     from rig.services.compensation import export_document, export_lines
     from rig.services.request import effects_of
 
@@ -160,7 +171,6 @@ def export_model_command(
         raise click.UsageError(f"--for {form} needs the number of measurements a second: give --rate HZ")
     if device_id is not None and len(models) > 1:
         raise click.UsageError("--device-id names one sensor; export one model at a time")
-    require_out(out, *models)
     effects = effects_of(bench_file)
     source_models = [read_model(model, effects) for model in models]
     walks = {"accelerometer": walk_a or 0.0, "gyroscope": walk_g or 0.0}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.cli.terminal.output import FOLDER, emit, json_option, note
+from rig.cli.terminal.output import FOLDER, emit, force_option, json_option, note, require_outputs
 
 if TYPE_CHECKING:
     from rig.bench import Bench
@@ -23,14 +23,13 @@ MEASURING = 0.4  # share of the bar
 @click.command("demo")
 @click.option(
     "--folder",
-    default="rig-demo",
-    show_default=True,
     type=FOLDER,
-    help="Folder for the model and the report.",
+    help="Folder for the model and the report. Default: rig-demo, or rig-demo-realistic.",
 )
+@force_option
 @click.option("--realistic", is_flag=True, help="The default rig with all its faults at once; takes minutes.")
 @json_option
-def demo_command(folder: Path, realistic: bool, as_json: bool) -> None:
+def demo_command(folder: Path | None, realistic: bool, as_json: bool) -> None:
     """Measure a simulated sensor with three hidden faults, find them, and compare them with what was hidden.
 
     --realistic is the second act: the default simulated rig, a standard sweep of 518 poses, and all faults at once.
@@ -49,7 +48,10 @@ def demo_command(folder: Path, realistic: bool, as_json: bool) -> None:
     from rig.services.provenance import today, write_model
     from rig.services.tables import load
 
+    folder = folder or Path("rig-demo-realistic" if realistic else "rig-demo")
     make_folder(folder)
+    model, page = folder / "model.yaml", folder / "report.html"
+    require_outputs(model, page)
     bench, settings = (read_bench(), {}) if realistic else (read_bench(DEMO), SETTINGS)
     note(
         "The default simulated rig: all its faults act at once. The analysis does not know them."
@@ -62,7 +64,6 @@ def demo_command(folder: Path, realistic: bool, as_json: bool) -> None:
         table, linear = load(run), read_model("linear")
         discovered = discover(table, linear)
         progress.text, progress.share = "writing the report", 0.9
-        model, page = folder / "model.yaml", folder / "report.html"
         faults = hidden_faults(bench, discovered.end, discovered.start)
         comparison = compare(table, linear)
         write_whole(page, report(discovered, comparison, today(), program(), album(discovered, comparison)))

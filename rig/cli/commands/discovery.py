@@ -11,7 +11,16 @@ import click
 
 from rig.cli.terminal.complete import complete_data, complete_effect, complete_model
 from rig.cli.terminal.options import request_options
-from rig.cli.terminal.output import FILE, check_option, emit, model_option, note, notes, verdict_status, watch_options
+from rig.cli.terminal.output import (
+    check_option,
+    emit,
+    model_option,
+    note,
+    notes,
+    out_option,
+    verdict_status,
+    watch_options,
+)
 from rig.cli.terminal.progress import working
 
 if TYPE_CHECKING:
@@ -110,7 +119,7 @@ NAME = re.compile(r"[A-Za-z0-9_-]+")  # no useful expression looks like this
 @click.option("--name", help="Name of an effect given as an expression.")
 @click.option("--model", required=True, shell_complete=complete_model, help="A shipped model by name, or a model file.")
 @click.option("--data", required=True, shell_complete=complete_data, help="A file or a run.")
-@click.option("--out", required=True, type=FILE, help="The new model file.")
+@out_option("The new model file.", required=True)
 @request_options
 def add_command(request: Request, effect: str, name: str | None, out: Path, as_json: bool) -> int:
     """Add EFFECT to a model, fit both models to the data, and write the new model. The old model file stays.
@@ -127,7 +136,7 @@ def add_command(request: Request, effect: str, name: str | None, out: Path, as_j
     from rig.services.provenance import write_model
 
     with working("fitting both models") as progress:
-        question = loaded(request, note, out)
+        question = loaded(request, note)
         added = _find_effect(effect, name, question)
         effects = question.effects if effect.startswith("free:") else {**question.effects, added.name: added}
         result = question.data.add(added, question.model, progress.searched(effects))
@@ -170,7 +179,7 @@ def _find_effect(effect: str, name: str | None, question: Loaded) -> Effect:
 @click.command("discover")
 @click.argument("data", nargs=-1, shell_complete=complete_data)
 @model_option
-@click.option("--out", type=FILE, help="Write the final model to this file.")
+@out_option("Write the final model to this file.")
 @click.option("--without", multiple=True, metavar="PLACE", help="A place to leave out of the search; may be repeated.")
 @click.option("--enough", metavar="ERROR", help="Stop at this error on unseen data: 0.5mg, 2mV or 1.5floors.")
 @click.option("--all", "every", is_flag=True, help="Of a still record, also each step's error and every parameter.")
@@ -269,7 +278,7 @@ def _discover(
 
         small = parse_enough(enough)
     with working("fitting the model") as progress:
-        question = loaded(request, note, out)
+        question = loaded(request, note)
         data = question.data if len(several) == 1 else _together(several, request, question)
         data = data.without(without)
         discovered = data.discover(question.model, progress.searched(question.effects), small)

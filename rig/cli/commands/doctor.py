@@ -15,15 +15,15 @@ from click.shell_completion import get_completion_class
 from calibrations.text import columns
 from rig.bench import read_bench
 from rig.cli import COMPLETE, rig
-from rig.cli.terminal.output import FILE, FOLDER, bench_option, emit, json_option
-from rig.errors import OutputError, RecordError
-from rig.files import home, require_out
+from rig.cli.terminal.output import FOLDER, bench_option, emit, json_option, out_option, require_outputs
+from rig.errors import RecordError
+from rig.files import draft_of, home
 from rig.record.recover import recover
 from rig.services.health import Finding, findings, last_run, list_runs, versions, without_secrets
 
 
 @click.command("doctor")
-@click.option("--out", type=FILE, help="The archive. Default: a name with the time.")
+@out_option("The archive. Default: a name with the time.")
 @click.option("--run", "run", help="The run whose log goes into the archive. Default: the newest.")
 @click.option(
     "--recover",
@@ -45,7 +45,7 @@ def doctor_command(
         return _recovered(folder, as_json)
     checked = findings()
     archive = out or Path(f"rig-doctor-{datetime.now(UTC):%Y%m%d-%H%M%S}.zip")
-    require_out(archive)
+    require_outputs(archive)
     parts = _parts(checked, run, bench_file)
     _write(archive, parts)
     if as_json:
@@ -74,12 +74,9 @@ def _parts(checked: list[Finding], run: str | None, bench_file: Path | None) -> 
 
 
 def _write(archive: Path, parts: Mapping[str, Any]) -> None:
-    try:
-        with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
-            for name, document in parts.items():
-                file.writestr(name, json.dumps(document, indent=1, default=str))
-    except OSError as error:
-        raise OutputError(f"{archive}: cannot write the file: {error.strerror}; give another with --out") from None
+    with draft_of(archive) as draft, zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as file:
+        for name, document in parts.items():
+            file.writestr(name, json.dumps(document, indent=1, default=str))
 
 
 def _recovered(folder: Path, as_json: bool) -> int:

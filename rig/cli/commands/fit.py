@@ -19,7 +19,7 @@ from calibrations.table import Array, Table
 from calibrations.text import columns, concise
 from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.options import request_options
-from rig.cli.terminal.output import FILE, check_option, emit, model_option, note, notes
+from rig.cli.terminal.output import check_option, emit, model_option, note, notes, out_option
 from rig.cli.terminal.progress import working
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @click.command("fit")
 @click.argument("data", shell_complete=complete_data)
 @model_option
-@click.option("--out", type=FILE, help="Write the fitted model to this file.")
+@out_option("Write the fitted model to this file.")
 @check_option
 @request_options
 def fit_command(request: Request, out: Path | None, check: bool, as_json: bool) -> int:
@@ -44,7 +44,7 @@ def fit_command(request: Request, out: Path | None, check: bool, as_json: bool) 
     from rig.services.provenance import write_model
 
     with working("fitting the model"):
-        question = loaded(request, note, out)
+        question = loaded(request, note)
         data = question.data
         fitted = data.fit(question.model)
         path, reason = write_model(data, fitted, question.model, out, note), data.rejection(fitted)

@@ -14,7 +14,7 @@ import click
 from calibrations.fleet.batch import BatchEffect, Population, SensorVerdict
 from calibrations.text import columns, concise, concise_in_prefix, joined, percent
 from rig.cli.terminal.complete import complete_model
-from rig.cli.terminal.output import FILE, FOLDER, bench_option, emit, json_option, note
+from rig.cli.terminal.output import FOLDER, bench_option, emit, json_option, note, out_option, require_outputs
 from rig.fleet.calibrate import Calibrated, Calibration
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def _fleet_options(model: str, out: str) -> Callable[[Callable[[Request], None]]
         click.option(
             "--workers", type=click.IntRange(min=1), help="Size of the local cluster. Default: one worker a core."
         ),
-        click.option("--report", type=FILE, help="Write a report on the fleet to this HTML file."),
+        out_option("Write a report on the fleet to this HTML file.", "--report"),
         bench_option,
         json_option,
         click.option("--model", default="linear", shell_complete=complete_model, show_default=True, help=model),
@@ -127,14 +127,13 @@ def _write_report(request: Request, written: list[Path], page: Callable[[], str]
 @contextmanager
 def _fleet(request: Request) -> Iterator[tuple[Fleet, list[Member]]]:
     """The workers and the sensors; progress goes to standard error. Raises OutputError for an unusable report file."""
-    from rig.files import require_out
     from rig.fleet.crew import crew
     from rig.fleet.members import fleet_of
     from rig.fleet.questions import Fleet
     from rig.record import Record
 
-    if request.report is not None:
-        require_out(request.report, *request.sources)
+    if request.out is not None:
+        require_outputs(*sorted(request.out.glob("*.yaml")))
     members = fleet_of(request.sources)
     note(f"{len(members)} sensors of {len({m.batch for m in members})} batches on {len({m.rig for m in members})} rigs")
     with Record() as record, crew(request.scheduler, request.workers) as client:

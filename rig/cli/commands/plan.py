@@ -23,7 +23,7 @@ from procedures.settings import parse
 from rig.bench import Bench, read_bench
 from rig.cli.terminal.complete import complete_procedure
 from rig.cli.terminal.options import PASS_ON, read_settings, settings_arguments
-from rig.cli.terminal.output import FILE, bench_option, emit, json_option, model_option
+from rig.cli.terminal.output import bench_option, emit, json_option, model_option, out_option
 from rig.cli.terminal.progress import working
 from rig.cli.terminal.settings_help import ProcedureCommand
 from rig.errors import BeyondLimits
@@ -55,7 +55,7 @@ def _limits_as_bad_input() -> Iterator[None]:
 @model_option
 @click.option("--poses", type=int, help="Number of poses to choose, at most 60. Default: a quarter.")
 @click.option("--criterion", type=click.Choice(["D", "I"]), help="D: joint uncertainty; I, the default: prediction.")
-@click.option("--out", type=FILE, help="Write the poses to this file.")
+@out_option("Write the poses to this file.")
 @bench_option
 @json_option
 @_limits_as_bad_input()

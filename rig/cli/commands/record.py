@@ -13,7 +13,7 @@ from calibrations.tables import MEANS
 from calibrations.text import columns, duration
 from rig.bench.certificates import EXPIRED
 from rig.cli.terminal.complete import complete_data, complete_run
-from rig.cli.terminal.output import emit, json_option, note
+from rig.cli.terminal.output import emit, json_option, note, out_option
 from rig.cli.terminal.progress import working
 from rig.errors import RecordError
 from rig.record import Event, Kept, Line, Record, Run
@@ -243,15 +243,15 @@ def exclude_command(run: str, pose: int, reason: str | None, include: bool, as_j
 @click.option(
     "--format", "kind", type=click.Choice(["csv", "parquet", "hdf5", "event-model"]), default="csv", show_default=True
 )
-@click.option("--out", "path", type=click.Path(path_type=Path), required=True, help="The file to write.")
+@out_option("The file to write.", required=True)
 @json_option
-def export_command(data: str, kind: str, path: Path, as_json: bool) -> None:
+def export_command(data: str, kind: str, out: Path, as_json: bool) -> None:
     """Write DATA, a run or a file, to --out."""
     from rig.services.export import export
 
-    with working(f"writing {path}"):
-        rows = export(data, kind, path)
+    with working(f"writing {out}"):
+        rows = export(data, kind, out)
     if as_json:
-        emit({"schema": "rig.export/1", "data": data, "format": kind, "rows": rows, "path": str(path)})
+        emit({"schema": "rig.export/1", "data": data, "format": kind, "rows": rows, "path": str(out)})
     else:
-        note(f"{rows} rows to {path}")
+        note(f"{rows} rows to {out}")

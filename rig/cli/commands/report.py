@@ -9,7 +9,18 @@ import click
 
 from rig.cli.terminal.complete import complete_data, complete_model
 from rig.cli.terminal.options import request_options
-from rig.cli.terminal.output import FILE, bench_option, emit, json_option, model_option, note, picture_options
+from rig.cli.terminal.output import (
+    FILE,
+    bench_option,
+    emit,
+    force_option,
+    json_option,
+    model_option,
+    note,
+    out_option,
+    picture_options,
+    require_outputs,
+)
 from rig.cli.terminal.progress import working
 from rig.errors import OutputError
 
@@ -21,8 +32,8 @@ if TYPE_CHECKING:
 @click.command("report")
 @click.argument("data", shell_complete=complete_data)
 @model_option
-@click.option("--out", type=FILE, help="Write the page to this HTML file.")
 @picture_options("Write all pictures here.")
+@out_option("Write the page to this HTML file.")
 @request_options
 def report_command(request: Request, out: Path | None, folder: Path | None, form: str, as_json: bool) -> None:
     """Write a page on DATA (a file or a run) and a model: missing effects, and the completed model.
@@ -34,10 +45,8 @@ def report_command(request: Request, out: Path | None, folder: Path | None, form
         raise click.UsageError("nothing to write: give --out FILE.html, --pictures FOLDER, or both")
     from calibrations.presentation.static import save_all
     from rig.files import write_whole
-    from rig.services.load import require_output
     from rig.services.report import reported
 
-    require_output(request, out)
     with working("fitting the model and searching for missing effects") as progress:
         pictures, page = reported(request, note, progress.searched)
         progress.text = "drawing the pictures"
@@ -68,6 +77,7 @@ FORMS = (".html", ".pdf", ".xml")
     required=True,
     help="A file that ends in .html, .pdf or .xml; any other name gives all three.",
 )
+@force_option
 @click.option(
     "--as-found", "before", help="The model file in use before. Default: --model, if it has values from other data."
 )
@@ -98,6 +108,7 @@ def certificate_command(
     from rig.services.request import Request
 
     paths = _paths(out)
+    require_outputs(*paths)
     if is_still(data):
         require_reference(data, "still")
     with working("fitting the model") as progress:
@@ -117,11 +128,9 @@ def certificate_command(
 
 
 def _paths(out: Path) -> list[Path]:
-    """The files to write. Raises OutputError for another ending or a missing folder."""
+    """The files to write. Raises OutputError for another ending."""
     if out.suffix and out.suffix not in FORMS and not out.suffix[1:].isdigit():
         raise OutputError(f'{out}: a certificate ends in .html, .pdf or .xml, not in "{out.suffix}"')
-    if not out.parent.is_dir():
-        raise OutputError(f"{out}: there is no folder {out.parent}; make it, or give another file")
     return [out] if out.suffix in FORMS else [out.with_name(out.name + form) for form in FORMS]
 
 

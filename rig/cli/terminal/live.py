@@ -19,7 +19,6 @@ from rig.bench import Bench, read_bench
 from rig.cli.terminal.output import emit, note, notes, verdict_status
 from rig.cli.terminal.watch import watching
 from rig.cli.terminal.words import discovery, parameters, warning
-from rig.files import require_out
 from rig.record import Record
 from rig.record.measured import Measured
 from rig.runs.live import FIRST, STANDARD, Live, Measurement, stands
@@ -80,8 +79,6 @@ def discover_live(
     """The command. Returns its exit status."""
     bench_file = request.bench_file
     bench, effects = read_bench(bench_file), effects_of(bench_file)
-    if out is not None:
-        require_out(out, request.model, bench_file)
     start_model = read_model(request.model or "linear", effects)
     with Record() as record:
         experiments = Experiments(record, bench, unattended, answers)

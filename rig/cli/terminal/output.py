@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ import click
 
 from rig.cli.terminal.complete import complete_model
 from rig.cli.terminal.progress import erase
+from rig.files import require_new, require_out
 
 if TYPE_CHECKING:
     from calibrations.discovery.verdict import Verdict
@@ -29,12 +31,69 @@ FOLDER = click.Path(file_okay=False, path_type=Path)
 bench_option = click.option("--bench", "bench_file", type=FILE, help="The bench file; without it the simulated rig.")
 
 
-def picture_options(help_text: str) -> Callable[[Any], Any]:
-    """--pictures with this help, and --format: the arguments `folder` and `form`."""
+# Output files. A file that exists is refused before the work begins, unless the command has --force.
+
+
+INPUTS = ("data", "model", "models", "noise", "sources", "before", "bench_file", "answers")  # parameters with files
+
+
+def _forced(context: click.Context, _: click.Parameter, force: bool) -> None:
+    context.meta[force_option.__name__] = force
+
+
+def force_option(function: Any) -> Any:
+    """--force, for a command that calls `require_outputs`."""
+    words = "Replace output files that exist."
+    return click.option("--force", is_flag=True, expose_value=False, callback=_forced, help=words)(function)
+
+
+def require_outputs(*paths: Path | None) -> None:
+    """Raises OutputError for an input or a device, and unless --force is given, for a file that exists."""
+    context = click.get_current_context()
+    for path in filter(None, paths):
+        require_out(path, *_inputs(context))
+        if not context.meta.get(force_option.__name__):
+            require_new(path)
+
+
+def _inputs(context: click.Context) -> Iterator[str | Path]:
+    for value in (context.params.get(name) for name in INPUTS):
+        yield from value if isinstance(value, tuple) else (value,) if value else ()
+
+
+def out_option(help_text: str, name: str = "--out", **attributes: Any) -> Callable[[Any], Any]:
+    """An option for one output file, which is checked before the command begins; and --force."""
 
     def decorated(function: Any) -> Any:
-        form = click.option("--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True)
-        return click.option("--pictures", "folder", type=FOLDER, help=help_text)(form(function))
+        @wraps(function)
+        def checked(**words: Any) -> Any:
+            require_outputs(click.get_current_context().params[name.lstrip("-")])
+            return function(**words)
+
+        return click.option(name, type=FILE, help=help_text, **attributes)(force_option(checked))
+
+    return decorated
+
+
+def picture_options(help_text: str) -> Callable[[Any], Any]:
+    """--pictures with this help, and --format: the arguments `folder` and `form`.
+
+    A folder that already has pictures of the format is refused before the command begins, unless --force is given.
+    """
+
+    def decorated(function: Any) -> Any:
+        @wraps(function)
+        def checked(folder: Path | None, form: str, **words: Any) -> Any:
+            if folder is not None:
+                require_outputs(*sorted(folder.glob(f"*.{form}")))
+            return function(folder=folder, form=form, **words)
+
+        has_force = any(option.name == "force" for option in getattr(function, "__click_params__", ()))
+        checked = checked if has_force else force_option(checked)
+        form_option = click.option(
+            "--format", "form", type=click.Choice(["png", "svg"]), default="png", show_default=True
+        )
+        return click.option("--pictures", "folder", type=FOLDER, help=help_text)(form_option(checked))
 
     return decorated
 
