@@ -118,7 +118,8 @@ class Effect:
     incidental  nobody plans what excites it: a table that cannot show it is no reason for a remark
     of_force   it adds what the sensor makes of the force, which a drift of the sensitivity multiplies
     scales     it is a drift of the sensitivity: it multiplies what the sensor makes of the force
-    memory     how many arrays (n, 3) `follow` keeps from one sample to the next
+    memory     how many arrays (n, 3) `follow` keeps from one sample to the next; where it is 0, `transduction` follows
+               the force of its own row alone, and derivatives rely on that
     """
 
     name: str

@@ -146,15 +146,14 @@ class Problem:
         low, high = self.layout.bounds
         steps = 1e-3 * self.layout.typical
         chosen = np.flatnonzero(np.ones(len(theta), dtype=bool) if of is None else of)
-        error, known = self._errors_near(theta, stairs), self._known_columns(theta)
+        change, known = self._changes_near(theta, stairs), self._known_columns(theta)
         columns = []
         for k in map(int, chosen):
             if k in known:
                 columns.append(known[k])
                 continue
-            ahead, behind = theta.copy(), theta.copy()
-            ahead[k], behind[k] = min(theta[k] + steps[k], high[k]), max(theta[k] - steps[k], low[k])
-            columns.append((error(k, ahead) - error(k, behind)) / (ahead[k] - behind[k]))
+            ahead, behind = min(theta[k] + steps[k], high[k]), max(theta[k] - steps[k], low[k])
+            columns.append(change(k, ahead, behind) / (ahead - behind))
         return np.stack(columns, axis=2) if columns else np.zeros((len(self.channels), self.table.n, 0))
 
     def _known_columns(self, theta: Array) -> dict[int, Array]:
@@ -180,23 +179,19 @@ class Problem:
         """The chain with these values."""
         return Near(self.samples, steps)
 
-    def _errors_near(self, theta: Array, stairs: bool) -> Callable[[int, Array], Array]:
-        """The residual, up to a constant, as a function of (entry changed, vector).
-
-        An entry of an effect that only adds to the output changes that effect's contribution and nothing else.
-        """
-        samples = self.samples
+    def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:
+        """What the residual changes by, as a function of (entry changed, its value ahead, its value behind)."""
         steps = self.layout.steps(theta)
         even = [i for i, (effect, _) in enumerate(steps) if stairs or not effect.rounds]
-        by_all, beside_stairs = Near(samples, steps), Near(samples, [steps[i] for i in even])
+        by_all, beside_stairs = Near(self.samples, steps), Near(self.samples, [steps[i] for i in even])
 
-        def error(k: int, vector: Array) -> Array:
+        def change(k: int, ahead: float, behind: float) -> Array:
             term = self.layout.slots[k].term
-            values = self.layout.values(term, vector)
-            output = beside_stairs.output(even.index(term), values) if term in even else by_all.output(term, values)
-            return self._reduced(-output)
+            chain, place = (beside_stairs, even.index(term)) if term in even else (by_all, term)
+            values = (self.layout.values_with(steps[term][1], k, value) for value in (ahead, behind))
+            return self._reduced(-chain.change(place, *values))
 
-        return error
+        return change
 
     @cached_property
     def white(self) -> Array | None:
@@ -289,8 +284,12 @@ class PositionProblem(Problem):
         """A magnitude is not linear in any parameter."""
         return False
 
-    def _errors_near(self, theta: Array, stairs: bool) -> Callable[[int, Array], Array]:  # noqa: ARG002
-        return lambda _, vector: self.residual(vector)
+    def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:  # noqa: ARG002
+        def change(k: int, ahead: float, behind: float) -> Array:
+            more, less = (np.where(np.arange(len(theta)) == k, value, theta) for value in (ahead, behind))
+            return self.residual(more) - self.residual(less)
+
+        return change
 
     def _white(self, std: Array) -> Array:
         return norm_std(self.table, std).T / self.layout.nominal

@@ -12,18 +12,19 @@ field as a share of its strength.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 
 from calibrations.effects import Effect, Values
-from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.geometry.orientation import Pose, nominal_pose, specific_force
 from calibrations.geometry.rate_table import rate_deg_s
 from calibrations.motion.spectrum import sample_output
 from calibrations.table import Array, Table
 
 Step = tuple[Effect, Values]
+LITTLE = 1e-5  # of the largest force, and rad: steps of derivatives with respect to the force and the stage angles
 
 
 def force(table: Table, steps: Sequence[Step]) -> Array:
@@ -35,13 +36,19 @@ def static_force(table: Table, steps: Sequence[Step]) -> Array:
     """The same along the reference axes."""
     if table.type.turning:
         return rate_deg_s(table)
-    pose = nominal = nominal_pose(table)
-    for effect, p in steps:
-        pose = effect.pose(pose, table, p)
-    a = _reported(table).copy() if pose is nominal else specific_force(pose)
+    pose = true_pose(table, steps)
+    a = _reported(table).copy() if pose is nominal_pose(table) else specific_force(pose)
     if table.type.moving:  # along the sensor's reference edge x, Ang V
         a[:, 0] += table.column("acceleration_m_s2") / table.gravity_m_s2
     return a
+
+
+def true_pose(table: Table, steps: Sequence[Step]) -> Pose:
+    """The true stage angles and the true vertical."""
+    pose = nominal_pose(table)
+    for effect, p in steps:
+        pose = effect.pose(pose, table, p)
+    return pose
 
 
 @lru_cache(maxsize=2)
@@ -152,10 +159,19 @@ class Near:
         return added(self._sensed, self.table, self.steps)
 
     @cached_property
+    def _total(self) -> Array:
+        """The sum of all parts, shape (n, 3)."""
+        return np.asarray(sum(self._added, np.zeros((self.table.n, 3))))
+
+    @cached_property
+    def _has_output_stage(self) -> bool:
+        return any("output" in effect.places for effect, _ in self.steps)
+
+    @cached_property
     def _slope(self) -> Array:
         """d output / d the sum of all parts, where the output stage has no memory, shape (n, axes)."""
-        total, axes = sum(self._added, np.zeros((self.table.n, 3))), len(self.table.axes)
-        if not any("output" in effect.places for effect, _ in self.steps):
+        total, axes = self._total, len(self.table.axes)
+        if not self._has_output_stage:
             return np.ones((self.table.n, axes))
         h = 1e-6 * (float(np.ptp(total)) or 1.0)
         more, less = (converted([total + s * h], self.table.n, self.table, self.steps) for s in (1.0, -1.0))
@@ -207,8 +223,84 @@ class Near:
         if effect.places & {"pose", "force"}:
             static = static_force(self.table, steps) if "pose" in effect.places else self._static
             parts = added(sensed(static, self.table, steps), self.table, steps)
-        elif not any("output" in other.places for other, _ in steps):
+        elif not self._has_output_stage:
             parts = [self._alone(effect, values)]
         else:
             parts = [*self._added[:term], self._alone(effect, values), *self._added[term + 1 :]]
         return converted(parts, self.table.n, self.table, steps)[:, : len(self.table.axes)]
+
+    def change(self, term: int, ahead: Values, behind: Values) -> Array:
+        """Output with the values `ahead` of one effect less that with `behind`, to first order, shape (n, axes).
+
+        Values before the transduction change the force. The output follows by d output / d force, found once for all.
+        """
+        effect = self.steps[term][0]
+        if len(effect.places) > 1 or "output" in effect.places:
+            return self.output(term, ahead) - self.output(term, behind)
+        if "transduction" in effect.places:
+            return self._read_out(self._alone(effect, ahead) - self._alone(effect, behind))
+        more, less = self._force_with(term, ahead), self._force_with(term, behind)
+        parts = [np.einsum("nij,nj->ni", self._by_force, more - less)]
+        for other, values in self._remembering:
+            followed = (other.transduction(a, self.table, values) for a in (more, less))
+            parts.append((next(followed) - next(followed)) * self._drift_of(other))
+        return self._read_out(sum(parts[1:], parts[0]))
+
+    def _force_with(self, term: int, values: Values) -> Array:
+        """Force along the sensing axes with other values of one effect, shape (n, 3)."""
+        effect = self.steps[term][0]
+        steps = [*self.steps[:term], (effect, values), *self.steps[term + 1 :]]
+        if "pose" not in effect.places:
+            return sensed(self._static, self.table, steps)
+        pose, by_angle, by_up = self._pose, self._by_angle, self._by_up
+        moved = true_pose(self.table, steps)
+        static = self._static + by_up @ (moved.up - pose.up)
+        for change, by in zip((moved.alpha - pose.alpha, moved.beta - pose.beta), by_angle, strict=True):
+            static = static + change[:, None] * by
+        return sensed(static, self.table, steps)
+
+    @cached_property
+    def _pose(self) -> Pose:
+        return true_pose(self.table, self.steps)
+
+    @cached_property
+    def _by_angle(self) -> tuple[Array, Array]:
+        """d force along the reference axes / d alpha and beta, g/rad, shape (n, 3) each."""
+        pose = self._pose
+
+        def slope(more: Pose, less: Pose) -> Array:
+            return (specific_force(more) - specific_force(less)) / (2 * LITTLE)
+
+        return (
+            slope(replace(pose, alpha=pose.alpha + LITTLE), replace(pose, alpha=pose.alpha - LITTLE)),
+            slope(replace(pose, beta=pose.beta + LITTLE), replace(pose, beta=pose.beta - LITTLE)),
+        )
+
+    @cached_property
+    def _by_up(self) -> Array:
+        """d force along the reference axes / d the true vertical, shape (n, 3, 3)."""
+        return np.stack([specific_force(replace(self._pose, up=e)) for e in np.eye(3)], axis=2)
+
+    @cached_property
+    def _remembering(self) -> list[Step]:
+        """Effects that follow the force of earlier rows as well."""
+        return [(effect, values) for effect, values in self.steps if effect.memory]
+
+    @cached_property
+    def _by_force(self) -> Array:
+        """d the sum of all parts / d the force, without effects that remember, shape (n, 3, 3)."""
+        a, steps = self._sensed, [(effect, values) for effect, values in self.steps if not effect.memory]
+        h = LITTLE * (float(np.max(np.abs(a))) or 1.0)
+
+        def total(a: Array) -> Array:
+            return np.asarray(sum(added(a, self.table, steps), np.zeros_like(a)))
+
+        return np.stack([(total(a + h * e) - total(a - h * e)) / (2 * h) for e in np.eye(3)], axis=2)
+
+    def _read_out(self, change: Array) -> Array:
+        """What a small change of the sum of all parts, (n, 3), changes of the output, shape (n, axes)."""
+        axes, n = len(self.table.axes), self.table.n
+        if self.table.type.moving or any(effect.rounds for effect, _ in self.steps):
+            more, less = (converted([self._total + s * change / 2], n, self.table, self.steps) for s in (1.0, -1.0))
+            return np.asarray((more - less)[:, :axes])
+        return np.asarray(self._slope * change[:, :axes])

@@ -123,14 +123,24 @@ class Layout:
         named = Values.of(term.constants)
         named |= {p.name: np.zeros(3 if p.per_axis else ()) for p in term.effect.parameters}
         for k in self._entries[i]:
-            name, axis = self.slots[k].parameter.name, self.slots[k].axis
-            if not self.slots[k].parameter.per_axis:
-                named[name] = np.asarray(theta[k])
-            elif axis:
-                named[name][AXES.index(axis)] = theta[k]
-            else:
-                named[name] = np.full(3, theta[k])
+            self._enter(named, k, theta[k])
         return named
+
+    def values_with(self, values: Values, k: int, value: float) -> Values:
+        """The named values of a term with another one for its entry `k`."""
+        name = self.slots[k].parameter.name
+        named = Values({**values, name: values[name].copy()})
+        self._enter(named, k, value)
+        return named
+
+    def _enter(self, named: Values, k: int, value: float) -> None:
+        parameter, axis = self.slots[k].parameter, self.slots[k].axis
+        if not parameter.per_axis:
+            named[parameter.name] = np.asarray(value)
+        elif axis:
+            named[parameter.name][AXES.index(axis)] = value
+        else:
+            named[parameter.name] = np.full(3, value)
 
     @cached_property
     def _entries(self) -> list[list[int]]:

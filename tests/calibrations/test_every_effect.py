@@ -76,6 +76,18 @@ def test_every_parameter_changes_the_residual_smoothly(effect: Effect) -> None:
         assert {name for name, each in zip(names, seen, strict=True) if each} == set(names)  # of one axis at least
 
 
+@EFFECTS_ON_SAMPLES
+def test_an_effect_without_memory_follows_the_force_of_its_own_row(effect: Effect) -> None:
+    kind = effect.kinds[0]
+    problem = Problem.of(read_model(STARTS.get(kind, "linear")).with_effect(effect), table_for(effect, kind))
+    table, layout = problem.samples, problem.layout
+    steps = dict(layout.steps(layout.starts()[-1] + 0.1 * layout.typical))
+    a, moved = (np.random.default_rng(0).uniform(-1, 1, (table.n, 3)) for _ in range(2))
+    moved[::2], moved[1::2] = a[::2], -a[1::2]
+    before, after = (np.broadcast_to(effect.transduction(each, table, steps[effect]), a.shape) for each in (a, moved))
+    assert np.array_equal(before[::2], after[::2]) or effect.memory
+
+
 @EFFECTS
 def test_says_what_a_person_should_know(effect: Effect) -> None:
     for text in (

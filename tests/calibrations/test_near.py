@@ -43,3 +43,18 @@ def test_what_only_adds_has_derivatives_to_the_last_digits() -> None:
         for factor in (1 + 1e-4, 1 - 1e-4, 1.0)
     )
     np.testing.assert_allclose((more - less) / 2e-4, whole, rtol=0, atol=1e-11 * np.max(np.abs(whole)))
+
+
+@pytest.mark.parametrize("stairs", [False, True])
+def test_derivatives_are_those_of_the_whole_chain(stairs: bool) -> None:
+    model = read_model("linear")
+    others = ("base-tilt", "stage-eccentricity", "temperature-scale", "cubic-nonlinearity", "supply-sensitivity")
+    for each in (*EVERY, *others):
+        if each != "quantisation" or stairs:
+            model = model.with_effect(catalogue()[each])
+    problem = Problem.of(model, TABLE)
+    theta = problem.layout.starts()[0] + problem.layout.typical / 10
+    found, steps = problem.jacobian(theta, stairs=stairs), 1e-3 * np.diag(problem.layout.typical)
+    for k, step in enumerate(steps):
+        expected = (problem.residual(theta + step) - problem.residual(theta - step)) / (2 * step[k])
+        np.testing.assert_allclose(found[:, :, k], expected, rtol=0, atol=1e-5 * max(np.max(np.abs(expected)), 1e-6))
