@@ -80,6 +80,12 @@ def test_an_error_above_the_floor_without_a_search_is_no_complete_model() -> Non
     assert "No search for further effects was made" in judgement.text
 
 
+def test_noise_above_the_floor_is_said_to_be_noise() -> None:
+    assert "slow noise or scatter" in Judgement(model="linear", error=2.46).text
+    assert "slow noise" not in Judgement(model="linear", error=1.02).text
+    assert "slow noise" not in Judgement(model="linear", error=2.46, left="a step in time", share_left=0.04).text
+
+
 def test_before_nothing_is_as_likely_as_anything() -> None:
     """No clean sensor is likely to miss something, however many effects are tried.
 

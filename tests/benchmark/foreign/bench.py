@@ -12,6 +12,9 @@ LAYOUTS = ("turns", "uneven", "shuffled", "sparse", "plus-minus")
 DWELL_S = 5.0
 
 
+SAMPLE_V = 0.78e-3  # noise of a sample without shaking
+
+
 @dataclass(frozen=True)
 class Bench:
     """One record: columns (n,), angles in rad. `die_c` is the temperature of the sensor."""
@@ -25,6 +28,11 @@ class Bench:
     thermometer_c: Array
     supply_v: Array
     vibration: Array  # rms of the shaking at each pose, in units of the sample noise
+
+    @property
+    def sample_noise_v(self) -> Array:
+        """Standard deviation of a sample at each pose, noise and shaking, (n,)."""
+        return np.asarray(SAMPLE_V * np.sqrt(1 + self.vibration**2))
 
     @property
     def n(self) -> int:

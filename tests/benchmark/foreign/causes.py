@@ -15,8 +15,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import norm
 
 from tests.benchmark.foreign.bench import Array, Bench
+
+QUANTILES = norm.ppf((np.arange(200) + 0.5) / 200)  # equally likely values of normal noise
 
 OTHER = [1, 0]
 
@@ -147,14 +150,11 @@ def _supply(scene: Scene) -> Array:
     return _column(scene.bench.supply_v / 5.0 - 1)
 
 
-def _stairs(v: Array, s: float, scene: Scene) -> Array:
-    """Means of rounded samples (the noise of the samples is in `sensor`): the saw of a rounding with noise."""
-    step, noise = max(abs(s), 1e-9), 0.78e-3
-    out = v.copy()
-    for k in range(1, 6):
-        kept = np.exp(-2 * (np.pi * k * noise / step) ** 2)
-        out += step / np.pi / k * (-1) ** k * kept * np.sin(2 * np.pi * k * v / step)
-    return out
+def rounded(v: Array, s: float, scene: Scene) -> tuple[Array, Array]:
+    """Mean and standard deviation of samples with noise and vibration, each rounded to a multiple of `s`, (n, 2)."""
+    step, noise = max(abs(s), 1e-9), scene.bench.sample_noise_v[:, None, None]
+    samples = step * np.round((v[:, :, None] + noise * QUANTILES) / step)
+    return samples.mean(axis=2), samples.std(axis=2)
 
 
 CATALOGUE = (
@@ -213,7 +213,7 @@ CATALOGUE = (
     Cause("stage-backlash", "angles", _springy),
     Cause("adc-nonlinearity", "volts", lambda v, s, _: v + s * np.sin(np.pi * (v - 1.2) / 2.8)),
     Cause("adc-nonlinearity", "volts", lambda v, s, _: v + s * ((v - 2.5) ** 2 + 0.6 * (v - 2.5) ** 3)),
-    Cause("quantisation", "volts", _stairs),
+    Cause("quantisation", "volts", lambda v, s, scene: rounded(v, s, scene)[0]),
 )  # fmt: skip
 
 

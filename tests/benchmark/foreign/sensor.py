@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.benchmark.foreign.bench import LAYOUTS, Array, Bench, bench, flicker
-from tests.benchmark.foreign.causes import Cause, Scene
+from tests.benchmark.foreign.causes import Cause, Scene, rounded
 
 STOPS = 6  # on the way to each pose
 WHITE_V = 5e-5  # noise of a mean
-SAMPLE_V = 0.78e-3
 SAMPLES = 5000
 
 
@@ -33,8 +32,8 @@ class Sensor:
     gain_v: Array
     scenes: tuple[Scene, ...]
 
-    def output(self, hidden: Sequence[Hidden]) -> Array:
-        """Means without noise, V, (n, 2)."""
+    def output(self, hidden: Sequence[Hidden], noise: Array | float = 0.0) -> Array:
+        """Means, V, (n, 2), with such noise in front of the converter."""
         stages = {name: [(h, s) for h, s in zip(hidden, self.scenes, strict=False) if h.cause.stage == name]
                   for name in ("angles", "tilt", "frame", "response", "volts")}  # fmt: skip
         angles = (self.bench.alpha, self.bench.beta)
@@ -49,7 +48,7 @@ class Sensor:
         u = force[:, :2]
         for h, scene in stages["response"]:
             u = h.cause.law(u, h.size, scene)
-        v = self.bias_v + self.gain_v * u
+        v = self.bias_v + self.gain_v * u + noise
         for h, scene in stages["volts"]:
             v = h.cause.law(v, h.size, scene)
         return v
@@ -112,8 +111,12 @@ def logged(random: np.random.Generator, made: Sensor, hidden: Sequence[Hidden], 
     b = made.bench
     noise = random.normal(0, WHITE_V, (b.n, 2))
     noise += slow * WHITE_V * np.column_stack([flicker(random, b.t) for _ in range(2)])
-    v = made.output(hidden) + noise
-    std = SAMPLE_V * np.sqrt(1 + b.vibration[:, None] ** 2) * random.normal(1, 1 / np.sqrt(500), (b.n, 2))
+    v = made.output(hidden, noise)
+    rounding = [(h, scene) for h, scene in zip(hidden, made.scenes, strict=False) if h.cause.name == "quantisation"]
+    std = np.tile(b.sample_noise_v[:, None], (1, 2))
+    for h, scene in rounding:
+        std = rounded(made.output([other for other in hidden if other is not h], noise), h.size, scene)[1]
+    std = std * random.normal(1, 1 / np.sqrt(500), (b.n, 2))
     lines = ["# sample_rate_hz: 1000", "# filter_corner_hz: 15.2",
              "path,t_s,alpha_deg,beta_deg,direction,temperature_c,vx_v,vy_v,vx_std_v,vy_std_v,n,supply_v"]  # fmt: skip
     supply = b.supply_v + random.normal(0, 1e-5, b.n)
