@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
-from calibrations.criteria import MATERIAL, SIGNIFICANT
+from calibrations.criteria import MATERIAL, MOST_UNEXPLAINED, SIGNIFICANT
 from calibrations.discovery.additions import (
     BASIC,
     NO_WORSE,
@@ -87,9 +87,9 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     """The effects and free forms that the model of `start` misses."""
     basic = [name for name in BASIC if name in effects and not start.model.holds(name)]
     base = _freed(start, basic, effects)
-    behind = _behind_stairs(base, effects)
+    behind, share_left = _behind_stairs(base, effects)
     remarks: tuple[str, ...] = ()
-    if behind is not None and behind.end.held_out_excess <= MATERIAL:
+    if behind is not None and (behind.end.held_out_excess <= MATERIAL or share_left < MOST_UNEXPLAINED):
         best = behind
     else:
         found = structure(base, effects)
@@ -161,14 +161,18 @@ def _named_and_fitted(base: Fit, found: Structure, effects: Mapping[str, Effect]
     return _Named(found, causes, forms, end)
 
 
-def _behind_stairs(base: Fit, effects: Mapping[str, Effect]) -> _Named | None:
-    """What acts before a coarse converter, searched for in the outputs before their rounding; None: no stairs show."""
+def _behind_stairs(base: Fit, effects: Mapping[str, Effect]) -> tuple[_Named | None, float]:
+    """What acts before a coarse converter, searched for in the outputs before their rounding; None: no stairs show.
+
+    Also the part of the excess variance of the same without the converter that they leave. Noise in front of a coarse
+    converter is magnified at the edges of its steps, so that more than the noise floor may be left.
+    """
     white = base.problem.white
     if STAIRS not in effects or base.model.holds(STAIRS) or white is None or "output" in base.table.left_out:
-        return None
+        return None, 1.0
     stairs = find_stairs(base.table, base.table.outputs.T - base.residual, white)
     if stairs is None:
-        return None
+        return None, 1.0
     smooth = fit(base.model, before_stairs(base.table, white, stairs))
     found = structure(smooth, effects)
     causes = separately(smooth, found, additions(found, smooth.model, effects))
@@ -178,10 +182,11 @@ def _behind_stairs(base: Fit, effects: Mapping[str, Effect]) -> _Named | None:
     rounding = Addition(
         effects[STAIRS], {}, tuple(Estimate(name, "", value, None, "") for name, value in values.items())
     )
-    end = together(base, [*causes, rounding, *forms])
-    if together(base, [*causes, *forms]).pooled_excess < NO_WORSE * end.pooled_excess:
-        return None  # as well without: a regular sweep gathers outputs by itself
-    return _Named(with_stairs(found, base.residual, stairs, white), [*causes, rounding], forms, end)
+    end, without = (together(base, [*causes, *stage, *forms]) for stage in ([rounding], []))
+    if without.pooled_excess < NO_WORSE * end.pooled_excess:
+        return None, 1.0  # as well without: a regular sweep gathers outputs by itself
+    named = _Named(with_stairs(found, base.residual, stairs, white), [*causes, rounding], forms, end)
+    return named, end.share_left(without)
 
 
 def _freed(start: Fit, names: list[str], effects: Mapping[str, Effect]) -> Fit:

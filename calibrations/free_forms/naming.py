@@ -19,6 +19,7 @@ LEAST_NEEDED = 0.02  # the same of a form without which the others, as the catal
 NAMED = 0.5  # of it that one form must take up: else the cause is unknown
 MOST_FORMS, NAMED_TOGETHER = 2, 0.8  # forms that only approximate a curve, and what two of them must take up
 LEAST_SIZE = 0.6  # noise floors: a smaller place is a refinement
+LEAST_OWN = 0.3  # noise floors: the part of a place with a cause that no other place takes up
 LEAST_SHARE = 0.015  # of the largest place's size
 LEAST_UNKNOWN, LEAST_UNKNOWN_SHARE = 1.0, 0.05  # the same two of a place without a cause
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
@@ -90,7 +91,8 @@ def places(result: SearchResult) -> list[ActingPlace]:
         least = LEAST_SHARE * largest
         if walks:
             least = max(LEAST_UNKNOWN_SHARE * largest, READING_ERRORS * _reading_errors(result, sizes))
-        material = _own_size(result, gain) >= LEAST_SIZE and sizes[place] >= least
+        own = LEAST_OWN if causes else LEAST_SIZE  # what has no form of the catalogue is more often a remainder
+        material = _own_size(result, gain) >= own and sizes[place] >= max(LEAST_SIZE, least)
         curve = curves[place].reshape(result.white.shape) * result.white
         constants = followed[0].constants if followed else ()
         acting = tuple(names), causes, share, material, gain, others, curve, constants

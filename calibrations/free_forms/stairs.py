@@ -32,6 +32,10 @@ SAW = "output/quantisation"  # the component that a search without stairs leaves
 GRID = np.linspace(-1.0, 1.0, 401)  # of a step, about a code
 REACH = 3  # codes to either side that noise may reach
 LEAST_NOISE = 0.02  # of a step
+TREAD = np.linspace(-0.5, 0.5, 400, endpoint=False)  # of a step, about a code
+NOISES = tuple(map(float, np.geomspace(LEAST_NOISE, 0.4, 41)))  # of a sample, in steps: with more no stairs are seen
+NARROWEST = 3e-3  # standard deviation in steps that the points of a tread resolve
+OUTLIER = 1e-6  # least density: one odd output does not decide
 SAW_POINTS = 3.0  # frequencies in a resolved interval
 SAW_REJECTIONS = 1  # of one saw: its phase may belong to an output that is not right yet
 LEAST_OF_SAW = 0.3  # of the first harmonic that a step of this height has
@@ -75,7 +79,26 @@ def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
     phase = float(np.angle(np.mean(np.exp(2j * np.pi * at * (values - middle)))))
     step, offset = _whole(values, 1 / at, middle + phase / (2 * np.pi * at))
     width = max(3 * float(np.sqrt(np.mean(white**2))), 0.01 * step)
-    return Stairs(*_sharpened(values, step, offset, middle, width), noise)
+    step, offset = _sharpened(values, step, offset, middle, width)
+    return Stairs(step, offset, noise or _sample_noise(table.outputs.T, white, step, offset))
+
+
+def _sample_noise(outputs: Array, white: Array, step: float, offset: float) -> float:
+    """The noise of a sample at which the outputs are likeliest to lie between the codes as they do.
+
+    outputs, white  means and their standard deviations, (channels, n)
+
+    Of steps so coarse that most means are samples of one code, their standard deviations tell nothing of it. Outputs
+    before the rounding are taken to lie anywhere between two codes with the same probability.
+    """
+    seen, std = ((outputs - offset) / step).ravel()[:, None], np.maximum(white / step, NARROWEST).ravel()[:, None]
+
+    def likelihood(share: float) -> float:
+        beyond = _mean_code(TREAD, 1.0, 0.0, share) - seen
+        density = np.mean(np.exp(-0.5 * ((beyond - np.round(beyond)) / std) ** 2), axis=1)
+        return float(np.sum(np.log(np.maximum(density, OUTLIER))))
+
+    return step * max(NOISES, key=likelihood)
 
 
 def _whole(values: Array, step: float, offset: float) -> tuple[float, float]:

@@ -174,9 +174,10 @@ def white_std(table: Table) -> Array | None:
     if "n" not in table or not all(name in table for name in names):
         return None
     std = np.column_stack([table.column(name) for name in names])
-    usual = np.median(std, axis=0)
-    if not np.all(usual > 0):
+    scattered = std > 0
+    if not scattered.any(axis=0).all():
         return None
+    usual = np.array([np.median(x[some]) for x, some in zip(std.T, scattered.T, strict=True)])
     std = np.where(std > NO_SCATTER * usual, std, usual)
     factors = np.array([inflation(table, axis) for axis in table.axes])
     mean: Array = std * np.sqrt(factors / table.column("n")[:, None])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -45,6 +47,15 @@ def test_stairs_are_found_at_their_height_and_place(step: float, noise: float) -
     assert found.step == pytest.approx(step, rel=1e-3)
     sharp = fitted_stairs(measured, values, white(values, noise), found)
     assert abs(sharp.offset / step - np.round(sharp.offset / step)) < 0.05
+
+
+def test_the_noise_of_samples_that_mostly_are_one_code_is_that_of_the_means() -> None:
+    values = before() + np.random.default_rng(1).uniform(-0.02, 0.02, before().shape)  # a regular sweep is no sample
+    measured = table(values, 0.02, 0.001)
+    columns = {name: np.zeros_like(x) if name.endswith("_std_v") else x for name, x in measured.columns.items()}
+    found = find_stairs(replace(measured, columns=columns), values, white(values, 0.001))
+    assert found is not None
+    assert found.noise == pytest.approx(0.001, rel=0.3)
 
 
 def test_outputs_that_are_not_rounded_have_no_stairs() -> None:
