@@ -218,7 +218,8 @@ def _remaining(j: Judgement) -> str:
     with_them = f"With {joined(j.added)}, no effect is missing. " if j.added and j.verdict is Verdict.ADEQUATE else ""
     error = f"{with_them}Remaining error: {j.error:.3g} times {j.floor}"
     if j.left is None:
-        rest = " The part above it is slow noise or scatter between rows: it has no pattern." if j.error > MATERIAL else ""
+        noise = " The part above it is slow noise or scatter between rows: it has no pattern."
+        rest = noise if j.error > MATERIAL else ""
         return f"{error}. No search for further effects was made." if _incomplete(j) else f"{error}.{rest}"
     causes = f" The cause may be the exact form of {joined(j.added, 'or')}, or one more effect." if j.added else ""
     return f"{error}: {j.left}.{causes}"
