@@ -25,6 +25,7 @@ LEAST_UNKNOWN, LEAST_UNKNOWN_SHARE = 1.0, 0.05  # the same two of a place withou
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
 CLOSE = 10.0  # of -2 log likelihood: not told apart
 UNSEEN = 0.3  # noise floors: what an effect leaves of a curve, and a wider one does not, says nothing of the mechanism
+CLEARLY_LESS = 1.5  # times the rms that an effect leaves of a curve: one that leaves more is not its cause
 READING_ERRORS = 1.5  # times what the errors of noisy columns leave: their size is uncertain
 FOLLOWS = 0.97  # of the variance of a curve over time that a line over a column takes up: no two clocks agree so well
 FOLLOWERS = {"time-bias": ("temperature-bias", "column:std"), "time-scale": ("temperature-scale",)}
@@ -203,13 +204,21 @@ def _one_name(
 ) -> tuple[str, ...]:
     """The causes with one name for an effect and the wider one that contains it.
 
-    It is the wider one where the other, at its best shape, leaves a part of the curve that can be seen.
+    It is the wider one where the other, at its best shape, leaves a part of the curve that can be seen, and the wider
+    one beside the other without a shape leaves clearly less: both with their shapes follow many lags.
     """
     causes = dict.fromkeys(chosen)
+
+    def left(comps: Sequence[Component], beside: Sequence[Array]) -> float:
+        squares = min((_left_at_best(result, c, curve, Q, beside)[0] for c in comps), default=np.inf)
+        return float(np.sqrt(squares / len(curve)))
+
     for outer in (comp for comp in map(result.component, names) if comp.contains):
-        alone = [c for c in result.components if c.cause == outer.contains and c.place == outer.place and not c.form]
-        left = min((_left_at_best(result, c, curve, Q)[0] for c in alone), default=np.inf)
-        name = outer.cause if np.sqrt(left / len(curve)) > UNSEEN else outer.contains
+        here = [c for c in result.components if c.place == outer.place and not c.form]
+        inner, wider = ([c for c in here if c.cause == cause] for cause in (outer.contains, outer.cause))
+        plain = [c.reshaped((0.0,) * len(c.shape)) if c.reshaped else c for c in inner[:1]]
+        clear = CLEARLY_LESS * left(wider, [_columns_of(result, c, Q) for c in plain])
+        name = outer.cause if left(inner, []) > max(UNSEEN, clear) else outer.contains
         causes = dict.fromkeys(name if cause in (outer.cause, outer.contains) else cause for cause in causes)
     return tuple(causes)
 
