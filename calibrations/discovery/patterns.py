@@ -56,6 +56,8 @@ class Pattern:
         return re.sub(r"[^a-z0-9]+", "-", words).strip("-")
 
 
+FEWEST_ATTITUDES = 3  # of a motion: of two, an offset at one is as good as at the other
+
 # words for columns and their units, and their short names in expressions
 WORDS = {
     "direction": ("direction of turning", "", "direction"),
@@ -70,8 +72,23 @@ def patterns(table: Table, channels: tuple[str, ...]) -> list[Pattern]:
     if table.type.stage_angles:
         found += [*_in_angles(table), *_in_stage(table, len(channels))]
     if table.type.moving:
-        found += _in_parts(table, channels)
+        found += [*_in_parts(table, channels), *at_attitudes(table, channels)]
     return [per_channel(p, len(channels)) for p in found if np.ptp(p.columns) > 0]
+
+
+def at_attitudes(table: Table, channels: tuple[str, ...]) -> list[Pattern]:
+    """An offset of every axis at one attitude of a motion, where there are three attitudes or more."""
+    attitudes = np.column_stack([np.round(table.optional(name, 0.0), 1) for name in ("alpha_deg", "beta_deg")])
+    distinct = np.unique(attitudes, axis=0)
+    means = [c for c, name in enumerate(channels) if name.endswith(" mean")]
+    found = []
+    for alpha, beta in distinct if len(distinct) >= FEWEST_ATTITUDES else ():
+        columns = np.zeros((len(channels), table.n, len(means)))
+        for k, c in enumerate(means):
+            columns[c, :, k] = np.all(attitudes == (alpha, beta), axis=1)
+        text = f"an offset at alpha = {alpha:g} deg, beta = {beta:g} deg only"
+        found.append(Pattern(text, columns, price=2 * float(np.log(len(distinct)))))
+    return found
 
 
 def per_channel(pattern: Pattern, channels: int) -> Pattern:

@@ -18,9 +18,12 @@ from calibrations.discovery.findings import Step
 from calibrations.discovery.search import cost, first_order
 from calibrations.discovery.significance import chance, of_search
 from calibrations.fitting.fit import Fit
+from calibrations.fitting.shown_forms import Shown, form_columns, forms_at, in_white_noise
 from calibrations.free_forms.bases import Basis, Line, Spline, spline
 from calibrations.free_forms.form import Factor, Form
+from calibrations.free_forms.naming import FORM_OF, MOSTLY
 from calibrations.free_forms.place_names import place_of_effect
+from calibrations.free_forms.selection import ENTER
 from calibrations.table import Array
 
 BASE = ("bias", "scale-factor")
@@ -37,6 +40,7 @@ DRIVERS: dict[str, tuple[str, Factor]] = {
     "output": ("output", ""),
 }
 LINEAR = ("cross-response", "z-response", "scale-over-cross", "scale-over-z")  # whose linear parts are geometry
+SLOW = (("temperature-bias", "time-bias"), ("temperature-scale", "time-scale"))  # places that go the same way
 LEAD_S, LEADS = 15.0, 4.0  # by which the sensor may be ahead of its thermometer, and how often that
 INTERVALS = 8
 FORCES = Spline(-1.1, 1.1, INTERVALS)
@@ -56,12 +60,57 @@ def causes(steps: tuple[Step[Fit], ...], tried: int) -> tuple[str, ...]:
     material = [name for name, lost in costs.items() if name not in approximate or lost >= REFINEMENT * greatest]
     if len(material) < 2:
         return tuple(material)
+    material = _one_of_slow(end, material)
     found: list[str] = []
     for name in sorted(material, key=lambda n: -costs[n]):
         forms = [_whitened_forms(end, other) for other in found]
-        if not forms or name in BASE or of_search(chance(*_beside(end, name, np.hstack(forms))), tried) < SIGNIFICANT:
+        if (
+            not forms
+            or name in BASE
+            or not (
+                of_search(chance(*_beside(end, name, np.hstack(forms))), tried) >= SIGNIFICANT
+                or _follows(end, name, [other for other in found if _is_smaller(costs[name], costs[other])])
+            )
+        ):
             found.append(name)
     return tuple(name for name in material if name in found)
+
+
+def _one_of_slow(end: Fit, names: list[str]) -> list[str]:
+    """The effects without that of a temperature, or of the time, which a free form of the other one replaces.
+
+    Where both go the same way, each of the two formulas makes up for what the other one leaves. The likelier place is
+    the cause.
+    """
+    at = {place_of_effect(name): name for name in names}
+    for pair in SLOW:
+        if not all(place in at for place in pair):
+            continue
+        ends = [
+            Shown.of(in_white_noise(end), forms_at(place, end), apart=at[other]) for place, other in (pair, pair[::-1])
+        ]
+        likelier = min(ends, key=lambda shown: shown.selected.deviance)
+        if _takes_up(likelier):
+            names = [name for name in names if name != likelier.apart]
+    return names
+
+
+def _takes_up(shown: Shown) -> bool:
+    """Whether the forms leave little of what the effect that is set apart explains without them."""
+    return shown.gain_apart(shown.selected) < max(ENTER, (1 - MOSTLY) * shown.gain_apart(shown.nothing))
+
+
+def _is_smaller(cost_: float, other: float) -> bool:
+    return cost_ < FORM_OF**2 * other
+
+
+def _follows(end: Fit, name: str, larger: list[str]) -> bool:
+    """Whether free forms at the places of much larger effects, of the size that the data show, take up most of it."""
+    places = dict.fromkeys(place_of_effect(other) for other in larger)
+    forms = {key: form for place in places if place in DRIVERS for key, form in forms_at(place, end).items()}
+    if not forms:
+        return False
+    return _takes_up(Shown.of(in_white_noise(end), forms, apart=name))
 
 
 def _beside(end: Fit, name: str, forms: Array) -> tuple[float, int]:
@@ -88,7 +137,7 @@ def _whitened_forms(end: Fit, name: str) -> Array:
     own = np.linalg.norm(_freed(white[:, mine] @ end.theta[mine], base))
     blocks = [np.zeros((len(white), 0))]
     for form, part in _forms(end, name):
-        columns = _freed(end.noise.whiten(_columns(end, form)), base)
+        columns = _freed(end.noise.whiten(form_columns(end, form)), base)
         size = np.linalg.norm(columns)
         blocks.append(columns * (part * own / size if size > 0 else 0.0))
     return np.hstack(blocks)
@@ -118,16 +167,3 @@ def _forms(end: Fit, name: str) -> Iterator[tuple[Form, float]]:
     if driver == "temperature" and "t_s" in table:
         for lead in (-LEAD_S, LEAD_S):
             yield Form(place, "lead", driver, (Line(float(x.min()), float(x.max())),), factor, lead_s=lead), LEADS
-
-
-def _columns(end: Fit, form: Form) -> Array:
-    """d residual / d the coefficients of a form of every axis, (channels, n, m)."""
-    problem = end.problem
-    samples, force = problem.samples, problem.sensed(end.theta)
-    found = []
-    for k in range(len(samples.axes)):
-        for column in form.columns(samples, force, samples.outputs[:, k], k).T:
-            change = np.zeros(samples.outputs.shape)
-            change[:, k] = column
-            found.append(change)
-    return problem.of_output(end.theta, np.stack(found, axis=2))

@@ -25,7 +25,7 @@ from calibrations.discovery.candidates import candidates, with_rivals
 from calibrations.discovery.findings import Candidate, Findings, Step
 from calibrations.discovery.outliers import caution, told
 from calibrations.discovery.plausibility import Finding, rejection
-from calibrations.discovery.search import Path, Settled, find_path, is_complete, recounted, settled
+from calibrations.discovery.search import Path, Settled, continued, find_path, is_complete, recounted, settled
 from calibrations.discovery.structure import plainer, structure_of
 from calibrations.discovery.verdict import Verdict
 from calibrations.effects import Effect
@@ -103,7 +103,10 @@ class RowSearch:
     def _among(
         self, start: Fit, outliers: tuple[int, ...], origin: Fit, effects: Mapping[str, Effect]
     ) -> Findings[Fit]:
-        path = find_path(start, outliers, effects, most=1 if self._shows_places else MOST_EFFECTS)
+        moving = self.table.type.moving
+        path = find_path(start, outliers, effects, most=1 if self._shows_places or moving else MOST_EFFECTS)
+        if moving and plainer(path.start, path.end) is None:
+            path = continued(path, effects)
         if not self._shows_places or _explained(path):
             return self._on_path(path, effects, origin)
         from calibrations.discovery.structural import search_structure  # only this search needs it

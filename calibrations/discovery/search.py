@@ -106,6 +106,12 @@ def grown(path: Path, effects: Mapping[str, Effect], most: int = MOST_EFFECTS) -
     return Path(path.start, tuple(steps), tuple(found), path.outliers)
 
 
+def continued(path: Path, effects: Mapping[str, Effect]) -> Path:
+    """The forward search from the last model of a path that has ended after its first step."""
+    done = not path.steps or path.end.share_left(path.start) <= 0
+    return path if done else recounted(further := grown(path, effects), further.end)
+
+
 def recounted(path: Path, end: Fit) -> Path:
     """The path with all errors as multiples of the residual of `end`, where that is the only measure of noise."""
     if not end.residual_is_noise:

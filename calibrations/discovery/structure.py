@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln, ndtri
 
 from calibrations.criteria import (
+    MATERIAL,
     MOST_ROWS_STAND_OUT,
     MOST_SLOW_NOISE,
     MOST_UNDER_SLOW_PATTERN,
@@ -25,7 +26,7 @@ from calibrations.criteria import (
     SIGNIFICANT,
 )
 from calibrations.discovery.outliers import told
-from calibrations.discovery.patterns import Pattern, one_sided, patterns, per_channel
+from calibrations.discovery.patterns import Pattern, at_attitudes, one_sided, patterns, per_channel
 from calibrations.discovery.plausibility import UNEXPLAINED, Finding
 from calibrations.discovery.significance import Screen, Search
 from calibrations.fitting.fit import Fit
@@ -145,15 +146,19 @@ def plainer(begin: Fit, end: Fit, named: Fit | None = None) -> Pattern | None:
 
     Both are compared by likelihood under the noise without its slow part, which would take up either; a parameter
     costs log(rows), and so does the choice among the patterns. In a motion, whose rows repeat each other, a step at the
-    beginning is an effect that is always there: nothing competes. `named`: the effects without free forms, which follow
-    any pattern and tell nothing of its cause.
+    beginning is an effect that is always there: only an offset at one attitude competes, where it leaves noise: of few
+    attitudes it takes up part of most effects. `named`: the effects without free forms, which follow any pattern and
+    tell nothing of its cause.
     """
-    if end is begin or begin.table.type.moving:
+    if end is begin:
         return None
     start = without_slow(begin)
     screen = Screen(start)
     price = float(np.log(start.residual.size))
-    tried = [(worth(p, screen) - price, p) for p in patterns(start.table, start.channels)]
+    every = patterns(start.table, start.channels)
+    if start.table.type.moving:
+        every = [p for p in at_attitudes(start.table, start.channels) if _leaves_noise(p, screen)]
+    tried = [(worth(p, screen) - price, p) for p in every]
     best, pattern = max(tried, key=lambda each: each[0], default=(-np.inf, None))
     if (
         pattern is None
@@ -162,6 +167,13 @@ def plainer(begin: Fit, end: Fit, named: Fit | None = None) -> Pattern | None:
     ):
         return None
     return sharpened(pattern, screen)
+
+
+def _leaves_noise(pattern: Pattern, screen: Screen) -> bool:
+    """Whether what a pattern leaves is no more than noise."""
+    basis = screen.basis(pattern.columns)
+    left = float(screen.residual @ screen.residual) - screen.statistic(basis)
+    return left <= MATERIAL**2 * max(screen.free - basis.shape[1], 1)
 
 
 def _contains(pattern: Pattern, begin: Fit, end: Fit, screen: Screen) -> bool:

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibrations.effects import Effect
 from calibrations.fitting.fit import Fit
@@ -42,6 +44,7 @@ OF_TABLE: Mapping[str, tuple[str, Factor]] = {
     "time-bias": ("time", ""),
     "time-scale": ("time", "force"),
 }
+LEADS_S = {"ahead": 15.0, "behind": -15.0}  # of the sensor, of its thermometer; together they are a lag of any length
 SMALLEST = 1e-3  # noise floors: what a form adds that the data do not show
 
 
@@ -50,31 +53,49 @@ class Shown:
     """The forms that a residual can show: products of their columns with the model's own (`gram`), and the inputs.
 
     columns  whitened [base, forms, residual], (rows, base + forms + 1)
+    apart    an effect of the model whose parameters are no part of the base
     """
 
     fit: Fit
     forms: Mapping[str, Form]
     gram: Gram
     columns: Array
+    apart: str = ""
 
     @staticmethod
-    def of(fit: Fit, forms: Mapping[str, Form]) -> Shown:
-        """The forms by name, beside the parameters of a fit. Only forms that its rows can show are kept."""
-        base, blocks, parts, at = fit.whitened[:, 1:], {}, [], 0
-        for name, form in forms.items():
-            white = fit.noise.whiten(form_columns(fit, form))
-            parts.append(white)
-            blocks[name] = slice(at, at + white.shape[1])
-            at += white.shape[1]
-        X = np.hstack([base, *parts, fit.whitened[:, :1]])
-        g = _gram(fit, X, blocks, dict.fromkeys(blocks, 1.0))
-        X, scales = beside_base(X, g, base.shape[1])
-        return Shown(fit, forms, _gram(fit, X, blocks, scales), X)
+    def of(fit: Fit, forms: Mapping[str, Form], apart: str = "") -> Shown:
+        """The forms by name, and an effect of the model, beside the other parameters of a fit."""
+        J, own = fit.whitened[:, 1:], fit.problem.layout.of_effect(apart)
+        parts = {name: fit.noise.whiten(form_columns(fit, form)) for name, form in forms.items()}
+        parts |= {apart: J[:, own]} if apart else {}
+        ends = np.cumsum([0, *(part.shape[1] for part in parts.values())])
+        blocks = {name: slice(int(a), int(b)) for name, a, b in zip(parts, ends[:-1], ends[1:], strict=True)}
+        left = fit.whitened[:, 0] - J[:, own] @ fit.theta[own]
+        X = np.hstack([J[:, ~own], *parts.values(), left[:, None]])
+        g = _gram(fit, X, ~own, blocks, dict.fromkeys(blocks, 1.0))
+        X, scales = beside_base(X, g, int(np.sum(~own)))
+        return Shown(fit, forms, _gram(fit, X, ~own, blocks, scales), X, apart)
+
+    @cached_property
+    def selected(self) -> Sizes:
+        """The forms that act, and their sizes."""
+        components = [_component(name, form) for name, form in self.forms.items()]
+        sizes, _ = select(self.gram, self.nothing, components, [{c.name: c for c in components}], {}, ENTER, True)
+        return sizes
+
+    @property
+    def nothing(self) -> Sizes:
+        """No form acts."""
+        return estimate(self.gram, {}, {})
+
+    def gain_apart(self, sizes: Sizes) -> float:
+        """What the effect gains beside forms of these sizes, as twice the log-likelihood."""
+        return gains(self.gram, sizes, [self.apart])[self.apart][0]
 
     def sized(self, name: str, sizes: Sizes) -> Form:
         """A form with the size that was found, and the columns that add something."""
         form, g = self.forms[name], self.gram
-        block, base = g.blocks[name], self.fit.jacobian.shape[2]
+        block, base = g.blocks[name], len(g.base_with_data)
         columns = self.columns[:, base + block.start : base + block.stop]
         added = sizes.of(g, name) ** 2 * np.sum(columns**2, axis=0) / self.fit.table.n
         size = float(np.sqrt(sizes.variances[name]) / g.scales[name])
@@ -117,13 +138,10 @@ def estimated_by_residual(before: Fit, place: str) -> Effect:
 
     One form is always kept, however small: a person asked for it, and at a size near zero it changes nothing.
     """
-    before = in_white_noise(before)
-    shown = Shown.of(before, forms_at(place, before))
-    components = [_component(name, form) for name, form in shown.forms.items()]
-    by_name = {c.name: c for c in components}
-    sizes, _ = select(shown.gram, estimate(shown.gram, {}, {}), components, [by_name], {}, ENTER, True)
+    shown = Shown.of(in_white_noise(before), forms_at(place, before))
+    sizes = shown.selected
     if not sizes.variances:
-        gained = gains(shown.gram, sizes, list(by_name))
+        gained = gains(shown.gram, sizes, list(shown.forms))
         best = max(gained, key=lambda name: gained[name][0])
         sizes = estimate(shown.gram, {best: max(gained[best][1], SMALLEST**2)}, {best: SMALLEST**2})
     return free_form(tuple(shown.sized(name, sizes) for name in sizes.variances))
@@ -134,13 +152,14 @@ def _component(name: str, form: Form) -> Component:
     return Component(name, form.place, "response", price=price, form=form)
 
 
-def _gram(fit: Fit, X: Array, blocks: Mapping[str, slice], scales: Mapping[str, float]) -> Gram:
-    """Products of the columns, with the priors of the model's own free forms."""
-    b = fit.jacobian.shape[2]
-    rows = fit.problem.layout.prior_rows
+def _gram(
+    fit: Fit, X: Array, base: NDArray[np.bool_], blocks: Mapping[str, slice], scales: Mapping[str, float]
+) -> Gram:
+    """Products of the columns, with the priors of the model's own free forms; `base`: parameters that stand first."""
+    b, rows = int(base.sum()), fit.problem.layout.prior_rows[:, base]
     products = X.T @ X
     products[:b, :b] += rows.T @ rows
-    products[:b, -1] += rows.T @ (rows @ fit.theta)
+    products[:b, -1] += rows.T @ (rows @ fit.theta[base])
     products[-1, :b] = products[:b, -1]
     return eliminated(products, blocks, scales, b, len(X))
 
@@ -159,6 +178,8 @@ def _forms(place: str, table: Table, force: Array) -> Sequence[Form]:
         ends = float(x.min()), float(x.max())
         found = [Form(place, "line", driver, (Line(*ends),), factor)]
         found.append(Form(place, "curve", driver, (spline(x, INTERVALS[driver]),), factor))
+        if driver == "temperature" and "t_s" in table:
+            found += [Form(place, name, driver, (Line(*ends),), factor, lead_s=lead) for name, lead in LEADS_S.items()]
         if driver == "time":
             span = ends[1] - ends[0] or 1.0
             found.append(Form(place, "settling", driver, (Settling(ends[0], span, span / len(x), AGES),), factor))

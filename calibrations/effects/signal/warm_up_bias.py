@@ -17,7 +17,7 @@ class WarmUpBias(Effect):
     Source    Ang III.B and Fig. 10; Barshan and Durrant-Whyte (1995); IEEE Std 528, warm-up time.
     """
 
-    kinds = ("poses", "positions", "fields", "rates")
+    kinds = ("poses", "positions", "fields", "motion", "rates")
     needs = ("t_s",)
 
     amplitude = Parameter("{out}", typical=0.01, doc="bias at the record's beginning less the final one")
