@@ -19,7 +19,7 @@ LEAST_NEEDED = 0.02  # the same of a form without which the others, as the catal
 NAMED = 0.5  # of it that one form must take up: else the cause is unknown
 MOST_FORMS, NAMED_TOGETHER = 2, 0.8  # forms that only approximate a curve, and what two of them must take up
 LEAST_SIZE = 0.6  # noise floors: a smaller place is a refinement
-LEAST_OWN = 0.3  # noise floors: the part of a place with a cause that no other place takes up, where noise is left
+LEAST_OWN = 0.3  # noise floors: part of a place with a cause that no other place explains, if the residual is noise
 LEAST_SHARE = 0.015  # of the largest place's size
 LEAST_UNKNOWN, LEAST_UNKNOWN_SHARE = 1.0, 0.05  # the same two of a place without a cause
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
@@ -92,8 +92,8 @@ def places(result: SearchResult) -> list[ActingPlace]:
         least = LEAST_SHARE * largest
         if walks:
             least = max(LEAST_UNKNOWN_SHARE * largest, READING_ERRORS * _reading_errors(result, sizes))
-        # what has no form of the catalogue, or adds less than is left beyond noise, is more often a remainder
-        own = min(LEAST_SIZE, max(LEAST_OWN, _beyond_noise(result))) if causes else LEAST_SIZE
+        # a place without a form of the catalogue, or smaller than the excess of the residual, is more often a remainder
+        own = min(LEAST_SIZE, max(LEAST_OWN, _excess(result))) if causes else LEAST_SIZE
         material = _own_size(result, gain) >= own and sizes[place] >= max(LEAST_SIZE, least)
         curve = curves[place].reshape(result.white.shape) * result.white
         constants = followed[0].constants if followed else ()
@@ -107,8 +107,8 @@ def _own_size(result: SearchResult, gain: float) -> float:
     return float(np.sqrt(max(gain, 0.0) / len(result.columns)))
 
 
-def _beyond_noise(result: SearchResult) -> float:
-    """What is left beyond noise, rms in noise floors."""
+def _excess(result: SearchResult) -> float:
+    """The part of the residual above the noise, rms in noise floors."""
     return float(np.sqrt(max(result.ratio**2 - 1, 0.0)))
 
 
