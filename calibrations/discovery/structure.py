@@ -173,7 +173,7 @@ def _leaves_noise(pattern: Pattern, screen: Screen) -> bool:
     """Whether what a pattern leaves is no more than noise."""
     basis = screen.basis(pattern.columns)
     left = float(screen.residual @ screen.residual) - screen.statistic(basis)
-    return left <= MATERIAL**2 * max(screen.free - basis.shape[1], 1)
+    return bool(left <= MATERIAL**2 * max(screen.free - basis.shape[1], 1))
 
 
 def _contains(pattern: Pattern, begin: Fit, end: Fit, screen: Screen) -> bool:
