@@ -19,6 +19,7 @@ from calibrations.table import AXES, MILLI, Array, Table, in_time, time_origin
 from calibrations.text import minus, rounded
 
 RESOLUTION_C = 0.01  # a smaller range of temperatures is that of a constant one
+MANY_VISITS = 10  # of one pose: the change over time is the question, and not the angle
 LABELS = {"temperature_c": "temperature (°C)", "supply_v": "supply voltage (V)"}
 SHOWN_OTHERWISE = ("direction", "alpha_deg", "beta_deg")
 NAMES = {
@@ -139,10 +140,21 @@ def nearest_axis(fit: Fit) -> Column:
     return Column("axis", (f"axis nearest to {fit.table.type.nearest_to}",) * n, np.tile(nearest, (n, 1)), AXES)
 
 
-def first_choices(names: Sequence[str]) -> tuple[str, str]:
-    """What to draw against, and what to colour by, at first."""
+def first_choices(names: Sequence[str], table: Table) -> tuple[str, str]:
+    """What to draw against, and what to colour by, at first.
+
+    A few poses that are held again and again, as in a soak, are drawn over time.
+    """
+    if {"beta", "time"} <= set(names) and repeats(table):
+        return "time", "beta"
     colour = next((name for name in ("alpha_deg", "axis", "time", "row") if name in names), names[-1])
     return names[0], colour
+
+
+def repeats(table: Table) -> bool:
+    """Whether the rows are visits to a few stage angles, each `MANY_VISITS` times on average or more."""
+    angles = np.column_stack([table.column("alpha_deg"), table.column("beta_deg")]).round()
+    return len(angles) >= MANY_VISITS * len(np.unique(angles, axis=0))
 
 
 def named(column: str) -> str:

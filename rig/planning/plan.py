@@ -215,6 +215,7 @@ PLAIN = re.compile(
     r"(alpha|beta) (from|seeks|turns|brakes)|adc records|wait |level is read"
 )  # steps that are not listed
 COUNTER = re.compile(r"\s*(\d+)$")  # of a path: "still 3" is the third pose of a stretch
+WAY_ROUND = re.compile(r"\s*[AB][+-] to [AB][+-]$")  # of a path: the angles already say it
 LONG_WAIT_S = 30.0
 
 
@@ -249,6 +250,14 @@ def _kind(pose: Pose) -> tuple[str, float, int]:
     return COUNTER.sub("", pose.path), pose.mount_deg, pose.flip
 
 
+def turn_words(pose: Pose) -> str:
+    """The path of a pose in words: inclination and direction of beta in place of the names of the turn's ends."""
+    if not WAY_ROUND.search(pose.path):
+        return pose.path
+    turning = {1: ", beta rising", -1: ", beta falling"}.get(pose.direction, "")
+    return f"{WAY_ROUND.sub('', pose.path)} alpha {pose.alpha_deg:g} deg{turning}".lstrip()
+
+
 def _besides(plan: Plan, from_s: float, to_s: float) -> Iterator[str]:
     """Other steps between two times, each once, and long waits."""
     mine = [step for step in plan.steps if from_s <= step.start_s < to_s]
@@ -269,7 +278,7 @@ def _range(angles_deg: Sequence[float]) -> str:
 def _named(poses: Sequence[Pose]) -> Iterator[str]:
     """The path, the rates, and an unusual mounting of the sensor."""
     numbers = [match[1] for pose in (poses[0], poses[-1]) if (match := COUNTER.search(pose.path))]
-    path = COUNTER.sub("", poses[0].path)
+    path = WAY_ROUND.sub("", COUNTER.sub("", poses[0].path))
     counted = [*dict.fromkeys(numbers)]
     if path:
         yield f"{path} {' to '.join(counted)}".rstrip()

@@ -27,6 +27,7 @@ from procedures.instruments import OUTPUTS
 from procedures.questions import EDGES
 from procedures.session import Dwell, Pose
 from procedures.tumbles import tumble
+from rig.planning.plan import turn_words
 from rig.record import Kept, Record
 from rig.record.measured import FIELD, RATE, Measured, of_sensor, sensor_from_table, sensors_of, specific_force_g
 from rig.record.tables import units_of
@@ -84,7 +85,7 @@ class RunningEstimates:
 
     law: Law | None = None
     known: dict[str, Recursive] = field(default_factory=dict)
-    path: str = ""
+    pose: Pose | None = None  # the last one
     units: Mapping[str, str] = field(default_factory=dict)  # of the channels that are not in V
 
     def begun(self, run: str) -> None:
@@ -99,12 +100,13 @@ class RunningEstimates:
     def values(self, kept: Kept) -> list[Value]:
         """The estimates after one more pose."""
         self._take(kept.dwell)
-        self.path = kept.pose.path
+        self.pose = kept.pose
         return list(self._estimates())
 
     def report(self, kept: Kept) -> str:
         """The estimates in lines, if this pose begins a new path; they do not include this pose."""
-        ended = self.path if self.path not in ("", kept.pose.path) else ""
+        before = self.pose
+        ended = turn_words(before) if before is not None and before.path not in ("", kept.pose.path) else ""
         estimates = list(self._estimates()) if ended else []
         self.values(kept)
         lines = [f"  {value.name:<12} {value.shown}" for value in estimates]

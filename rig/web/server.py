@@ -13,6 +13,7 @@ from types import FrameType
 import uvicorn
 from fastapi import FastAPI
 from nicegui import run, ui
+from nicegui.translations import translations
 
 from rig.errors import RigError
 from rig.web.calculations import leave_calculations
@@ -21,6 +22,11 @@ from rig.web.frame import TITLE
 from rig.web.guard import TOKEN, Guard, names
 from rig.web.pages import register
 
+LOST = {  # the message of a page whose server does not answer
+    "connection_lost": "The workbench does not answer. Buttons and keys have no effect.",
+    "trying_to_reconnect": "A run continues; to stop the rig now, use its emergency stop. This page connects again by "
+    "itself. If it does not, start the workbench again.",
+}
 PORT = 8473  # preferred, so that an open page finds a restarted server
 
 
@@ -47,6 +53,7 @@ def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[
     place = Place(host, listener.getsockname()[1], token)
     app = FastAPI(openapi_url=None)
     register(desk)
+    translations["en-US"] |= LOST
     run.process_pool_start_method = "spawn"  # the pool is not used; this avoids a warning
     ui.run_with(
         app,

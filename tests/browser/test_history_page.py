@@ -37,7 +37,7 @@ def test_the_check_standard_has_its_charts(workbench: Workbench) -> None:
     page = workbench.visit("/history")
     expect(page.locator(".chip", has_text="out of control")).to_be_visible()
     expect(page.get_by_text(f"{names[-1]}: CS-1 bias-x is")).to_be_visible()
-    for title, count in (("Individuals", 21), ("Moving ranges", 20)):
+    for title, count in (("Single runs", 21), ("Change from run to run", 20)):
         dots(page, f"Check standard: {title}", count)
     workbench.shot(page, "check-standard")
     workbench.fits(page)
@@ -97,8 +97,8 @@ def test_a_life_says_what_the_command_says_and_its_points_lead_to_their_runs(
     page.get_by_label("Chart baseline").fill("3")
     expect(page.locator(".verdict")).to_contain_text("Out of control: bias-x.")
     assert symbols(page, LIFE) == ["circle"] * 4 + ["diamond"] * 2
-    assert symbols(page, "Individuals") == ["circle-open"] * 3 + ["circle", "diamond", "diamond"]
-    dots(page, "Moving ranges", 5)
+    assert symbols(page, "Single runs") == ["circle-open"] * 3 + ["circle", "diamond", "diamond"]
+    dots(page, "Change from run to run", 5)
     expect(page).to_have_url(re.compile("limit=bias-x%3D0.02&baseline=3"))
     page.locator(f"[aria-label='{LIFE}'] .points path").nth(2).hover(force=True)
     expect(page.locator(f"[aria-label='{LIFE}'] .hovertext")).to_contain_text("2022-03-01: 2.502")

@@ -82,6 +82,33 @@ def test_a_server_that_is_to_end_waits_for_no_search(visitor: Callable[[], Brows
             server.kill()
 
 
+def test_a_page_says_that_its_server_is_lost_and_connects_again(
+    visitor: Callable[[], BrowserContext], watch: Watch, tmp_path: Path
+) -> None:
+    home = {**os.environ, "RIG_HOME": str(tmp_path)}
+    with subprocess.Popen([*WEB, "--json"], stdout=subprocess.PIPE, text=True, env=home) as server:
+        assert server.stdout is not None
+        said = json.loads(server.stdout.readline())
+        page = visitor().new_page()
+        page.goto(said["url"])
+        expect(page.get_by_text("There are no measurements yet")).to_be_visible()
+        lost = page.get_by_text("The workbench does not answer")
+        expect(lost).to_be_hidden()
+        server.terminate()
+    expect(lost).to_be_visible()
+    box = page.locator("#popup").bounding_box()
+    assert box is not None
+    assert 0 < box["y"] < 100  # where the eye is, and no button of the head is covered
+    words = [*WEB, "--json", "--port", str(said["port"])]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=home) as server:
+        assert server.stdout is not None
+        assert server.stdout.readline()
+        expect(lost).to_be_hidden()
+        page.context.close()
+        server.terminate()
+    watch.expects("")  # requests that no server answered
+
+
 def test_the_address_lasts_over_a_restart_until_a_new_token_is_asked_for() -> None:
     said = []
     for options in ((), (), ("--new-token",)):

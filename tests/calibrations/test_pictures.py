@@ -23,7 +23,7 @@ from calibrations.presentation.chart import Bars, Chart, Line, Panel, Points, Se
 from calibrations.presentation.charts import fit as charts
 from calibrations.presentation.charts.discovery import MOST_CURVES, album, effect_chart, levels, tried, waterfall
 from calibrations.presentation.interactive import figure
-from calibrations.presentation.residual import telling_columns
+from calibrations.presentation.residual import choices, first_choices, telling_columns
 from calibrations.presentation.static import PictureError, compact, draw, inline, png, save, save_all, svg
 from calibrations.table import Array, Table
 from tests.calibrations.synthetic import components, poses, turns
@@ -185,6 +185,16 @@ def test_an_effect_is_a_line_only_over_a_column_that_it_is_a_function_of() -> No
     change = charts.change_of(step)[0]
     np.testing.assert_allclose(series[-1].y, 1e3 * change)  # type: ignore[union-attr] # a cross at the change of each row
     assert len(change) == table.n
+
+
+def test_poses_that_are_held_again_and_again_are_drawn_over_time() -> None:
+    beta = np.tile([0.0, 90.0, 180.0, 270.0], 20)
+    soak = {"alpha_deg": np.full(80, 90.0), "beta_deg": beta, "direction": np.ones(80), "t_s": 60.0 * np.arange(80)}
+    x, y, _ = components(soak)
+    warming = fit(read_model("linear"), poses(soak, 2.5 + x + 1e-5 * soak["t_s"], 2.5 + y))
+    assert first_choices(list(choices(warming)), warming.table) == ("time", "beta")
+    once = fits()["two axes"]
+    assert first_choices(list(choices(once)), once.table) == ("beta", "alpha_deg")
 
 
 def test_the_map_of_positions_is_of_equal_area() -> None:

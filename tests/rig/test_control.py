@@ -94,7 +94,14 @@ def test_its_pictures_are_files_of_each_sensor(rig: Rig, tmp_path: Path) -> None
     assert f"written: {tmp_path / 'charts' / 'control-CS-1.svg'}" in ended.out
     assert all(
         words in picture
-        for words in ("Individuals", "Moving ranges", "EWMA", "bias-x − centre", "centre 2.5 V", "out of control")
+        for words in (
+            "Single runs",
+            "Change from run to run",
+            "(EWMA)",
+            "bias-x − centre",
+            "centre 2.5 V",
+            "out of control",
+        )
     )
 
 

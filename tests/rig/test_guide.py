@@ -95,7 +95,7 @@ def test_before_a_run_one_screen_says_all_of_it() -> None:
         "scale factor, bias, cross-axis effects, misalignment, hysteresis, stage errors.",
         "518 poses",
         "56:",
-        "alpha 90, beta 0 to 360 deg: 37 poses  A+ to B-",
+        "alpha 90, beta 0 to 360 deg: 37 poses",
         "from -5 to 365 deg; the limits are -400 to 400 deg",
         "not at -20 to 85 C; if the tilt of the table exceeds 0.3 deg",
         "MB on the disk; 2.0 GB are free",

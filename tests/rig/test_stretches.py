@@ -12,7 +12,7 @@ from procedures.catalogue import find
 from procedures.session import Pose
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.planning.plan import Plan, Stretch, plan, stretches
+from rig.planning.plan import Plan, Stretch, plan, stretches, turn_words
 from rig.planning.planned import Held, Step
 from tests.rig.rigging import ON_STAGES
 
@@ -27,9 +27,21 @@ def planned(name: str, **settings: str) -> Plan:
 def test_a_sweep_is_one_line_for_each_way_round() -> None:
     found = stretches(planned("sweep"))
     assert len(found) == 14
-    assert found[0].words == "alpha 90, beta 0 to 360 deg: 37 poses  A+ to B-"
-    assert found[1].words == "alpha 90, beta 360 to 0 deg: 37 poses  B+ to A-"
+    assert found[0].words == "alpha 90, beta 0 to 360 deg: 37 poses"
+    assert found[1].words == "alpha 90, beta 360 to 0 deg: 37 poses"
     assert [stretch.start_s for stretch in found] == sorted(stretch.start_s for stretch in found)
+
+
+@pytest.mark.parametrize(
+    ("pose", "expected"),
+    [
+        (Pose(30, 360, -1, "B+ to A-"), "alpha 30 deg, beta falling"),
+        (Pose(90, 0, 1, "sweep A+ to B-"), "sweep alpha 90 deg, beta rising"),
+        (Pose(90, 45, 1, "reference"), "reference"),
+    ],
+)
+def test_a_path_is_named_by_its_angles(pose: Pose, expected: str) -> None:
+    assert turn_words(pose) == expected
 
 
 @pytest.mark.parametrize("name", ON_STAGES)
@@ -77,7 +89,7 @@ def test_the_range_of_angles_is_said_whatever_their_order() -> None:
 
 def test_a_long_plan_is_summed_up_and_a_short_one_printed(rig: Rig) -> None:
     summed, whole = rig("plan", "sweep").out, rig("plan", "sweep", "--moves").out
-    assert "  24:21  alpha 60, beta 0 to 360 deg: 37 poses  A+ to B-\n" in summed
+    assert "  24:21  alpha 60, beta 0 to 360 deg: 37 poses\n" in summed
     assert len(summed.splitlines()) < 25
     assert "--moves" in summed
     document = json.loads(rig("plan", "sweep", "--json").out)

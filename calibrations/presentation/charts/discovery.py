@@ -110,7 +110,7 @@ def waterfall(steps: Sequence[Level], words: Measure = Measure()) -> Chart:
 def effect_chart(step: Step[Fit]) -> Chart:
     """A row for each channel: the residual before with the effect's curve through it, and the residual after."""
     columns_of_fit = choices(step.before)
-    colour, x = columns_of_fit[first_choices(list(columns_of_fit))[1]], most_telling(step)
+    colour, x = columns_of_fit[first_choices(list(columns_of_fit), step.before.table)[1]], most_telling(step)
     rows = []
     for k, c in enumerate(drawn_channels(step.before, change_of(step))):
         titles = (f"before; line: {step.name}", "after") if k == 0 else ("", "")

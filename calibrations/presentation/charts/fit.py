@@ -80,7 +80,7 @@ def measurement_chart(fit: Fit) -> Chart:
     if fit.table.type.moving:
         return stacked([motion.measurement(Shown(fit, c, False)) for c in motion.firsts(fit)], 2.6)
     columns_of_fit, n = choices(fit), 1 if fit.table.type.magnitude else len(fit.channels)
-    x, colour = (columns_of_fit[name] for name in first_choices(list(columns_of_fit)))
+    x, colour = (columns_of_fit[name] for name in first_choices(list(columns_of_fit), fit.table))
     if fit.table.type.magnitude:
         x = columns(fit)[3]
     panels = [measurement(Shown(fit, c, False), x, colour) for c in range(n)]
@@ -91,7 +91,7 @@ def measurement_chart(fit: Fit) -> Chart:
 def residual_chart(fit: Fit) -> Chart:
     """A row of panels for each channel, a column for each thing that the residual may follow."""
     columns_of_fit = choices(fit)
-    colour = columns_of_fit[first_choices(list(columns_of_fit))[1]]
+    colour = columns_of_fit[first_choices(list(columns_of_fit), fit.table)[1]]
     across = columns(fit)
     rows = tuple(
         tuple(residual(Shown(fit, c, False), x, colour, second=x is across[-1]) for x in across)

@@ -31,7 +31,12 @@ POINTS = 200
 AHEAD = 0.5  # of the time from first to last calibration: how far the drift is drawn beyond the last
 MARGIN = 0.03  # of the time shown, at both ends
 ALONE_DAYS = 30.0  # around calibrations of one moment
-INDIVIDUALS, EWMA, RANGES = "Individuals", "EWMA", "Moving ranges"
+INDIVIDUALS, EWMA, RANGES = "Single runs", "Weighted mean of the runs (EWMA)", "Change from run to run"
+CONTROL_LEGENDS = {
+    INDIVIDUALS: "◆ outside the band: the value has jumped; ○: these runs set the band",
+    EWMA: "newer runs count more; ◆ outside the band: the value drifts",
+    RANGES: "difference from the run before; above the band: the runs scatter more",
+}
 
 
 @dataclass(frozen=True)
@@ -108,7 +113,7 @@ def _drift(q: Life, start: float, end: float, factor: float) -> tuple[Band | Lin
 
 
 def control_charts(charts: Mapping[str, ControlChart], units: Mapping[str, str]) -> Chart:
-    """A row for each quantity: individuals, EWMA and moving ranges."""
+    """A row for each quantity: single runs, their weighted mean, and moving ranges."""
     rows = tuple(tuple(control_panels(name, chart, units[name]).values()) for name, chart in charts.items())
     return Chart(rows, 2.3, share_x=True)
 

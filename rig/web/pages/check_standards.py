@@ -7,7 +7,7 @@ from functools import partial
 from nicegui import events, ui
 
 from calibrations.presentation.chart import Panel
-from calibrations.presentation.charts.history import control_panels
+from calibrations.presentation.charts.history import CONTROL_LEGENDS, control_panels
 from rig.errors import RecordError
 from rig.record import Run
 from rig.services.control import HEAD, OUT, PROCEDURE, controlled, row, signals, worst
@@ -49,12 +49,13 @@ class CheckStandards:
             self.chosen = ui.select(names, value=0, label="Chart of", on_change=self.draw).props("dense options-dense")
             self.chosen.style("min-width: 240px")
             self.plots: dict[str, ui.plotly] = {}
-            with div("two"):
+            with div("pictures three"):
                 for title in self._panels():
                     with div("picture"):
                         with div("title"):
                             words(title, "grow")
                             downloads(partial(self.plots.get, title), title)
+                        words(CONTROL_LEGENDS[title], "legend quiet")
                         plot = empty_plot(f"Check standard: {title}", "live-plot")
                         self.plots[title] = plot.on("plotly_click", _clicked, js_handler=CLICKED)
         self.draw()

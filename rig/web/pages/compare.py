@@ -89,7 +89,7 @@ def _of_rows(first: Fit, second: Fit) -> Comparison:
     """Residuals, and the difference of the measurements at common poses."""
     shared = again(first, second)
     columns, second_choices = choices(first), choices(second)
-    x, _ = first_choices([name for name in columns if name in second_choices])
+    x, _ = first_choices([name for name in columns if name in second_choices], first.table)
 
     def draw(c: int, in_sensed: bool) -> Sequence[Chart]:
         one, other = Shown(first, c, in_sensed), Shown(second, c, in_sensed)

@@ -14,7 +14,7 @@ from starlette.datastructures import QueryParams
 from calibrations.analyses.stability import YEAR_DAYS
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
 from calibrations.presentation.chart import Chart, Panel, one
-from calibrations.presentation.charts.history import EWMA, INDIVIDUALS, RANGES, control_panels, life
+from calibrations.presentation.charts.history import CONTROL_LEGENDS, control_panels, life
 from calibrations.text import estimate_in_prefix, estimate_text, minus, rounded, unit
 from rig.errors import RigError
 from rig.services.charts import life_of
@@ -200,11 +200,12 @@ class HistoryPictures:
                 words(FEW, "quiet")
             self.boxes = []
             self.charts: dict[str, ui.plotly] = {}
-            for title in (INDIVIDUALS, EWMA, RANGES):
+            for title, legend in CONTROL_LEGENDS.items():
                 with box("picture") as place:
                     with div("title"):
                         words(title, "grow")
                         downloads(partial(self.charts.get, title), title)
+                    words(legend, "legend quiet")
                     self.charts[title] = self._plot(title)
                 self.boxes.append(place)
 

@@ -104,7 +104,7 @@ class Pictures:
             self.selected = []
         self.fit, self.session, self.step = fit, session, None
         self.columns = choices(fit)
-        x, colour = first_choices(list(self.columns))
+        x, colour = first_choices(list(self.columns), fit.table)
         self._offer(fit.channels)
         self.unit.set_options(residual_units(fit), value=fit.table.type.magnitude or bool(self.unit.value))
         self.unit.set_visibility(len(self.unit.options) > 1)

@@ -23,6 +23,7 @@ from rig.services.history import lives
 from rig.services.next_steps import page_steps, result_rows
 from rig.services.report import reported
 from rig.services.request import Request
+from rig.services.result_meaning import meaning
 from rig.services.search import Cancelled
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk
@@ -336,7 +337,7 @@ def _results(run: Run) -> None:
         where = "The results are in the report below." if run.rows else "There are no results."
         words(where if run.state == "complete" else "The run is not complete.", "quiet")
         return
-    with ui.element("table").classes("plain-table"):
+    with ui.element("table").classes("plain-table results"):
         for row in result_rows(run.results):
             with ui.element("tr"):
                 for cell in (row.name, for_page(row.value), row.limit):
@@ -345,6 +346,8 @@ def _results(run: Run) -> None:
                 with ui.element("td"):
                     if row.verdict:
                         words(row.verdict, f"chip {LOOKS[row.verdict]}")
+                with ui.element("td").classes("meaning quiet small"):
+                    words(meaning(row.name))
 
 
 def _made(run: Run) -> tuple[dict[str, str], ...]:
