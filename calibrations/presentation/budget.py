@@ -13,7 +13,7 @@ from calibrations.fitting.fit import Fit
 from calibrations.fitting.inputs import input_contributions
 from calibrations.model import Estimate
 from calibrations.presentation.document import Remark, Section, Table
-from calibrations.text import INFINITE_FREEDOM, contribution_text, freedom_text, rounded, unit
+from calibrations.text import INFINITE_FREEDOM, contribution_text, freedom_text, in_prefix, rounded, unit
 
 SOURCE_HEAD = ("source", "type", "standard uncertainty of the source", "sensitivity", "contribution", "ν")
 METHOD = (
@@ -35,14 +35,15 @@ class Source:
     contribution: float
     freedom: float
 
-    def cells(self, combined: float) -> tuple[str, ...]:
-        """Texts in the order of `SOURCE_HEAD`, beside a `combined` standard uncertainty."""
+    def cells(self, combined: float, factor: float = 1.0) -> tuple[str, ...]:
+        """Texts in the order of `SOURCE_HEAD`, beside a `combined` standard uncertainty; `factor`: from the result's
+        unit to the one that is shown."""
         return (
             self.name,
             self.kind,
             "–" if self.std is None else f"{rounded(self.std, 2)} {unit(self.unit)}".strip(),
-            "–" if self.sensitivity is None else rounded(self.sensitivity, 2),
-            contribution_text(self.contribution, combined),
+            "–" if self.sensitivity is None else rounded(factor * self.sensitivity, 2),
+            contribution_text(factor * self.contribution, factor * combined),
             freedom_text(self.freedom),
         )
 
@@ -74,15 +75,16 @@ def budget_section(fit: Fit) -> Section | None:
     )  # fmt: skip
     rows, lines = [], dict[str, list[tuple[str, ...]]]()
     for k, effect, e in _known(fit):
-        label, combined = f"{e.name} {e.axis}".strip(), float(budget.combined[k])
+        label, combined, expanded = f"{e.name} {e.axis}".strip(), float(budget.combined[k]), float(budget.expanded[k])
+        factor, of = in_prefix(expanded, None, e.unit)
         largest = max(sources(budget, k), key=lambda source: source.contribution)
         rows.append((
-            effect, label, rounded(combined, 2), freedom_text(budget.freedom[k]), f"{budget.coverage[k]:.2f}",
-            rounded(budget.expanded[k], 2), unit(e.unit), largest.name,
+            effect, label, rounded(factor * combined, 2), freedom_text(budget.freedom[k]), f"{budget.coverage[k]:.2f}",
+            rounded(factor * expanded, 2), unit(of), largest.name,
         ))  # fmt: skip
         for number, source in enumerate(sources(budget, k)):
-            name = "" if number else f"{label}, {unit(e.unit)}"
-            lines.setdefault(effect, []).append((name, *source.cells(combined)))
+            name = "" if number else f"{label}, {unit(of)}"
+            lines.setdefault(effect, []).append((name, *source.cells(combined, factor)))
     missing = [Remark(f"Not given and not included: {', '.join(budget.not_given)}.")] if budget.not_given else []
     parts = (
         Table(f"Sources of {effect}", ("parameter", *SOURCE_HEAD), cells, (3, 4, 5, 6), folded=True, grouped=True)

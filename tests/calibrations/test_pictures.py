@@ -21,7 +21,7 @@ from calibrations.model import Model
 from calibrations.model.file import read_model
 from calibrations.presentation.chart import Bars, Chart, Line, Panel, Points, Second
 from calibrations.presentation.charts import fit as charts
-from calibrations.presentation.charts.discovery import MOST_CURVES, album, effect_chart, levels, tried, waterfall
+from calibrations.presentation.charts.discovery import MOST_CURVES, album, brief, effect_chart, levels, tried, waterfall
 from calibrations.presentation.interactive import figure
 from calibrations.presentation.residual import choices, first_choices, telling_columns
 from calibrations.presentation.static import PictureError, compact, draw, inline, png, save, save_all, svg
@@ -270,6 +270,11 @@ def test_the_waterfall_falls_from_level_to_level() -> None:
     assert dots(panel).x.tolist() == [levels(found)[0].unseen, found.steps[0].held_out_after]
     assert panel.y.names == ("linear", "+ temperature-bias")
     assert bars.texts[0].endswith(f"× ({pooled_milli(found.start)[0]:.2f} mg)")
+
+
+def test_the_name_of_a_model_with_many_effects_leaves_room_for_bars() -> None:
+    assert brief("linear+hysteresis+base-tilt+bias-drift") == "linear+hysteresis+base-tilt+bias-drift"
+    assert brief("linear+a+b+c+d+free:history") == "linear + 5 effects"
 
 
 def test_rms_in_mg_is_that_of_the_residual() -> None:

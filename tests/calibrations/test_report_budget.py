@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 from calibrations.fitting.fit import fit
 from calibrations.loop import compare, discover
 from calibrations.model.file import read_model
@@ -32,6 +34,17 @@ def test_the_section_says_what_counts_most() -> None:
     contribution = {row[1]: row[5] for row, _ in parameter_of_x}
     assert contribution["gain of the converter"] == "0.20"
     assert contribution["scatter from row to row"] == "negligible"
+
+
+def test_small_uncertainties_have_a_prefix() -> None:
+    fitted = fit(read_model("linear"), given(measured(1), gain_std=2e-4))
+    section, document = budget_section(fitted), budget_document(fitted)
+    assert section is not None
+    assert document is not None
+    for row, found in zip(section.tables[0].rows, document["parameters"], strict=True):
+        factor = {"µ": 1e6, "m": 1e3}[str(row[6])[0]]
+        assert float(str(row[2])) == pytest.approx(factor * found["combined"], rel=0.05)
+        assert float(str(row[5])) == pytest.approx(factor * found["expanded"], rel=0.05)
 
 
 def test_the_document_is_json_and_adds_up() -> None:

@@ -46,6 +46,7 @@ FEWEST = 4  # bars that there is room for: one alone is no thicker than they
 NEAR = 1.15  # times the floor: as good as noise
 LONG = 0.3  # of the axis: a bar that its text fits into
 ROW = 0.42  # inches
+MANY_EFFECTS = 4  # in the name of a model: more are counted, so that bars have room
 MOST_CURVES = 4
 
 
@@ -75,10 +76,16 @@ class Measure:
 def levels(steps: Falling) -> list[Level]:
     """The model as it was, then each effect added."""
     start = Level(
-        steps.start.model.name, steps.start.pooled_excess, steps.start.held_out_excess, error_text(steps.start)
+        brief(steps.start.model.name), steps.start.pooled_excess, steps.start.held_out_excess, error_text(steps.start)
     )
     after = [Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, error_text(s.after)) for s in steps.steps]
     return [start, *after]
+
+
+def brief(model: str) -> str:
+    """The name of a model with many effects in a few words: `linear + 9 effects`."""
+    first, *effects = model.split("+")
+    return model if len(effects) < MANY_EFFECTS else f"{first} + {len(effects)} effects"
 
 
 def error_text(fit: Fit) -> str:

@@ -23,7 +23,7 @@ from calibrations.fitting.sensed import in_milli, milli_unit, pooled_milli
 from calibrations.model import Model, Term
 from calibrations.presentation.budget import budget_section
 from calibrations.presentation.chart import Picture
-from calibrations.presentation.charts.discovery import album, error_text
+from calibrations.presentation.charts.discovery import album, brief, error_text
 from calibrations.presentation.document import Block, Code, Items, Page, Remark, Section, Table
 from calibrations.presentation.formula import formula_html
 from calibrations.presentation.page import html
@@ -172,7 +172,7 @@ def report(
 def _sections(
     discovery: Discovery[Fit], comparison: Comparison[Fit], shown: Mapping[str, Picture]
 ) -> Iterable[Section]:
-    end, given_model = discovery.end, comparison.fit.model.name
+    end, given_model = discovery.end, brief(comparison.fit.model.name)
     yield Section("Error by model", (shown["waterfall"], _steps(discovery), _held_out(discovery)))
     three = [shown[name] for name in ("measurement", "residual", "failure")]
     yield Section(f"Residuals of the model {given_model}", (*_places(comparison), _errors(comparison.fit), *three))
@@ -191,7 +191,13 @@ def _sections(
 def _steps(discovery: Discovery[Fit]) -> Table:
     start = discovery.start
     rows = [
-        (start.model.name, error_text(start), rounded(start.pooled_excess), rounded(start.held_out_excess), "as given")
+        (
+            brief(start.model.name),
+            error_text(start),
+            rounded(start.pooled_excess),
+            rounded(start.held_out_excess),
+            "as given",
+        )
     ]
     for step in discovery.steps:
         part = "cause" if step.name in discovery.causes else "refines the form of a cause"
