@@ -10,6 +10,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rig.record import Record
+from rig.web.pages.import_file import MOST_BYTES
 from tests.browser.conftest import Workbench
 
 pytestmark = pytest.mark.slow
@@ -106,6 +107,14 @@ def test_a_file_that_cannot_be_read_says_why(workbench: Workbench, tmp_path: Pat
     expect(page.get_by_text("Import a file")).to_be_visible()
     page.goto(f"{workbench.origin}/import?file=nothing.csv")
     expect(page.get_by_role("alert")).to_contain_text("nothing.csv")
+
+
+def test_a_file_that_is_too_large_says_what_to_do(workbench: Workbench, tmp_path: Path) -> None:
+    with (large := tmp_path / "large.csv").open("wb") as file:
+        file.truncate(MOST_BYTES + 1)
+    page = workbench.visit("/import")
+    page.locator("input[type=file]").set_input_files(large)
+    expect(page.get_by_role("alert")).to_contain_text("larger than 200 MB. Copy it")
 
 
 def test_a_file_with_several_tables_asks_for_one(workbench: Workbench, tmp_path: Path) -> None:

@@ -186,6 +186,38 @@ def test_a_run_begins_after_the_checks_and_no_single_key_moves_anything(workbenc
     page.get_by_role("button", name="Cancel").click()
 
 
+FOCUSED = "document.activeElement.innerText || ''"
+UNTICKED = "document.activeElement.getAttribute('aria-checked') === 'false'"
+
+
+def tab_to(page: Page, text: str) -> None:
+    """Press Tab until a button with this text has the focus; tick the checks on the way."""
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        if page.locator(".q-dialog").count() and page.evaluate(UNTICKED):
+            page.keyboard.press("Space")
+        if text in page.evaluate(FOCUSED):
+            return
+    raise AssertionError(f"Tab does not lead to {text}")
+
+
+def test_a_run_without_poses_is_made_by_keyboard_and_leads_to_its_results(workbench: Workbench) -> None:
+    page = workbench.visit("/run?procedure=level-check")
+    expect(page.get_by_text("Takes", exact=True)).to_be_visible()
+    tab_to(page, "Start")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("dialog")).to_be_visible()
+    tab_to(page, "Cancel")  # over all checks, which enables Begin before it
+    page.keyboard.press("Shift+Tab")
+    expect(page.get_by_role("dialog").get_by_role("button", name="Begin")).to_be_focused()
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("dialog")).to_have_count(0)
+    phase(page, "complete")
+    expect(page.get_by_role("button", name="Download: Run over time")).to_be_hidden()  # there is no picture
+    page.get_by_role("button", name="Open the results").click()
+    expect(page.get_by_text("Tilt of the table along this axis of the level.").first).to_be_visible()
+
+
 def test_a_bench_is_chosen_before_a_run_and_stays_during_it(workbench: Workbench) -> None:
     page = workbench.visit("/run")
     bench(page, "demonstration rig")

@@ -114,7 +114,14 @@ def upload(done: Callable[[Path], Awaitable[None]]) -> None:
             return
         await done(path)
 
-    field = ui.upload(on_upload=received, auto_upload=True, max_file_size=MOST_BYTES)
+    def rejected() -> None:
+        text = (
+            f"The file was not opened: it is larger than {MOST_BYTES / 1e6:g} MB. Copy it to the computer of the "
+            "workbench, and write its path in the field Data of the page Model."
+        )
+        ui.notify(text, type="negative", multi_line=True, timeout=0, close_button="Close")
+
+    field = ui.upload(on_upload=received, on_rejected=rejected, auto_upload=True, max_file_size=MOST_BYTES)
     field.props("flat bordered").classes("upload")
     with field.add_slot("list"), div("stack"):
         ui.button("Choose a file", icon="upload_file", on_click=lambda: field.run_method("pickFiles"))

@@ -99,7 +99,7 @@ class Instruments:
 
     def __init__(self, desk: Desk, bench: Bench) -> None:
         self.bench = bench
-        with box("stack"):
+        with box("stack bench"):
             words("Bench", "title")
             if len(desk.benches) > 1:
                 BenchChoice(desk)
@@ -265,7 +265,8 @@ def _show(planned: Plan, bench: Bench) -> None:
         rows["Asks you"] = "; ".join(dict.fromkeys(planned.questions))
     facts(rows)
     lines = [(duration(stretch.start_s), stretch.words) for stretch in stretches(planned)]
-    table(("at", "what"), lines[:MOST_STRETCHES])
+    if lines:
+        table(("at", "what"), lines[:MOST_STRETCHES])
     if len(lines) > MOST_STRETCHES:
         with ui.expansion(f"{len(lines) - MOST_STRETCHES} more").props("dense"):
             table(("at", "what"), lines[MOST_STRETCHES:])

@@ -96,9 +96,9 @@ class Live:
             dialog.open()
 
     def _see(self) -> None:
-        """Open the model page for the data of the run."""
-        if self.status is not None:
-            ui.navigate.to(f"/?{urlencode({'data': self.status.run})}")
+        """Open the model page for the data of the run; without poses the page of the run, which has its results."""
+        if (status := self.status) is not None:
+            ui.navigate.to(f"/?{urlencode({'data': status.run})}" if status.done else f"/record/{status.run}")
 
     def go_on(self) -> None:
         """Open the checks before an incomplete run resumes."""
@@ -145,6 +145,7 @@ class Live:
         self.hint.set_text(SEATS[status.seat] if active else "")
         self.stop.set_visibility(active)
         self.see.set_visibility(status.state == "complete")
+        self.see.set_text("Open the model" if status.done else "Open the results")
         self.again.set_visibility(not active and status.state == "stopped" and bool(status.run))
         if before is None or (before.error, before.moving) != (status.error, status.moving):
             self._alarm(status)

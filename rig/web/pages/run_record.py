@@ -118,13 +118,14 @@ class OverTime:
         self.run, self.last = "", -1
         self.courses: dict[str, Course] = {}
         self.chosen = False  # a person has selected the kind of pose
-        with div("row-of"):
+        with div("row-of") as self.head:
             self.kind = ui.select([], label="of", on_change=self.draw).props("dense options-dense")
             self.name = ui.select([], label="over time", on_change=self.draw).props("dense options-dense")
             downloads(lambda: self.plot, "Run over time")
         self.kind.on("update:model-value", self._choose)
         for select in (self.kind, self.name):
-            select.style("min-width: 150px").set_visibility(False)
+            select.style("min-width: 150px")
+        self.head.set_visibility(False)
         self.place = div("")
         self.time = RunTime()
         self.units: dict[str, str] = {}
@@ -135,8 +136,7 @@ class OverTime:
         if run != self.run:
             self.run, self.last, self.courses, self.plot, self.chosen = run, -1, {}, None, False
             self.place.clear()
-            self.kind.set_visibility(False)
-            self.name.set_visibility(False)
+            self.head.set_visibility(False)
         if not run:
             return
         new, time, units = await off_loop(_new, run, self.last)
@@ -163,7 +163,7 @@ class OverTime:
         if names != list(self.name.options):
             self.name.set_options(names, value=self.name.value if self.name.value in names else names[0])
         self.kind.set_visibility(len(kinds) > 1)
-        self.name.set_visibility(True)
+        self.head.set_visibility(True)
 
     def draw(self) -> None:
         """Draw the picture again."""
