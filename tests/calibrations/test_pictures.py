@@ -19,9 +19,11 @@ from calibrations.fitting.sensed import pooled_milli
 from calibrations.loop import compare, discover
 from calibrations.model import Model
 from calibrations.model.file import read_model
-from calibrations.presentation.chart import Bars, Chart, Line, Panel, Points, Second
+from calibrations.noise.comparison import DeviationComparison
+from calibrations.presentation.chart import Bars, Chart, Line, Panel, Points, Second, one
 from calibrations.presentation.charts import fit as charts
 from calibrations.presentation.charts.discovery import MOST_CURVES, album, brief, effect_chart, levels, tried, waterfall
+from calibrations.presentation.charts.noise import ratio
 from calibrations.presentation.interactive import figure
 from calibrations.presentation.residual import choices, first_choices, telling_columns
 from calibrations.presentation.static import PictureError, compact, draw, inline, png, save, save_all, svg
@@ -275,6 +277,13 @@ def test_the_waterfall_falls_from_level_to_level() -> None:
 def test_the_name_of_a_model_with_many_effects_leaves_room_for_bars() -> None:
     assert brief("linear+hysteresis+base-tilt+bias-drift") == "linear+hysteresis+base-tilt+bias-drift"
     assert brief("linear+a+b+c+d+free:history") == "linear + 5 effects"
+
+
+def test_the_ratio_of_deviations_has_marks_on_both_sides_of_1() -> None:
+    times, ones = np.array([1.0, 10.0, 100.0]), np.ones(3)
+    curve = DeviationComparison(times, 1.1 * ones, 0.9 * ones, 1.4 * ones, ones, 10 * ones, ones)
+    marks = figure(one(ratio(curve)), "ratio")["layout"]["yaxis"]["tickvals"]
+    assert min(marks) < 1 < max(marks)
 
 
 def test_rms_in_mg_is_that_of_the_residual() -> None:

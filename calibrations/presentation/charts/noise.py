@@ -133,9 +133,12 @@ def ratio(curve: DeviationComparison) -> Panel:
     """Measured over modelled deviation: where the interval leaves 1, the model fails."""
     hover = [f"{abs(d):.1f} standard deviations off at {t:.4g} s"
              for d, t in zip(curve.deviations, curve.tau_s, strict=True)]  # fmt: skip
-    dots = Points(curve.tau_s, curve.ratio, low=curve.low / curve.modelled, high=curve.high / curve.modelled,
-                  hover=hover)  # fmt: skip
-    return Panel((Rule(1.0, colour=MODEL, width=1.4), dots), Axis(TIME, log=True), Axis("measured / model", log=True))
+    low, high = curve.low / curve.modelled, curve.high / curve.modelled
+    dots = Points(curve.tau_s, curve.ratio, low=low, high=high, hover=hover)
+    least = float(low.min(initial=0.5, where=low > 0))  # the axis is logarithmic
+    most = float(high.max(initial=2.0, where=np.isfinite(high)))
+    y = Axis("measured / model", log=True, low=0.9 * least, high=1.1 * most)
+    return Panel((Rule(1.0, colour=MODEL, width=1.4), dots), Axis(TIME, log=True), y)
 
 
 def spectrum(

@@ -34,8 +34,15 @@ TITLES = {
     "allan": "Allan deviation and model",
     "spectrum": "Spectrum and model",
     "ratio": "Residual pattern",
-    "waterfall": "Mismatch by model; ◆: on the half of the record that the fit did not use",
+    "waterfall": "Mismatch by model",
     "record": "The record",
+}
+LEGENDS = {
+    "allan": "●: measured, with 95 % interval; line: model",
+    "spectrum": "●: measured; grey band: 95 % of them by the model",
+    "ratio": "where the interval leaves 1, the model fails",
+    "waterfall": "bar: fit; ◆ the half of the record not used in the fit; grey: chance alone",
+    "record": "",
 }
 
 
@@ -58,7 +65,9 @@ class NoisePictures:
                 with box("picture wide" if name == "record" else "picture"):
                     with div("title"):
                         words(title, "grow")
-                        downloads(partial(self.plots.get, name), title.partition(";")[0])
+                        downloads(partial(self.plots.get, name), title)
+                    if LEGENDS[name]:
+                        words(LEGENDS[name], "legend quiet")
                     self.plots[name] = empty_plot(title)
 
     def show(self, compared: Comparison[NoiseFit], session: ModelSession[NoiseFit]) -> None:
