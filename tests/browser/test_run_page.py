@@ -186,7 +186,7 @@ def test_a_run_begins_after_the_checks_and_no_single_key_moves_anything(workbenc
     page.get_by_role("button", name="Cancel").click()
 
 
-FOCUSED = "document.activeElement.innerText || ''"
+FOCUSED = "document.activeElement.tagName === 'BUTTON' ? document.activeElement.innerText : ''"
 UNTICKED = "document.activeElement.getAttribute('aria-checked') === 'false'"
 
 
