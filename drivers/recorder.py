@@ -21,13 +21,15 @@ Input = TypeVar("Input", int, str)  # a number, or the name of a record
 class Samples:
     """A record: `volts` of shape (n, channels), the first scan at `start_s` of the clock.
 
-    Of a sensor that sends its own values, `volts` are in the unit of its settings.
+    Of a sensor that sends its own values, `volts` are in the unit of its settings. `temperature_c` is what the sensor
+    itself reports; None if it does not.
     """
 
     volts: NDArray[np.float64]
     channels: tuple[str, ...]
     rate_hz: float
     start_s: float
+    temperature_c: float | None = None
 
 
 @dataclass(frozen=True)
@@ -143,4 +145,6 @@ class Recorder(Generic[Settings]):
 def _joined(blocks: Sequence[Samples]) -> Samples:
     first = blocks[0]
     volts = np.concatenate([block.volts for block in blocks])
-    return Samples(volts, first.channels, first.rate_hz, first.start_s)
+    reported = [block.temperature_c for block in blocks if block.temperature_c is not None]
+    temperature_c = float(np.mean(reported)) if reported else None
+    return Samples(volts, first.channels, first.rate_hz, first.start_s, temperature_c)

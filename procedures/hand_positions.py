@@ -40,12 +40,16 @@ class Rest:
     channels: Sequence[str]
     rate_hz: float
     start_s: float
+    temperature_c: float | None
 
     @staticmethod
     def of(windows: Sequence[Samples]) -> Rest:
         """All `windows` joined."""
         first = windows[0]
-        return Rest(np.concatenate([w.volts for w in windows]), first.channels, first.rate_hz, first.start_s)
+        volts = np.concatenate([w.volts for w in windows])
+        reported = [w.temperature_c for w in windows if w.temperature_c is not None]
+        temperature_c = float(np.mean(reported)) if reported else None
+        return Rest(volts, first.channels, first.rate_hz, first.start_s, temperature_c)
 
 
 def hand_positions(

@@ -15,7 +15,8 @@ Read = TypeVar("Read")
 class Samples(Protocol):
     """A block of samples: `volts`, shape (n, channels); `start_s` is the clock's time of the first sample.
 
-    Of a digital sensor, `volts` are in the unit of the sensor.
+    Of a digital sensor, `volts` are in the unit of the sensor, and `temperature_c` is what it reports; None if it does
+    not.
     """
 
     @property
@@ -26,6 +27,8 @@ class Samples(Protocol):
     def rate_hz(self) -> float: ...
     @property
     def start_s(self) -> float: ...
+    @property
+    def temperature_c(self) -> float | None: ...
 
 
 OUTPUTS = (("vx", "vy", "vz"), ("ax", "ay", "az"))  # of an analog accelerometer, and of a digital one

@@ -289,7 +289,11 @@ class Session:
         self.keep_readings(*(Reading(name, value, units.get(name, "")) for name, value in wanted.items()))
 
     def keep(self, pose: Pose, *, samples: Samples, temperature_c: float | None = None) -> None:
-        """Store `pose` in the record. Raises SafetyLimit for a temperature outside the limits of the bench."""
+        """Store `pose` in the record. The temperature that the sensor reports replaces that of a thermometer beside it.
+
+        Raises SafetyLimit for a temperature outside the limits of the bench.
+        """
+        temperature_c = temperature_c if samples.temperature_c is None else samples.temperature_c
         self.check_temperature(temperature_c)
         self.host.keep(pose, samples, temperature_c)
 

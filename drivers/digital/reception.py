@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 RESTARTED_S, RESTARTED = 1.0, 0.05  # the clocks differ by more than this, and this share: the sensor began anew
+FRESH_S = 60.0  # age of a temperature that still describes the sensor
 FINE = 10  # counts of the sensor's time in a period of the samples: its steps count the samples
 
 
@@ -46,12 +47,14 @@ class Batch:
     missing  messages before each sample that did not arrive, by their numbers, shape (n,); -1 for a repeated sample;
              None if messages have no numbers
     clipped  the output that the sensor reports at the end of its range; empty for none
+    warm_c   temperatures that the sensor reports, C, shape (reported,)
     """
 
     values: Floats
     time: Floats | None = None
     missing: Ints | None = None
     clipped: str = ""
+    warm_c: Floats = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass
@@ -73,6 +76,37 @@ class Numbers:
         before = np.diff(np.concatenate([[0], total[samples]]))
         self._missing = int(total[-1] - (total[samples[-1]] if len(samples) else 0))
         return np.asarray(np.where(missing[samples] < 0, -1, before))
+
+
+@dataclass
+class Thermometer:
+    """The temperature that the sensor reports, maybe less often than its samples.
+
+    A record without a report has the last one, if it is not older than `FRESH_S`. `awaited`: a driver has waited for
+    the first report.
+    """
+
+    last_c: float | None = None
+    last_s: float = 0.0  # the host's time
+    awaited: bool = False
+    _new: list[Floats] = field(default_factory=list)
+
+    def take(self, warm_c: Floats, now_s: float) -> None:
+        """Add reports that arrived by `now_s`."""
+        if len(known := warm_c[np.isfinite(warm_c)]):
+            self.last_c, self.last_s = float(known[-1]), now_s
+            self._new.append(known)
+
+    def forget(self) -> None:
+        """Begin a record: earlier reports are not a part of its mean."""
+        self._new = []
+
+    def pull_c(self, now_s: float) -> float | None:
+        """The mean of the reports since the last call, else the last report; None without a fresh one."""
+        new, self._new = self._new, []
+        if new:
+            return float(np.concatenate(new).mean())
+        return self.last_c if now_s - self.last_s <= FRESH_S else None
 
 
 class Moment(NamedTuple):

@@ -13,7 +13,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.digital.reception import Batch, Reception, Tally, TimeBase
+from drivers.digital.reception import Batch, Reception, Tally, Thermometer, TimeBase
 from drivers.digital.settings import FORCES, DigitalSettings
 from drivers.errors import DriverError, LimitError, LinkTimeout, OverRange, SensorFault, StreamError
 from drivers.instrument import Check
@@ -65,7 +65,7 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
     def __init__(self, link: Link, settings: Settings, name: str) -> None:
         self.name, self.settings = name, settings
         self._link, self._clock = link, link.clock
-        self._tally = self._new_tally()
+        self._tally, self._warmth = self._new_tally(), Thermometer()
 
     @property
     @abstractmethod
@@ -127,6 +127,11 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         """
         return self._tally.values()
 
+    @property
+    def _warm(self) -> str:
+        """The temperature of the sensor, as the end of a sentence; nothing if it does not report one."""
+        return "" if self._warmth.last_c is None else f"; the sensor is at {self._warmth.last_c:.1f} C"
+
     def power(self, on: bool) -> None:  # noqa: ARG002 - as the converter's
         """Raises LimitError: no line switches its power."""
         raise LimitError(f"{self.name}: no line switches the power of a digital sensor", "Switch it by hand")
@@ -140,20 +145,24 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         rate_hz, names = self.settings.rate_hz, tuple(self.settings.channels)
         total, block = self.scans(duration_s), self.scans(block_s)
         self._begin()
+        self._warmth.forget()
         decoder, reception, sent = self._decoder(), self._reception(), 0
-        begun_s, quiet_s = self._clock.now(), max(QUIET_S, 10 / rate_hz)
+        begun_s, quiet_s, damaged = self._clock.now(), max(QUIET_S, 10 / rate_hz), 0
         try:
             while sent < total:
                 due = min(block, total - sent)
                 while reception.count < sent + due:
                     self._pause(reception, total)
-                    reception.take(self._listen(decoder, quiet_s), self._clock.now())
+                    if len((batch := self._listen(decoder, quiet_s)).values):
+                        damaged = decoder.damaged
+                    reception.take(batch, self._clock.now())
                     if self._clock.now() - (reception.end_s if reception.count else begun_s) > quiet_s:
-                        raise self._silence(quiet_s)
+                        raise self._unreadable(decoder) if decoder.damaged > damaged else self._silence(quiet_s)
                 self._require_complete(reception, decoder)
                 values = reception.pull(due)
                 self._require_alive(values, names, reception)
-                yield Samples(values, names, rate_hz, reception.start_s + sent / rate_hz)
+                start_s, temperature_c = reception.start_s + sent / rate_hz, self._warmth.pull_c(self._clock.now())
+                yield Samples(values, names, rate_hz, start_s, temperature_c)
                 sent += due
         finally:
             self._tally.add(reception, decoder.damaged)
@@ -180,6 +189,7 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         while more := self._link.read(0.0):  # a read has an end, and samples must not gather behind it
             data += more
         batch = decoder.take(data)
+        self._warmth.take(batch.warm_c, self._clock.now())
         if decoder.damaged > SHOWN + decoder.good or decoder.unread > self.longest:
             raise self._unreadable(decoder)
         return batch

@@ -11,6 +11,7 @@ from drivers.recorder import NoDigitalLines
 
 FORCES, RATES, FIELDS = ("ax", "ay", "az"), ("gx", "gy", "gz"), ("mx", "my", "mz")
 OUTPUTS = (*FORCES, *RATES, *FIELDS)
+TEMPERATURE = "temperature"  # of the sensor, in C
 VOLTAGES = ("supply", "d63")  # of the board's own converter, in V, sampled with the sensor
 
 

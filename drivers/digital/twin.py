@@ -15,7 +15,6 @@ from drivers.digital.settings import FIELDS, FORCES, RATES, VOLTAGES, DigitalSet
 from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
 from drivers.transport.server import Connection, Port, Server, Twin
-from drivers.world.digital import Trim, trims
 
 Floats = NDArray[np.float64]
 G_M_S2 = 9.80665
@@ -49,15 +48,8 @@ FRAME_FAULTS = {  # of a sensor that sends frames when they are requested
 class World(Protocol):
     """What a sensor knows of physics."""
 
-    trims: Mapping[str, Trim]
-
     def sensed(self, outputs: Sequence[str], start_s: float, interval_s: float, n: int) -> Floats: ...
-
-
-class WarmWorld(World, Protocol):
-    """The same, with the temperature of the sensor."""
-
-    def thermometer_c(self) -> float: ...
+    def die_c(self) -> float: ...
 
 
 W = TypeVar("W", bound=World)
@@ -193,9 +185,9 @@ class DigitalTwin(Twin):
 class FramedTwin(DigitalTwin):
     """A sensor that sends frames of bytes when they are requested."""
 
-    def __init__(self, world: WarmWorld, settings: DigitalSettings, port: Port) -> None:
+    def __init__(self, world: World, settings: DigitalSettings, port: Port) -> None:
         super().__init__(world, settings, port)
-        self._warmth, self._sending = world, False
+        self._sending = False
         port.answer = self._answer
 
     @abstractmethod
@@ -239,12 +231,7 @@ def talking_port(listen: str) -> Port:
 def serve_sensors(
     sensor: Callable[[W, S, Port], DigitalTwin], world: W, roles: Mapping[str, tuple[int, S]], listen: str
 ) -> Server:
-    """A link with a sensor for each role: role -> (unit id, which such a sensor has not, settings).
-
-    Raises UnknownInput for an output that the simulated sensor does not have.
-    """
-    for _, settings in roles.values():
-        trims(list(settings.wired), world.trims)
+    """A link with a sensor for each role: role -> (unit id, which such a sensor has not, settings)."""
     ports = {role: talking_port(listen) for role in roles}
     twins = {role: sensor(world, roles[role][1], port) for role, port in ports.items()}
     return Server(list(ports.values()), twins, {role: Address(port.url) for role, port in ports.items()})

@@ -17,7 +17,7 @@ import numpy as np
 
 from drivers.digital.reception import Batch, Reception, TimeBase
 from drivers.digital.sensor import TEST_S, DigitalSensor
-from drivers.digital.settings import OUTPUTS, VOLTAGES, DigitalSettings
+from drivers.digital.settings import OUTPUTS, TEMPERATURE, VOLTAGES, DigitalSettings
 from drivers.errors import BadFrame, DriverError, LinkTimeout
 from drivers.imu_lines.lines import TIME, Assembly
 from drivers.imu_lines.proposal import proposed_settings
@@ -26,6 +26,7 @@ from drivers.transport import Address, Links
 
 WRAP = 2**32  # counts of the sensor's time
 LONGEST = 1024  # bytes without an end of line
+UNASKED = (TIME, TEMPERATURE)  # columns that every record reads
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,8 @@ class Settings(DigitalSettings):
     """The line: `columns` are {ax: 1, ay: 2, az: 3}, by number from 1, or by name for `named` and `teleplot`.
 
     Columns of a gyroscope (gx, gy, gz) and a magnetometer (mx, my, mz) are recorded for procedures that ask for them.
-    The columns supply and d63 are voltages of the board's converter. A column `time` is the sensor's own time, in units
+    The columns supply and d63 are voltages of the board's converter. A column `temperature` is the sensor's, in C: it
+    becomes the temperature of a pose. A column `time` is the sensor's own time, in units
     of `time_unit_s`. `range` is the end of the accelerometer's range each way, in `unit`. Raises ValueError for what
     cannot be.
     """
@@ -51,8 +53,8 @@ class Settings(DigitalSettings):
     def __post_init__(self) -> None:
         self.require_valid()
         require_positive(self, "time_unit_s")
-        if not set(self.columns) & {*OUTPUTS} or not set(self.columns) <= {*OUTPUTS, *VOLTAGES, TIME}:
-            others = f"{', '.join(VOLTAGES)} and {TIME}"
+        if not set(self.columns) & {*OUTPUTS} or not set(self.columns) <= {*OUTPUTS, *VOLTAGES, *UNASKED}:
+            others = f"{', '.join(VOLTAGES)}, {TEMPERATURE} and {TIME}"
             raise ValueError(f"columns must name outputs of {', '.join(OUTPUTS)}, and may name {others}")
         if len(set(self.columns.values())) < len(self.columns):
             raise ValueError("columns must be different; two names have the same column")
@@ -62,15 +64,15 @@ class Settings(DigitalSettings):
 
     @property
     def wired(self) -> Mapping[str, int | str]:
-        """All columns but the time, by name."""
-        return {name: column for name, column in self.columns.items() if name != TIME}
+        """All columns but time and temperature, by name."""
+        return {name: column for name, column in self.columns.items() if name not in UNASKED}
 
     @property
     def kinds(self) -> tuple[str, str, str]:
         return self.unit, self.gyro_unit, self.field_unit
 
     def chosen(self, outputs: Sequence[str]) -> Settings:
-        return replace(self, columns={k: c for k, c in self.columns.items() if k in outputs or k == TIME})
+        return replace(self, columns={k: c for k, c in self.columns.items() if k in (*outputs, *UNASKED)})
 
 
 class LineDecoder:
@@ -96,7 +98,8 @@ class LineDecoder:
         rows = self.assembly.take(data)
         values = np.array([[row[name] for name in self._names] for row in rows]).reshape(len(rows), len(self._names))
         time = np.array([row[TIME] for row in rows], dtype=float) if rows and TIME in rows[0] else None
-        return Batch(values, time)
+        warm_c = [row[TEMPERATURE] for row in rows] if rows and TEMPERATURE in rows[0] else []
+        return Batch(values, time, warm_c=np.array(warm_c, dtype=float))
 
 
 class LineSensor(DigitalSensor[Settings, LineDecoder]):
@@ -117,7 +120,7 @@ class LineSensor(DigitalSensor[Settings, LineDecoder]):
         return LineDecoder(self.settings)
 
     def _content(self, decoder: LineDecoder) -> str:
-        return f"the lines have the columns {', '.join(map(str, decoder.assembly.seen))}"
+        return f"the lines have the columns {', '.join(map(str, decoder.assembly.seen))}{self._warm}"
 
     def _advice(self, decoder: LineDecoder, begun_s: float) -> list[Check]:
         """Settings that fit the lines since `begun_s`, as far as the test goes; nothing where none do."""

@@ -15,15 +15,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.digital.settings import TEMPERATURE
 from drivers.imu_lines.lines import TIME, Column, fields
 
 FEWEST = 5  # samples
 NEAR = 0.1  # of 1 g, for the norm at rest
 ONE_G = {"g": (1.0,), "m/s^2": (9.80665,), "count": tuple(float(1 << k) for k in range(7, 16))}
 EVEN = 0.5  # of the median step of the time, by which a step may differ
-ORDER = (TIME, *(f"{sensor}{axis}" for sensor in "agm" for axis in "xyz"))
+ORDER = (TIME, *(f"{sensor}{axis}" for sensor in "agm" for axis in "xyz"), TEMPERATURE)
 NAMES = (  # of a column, in small letters; the first match
     (r"^(t|ts|time|ms|us|micros|millis|timestamp)(_?[mu]?s)?$", TIME),
+    (r"^(temp|temperature)(_?(deg)?c)?$", TEMPERATURE),
     (r"^(a|acc|accel|acceleration)_?([xyz])$", "a"),
     (r"^(g|w|gyr|gyro|omega)_?([xyz])$", "g"),
     (r"^(m|mag|b|field)_?([xyz])$", "m"),
@@ -76,7 +78,7 @@ def _by_name(values: Mapping[Column, NDArray[np.float64]]) -> dict[str, Column]:
         match = next((m for pattern, _ in NAMES if (m := re.match(pattern, str(column).lower()))), None)
         ours = next((ours for pattern, ours in NAMES if re.match(pattern, str(column).lower())), "")
         if match and ours:
-            columns.setdefault(ours if ours == TIME else f"{ours}{match[2]}", column)
+            columns.setdefault(ours if ours in (TIME, TEMPERATURE) else f"{ours}{match[2]}", column)
     return columns
 
 

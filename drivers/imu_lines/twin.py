@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.digital.settings import FIELDS, FORCES, RATES, VOLTAGES
+from drivers.digital.settings import FIELDS, FORCES, RATES, TEMPERATURE, VOLTAGES
 from drivers.digital.twin import DigitalTwin, Floats, World, common_faults, serve_sensors
 from drivers.imu_lines.driver import WRAP, Settings
 from drivers.imu_lines.lines import TIME, checksum
@@ -30,8 +30,8 @@ class Talker(DigitalTwin):
 
     def _messages(self, values: Floats, ticks: NDArray[np.int64]) -> list[bytes]:
         rows = (dict(zip(self._names, row, strict=True)) for row in values.tolist())
-        times = map(self._time, ticks.tolist())
-        return [line_of(row | {TIME: time}, self._settings) for row, time in zip(rows, times, strict=True)]
+        times, warm = map(self._time, ticks.tolist()), {TEMPERATURE: self._world.die_c()}
+        return [line_of(row | warm | {TIME: time}, self._settings) for row, time in zip(rows, times, strict=True)]
 
     def _time(self, tick: int) -> float:
         """The sensor's time of a sample, which counts to 2^32 and begins again."""
@@ -52,7 +52,7 @@ def decimals(settings: Settings) -> dict[str, int]:
 
 def line_of(values: Mapping[str, float], settings: Settings) -> bytes:
     """The text of one sample."""
-    digits = decimals(settings) | {TIME: 0}
+    digits = decimals(settings) | {TIME: 0, TEMPERATURE: 2}
     shown = {column: f"{values[name]:.{digits[name]}f}" for name, column in settings.columns.items()}
     if settings.format == "named":
         return (" ".join(f"{name}:{text}" for name, text in shown.items()) + "\r\n").encode()
@@ -67,5 +67,5 @@ def line_of(values: Mapping[str, float], settings: Settings) -> bytes:
 
 
 def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
-    """A sensor for each role. Raises UnknownInput for an output that the simulated sensor does not have."""
+    """A sensor for each role."""
     return serve_sensors(Talker, world, roles, listen)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.digital.frames import FrameDecoder, Frames, Ints, groups
-from drivers.digital.reception import Batch, Numbers, Reception, TimeBase
+from drivers.digital.reception import Batch, Floats, Numbers, Reception, TimeBase
 from drivers.digital.sensor import DigitalSensor, no_samples
 from drivers.digital.settings import OUTPUTS, DigitalSettings, require_outputs
 from drivers.errors import BadFrame, DriverError, LinkTimeout, Refused, SensorFault
@@ -32,6 +32,8 @@ HEARTBEAT_S = 3.0  # it comes once a second
 ACK_S, ATTEMPTS = 1.0, 3
 GROUND = (255, 190)  # our own system and component: those of a ground station
 END = 32767  # of a count of 16 bits, each way
+NO_TEMPERATURE = 0  # in messages of whole numbers
+WARM = 1 << 12  # bit of `fields_updated` for the temperature
 UPDATED = {name: 1 << k for k, name in enumerate(OUTPUTS)}  # bits of `fields_updated`
 
 
@@ -91,7 +93,6 @@ class SampleDecoder(FrameDecoder):
         super().__init__(mav.Mavlink())
         self.seen: Counter[str] = Counter()
         self.updated = 0
-        self.temperature_c: float | None = None
         self._settings, self._target = settings, target
         self._names = tuple(settings.channels)
         self._columns = [OUTPUTS.index(name) for name in self._names]
@@ -119,12 +120,16 @@ class SampleDecoder(FrameDecoder):
         if len(content) and self._message is not mav.HIGHRES_IMU:
             ends = (np.abs(numbers[:, self._columns]) >= END).any(axis=0)
             clipped = self._names[int(np.argmax(ends))] if ends.any() else ""
-            if raw := int(content["temperature"][-1]):
-                self.temperature_c = raw / 100
         elif len(content):
             self.updated |= int(np.bitwise_or.reduce(content["updated"]))
-            self.temperature_c = float(content["temperature"][-1])
-        return Batch(values, content["time"].astype(np.float64), gaps, clipped)
+        return Batch(values, content["time"].astype(np.float64), gaps, clipped, self._warm_c(content))
+
+    def _warm_c(self, content: NDArray[np.void]) -> Floats:
+        """The temperatures in the messages that have one."""
+        raw = content["temperature"].astype(np.float64)
+        if self._message is mav.HIGHRES_IMU:
+            return np.asarray(raw[content["updated"] & WARM != 0])
+        return np.asarray(raw[raw != NO_TEMPERATURE] / 100)
 
 
 class FlightController(DigitalSensor[Settings, SampleDecoder]):
@@ -246,8 +251,8 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
             )
 
     def _content(self, decoder: SampleDecoder) -> str:
-        warm = "" if decoder.temperature_c is None else f", the sensor is at {decoder.temperature_c:.1f} C"
-        return f"{', '.join(f'{name} {count}' for name, count in sorted(decoder.seen.items()))}{warm}"
+        seen = ", ".join(f"{name} {count}" for name, count in sorted(decoder.seen.items()))
+        return seen + self._warm
 
     def _silence(self, timeout_s: float) -> DriverError:
         return no_samples(self.name, self._link.url, timeout_s, self.settings.message)

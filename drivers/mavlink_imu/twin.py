@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from drivers.digital.frames import Frames, Ints
 from drivers.digital.settings import OUTPUTS
-from drivers.digital.twin import FRAME_FAULTS, Floats, FramedTwin, WarmWorld, common_faults, serve_sensors
+from drivers.digital.twin import FRAME_FAULTS, Floats, FramedTwin, World, common_faults, serve_sensors
 from drivers.mavlink_imu import messages as mav
-from drivers.mavlink_imu.driver import END, UPDATED, Settings
+from drivers.mavlink_imu.driver import END, NO_TEMPERATURE, UPDATED, WARM, Settings
 from drivers.transport.faults import Kind
 from drivers.transport.server import Connection, Port, Server
 
@@ -29,7 +29,7 @@ class Autopilot(FramedTwin):
 
     carrier = "message"
 
-    def __init__(self, world: WarmWorld, settings: Settings, port: Port) -> None:
+    def __init__(self, world: World, settings: Settings, port: Port) -> None:
         super().__init__(world, settings, port)
         self._settings, self._message = settings, mav.IMU[settings.message]
         self._columns = [OUTPUTS.index(name) for name in settings.outputs]
@@ -107,12 +107,12 @@ class Autopilot(FramedTwin):
         for k, sensor in enumerate("agm"):
             content[sensor] = numbers[:, 3 * k : 3 * k + 3]
         content["time"] = np.rint(self._sensor_s(ticks) / self._settings.time_unit_s)
-        temperature_c = self._warmth.thermometer_c()
+        temperature_c = self._world.die_c()
         if self._message is mav.HIGHRES_IMU:
             content["temperature"], content["pressure"][:, 0] = temperature_c, 1013.25
-            content["updated"] = sum(UPDATED[name] for name in self._settings.outputs) | 1 << 9 | 1 << 12
+            content["updated"] = sum(UPDATED[name] for name in self._settings.outputs) | 1 << 9 | WARM
         else:
-            content["temperature"] = round(100 * temperature_c) or 1  # 0 is none
+            content["temperature"] = round(100 * temperature_c) or NO_TEMPERATURE + 1
         if "id" in (self._message.dtype.names or ()):
             content["id"] = self._settings.imu
         return self._framed(self._message, content)
@@ -123,6 +123,6 @@ class Autopilot(FramedTwin):
         return mav.frames(message, content, sequences, SYSTEM, COMPONENT)
 
 
-def serve(world: WarmWorld, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
-    """A flight controller for each role. Raises UnknownInput for an output that the simulated sensor does not have."""
+def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
+    """A flight controller for each role."""
     return serve_sensors(Autopilot, world, roles, listen)

@@ -8,7 +8,7 @@ The contact may be pressed harder by the load of the neighbouring axis.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from drivers.world.kernel import Floats, kernel
 
@@ -124,6 +124,15 @@ class Plates:
     overlap_slide_per_um: float = 0.0  # relative overlap gained per displacement of the neighbouring axis
     charging_pm: float = 0.0  # displacement by charge that creeps into the plates' oxide while powered
     dead_band_nm: float = 0.0  # half width around the trimmed zero in which the amplifier is blind
+
+
+@dataclass(frozen=True)
+class OutOfPlane:
+    """The plates above and below the proof mass, which sense its sag: the third axis of a triaxial sensor."""
+
+    plates: Plates = field(default_factory=lambda: Plates(gap_um=2.0))
+    stress_pm_per_k: float = 0.0  # sag by package stress
+    noise_v: float = 1.5e-3  # rms of a sample
 
 
 @kernel

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, TypeVar
 
 from drivers.errors import did_you_mean
-from drivers.world.accelerometer import Friction, Plates, Springs
+from drivers.world.accelerometer import Friction, OutOfPlane, Plates, Springs
 from drivers.world.converter import Converter
 from drivers.world.displacement_sensor import FibreProbe
 from drivers.world.disturbances import Oddities, Supply
@@ -61,13 +61,14 @@ class SensingAxis:
 
 @dataclass(frozen=True)
 class Sensor:
-    """A proof mass with two sensing axes in a package."""
+    """A proof mass in a package, with two sensing axes in its plane and one out of it."""
 
     package: Package = field(default_factory=Package)
     x: SensingAxis = field(default_factory=SensingAxis)
     y: SensingAxis = field(default_factory=SensingAxis)
     sag_resonance_hz: float = 4000.0  # out-of-plane resonance: fixes the sag per g (15.5 nm)
     charging_s: float = 900.0  # time constant of the charge that creeps into the oxide
+    z: OutOfPlane = field(default_factory=OutOfPlane)  # the ADXL203 does not lead it out
 
 
 @dataclass(frozen=True)
@@ -198,6 +199,7 @@ ADXL203: dict[str, Any] = {
                 "height_step_nm": -2.0,
             },
         },
+        "z": {"plates": {"plate_mismatch_fraction": 0.01, "stray_fraction": 1.0}, "stress_pm_per_k": 6.0},
     },
     "magnetometer": {
         "x": {"volts_per_ut": 0.0204, "offset_v": 0.013},

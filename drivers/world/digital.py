@@ -22,7 +22,7 @@ class Trim:
     gain_v: float = 1.0
 
 
-ACCELEROMETER = {f"a{axis}": Trim(f"v{axis}", 2.5, 1.0) for axis in "xy"}
+ACCELEROMETER = {f"a{axis}": Trim(f"v{axis}", 2.5, 1.0) for axis in "xyz"}
 GYROSCOPE = {f"g{axis}": Trim(f"g{axis}", 2.5, 6e-3) for axis in "xyz"}
 MAGNETOMETER = {f"m{axis}": Trim(f"m{axis}", 0.0, 0.02) for axis in "xyz"}
 VOLTAGES = {name: Trim(name) for name in ("supply", "d63")}  # of a converter on the sensor's board

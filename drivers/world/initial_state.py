@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import fields, is_dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from drivers.world import gravity, laboratory, mechanics, noise, pickup, turned_sensors
+from drivers.world.accelerometer import OutOfPlane
 from drivers.world.config import SensingAxis, Spread, WorldConfig
 from drivers.world.heat import Heat, Warmth
 from drivers.world.kernel import record
@@ -62,6 +63,7 @@ def _warm_up(warmth: Warmth, heat: Heat) -> None:
 
 # No two rigs are alike: an individual drawn around its settings.
 
+Axis = TypeVar("Axis", SensingAxis, OutOfPlane)
 # What a factory or a designer fixes: no imperfection, so no scatter.
 EXACT = {"resonance_hz", "sag_resonance_hz", "charging_s", "gap_um", "zero_g_v", "sensitivity_v_per_g", "worm_cycles"}
 
@@ -76,11 +78,15 @@ def individual(config: WorldConfig, seed: int, place: int = 0) -> WorldConfig:
         random = np.random.default_rng([seed, 0, place])
         trims = random.standard_normal((2, 2))
     sensor = _scattered(config.sensor, fraction, random)
-    x, y = (_trimmed(axis, config.spread, *trim) for axis, trim in zip((sensor.x, sensor.y), trims, strict=True))
-    return replace(config, stages=stages, base=base, sensor=replace(sensor, x=x, y=y))
+    axes = (sensor.x, sensor.y, sensor.z)
+    x, y, z = (
+        _trimmed(axis, config.spread, *trim)
+        for axis, trim in zip(axes, [*trims, random.standard_normal(2)], strict=True)
+    )
+    return replace(config, stages=stages, base=base, sensor=replace(sensor, x=x, y=y, z=z))
 
 
-def _trimmed(axis: SensingAxis, spread: Spread, zero: float, gain: float) -> SensingAxis:
+def _trimmed(axis: Axis, spread: Spread, zero: float, gain: float) -> Axis:
     plates = replace(
         axis.plates,
         zero_g_v=axis.plates.zero_g_v + spread.zero_g_v * zero,

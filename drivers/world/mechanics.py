@@ -106,6 +106,13 @@ def load_g(world: State, config: WorldConfig, t_ns: int) -> tuple[float, float, 
     b_motor = stage.motor_angle_deg(world.pieces[1], t_s)
     world.table_deg[0] = stage.engaged_deg(config.stages.alpha, world.table_deg[0], a_motor)
     world.table_deg[1] = stage.engaged_deg(config.stages.beta, world.table_deg[1], b_motor)
+    gx, gy, gz = force_g(world, config, t_ns)
+    return gx, gravity.along_y(config.sensor.package, gx, gy), gz
+
+
+@kernel
+def force_g(world: State, config: WorldConfig, t_ns: int) -> tuple[float, float, float]:
+    """Specific force in the frame of the package, where the tables are now."""
     alpha, beta = true_angles_rad(world, config.stages)
     gx, gy, gz = gravity.felt_g(world.up, world.mount, alpha, beta)
     for axis in range(3):
@@ -114,7 +121,18 @@ def load_g(world: State, config: WorldConfig, t_ns: int) -> tuple[float, float, 
             gx += world.mount[0, axis] * shaken
             gy += world.mount[1, axis] * shaken
             gz += world.mount[2, axis] * shaken
-    return gx, gravity.along_y(config.sensor.package, gx, gy), gz
+    return gx, gy, gz
+
+
+@kernel
+def out_of_plane_v(world: State, config: WorldConfig) -> float:
+    """Output of the third axis since the last event, without noise."""
+    sensor = config.sensor
+    _, _, gz = force_g(world, config, world.mechanics_ns)
+    stress_k = world.warmth.glue_c - REFERENCE_C
+    sag = gz * accelerometer.per_g_nm(sensor.sag_resonance_hz) + 1e-3 * sensor.z.stress_pm_per_k * stress_k
+    volts = accelerometer.read_v(sensor.z.plates, sensor.sag_resonance_hz, sag, 0.0, 0.0, world.supply_v)
+    return world.powered * volts
 
 
 @kernel

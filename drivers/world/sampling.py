@@ -10,12 +10,12 @@ from numpy.random import Generator
 from drivers.world import converter, displacement_sensor, noise, positioner
 from drivers.world.config import WorldConfig
 from drivers.world.kernel import Floats, Ints, kernel
-from drivers.world.mechanics import STEP_NS, next_event_ns, run_to
+from drivers.world.mechanics import STEP_NS, next_event_ns, out_of_plane_v, run_to
 from drivers.world.pickup import with_pickup_v
 from drivers.world.state import State
 
-INPUTS = ("vx", "vy", "supply", "thermistor", "ground", "d63", "mx", "my", "mz", "gx", "gy", "gz")
-VX, VY, SUPPLY, THERMISTOR, D63, FIELD, RATE = 0, 1, 2, 3, 5, 6, 9
+INPUTS = ("vx", "vy", "supply", "thermistor", "ground", "d63", "vz", "mx", "my", "mz", "gx", "gy", "gz")
+VX, VY, SUPPLY, THERMISTOR, D63, VZ, FIELD, RATE = 0, 1, 2, 3, 5, 6, 7, 10
 
 # A 10 kOhm thermistor at the package, below a 10 kOhm resistor on the sensor's supply.
 THERMISTOR_B_K = 3950.0
@@ -46,7 +46,7 @@ def convert(
     world: State, config: WorldConfig, channels: Ints, late_ns: Ints, times_ns: Ints, random: Generator, volts: Floats
 ) -> None:
     """Fill `volts` with scans between which nothing happens: only filters and noise go on."""
-    steady = steady_v(world)
+    steady = steady_v(world, config)
     for i in range(len(times_ns)):
         for k in range(len(channels)):
             t_ns = times_ns[i] + late_ns[k]
@@ -62,6 +62,8 @@ def convert(
                     analog = with_pickup_v(world.pickup_y, config.noise.y, config.floor, analog, t_ns, random)
             elif channels[k] == D63:
                 analog = displacement_v(world, config, t_ns, random.standard_normal())
+            elif channels[k] == VZ:
+                analog = steady[VZ] + config.sensor.z.noise_v * random.standard_normal()
             elif channels[k] >= RATE:
                 analog = steady[channels[k]] + config.gyroscope.noise_v * random.standard_normal()
             elif channels[k] >= FIELD:
@@ -82,10 +84,11 @@ def displacement_v(world: State, config: WorldConfig, t_ns: int, normal: float) 
 
 
 @kernel
-def steady_v(world: State) -> Floats:
+def steady_v(world: State, config: WorldConfig) -> Floats:
     """Voltages of INPUTS that change at events only, without noise; 0 for the others."""
     volts = np.zeros(len(INPUTS))
     volts[SUPPLY] = world.supply_v * world.powered
+    volts[VZ] = out_of_plane_v(world, config)
     volts[FIELD:RATE] = world.field_v * world.powered
     volts[RATE:] = world.rate_v * world.powered
     volts[THERMISTOR] = thermistor_v(world.warmth.body_c + world.warmth.board_k, volts[SUPPLY])

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from drivers.errors import did_you_mean
-from drivers.world import digital, gravity, mechanics, positioner, sampling, stage, state, visit
+from drivers.world import digital, gravity, heat, mechanics, positioner, sampling, stage, state, visit
 from drivers.world.config import WorldConfig
 from drivers.world.errors import TimeReversal, UnknownInput
 from drivers.world.initial_state import beginning, individual
@@ -111,6 +111,10 @@ class World:
         """What the thermocouple on the sensor's package shows now."""
         return float(self._world.warmth.thermocouple_c)
 
+    def die_c(self) -> float:
+        """What a thermometer on the sensor's chip shows now."""
+        return float(heat.die_c(self._world.warmth))
+
     def level_deg(self) -> tuple[float, float]:
         """What a level on the turntable shows now: how far the positive ends of its x and y axis are up, in deg."""
         angles_rad = mechanics.true_angles_rad(self._world, self._numbers.stages)
@@ -124,7 +128,7 @@ class World:
 
         Scan i begins at `start_s + i * interval_s`; an input follows as many times the converter's skew later as its
         place in the scan says, which are 0, 1, .. unless given. The world is at the last scan afterwards. Inputs:
-        vx, vy, supply, thermistor, ground, d63, mx, my, mz of the magnetometer, gx, gy, gz of the gyroscope.
+        vx, vy, vz, supply, thermistor, ground, d63, mx, my, mz of the magnetometer, gx, gy, gz of the gyroscope.
 
         Raises:
             UnknownInput: an input of another name.
@@ -142,7 +146,7 @@ class World:
     def sensed(self, outputs: Sequence[str], start_s: float, interval_s: float, n: int) -> Floats:
         """Outputs of a digital sensor in g, deg/s, uT and V, shape (n, len(outputs)), all sampled at once.
 
-        Outputs: those of `trims`. The accelerometer has no axis z. Raises as `adc_volts`.
+        Outputs: those of `trims`. Raises as `adc_volts`.
         """
         of = digital.trims(outputs, self.trims)
         volts = self.adc_volts([trim.analog for trim in of], start_s, interval_s, n, [0] * len(of))

@@ -29,6 +29,7 @@ ANSWER_S, ATTEMPTS = 0.5, 3
 TICK_S, WRAPS = 1e-4, (864_000_000, 2**32)  # of SampleTimeFine: 10 and 100 series, 1 and 600 series
 FILTERED_HZ = 400.0  # the highest rate of the filtered outputs; above it, the high-rate (HR) ones
 PROBE_S = 0.1
+WARM_S = 1.2  # from one report of the temperature to the next, with a margin
 SAME = 0.01  # of a rate
 TRIADS = {  # kinds of packets -> their outputs
     xbus.ACCELERATION: FORCES,
@@ -97,13 +98,14 @@ class SampleDecoder(FrameDecoder):
         super().__init__(xbus.Xbus())
         self._names = tuple(settings.channels)
         self._numbers = Numbers(1 << 16)
-        self.temperature_c: float | None = None
+        self._warm_c: list[xbus.Floats] = []
         self.kinds: set[int] = set()
 
     def take(self, data: bytes) -> Batch:
         messages = self.stream.take(data)
         n = len(messages.starts)
         values = np.full((n, len(self._names)), np.nan)
+        self._warm_c = [np.empty(0)]
         counter, time, status = np.full(n, -1), np.zeros(n), np.zeros(n, dtype=np.int64)
         for places, rows, packets in xbus.of_one_layout(messages):
             for packet in packets:
@@ -119,7 +121,7 @@ class SampleDecoder(FrameDecoder):
         numbered = np.flatnonzero(counter >= 0)
         samples = numbered[np.isfinite(values[numbered]).all(axis=1)]
         gaps = self._numbers.gaps(counter[numbered], np.searchsorted(numbered, samples))
-        return Batch(values[samples], time[samples], gaps, self._clipped(status))
+        return Batch(values[samples], time[samples], gaps, self._clipped(status), np.concatenate(self._warm_c))
 
     def _numbers_of(self, rows: Bytes, packet: Packet, places: Ints, values: xbus.Floats) -> None:
         """Put the real numbers of a packet in their columns."""
@@ -129,8 +131,8 @@ class SampleDecoder(FrameDecoder):
             for column, name in enumerate(self._names):
                 if name in outputs:
                     values[places, column] = found[:, outputs.index(name)]
-        elif packet.kind == xbus.TEMPERATURE and (warm := xbus.numbers(rows, packet)).size:
-            self.temperature_c = float(warm[-1, 0])
+        elif packet.kind == xbus.TEMPERATURE and (warm_c := xbus.numbers(rows, packet)).size:
+            self._warm_c.append(warm_c[:, 0])
 
     def _clipped(self, status: Ints) -> str:
         """The first output that the tracker reports at the end of its range."""
@@ -167,6 +169,18 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
             self._configuring()
             self._configure()
             self._asked(xbus.GO_TO_MEASUREMENT)
+        self._link.discard()
+        self._await_temperature()
+
+    def _await_temperature(self) -> None:
+        """Before the first record, wait for the temperature: it comes once a second, and each record needs one."""
+        if self._warmth.awaited:
+            return
+        self._warmth.awaited = True
+        decoder, deadline_s = self._decoder(), self._clock.now() + WARM_S
+        while self._warmth.last_c is None and (left_s := deadline_s - self._clock.now()) > 0:
+            if data := self._link.read(left_s):
+                self._warmth.take(decoder.take(data).warm_c, self._clock.now())
         self._link.discard()
 
     def _is_sending(self) -> bool:
@@ -228,8 +242,7 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
 
     def _content(self, decoder: SampleDecoder) -> str:
         names = ", ".join(name for kind, name in NAMES.items() if kind in decoder.kinds)
-        warm = "" if decoder.temperature_c is None else f"; the sensor is at {decoder.temperature_c:.1f} C"
-        return f"{decoder.good} messages with {names}{warm}"
+        return f"{decoder.good} messages with {names}{self._warm}"
 
     def _silence(self, timeout_s: float) -> DriverError:
         outputs = ", ".join(NAMES[kind] for kind in self.settings.packets if kind in NAMES)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from drivers.digital.frames import Frames
 from drivers.digital.settings import FIELDS
-from drivers.digital.twin import FRAME_FAULTS, Floats, FramedTwin, WarmWorld, common_faults, serve_sensors
+from drivers.digital.twin import FRAME_FAULTS, Floats, FramedTwin, World, common_faults, serve_sensors
 from drivers.transport.faults import Kind
 from drivers.transport.server import Connection, Port, Server
 from drivers.xsens_mti import messages as xbus
@@ -36,7 +36,7 @@ class MotionTracker(FramedTwin):
 
     carrier = "message"
 
-    def __init__(self, world: WarmWorld, settings: Settings, port: Port) -> None:
+    def __init__(self, world: World, settings: Settings, port: Port) -> None:
         super().__init__(world, settings, port)
         self._outputs = list(settings.wired)
         self._factors[[name in FIELDS for name in self._outputs]] = 1 / EARTH_UT
@@ -108,7 +108,7 @@ class MotionTracker(FramedTwin):
         columns: list[tuple[int, NDArray[Any]]] = [(xbus.COUNTER, counter), (xbus.TIME, (time % 2**32).astype(">u4"))]
         columns += [(kind, self._triad(values, TRIADS[kind])) for kind in self._rates]
         columns.append((xbus.STATUS, status.astype(">u4")))
-        temperature = np.full(len(ticks), self._warmth.thermometer_c(), dtype=">f4")
+        temperature = np.full(len(ticks), self._world.die_c(), dtype=">f4")
         out = [b""] * len(ticks)
         for of, more in ((~warm, []), (warm, [(xbus.TEMPERATURE, temperature)])):
             if of.any():
@@ -126,6 +126,6 @@ class MotionTracker(FramedTwin):
         return out
 
 
-def serve(world: WarmWorld, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
-    """A tracker for each role. Raises UnknownInput for an output that the simulated sensor does not have."""
+def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
+    """A tracker for each role."""
     return serve_sensors(MotionTracker, world, roles, listen)

@@ -71,6 +71,7 @@ class Block:
     channels: tuple[str, ...]
     rate_hz: float
     start_s: float
+    temperature_c: float | None = None  # in the record it is that of the pose
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import SimulatedClock
-from drivers.handheld.world import HandheldWorld
 from drivers.transport import Links
 from drivers.transport.faults import Fault, faults_of
 
@@ -23,10 +22,9 @@ LEVEL = FORCE_G | RATE_DEG_S | FIELD_UT
 class Ramp:
     """Outputs of LEVEL, with a ramp of 1e-3 g, deg/s and uT a second."""
 
-    trims = HandheldWorld.trims
     samples = 0  # taken so far
 
-    def thermometer_c(self) -> float:
+    def die_c(self) -> float:
         return 24.5
 
     def sensed(self, outputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:

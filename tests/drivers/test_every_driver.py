@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from drivers import clock as clock_module
 from drivers.clock import SimulatedClock
-from drivers.handheld.world import HandheldWorld
 from drivers.instrument import Check, Identity
 from drivers.transport import Links
 
@@ -28,8 +27,6 @@ WIRES = [(name, None) for name in NAMES] + [(name, listen) for name in SERIAL fo
 class Steady:
     """A world whose inputs are all at 2 V, and whose digital outputs are all 2."""
 
-    trims = HandheldWorld.trims
-
     def advance(self, t_s: float) -> None:
         """Nothing changes."""
 
@@ -38,7 +35,7 @@ class Steady:
 
     sensed = adc_volts
 
-    def thermometer_c(self) -> float:
+    def die_c(self) -> float:
         return 25.0
 
 

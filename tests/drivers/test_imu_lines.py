@@ -188,3 +188,19 @@ def test_six_axes_are_proposed_in_the_usual_order() -> None:
 @pytest.mark.parametrize("lines", [[], ["boot"] * 20, ["1,2"] * 20, ["5.5,0.1,0.2"] * 20])
 def test_nothing_is_proposed_where_no_accelerometer_is_seen(lines: list[str]) -> None:
     assert proposed_settings(lines, 1.0) is None
+
+
+def test_a_column_of_the_temperature_is_not_an_output(connect: Connect) -> None:
+    adc = connect(columns={**NUMBERED, "temperature": 6})
+    samples = adc.acquire(0.5)
+    assert samples.channels == ("ax", "ay", "az")
+    assert samples.temperature_c == 24.5
+    assert connect().acquire(0.5).temperature_c is None
+    assert "the sensor is at 24.5 C" in adc.self_test()[0].detail
+
+
+def test_a_named_column_of_the_temperature_is_proposed() -> None:
+    lines = [f"ax:{k % 2} ay:0 az:{1 + k % 2} temp:25.{k % 10}" for k in range(20)]
+    found = proposed_settings(lines, 0.2)
+    assert found is not None
+    assert found["columns"] == {"ax": "ax", "ay": "ay", "az": "az", "temperature": "temp"}

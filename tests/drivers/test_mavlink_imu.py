@@ -152,3 +152,22 @@ def test_settings_that_cannot_be_are_refused(keys: dict[str, Any], said: str) ->
 def test_only_outputs_of_the_settings_can_be_recorded(connect: Connect) -> None:
     with pytest.raises(LimitError, match="the sensor sends no mx; its outputs are ax, ay"):
         connect(outputs=("ax", "ay")).only("mx")
+
+
+@pytest.mark.parametrize(
+    ("message", "field", "updated", "expected_c"),
+    [
+        ("HIGHRES_IMU", 31.5, 1 << 12 | 7, 31.5),
+        ("HIGHRES_IMU", 31.5, 7, None),
+        ("SCALED_IMU", 3150, 0, 31.5),
+        ("SCALED_IMU", 0, 0, None),
+    ],
+)
+def test_a_temperature_that_the_message_marks_as_missing_is_none(
+    message: Any, field: float, updated: int, expected_c: float | None
+) -> None:
+    fields = {"temperature": field} | ({"updated": updated} if message == "HIGHRES_IMU" else {})
+    kind = twin.mav.IMU[message]
+    frames = twin.mav.frames(kind, twin.mav.fields(kind, **fields), np.array([1]), 1, 1)
+    decoder = mavlink_imu.SampleDecoder(mavlink_imu.Settings(message=message), (1, 1))
+    assert decoder.take(frames[0]).warm_c.tolist() == ([] if expected_c is None else [expected_c])

@@ -117,3 +117,17 @@ def test_lost_doubled_and_damaged_messages_are_counted(connect: Connect) -> None
 def test_a_rate_that_cannot_be_is_refused(rate_hz: float) -> None:
     with pytest.raises(ValueError, match="rate_hz must be"):
         xsens_mti.Settings(rate_hz=rate_hz)
+
+
+def test_a_record_shorter_than_a_second_has_the_temperature_too(connect: Connect) -> None:
+    """The tracker reports it once a second."""
+    adc = connect()
+    assert [adc.acquire(0.2).temperature_c for _ in range(4)] == [24.5] * 4
+    assert adc.only("gx").acquire(0.2).temperature_c == 24.5
+
+
+def test_an_old_temperature_does_not_describe_the_sensor(connect: Connect) -> None:
+    adc = connect()
+    adc.acquire(0.2)
+    adc._clock.sleep(120.0)
+    assert adc._warmth.pull_c(adc._clock.now()) is None

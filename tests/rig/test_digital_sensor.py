@@ -8,15 +8,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
 from procedures.catalogue import paths
 from rig.bench.file import DEFAULT
 from rig.record import Record
+from rig.record.measured import table_of
 
 Rig = Callable[..., Any]
-OUTPUTS = "time ax ay gx gy gz mx my mz supply d63"
+OUTPUTS = "time ax ay az gx gy gz mx my mz supply d63 temperature"
 COLUMNS = {name: k for k, name in enumerate(OUTPUTS.split(), 1)}
 PER_G = {"g": 1.0, "m/s^2": 9.80665, "count": 16384.0}
 VOLTS = re.compile(r"\b[munµ]?V\b(?!/min)")
@@ -53,9 +55,9 @@ def digital(tmp_path: Path) -> Callable[..., str]:
     return write
 
 
-FRAMED = {  # drivers of sensors that send frames: their settings, and the units of a table and of a magnetometer
-    "mavlink_imu": ({"outputs": ["ax", "ay", "gx", "gy", "gz", "mx", "my", "mz"]}, "m/s^2", "gauss"),
-    "xsens_mti": ({"outputs": ["ax", "ay", "gx", "gy", "gz", "mx", "my", "mz"]}, "m/s^2", "count"),
+FRAMED = {  # drivers of sensors that send frames: the units of a table and of a magnetometer
+    "mavlink_imu": ("m/s^2", "gauss"),
+    "xsens_mti": ("m/s^2", "count"),
 }
 NEED_D63 = {"motion"}
 PAGE = Path(__file__).parents[2] / "docs/how-to/digital.md"
@@ -70,7 +72,7 @@ def framed(tmp_path: Path) -> Callable[..., str]:
         adc = {
             "driver": driver,
             "url": "simulated",
-            "settings": FRAMED[driver][0] | {"rate_hz": 100, "most_lost": 0.05},
+            "settings": {"rate_hz": 100, "most_lost": 0.05},
         }
         document["instruments"]["adc"] = adc | {"faults": list(faults)}
         path = tmp_path / f"{driver}.yaml"
@@ -112,7 +114,7 @@ def test_a_procedure_gives_its_results_in_the_unit_of_the_sensor(
         assert result["unit"] not in ("V", "V/g", "V/K", "V/h"), name
         assert not (expected := unit_expected(name, unit)) or result["unit"] in expected, name
     assert not VOLTS.search(ended.err)
-    for axis in "xy":
+    for axis in "xyz":
         if (scale := results.get(f"scale-{axis}")) is not None:
             assert scale["value"] == pytest.approx(PER_G[unit], rel=0.1)
 
@@ -127,13 +129,13 @@ def test_a_procedure_runs_with_each_digital_sensor(
     ended = rig("run", procedure, "--bench", framed(driver), "--unattended", "--json", *SHORT[procedure])
     assert ended.status in (0, 1), ended.err
     results = json.loads(ended.out)["results"]
-    _, unit, field = FRAMED[driver]
+    unit, field = FRAMED[driver]
     for name, result in results.items():
         assert result["unit"] not in ("V", "V/g", "V/K", "V/h"), name
         expected = {u if u != "gauss" else field for u in unit_expected(name, unit)}
         assert not expected or result["unit"] in expected, name
     assert not VOLTS.search(ended.err)
-    for axis in "xy":
+    for axis in "xyz":
         if (scale := results.get(f"scale-{axis}")) is not None:
             assert scale["value"] == pytest.approx(9.80665, rel=0.1)
 
@@ -206,8 +208,8 @@ def test_table_model_and_noise_have_the_unit_of_the_sensor(
     assert rig("export", "last", "--format", "csv", "--out", str(file)).status == 0
     text = file.read_text(encoding="utf-8")
     assert "# unit: count\n" in text
-    assert ",ax,ay," in text
-    assert ",ax_std,ay_std," in text
+    assert ",ax,ay,az," in text
+    assert ",ax_std,ay_std,az_std," in text
     fitted = rig("fit", str(file), "--model", "linear", "--out", str(model))
     assert re.search(r"scale +x +1[67]\d{3}\(\d+\) count/g", fitted.out)
     assert not VOLTS.search(fitted.out)
@@ -215,8 +217,8 @@ def test_table_model_and_noise_have_the_unit_of_the_sensor(
     assert " count " in rig("compare", "last", "--model", str(model)).out
     poses = json.loads(rig("show", "last", "--poses", "--json").out)["kept"]
     assert set(poses[0]["means_v"]) == {"supply", "d63"}
-    assert set(poses[0]["means"]) == {"ax", "ay"}
-    assert poses[0]["units"] == {"ax": "count", "ay": "count"}
+    assert set(poses[0]["means"]) == {"ax", "ay", "az"}
+    assert poses[0]["units"] == {"ax": "count", "ay": "count", "az": "count"}
 
 
 @pytest.mark.sockets
@@ -248,12 +250,49 @@ def test_lost_and_doubled_samples_and_the_clock_are_in_the_record(
     assert "digital sensor" in rig("show", "last").out
 
 
+ANALOG = {"channels": {"vx": 0, "vy": 1, "vz": 2}, "rate_hz": 1000}  # the same sensor behind a converter
+ATTITUDES = ("--inclinations-deg", "60,150", "--step-deg", "90", "--dwell-s", "0.5")
+
+
 @pytest.mark.sockets
-def test_an_output_that_the_simulated_sensor_lacks_is_refused(
-    rig: Rig, rig_home: Path, digital: Callable[..., str]
+@pytest.mark.parametrize("driver", ["imu_lines", *FRAMED])
+def test_a_digital_sensor_has_the_specific_force_of_the_analog_one_on_each_axis(
+    rig: Rig, rig_home: Path, tmp_path: Path, driver: str
 ) -> None:
-    path = Path(digital("g"))
-    path.write_text(path.read_text(encoding="utf-8").replace("ay: 3", "az: 3"), encoding="utf-8")
-    ended = rig("plan", "misalignment", "--bench", str(path))
-    assert ended.status not in (0, 70)
-    assert "the simulated sensor has no output 'az'" in ended.err
+    tables = []
+    for name, settings in (("labjack_t7", ANALOG), (driver, {"rate_hz": 100})):
+        document = yaml.safe_load(DEFAULT.read_text(encoding="utf-8")) | {"world": {"preset": "ideal"}}
+        document["instruments"]["adc"] = {"driver": name, "url": "simulated", "settings": settings}
+        path = tmp_path / f"{name}.yaml"
+        path.write_text(yaml.safe_dump(document), encoding="utf-8")
+        assert rig("run", "sweep", "--bench", str(path), "--unattended", *ATTITUDES).status == 0
+        with Record() as record:
+            tables.append(table_of(record, "last"))
+    analog, digital = tables
+    assert digital.axes == analog.axes == ("x", "y", "z")
+    per_g = 1.0 if driver == "imu_lines" else 9.80665
+    np.testing.assert_allclose(digital.outputs / per_g, analog.outputs - 2.5, atol=2e-3)
+    alpha, beta = np.radians(digital.column("alpha_deg")), np.radians(digital.column("beta_deg"))
+    force_g = np.column_stack([np.sin(alpha) * np.cos(beta), np.sin(alpha) * np.sin(beta), np.cos(alpha)])
+    np.testing.assert_allclose(digital.outputs / per_g, force_g, atol=0.07)
+
+
+@pytest.mark.sockets
+@pytest.mark.parametrize("driver", ["imu_lines", *FRAMED])
+@pytest.mark.parametrize("oven", [True, False])
+def test_the_temperature_of_a_pose_is_what_the_sensor_reports(
+    rig: Rig, rig_home: Path, tmp_path: Path, driver: str, oven: bool
+) -> None:
+    document = yaml.safe_load(DEFAULT.read_text(encoding="utf-8"))
+    document["world"] = {"heat": {"package_rise_k": 9.0, "ambient_wander_k": 0.0}}
+    settings = {"columns": {"ax": 1, "ay": 2, "temperature": 4}} if driver == "imu_lines" else {}
+    document["instruments"]["adc"] = {"driver": driver, "url": "simulated", "settings": settings | {"rate_hz": 100}}
+    if not oven:
+        del document["instruments"]["oven"]
+    path = tmp_path / "bench.yaml"
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    sweep = ("--inclinations-deg", "90", "--step-deg", "180", "--dwell-s", "0.5")
+    assert rig("run", "sweep", "--bench", str(path), "--unattended", *sweep).status == 0
+    with Record() as record:
+        warm_c = table_of(record, "last").column("temperature_c")
+    np.testing.assert_allclose(warm_c, 22.0 + 6.0 + 9.0, atol=0.05)  # room, board and package

@@ -7,10 +7,10 @@ import pytest
 
 from drivers.world.config import WorldConfig
 from drivers.world.errors import BadSetting, TimeReversal, UnknownInput
-from drivers.world.stage import Trajectory
+from drivers.world.stage import Trajectory, at_rest
 from drivers.world.world import World
 
-INPUTS = ("vx", "vy", "supply", "thermistor", "ground")
+INPUTS = ("vx", "vy", "supply", "thermistor", "ground", "vz")
 
 
 def turning(seed: int = 5) -> World:
@@ -129,3 +129,14 @@ def test_the_converter_bows_and_adds_noise() -> None:
     assert ground.std() == pytest.approx(1e-3, rel=0.05)
     supply = world.adc_volts(["supply"], 30.0, 1e-3, 20_000)[:, 0]
     assert supply.mean() == pytest.approx(5.0 + 0.02 * 0.75, abs=1e-4)
+
+
+@pytest.mark.parametrize(("alpha_deg", "along"), [(0.0, 1.0), (90.0, 0.0), (180.0, -1.0), (-60.0, 0.5)])
+def test_the_third_axis_senses_the_specific_force_along_the_normal_of_the_table(alpha_deg: float, along: float) -> None:
+    world = World(WorldConfig.ideal().changed({"spread": {"zero_g_v": 0.0, "sensitivity_fraction": 0.0}}), 1)
+    world.move_stage("alpha", at_rest(alpha_deg))
+    world.advance(1.0)
+    assert world.sensed(["az"], 1.0, 1e-3, 2000).mean() == pytest.approx(along, abs=2e-4)
+    world.mount_sensor(0.0, 1)
+    world.advance(4.0)
+    assert world.sensed(["az"], 4.0, 1e-3, 2000).mean() == pytest.approx(-along, abs=2e-4)
