@@ -45,7 +45,8 @@ from calibrations.motion.spectrum import (
     periodogram,
     skew_s,
 )
-from calibrations.table import Array, Table
+from calibrations.table import Array, Table, std_column
+from calibrations.tables import KINDS
 
 # Acceleration from the sensor's output: the output filter undone, and a model solved backwards.
 #
@@ -255,6 +256,7 @@ def _motion_part(x: Array, record: Record, reference: Reference) -> Array:
 
 def linear_from_turns(sweep: Table) -> Model:
     """Ang (1)-(3). Raises DataError where an axis was not held at both +1 g and -1 g."""
+    sweep = _in_plane(sweep)
     ends = {axis: [_mean(sweep, axis, beta_deg) for beta_deg in UPRIGHT_DEG[axis]] for axis in sweep.axes}
     unit = sweep.unit
     values = {
@@ -270,11 +272,20 @@ def linear_from_turns(sweep: Table) -> Model:
 
 def fit_physical(sweep: Table) -> Model:
     """The physical model of this sweep. Raises TooFewRows, DataError."""
+    sweep = _in_plane(sweep)
     is_two_way = "direction" in sweep and np.ptp(sweep.column("direction")) > 0
     model = read_model("physical")
     return fit(
         replace(model.with_effect(catalogue()["hysteresis"]), name=model.name) if is_two_way else model, sweep
     ).model
+
+
+def _in_plane(sweep: Table) -> Table:
+    """The sweep with the axes that a table of motion has: those in the plane of the table of beta."""
+    kept = {*KINDS["motion"].outputs, *KINDS["motion"].digital}
+    others = {name for name in sweep.output_names if name not in kept}
+    others |= {std_column(name) for name in others}
+    return replace(sweep, columns={name: values for name, values in sweep.columns.items() if name not in others})
 
 
 def _mean(sweep: Table, axis: str, beta_deg: float) -> float:

@@ -63,6 +63,7 @@ def _resolution_deg(part: Mapping[str, Any]) -> float:
 UM = 1e-6
 DIGITAL = {f"{sensor}{axis}" for sensor in "agm" for axis in "xyz"}  # channels that may have another unit than V
 AXES = tuple(chain(*OUTPUTS))  # outputs of the sensor; other channels are regressors
+OUT_OF_PLANE = tuple(names[2] for names in OUTPUTS)  # which no motion of the carriage changes
 
 
 def units_of(run: Run, channels: Iterable[str]) -> dict[str, str]:
@@ -119,7 +120,11 @@ def samples_table(run: Run, poses: Iterable[Kept]) -> Table:
     units = units_of(run, names)
     volts = np.concatenate([kept.samples.volts for kept in stretches])
     columns = {"t_s": np.concatenate([_times_s(kept) for kept in stretches])}
-    columns |= {column_of(name, units): volts[:, k] for k, name in enumerate(names)}
+    columns |= {
+        column_of(name, units): volts[:, k]
+        for k, name in enumerate(names)
+        if not (KINDS[run.kind].moving and name in OUT_OF_PLANE)
+    }
     if KINDS[run.kind].moving:
         columns |= _attitude(stretches) | {"displacement_m": displacement_m(run, columns.pop(f"{D63}_v"))}
     columns, angle_stds = correct_angles(run, columns)
