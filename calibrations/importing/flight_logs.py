@@ -11,6 +11,7 @@ import io
 import re
 from array import array
 from collections.abc import Mapping
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ ULOG_FIELDS: Mapping[str, Mapping[str, str]] = {
 }
 RAW = {"sensor_accel": "a", "sensor_gyro": "g", "sensor_mag": "m"}  # before the autopilot's correction
 ULOG_HEADER_BYTES = 16
+BLOCK_BYTES = 1 << 20  # of a log in memory at once, while its records are walked
 CORRECTED = "values after the autopilot's own correction: the fit finds the error that it left"
 
 
@@ -92,12 +94,15 @@ def _cut_at(path: Path) -> int | None:
     """The byte where an incomplete last record begins, None for a complete file."""
     size, place = path.stat().st_size, ULOG_HEADER_BYTES
     with path.open("rb") as file:
-        content = memoryview(file.read())
-    while place + 3 <= size:
-        following = place + 3 + content[place] + 256 * content[place + 1]
-        if following > size:
-            return place
-        place = following
+        while place + 3 <= size:
+            file.seek(place)
+            begin, block = place, file.read(BLOCK_BYTES)
+            last = begin + len(block) - 3
+            while place <= last:
+                following = place + 3 + block[place - begin] + 256 * block[place - begin + 1]
+                if following > size:
+                    return place
+                place = following
     return place if place < size else None
 
 
@@ -130,10 +135,13 @@ def dataflash_topics(path: Path) -> list[Topic]:
 
 def _require_lengths(path: Path) -> None:
     """Raises DataError for records of less than 3 bytes: pymavlink would read the same bytes for ever."""
-    if (match := TOO_SHORT.search(path.read_bytes())) is not None:
+    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
+        match = TOO_SHORT.search(content)
+        found = None if match is None else (match.start(), match[0][4])
+    if found is not None:
         raise DataError(
-            f"{path}: is damaged: the format at byte {match.start()} has records of {match[0][4]} bytes, which cannot "
-            "be; copy it again from the vehicle"
+            f"{path}: is damaged: the format at byte {found[0]} has records of {found[1]} bytes, which cannot be; copy "
+            "it again from the vehicle"
         )
 
 

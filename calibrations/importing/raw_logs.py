@@ -101,12 +101,12 @@ def still_intervals(samples: Array, rate_hz: float) -> list[tuple[int, int]]:
 
 def _moving_std(samples: Array, width: int) -> Array:
     """Root of the summed variances in each window, shape (n - width + 1,)."""
-    centred = samples - samples.mean(axis=0)
-    first = np.cumsum(np.vstack([np.zeros((1, 3)), centred]), axis=0)
-    second = np.cumsum(np.vstack([np.zeros((1, 3)), centred**2]), axis=0)
-    mean = (first[width:] - first[:-width]) / width
-    variance = (second[width:] - second[:-width]) / width - mean**2
-    return np.asarray(np.sqrt(np.maximum(variance.sum(axis=1), 0.0)))
+    variance = np.zeros(len(samples) - width + 1)
+    for values, mean in zip(samples.T, samples.mean(axis=0), strict=True):  # one axis at a time takes a third of memory
+        centred = values - mean
+        first, second = (np.concatenate([[0.0], np.cumsum(power)]) for power in (centred, centred**2))
+        variance += (second[width:] - second[:-width]) / width - ((first[width:] - first[:-width]) / width) ** 2
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from calibrations.errors import DataError
+from calibrations.importing import flight_logs
 from calibrations.importing.binary import open_sheet
 from calibrations.importing.foreign import import_sheet, read_foreign
 from calibrations.importing.topics import SeveralTopics
@@ -175,3 +176,19 @@ def test_a_missing_library_is_named_with_its_extra(
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(DataError, match=rf"the library {module} .*\n\n +pip install 'inertial-rig\[robotics\]'"):
         open_sheet(tmp_path / "log")
+
+
+@pytest.mark.parametrize("block", [16, 1000, 1 << 20])
+@pytest.mark.parametrize("cut", [0, 7, 60])
+def test_the_cut_end_of_a_ulog_is_found_block_by_block(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block: int, cut: int
+) -> None:
+    whole, path = ulog(("sensor_accel", 0, 7)), tmp_path / "cut.ulg"
+    starts, place = [], 16
+    while place < len(whole):
+        starts.append(place)
+        place += 3 + whole[place] + 256 * whole[place + 1]
+    path.write_bytes(whole[: len(whole) - cut])
+    monkeypatch.setattr(flight_logs, "BLOCK_BYTES", block)
+    last = max(start for start in starts if start < len(whole) - cut)
+    assert flight_logs._cut_at(path) == (None if cut == 0 else last)

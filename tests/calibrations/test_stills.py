@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -134,3 +136,13 @@ def test_a_log_is_raw_where_its_rows_are_samples() -> None:
     assert not is_raw_log(log(samples[:100]))
     assert not is_raw_log(log(samples, n=np.full(len(samples), 50.0)))
     assert not is_raw_log(average_still_positions(log(samples), RATE_HZ))
+
+
+def test_the_memory_of_the_search_is_that_of_few_columns() -> None:
+    samples = np.random.default_rng(5).standard_normal((200_000, 3))
+    tracemalloc.start()
+    try:
+        still_intervals(samples, 100.0)
+        assert tracemalloc.get_traced_memory()[1] < 3 * samples.nbytes
+    finally:
+        tracemalloc.stop()
