@@ -44,7 +44,10 @@ def ulog_topics(path: Path) -> list[Topic]:
     """The messages of a PX4 log, raw sensors first. Raises DataError."""
     core = library("pyulog.core", "robotics", path, "a PX4 ULog")
     require_size(path, path.stat().st_size)
-    log = core.ULog(str(path))
+    with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
+        log = core.ULog(str(path))
+    if not log.data_list:
+        raise DataError(f"{path}: has no data: it is cut or damaged near its start; copy it again from the vehicle")
     remarks = list(_ulog_remarks(path, log))
     several = {d.name for d in log.data_list if d.multi_id > 0}
     topics = [_ulog_topic(data, data.name in several, tuple(remarks)) for data in log.data_list]

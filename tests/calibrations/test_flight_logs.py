@@ -192,3 +192,13 @@ def test_the_cut_end_of_a_ulog_is_found_block_by_block(
     monkeypatch.setattr(flight_logs, "BLOCK_BYTES", block)
     last = max(start for start in starts if start < len(whole) - cut)
     assert flight_logs._cut_at(path) == (None if cut == 0 else last)
+
+
+def test_a_ulog_without_data_is_refused_without_the_words_of_the_library(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "head.ulg"
+    path.write_bytes(ulog(("sensor_accel", 0, 7))[:30])
+    with pytest.raises(DataError, match="cut or damaged near its start"):
+        open_sheet(path)
+    assert capsys.readouterr() == ("", "")
