@@ -47,6 +47,11 @@ def read(path: Path | str, kind: str | None = None, topic: str | None = None) ->
 
 def table(columns: Columns, kind: str, constants: Mapping[str, Constant] | None = None) -> Table:
     """A table of `kind` (poses, positions, motion, rates) from columns in the units of data files. Raises DataError."""
+    if not callable(getattr(columns, "items", None)):
+        raise DataError(
+            f"cal.table: columns with names are needed, and a {type(columns).__name__} was given; give a data frame or "
+            'a mapping, such as {"ax": a[:, 0], "ay": a[:, 1], "az": a[:, 2]}'
+        )
     return Table.from_columns(kind, dict(columns.items()), constants, "the given columns")
 
 
@@ -54,14 +59,14 @@ def fit(data: Table, model: GivenModel) -> Fit:
     """`model` with its parameters estimated from `data`."""
     from calibrations.fitting.fit import fit as fitted
 
-    return fitted(_model(model), data)
+    return fitted(_model(model), _data(data))
 
 
 def compare(data: Table, model: GivenModel) -> Comparison[Fit]:
     """`model` beside `data`, and where it fails."""
     from calibrations.loop import compare as compared
 
-    return compared(data, _model(model))
+    return compared(_data(data), _model(model))
 
 
 def diagnose(data: Table, model: GivenModel, effects: Iterable[GivenEffect] = ()) -> Diagnosis[Fit]:
@@ -69,7 +74,7 @@ def diagnose(data: Table, model: GivenModel, effects: Iterable[GivenEffect] = ()
     from calibrations.effects.catalogue import with_own
     from calibrations.loop import diagnose as diagnosed
 
-    return diagnosed(data, _model(model), with_own(effects))
+    return diagnosed(_data(data), _model(model), with_own(effects))
 
 
 def discover(
@@ -90,7 +95,7 @@ def discover(
     from calibrations.loop import discover as discovered
 
     stop = parse_enough(enough) if enough else None
-    return discovered(data, _model(model), with_own(effects), without, stop)
+    return discovered(_data(data), _model(model), with_own(effects), without, stop)
 
 
 def add(model: GivenModel, effect: GivenEffect) -> Model:
@@ -133,6 +138,14 @@ def compensate(model: GivenModel, outputs: Table | Columns | Array, **columns: f
     from calibrations.compensation.samples import compensate as compensated
 
     return compensated(_model(model), outputs, columns)
+
+
+def _data(given: Table) -> Table:
+    """The table itself. Raises DataError for anything else: it would end in an error of the analysis."""
+    if isinstance(given, Table):
+        return given
+    hint = "cal.read(path)" if isinstance(given, (str, Path)) else 'cal.table(data, kind="positions")'
+    raise DataError(f"a table is needed, and a {type(given).__name__} was given; make one with {hint}")
 
 
 def _model(given: GivenModel) -> Model:

@@ -66,7 +66,7 @@ class Table:
         labels: Mapping[str, tuple[str, ...]] | None = None,
     ) -> Table:
         """A checked table. Raises DataError when it cannot be a table of this kind."""
-        arrays = {name: np.array(values, dtype=np.float64) for name, values in columns.items()}
+        arrays = {name: _numbers(name, values, source) for name, values in columns.items()}
         for values in arrays.values():
             values.flags.writeable = False
         table = Table(kind, MappingProxyType(arrays), dict(constants or {}), source, dict(labels or {}))
@@ -259,6 +259,17 @@ def time_origin(table: Table) -> tuple[float, str]:
 def in_time(length_s: float) -> tuple[float, str]:
     """(unit in s, its name) for a time axis of this length."""
     return next((size, unit) for limit, size, unit in LENGTHS if length_s > limit)
+
+
+def _numbers(name: str, values: Iterable[float], source: str) -> Array:
+    """A column of its own, shape (n,). Raises DataError for texts, and for an array of another shape."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataError(f'{source}: the column "{name}" is not a column of numbers: {error}') from None
+    if array.ndim != 1:
+        raise DataError(f'{source}: the column "{name}" has the shape {array.shape}; give one number a row, shape (n,)')
+    return array
 
 
 def _check(table: Table) -> None:
