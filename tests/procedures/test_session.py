@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,6 +16,7 @@ from procedures.instruments import Samples
 from procedures.questions import Question
 from procedures.session import Dwell, Limits, Pose, Reading, Session
 from procedures.sweep import grid
+from rig.record.values import Block
 
 POSES = st.builds(Pose, st.sampled_from([30.0, 90.0]), st.sampled_from([0.0, 10.0]), st.sampled_from([-1, 1]))
 
@@ -47,6 +49,7 @@ class Book:
     """A host that remembers."""
 
     held: list[Pose] = field(default_factory=list)
+    warm_c: list[float | None] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
     read: list[Reading] = field(default_factory=list)
     answers: dict[str, str] = field(default_factory=dict)
@@ -59,6 +62,7 @@ class Book:
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
         self.held.append(pose)
+        self.warm_c.append(temperature_c)
 
     def measured(self) -> Sequence[Dwell]:
         return ()
@@ -119,19 +123,33 @@ def test_a_pose_without_direction_is_approached_straight() -> None:
     assert beta.way == [0]
 
 
+def samples_at(reported_c: float | None) -> Block:
+    """A sample of a sensor that reports this temperature."""
+    return Block(np.zeros((1, 1)), ("ax",), 100.0, 0.0, reported_c)
+
+
 @pytest.mark.parametrize("temperature", [9.9, 40.1, float("nan"), float("inf")])
-def test_a_temperature_outside_the_limits_stops(temperature: float) -> None:
-    book, samples = Book(), None
+@pytest.mark.parametrize("reports", [True, False])
+def test_a_temperature_outside_the_limits_stops(temperature: float, reports: bool) -> None:
+    book, samples = Book(), samples_at(temperature if reports else None)
     with pytest.raises(SafetyLimit, match="outside the limits of 10 to 40 C"):
-        session(book).keep(Pose(90, 0), samples=samples, temperature_c=temperature)  # type: ignore[arg-type]
+        session(book).keep(Pose(90, 0), samples=samples, temperature_c=25.0 if reports else temperature)
     assert not book.held
 
 
 @pytest.mark.parametrize("temperature", [10.0, 40.0, None])
 def test_a_temperature_within_the_limits_or_unknown_is_kept(temperature: float | None) -> None:
-    book, samples = Book(), None
-    session(book).keep(Pose(90, 0), samples=samples, temperature_c=temperature)  # type: ignore[arg-type]
+    book = Book()
+    session(book).keep(Pose(90, 0), samples=samples_at(None), temperature_c=temperature)
     assert book.held == [Pose(90, 0)]
+    assert book.warm_c == [temperature]
+
+
+@pytest.mark.parametrize("beside_c", [25.0, None])
+def test_the_temperature_that_the_sensor_reports_is_that_of_the_pose(beside_c: float | None) -> None:
+    book = Book()
+    session(book).keep(Pose(90, 0), samples=samples_at(31.5), temperature_c=beside_c)
+    assert book.warm_c == [31.5]
 
 
 def test_only_a_stage_that_does_not_know_its_zero_is_homed() -> None:
