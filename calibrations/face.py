@@ -140,7 +140,7 @@ def compensate(model: GivenModel, outputs: Table | Columns | Array, **columns: f
     return compensated(_model(model), outputs, columns)
 
 
-def _data(given: Table) -> Table:
+def _data(given: Any) -> Table:
     """The table itself. Raises DataError for anything else: it would end in an error of the analysis."""
     if isinstance(given, Table):
         return given
