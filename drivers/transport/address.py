@@ -37,6 +37,7 @@ class Address:
 
 SCHEMES = ("tcp", "rtu+tcp", "serial", "pty", "visa", "ca", "udpin", "udpout")
 UDP = ("udpin", "udpout")
+NETWORK = ("tcp", "rtu+tcp", *UDP)  # each needs a port
 CA_PORT = 5064  # of a server of Channel Access
 TCP_LATENCY_S = 150e-6  # one way through a switch and a small embedded stack
 USER = re.compile("//.*@")
@@ -87,6 +88,8 @@ class Url:
             raise LinkRefused(f"{_shown(text)} has a user name, which a wire does not need", REMEDY)
         if options or not url._complete():
             raise LinkRefused(f"{_shown(text)} is not the address of a wire", REMEDY)
+        if parts.port is None and url.scheme in NETWORK:
+            raise LinkRefused(f"{_shown(text)} has no port", f"Write {url.scheme}://{url.host}:PORT")
         return url
 
     def _complete(self) -> bool:
@@ -129,7 +132,7 @@ class Url:
             return self.host not in ("localhost", "127.0.0.1", "::1")  # an EPICS record is there for all clients
         if self.scheme in UDP:
             return self.host != "localhost" and not self.host.startswith("127.")
-        return self.scheme in ("tcp", "rtu+tcp") and not self.line.startswith("127.")
+        return self.scheme in NETWORK and not self.line.startswith("127.")
 
     @property
     def rtu(self) -> bool:

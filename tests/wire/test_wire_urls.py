@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from drivers.clock import SimulatedClock
@@ -47,6 +49,12 @@ def test_a_byte_with_parity_is_eleven_bits() -> None:
     assert even.character_s == pytest.approx(11 / 9600)
     assert none.line_s(100) == pytest.approx(103.5 * 10 / 9600)  # 3.5 characters of silence end a frame
     assert Url.parse("serial:/dev/x?baud=115200").gap_s == 1.75e-3  # fixed above 19200 baud
+
+
+@pytest.mark.parametrize("url", ["tcp://lab", "rtu+tcp://10.0.0.7", "udpin://0.0.0.0", "udpout://lab"])
+def test_an_address_on_a_network_needs_a_port(url: str) -> None:
+    with pytest.raises(LinkRefused, match=f"'{re.escape(url)}' has no port. Write {re.escape(url)}:PORT"):
+        Url.parse(url)
 
 
 def test_a_port_nobody_listens_on_is_refused() -> None:
