@@ -14,12 +14,12 @@ import time
 from collections import Counter
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from drivers.transport.faults import EFFECTS, Fault, Kind, kinds_of
-from tests.rig.enduring import BENCH, FAULTS, PROCEDURES, endured, moment
+from tests.rig.enduring import BENCH, FAULTS, OTHER_FAULTS, OTHER_PARTS, PROCEDURES, endured, moment
 
 PAGE = Path(__file__).parents[2] / "docs" / "faults.md"
 KINDS = ("<!-- kinds -->\n", "<!-- end of kinds -->\n")
@@ -27,6 +27,8 @@ TABLE = ("<!-- made by tests.benchmark.faults -->\n", "<!-- end -->\n")
 SHORT = {"complete": "c", "stopped": "s", "not begun": "n"}
 BROKEN = "BROKEN"
 DRIVERS = {role: part.driver for role, part in BENCH.instruments.items()}
+EVERY = [("", role, what) for role, what in FAULTS] + OTHER_FAULTS  # driver in place of the bench's, role, fault
+ROWS = {(driver or DRIVERS[role], what) for driver, role, what in EVERY}
 
 
 @dataclass(frozen=True)
@@ -39,29 +41,42 @@ class Case:
     seed: int
     end: str = ""
     why: str = ""
+    driver: str = ""  # in place of that of the bench
+    guided: bool = False
+
+    @property
+    def row(self) -> tuple[str, str]:
+        """Driver and fault."""
+        return self.driver or DRIVERS[self.role], self.what
 
 
 def tried(case: Case) -> Case:
     """Run it."""
     try:
-        fault = Fault(case.what, at_s=moment(case.procedure, case.role, case.what, case.seed))
-        end, why = endured(case.procedure, case.role, fault), ""
+        fault = Fault(case.what, at_s=moment(case.procedure, case.role, case.what, case.seed, case.driver))
+        end, why = endured(case.procedure, case.role, fault, case.driver, case.guided), ""
     except BaseException as error:  # whatever it is, the others are tried
         end, why = BROKEN, f"{type(error).__name__}: {error}".partition("\n")[0]
-    return Case(case.procedure, case.role, case.what, case.seed, end, why)
+    return replace(case, end=end, why=why)
 
 
 def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("moments", nargs="?", type=int, default=1)
     parser.add_argument("--procedures", default=",".join(PROCEDURES))
+    parser.add_argument("--drivers", default="", help="Only these.")
+    parser.add_argument("--guided", action="store_true", help="A person is asked, and resumes at once.")
     parser.add_argument("--every", type=int, default=1, help="Try one of so many.")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     parser.add_argument("--out", type=Path, help="Add the cases to this file, a line of JSON each.")
     parser.add_argument("--page", action="store_true")
     asked = parser.parse_args()
     wanted = [
-        Case(p, r, w, seed) for p in asked.procedures.split(",") for r, w in FAULTS for seed in range(asked.moments)
+        Case(procedure, role, what, seed, driver=driver, guided=asked.guided)
+        for procedure in asked.procedures.split(",")
+        for driver, role, what in EVERY
+        for seed in range(asked.moments)
+        if not asked.drivers or (driver or DRIVERS[role]) in asked.drivers.split(",")
     ]
     wanted = wanted[:: asked.every]
     began = time.perf_counter()
@@ -76,7 +91,7 @@ def main() -> int:
     broken = [case for case in done if case.end == BROKEN]
     print(json.dumps({"runs": len(done), "seconds": time.perf_counter() - began, "ends": Counter(c.end for c in done)}))
     for case in broken:
-        print(f"{case.procedure}, {case.role}, {case.what}, seed {case.seed}: {case.why}", file=sys.stderr)
+        print(f"{case.procedure}, {case.row}, {case.what}, seed {case.seed}: {case.why}", file=sys.stderr)
     return int(bool(broken))
 
 
@@ -106,9 +121,11 @@ def table(done: list[Case]) -> str:
     procedures = PROCEDURES
     rows: dict[tuple[str, str], dict[str, Counter[str]]] = {}
     for case in done:
-        row = rows.setdefault((DRIVERS[case.role], case.what), {})
+        row = rows.setdefault(case.row, {})
         row.setdefault(case.procedure, Counter())[SHORT.get(case.end, BROKEN)] += 1
-    lines = [f"{len(done)} runs: {_summary(done)}.\n", f"| driver | fault | {' | '.join(procedures)} |",
+    guided = sum(case.guided for case in done)
+    lines = [f"{len(done)} runs, {guided} of them guided: {_summary(done)}.\n",
+             f"| driver | fault | {' | '.join(procedures)} |",
              f"| --- | --- | {' | '.join('---' for _ in procedures)} |"]  # fmt: skip
     lines += [f"| {driver} | {what} | {_cells(row, procedures)} |" for (driver, what), row in sorted(rows.items())]
     return "\n".join(lines) + "\n"
@@ -128,7 +145,7 @@ def kinds() -> str:
     lines = ["| of | fault | usual size | what it does |", "| --- | --- | --- | --- |"]
     common = {what: kind for what, (kind, _) in EFFECTS.items()}
     lines += [_kind("every wire", what, kind) for what, kind in common.items()]
-    for driver in sorted(set(DRIVERS.values())):
+    for driver in sorted({*DRIVERS.values(), *OTHER_PARTS}):
         own = {what: kind for what, kind in kinds_of(driver).items() if what not in common}
         lines += [_kind(driver, what, kind) for what, kind in own.items()]
     return "\n".join(lines) + "\n"

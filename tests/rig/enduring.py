@@ -35,18 +35,31 @@ End = Literal["complete", "stopped", "not begun"]
 PROCEDURES = ON_STAGES
 BENCH = watched_bench()
 FAULTS = [(role, what) for role, part in BENCH.instruments.items() for what in kinds_of(part.driver)]
+SENSOR = {"outputs": ["ax", "ay"], "rate_hz": 100, "most_lost": 0.05}
+OTHER_PARTS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {  # roles and settings of further drivers
+    "imu_lines": (("adc",), {"columns": {"time": 1, "ax": 2, "ay": 3}, "rate_hz": 100, "most_lost": 0.05}),
+    "mavlink_imu": (("adc",), SENSOR),
+    "xsens_mti": (("adc",), SENSOR),
+    "scpi_meter": (("adc",), {"channels": {"vx": 101, "vy": 102}, "rate_hz": 10, "range_v": 10.0, "nplc": 0.02}),
+    "epics_adc": (("adc",), {"channels": {"vx": "ai1", "vy": "ai2"}, "rate_hz": 20}),
+    "epics_motor": (("alpha", "beta"), {"limits_deg": [-400, 400]}),
+}
+OTHER_FAULTS = [(driver, roles[-1], what) for driver, (roles, _) in OTHER_PARTS.items() for what in kinds_of(driver)]
 NEEDS_A_GUARD = {"open-interlock"}  # felt only by a bench that has interlocks
+FREE_RUNNING = {"imu_lines", "mavlink_imu", "xsens_mti"}  # a resumed run meets other samples of the same sensor
 OTHER_NOISE = {"delay", "endless", "trickle"}  # after which a run may go on, at other times: as good, but not the same
-NAMES: dict[str, str] = {}  # what a message calls an instrument, where it is not the role
 NEAR_V = 5e-3  # of a dwell's mean: ten times its noise
+NEAR_DIGITAL = 0.05  # of a mean in g or m/s^2
 NEAR = {"deg": 0.05, "s": 1.0}  # of a reading; what is done again after a lost packet happens that much later
 
 
 @cache
-def undisturbed(procedure: str, guarded: bool = False) -> tuple[list[Any], list[Kept], list[Reading], float]:
+def undisturbed(
+    procedure: str, guarded: bool = False, driver: str = ""
+) -> tuple[list[Any], list[Kept], list[Reading], float]:
     """What a procedure measures on the sound bench: its digest, poses and readings, and when it has ended."""
     with Record() as record:
-        run = short(record, bench_for(guarded), procedure).run
+        run = short(record, bench_for(guarded, driver), procedure).run
         state = record.state(run.run)
         assert run.state == "complete"
         assert state
@@ -54,81 +67,103 @@ def undisturbed(procedure: str, guarded: bool = False) -> tuple[list[Any], list[
         return digest(record, run.run), kept, record.readings(run.run), state["rig"]["clock_s"]
 
 
-def bench_for(guarded: bool) -> Bench:
-    """The sound bench."""
-    return guarded_bench() if guarded else BENCH
+@cache
+def bench_for(guarded: bool, driver: str = "") -> Bench:
+    """The sound bench; with a `driver` of OTHER_PARTS, its instruments are in their roles."""
+    if not driver:
+        return guarded_bench() if guarded else BENCH
+    roles, settings = OTHER_PARTS[driver]
+    document = BENCH.document()
+    for role in roles:
+        document["instruments"][role] = {"driver": driver, "url": "simulated", "settings": settings}
+    return Bench.model_validate(document)
 
 
-def moment(procedure: str, role: str, what: str, seed: int = 0) -> float:
+def moment(procedure: str, role: str, what: str, seed: int = 0, driver: str = "") -> float:
     """Some time of the run, the same for the same seed."""
     luck = random.Random(zlib.crc32(f"{procedure} {role} {what}".encode()) + seed)
-    return round(luck.uniform(0.02, 0.95) * undisturbed(procedure)[-1], 3)
+    return round(luck.uniform(0.02, 0.95) * undisturbed(procedure, driver=driver)[-1], 3)
 
 
-def endured(procedure: str, role: str, fault: Fault) -> End:
-    """Run it with the fault, and see what must hold; raises AssertionError where it does not."""
+def endured(procedure: str, role: str, fault: Fault, driver: str = "", guided: bool = False) -> End:
+    """Run it with the fault, and see what must hold; raises AssertionError where it does not.
+
+    `guided`: a person is asked after the stop, resumes the run at once, and ends it if the fault is still there.
+    """
+    person = Onlooker(wishes=["resume"] if guided else [])
     guarded = fault.what in NEEDS_A_GUARD
     with Record() as record, looking_on() as aftermath:
         before = len(record.runs())
         try:
-            outcome = short(record, afflicted(bench_for(guarded), role, fault), procedure)
+            outcome = short(record, afflicted(bench_for(guarded, driver), role, fault), procedure, person)
         except DriverError as refused:  # while the instruments said who they are
-            _require_told(refused, role)
+            _require_told(refused, role, driver)
             assert len(record.runs()) == before
             return "not begun"
+        assert bool(person.outcomes) or outcome.error is None, "the person is asked"
         if outcome.error is None:
-            _require_right(record, outcome, procedure, guarded)
+            _require_right(record, outcome, undisturbed(procedure, guarded, driver), driver in FREE_RUNNING)
             return "complete"
-        _require_safe(outcome, role, fault, aftermath)
-        done = resume(record, outcome.run.run, Onlooker(), bench_for(guarded))
+        _require_safe(outcome, role, fault, aftermath, driver)
+        done = resume(record, outcome.run.run, Onlooker(), bench_for(guarded, driver))
         assert (done.run.state, done.error) == ("complete", None)
         if procedure in STRETCHES:
             return "stopped"
         if (role, fault.what) == ("oven", "runaway"):  # what was kept before it was noticed is hotter, and says so
             assert [kept.pose for kept in record.kept(done.run.run)] == [
-                kept.pose for kept in undisturbed(procedure)[1]
+                kept.pose for kept in undisturbed(procedure, driver=driver)[1]
             ]
             return "stopped"
-        if fault.what in OTHER_NOISE or (role, fault.what) == ("level", "lies"):  # what the level said is read again
-            _require_right(record, done, procedure, guarded)
+        if (
+            fault.what in OTHER_NOISE or driver in FREE_RUNNING or (role, fault.what) == ("level", "lies")
+        ):  # what the level said is read again
+            _require_right(record, done, undisturbed(procedure, guarded, driver), driver in FREE_RUNNING)
         else:
-            assert digest(record, done.run.run) == undisturbed(procedure, guarded)[0], "goes on as if nothing had been"
+            assert digest(record, done.run.run) == undisturbed(procedure, guarded, driver)[0], (
+                "goes on as if nothing had been"
+            )
     return "stopped"
 
 
-def _require_right(record: Record, outcome: Outcome, procedure: str, guarded: bool) -> None:
+def _require_right(
+    record: Record, outcome: Outcome, expected: tuple[Any, list[Kept], list[Reading], float], digital: bool
+) -> None:
     """A run that noticed nothing has measured what an undisturbed one does, or a result of it says so."""
     assert outcome.run.state == "complete"
-    _, sound, readings, _ = undisturbed(procedure, guarded)
+    _, sound, readings, _ = expected
     kept = list(record.kept(outcome.run.run))
     assert [each.pose for each in kept] == [each.pose for each in sound]
     means = [[list(each.dwell.means.values()) for each in run] for run in (kept, sound)]
-    wrong = bool(kept) and bool(np.abs(np.subtract(*means)).max() > NEAR_V)
+    wrong = bool(kept) and bool(np.abs(np.subtract(*means)).max() > (NEAR_DIGITAL if digital else NEAR_V))
     found = {reading.name: reading.value for reading in record.readings(outcome.run.run)}
-    wrong = wrong or any(abs(found[reading.name] - reading.value) > NEAR[reading.unit] for reading in readings)
+    same = (reading for reading in readings if reading.unit in NEAR)  # not counts of lost samples
+    wrong = wrong or any(abs(found[reading.name] - reading.value) > NEAR[reading.unit] for reading in same)
     marked = any(result["verdict"] == "fail" for result in outcome.run.results.values()) or outcome.run.message
     assert not wrong or marked, "a wrong number without a mark"
 
 
-def _require_safe(outcome: Outcome, role: str, fault: Fault, aftermath: Aftermath) -> None:
+def _require_safe(outcome: Outcome, role: str, fault: Fault, aftermath: Aftermath, driver: str) -> None:
     """All stands still, and the message helps."""
     assert outcome.error
-    _require_told(outcome.error, role)
+    _require_told(outcome.error, role, driver)
     assert not aftermath.turning
     assert not aftermath.swinging or any(said.startswith("positioner may") for said in aftermath.complaints)
     assert not aftermath.heating or any(said.startswith("oven may still heat") for said in aftermath.complaints)
-    assert {said.split()[0] for said in aftermath.complaints} <= {role, *_beside(role, fault)}
+    assert {said.split()[0] for said in aftermath.complaints} <= {role, *_beside(role, fault, driver)}
 
 
-def _require_told(error: Exception, role: str) -> None:
+def _require_told(error: Exception, role: str, driver: str) -> None:
     """The message names the instrument, the cause and what to do."""
     assert isinstance(error, (DriverError, ProcedureError))
-    assert NAMES.get(role, role) in str(error), "names the instrument"
+    names = OTHER_PARTS[driver][0] if driver else (role,)  # instruments on one server share its faults
+    assert any(name in str(error) for name in names), f"names the instrument: {error}"
     assert status_of(error) in (3, 4)
     assert str(error).count(". ") + str(error).count("; ") >= 1, "says what to do"
 
 
-def _beside(role: str, fault: Fault) -> set[str]:
+def _beside(role: str, fault: Fault, driver: str) -> set[str]:
     """Who else cannot be reached: noise and a lost connection are felt by all on the wire."""
+    if driver:
+        return set(OTHER_PARTS[driver][0])
     shared = {"alpha", "beta"}
     return shared if role in shared and fault.what in ("disconnect", "babble", "delay", "trickle") else set()

@@ -59,10 +59,10 @@ def afflicted(bench: Bench, role: str, *faults: Fault) -> Bench:
     return bench.model_copy(update={"instruments": {**bench.instruments, role: part}})
 
 
-def short(record: Record, bench: Bench, name: str, **settings: str) -> Outcome:
+def short(record: Record, bench: Bench, name: str, onlooker: Onlooker | None = None, **settings: str) -> Outcome:
     """A short run of a procedure."""
     procedure = find(name)
-    return start(record, bench, procedure, parse(procedure, SHORT.get(name, {}) | settings), Onlooker())
+    return start(record, bench, procedure, parse(procedure, SHORT.get(name, {}) | settings), onlooker or Onlooker())
 
 
 def digest(record: Record, run: str) -> list[Any]:
@@ -73,7 +73,7 @@ def digest(record: Record, run: str) -> list[Any]:
 
 @dataclass
 class Aftermath:
-    """The world after a run was stopped: what turns, what swings, what heats; and what could not be stopped."""
+    """The world after each stop of a run: what turned, what swung, what heated; and what could not be stopped."""
 
     turning: list[str] = field(default_factory=list)
     swinging: list[str] = field(default_factory=list)
@@ -88,9 +88,9 @@ class Aftermath:
         before = self._places(rig)
         rig.clock.sleep(0.33)
         moved = {name: abs(place - before[name]) for name, place in self._places(rig).items()}
-        self.turning = [name for name in STAGES if moved[name] > 0]
-        self.swinging = [name for name in ("x", "y", "z") if moved[name] > 0.1]
-        self.heating = bool(rig.world.state()["world"]["warmth"]["oven_running"])  # type: ignore[index,call-overload]
+        self.turning += [name for name in STAGES if moved[name] > 0]
+        self.swinging += [name for name in ("x", "y", "z") if moved[name] > 0.1]
+        self.heating |= bool(rig.world.state()["world"]["warmth"]["oven_running"])  # type: ignore[index,call-overload]
 
     def _places(self, rig: Rig) -> dict[str, float]:
         assert rig.world
@@ -106,9 +106,10 @@ def looking_on() -> Iterator[Aftermath]:
 
     def stopped(rig: Rig) -> list[str]:
         aftermath.stops += 1
-        aftermath.complaints = stop(rig)
+        complaints = stop(rig)
+        aftermath.complaints += complaints
         aftermath.look(rig)
-        return aftermath.complaints
+        return complaints
 
     with patch.object(Rig, "stop", stopped):
         yield aftermath
