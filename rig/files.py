@@ -7,7 +7,6 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from importlib.metadata import version
 from pathlib import Path
 
 from rig.errors import OutputError
@@ -68,6 +67,8 @@ def draft_of(out: Path) -> Iterator[Path]:
 
 def program() -> str:
     """Name and version of this program, as runs and results carry it."""
+    from importlib.metadata import version  # slow to import
+
     return f"inertial-rig {version('inertial-rig')}"
 
 

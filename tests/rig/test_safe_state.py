@@ -25,13 +25,19 @@ from rig.instruments.guard import GuardedClock
 from rig.instruments.instruments import Rig
 from rig.record import Record
 from rig.runs.runner import resume
-from tests.rig.enduring import BENCH, FAULTS, PROCEDURES, endured, moment, undisturbed
+from tests.rig.enduring import BENCH, FAULTS, OTHER_PARTS, PROCEDURES, endured, moment, undisturbed
 from tests.rig.misbehaving import Aftermath, afflicted, digest, looking_on, short
 from tests.rig.rigging import Onlooker
 from tests.slow import first_fast
 
 pytestmark = pytest.mark.sockets
 SAMPLE = 36  # of all that the benchmark tries
+OTHERS = [  # a fault of the wire and one of its own for each further instrument
+    ("imu_lines", "silence"), ("imu_lines", "wrong-baud"), ("mavlink_imu", "disconnect"), ("mavlink_imu", "mute"),
+    ("xsens_mti", "garbage"), ("xsens_mti", "restart"), ("scpi_meter", "lost-answers"), ("scpi_meter", "stall"),
+    ("epics_adc", "silence"), ("epics_adc", "frozen"), ("epics_motor", "disconnect"), ("epics_motor", "stuck"),
+]  # fmt: skip
+GUIDED = [("sweep", "beta", "alarm"), ("soak", "oven", "silence"), ("motion", "positioner", "restart")]
 
 
 @pytest.fixture
@@ -63,6 +69,20 @@ def test_a_procedure_endures_a_fault_at_a_random_moment(procedure: str, role: st
         "stopped",
         "not begun",
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("driver", "what"), OTHERS)
+def test_a_sweep_with_another_instrument_endures_a_fault(driver: str, what: str) -> None:
+    role = OTHER_PARTS[driver][0][-1]
+    at_s = moment("sweep", role, what, driver=driver)
+    assert endured("sweep", role, Fault(what, at_s=at_s), driver) in ("complete", "stopped", "not begun")
+
+
+@pytest.mark.parametrize(("procedure", "role", "what"), first_fast(GUIDED))
+def test_a_guided_run_asks_when_all_is_at_rest(procedure: str, role: str, what: str) -> None:
+    fault = Fault(what, at_s=moment(procedure, role, what))
+    assert endured(procedure, role, fault, guided=True) == "stopped"
 
 
 LIMITS = [  # a fault of an instrument, the exit status, and what is said
