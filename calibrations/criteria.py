@@ -26,6 +26,7 @@ LEAST_NOISE, NO_MORE_THAN_NOISE = 0.93, 1.06  # excess: between them, one effect
 FEWEST_FOR_PLACES = 48  # poses that can show where in the signal chain something acts
 MATERIAL = 1.15  # excess: below, the residual is as good as noise
 MOST_SLOW_NOISE = 2.5  # excess: white and slow noise of a sensor alone leave less
+MOST_UNSEEN = 1.5  # excess on unseen stretches of a motion: the right effect leaves more in one of 30 records
 MOST_UNEXPLAINED = 1 / 5  # of the excess variance: with more left, the catalogue has not explained the data
 MOST_BY_FORM = 1 / 16  # of the excess variance: less may be the form of a named cause, which is approximate
 LEAST_SHARE = 0.05  # of the excess variance: a step that explains less may be the wrong form of a strong effect

@@ -26,7 +26,7 @@ from calibrations.discovery.findings import Candidate, Findings, Step
 from calibrations.discovery.outliers import caution, told
 from calibrations.discovery.plausibility import Finding, rejection
 from calibrations.discovery.search import Path, Settled, continued, find_path, is_complete, recounted, settled
-from calibrations.discovery.structure import plainer, structure_of
+from calibrations.discovery.structure import plainer, poorly_predicted, structure_of
 from calibrations.discovery.verdict import Verdict
 from calibrations.effects import Effect
 from calibrations.fitting.determined import undetermined
@@ -138,6 +138,7 @@ class RowSearch:
         inseparable = {name: stand.beside[name].indistinguishable_from for name in causes if name in stand.beside}
         rivals = {name: others for name, others in inseparable.items() if others}
         left = (better or structure_of(stand.end)) if stand.end.pooled_excess > MATERIAL else None
+        left = left or poorly_predicted(stand.end)
         found = self._findings(
             path.start, stand.end, path.outliers, left,
             origin=origin,

@@ -21,6 +21,7 @@ from calibrations.criteria import (
     MOST_ROWS_STAND_OUT,
     MOST_SLOW_NOISE,
     MOST_UNDER_SLOW_PATTERN,
+    MOST_UNSEEN,
     PATTERN_BETTER,
     PATTERN_CONTAINED,
     SIGNIFICANT,
@@ -139,6 +140,14 @@ def _patternless(fit: Fit) -> Pattern | None:
         return None  # the means may be of so few independent samples
     what = "slow drift" if slow > scatter else "scatter"
     return Pattern(f"{what} without a pattern, {max(slow, scatter):.1f} x the noise floor", np.zeros((0, 0, 0)))
+
+
+def poorly_predicted(fit: Fit) -> Pattern | None:
+    """The error on unseen stretches of a motion, if it is far above the noise: effects can fit few stretches alone."""
+    if not fit.table.type.moving or fit.held_out_excess <= MOST_UNSEEN:
+        return None
+    text = f"the error on unseen stretches is {fit.held_out_excess:.2g} times the noise floor"
+    return Pattern(text, np.zeros((0, 0, 0)))
 
 
 def plainer(begin: Fit, end: Fit, named: Fit | None = None) -> Pattern | None:

@@ -167,11 +167,11 @@ class Fit(Result):
         return held_out(self.residual, jacobian, self.noise, folds(self.table), theta, prior)
 
     def share_left(self, start: Fit) -> float:
-        """Part of the excess variance of `start` that this fit does not explain: on unseen rows where it has priors.
+        """Part of the excess variance of `start` that this fit does not explain.
 
-        A free form follows the rows of its fit, so that only unseen rows show what it explains.
+        On unseen rows where it has priors, because a free form follows the rows of its fit, and in motion (few rows).
         """
-        if len(self.problem.layout.prior_rows):
+        if len(self.problem.layout.prior_rows) or self.table.type.moving:
             return max(self.held_out_excess**2 - 1, 0.0) / max(start.held_out_excess**2 - 1, 1e-9)
         return max(self.pooled_excess**2 - 1, 0.0) / max(start.pooled_excess**2 - 1, 1e-9)
 

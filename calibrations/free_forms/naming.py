@@ -16,8 +16,8 @@ from calibrations.table import Array
 
 NEXT_FORM = 0.05  # of a place's variance that a second form must take up: less is the form of the first
 LEAST_NEEDED = 0.02  # the same of a form without which the others, as the catalogue has them, do less
-NAMED = 0.5  # of it that one form must take up: else the cause is unknown
-MOST_FORMS, NAMED_TOGETHER = 2, 0.8  # forms that only approximate a curve, and what two of them must take up
+NAMED = 0.9  # of it that the forms must take up: another formula of the same mechanism leaves less
+MOST_FORMS = 2  # forms that only approximate a curve
 LEAST_SIZE = 0.6  # noise floors: a smaller place is a refinement
 LEAST_OWN = 0.3  # noise floors: part of a place with a cause that no other place explains, if the residual is noise
 LEAST_SHARE = 0.015  # of the largest place's size
@@ -201,8 +201,7 @@ def _named(
             continue
         share, chosen[best] = tried[best]
     causes = _one_name(result, names, tuple(chosen), curve, Q)
-    enough = NAMED if len(set(causes) - acting.keys()) < MOST_FORMS else NAMED_TOGETHER
-    return (causes, share) if share >= enough else ((), share)
+    return (causes, share) if share >= NAMED else ((), share)
 
 
 def _one_name(

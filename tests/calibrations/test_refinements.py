@@ -61,3 +61,14 @@ def test_a_second_cause_keeps_its_name(second: str) -> None:
     replaced = {other for name in found.causes for other in found.alternatives.get(name, ())}
     assert named <= {*found.causes, *replaced}
     assert len(found.causes) == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["slew", "clocks part"])
+def test_effects_that_predict_unseen_stretches_badly_explain_nothing(name: str) -> None:
+    mechanism = OUTSIDE[name]
+    data = measured(((mechanism, size_for(mechanism, 3.0, "three lines", 1)),), "three lines", 1)
+    found = discover(data, read_model("linear"))
+    assert (found.verdict, found.causes) == (Verdict.UNEXPLAINED, ())
+    assert found.residual_structure is not None
+    assert "error on unseen stretches" in found.residual_structure
