@@ -21,7 +21,8 @@ MOST_FORMS = 2  # forms that only approximate a curve
 LEAST_SIZE = 0.6  # noise floors: a smaller place is a refinement
 LEAST_OWN = 0.3  # noise floors: part of a place with a cause that no other place explains, if the residual is noise
 LEAST_SHARE = 0.015  # of the largest place's size
-LEAST_UNKNOWN, LEAST_UNKNOWN_SHARE = 1.0, 0.05  # the same two of a place without a cause
+LEAST_UNKNOWN = 1.0  # noise floors: size of a place whose cause is unknown
+LEAST_UNKNOWN_SHARE = 0.05  # of the largest place's size: the part of such a place that no other one explains
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
 CLOSE = 10.0  # of -2 log likelihood: not told apart
 UNSEEN = 0.3  # noise floors: what an effect leaves of a curve, and a wider one does not, says nothing of the mechanism
@@ -36,11 +37,12 @@ FORM_OF, MOSTLY = 0.25, 0.85  # size beside a larger place, and share of its gai
 class ActingPlace:
     """A place that acts: its size (rms over the poses, in floors), and its causes with the share that they take up.
 
-    `largest`: size of the largest place.
+    `own`: size of the part that no other place explains. `largest`: size of the largest place.
     """
 
     name: str
     size: float
+    own: float
     largest: float
     components: tuple[str, ...]
     causes: tuple[str, ...]
@@ -64,7 +66,8 @@ class ActingPlace:
     @property
     def unknown(self) -> bool:
         """Whether no effect of the catalogue is its cause, and it is no remainder of the form of a larger one."""
-        return self.material and not self.causes and self.size >= max(LEAST_UNKNOWN, LEAST_UNKNOWN_SHARE * self.largest)
+        seen = self.size >= LEAST_UNKNOWN and self.own >= LEAST_UNKNOWN_SHARE * self.largest
+        return self.material and not self.causes and seen
 
 
 def places(result: SearchResult) -> list[ActingPlace]:
@@ -93,12 +96,13 @@ def places(result: SearchResult) -> list[ActingPlace]:
         if walks:
             least = max(LEAST_UNKNOWN_SHARE * largest, READING_ERRORS * _reading_errors(result, sizes))
         # a place without a form of the catalogue, or smaller than the excess of the residual, is more often a remainder
-        own = min(LEAST_SIZE, max(LEAST_OWN, _excess(result))) if causes else LEAST_SIZE
-        material = _own_size(result, gain) >= own and sizes[place] >= max(LEAST_SIZE, least)
+        least_own = min(LEAST_SIZE, max(LEAST_OWN, _excess(result))) if causes else LEAST_SIZE
+        own = _own_size(result, gain)
+        material = own >= least_own and sizes[place] >= max(LEAST_SIZE, least)
         curve = curves[place].reshape(result.white.shape) * result.white
         constants = followed[0].constants if followed else ()
         acting = tuple(names), causes, share, material, gain, others, curve, constants
-        out.append(ActingPlace(place, sizes[place], largest, *acting))
+        out.append(ActingPlace(place, sizes[place], own, largest, *acting))
     return _with_substitutes(result, sorted(out, key=lambda p: -p.size))
 
 
@@ -113,13 +117,13 @@ def _excess(result: SearchResult) -> float:
 
 
 def _with_substitutes(result: SearchResult, acting: Sequence[ActingPlace]) -> list[ActingPlace]:
-    """The places, the larger of two material of which each can take up the other, and neither is so alone.
+    """The places, the larger of two material of which each can take up most of the other.
 
     The smaller one is what the data cannot separate from it.
     """
     out = list(acting)
     for i, place in enumerate(out):
-        if place.material or place.size < max(LEAST_SIZE, LEAST_SHARE * place.largest):
+        if (place.material and place.own >= LEAST_SIZE) or place.size < max(LEAST_SIZE, LEAST_SHARE * place.largest):
             continue
         for other in (o for o in out[i + 1 :] if not o.material):
             gain = _lost(result, (*place.components, *other.components))

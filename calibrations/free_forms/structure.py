@@ -198,12 +198,16 @@ def with_stairs(found: Structure, left: Array, stairs: Stairs, white: Array) -> 
     floor = float(np.sqrt(np.mean(white**2)))
     size = stairs.rms / floor
     largest = max([size, *(place.rms / floor for place in found.places)])
-    places = [replace(p, size=p.rms / floor, largest=largest) for p in found.places if p.name != "output"]
+    places = [
+        replace(p, size=p.rms / floor, own=p.own * p.rms / (floor * p.size), largest=largest)
+        for p in found.places
+        if p.name != "output"
+    ]
     own = next((p for p in found.places if p.name == "output"), None)
     causes = ("quantisation", *(own.causes if own and own.material else ()))
     components, gain = (own.components, own.gain) if own else ((), 2 * left.size * float(np.log1p(size)))
     curve = np.clip(left, -stairs.step / 2, stairs.step / 2)
-    places.append(ActingPlace("output", size, largest, components, causes, 1.0, True, gain, (), curve))
+    places.append(ActingPlace("output", size, size, largest, components, causes, 1.0, True, gain, (), curve))
     return replace(found, places=tuple(sorted(places, key=lambda p: -p.size)), white=white)
 
 
@@ -229,7 +233,7 @@ def find_structure(table: Table, white: Array | None, given: Given, effects: Geo
     result, factor = _in_larger_noise(result, given)
     found = places(result)
     shape = geometry(result, _curves(found), effects)
-    acting = [replace(p, size=p.size * factor, largest=p.largest * factor) for p in found]
+    acting = [replace(p, size=p.size * factor, own=p.own * factor, largest=p.largest * factor) for p in found]
     return Structure(result, tuple(acting), shape, white, source)
 
 

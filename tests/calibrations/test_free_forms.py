@@ -263,10 +263,17 @@ def test_a_form_that_the_catalogue_lacks_is_an_unknown_effect_at_its_place() -> 
 
 def test_a_cause_in_another_form_keeps_its_curve() -> None:
     cross = forces_of_sweep()[:, [1, 0]]
-    result = discover(poses(1e-3 * cross**2 + 4e-4 * np.cos(6 * cross) + 5e-4 * cross))
+    result = discover(poses(1e-3 * cross**2 + 1.2e-4 * np.cos(6 * cross) + 5e-4 * cross))
     assert result.causes == ("cross-axis-bias",)
     assert "free:cross-response" in [step.name for step in result.steps]
     assert result.end.held_out_excess < 1.15
+
+
+def test_a_curve_of_which_a_form_of_the_catalogue_is_only_a_part_has_an_unknown_cause() -> None:
+    cross = forces_of_sweep()[:, [1, 0]]
+    result = discover(poses(1e-3 * cross**2 + 4e-4 * np.cos(6 * cross) + 5e-4 * cross))
+    assert (result.verdict, result.causes) == (Verdict.UNEXPLAINED, ())
+    assert [place.name for place in result.findings.places if place.unknown] == ["cross-response"]
 
 
 def test_a_linear_sensor_gets_neither_a_name_nor_a_form() -> None:
