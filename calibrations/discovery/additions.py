@@ -36,42 +36,44 @@ class Addition:
     def to(self, model: Model) -> Model:
         """The model with the effect, its parameters at the values to start from."""
         larger = model.with_effect(self.effect)
-        return replace(larger, terms=tuple(self._begun(t) if t.name == self.effect.name else t for t in larger.terms))
+        return replace(larger, terms=tuple(self._started(t) if t.name == self.effect.name else t for t in larger.terms))
 
-    def _begun(self, term: Term) -> Term:
+    def _started(self, term: Term) -> Term:
         known = {name: value for name, value in self.constants.items() if name in term.effect.constants}
         return replace(term, constants={**term.constants, **known}, estimates=self.estimates)
 
 
-def additions(found: Structure, model: Model, effects: Mapping[str, Effect]) -> list[Addition]:
+def additions(structure: Structure, model: Model, effects: Mapping[str, Effect]) -> list[Addition]:
     """The catalogue effects that the structure adds to a model: the largest place first, then geometry."""
-    causes = [cause for place in found.places for cause in (*place.causes, *found.refinements(place))]
-    names = dict.fromkeys([*causes, *found.geometry.causes, *found.geometry.refinements])
-    starts = {c: tuple(Estimate(name, axis, value, None, "") for name, axis, value in found.starts(c)) for c in names}
-    possible = [c for c in names if c in effects and effects[c].excluded(found.result.data.table) is None]
-    return [Addition(effects[c], found.constants(c), starts[c]) for c in possible if not model.holds(c)]
+    causes = [cause for place in structure.places for cause in (*place.causes, *structure.refinements(place))]
+    names = dict.fromkeys([*causes, *structure.geometry.causes, *structure.geometry.refinements])
+    starts = {
+        c: tuple(Estimate(name, axis, value, None, "") for name, axis, value in structure.starts(c)) for c in names
+    }
+    possible = [c for c in names if c in effects and effects[c].excluded(structure.result.data.table) is None]
+    return [Addition(effects[c], structure.constants(c), starts[c]) for c in possible if not model.holds(c)]
 
 
-def free_additions(found: Structure, model: Model) -> list[Addition]:
+def free_additions(structure: Structure, model: Model) -> list[Addition]:
     """The free forms that the structure adds to a model, the largest place first."""
-    free = [Addition(free_form(forms)) for forms in found.free_forms]
+    free = [Addition(free_form(forms)) for forms in structure.free_forms]
     return [a for a in free if not model.holds(a.effect.name)]
 
 
-def separately(base: Fit, found: Structure, added: list[Addition]) -> list[Addition]:
+def separately(base: Fit, structure: Structure, added: list[Addition]) -> list[Addition]:
     """The additions with values to start from: each place's causes fitted to what the other places leave.
 
     Beside other effects that are missing, the search for a nonlinear parameter goes astray.
     """
     names = {a.effect.name: a for a in added}
     model = _with(base.model, [a for name, a in names.items() if name in GEOMETRY])
-    linear = fit(model, _less(base.table, found.others(None))) if model is not base.model else base
+    linear = fit(model, _without_part(base.table, structure.others(None))) if model is not base.model else base
     known: dict[str, tuple[Estimate, ...]] = {term.name: term.estimates for term in linear.model.terms}
-    for place in found.places:
-        own = [names[cause] for cause in (*place.causes, *found.refinements(place)) if cause in names]
-        if own:
-            alone = fit(_with(linear.model, own), _less(base.table, found.others(place)))
-            known |= {a.effect.name: alone.model.estimates(a.effect.name) for a in own}
+    for place in structure.places:
+        place_additions = [names[cause] for cause in (*place.causes, *structure.refinements(place)) if cause in names]
+        if place_additions:
+            alone = fit(_with(linear.model, place_additions), _without_part(base.table, structure.others(place)))
+            known |= {a.effect.name: alone.model.estimates(a.effect.name) for a in place_additions}
     return [replace(a, estimates=known.get(name, a.estimates)) for name, a in names.items()]
 
 
@@ -85,20 +87,20 @@ def together(base: Fit, added: list[Addition]) -> Fit:
     problem = base.problem
     white = white_only(problem.white, problem.gap_s, len(problem.channels), problem.given)
     model = _with(base.model, added)
-    return refit(replace(base, noise=white), model, _begun(base, model, white))
+    return refit(replace(base, noise=white), model, _start_values(base, model, white))
 
 
-def _begun(base: Fit, model: Model, noise: Noise) -> Array:
+def _start_values(base: Fit, model: Model, noise: Noise) -> Array:
     """The values of a model to start from, those of its base fitted beside the others.
 
     Each addition was fitted alone, and took its own bias and scale factor with it.
     """
     problem = Problem.of(model, base.table)
     theta = problem.layout.starts()[0]
-    own = np.any([problem.layout.of_effect(term.name) for term in base.model.terms], axis=0)
+    base_mask = np.any([problem.layout.of_effect(term.name) for term in base.model.terms], axis=0)
     for _ in range(BASE_STEPS):
-        white = noise.whiten(np.dstack([problem.residual(theta)[:, :, None], problem.jacobian(theta, of=own)]))
-        theta[own] -= np.linalg.lstsq(white[:, 1:], white[:, 0], rcond=1e-12)[0]
+        white = noise.whiten(np.dstack([problem.residual(theta)[:, :, None], problem.jacobian(theta, of=base_mask)]))
+        theta[base_mask] -= np.linalg.lstsq(white[:, 1:], white[:, 0], rcond=1e-12)[0]
     return theta
 
 
@@ -119,21 +121,21 @@ def gradually(base: Fit, added: list[Addition], end: Fit | None = None) -> tuple
     yet, such as a quantiser beside a drift that is missing, is tried again beside the others. `end` is the fit of all
     where that is known.
     """
-    taken: list[Addition] = []
+    accepted: list[Addition] = []
     fits = [base]
     waiting = added
     while waiting:
         postponed: list[Addition] = []
         for addition in waiting:
-            whole = end if len(taken) == len(added) - 1 else None
-            larger = whole if whole is not None else refit(fits[-1], addition.to(fits[-1].model))
+            complete = end if len(accepted) == len(added) - 1 else None
+            larger = complete if complete is not None else refit(fits[-1], addition.to(fits[-1].model))
             if larger.pooled_excess <= NO_WORSE * fits[-1].pooled_excess:
-                taken.append(addition)
+                accepted.append(addition)
                 fits.append(larger)
             else:
                 postponed.append(addition)
         waiting = postponed if len(postponed) < len(waiting) else []
-    return taken, fits
+    return accepted, fits
 
 
 def causes_alone(end: Fit, forms: list[Addition]) -> Fit:
@@ -157,8 +159,8 @@ def without_forms(end: Fit) -> Fit:
     alone = evaluate(model, end.table)
     assert alone is not None  # noqa: S101 every parameter has been fitted
     steps = (fit_.problem.layout.steps(fit_.theta) for fit_ in (end, alone))
-    whole, rest = (forward(end.table, each).T for each in steps)
-    return fit(model, _less(end.table, whole - rest))
+    with_parts, without_parts = (forward(end.table, chain_steps).T for chain_steps in steps)
+    return fit(model, _without_part(end.table, with_parts - without_parts))
 
 
 def at_values_of(end: Fit, added: list[Addition]) -> list[Addition]:
@@ -185,18 +187,20 @@ def _small(cause: Addition) -> Addition:
     return replace(cause, estimates=tuple(estimates))
 
 
-def largest_first(added: list[Addition], end: Fit, found: Structure) -> list[Addition]:
+def largest_first(added: list[Addition], end: Fit, structure: Structure) -> list[Addition]:
     """The additions by the size of their place; those of the geometry by what they contribute to the outputs."""
-    sizes = {c: place.size for place in found.places for c in (*place.causes, *found.refinements(place))}
+    sizes = {c: place.size for place in structure.places for c in (*place.causes, *structure.refinements(place))}
     for name in (a.effect.name for a in added if a.effect.name not in sizes):
         mask = end.problem.layout.of_effect(name)
         contribution = end.jacobian[:, :, mask] @ end.theta[mask]
-        basic = np.any([end.problem.layout.of_effect(own) for own in BASIC], axis=0)
-        sizes[name] = float(np.sqrt(np.mean((_beside(contribution, end.jacobian[:, :, basic]) / found.white) ** 2)))
+        basic = np.any([end.problem.layout.of_effect(basic_name) for basic_name in BASIC], axis=0)
+        sizes[name] = float(
+            np.sqrt(np.mean((_residual_of(contribution, end.jacobian[:, :, basic]) / structure.white) ** 2))
+        )
     return sorted(added, key=lambda a: -sizes[a.effect.name])
 
 
-def _beside(values: Array, columns: Array) -> Array:
+def _residual_of(values: Array, columns: Array) -> Array:
     """Values (channels, n) without what columns (channels, n, k) explain of each channel."""
     return np.stack([v - c @ np.linalg.lstsq(c, v, rcond=None)[0] for v, c in zip(values, columns, strict=True)])
 
@@ -207,6 +211,6 @@ def _with(model: Model, added: list[Addition]) -> Model:
     return model
 
 
-def _less(table: Table, part: Array | float) -> Table:
+def _without_part(table: Table, part: Array | float) -> Table:
     """The table with a part (channels, n) taken off its outputs."""
     return table.with_outputs(table.outputs - np.broadcast_to(part, (len(table.axes), table.n)).T)

@@ -1,11 +1,11 @@
-"""Every effect of the catalogue that a table can excite, tried on top of a fitted model.
+"""Every effect of the catalogue that a table can excite, as a candidate on top of a fitted model.
 
-Each is judged jointly with the model and with the noise fitted anew: a candidate may win only what slow noise does not
-already take up. First order about the present fit; the best are then refitted in full.
+The gain of a candidate is that of a joint fit with the model and the noise: it counts only what slow noise does not
+explain. The fit is of first order about the present one; the search refits the best candidates in full.
 
-A rival of a candidate is as likely, or leaves a residual as small as noise: the form in which an effect acts is known
-only approximately, and so is the column that it depends on. A fit that is slightly better is then no proof. In a
-motion, whose rows repeat each other, it is one.
+A rival of a candidate is as likely, or its residual is noise as well: the form of an effect and the column that drives
+it are known only approximately, so that a slightly better fit proves nothing. In a motion, whose rows repeat each
+other, it does.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from calibrations.model.parameters import Layout
 from calibrations.table import Array
 
 OFFSETS = {"bias", "hard-iron", "gyro-bias"}
-DRIFTING = {"t_s", "temperature_c"}  # what an effect goes by that lets an offset drift
-SAME = 3  # decimals of twice the log-likelihood: less is rounding, and the catalogue's order counts
+DRIFTING = {"t_s", "temperature_c"}  # columns that drive the drift of an offset
+DECIMALS = 3  # decimals of twice the log-likelihood: less is rounding, and the catalogue's order counts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,50 +46,52 @@ class RowCandidate(Candidate):
 
 
 def candidates(before: Fit, effects: Mapping[str, Effect]) -> list[RowCandidate]:
-    """All candidates, best first: by likelihood, a parameter costing log(rows) (Schwarz); those that do not lower
-    the error on unseen poses come last."""
+    """All candidates, best first: by likelihood, minus log(rows) for each parameter (Schwarz). Those that do not lower
+    the error on unseen poses are last."""
     screen = Screen(before)
-    tried = [(effect, *_columns(screen, effect)) for effect in askable(before, effects)]
-    tried = [each for each in tried if each[3].shape[1]]
-    search = Search(screen, [basis for *_, basis in tried])
-    extras = [columns for *_, columns, _ in tried]
-    worth = _gains(before, extras)
-    besides = _gains(before, extras, before.problem.smooth) if before.problem.smooth.size else worth
-    found = [
-        _judge(screen, *each, gain, beside, search.trials)
-        for each, gain, beside in zip(tried, worth, besides, strict=True)
+    linearised = [(effect, *_columns(screen, effect)) for effect in testable_effects(before, effects)]
+    linearised = [item for item in linearised if item[3].shape[1]]
+    search = Search(screen, [basis for *_, basis in linearised])
+    extras = [columns for *_, columns, _ in linearised]
+    joint_gains = _gains(before, extras)
+    smooth_gains = _gains(before, extras, before.problem.smooth) if before.problem.smooth.size else joint_gains
+    ranked = [
+        _candidate(screen, *item, gain, smooth_gain, search.trials)
+        for item, gain, smooth_gain in zip(linearised, joint_gains, smooth_gains, strict=True)
     ]
     unseen = before.held_out_excess
-    found = _with_probabilities(found, before.residual.size, unseen)
-    found.sort(key=lambda c: (c.held_out_after < unseen, round(schwarz(c, before.residual.size), SAME)), reverse=True)
-    like = [_like(c, found, screen) for c in found]
+    ranked = _with_probabilities(ranked, before.residual.size, unseen)
+    ranked.sort(
+        key=lambda c: (c.held_out_after < unseen, round(schwarz(c, before.residual.size), DECIMALS)), reverse=True
+    )
+    rivals = [_same_signal(c, ranked, screen) for c in ranked]
     return [
         replace(c, indistinguishable_from=(*names, *_unlogged(c.effect, before, effects)))
-        for c, names in zip(found, like, strict=True)
+        for c, names in zip(ranked, rivals, strict=True)
     ]
 
 
-def best_pair(before: Fit, found: list[RowCandidate]) -> tuple[RowCandidate, RowCandidate] | None:
-    """The two candidates that gain most together, where together they are significant; the stronger first.
+def best_pair(before: Fit, ranked: list[RowCandidate]) -> tuple[RowCandidate, RowCandidate] | None:
+    """The two candidates with the largest joint gain, the stronger first; None if no pair is significant.
 
-    A sensor may miss two effects of which neither is seen while the other is missing.
+    A model may miss two effects of which neither is visible while the other one is missing.
     """
-    pairs = [(a, b) for a, b in combinations(found, 2) if _fits(before, a.effect, b.effect)]
+    pairs = [(a, b) for a, b in combinations(ranked, 2) if _fits(before, a.effect, b.effect)]
     joint = _gains(before, [np.concatenate([a.columns, b.columns], axis=2) for a, b in pairs], before.problem.smooth)
-    best, least = None, 1.0
+    best, lowest_p = None, 1.0
     for (a, b), gain in zip(pairs, joint, strict=True):
         rank = a.rank + b.rank
         free = before.residual.size - before.jacobian.shape[2] - rank - before.problem.smooth.size
         p = _tail(gain, before.residual.size, rank, max(free, 1)) * len(pairs)
-        if p < least:
-            best, least = (a, b), p
-    return best if least < SIGNIFICANT else None
+        if p < lowest_p:
+            best, lowest_p = (a, b), p
+    return best if lowest_p < SIGNIFICANT else None
 
 
 def _tail(twice_gain: float, rows: int, rank: int, free: float) -> float:
     """Chance of such a gain on noise. F rather than chi-squared: the noise's level is estimated from these rows.
 
-    Columns that the model could have already (rank 0) show nothing: any gain comes by chance.
+    Columns that the model already spans (rank 0) prove nothing: any gain is chance.
     """
     if rank == 0:
         return 1.0
@@ -97,23 +99,23 @@ def _tail(twice_gain: float, rows: int, rank: int, free: float) -> float:
 
 
 def schwarz(c: RowCandidate, rows: int) -> float:
-    """Gain less the price of the parameters, log(rows) each."""
+    """Gain minus the price of the parameters, log(rows) each."""
     return c.gain - c.rank * float(np.log(rows))
 
 
-def with_planned(found: Sequence[RowCandidate], step: Step[Fit]) -> list[RowCandidate]:
-    """The candidates with the effect of a planned step first, as its full fit shows it. It may be a free form."""
+def with_planned(ranked: Sequence[RowCandidate], step: Step[Fit]) -> list[RowCandidate]:
+    """The candidates, first the effect of a planned step with the errors of its full fit. It may be a free form."""
     before, after = step.before, step.after
-    own = next((c for c in found if c.name == step.name), None)
-    if own is None:
-        own = _free(next(t.effect for t in after.model.terms if t.name == step.name), before, after)
-    full = replace(own, excess_after=after.pooled_excess, held_out_after=after.held_out_excess)
-    others = [c for c in found if c.name != step.name]
-    return _with_probabilities([full, *others], before.residual.size, before.held_out_excess)
+    planned = next((c for c in ranked if c.name == step.name), None)
+    if planned is None:
+        planned = _free_candidate(next(t.effect for t in after.model.terms if t.name == step.name), before, after)
+    full = replace(planned, excess_after=after.pooled_excess, held_out_after=after.held_out_excess)
+    remaining = [c for c in ranked if c.name != step.name]
+    return _with_probabilities([full, *remaining], before.residual.size, before.held_out_excess)
 
 
-def _free(effect: Effect, before: Fit, after: Fit) -> RowCandidate:
-    """A free form as a candidate, from the fit with it; its rank is that of the columns that it could have."""
+def _free_candidate(effect: Effect, before: Fit, after: Fit) -> RowCandidate:
+    """A free form as a candidate, from its fit; its rank is that of all columns that it may use."""
     screen = Screen(before)
     start, columns, basis = _columns(screen, effect)
     gain, rank = twice_log_likelihood(after) - twice_log_likelihood(before), basis.shape[1]
@@ -130,27 +132,27 @@ def added(before: Fit, c: RowCandidate) -> Fit:
     return refit(before, before.model.with_effect(c.effect), c.start)
 
 
-def askable(before: Fit, effects: Mapping[str, Effect]) -> list[Effect]:
-    """The effects that the model can miss and that the data can show, with rows enough for their parameters."""
+def testable_effects(before: Fit, effects: Mapping[str, Effect]) -> list[Effect]:
+    """The effects that the model can miss and that the data can show, with enough rows for their parameters."""
     return [effect for effect in effects.values() if _applies(effect, before) and _fits(before, effect)]
 
 
 def _applies(effect: Effect, before: Fit) -> bool:
-    """Whether the model can miss it, and the data can have it.
+    """Whether the model can miss the effect, and the data can show it.
 
-    Where iron cannot be asked for, as directions leave parts of the sphere out, it looks like anything else that
-    changed from one direction to the next: nothing but iron is asked for then. And what drifts is an offset: a model
-    without one would take a drift that hardly moves for it.
+    If the directions do not cover the sphere, iron cannot be tested, and looks like any other change from one direction
+    to the next: then only effects of iron are candidates. A drift needs an offset in the model: without one, a fit uses
+    a nearly constant drift as the offset.
     """
     model = before.model
     known = set(effect.after) <= set(model.effects) and not model.holds(effect.name)
     known = known and (not DRIFTING & set(effect.needs) or bool(OFFSETS & set(model.effects)))
-    askable = effect.first_kind.field or magnetometer_coverage_warning(before.table) is None
-    return known and askable and effect.excluded(before.table) is None
+    iron_is_seen = effect.first_kind.field or magnetometer_coverage_warning(before.table) is None
+    return known and iron_is_seen and effect.excluded(before.table) is None
 
 
 def _fits(before: Fit, *added: Effect) -> bool:
-    """Whether there are more rows than parameters with these effects."""
+    """Whether the table has more rows than the model with these effects has parameters."""
     model = before.model
     for effect in added:
         model = model.with_effect(effect)
@@ -162,12 +164,12 @@ def _columns(screen: Screen, effect: Effect) -> tuple[Array, Array, Array]:
     before = screen.fit
     model = before.model.with_effect(effect)
     problem = Problem.of(model, before.table)
-    mine = problem.layout.of_effect(effect.name)
+    mask = problem.layout.of_effect(effect.name)
     best = (np.zeros(0), np.zeros((*before.residual.shape, 0)), np.zeros((before.residual.size, 0)))
     for theta in _starts(before, problem, effect):
-        columns = problem.jacobian(theta, mine)
+        columns = problem.jacobian(theta, mask)
         if effect.searched(before.table) > 1:
-            columns = np.concatenate([_contribution(before, problem, theta, mine), columns], axis=2)
+            columns = np.concatenate([_contribution(before, problem, theta, mask), columns], axis=2)
         basis = screen.basis(columns)
         if not best[2].shape[1] or screen.statistic(basis) > screen.statistic(best[2]):
             best = (theta, columns, basis)
@@ -175,37 +177,37 @@ def _columns(screen: Screen, effect: Effect) -> tuple[Array, Array, Array]:
 
 
 def _starts(before: Fit, problem: Problem, effect: Effect) -> list[Array]:
-    """Where the effect's derivatives are taken: near nothing or, where it was searched for in the data, at its fit."""
+    """Values for the effect's derivatives: near zero, or its fit if its values were searched for in the data."""
     if effect.searched(before.table) > 1:
         return [refit(before, problem.layout.model).theta]
     return problem.layout.starts()
 
 
-def _contribution(before: Fit, problem: Problem, theta: Array, mine: NDArray[np.bool_]) -> Array:
-    """What the effect changes of the residual, shape (channels, n, 1)."""
-    return (before.problem.residual(theta[~mine]) - problem.residual(theta))[:, :, None]
+def _contribution(before: Fit, problem: Problem, theta: Array, mask: NDArray[np.bool_]) -> Array:
+    """Change of the residual by the effect, shape (channels, n, 1)."""
+    return (before.problem.residual(theta[~mask]) - problem.residual(theta))[:, :, None]
 
 
 def _gains(before: Fit, extras: list[Array], smooth: Array | None = None) -> list[float]:
-    """Twice the gain in log-likelihood by each, the noise fitted anew with it, `smooth` columns set aside."""
+    """Twice the gain in log-likelihood by each block of columns, with the noise refitted and `smooth` eliminated."""
     scaled = [e / np.maximum(np.sqrt(np.sum(e**2, axis=(0, 1))), np.finfo(float).tiny) for e in extras]
     nothing = np.zeros((before.table.n, 0))
     return gains(before.noise, before.residual, before.jacobian, scaled, nothing if smooth is None else smooth)
 
 
-def _judge(
+def _candidate(
     screen: Screen,
     effect: Effect,
     start: Array,
     columns: Array,
     basis: Array,
-    worth: float,
-    beside_smooth: float,
+    twice_gain: float,
+    smooth_gain: float,
     trials: float,
 ) -> RowCandidate:
-    """`worth`: twice the gain in log-likelihood; `beside_smooth`: what is left of it beside the smooth columns.
+    """`twice_gain`: twice the gain in log-likelihood; `smooth_gain`: the same with the smooth columns eliminated.
 
-    What returns with the angles passes for slow noise in neither test: it is set aside, or the noise stays as it was.
+    A signal that repeats with the angles counts as slow noise in neither test: one eliminates it, one keeps the noise.
     """
     before, rank = screen.fit, basis.shape[1]
     smooth = before.problem.smooth.shape[1]
@@ -214,13 +216,13 @@ def _judge(
         before.residual.size - before.jacobian.shape[2] - rank - smooth * len(before.channels), before.noise.freedom
     )
     p_score = float(fdtrc(rank, free, score / rank)) if smooth else 1.0
-    p_refitted = _tail(beside_smooth, before.residual.size, rank, free)
+    p_refitted = _tail(smooth_gain, before.residual.size, rank, free)
     tests, searched = 2 if smooth else 1, effect.searched(before.table)
     after = before.residual - np.concatenate([before.jacobian, columns], axis=2) @ _change(before, columns)
     return RowCandidate(
         effect=effect,
         rank=rank,
-        gain=worth - 2 * float(np.log(searched)),
+        gain=twice_gain - 2 * float(np.log(searched)),
         p_value=float(of_search(min(p_score, p_refitted), tests * trials * searched)),
         excess_after=float(np.sqrt(np.mean((rms(after) / before.noise.floor) ** 2))),
         held_out_after=before.held_out_with(columns),
@@ -239,74 +241,78 @@ def _change(before: Fit, columns: Array) -> Array:
     return np.asarray(np.linalg.lstsq(white / size, before.whitened[:, 0], rcond=1e-9)[0] / size)
 
 
-def _with_probabilities(found: list[RowCandidate], rows: int, unseen: float) -> list[RowCandidate]:
-    """Posterior probability of each, against the others and against nothing missing.
+def _with_probabilities(ranked: list[RowCandidate], rows: int, unseen: float) -> list[RowCandidate]:
+    """Posterior probability of each candidate, against the others and against a complete model.
 
-    Before, that nothing is missing is as likely as that something is, and all effects are equally likely: of many that
-    are tried one is always good (Scott and Berger, Ann. Statist. 38 (2010), 2587). A candidate that does not lower the
-    error on unseen poses has none.
+    Prior: a complete model has probability 1/2, and all effects share the other half equally, because of many trials
+    one always fits well (Scott and Berger, Ann. Statist. 38 (2010), 2587). A candidate that does not lower the error on
+    unseen poses has probability 0.
     """
-    each = [schwarz(c, rows) / 2 if c.held_out_after < unseen else -np.inf for c in found]
-    half = np.array([*each, np.log(max(len(found), 1))])
-    weight = np.exp(half - half.max())
-    return [replace(c, probability=float(w / weight.sum())) for c, w in zip(found, weight[:-1], strict=True)]
+    half_scores = [schwarz(c, rows) / 2 if c.held_out_after < unseen else -np.inf for c in ranked]
+    log_weights = np.array([*half_scores, np.log(max(len(ranked), 1))])
+    weight = np.exp(log_weights - log_weights.max())
+    return [replace(c, probability=float(w / weight.sum())) for c, w in zip(ranked, weight[:-1], strict=True)]
 
 
 def _unlogged(effect: Effect, before: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:
-    """What an effect of time may be confused with, and the table lacks the column to tell: an unlogged temperature."""
+    """Effects of temperature that the table cannot separate from an effect of time, because it has no temperature."""
     if "t_s" not in effect.needs or not before.table.type.stage_angles:
         return ()
     return tuple(
         name
-        for name, other in effects.items()
-        if name in effect.confused_with and "temperature_c" in other.needs and "temperature_c" not in before.table
+        for name, rival in effects.items()
+        if name in effect.confused_with and "temperature_c" in rival.needs and "temperature_c" not in before.table
     )
 
 
-def _like(c: RowCandidate, others: list[RowCandidate], screen: Screen) -> tuple[str, ...]:
-    """RowCandidates that would take up nearly all that `c` takes up, with at most one parameter more."""
+def _same_signal(c: RowCandidate, ranked: list[RowCandidate], screen: Screen) -> tuple[str, ...]:
+    """Candidates that explain nearly all of the signal of `c`, with at most one parameter more."""
     signal = c.basis @ (c.basis.T @ screen.residual)
     strength = float(signal @ signal)
     if strength < 2 * INSEPARABLE:
         return ()
-    same = []
-    for other in others:
-        lost = strength - float(np.sum((other.basis.T @ signal) ** 2))
-        if other is not c and lost < INSEPARABLE and other.rank <= c.rank + 1:
-            same.append(other.name)
-    return tuple(same)
+    names = []
+    for rival in ranked:
+        lost = strength - float(np.sum((rival.basis.T @ signal) ** 2))
+        if rival is not c and lost < INSEPARABLE and rival.rank <= c.rank + 1:
+            names.append(rival.name)
+    return tuple(names)
 
 
-def with_rivals(best: RowCandidate, found: Sequence[RowCandidate], before: Fit) -> RowCandidate:
-    """`best`, one of the candidates `found` on top of `before`, with all that may stand in its place."""
+def with_rivals(best: RowCandidate, ranked: Sequence[RowCandidate], before: Fit) -> RowCandidate:
+    """`best`, one of the candidates `ranked` on top of `before`, with all its rivals."""
     if best.p_value >= SIGNIFICANT:
         return best
-    by_name = {c.name: c for c in found}
-    like = [name for name in best.indistinguishable_from if name not in by_name or _open(by_name[name], best, before)]
-    near = [c for c in found if c.name not in (best.name, *best.indistinguishable_from) and _near(c, best)]
-    own = twice_log_likelihood(added(before, best)) if near else 0.0
-    further = [c.name for c in near if _may_be(added(before, c), before, own)]
-    return replace(best, indistinguishable_from=(*like, *further))
+    by_name = {c.name: c for c in ranked}
+    inseparable = [
+        name
+        for name in best.indistinguishable_from
+        if name not in by_name or _has_undetermined_part(by_name[name], best, before)
+    ]
+    similar = [c for c in ranked if c.name not in (best.name, *best.indistinguishable_from) and _is_similar(c, best)]
+    likelihood = twice_log_likelihood(added(before, best)) if similar else 0.0
+    further = [c.name for c in similar if _is_rival(added(before, c), before, likelihood)]
+    return replace(best, indistinguishable_from=(*inseparable, *further))
 
 
-def _open(c: RowCandidate, best: RowCandidate, before: Fit) -> bool:
-    """Whether a rival that has `best` within it may still be more: the data then leave a part of it undetermined.
+def _has_undetermined_part(c: RowCandidate, best: RowCandidate, before: Fit) -> bool:
+    """Whether the data leave a part of a rival that contains `best` undetermined, so that it is a rival still.
 
-    A play whose width is known to be none is no rival; one that no reversal has shown may have any width.
+    A play of width 0 is no rival; without a reversal, a play may have any width.
     """
     if best.name not in c.effect.contains:
         return True
     return not all(e.identified for e in added(before, c).model.estimates(c.name))
 
 
-def _near(c: RowCandidate, best: RowCandidate) -> bool:
-    """Whether it explains much of the same with hardly more parameters. Neither is within the other: that is tested."""
+def _is_similar(c: RowCandidate, best: RowCandidate) -> bool:
+    """Whether `c` explains nearly as much with at most one parameter more, and neither effect contains the other."""
     within = best.name in c.effect.contains or c.name in best.effect.contains
     return not within and c.rank <= best.rank + 1 and c.gain > SAME_SHAPE * best.gain
 
 
-def _may_be(after: Fit, before: Fit, likeliest: float) -> bool:
-    """`likeliest`: twice the log-likelihood with the effect whose rival this is."""
+def _is_rival(after: Fit, before: Fit, likeliest: float) -> bool:
+    """Whether the fit `after` is as good as that of the effect with twice the log-likelihood `likeliest`."""
     if likeliest - twice_log_likelihood(after) < INSEPARABLE:
         return True
     as_good = after.pooled_excess <= MATERIAL and after.share_left(before) <= MOST_BY_FORM

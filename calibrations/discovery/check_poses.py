@@ -1,11 +1,11 @@
-"""A model judged on poses that its fit has not seen, by noise that repeated poses show: is anything missing?
+"""Test of a model on check poses, which its fit does not use, against the noise that repeated poses show.
 
-The rows marked as checks are kept out of the fit. Their errors e have the variance of noise and of the parameters,
+The fit excludes the rows marked as checks. Their errors e have the variance of noise and of the parameters,
 
     S = W + J C J'        W the white noise of the means, C the covariance of the parameters by the other rows
 
-and e' S^-1 e / m has an F distribution, over the same ratio (pure error over W) for the poses that were measured more
-than once. What the repeats show beyond white noise, such as a slow noise, is then no misfit of the model.
+and e' S^-1 e / m has an F distribution, over the same ratio (pure error over W) for the repeated poses. Noise of the
+repeats beyond white noise, such as a slow noise, is then no misfit of the model.
 
 Source  Atkinson, Donev and Tobias, Optimum Experimental Designs, with SAS (2007), on lack of fit and checking points.
 """
@@ -25,20 +25,20 @@ from calibrations.fitting.problem import Problem
 from calibrations.model import Model
 from calibrations.table import Array, Table
 
-MARK = "check"  # what the path of a check pose begins with
-MANY = 1e9  # degrees of freedom of a noise that is known
+MARK = "check"  # prefix of the path of a check pose
+KNOWN_FREEDOM = 1e9  # degrees of freedom of a noise that is known
 
 
 @dataclass(frozen=True)
 class Check:
-    """How well a fit to the other poses predicts the check poses.
+    """Prediction of the check poses by a fit to the other poses.
 
-    poses       that are predicted
-    error       rms of their errors, each in units of the standard deviation foreseen by white noise and parameters
-    repeats     poses measured again, by their number
-    pure_error  rms of what they differ by, in units of that by white noise; 1 where there are too few
-    chance      that noise, as large as the repeats show it, makes errors as large
-    again       that white noise makes the repeats differ as much
+    poses       number of check poses
+    error       rms of their errors in units of the standard deviation by white noise and parameters
+    repeats     number of repeated poses
+    pure_error  rms of the differences between repeats in units of white noise; 1 if there are too few
+    chance      probability that noise of the size that the repeats show makes errors as large
+    again       probability that white noise makes the repeats differ as much
     """
 
     poses: int
@@ -60,58 +60,59 @@ class Check:
 
 
 def unseen(model: Model, table: Table) -> Check | None:
-    """`model` on the check poses of `table`.
+    """Test of `model` on the check poses of `table`.
 
-    None where they are too few, where the others do not determine the model, or where the noise is not known.
+    None if they are too few, if the other poses do not determine the model, or if the noise is not known.
     """
     marked = np.array([path.startswith(MARK) for path in table.labels.get("path", ())], dtype=bool)
     if not table.type.stage_angles or marked.sum() < FEWEST_CHECKS:
         return None
     try:
-        found = fit(model, table.rows(~marked))
+        fitted = fit(model, table.rows(~marked))
     except TooFewRows:
         return None
-    if found.problem.white is None:
+    if fitted.problem.white is None:
         return None
-    problem = found.problem.on(table.rows(marked))
-    errors = _standardised(found, problem)
-    squares, freedom = repeated(found)
-    known = freedom < FEWEST_CHECKS * len(table.axes)
-    pure, ratio = 1.0 if known else squares / freedom, float(np.mean(errors**2))
+    problem = fitted.problem.on(table.rows(marked))
+    errors = _standardised(fitted, problem)
+    squares, freedom = repeated(fitted)
+    noise_known = freedom < FEWEST_CHECKS * len(table.axes)
+    pure, ratio = 1.0 if noise_known else squares / freedom, float(np.mean(errors**2))
     return Check(
         poses=problem.table.n,
         error=float(np.sqrt(ratio)),
         repeats=freedom // len(table.axes),
         pure_error=float(np.sqrt(pure)),
-        chance=float(fdtrc(len(errors), MANY if known else freedom, ratio / pure)),
-        again=1.0 if known else float(chdtrc(freedom, squares)),
+        chance=float(fdtrc(len(errors), KNOWN_FREEDOM if noise_known else freedom, ratio / pure)),
+        again=1.0 if noise_known else float(chdtrc(freedom, squares)),
     )
 
 
-def repeated(found: Fit) -> tuple[float, int]:
-    """Of poses that were measured more than once: the sum of squares about their means in units of white noise, and
-    its degrees of freedom. Residuals are taken, so that what the model knows of time and temperature is off.
+def repeated(fit: Fit) -> tuple[float, int]:
+    """Sum of squares of repeated poses about their means in units of white noise, and its degrees of freedom.
+
+    It is that of residuals, without the effects of time and temperature that the model describes.
     """
-    names = [name for name in ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip") if name in found.table]
-    angles = np.column_stack([found.table.column(name) for name in names])
+    names = [name for name in ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip") if name in fit.table]
+    angles = np.column_stack([fit.table.column(name) for name in names])
     _, group = np.unique(np.round(angles, 6), axis=0, return_inverse=True)
-    same = np.eye(int(group.max()) + 1)[group.ravel()]  # (n, groups)
-    white = found.residual / _white(found.problem)
-    about = white - (white @ same / same.sum(axis=0)) @ same.T
-    return float(np.sum(about**2)), len(white) * (found.table.n - same.shape[1])
+    membership = np.eye(int(group.max()) + 1)[group.ravel()]  # (n, groups)
+    white = fit.residual / _white(fit.problem)
+    deviation = white - (white @ membership / membership.sum(axis=0)) @ membership.T
+    return float(np.sum(deviation**2)), len(white) * (fit.table.n - membership.shape[1])
 
 
-def _standardised(found: Fit, problem: Problem) -> Array:
+def _standardised(fit: Fit, problem: Problem) -> Array:
     """Errors on the rows of `problem`, each of variance 1 and independent of the others, shape (axes * n,)."""
-    own, J = found.jacobian / _white(found.problem)[:, :, None], problem.jacobian(found.theta)
-    cov, _ = covariance(own.reshape(-1, own.shape[2]), found.problem.layout.typical)
+    weighted, J = fit.jacobian / _white(fit.problem)[:, :, None], problem.jacobian(fit.theta)
+    cov, _ = covariance(weighted.reshape(-1, weighted.shape[2]), fit.problem.layout.typical)
     flat = J.reshape(-1, J.shape[2])
     S = np.diag(_white(problem).ravel() ** 2) + flat @ cov @ flat.T
-    return np.asarray(np.linalg.solve(np.linalg.cholesky(S), problem.residual(found.theta).ravel()))
+    return np.asarray(np.linalg.solve(np.linalg.cholesky(S), problem.residual(fit.theta).ravel()))
 
 
 def _white(problem: Problem) -> Array:
-    """Standard deviations of the means, (axes, n). Raises DataError where nothing tells them."""
+    """Standard deviations of the means, (axes, n). Raises DataError if they are unknown."""
     if problem.white is None:
         raise DataError(f"{problem.table.source}: the noise of the means is unknown; give the columns vx_std_v and n")
     return problem.white

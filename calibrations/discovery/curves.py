@@ -1,8 +1,8 @@
-"""What acts at a place of the signal chain as a curve over what drives it, with its band, symmetry and expression.
+"""The effects at a place of the signal chain as a curve over its driver, with band, symmetry and expression.
 
-A curve is what the effects of the place contribute to the final model's prediction, effects of the catalogue and free
-form together, averaged over poses of the same driver. Constant and linear parts over the forces, which belong to bias,
-scale factor and geometry, are taken off. The band is the standard uncertainty by the parameters.
+A curve is the contribution of the effects of the place to the final model's prediction, effects of the catalogue and
+free form together, averaged over poses of the same driver. It has no constant and linear parts over the forces, which
+belong to bias, scale factor and geometry. The band is the standard uncertainty by the parameters.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from calibrations.table import Array, Table
 MOST_POINTS = 48  # of a curve
 NEARLY_ALL = 0.9  # of the variance of a curve: it is even, or odd
 DESCRIBED = 0.8  # of it that an expression must explain to be proposed
-LESS_PLAIN = 0.02  # of it that a less plain expression must explain beyond a plainer one
+LESS_SIMPLE = 0.02  # of it that a less plain expression must explain beyond a plainer one
 LEAST_STD = 0.02  # of a curve's rms: a smaller band does not weigh more
 STEP_RAD = 1e-5  # of a numerical derivative by an angle
 WAVES = 9  # in a turn, at most
 
-DRIVERS = {  # place -> driver, its unit, what the curve is multiplied by
+DRIVERS = {  # place -> driver, its unit, factor of the curve
     "stage-angle-alpha": ("alpha_deg", "deg", "angle"),
     "stage-angle-beta": ("beta_deg", "deg", "angle"),
     "own-response": ("own force", "g", ""),
@@ -78,18 +78,18 @@ class PlaceCurve:
     def expression(self) -> str | None:
         """An expression that describes the largest curve and can be added; None where none does."""
         axis = self.largest
-        return _proposed(self, axis, self.at[axis], self.value[axis], self.std[axis])
+        return _proposed_expression(self, axis, self.at[axis], self.value[axis], self.std[axis])
 
 
 def place_curves(findings: Findings[Fit]) -> dict[str, PlaceCurve]:
-    """The curve of each place of a search that acts, by name; places without one driver have none."""
+    """By name, the curve of each acting place of a search; places without a single driver have none."""
     end = findings.end
-    found = (place_curve(end, place.name) for place in findings.places)
-    return {curve.place: curve for curve in found if curve is not None}
+    curves = (place_curve(end, place.name) for place in findings.places)
+    return {curve.place: curve for curve in curves if curve is not None}
 
 
 def place_curve(end: Fit, place: str) -> PlaceCurve | None:
-    """The curve of one place in a fitted model; None where the model has no effect there, or it has no one driver."""
+    """The curve of a place in a fitted model; None without an effect there, or without a single driver."""
     names = [term.name for term in end.model.terms if place_of_effect(term.name) == place]
     known = DRIVERS.get(place) or _logged(place, end.table)
     if not names or known is None:
@@ -123,10 +123,10 @@ def _base(driver: str, factor: str, x: Array, weight: Array) -> Array:
 
 
 def _contribution(end: Fit, names: list[str], base: list[Array] | None) -> tuple[Array, Array]:
-    """What effects contribute to the prediction beside the base, and its standard uncertainty, (channels, n)."""
+    """Contribution of effects to the prediction off the base, and its standard uncertainty, (channels, n)."""
     steps = end.problem.layout.steps(end.theta)
-    rest = [step for step in steps if step[0].name not in names]
-    value = (forward(end.table, steps) - forward(end.table, rest)).T
+    other_steps = [step for step in steps if step[0].name not in names]
+    value = (forward(end.table, steps) - forward(end.table, other_steps)).T
     mask = np.any([end.problem.layout.of_effect(name) for name in names], axis=0)
     cov = covariance(end.information, end.problem.layout.typical)[0][np.ix_(mask, mask)]
     J = end.jacobian[:, :, mask]
@@ -137,14 +137,14 @@ def _contribution(end: Fit, names: list[str], base: list[Array] | None) -> tuple
 
 
 def _groups(end: Fit, place: str, driver: str, factor: str) -> dict[str, tuple[list[int], Array, Array]]:
-    """By axis: channels, what drives the place, and what the curve is multiplied by, for all their rows."""
+    """By axis: channels, driver of the place, and factor of the curve, for all their rows."""
     table, count = end.table, len(end.table.axes)
     force = static_force(table, end.problem.layout.steps(end.theta))
     if factor == "angle":
         channels = list(range(count))
-        by = np.concatenate([_by_angle(end, place)[k] for k in channels])
-        return {place.removeprefix("stage-angle-"): (channels, np.tile(table.column(driver), count), by)}
-    found = {}
+        weight = np.concatenate([_by_angle(end, place)[k] for k in channels])
+        return {place.removeprefix("stage-angle-"): (channels, np.tile(table.column(driver), count), weight)}
+    groups = {}
     for k, axis in enumerate(table.axes):
         x = {
             "own force": force[:, k],
@@ -153,8 +153,8 @@ def _groups(end: Fit, place: str, driver: str, factor: str) -> dict[str, tuple[l
             "output": table.outputs[:, k],
         }.get(driver)
         x = table.column(driver) if x is None else x
-        found[axis] = [k], x, force[:, k] if factor == "force" else np.ones(table.n)
-    return found
+        groups[axis] = [k], x, force[:, k] if factor == "force" else np.ones(table.n)
+    return groups
 
 
 def _by_angle(end: Fit, place: str) -> Array:
@@ -182,15 +182,15 @@ def _averaged(x: Array, weight: Array, value: Array, std: Array, explained: Arra
         edges = np.quantile(x, np.linspace(0, 1, MOST_POINTS + 1))
         part = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, MOST_POINTS - 1)
     squares = np.bincount(part, weight**2)
-    kept = np.flatnonzero(squares > 1e-6 * squares.max())
+    occupied = np.flatnonzero(squares > 1e-6 * squares.max())
     rows = np.bincount(part)
-    at = (np.bincount(part, x) / np.maximum(rows, 1))[kept]
+    at = (np.bincount(part, x) / np.maximum(rows, 1))[occupied]
 
     def mean(values: Array) -> Array:
-        return np.asarray((np.bincount(part, weight * values) / np.where(squares > 0, squares, 1.0))[kept])
+        return np.asarray((np.bincount(part, weight * values) / np.where(squares > 0, squares, 1.0))[occupied])
 
     band = np.sqrt(np.bincount(part, (weight * std) ** 2 * rows[part]) / np.where(squares > 0, squares, 1.0) ** 2)
-    return at, mean(value), band[kept], mean(explained)
+    return at, mean(value), band[occupied], mean(explained)
 
 
 def _symmetry(driver: str, x: Array, value: Array) -> str:
@@ -217,20 +217,24 @@ def _wave(x: Array, k: float) -> Array:
     return np.column_stack([np.sin(k * x), np.cos(k * x)])
 
 
-def _proposed(curve: PlaceCurve, axis: str, x: Array, value: Array, std: Array) -> str | None:
-    """The plainest expression that explains nearly as much of the curve as the best."""
+def _proposed_expression(curve: PlaceCurve, axis: str, x: Array, value: Array, std: Array) -> str | None:
+    """The simplest expression that explains nearly as much of the curve as the best one."""
     variable = _variable(curve.driver, axis)
     if variable is None or len(x) < 6 or not np.ptp(value) > 0:
         return None
     line = "force" in curve.driver  # constant and line over a force belong to bias and geometry
     base = np.column_stack([np.ones(len(x)), x] if line else [np.ones(len(x))])
     weight = 1 / np.maximum(std, LEAST_STD * float(np.std(value)))
-    total = _left(np.ones((len(x), 1)), value, weight)
-    rest = _left(base, value, weight)
+    total_squares = _residual_squares(np.ones((len(x), 1)), value, weight)
+    base_squares = _residual_squares(base, value, weight)
     best: tuple[float, str] | None = None
     for columns, text in _shapes(curve, x, variable):
-        share = 1 - _left(np.column_stack([base, columns]), value, weight) / rest if rest > 1e-12 * total else 0.0
-        if share > DESCRIBED and (best is None or share > best[0] + LESS_PLAIN):
+        share = (
+            1 - _residual_squares(np.column_stack([base, columns]), value, weight) / base_squares
+            if base_squares > 1e-12 * total_squares
+            else 0.0
+        )
+        if share > DESCRIBED and (best is None or share > best[0] + LESS_SIMPLE):
             best = share, text
     if best is None:
         return None
@@ -242,17 +246,17 @@ def _proposed(curve: PlaceCurve, axis: str, x: Array, value: Array, std: Array) 
 
 def _variable(driver: str, axis: str) -> str | None:
     """The driver's name in an expression; None where it has none."""
-    other = {"x": "y", "y": "x", "z": "x"}.get(axis, "")
+    cross_axis = {"x": "y", "y": "x", "z": "x"}.get(axis, "")
     words = {
         "alpha_deg": "alpha", "beta_deg": "beta", "temperature_c": "temperature", "t_s": "t", "supply_v": "supply",
-        "own force": f"a{axis}", "force along the other axis": f"a{other}", "force out of the plane": "az",
+        "own force": f"a{axis}", "force along the other axis": f"a{cross_axis}", "force out of the plane": "az",
         "output": None,
     }  # fmt: skip
     return words.get(driver, driver)
 
 
 def _shapes(curve: PlaceCurve, x: Array, u: str) -> Iterator[tuple[Array, str]]:
-    """Columns of shapes over x with their expressions, the plainest first."""
+    """Columns of shapes over x with their expressions, the simplest first."""
     if curve.unit == "deg":
         turned = np.radians(x)
         for k in range(1, WAVES + 1):
@@ -283,14 +287,14 @@ def _shapes(curve: PlaceCurve, x: Array, u: str) -> Iterator[tuple[Array, str]]:
         yield _wave(x, 2 * np.pi * waves / span), f"a*sin(c*{u}) + b*cos(c*{u})"
 
 
-def _left(columns: Array, value: Array, weight: Array) -> float:
+def _residual_squares(columns: Array, value: Array, weight: Array) -> float:
     X, y = columns * weight[:, None], value * weight
     size = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
-    rest = y - X @ (np.linalg.lstsq(X / size, y, rcond=1e-9)[0] / size)
-    return float(rest @ rest)
+    remainder = y - X @ (np.linalg.lstsq(X / size, y, rcond=1e-9)[0] / size)
+    return float(remainder @ remainder)
 
 
 def _share(columns: Array, value: Array) -> float:
     ones = np.ones(len(value))
-    whole = _left(ones[:, None], value, ones)
-    return 1 - _left(np.column_stack([ones, columns]), value, ones) / whole if whole > 0 else 0.0
+    total = _residual_squares(ones[:, None], value, ones)
+    return 1 - _residual_squares(np.column_stack([ones, columns]), value, ones) / total if total > 0 else 0.0

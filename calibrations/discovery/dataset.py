@@ -86,7 +86,7 @@ class Dataset(ABC, Generic[F]):
         """The model with the values that it has; None where it has none."""
 
     @abstractmethod
-    def places(self, found: F) -> tuple[Place, ...]:
+    def places(self, fit: F) -> tuple[Place, ...]:
         """Places where a model fails, worst first."""
 
     @abstractmethod
@@ -116,32 +116,32 @@ class Dataset(ABC, Generic[F]):
     def followed(self, plan: Findings[F], k: int, effects: Mapping[str, Effect]) -> Findings[F]:
         """The rest of a search once its first `k` steps are taken."""
         start = plan.steps[k - 1].after
-        rest = replace(plan, added=(*plan.added, *plan.names[:k]), steps=plan.steps[k:])
+        remaining = replace(plan, added=(*plan.added, *plan.names[:k]), steps=plan.steps[k:])
         return replace(
-            rest,
+            remaining,
             start=start,
             baseline=start,
-            candidates=self.candidates(start, rest, effects),
+            candidates=self.candidates(start, remaining, effects),
             undetermined=(self.undetermined(start), plan.undetermined[1]),
         )
 
-    def rejection(self, found: F) -> Finding | None:  # noqa: ARG002
+    def rejection(self, fit: F) -> Finding | None:  # noqa: ARG002
         """Why neither the data nor the values of a fit can be used; None where they can."""
         return None
 
-    def covered(self, found: F) -> dict[str, tuple[float, float]]:  # noqa: ARG002
+    def covered(self, fit: F) -> dict[str, tuple[float, float]]:  # noqa: ARG002
         """Lowest and highest value of each influence over which a fit is valid; {} where none was measured."""
         return {}
 
-    def correlations(self, found: F) -> Correlations | None:  # noqa: ARG002
+    def correlations(self, fit: F) -> Correlations | None:  # noqa: ARG002
         """How the parameters of a fit go together; None where it is not known."""
         return None
 
-    def undetermined(self, found: F) -> str | None:  # noqa: ARG002
+    def undetermined(self, fit: F) -> str | None:  # noqa: ARG002
         """Why the data do not determine a model, in words."""
         return None
 
-    def untestable(self, found: F, effects: Mapping[str, Effect]) -> str | None:  # noqa: ARG002
+    def untestable(self, fit: F, effects: Mapping[str, Effect]) -> str | None:  # noqa: ARG002
         """The effects that these data cannot show, in words; None where they show all."""
         return None
 
@@ -158,7 +158,7 @@ class Dataset(ABC, Generic[F]):
         return False
 
     @abstractmethod
-    def errors_document(self, found: F) -> dict[str, Any]:
+    def errors_document(self, fit: F) -> dict[str, Any]:
         """Errors and noise by axis, for the JSON documents."""
 
     def comparison_fields(self, result: Comparison[F]) -> dict[str, Any]:  # noqa: ARG002
@@ -181,19 +181,19 @@ class Dataset(ABC, Generic[F]):
     def require_allowed(self, effect: Effect) -> None:
         """Raises ModelError where the effect is not defined for these data."""
 
-    def remarks(self, found: F) -> list[str]:  # noqa: ARG002
+    def remarks(self, fit: F) -> list[str]:  # noqa: ARG002
         """Sentences on an error that cannot be right."""
         return []
 
-    def cautions(self, found: F) -> list[str]:  # noqa: ARG002
+    def cautions(self, fit: F) -> list[str]:  # noqa: ARG002
         """Why a fit of these data may mislead."""
         return []
 
-    def doubts(self, found: F) -> list[str]:  # noqa: ARG002
+    def doubts(self, fit: F) -> list[str]:  # noqa: ARG002
         """What a fit shows to be wrong with its input."""
         return []
 
-    def noise_known(self, found: F) -> bool:  # noqa: ARG002
+    def noise_known(self, fit: F) -> bool:  # noqa: ARG002
         """Whether the noise is known independently of what a fit leaves."""
         return True
 
@@ -202,9 +202,9 @@ class Dataset(ABC, Generic[F]):
 
         `effects` are searched for where only the residual measures the noise.
         """
-        found = self.evaluate(model) or self.fit(model)
-        compared = Comparison(self, found, self.places(found), self.rejection(found))
-        if effects is None or not compared.adequate or self.noise_known(found):
+        fit = self.evaluate(model) or self.fit(model)
+        compared = Comparison(self, fit, self.places(fit), self.rejection(fit))
+        if effects is None or not compared.adequate or self.noise_known(fit):
             return compared
         return replace(compared, given=self.diagnose(model, effects).judgement)
 
@@ -214,10 +214,10 @@ class Dataset(ABC, Generic[F]):
 
     def discover(self, model: Model, effects: Mapping[str, Effect], enough: Enough | None = None) -> Discovery[F]:
         """The model with all effects that it misses, or those that make the error small enough. Raises ModelError."""
-        found = self.search(model, effects)
-        return Discovery.of(found if enough is None else self.until(found, enough))
+        findings = self.search(model, effects)
+        return Discovery.of(findings if enough is None else self.until(findings, enough))
 
-    def until(self, found: Findings[F], enough: Enough) -> Findings[F]:  # noqa: ARG002
+    def until(self, findings: Findings[F], enough: Enough) -> Findings[F]:  # noqa: ARG002
         """The findings up to the first model whose error on unseen data is small enough. Raises ModelError."""
         raise ModelError(f"{self.source}: the search in a still record has no error at which to stop; remove --enough")
 

@@ -26,7 +26,7 @@ UNITS: Mapping[str, tuple[str, str, float]] = {
     "g": (SENSED, "g", 1.0), "mg": (SENSED, "g", 1e-3), "ug": (SENSED, "g", 1e-6), "µg": (SENSED, "g", 1e-6),
     "deg/s": (SENSED, "deg/s", 1.0), "mdeg/s": (SENSED, "deg/s", 1e-3),
 }  # fmt: skip
-_WRITTEN = re.compile(r"\s*(?P<value>[+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(?P<unit>\S*)\s*")
+_PATTERN = re.compile(r"\s*(?P<value>[+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(?P<unit>\S*)\s*")
 
 
 @dataclass(frozen=True)
@@ -38,48 +38,49 @@ class Enough:
 
     @property
     def text(self) -> str:
-        """As a person writes it."""
+        """The error in words."""
         return f"{self.value:g} noise floors" if self.of == "floors" else f"{self.value:g} {self.of}"
 
-    def limit(self, found: Fit) -> float:
-        """The same in noise floors of a fit. Raises ModelError where the data have another unit."""
+    def limit(self, fit: Fit) -> float:
+        """The error in noise floors of a fit. Raises ModelError if the data have another unit."""
         if self.of == "floors":
             return self.value
         measures, base, factor = UNITS[self.of]
-        if measures == SENSED and one_orientation(found.table):
+        if measures == SENSED and one_orientation(fit.table):
             raise ModelError(
                 f"an error of {self.text} cannot be asked of data at one orientation, which do not show the scale "
-                f"factor; give it in {unit(found.table.unit)} or floors"
+                f"factor; give it in {unit(fit.table.unit)} or floors"
             )
-        has = found.table.unit if measures == OUTPUT else found.table.input_unit
-        if base != has:
-            other = found.table.input_unit if measures == OUTPUT else found.table.unit
+        data_unit = fit.table.unit if measures == OUTPUT else fit.table.input_unit
+        if base != data_unit:
+            other_unit = fit.table.input_unit if measures == OUTPUT else fit.table.unit
             raise ModelError(
-                f"an error of {self.text} cannot be asked of this data, whose outputs are in {unit(found.table.unit)} "
-                f"and whose input is in {unit(found.table.input_unit)}; give it in {unit(has)}, {unit(other)} or floors"
+                f"an error of {self.text} cannot be asked of this data, whose outputs are in {unit(fit.table.unit)} "
+                f"and whose input is in {unit(fit.table.input_unit)}; give it in {unit(data_unit)}, {unit(other_unit)} "
+                "or floors"
             )
-        floor = found.noise.floor if measures == OUTPUT else in_milli(found.noise.floor, found) / 1e3
+        floor = fit.noise.floor if measures == OUTPUT else in_milli(fit.noise.floor, fit) / 1e3
         return self.value * factor / _pooled(floor)
 
-    def error(self, found: Fit) -> str:
+    def error(self, fit: Fit) -> str:
         """The error on unseen data, in this unit."""
         if self.of == "floors":
-            return f"{rounded(found.held_out_excess)} noise floors"
+            return f"{rounded(fit.held_out_excess)} noise floors"
         measures, base, _ = UNITS[self.of]
-        floor = found.noise.floor if measures == OUTPUT else in_milli(found.noise.floor, found) / 1e3
-        value = found.held_out_excess * _pooled(floor)
+        floor = fit.noise.floor if measures == OUTPUT else in_milli(fit.noise.floor, fit) / 1e3
+        value = fit.held_out_excess * _pooled(floor)
         scale, name = prefixed(base, value)
         return f"{rounded(scale * value)} {name}"
 
 
 def parse_enough(text: str) -> Enough:
     """`0.5mg`, `2 mV` or `1.5floors`. Raises ModelError."""
-    found = _WRITTEN.fullmatch(text)
+    match = _PATTERN.fullmatch(text)
     try:
-        value = float(found["value"]) if found else np.nan
+        value = float(match["value"]) if match else np.nan
     except ValueError:
         value = np.nan
-    name = found["unit"] if found else ""
+    name = match["unit"] if match else ""
     if not value > 0 or not np.isfinite(value) or (name not in UNITS and name not in FLOORS):
         raise ModelError(f'"{text}" is no error at which to stop; give a number with mg, mV or floors, such as 0.5mg')
     return Enough(value, "floors" if name in FLOORS else name)
@@ -88,21 +89,21 @@ def parse_enough(text: str) -> Enough:
 def until(findings: Findings[Fit], enough: Enough) -> Findings[Fit]:
     """The findings up to the first model whose error on unseen data is small enough. Raises ModelError."""
     fits = [findings.baseline, *(step.after for step in findings.steps)]
-    k = next((k for k, found in enumerate(fits) if found.held_out_excess <= enough.limit(found)), None)
+    k = next((k for k, fit in enumerate(fits) if fit.held_out_excess <= enough.limit(fit)), None)
     if k is None:
         error = enough.error(findings.end)
         remark = f"The error on {findings.data.unseen} is {error}, more than asked ({enough.text})."
         return replace(findings, remarks=(*findings.remarks, remark))
-    kept, rest = findings.steps[:k], findings.steps[k:]
-    names = {step.name for step in kept}
+    kept_steps, omitted_steps = findings.steps[:k], findings.steps[k:]
+    names = {step.name for step in kept_steps}
     remark = f"The error on {findings.data.unseen} is {enough.error(fits[k])}, as small as asked ({enough.text})."
-    if rest:
-        remark += f" Left out: {joined([step.name for step in rest])}."
+    if omitted_steps:
+        remark += f" Left out: {joined([step.name for step in omitted_steps])}."
     return replace(
         findings,
-        steps=kept,
+        steps=kept_steps,
         causes=tuple(cause for cause in findings.causes if cause in names),
-        alternatives={name: others for name, others in findings.alternatives.items() if name in names},
+        alternatives={name: rivals for name, rivals in findings.alternatives.items() if name in names},
         separations={name: plan for name, plan in findings.separations.items() if name in names},
         places=tuple(p for p in findings.places if names & {*p.causes, f"{PREFIX}{p.name}"}),
         left=None,

@@ -1,4 +1,4 @@
-"""What a search in data of any kind finds.
+"""The findings of a search in data of any kind.
 
 FittedModel  a model fitted to data, as the loop needs it
 Place        a place where a model fails
@@ -43,7 +43,7 @@ class Measured(Protocol):
 
     @property
     def constants(self) -> Mapping[str, str | float]:
-        """What is known of the sensor."""
+        """Known constants of the sensor."""
 
 
 class FittedModel(Protocol):
@@ -132,7 +132,7 @@ class Step(Generic[F]):
 
 @dataclass(frozen=True, kw_only=True)
 class Findings(Generic[F]):
-    """All that one search found. Diagnosis and discovery are two views of it, so that they cannot disagree.
+    """The findings of one search. Diagnosis and discovery are two views of them, so that they cannot disagree.
 
     data          the data
     start         the given model
@@ -202,10 +202,10 @@ class Findings(Generic[F]):
 
     @cached_property
     def given(self) -> Judgement:
-        """The judgement on the given model; on the one before the added effects where no further one is missing."""
-        begun = self.origin if self.added and not self._lacking else self.start
+        """The judgement on the given model; on the model before the added effects if no further effect is missing."""
+        judged = self.origin if self.added and not self._missing else self.start
         return Judgement(
-            model=begun.model.name, missing=self._lacking, added=self.added, undetermined=self.undetermined[0],
+            model=judged.model.name, missing=self._missing, added=self.added, undetermined=self.undetermined[0],
             closest=self._closest, provisional=not self.settled, **self._common,
         )  # fmt: skip
 
@@ -218,7 +218,7 @@ class Findings(Generic[F]):
         )  # fmt: skip
 
     @property
-    def _lacking(self) -> tuple[str, ...]:
+    def _missing(self) -> tuple[str, ...]:
         """The effects of the steps. A curve at an unknown place has the name of its place."""
         unknown = any(place.unknown for place in self.places)
         return tuple(name for name in self.names if not (unknown and name.startswith("free:")))
@@ -242,17 +242,17 @@ class Findings(Generic[F]):
 
     @property
     def _closest(self) -> Closest | None:
-        """The best candidate where nothing is significant, if chance alone seldom shows as much."""
+        """The best candidate if no effect is significant, and if chance alone seldom shows as much."""
         best = next(iter(self.candidates), None)
         if self.steps or best is None or best.held_out_after >= self.baseline.held_out_excess:
             return None
-        near = best.p_value < NOTEWORTHY or best.probability > LIKELY
-        return Closest(best.name, best.p_value) if near else None
+        noteworthy = best.p_value < NOTEWORTHY or best.probability > LIKELY
+        return Closest(best.name, best.p_value) if noteworthy else None
 
     def experiment(self, names: tuple[str, ...]) -> Experiment | None:
         """The experiment for the first of these effects that is in doubt, or for anything else in doubt."""
         return next((self.separations[name] for name in names if name in self.separations), self.further)
 
     def without_steps(self) -> Self:
-        """The same, with no effect named: the residual makes all of them doubtful."""
+        """The findings without named effects: the residual makes all of them doubtful."""
         return replace(self, steps=(), tried=self.steps, causes=(), alternatives={}, separations={}, settled=True)

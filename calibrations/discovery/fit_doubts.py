@@ -1,7 +1,7 @@
-"""What a fit shows to be wrong with its input: noise that was stated wrongly, and parameters that no sensor has.
+"""Doubts about the input of a fit: noise that is stated wrongly, and parameters that no sensor has.
 
 floor        the error is far below the noise floor, or far above it without any pattern: std, n or a constant is wrong
-misfit       the model leaves a part of the output that is larger than effects of a sensor
+misfit       the residual is larger than effects of a sensor
 response     a scale factor that is 0 within its uncertainty, negative, unlike the other axes, or unlike the unit
 
 Source  von Neumann, Ann. Math. Statist. 12 (1941): the mean square of successive differences shows a pattern.
@@ -23,7 +23,7 @@ from calibrations.criteria import (
     V_PER_G,
     WRONG_FLOOR,
 )
-from calibrations.discovery.outliers import told
+from calibrations.discovery.outliers import outlier_text
 from calibrations.estimators.robust import robust_std
 from calibrations.fitting.fit import Fit
 from calibrations.geometry.orientation import one_orientation
@@ -34,46 +34,46 @@ from calibrations.tables import Kind
 SCALES = ("scale-factor", "gyro-scale-factor")
 INDEPENDENT = 0.75  # of the successive differences' mean square over twice the variance: 1 without a pattern
 UNEVEN = 1.5  # ratio of the 90 % and 10 % quantiles of a standard deviation: that of thousands of samples is known well
-LEAST_KEPT = 0.7  # of an rms
+LEAST_REMAINDER = 0.7  # of an rms
 FARTHEST = 10.0  # robust standard deviations of the other rows
 FEW_ROWS = 0.15  # of all: more are no outliers
 _ANGLES = ("alpha_deg", "beta_deg")
-NEAR = 1.3  # ratio up to which a factor is taken for the one of a mistake
+SAME_FACTOR = 1.3  # largest ratio between a factor and that of a mistake
 ROWS_APART = 3.0  # standard uncertainties of a scale factor
 RATE_UNITS = {"rad/s": 180 / np.pi, "revolutions a minute": 6.0, "revolutions a second": 360.0}  # in deg/s
 
 
-def fit_doubts(found: Fit) -> tuple[str, ...]:
+def fit_doubts(fit: Fit) -> tuple[str, ...]:
     """All doubts about the input of a fit, () for a healthy one."""
-    return (*_response(found), *_floor(found), *_outliers(found), *_misfit(found))
+    return (*_response(fit), *_floor(fit), *_outliers(fit), *_misfit(fit))
 
 
-def _floor(found: Fit) -> Iterator[str]:
+def _floor(fit: Fit) -> Iterator[str]:
     """A noise floor that is far too high or too low."""
-    if not found.noise.known or found.table.n < FEWEST_FOR_FLOOR or found.table.type.moving:
+    if not fit.noise.known or fit.table.n < FEWEST_FOR_FLOOR or fit.table.type.moving:
         return
-    low = [k for k, excess in enumerate(found.excess) if excess < WRONG_FLOOR]
-    if low and not _uneven_std(found):
-        least = float(np.min(found.excess))
-        names = ", ".join(found.channels[k] for k in low)
+    low = [k for k, excess in enumerate(fit.excess) if excess < WRONG_FLOOR]
+    if low and not _uneven_std(fit):
+        lowest = float(np.min(fit.excess))
+        names = ", ".join(fit.channels[k] for k in low)
         yield (
-            f"the error of {names} is only {least:.2g} times the noise floor: "
-            f"{_cause(found, 1 / max(least, 1e-9), high=True)}; the uncertainties are too large"
+            f"the error of {names} is only {lowest:.2g} times the noise floor: "
+            f"{_cause(fit, 1 / max(lowest, 1e-9), high=True)}; the uncertainties are too large"
         )
         return
-    noisy = [k for k in range(len(found.channels)) if _without_pattern(found, k)]
+    noisy = [k for k in range(len(fit.channels)) if _without_pattern(fit, k)]
     if noisy:
-        most = float(np.max(found.excess[noisy]))
-        names = ", ".join(found.channels[k] for k in noisy)
+        highest = float(np.max(fit.excess[noisy]))
+        names = ", ".join(fit.channels[k] for k in noisy)
         yield (
-            f"the rows of {names} scatter, without a pattern, {most:.3g} times more than std and n say: "
-            f"{_cause(found, most, high=False)}; the uncertainties are from the scatter"
+            f"the rows of {names} scatter, without a pattern, {highest:.3g} times more than std and n say: "
+            f"{_cause(fit, highest, high=False)}; the uncertainties are from the scatter"
         )
 
 
-def _cause(found: Fit, factor: float, *, high: bool) -> str:
+def _cause(fit: Fit, factor: float, *, high: bool) -> str:
     """The likeliest mistake that makes the floor wrong by `factor`, and what to check."""
-    table = found.table
+    table = fit.table
     white = white_std(table)
     general = "check the std columns (standard deviation of single samples), n, filter_corner_hz and sample_rate_hz"
     if white is None or "n" not in table:
@@ -90,35 +90,35 @@ def _cause(found: Fit, factor: float, *, high: bool) -> str:
             "std columns in thousands of the output's unit": 1e3,
         }
     )
-    likely = [text for text, of in causes.items() if 1 / NEAR < factor / of < NEAR]
+    likely = [text for text, expected in causes.items() if 1 / SAME_FACTOR < factor / expected < SAME_FACTOR]
     return f"it looks like {' or '.join(likely)}; {general}" if likely else general
 
 
-def _uneven_std(found: Fit) -> bool:
-    """Whether the samples scatter much more in some rows than in others, as vibration makes them: no floor is wrong."""
-    std = [found.table.column(name) for name in found.table.columns if "_std" in name]
-    return any(np.quantile(each, 0.9) > UNEVEN * np.quantile(each, 0.1) for each in std)
+def _uneven_std(fit: Fit) -> bool:
+    """Whether the scatter of samples differs much from row to row, as under vibration: then no floor is wrong."""
+    std = [fit.table.column(name) for name in fit.table.columns if "_std" in name]
+    return any(np.quantile(column, 0.9) > UNEVEN * np.quantile(column, 0.1) for column in std)
 
 
-def _without_pattern(found: Fit, channel: int) -> bool:
+def _without_pattern(fit: Fit, channel: int) -> bool:
     """Whether a residual is far above the floor, and its rows are independent in time, in angle and in size."""
-    if found.excess[channel] < MUCH_MORE_THAN_NOISE:
+    if fit.excess[channel] < MUCH_MORE_THAN_NOISE:
         return False
-    table = found.table
-    r = _beyond_squares(found.residual[channel], table)
-    if rms(r) < LEAST_KEPT * rms(found.residual[channel]) or robust_std(r) < LEAST_KEPT * rms(r):
-        return False  # an effect, or some rows that stand out: they are named elsewhere
+    table = fit.table
+    r = _beyond_squares(fit.residual[channel], table)
+    if rms(r) < LEAST_REMAINDER * rms(fit.residual[channel]) or robust_std(r) < LEAST_REMAINDER * rms(r):
+        return False  # an effect, or outliers: other checks name them
     orders = [np.arange(table.n)]
     if table.type.known_input and channel < len(table.axes):  # by what is predicted: a reading holds its own error
-        orders += [np.argsort(table.outputs[:, channel] - found.residual[channel], kind="stable")]
+        orders += [np.argsort(table.outputs[:, channel] - fit.residual[channel], kind="stable")]
     if table.type.stage_angles:
         orders += [np.lexsort((table.column(a), table.column(b))) for a, b in (_ANGLES, _ANGLES[::-1])]
-    least = min(INDEPENDENT, 1 - 2.5 / np.sqrt(table.n))  # with few rows the ratio scatters
-    return all(_ratio(r[order]) > least for order in orders)
+    limit = min(INDEPENDENT, 1 - 2.5 / np.sqrt(table.n))  # with few rows the ratio scatters
+    return all(_ratio(r[order]) > limit for order in orders)
 
 
 def _beyond_squares(r: Array, table: Table) -> Array:
-    """What outputs, temperature, supply, time and their products leave of a residual, scaled for their freedom."""
+    """The residual of a regression on outputs, temperature, supply, time and products, scaled for its freedom."""
     v = (table.outputs - table.outputs.mean(axis=0)) / np.maximum(table.outputs.std(axis=0), np.finfo(float).tiny)
     rows, columns = np.triu_indices(v.shape[1])
     parts = [np.ones(len(v)), v, v[:, rows] * v[:, columns]]
@@ -134,52 +134,52 @@ def _ratio(x: Array) -> float:
     return float(np.mean(np.diff(x) ** 2) / 2 / np.var(x))
 
 
-def _outliers(found: Fit) -> Iterator[str]:
-    """Rows far from all others; those of poses are found by `outliers`, which knows what is around them."""
-    table = found.table
+def _outliers(fit: Fit) -> Iterator[str]:
+    """Rows far from all others. The module `outliers` finds those of poses, by their neighbours."""
+    table = fit.table
     if table.type.stage_angles or table.type.moving or table.n < FEWEST_RESPONSE_ROWS:
         return
-    if not found.noise.known or found.pooled_excess < MUCH_MORE_THAN_NOISE:
+    if not fit.noise.known or fit.pooled_excess < MUCH_MORE_THAN_NOISE:
         return
-    spread = np.maximum(robust_std(found.residual, axis=1), rms(found.noise.white))[:, None]
-    rows = np.flatnonzero(np.any(np.abs(found.residual) > FARTHEST * spread, axis=0))
+    spread = np.maximum(robust_std(fit.residual, axis=1), rms(fit.noise.white))[:, None]
+    rows = np.flatnonzero(np.any(np.abs(fit.residual) > FARTHEST * spread, axis=0))
     if 0 < len(rows) <= FEW_ROWS * table.n:
         yield (
-            f"{told(tuple(map(int, table.numbered(rows))), 'rows')} (counted from 0): the sensor moved, or "
+            f"{outlier_text(tuple(map(int, table.numbered(rows))), 'rows')} (counted from 0): the sensor moved, or "
             "readings are missing; check them, and leave them out by a column `excluded` with 1"
         )
 
 
-def _misfit(found: Fit) -> Iterator[str]:
-    """A model that leaves more than the effects of a sensor."""
-    table = found.table
+def _misfit(fit: Fit) -> Iterator[str]:
+    """A residual that is larger than the effects of a sensor."""
+    table = fit.table
     if table.n < FEWEST_RESPONSE_ROWS and not table.type.moving:
         return
     if table.type.moving:
-        if found.noise.known and found.pooled_excess > MUCH_MORE_THAN_NOISE:
+        if fit.noise.known and fit.pooled_excess > MUCH_MORE_THAN_NOISE:
             yield (
-                f"the model leaves {found.pooled_excess:.3g} times the noise: it does not follow the motion; "
+                f"the model leaves {fit.pooled_excess:.3g} times the noise: it does not follow the motion; "
                 "check filter_corner_hz, the delay and the unit of displacement_m, and the attitude, then use "
                 "`rig diagnose`"
             )
         return
     if one_orientation(table):
-        return  # an output at rest varies by nothing but what the model may lack
+        return  # an output at rest varies only by effects that the model may lack
     size = np.ones(1) if table.type.magnitude else table.outputs.std(axis=0)
-    share = float(np.max(found.rmse / np.maximum(size, np.finfo(float).tiny)))
+    share = float(np.max(fit.rmse / np.maximum(size, np.finfo(float).tiny)))
     if share > LARGEST_MISFIT:
-        what = "magnitude" if table.type.magnitude else "variation of an output"
+        quantity = "magnitude" if table.type.magnitude else "variation of an output"
         yield (
-            f"the model leaves {share:.0%} of the {what}, more than effects of a sensor: the values cannot be used; "
-            "check units, rounding and the order of rows and columns, then use `rig diagnose`"
+            f"the model leaves {share:.0%} of the {quantity}, more than effects of a sensor: the values cannot be "
+            "used; check units, rounding and the order of rows and columns, then use `rig diagnose`"
         )
 
 
-def _response(found: Fit) -> Iterator[str]:
+def _response(fit: Fit) -> Iterator[str]:
     """Scale factors that no sensor has."""
-    table, kind = found.table, found.table.type
+    table, kind = fit.table, fit.table.type
     known = [
-        e for name in SCALES for e in found.model.estimates(name)
+        e for name in SCALES for e in fit.model.estimates(name)
         if e.axis and e.std is not None and (e.identified or e.std > 0) and e.name in ("scale_factor", "scale", name)
     ]  # fmt: skip
     if not known:
@@ -216,7 +216,7 @@ def _response(found: Fit) -> Iterator[str]:
             for name, of in RATE_UNITS.items()
             for u, size in ((f"rate_deg_s in {name}", of), (f"outputs in {name}", 1 / of))
         }
-        likely = [text for text, of in units.items() if 1 / NEAR < value / of < NEAR]
+        likely = [text for text, of in units.items() if 1 / SAME_FACTOR < value / of < SAME_FACTOR]
         fits = f"it looks like {' or '.join(likely)}" if likely else "the unit of rate_deg_s or of the outputs is wrong"
         yield f"outputs in deg/s have a scale factor of {value:.4g}; {fits}: state the unit of each column"
 

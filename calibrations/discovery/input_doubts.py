@@ -1,7 +1,7 @@
-"""What a person should check in a table before any model is fitted: times, repeated values, rounding, constants.
+"""Doubts about a table before any model is fitted: times, repeated values, rounding, constants.
 
-Each doubt is a sentence on what is odd, where, and what to do. A table with doubts is still used: a saturated output or
-a coarse converter is a property of the sensor, and a person decides.
+A doubt is a sentence with the observation, its place, and the action to take. The program still uses a table with
+doubts: a saturated output or a coarse converter is a property of the sensor, and a person decides.
 
 equal values   exactly one value in several rows, where nearly all other rows differ: saturation at an end of the
                range, a placeholder for a missing reading inside it
@@ -33,19 +33,19 @@ from calibrations.means.noise import norm_std, rms, white_std
 from calibrations.table import Array, Table
 
 FIELD_UNITS = {"nT": 1e3, "mG": 10.0, "G": 1e-2, "mT": 1e-3}  # of one uT
-BESIDE_RANGE = 0.25  # of the range of the other values: farther away is no end of the range
+END_OF_RANGE = 0.25  # of the range of the other values: farther away is no end of the range
 FEWEST_ON_ELLIPSOID = 15  # rows: nine parameters, and some to test them
 WIDEST = 10.0  # times the noise of a mean, by the widest form of a kind
 
 
 def doubts(table: Table) -> tuple[str, ...]:
     """All doubts about a table, () for a healthy one."""
-    each = (_times, _copies, _equal_values, _rounded, _field, _beyond_widest)
-    return tuple(text for check in each for text in check(table))
+    checks = (_times, _copies, _equal_values, _rounded, _field, _beyond_widest)
+    return tuple(text for check in checks for text in check(table))
 
 
 def _times(table: Table) -> Iterator[str]:
-    """Times that do not go on, or are too near or too far for a stage."""
+    """Times that stop, repeat, or are too short or too long for a stage."""
     if "t_s" not in table or table.n < FEWEST_RESPONSE_ROWS:
         return
     t_s = table.column("t_s")
@@ -55,11 +55,11 @@ def _times(table: Table) -> Iterator[str]:
     if table.kind == "motion":
         yield from _sample_rate(table, t_s)
         return
-    again = int(np.count_nonzero(np.diff(np.sort(t_s)) == 0))
-    if again:
+    repeated = int(np.count_nonzero(np.diff(np.sort(t_s)) == 0))
+    if repeated:
         yield (
-            f"{again} rows have the time of another row, as of a clock that began again or of two files in one; rows "
-            "are ordered by t_s: correct the times, or separate the files"
+            f"{repeated} rows have the time of another row, as of a clock that began again or of two files in one; "
+            "rows are ordered by t_s: correct the times, or separate the files"
         )
     elif table.type.stage_angles:
         poses = np.column_stack([table.column("alpha_deg"), table.column("beta_deg")])[table.order]
@@ -83,36 +83,38 @@ def _equal_values(table: Table) -> Iterator[str]:
         return
     for name in (*table.output_names, *(n for n in ("temperature_c", "supply_v") if n in table)):
         values = table.column(name)
-        each, counts = np.unique(values, return_counts=True)
-        if len(each) < 2:
+        levels, counts = np.unique(values, return_counts=True)
+        if len(levels) < 2:
             continue
-        most = int(np.argmax(counts))
-        count, value = int(counts[most]), float(each[most])
-        if count < TIMES_NEXT * np.delete(counts, most).max():
+        mode = int(np.argmax(counts))
+        count, value = int(counts[mode]), float(levels[mode])
+        if count < TIMES_NEXT * np.delete(counts, mode).max():
             continue  # a coarse reading repeats many values by chance
-        others = table.n - count
-        if count < max(FEWEST_EQUAL, EQUAL_SHARE * table.n) or len(each) - 1 < DISTINCT_SHARE * others:
+        other_rows = table.n - count
+        if count < max(FEWEST_EQUAL, EQUAL_SHARE * table.n) or len(levels) - 1 < DISTINCT_SHARE * other_rows:
             continue
-        rest = values[values != value]
-        place = f"{name} is exactly {value:g} in {count} of {table.n} rows, and the others all differ"
-        away = max(value - rest.max(), rest.min() - value)
-        if name in table.output_names and 0 < away < BESIDE_RANGE * np.ptp(rest):
-            end = "highest" if value > rest.max() else "lowest"
+        other_values = values[values != value]
+        repetition = f"{name} is exactly {value:g} in {count} of {table.n} rows, and the others all differ"
+        away = max(value - other_values.max(), other_values.min() - value)
+        if name in table.output_names and 0 < away < END_OF_RANGE * np.ptp(other_values):
+            end = "highest" if value > other_values.max() else "lowest"
             yield (
-                f"{place}: at its {end} value the output or the converter is saturated; take a wider range, or leave "
-                "these rows out"
+                f"{repetition}: at its {end} value the output or the converter is saturated; take a wider range, or "
+                "leave these rows out"
             )
-        elif away < 0 or abs(value - np.median(rest)) > FAR_FROM_OTHERS * robust_std(rest - np.median(rest)):
-            yield f"{place}: it may stand for a missing reading, or a stuck one; leave these rows out"
+        elif away < 0 or abs(value - np.median(other_values)) > FAR_FROM_OTHERS * robust_std(
+            other_values - np.median(other_values)
+        ):
+            yield f"{repetition}: it may stand for a missing reading, or a stuck one; leave these rows out"
 
 
 def _copies(table: Table) -> Iterator[str]:
-    """Columns that hold the same, and a reference that does not move."""
+    """Columns with equal values, and a reference that does not move."""
     names = table.output_names
     for k, name in enumerate(names):
-        for other in names[:k]:
-            if np.ptp(table.column(name)) > 0 and np.array_equal(table.column(name), table.column(other)):
-                yield f"{name} is equal to {other} in every row: one channel was read twice; check the channels"
+        for earlier in names[:k]:
+            if np.ptp(table.column(name)) > 0 and np.array_equal(table.column(name), table.column(earlier)):
+                yield f"{name} is equal to {earlier} in every row: one channel was read twice; check the channels"
     if table.kind == "motion" and np.ptp(table.column("displacement_m")) == 0:
         yield "displacement_m never changes: the displacement sensor is stuck or not connected; measure again"
 
@@ -123,14 +125,14 @@ def _rounded(table: Table) -> Iterator[str]:
     if white is None or not table.type.known_input or table.n < FEWEST_RESPONSE_ROWS:
         return
     for k, name in enumerate(table.output_names):
-        each = np.unique(table.outputs[:, k])
-        if len(each) < 3:
+        levels = np.unique(table.outputs[:, k])
+        if len(levels) < 3:
             continue
-        step = float(np.diff(each).min())
+        step = float(np.diff(levels).min())
         floor = float(rms(white[:, k]))
         if step / np.sqrt(12) < VISIBLE_STEP * floor:
             continue
-        steps = (each - each[0]) / step
+        steps = (levels - levels[0]) / step
         if np.max(np.abs(steps - np.round(steps))) < 1e-3:
             yield (
                 f"all values of {name} are multiples of {step:.3g} {table.unit}, {step / floor:.0f} times the noise of "
@@ -139,28 +141,28 @@ def _rounded(table: Table) -> Iterator[str]:
 
 
 def _field(table: Table) -> Iterator[str]:
-    """A field that is not the earth's, in the unit that a table states."""
+    """A field that is not the earth's in the stated unit."""
     if not table.type.field or table.unit != "uT":
         return
     size = sphere_radius(table)
     if EARTH_UT[0] <= size <= EARTH_UT[1]:
         return
-    unit = next((u for u, one in FIELD_UNITS.items() if EARTH_UT[0] <= size / one <= EARTH_UT[1]), None)
+    unit = next((u for u, size_in_ut in FIELD_UNITS.items() if EARTH_UT[0] <= size / size_in_ut <= EARTH_UT[1]), None)
     fits = f"the outputs look like {unit}: state this unit" if unit else "check the unit, or state `counts`"
     yield f"the field is {size:.4g} uT, and the earth's is {EARTH_UT[0]:g} to {EARTH_UT[1]:g} uT; {fits}"
 
 
 def _beyond_widest(table: Table) -> Iterator[str]:
-    """Rows that even the widest form of their kind does not describe, by far."""
+    """Rows that even the most general model of their kind does not describe."""
     white = white_std(table)
     if white is None or not (table.type.widest_form or table.type.magnitude):
         return
     magnitude = table.type.magnitude
-    left = beyond_ellipsoid(table)[:, None] if magnitude and table.n > FEWEST_ON_ELLIPSOID else scatter(table)
-    if left is None:
+    remainder = beyond_ellipsoid(table)[:, None] if magnitude and table.n > FEWEST_ON_ELLIPSOID else scatter(table)
+    if remainder is None:
         return
     floor = rms((norm_std(table, white) / sphere_radius(table)).T) if magnitude else rms(white.T)
-    times = float(np.max(rms(left) / floor))
+    times = float(np.max(rms(remainder) / floor))
     if times > WIDEST:
         yield (
             f"{table.type.widest_form or 'an ellipsoid'} leaves {times:.0f} times the noise that the samples of a mean "

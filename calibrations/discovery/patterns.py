@@ -68,12 +68,12 @@ WORDS = {
 
 def patterns(table: Table, channels: tuple[str, ...]) -> list[Pattern]:
     """Every pattern that the table's columns can show; rows in order of time."""
-    found = [*_in_time(table), *_in_columns(table)]
+    all_patterns = [*_in_time(table), *_in_columns(table)]
     if table.type.stage_angles:
-        found += [*_in_angles(table), *_in_stage(table, len(channels))]
+        all_patterns += [*_in_angles(table), *_in_stage(table, len(channels))]
     if table.type.moving:
-        found += [*_in_parts(table, channels), *at_attitudes(table, channels)]
-    return [per_channel(p, len(channels)) for p in found if np.ptp(p.columns) > 0]
+        all_patterns += [*_in_parts(table, channels), *at_attitudes(table, channels)]
+    return [per_channel(p, len(channels)) for p in all_patterns if np.ptp(p.columns) > 0]
 
 
 def at_attitudes(table: Table, channels: tuple[str, ...]) -> list[Pattern]:
@@ -81,14 +81,14 @@ def at_attitudes(table: Table, channels: tuple[str, ...]) -> list[Pattern]:
     attitudes = np.column_stack([np.round(table.optional(name, 0.0), 1) for name in ("alpha_deg", "beta_deg")])
     distinct = np.unique(attitudes, axis=0)
     means = [c for c, name in enumerate(channels) if name.endswith(" mean")]
-    found = []
+    offsets = []
     for alpha, beta in distinct if len(distinct) >= FEWEST_ATTITUDES else ():
         columns = np.zeros((len(channels), table.n, len(means)))
         for k, c in enumerate(means):
             columns[c, :, k] = np.all(attitudes == (alpha, beta), axis=1)
         text = f"an offset at alpha = {alpha:g} deg, beta = {beta:g} deg only"
-        found.append(Pattern(text, columns, price=2 * float(np.log(len(distinct)))))
-    return found
+        offsets.append(Pattern(text, columns, price=2 * float(np.log(len(distinct)))))
+    return offsets
 
 
 def per_channel(pattern: Pattern, channels: int) -> Pattern:
@@ -108,13 +108,13 @@ def one_sided(pattern: Pattern, table: Table) -> list[Pattern]:
         return []
     direction = table.optional("direction", 0.0)
     sides = {"clockwise": ">", "anticlockwise": "<"} if np.ptp(direction) > 0 else {}
-    found = []
+    sided = []
     for word, sign in sides.items():
         rows = direction > 0 if sign == ">" else direction < 0
-        target, plus, of = pattern.expression.rpartition("+= ")
-        expression = f"{target}{plus}(direction {sign} 0)*({of})" if of else ""
+        target, plus, formula = pattern.expression.rpartition("+= ")
+        expression = f"{target}{plus}(direction {sign} 0)*({formula})" if formula else ""
         columns = pattern.columns * rows[None, :, None]
-        found.append(
+        sided.append(
             replace(
                 pattern,
                 text=f"{pattern.text}, turning {word} only",
@@ -123,7 +123,7 @@ def one_sided(pattern: Pattern, table: Table) -> list[Pattern]:
                 price=PATTERN_BETTER,
             )
         )
-    return found
+    return sided
 
 
 def _in_time(table: Table) -> Iterator[Pattern]:
@@ -132,8 +132,8 @@ def _in_time(table: Table) -> Iterator[Pattern]:
     trend, expression = ("trend with time", "a*t + b*t**2") if named else ("trend from row to row", "")
     yield Pattern(trend, np.column_stack([u, u**2]), expression, slow=True)
     inner = np.unique(np.linspace(2, table.n - 3, min(STEPS, max(table.n - 4, 1))).astype(int))
-    for k, near in zip(inner, _between(inner, table.n), strict=True):
-        yield replace(_step(table, k), finer=partial(_steps, table, near))
+    for k, rows in zip(inner, _between(inner, table.n), strict=True):
+        yield replace(_step(table, k), finer=partial(_steps, table, rows))
     if named:
         starts = np.quantile(t, np.linspace(0, 1, RAMPS + 2))
         for low, start, high in zip(starts[:-2], starts[1:-1], starts[2:], strict=True):
@@ -170,7 +170,7 @@ def _between(places: Array, n: int) -> list[Array]:
     """For each of the places in a row of n the rows up to its neighbours."""
     edges = np.concatenate([[1], places, [n - 1]])
     rows = [np.arange(a, b + 1) for a, b in zip(edges[:-2], edges[2:], strict=True)]
-    return [each[:: 1 + len(each) // NEIGHBOURS] for each in rows]
+    return [span[:: 1 + len(span) // NEIGHBOURS] for span in rows]
 
 
 def _steps(table: Table, rows: Array) -> list[Pattern]:
@@ -200,9 +200,9 @@ def _in_columns(table: Table) -> Iterator[Pattern]:
         yield Pattern(f"follows {words}", np.column_stack([u, u**2]) if curved else u[:, None], expression)
         if len(levels) >= FEWEST_LEVELS:
             places = np.unique(np.linspace(2, len(levels) - 3, LEVELS).astype(int))
-            for k, near in zip(places, _between(places, len(levels)), strict=True):
+            for k, rows in zip(places, _between(places, len(levels)), strict=True):
                 levelled = partial(_level, values, levels, (words, unit, short))
-                yield replace(levelled(k), finer=partial(_levels, levelled, near))
+                yield replace(levelled(k), finer=partial(_levels, levelled, rows))
 
 
 def _levels(levelled: Callable[[int], Pattern], places: Array) -> list[Pattern]:
@@ -218,8 +218,8 @@ def _level(values: Array, levels: Array, words: tuple[str, str, str], k: int) ->
 
 def _in_parts(table: Table, channels: tuple[str, ...]) -> Iterator[Pattern]:
     """A part of the motion that is off alike in every stretch."""
-    for channel, one in zip(channels, np.eye(len(channels)), strict=True):
-        yield Pattern(f"{channel} is off throughout", np.tile(one[:, None, None], (1, table.n, 1)))
+    for channel, indicator in zip(channels, np.eye(len(channels)), strict=True):
+        yield Pattern(f"{channel} is off throughout", np.tile(indicator[:, None, None], (1, table.n, 1)))
 
 
 def _in_angles(table: Table) -> Iterator[Pattern]:
@@ -269,13 +269,13 @@ def _in_stage(table: Table, channels: int) -> Iterator[Pattern]:
         ("alpha", "beta", ROCKING),
     ):
         turned = replace(pose, **{angle: getattr(pose, angle) + 1e-6})
-        felt = ((specific_force(turned) - specific_force(pose)) / 1e-6).T[:channels, :, None]
+        force_change = ((specific_force(turned) - specific_force(pose)) / 1e-6).T[:channels, :, None]
         degrees = table.column(f"{along}_deg")
-        where = f"the stage angle {angle}" if angle == along else f"{along} in the stage angle {angle}"
+        angle_words = f"the stage angle {angle}" if angle == along else f"{along} in the stage angle {angle}"
         for k in numbers:
             if len(np.unique(degrees)) > 2 * k:
-                text, waves = f"{_ordinal(k)} harmonic of {where}", _waves(k * np.radians(degrees))
-                yield Pattern(text, felt * waves[None], f"{angle}_deg += {_harmonic(k, along)}")
+                text, waves = f"{_ordinal(k)} harmonic of {angle_words}", _waves(k * np.radians(degrees))
+                yield Pattern(text, force_change * waves[None], f"{angle}_deg += {_harmonic(k, along)}")
 
 
 def _waves(turned: Array) -> Array:

@@ -40,7 +40,7 @@ SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # of the sensor, that gravity or t
 class _Stretch:
     """Rows of a table in which a column lies between `low` and `high`, and the residual of one channel there."""
 
-    where: str
+    coordinate: str
     low: float
     high: float
     channel: str
@@ -49,87 +49,87 @@ class _Stretch:
     unit: str
     scale: float  # output per g, field or deg/s of that channel; 1 for a residual in those
     milli: str  # a thousandth of the sensed unit
-    named: str  # the stretch in words
+    words: str  # the stretch in words
 
     @property
     def place(self) -> Place:
         """The stretch as a place of a comparison."""
-        return Place(self.where, self.low, self.high, axis_of(self.channel), self.excess, self._text)
+        return Place(self.coordinate, self.low, self.high, axis_of(self.channel), self.excess, self._text)
 
     @property
     def _text(self) -> str:
         """The place in words, with the mean residual there in the output's unit and in the sensed unit."""
-        mg = 1e3 * self.mean / self.scale
-        own = f"{1e3 * self.mean:+.3g} mV" if self.unit == "V" else f"{self.mean:+.3g} {self.unit}"
+        milli_value = 1e3 * self.mean / self.scale
+        output_text = f"{1e3 * self.mean:+.3g} mV" if self.unit == "V" else f"{self.mean:+.3g} {self.unit}"
         sensed = self.unit in ("g", "field") or self.milli == f"m{self.unit}"
-        value = f"{mg:+.3g} {self.milli}" if sensed else f"{own} ({mg:+.3g} {self.milli})"
-        return f"{self.named}: {self.channel} is off by {value} on average, rms {self.excess:.3g} x the noise floor"
+        value = f"{milli_value:+.3g} {self.milli}" if sensed else f"{output_text} ({milli_value:+.3g} {self.milli})"
+        return f"{self.words}: {self.channel} is off by {value} on average, rms {self.excess:.3g} x the noise floor"
 
 
-def places(found: Fit) -> tuple[Place, ...]:
+def places(fit: Fit) -> tuple[Place, ...]:
     """The worst places where a model fails."""
-    return tuple(each.place for each in _fails(found)[:MOST_PLACES])
+    return tuple(stretch.place for stretch in _failing_stretches(fit)[:MOST_PLACES])
 
 
-def rows_at(found: Fit, place: Place) -> NDArray[np.intp]:
+def rows_at(fit: Fit, place: Place) -> NDArray[np.intp]:
     """The rows of a place, as indices of the fit's table; empty for a place of another fit."""
-    for where, low, high, rows in (*_parts(found.table), *_sides(found)):
-        if (where, low, high) == (place.where, place.low, place.high):
+    for coordinate, low, high, rows in (*_parts(fit.table), *_sides(fit)):
+        if (coordinate, low, high) == (place.where, place.low, place.high):
             return rows
     return np.zeros(0, np.intp)
 
 
-def _fails(found: Fit) -> list[_Stretch]:
+def _failing_stretches(fit: Fit) -> list[_Stretch]:
     """Places where the residual is more than noise, worst first; at most one for each column and channel."""
-    tried: list[_Stretch] = []
+    stretches: list[_Stretch] = []
     chances: list[float] = []
-    scale = scales(found)
-    unit, milli = found.problem.unit, milli_unit(found)
-    floor = found.noise.floor
-    by_noise = _by_noise(found)
-    for where, low, high, rows in (*_parts(found.table), *_sides(found)):
-        for c, channel in enumerate(found.channels):
-            r = found.residual[c, rows]
+    scale = scales(fit)
+    unit, milli = fit.problem.unit, milli_unit(fit)
+    floor = fit.noise.floor
+    by_noise = _by_noise(fit)
+    for coordinate, low, high, rows in (*_parts(fit.table), *_sides(fit)):
+        for c, channel in enumerate(fit.channels):
+            r = fit.residual[c, rows]
             excess = float(rms(r) / floor[c])
-            named = _named(found.table, where, low, high)
+            words = _stretch_words(fit.table, coordinate, low, high)
             mean, size = float(r.mean()), float(scale[c])
-            tried.append(_Stretch(where, low, high, channel, excess, mean, unit, size, milli, named))
+            stretches.append(_Stretch(coordinate, low, high, channel, excess, mean, unit, size, milli, words))
             chances.append(float(chdtrc(len(r), np.sum(by_noise[c, rows] ** 2))))
-    if not tried:
+    if not stretches:
         return []
-    limit = SIGNIFICANT / len(tried)
-    bad = [k for k, p in enumerate(tried) if chances[k] < limit and p.excess > MATERIAL]
-    overall = {channel: (found.excess[c], floor[c]) for c, channel in enumerate(found.channels)}
-    bad = [k for k in bad if _stands_out(tried[k], *overall[tried[k].channel])] or bad[:1]
-    bad.sort(key=lambda k: tried[k].excess, reverse=True)
-    first = {(tried[k].where, tried[k].channel): k for k in reversed(bad)}
-    return [tried[k] for k in bad if first[tried[k].where, tried[k].channel] == k]
+    limit = SIGNIFICANT / len(stretches)
+    bad = [k for k, p in enumerate(stretches) if chances[k] < limit and p.excess > MATERIAL]
+    overall = {channel: (fit.excess[c], floor[c]) for c, channel in enumerate(fit.channels)}
+    bad = [k for k in bad if _stands_out(stretches[k], *overall[stretches[k].channel])] or bad[:1]
+    bad.sort(key=lambda k: stretches[k].excess, reverse=True)
+    first = {(stretches[k].coordinate, stretches[k].channel): k for k in reversed(bad)}
+    return [stretches[k] for k in bad if first[stretches[k].coordinate, stretches[k].channel] == k]
 
 
-def _named(table: Table, where: str, low: float, high: float) -> str:
+def _stretch_words(table: Table, coordinate: str, low: float, high: float) -> str:
     """A stretch in words; times of a run as its pictures show them."""
-    if where == "side":
+    if coordinate == "side":
         return f"side {SIDES[round(low)]}"
-    if where == "direction":
+    if coordinate == "direction":
         return {1: "turning clockwise", -1: "turning anticlockwise", 0: "direction unknown"}[round(low)]
-    unit, since = WORDS[where][1], ""
-    if where == "time":
+    unit, since = WORDS[coordinate][1], ""
+    if coordinate == "time":
         size, unit = in_time(float(np.ptp(table.time_s)))
         zero_s, since = time_origin(table)
         low, high = (low - zero_s) / size, (high - zero_s) / size
-    return f"{where} {f'{low:g}' if low == high else interval(low, high)} {unit}{since}"
+    return f"{coordinate} {f'{low:g}' if low == high else interval(low, high)} {unit}{since}"
 
 
-def _by_noise(found: Fit) -> Array:
+def _by_noise(fit: Fit) -> Array:
     """The residual over its noise, (channels, n): rows made independent where the slow noise is known beforehand.
 
     Slow noise that was only found in the residual counts as far as a sensor may have it; beyond, it is a misfit.
     """
-    if found.noise.given:
-        return found.whitened[:, 0].reshape(found.residual.shape)
-    slow = np.minimum(found.noise.slow, MOST_SLOW_NOISE * found.noise.floor)
-    own = np.hypot(found.noise.floor, slow) if found.noise.known else found.noise.floor
-    return np.asarray(found.residual / own[:, None])
+    if fit.noise.given:
+        return fit.whitened[:, 0].reshape(fit.residual.shape)
+    slow = np.minimum(fit.noise.slow, MOST_SLOW_NOISE * fit.noise.floor)
+    noise = np.hypot(fit.noise.floor, slow) if fit.noise.known else fit.noise.floor
+    return np.asarray(fit.residual / noise[:, None])
 
 
 def _stands_out(place: _Stretch, excess: float, floor: float) -> bool:
@@ -137,11 +137,11 @@ def _stands_out(place: _Stretch, excess: float, floor: float) -> bool:
     return place.excess > STANDS_OUT * excess or abs(place.mean) > ONE_SIDED * excess * floor
 
 
-def _sides(found: Fit) -> Iterator[tuple[str, float, float, NDArray[np.intp]]]:
+def _sides(fit: Fit) -> Iterator[tuple[str, float, float, NDArray[np.intp]]]:
     """Positions by the side of the sensor that gravity, or the field, came from."""
-    if not found.table.type.magnitude:
+    if not fit.table.type.magnitude:
         return
-    a = backward(found.table, found.problem.layout.steps(found.theta))
+    a = backward(fit.table, fit.problem.layout.steps(fit.theta))
     along = np.argmax(np.abs(a), axis=1)
     side = 2 * along + (a[np.arange(len(a)), along] < 0)
     for k in range(len(SIDES)):
@@ -151,7 +151,7 @@ def _sides(found: Fit) -> Iterator[tuple[str, float, float, NDArray[np.intp]]]:
 
 def _parts(table: Table) -> Iterator[tuple[str, float, float, NDArray[np.intp]]]:
     """Stretches of each column: its own values where they are few, else parts with equal numbers of rows."""
-    for where, (name, _) in WORDS.items():
+    for coordinate, (name, _) in WORDS.items():
         if name not in table:
             continue
         values = table.column(name)
@@ -159,11 +159,11 @@ def _parts(table: Table) -> Iterator[tuple[str, float, float, NDArray[np.intp]]]
         if len(grid) < 2:
             continue
         if len(grid) <= PARTS + 4:
-            yield from ((where, float(v), float(v), np.flatnonzero(values == v)) for v in grid)
+            yield from ((coordinate, float(v), float(v), np.flatnonzero(values == v)) for v in grid)
             continue
         edges = np.quantile(values, np.linspace(0, 1, PARTS + 1))
         part = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, PARTS - 1)
         for k in range(PARTS):
             rows = np.flatnonzero(part == k)
             if len(rows):
-                yield where, float(values[rows].min()), float(values[rows].max()), rows
+                yield coordinate, float(values[rows].min()), float(values[rows].max()), rows

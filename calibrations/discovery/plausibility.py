@@ -1,6 +1,6 @@
 """Whether outputs at known poses can be those of the sensor, mounted and wired as stated.
 
-A model fits some parameters to any numbers. These checks need no model: gravity is known, and a sensor follows it.
+A model fits some parameters to any numbers. These checks need no model: gravity is known, and a sensor responds to it.
 
 no response      an output that is constant, holds noise only, is stuck in many rows, or does not follow gravity
 two groups       rows that belong to two sensors: without a pattern in pose or time, and nothing between them
@@ -73,7 +73,7 @@ class Response:
 
 @lru_cache(maxsize=8)
 def findings(table: Table) -> tuple[Finding, ...]:
-    """What speaks against a table of poses or rates, worst first; () for other kinds and for healthy data."""
+    """Reasons against a table of poses or rates, worst first; () for other kinds and for healthy data."""
     if table.n < FEWEST_RESPONSE_ROWS:
         return ()
     if table.type.turning:
@@ -91,23 +91,23 @@ def findings(table: Table) -> tuple[Finding, ...]:
 
 
 def refusal(table: Table) -> Finding | None:
-    """The finding that forbids to use the table; None where there is none, or a warning only."""
+    """The finding that forbids to use the table; None if there is none, or only a warning."""
     return next((finding for finding in findings(table) if finding.verdict != DOUBTFUL), None)
 
 
 def doubt(table: Table) -> str | None:
-    """What a person should check although the table can be used; None where there is nothing."""
+    """A warning about a table that can be used; None if there is none."""
     return next((finding.text for finding in findings(table) if finding.verdict == DOUBTFUL), None)
 
 
-def rejection(found: Fit) -> Finding | None:
-    """Why neither the data nor the values of a fit to them can be used; None where they can."""
-    return refusal(found.table) or _implausible_zero(found)
+def rejection(fit: Fit) -> Finding | None:
+    """The reason not to use the data or the values of a fit; None if they can be used."""
+    return refusal(fit.table) or _implausible_zero(fit)
 
 
-def _implausible_zero(found: Fit) -> Finding | None:
-    """A zero of a stage that is off by tens of degrees: angles are assigned wrongly, and no zero is off."""
-    for e in found.model.estimates("stage-zero-offset"):
+def _implausible_zero(fit: Fit) -> Finding | None:
+    """A stage zero that is off by tens of degrees: the cause is a wrong assignment of angles, and no zero."""
+    for e in fit.model.estimates("stage-zero-offset"):
         if e.identified and abs(e.value) > TURNED_DEG:
             return Finding(
                 UNEXPLAINED,
@@ -121,14 +121,14 @@ def response(table: Table, a: Array) -> Response:
     """The response to a specific force `a` (n, 3) in g, along the directions in which it changes enough."""
     about = a - a.mean(axis=0)
     U, size, Vt = np.linalg.svd(about, full_matrices=False)
-    kept = size > EXCITED_G * np.sqrt(table.n)
+    excited = size > EXCITED_G * np.sqrt(table.n)
     outputs = table.outputs - table.outputs.mean(axis=0)
-    part = U[:, kept].T @ outputs
-    slope = (Vt[kept].T / size[kept]) @ part
-    residual = outputs - U[:, kept] @ part
-    whole = np.sum(outputs**2, axis=0)
-    share = 1 - np.sum(residual**2, axis=0) / np.where(whole > 0, whole, np.inf)
-    return Response(slope.T, np.where(whole > 0, share, 0.0), residual.T)
+    part = U[:, excited].T @ outputs
+    slope = (Vt[excited].T / size[excited]) @ part
+    residual = outputs - U[:, excited] @ part
+    total = np.sum(outputs**2, axis=0)
+    share = 1 - np.sum(residual**2, axis=0) / np.where(total > 0, total, np.inf)
+    return Response(slope.T, np.where(total > 0, share, 0.0), residual.T)
 
 
 def _dead(table: Table, stated: Response) -> Iterator[Finding]:
@@ -145,7 +145,7 @@ def _dead(table: Table, stated: Response) -> Iterator[Finding]:
 
 
 def _silent(output: Array, stated: Response, k: int, name: str, floor: float | None) -> str | None:
-    """Why an output as a whole does not respond; None where it does."""
+    """The reason against an output that does not respond in any row; None if it responds."""
     swing = float(np.ptp(output))
     if swing <= 1e-9 * float(np.abs(output).max()):
         return f"{name} is constant ({output[0]:.6g} V) while gravity along {AXES[k]} changes"
@@ -162,16 +162,16 @@ def _silent(output: Array, stated: Response, k: int, name: str, floor: float | N
 
 
 def _of_rates(table: Table) -> Iterator[Finding]:
-    """The same of gyroscopes, which follow the rate of the table about their own axes."""
+    """The same checks for gyroscopes, which respond to the rate of the table about their own axes."""
     if not (all(f"a{axis}" in table for axis in AXES) or all(f"axis_{axis}" in table for axis in AXES)):
         return
     rate = table.column("rate_deg_s")[:, None] * turn_axes(table)
     about = rate / max(float(np.abs(rate).max()), np.finfo(float).tiny)
-    found = response(table, about)
+    stated = response(table, about)
     turned = [k for k in range(len(table.axes)) if about[:, k].std() > EXCITED_G]
     remedy = "check the columns, the sign of rate_deg_s, and the sensor's mount and cable"
     for k in turned:
-        name, share, slope = table.output_names[k], float(found.share[k]), found.slope[k]
+        name, share, slope = table.output_names[k], float(stated.share[k]), stated.slope[k]
         if (why := _stuck(table.outputs[:, k], about, name, table.unit, "the rate")) is not None:
             yield Finding(NO_RESPONSE, f"{why}; check the sensor's supply, the cable and the channel of {AXES[k]}")
         elif share < FOLLOWS_GRAVITY:
@@ -183,7 +183,7 @@ def _of_rates(table: Table) -> Iterator[Finding]:
             yield Finding(UNEXPLAINED, f"{name} follows the rate about {axis}, not about {AXES[k]}; {remedy}")
     if (groups := _two_groups(table, about)) is not None:
         yield groups
-    if reversed_ := [table.output_names[k] for k in turned if found.slope[k, k] < 0]:
+    if reversed_ := [table.output_names[k] for k in turned if stated.slope[k, k] < 0]:
         yield Finding(
             DOUBTFUL,
             f"{' and '.join(reversed_)} fall{'s' if len(reversed_) == 1 else ''} where the rate rises, as of a table "
@@ -192,8 +192,8 @@ def _of_rates(table: Table) -> Iterator[Finding]:
         )
 
 
-def _stuck(output: Array, a: Array, name: str, unit: str = "V", what: str = "gravity") -> str | None:
-    """Why an output that responds in some rows does not in others; None where it does in all."""
+def _stuck(output: Array, a: Array, name: str, unit: str = "V", input_name: str = "gravity") -> str | None:
+    """The reason against an output that responds in some rows only; None if it responds in all."""
     n, count = len(output), max(FEWEST_RESPONSE_ROWS, int(STUCK_ROWS * len(output)))
     order = np.sort(output)
     if count >= n or not np.ptp(output):
@@ -202,22 +202,22 @@ def _stuck(output: Array, a: Array, name: str, unit: str = "V", what: str = "gra
     start = int(np.argmin(widths))
     value, width = float(np.median(order[start : start + count])), float(widths[start])
     rows = np.abs(output - value) <= max(2 * width, 1e-9 * abs(value))
-    others = ~rows
-    if others.sum() < FEWEST_RESPONSE_ROWS:
+    responding = ~rows
+    if responding.sum() < FEWEST_RESPONSE_ROWS:
         return None
     columns = np.column_stack([np.ones(n), a])
-    answer, _, rank, _ = np.linalg.lstsq(columns[others], output[others], rcond=EXCITED_G)
-    expected = columns @ answer
-    left = output[others] - expected[others]
-    if rank < 2 or np.var(left) > (1 - EXPLAINED_BY_GEOMETRY) * np.var(output[others]):
+    coefficients, _, rank, _ = np.linalg.lstsq(columns[responding], output[responding], rcond=EXCITED_G)
+    expected = columns @ coefficients
+    remainder = output[responding] - expected[responding]
+    if rank < 2 or np.var(remainder) > (1 - EXPLAINED_BY_GEOMETRY) * np.var(output[responding]):
         return None
     if np.std(output[rows]) > STUCK_CHANGE * np.std(expected[rows]):
         return None
-    away = expected[rows] - value
-    aside = LEAST_ASIDE * float(np.ptp(expected))
-    if min(np.mean(away > aside), np.mean(away < -aside)) < LEAST_OTHER_SIDE:
+    deviation = expected[rows] - value
+    margin = LEAST_ASIDE * float(np.ptp(expected))
+    if min(np.mean(deviation > margin), np.mean(deviation < -margin)) < LEAST_OTHER_SIDE:
         return None
-    return f"{name} is stuck at {value:.5g} {unit} in {rows.sum()} of {n} rows while {what} changes"
+    return f"{name} is stuck at {value:.5g} {unit} in {rows.sum()} of {n} rows while {input_name} changes"
 
 
 def _two_groups(table: Table, about: Array | None = None) -> Finding | None:
@@ -229,31 +229,31 @@ def _two_groups(table: Table, about: Array | None = None) -> Finding | None:
         table = table.in_order()
         about = specific_force(nominal_pose(table))
     columns = np.column_stack([np.ones(table.n), about])
-    labels, left, apart = _clusters(columns, table.outputs)
+    labels, within, distance = _clusters(columns, table.outputs)
     share = float(labels.mean())
-    if left > LEFT_WITHIN_GROUPS or not SMALLER_GROUP <= share <= 1 - SMALLER_GROUP or _patterned(table, labels):
+    if within > LEFT_WITHIN_GROUPS or not SMALLER_GROUP <= share <= 1 - SMALLER_GROUP or _patterned(table, labels):
         return None
     white = white_std(table)
-    axis = int(np.argmax(apart))
-    if white is not None and apart[axis] < GROUPS_APART * rms(white[:, axis]):
+    axis = int(np.argmax(distance))
+    if white is not None and distance[axis] < GROUPS_APART * rms(white[:, axis]):
         return None
-    times = "" if white is None else f", {apart[axis] / 2 / float(rms(white[:, axis])):.0f} times the noise floor"
+    times = "" if white is None else f", {distance[axis] / 2 / float(rms(white[:, axis])):.0f} times the noise floor"
     return Finding(
         UNEXPLAINED,
         f"scatter without a pattern{times}: two groups of rows ({(~labels).sum()} and {labels.sum()}) differ by "
-        f"{_apart(float(apart[axis]), table.unit)} in {table.axes[axis]}, as if two sensors were in one "
+        f"{_distance_text(float(distance[axis]), table.unit)} in {table.axes[axis]}, as if two sensors were in one "
         "table; separate them",
     )
 
 
-def _apart(size: float, unit: str) -> str:
+def _distance_text(size: float, unit: str) -> str:
     return f"{1e3 * size:.3g} mV" if unit == "V" else f"{size:.3g} {unit}"
 
 
 def _clusters(columns: Array, outputs: Array) -> tuple[NDArray[np.bool_], float, Array]:
-    """(which rows are in the second group, share of the residual's variance left within groups, distance per axis).
+    """(mask of the second group, share of the residual's variance within groups, distance of the groups by axis).
 
-    Rows begin in groups by the sign of their residual, as of two biases, or by its sign along the output, as of two
+    The first groups are those by the sign of the residual, for two biases, or by its sign along the output, for two
     scale factors.
     """
     basis = np.linalg.qr(columns)[0]
@@ -263,12 +263,16 @@ def _clusters(columns: Array, outputs: Array) -> tuple[NDArray[np.bool_], float,
         return np.zeros(len(outputs), dtype=bool), 1.0, size
     main = np.linalg.svd(residual / size, full_matrices=False)[0][:, 0]
     along = np.sum(residual / size**2 * (outputs - outputs.mean(axis=0)), axis=1)
-    labels, left, apart = min((_settled(start > 0, columns, outputs / size) for start in (main, along)), key=_second)
-    return labels, left, apart * size
+    labels, within, distance = min(
+        (_refined_clusters(start > 0, columns, outputs / size) for start in (main, along)), key=_within_share
+    )
+    return labels, within, distance * size
 
 
-def _settled(labels: NDArray[np.bool_], columns: Array, scaled: Array) -> tuple[NDArray[np.bool_], float, Array]:
-    """As `_clusters`, of outputs (n, axes) in units of their residual, from these groups on."""
+def _refined_clusters(
+    labels: NDArray[np.bool_], columns: Array, scaled: Array
+) -> tuple[NDArray[np.bool_], float, Array]:
+    """The result of `_clusters` for outputs (n, axes) in units of their residual, by iteration from these groups."""
     errors, fitted = np.zeros((2, len(scaled))), np.zeros((2, *scaled.shape))
     for _ in range(ROUNDS):
         for group, rows in enumerate((~labels, labels)):
@@ -280,16 +284,16 @@ def _settled(labels: NDArray[np.bool_], columns: Array, scaled: Array) -> tuple[
         if np.array_equal(after, labels):
             break
         labels = after
-    left = float(np.mean(np.min(errors, axis=0))) / scaled.shape[1]
-    return labels, left, rms((fitted[1] - fitted[0]).T)
+    within = float(np.mean(np.min(errors, axis=0))) / scaled.shape[1]
+    return labels, within, rms((fitted[1] - fitted[0]).T)
 
 
-def _second(found: tuple[NDArray[np.bool_], float, Array]) -> float:
-    return found[1]
+def _within_share(clusters: tuple[NDArray[np.bool_], float, Array]) -> float:
+    return clusters[1]
 
 
 def _patterned(table: Table, labels: NDArray[np.bool_]) -> bool:
-    """Whether the groups follow from time, direction, path or angle: then they are an effect of the sensor or rig."""
+    """Whether the groups depend on time, direction, path or angle: then they are an effect of the sensor or rig."""
     orders = [np.arange(table.n)]
     orders += [np.argsort(table.column(name), kind="stable") for name in ("temperature_c", "supply_v") if name in table]
     if any(_agreeing(labels, order) > PATTERNED for order in orders):
@@ -297,93 +301,104 @@ def _patterned(table: Table, labels: NDArray[np.bool_]) -> bool:
     if table.type.turning:
         return _agreeing(labels, np.argsort(table.column("rate_deg_s"), kind="stable")) > PATTERNED
     alpha, beta = table.column("alpha_deg"), table.column("beta_deg")
-    if min(_agreeing(labels, *_along(beta, alpha)), _agreeing(labels, *_along(alpha, beta))) > PATTERNED:
+    if min(_agreeing(labels, *_order_along(beta, alpha)), _agreeing(labels, *_order_along(alpha, beta))) > PATTERNED:
         return True
     kinds = [table.column(name) for name in ("direction", "flip", "mount_deg") if name in table]
     return any(
-        sum(max(labels[of == value].sum(), (~labels[of == value]).sum()) for value in np.unique(of))
+        sum(max(labels[values == value].sum(), (~labels[values == value]).sum()) for value in np.unique(values))
         > PATTERNED * table.n
-        for of in kinds
+        for values in kinds
     )
 
 
-def _agreeing(labels: NDArray[np.bool_], order: NDArray[np.intp], of: NDArray[np.bool_] | None = None) -> float:
-    """Share of neighbours in an order, of the pairs `of`, that are in one group; 1 where there are no neighbours."""
-    same = labels[order][1:] == labels[order][:-1]
-    same = same if of is None else same[of]
-    return float(same.mean()) if len(same) else 1.0
+def _agreeing(labels: NDArray[np.bool_], order: NDArray[np.intp], pairs: NDArray[np.bool_] | None = None) -> float:
+    """Share of neighbours in an order that are in one group, of the `pairs` given; 1 if there are no neighbours."""
+    agreeing = labels[order][1:] == labels[order][:-1]
+    agreeing = agreeing if pairs is None else agreeing[pairs]
+    return float(agreeing.mean()) if len(agreeing) else 1.0
 
 
-def _along(angle: Array, other: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Rows in order of an angle where the other one is the same, and which neighbours differ in that angle alone."""
-    order = np.lexsort((angle, other))
-    return order, (np.diff(other[order]) == 0) & (np.diff(angle[order]) != 0)
+def _order_along(angle: Array, fixed_angle: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """(order of the rows by an angle within equal values of the other, mask of neighbours that differ in it alone)."""
+    order = np.lexsort((angle, fixed_angle))
+    return order, (np.diff(fixed_angle[order]) == 0) & (np.diff(angle[order]) != 0)
 
 
 def _geometry(table: Table, stated: Response) -> Finding | None:
-    """What geometry explains the outputs where the stated one does not; None where it does, or nothing does."""
+    """The geometry that explains the outputs better than the stated one; None if there is none."""
     if (reading := other_reading(table, 1 - stated.share)) is not None:
         return Finding(UNEXPLAINED, f"the outputs do not follow the poses as stated; they do if {reading}")
     explained = bool(np.all(stated.share >= EXPLAINED_BY_GEOMETRY))
-    wrong = _assignment(table, stated, specific_force(nominal_pose(table))) if explained else None
-    if explained and (wrong is None or wrong.verdict == DOUBTFUL):
-        return wrong
-    other = " or if ".join(_other_angles(table, stated, explained))
-    if wrong is not None:
-        return Finding(UNEXPLAINED, f"{wrong.text}; the outputs fit as well if {other}") if other else wrong
-    return Finding(UNEXPLAINED, f"the outputs do not follow the poses as stated; they do if {other}") if other else None
+    assignment = _assignment(table, stated, specific_force(nominal_pose(table))) if explained else None
+    if explained and (assignment is None or assignment.verdict == DOUBTFUL):
+        return assignment
+    angle_readings = " or if ".join(_other_angles(table, stated, explained))
+    if assignment is not None:
+        return (
+            Finding(UNEXPLAINED, f"{assignment.text}; the outputs fit as well if {angle_readings}")
+            if angle_readings
+            else assignment
+        )
+    return (
+        Finding(UNEXPLAINED, f"the outputs do not follow the poses as stated; they do if {angle_readings}")
+        if angle_readings
+        else None
+    )
 
 
 def _other_angles(table: Table, stated: Response, explained: bool) -> list[str]:
-    """Readings of the angle columns under which each output follows its own axis, where the stated ones do not."""
-    found = []
+    """Readings of the angle columns by which each output follows its own axis, unlike by the stated ones."""
+    texts = []
     for text, pose in _readings(nominal_pose(table)).items():
         a = specific_force(pose)
-        tried = response(table, a)
-        better = np.max(1 - tried.share) <= FAR_BETTER_GEOMETRY * np.max(1 - stated.share)
+        candidate = response(table, a)
+        far_better = np.max(1 - candidate.share) <= FAR_BETTER_GEOMETRY * np.max(1 - stated.share)
         if (
-            np.all(tried.share >= EXPLAINED_BY_GEOMETRY)
-            and (explained or better)
-            and _assignment(table, tried, a) is None
+            np.all(candidate.share >= EXPLAINED_BY_GEOMETRY)
+            and (explained or far_better)
+            and _assignment(table, candidate, a) is None
         ):
-            found.append(text)
-    return found
+            texts.append(text)
+    return texts
 
 
 def _readings(pose: Pose) -> Mapping[str, Pose]:
     """Other meanings of the angles, in words."""
 
-    def of(alpha: Array, beta: Array) -> Pose:
+    def with_angles(alpha: Array, beta: Array) -> Pose:
         return Pose(alpha, beta, pose.mount, pose.flip, pose.up)
 
     return MappingProxyType(
         {
-            "the columns alpha_deg and beta_deg are exchanged": of(pose.beta, pose.alpha),
-            "beta counts backwards (change the sign of beta_deg)": of(pose.alpha, -pose.beta),
-            "alpha counts backwards (change the sign of alpha_deg)": of(-pose.alpha, pose.beta),
-            "alpha is counted from the horizontal (take 90 - alpha_deg)": of(np.pi / 2 - pose.alpha, pose.beta),
-            "the angles are in radians": of(np.degrees(pose.alpha), np.degrees(pose.beta)),
+            "the columns alpha_deg and beta_deg are exchanged": with_angles(pose.beta, pose.alpha),
+            "beta counts backwards (change the sign of beta_deg)": with_angles(pose.alpha, -pose.beta),
+            "alpha counts backwards (change the sign of alpha_deg)": with_angles(-pose.alpha, pose.beta),
+            "alpha is counted from the horizontal (take 90 - alpha_deg)": with_angles(
+                np.pi / 2 - pose.alpha, pose.beta
+            ),
+            "the angles are in radians": with_angles(np.degrees(pose.alpha), np.degrees(pose.beta)),
         }
     )
 
 
-def _assignment(table: Table, found: Response, a: Array) -> Finding | None:
-    """Outputs that do not follow their own axes, or follow them backwards; None where there are none."""
+def _assignment(table: Table, stated: Response, a: Array) -> Finding | None:
+    """Outputs that do not follow their own axes, or follow them backwards; None if there are none."""
     about = a - a.mean(axis=0)
-    excited = np.linalg.eigh(about.T @ about / table.n)
-    kept = excited[1][:, excited[0] > EXCITED_G**2]
-    own = (kept @ kept.T)[: len(found.slope)]  # each axis, as far as these poses excite it
-    size = np.linalg.norm(found.slope, axis=1)
+    eigen = np.linalg.eigh(about.T @ about / table.n)
+    excited_directions = eigen[1][:, eigen[0] > EXCITED_G**2]
+    projector = excited_directions @ excited_directions.T
+    excited_axes = projector[: len(stated.slope)]  # excited part of each axis
+    size = np.linalg.norm(stated.slope, axis=1)
     if not size.max() > 0:
         return None
-    reach = np.linalg.norm(own, axis=1)
-    asked = [k for k in range(len(size)) if found.share[k] >= FOLLOWS_GRAVITY and size[k] > 0]
-    cosine = {k: float(found.slope[k] @ own[k] / size[k] / reach[k]) for k in asked if reach[k] > 0.5}
-    off = np.cos(np.radians(TURNED_DEG))
-    astray = [k for k, c in cosine.items() if abs(c) < off]
-    astray += [k for k in asked if k not in cosine and size[k] > 0.5 * size.max()]
+    reach = np.linalg.norm(excited_axes, axis=1)
+    responding = [k for k in range(len(size)) if stated.share[k] >= FOLLOWS_GRAVITY and size[k] > 0]
+    cosine = {k: float(stated.slope[k] @ excited_axes[k] / size[k] / reach[k]) for k in responding if reach[k] > 0.5}
+    limit = np.cos(np.radians(TURNED_DEG))
+    astray = [k for k, c in cosine.items() if abs(c) < limit]
+    astray += [k for k in responding if k not in cosine and size[k] > 0.5 * size.max()]
     if astray:
-        return Finding(UNEXPLAINED, _astray(table, found, astray))
+        return Finding(UNEXPLAINED, _astray(table, stated, astray))
     reversed_ = [k for k, c in cosine.items() if c < 0]
     if not reversed_:
         return None
@@ -402,23 +417,23 @@ def _assignment(table: Table, found: Response, a: Array) -> Finding | None:
     )
 
 
-def _astray(table: Table, found: Response, rows: list[int]) -> str:
+def _astray(table: Table, stated: Response, rows: list[int]) -> str:
     """The axis that each output follows, and a hint on the wiring to check."""
     follow = []
     for k in rows:
-        slope = found.slope[k]
+        slope = stated.slope[k]
         axis = int(np.argmax(np.abs(slope)))
         if abs(slope[axis]) > np.cos(np.radians(TURNED_DEG)) * np.linalg.norm(slope):
             follow.append(f"{table.output_names[k]} follows gravity along {'-' if slope[axis] < 0 else ''}{AXES[axis]}")
         else:
             angle = float(np.degrees(np.arctan2(slope[1 - k], slope[k]))) if k < 2 else 0.0
             follow.append(f"{table.output_names[k]} follows gravity {abs(angle):.0f} deg away from {AXES[k]}")
-    swapped = len(rows) == 2 and rows == [0, 1] and np.argmax(np.abs(found.slope[:2]), axis=1).tolist() == [1, 0]
-    same = swapped and found.slope[0, 1] * found.slope[1, 0] > 0
+    swapped = len(rows) == 2 and rows == [0, 1] and np.argmax(np.abs(stated.slope[:2]), axis=1).tolist() == [1, 0]
+    exchanged = swapped and stated.slope[0, 1] * stated.slope[1, 0] > 0
     remedy = (
         f"the channels are exchanged: exchange the columns {' and '.join(table.output_names[:2])}, or the channels in "
         "the bench file"
-        if same
+        if exchanged
         else "check how the sensor is mounted on the stage (mount_deg) and the assignment of the channels"
     )
     return f"{' and '.join(follow)}; {remedy}"

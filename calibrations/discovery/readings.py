@@ -1,10 +1,10 @@
 """Other readings of a table of poses: angles by another scale or zero, rows that are shifted, a change in mid-run.
 
-Each is one mistake of a person, a cable or a stage that a table cannot state: steps of a turn that are set wrongly, a
-column that is pasted one row too low, a stage that lost steps. A reading is named only if it leaves a small part of
-what the stated one leaves; effects of a sensor stay, as they follow the stated poses better than any of these.
+A reading corrects one mistake of a person, a cable or a stage: a wrong number of steps a turn, a column pasted one row
+too low, a stage that lost steps. The module names a reading only if its residual is a small part of that of the stated
+reading. Effects of a sensor pass: they follow the stated poses better than any other reading.
 
-Source  Chow, Econometrica 28 (1960): a linear response before a row and another one from it on; Golub and Pereyra,
+Source  Chow, Econometrica 28 (1960): a linear response before a row and another one after it; Golub and Pereyra,
         SIAM J. Numer. Anal. 10 (1973): parameters that enter linearly are projected out.
 """
 
@@ -35,24 +35,24 @@ SHIFTS = (1, -1, 2, -2)  # rows
 COLUMNS = ("alpha_deg", "beta_deg")
 
 
-def other_reading(table: Table, shares_left: Array) -> str | None:
-    """The reading of the table that explains its outputs far better, as what to check; None where there is none.
+def other_reading(table: Table, residual_shares: Array) -> str | None:
+    """The reading of the table that explains its outputs far better, with a check to make; None if there is none.
 
-    `shares_left`: of the variance of each output, what a linear response at the stated poses leaves, shape (axes,).
+    `residual_shares`: residual share of each output's variance after a linear response at the stated poses, (axes,).
     """
     if not np.all(table.outputs.std(axis=0) > 0):
         return None
-    before = float(np.max(shares_left))
+    stated_share = float(np.max(residual_shares))
     noise = white_std(table)
     floor = UNTOUCHED_BY_READINGS if noise is None else 9 * float(np.max(rms(noise.T) ** 2 / np.var(table.outputs, 0)))
-    if before < max(floor, UNTOUCHED_BY_READINGS) or table.n < 2 * FEWEST_RESPONSE_ROWS:
+    if stated_share < max(floor, UNTOUCHED_BY_READINGS) or table.n < 2 * FEWEST_RESPONSE_ROWS:
         return None
-    limit = min(FAR_BETTER_GEOMETRY * before, 1 - EXPLAINED_BY_GEOMETRY)
+    limit = min(FAR_BETTER_GEOMETRY * stated_share, 1 - EXPLAINED_BY_GEOMETRY)
     return _scaled(table, limit) or _shifted(table, limit) or _changed(table, limit)
 
 
-def _left(force: Array, outputs: Array) -> Array:
-    """Share of the variance of each output that a linear response to the specific force leaves, shape (axes,)."""
+def _residual_share(force: Array, outputs: Array) -> Array:
+    """Residual share of each output's variance after a linear response to the specific force, shape (axes,)."""
     residual = _residual(force, outputs)
     return np.asarray(np.sum(residual**2, axis=0) / np.maximum(outputs.var(axis=0) * len(outputs), 1e-300))
 
@@ -78,63 +78,64 @@ class _Angle(NamedTuple):
 
 
 def _scaled(table: Table, limit: float) -> str | None:
-    """A stage whose angle is off by a factor, or by a zero of tens of degrees."""
-    found = []
+    """A stage angle with a wrong factor, or with a zero that is wrong by tens of degrees."""
+    angles = []
     for column in COLUMNS:
         if np.ptp(table.column(column)) == 0:
             continue
         shifted = _refined(_Angle(column, 1.0, 0.0), table, free_scale=False)
-        begins = [_best_zero(column, scale, table) for scale in SCALES]
-        begin = begins[int(np.argmin([_worst(angle, table) for angle in begins]))]
-        scaled = _refined(begin, table, free_scale=True)
-        found += [(_worst(shifted, table), shifted), (_worst(scaled, table), scaled)]
-    found = [(left, a) for left, a in found if left <= limit]
-    zeros = [each for each in found if each[1].scale == 1.0 and abs(each[1].zero_deg) > TURNED_DEG]
-    plain = [each for each in found if each[1].scale == 1.0]
-    scales = [each for each in found if abs(each[1].scale - 1) > LEAST_STAGE_SCALE]
+        starts = [_best_zero(column, scale, table) for scale in SCALES]
+        start = starts[int(np.argmin([_worst_share(angle, table) for angle in starts]))]
+        scaled = _refined(start, table, free_scale=True)
+        angles += [(_worst_share(shifted, table), shifted), (_worst_share(scaled, table), scaled)]
+    angles = [(share, angle) for share, angle in angles if share <= limit]
+    zeros = [item for item in angles if item[1].scale == 1.0 and abs(item[1].zero_deg) > TURNED_DEG]
+    unscaled = [item for item in angles if item[1].scale == 1.0]
+    scales = [item for item in angles if abs(item[1].scale - 1) > LEAST_STAGE_SCALE]
     if zeros:
-        a = min(zeros)[1]
+        angle = min(zeros)[1]
         return (
-            f"the zero of {a.column} is {a.zero_deg:+.3g} deg off; check the zero of the stage and add it to the column"
+            f"the zero of {angle.column} is {angle.zero_deg:+.3g} deg off; check the zero of the stage and add it to "
+            "the column"
         )
-    if scales and not plain and min(scales)[0] < _by_sensor(table):
-        a = min(scales)[1]
+    if scales and not unscaled and min(scales)[0] < _by_sensor(table):
+        angle = min(scales)[1]
         return (
-            f"{a.column} is multiplied by {a.scale:.4g}; check the steps for a turn, the gear ratio and the unit of "
-            "this stage"
+            f"{angle.column} is multiplied by {angle.scale:.4g}; check the steps for a turn, the gear ratio and the "
+            "unit of this stage"
         )
     return None
 
 
 def _by_sensor(table: Table) -> float:
-    """The least share of variance that a nonlinear response of one mechanism leaves at the stated poses.
+    """The least residual share of variance after a nonlinear response of one mechanism at the stated poses.
 
-    A scale factor that changes with the third axis resembles an angle that is off by half a percent.
+    A scale factor that changes with the third axis resembles an angle with a wrong scale of half a percent.
     """
-    a = specific_force(nominal_pose(table))
-    own, other, z = a[:, 0], a[:, 1], a[:, 2]
+    force = specific_force(nominal_pose(table))
+    x, y, z = force[:, 0], force[:, 1], force[:, 2]
     mechanisms: list[list[Array]] = [
-        [own**2, own**3, other**2, other**3, np.abs(own), np.abs(other)],
+        [x**2, x**3, y**2, y**3, np.abs(x), np.abs(y)],
         [z**2, z**3],
-        [own * z, own * z**2, other * z, other * z**2],
-        [own * other, own * other**2, other * own**2],
+        [x * z, x * z**2, y * z, y * z**2],
+        [x * y, x * y**2, y * x**2],
     ]
-    return min(float(np.max(_left(np.column_stack([a, *more]), table.outputs))) for more in mechanisms)
+    return min(float(np.max(_residual_share(np.column_stack([force, *terms]), table.outputs))) for terms in mechanisms)
 
 
 def _best_zero(column: str, scale: float, table: Table) -> _Angle:
-    """The zero, of every 30 deg, that goes with a scale."""
+    """The best zero for a scale, in steps of 30 deg."""
     zeros = [0.0] if scale == 1.0 else (np.arange(-5, 7) * 30.0).tolist()
     angles = [_Angle(column, scale, zero) for zero in zeros]
-    return angles[int(np.argmin([_worst(angle, table) for angle in angles]))]
+    return angles[int(np.argmin([_worst_share(angle, table) for angle in angles]))]
 
 
-def _worst(angle: _Angle, table: Table) -> float:
-    return float(np.max(_left(angle.force(table), table.outputs)))
+def _worst_share(angle: _Angle, table: Table) -> float:
+    return float(np.max(_residual_share(angle.force(table), table.outputs)))
 
 
 def _refined(angle: _Angle, table: Table, *, free_scale: bool) -> _Angle:
-    """The scale and zero nearby that leave least."""
+    """The scale and zero of least residual, by least squares from these."""
     size = table.outputs.std(axis=0)
     reach = float(np.max(np.abs(table.column(angle.column))))
 
@@ -150,36 +151,36 @@ def _refined(angle: _Angle, table: Table, *, free_scale: bool) -> _Angle:
 
 
 def _shifted(table: Table, limit: float) -> str | None:
-    """Outputs, one or all of them, that belong to the pose of another row."""
+    """One output, or all outputs, in another row than their pose."""
     force = specific_force(nominal_pose(table))
     names = table.output_names
     for shift in SHIFTS:
-        kept = slice(max(-shift, 0), table.n - max(shift, 0))
+        overlap = slice(max(-shift, 0), table.n - max(shift, 0))
         moved = np.roll(table.outputs, -shift, axis=0)
-        way = f"{abs(shift)} row{'s' if abs(shift) > 1 else ''} too {'late' if shift > 0 else 'early'}"
-        every = _left(force[kept], moved[kept])
-        if np.max(every) <= limit:
-            return f"the outputs stand {way} in the file; shift their columns, or those of the angles"
-        own = _left(force[kept], table.outputs[kept])
+        displacement = f"{abs(shift)} row{'s' if abs(shift) > 1 else ''} too {'late' if shift > 0 else 'early'}"
+        shifted_shares = _residual_share(force[overlap], moved[overlap])
+        if np.max(shifted_shares) <= limit:
+            return f"the outputs stand {displacement} in the file; shift their columns, or those of the angles"
+        stated_shares = _residual_share(force[overlap], table.outputs[overlap])
         for k, name in enumerate(names):
-            if every[k] <= limit and np.max(np.delete(own, k), initial=0.0) <= limit:
-                return f"{name} stands {way} in the file; shift this column"
+            if shifted_shares[k] <= limit and np.max(np.delete(stated_shares, k), initial=0.0) <= limit:
+                return f"{name} stands {displacement} in the file; shift this column"
     return None
 
 
 def _changed(table: Table, limit: float) -> str | None:
-    """A row from which on the outputs follow another linear response."""
+    """A row at which the linear response of the outputs changes."""
     columns = np.column_stack([np.ones(table.n), specific_force(nominal_pose(table))])
     outputs = (table.outputs - table.outputs.mean(axis=0)) / table.outputs.std(axis=0)
-    least, most = FEWEST_RESPONSE_ROWS, table.n - FEWEST_RESPONSE_ROWS
-    if most <= least:
+    first, last = FEWEST_RESPONSE_ROWS, table.n - FEWEST_RESPONSE_ROWS
+    if last <= first:
         return None
-    coarse = range(least, most, max(1, (most - least) // 24))
-    best = min(coarse, key=lambda k: _of_parts(columns, outputs, k)[0])
-    near = range(max(least, best - coarse.step), min(most, best + coarse.step) + 1)
-    best = min(near, key=lambda k: _of_parts(columns, outputs, k)[0])
-    left, change = _of_parts(columns, outputs, best)
-    if left > limit or change < LEAST_RESPONSE_CHANGE:
+    coarse = range(first, last, max(1, (last - first) // 24))
+    best = min(coarse, key=lambda k: _two_responses(columns, outputs, k)[0])
+    fine = range(max(first, best - coarse.step), min(last, best + coarse.step) + 1)
+    best = min(fine, key=lambda k: _two_responses(columns, outputs, k)[0])
+    share, change = _two_responses(columns, outputs, best)
+    if share > limit or change < LEAST_RESPONSE_CHANGE:
         return None
     number = int(table.numbered(np.array([best]))[0])
     return (
@@ -188,10 +189,10 @@ def _changed(table: Table, limit: float) -> str | None:
     )
 
 
-def _of_parts(columns: Array, outputs: Array, k: int) -> tuple[float, float]:
-    """(share of the variance that two responses leave, change of the slopes as far as both parts excite them).
+def _two_responses(columns: Array, outputs: Array, k: int) -> tuple[float, float]:
+    """(residual share of variance with two responses, change of the slopes that both parts excite).
 
-    No change where a part lacks a direction.
+    The change is 0 if a part lacks a direction.
     """
     answers, squares, ranks = [], 0.0, []
     for rows in (slice(None, k), slice(k, None)):

@@ -46,7 +46,7 @@ INTERVALS = 8
 FORCES = Spline(-1.1, 1.1, INTERVALS)
 
 
-def causes(steps: tuple[Step[Fit], ...], tried: int) -> tuple[str, ...]:
+def causes(steps: tuple[Step[Fit], ...], trials: int) -> tuple[str, ...]:
     """The effects of a search that are causes, in the order of its steps.
 
     steps  one or more
@@ -57,26 +57,26 @@ def causes(steps: tuple[Step[Fit], ...], tried: int) -> tuple[str, ...]:
     costs = {s.name: (first_order(end, s.name, shared=True) if s.name in tied else cost(end, s.name))[0] for s in steps}
     approximate = [s.name for s in steps if not s.effect.exact]
     greatest = max((costs[name] for name in approximate), default=0.0)
-    material = [name for name, lost in costs.items() if name not in approximate or lost >= REFINEMENT * greatest]
+    material = [name for name, growth in costs.items() if name not in approximate or growth >= REFINEMENT * greatest]
     if len(material) < 2:
         return tuple(material)
-    material = _one_of_slow(end, material)
-    found: list[str] = []
+    material = _one_of_slow_pair(end, material)
+    named: list[str] = []
     for name in sorted(material, key=lambda n: -costs[n]):
-        forms = [_whitened_forms(end, other) for other in found]
+        forms = [_whitened_forms(end, larger) for larger in named]
         if (
             not forms
             or name in BASE
             or not (
-                of_search(chance(*_beside(end, name, np.hstack(forms))), tried) >= SIGNIFICANT
-                or _follows(end, name, [other for other in found if _is_smaller(costs[name], costs[other])])
+                of_search(chance(*_cost_beside_forms(end, name, np.hstack(forms))), trials) >= SIGNIFICANT
+                or _follows(end, name, [larger for larger in named if _is_smaller(costs[name], costs[larger])])
             )
         ):
-            found.append(name)
-    return tuple(name for name in material if name in found)
+            named.append(name)
+    return tuple(name for name in material if name in named)
 
 
-def _one_of_slow(end: Fit, names: list[str]) -> list[str]:
+def _one_of_slow_pair(end: Fit, names: list[str]) -> list[str]:
     """The effects without that of a temperature, or of the time, which a free form of the other one replaces.
 
     Where both go the same way, each of the two formulas makes up for what the other one leaves. The likelier place is
@@ -86,10 +86,10 @@ def _one_of_slow(end: Fit, names: list[str]) -> list[str]:
     for pair in SLOW:
         if not all(place in at for place in pair):
             continue
-        ends = [
-            Shown.of(in_white_noise(end), forms_at(place, end), apart=at[other]) for place, other in (pair, pair[::-1])
+        shown_forms = [
+            Shown.of(in_white_noise(end), forms_at(place, end), apart=at[rival]) for place, rival in (pair, pair[::-1])
         ]
-        likelier = min(ends, key=lambda shown: shown.selected.deviance)
+        likelier = min(shown_forms, key=lambda shown: shown.selected.deviance)
         if _takes_up(likelier):
             names = [name for name in names if name != likelier.apart]
     return names
@@ -100,46 +100,46 @@ def _takes_up(shown: Shown) -> bool:
     return shown.gain_apart(shown.selected) < max(ENTER, (1 - MOSTLY) * shown.gain_apart(shown.nothing))
 
 
-def _is_smaller(cost_: float, other: float) -> bool:
-    return cost_ < FORM_OF**2 * other
+def _is_smaller(growth: float, larger: float) -> bool:
+    return growth < FORM_OF**2 * larger
 
 
 def _follows(end: Fit, name: str, larger: list[str]) -> bool:
     """Whether free forms at the places of much larger effects, of the size that the data show, take up most of it."""
-    places = dict.fromkeys(place_of_effect(other) for other in larger)
+    places = dict.fromkeys(place_of_effect(larger_name) for larger_name in larger)
     forms = {key: form for place in places if place in DRIVERS for key, form in forms_at(place, end).items()}
     if not forms:
         return False
     return _takes_up(Shown.of(in_white_noise(end), forms, apart=name))
 
 
-def _beside(end: Fit, name: str, forms: Array) -> tuple[float, int]:
+def _cost_beside_forms(end: Fit, name: str, forms: Array) -> tuple[float, int]:
     """Growth of the whitened sum of squares without an effect, to first order, and the number of its parameters.
 
     `forms`: columns that may replace it, whitened, (rows, m), for coefficients of prior N(0, 1).
     """
-    white, mine = end.whitened[:, 1:], end.problem.layout.of_effect(name)
+    white, mask = end.whitened[:, 1:], end.problem.layout.of_effect(name)
     size = np.linalg.norm(white, axis=0)
     white = white / np.where(size > 0, size, 1.0)
-    signal = white[:, mine] @ (end.theta[mine] * size[mine])
-    others, m = white[:, ~mine], forms.shape[1]
-    rows = np.block([[others, forms], [np.zeros((m, others.shape[1])), np.eye(m)]])
+    signal = white[:, mask] @ (end.theta[mask] * size[mask])
+    other_columns, m = white[:, ~mask], forms.shape[1]
+    rows = np.block([[other_columns, forms], [np.zeros((m, other_columns.shape[1])), np.eye(m)]])
     target = np.append(signal, np.zeros(m))
-    lost = target - rows @ np.linalg.lstsq(rows, target, rcond=1e-9)[0]
-    return float(lost @ lost), int(mine.sum())
+    lost_signal = target - rows @ np.linalg.lstsq(rows, target, rcond=1e-9)[0]
+    return float(lost_signal @ lost_signal), int(mask.sum())
 
 
 def _whitened_forms(end: Fit, name: str) -> Array:
     """Other forms of an effect, whitened, (rows, m): columns for coefficients of prior N(0, 1)."""
     white = end.whitened[:, 1:]
-    base = white[:, np.any([end.problem.layout.of_effect(each) for each in BASE], axis=0)]
-    mine = end.problem.layout.of_effect(name)
-    own = np.linalg.norm(_freed(white[:, mine] @ end.theta[mine], base))
+    base = white[:, np.any([end.problem.layout.of_effect(base_name) for base_name in BASE], axis=0)]
+    mask = end.problem.layout.of_effect(name)
+    size_of_effect = np.linalg.norm(_freed(white[:, mask] @ end.theta[mask], base))
     blocks = [np.zeros((len(white), 0))]
     for form, part in _forms(end, name):
         columns = _freed(end.noise.whiten(form_columns(end, form)), base)
         size = np.linalg.norm(columns)
-        blocks.append(columns * (part * own / size if size > 0 else 0.0))
+        blocks.append(columns * (part * size_of_effect / size if size > 0 else 0.0))
     return np.hstack(blocks)
 
 

@@ -1,8 +1,8 @@
 """The search in a table of rows: one effect if it explains all, else the places that act and their causes.
 
-An effect whose loss would cost little beside the loss of the greatest is a refinement: it corrects the form in which
-another acts, known only approximately, and is not named as a cause. Geometry is exact: a strong misalignment makes
-nothing else a refinement.
+An effect is a refinement if its removal costs little compared with the removal of the greatest effect. It corrects the
+form of another effect, which is known only approximately, and is not named as a cause. Geometry is exact: beside a
+strong misalignment, no effect is a refinement.
 """
 
 from __future__ import annotations
@@ -23,10 +23,18 @@ from calibrations.criteria import (
 )
 from calibrations.discovery.candidates import candidates, with_rivals
 from calibrations.discovery.findings import Candidate, Findings, Step
-from calibrations.discovery.outliers import caution, told
+from calibrations.discovery.outliers import caution, outlier_text
 from calibrations.discovery.plausibility import Finding, rejection
-from calibrations.discovery.search import Path, Settled, continued, find_path, is_complete, recounted, settled
-from calibrations.discovery.structure import plainer, poorly_predicted, structure_of
+from calibrations.discovery.search import (
+    FinalModel,
+    Path,
+    continue_path,
+    final_model,
+    find_path,
+    in_final_floor,
+    is_complete,
+)
+from calibrations.discovery.structure import competing_pattern, poorly_predicted, structure_of
 from calibrations.discovery.verdict import Verdict
 from calibrations.effects import Effect
 from calibrations.fitting.determined import undetermined
@@ -59,16 +67,16 @@ class RowSearch:
     def findings(
         self, start: Fit, outliers: tuple[int, ...], origin: Fit, effects: Mapping[str, Effect]
     ) -> Findings[Fit]:
-        """All that the model of `start` misses; `outliers` are rows that its fit leaves out."""
+        """The effects that the model of `start` misses; `outliers` are the rows that its fit excludes."""
         effects = self._searchable(effects)
-        found = self._among(start, outliers, origin, effects)
-        left_out = self.table.left_out
-        remarks = [f"Places left out of the search: {', '.join(left_out)}."] if left_out else []
+        findings = self._search_model(start, outliers, origin, effects)
+        excluded_places = self.table.left_out
+        remarks = [f"Places left out of the search: {', '.join(excluded_places)}."] if excluded_places else []
         remarks += [sentence(ONE_ORIENTATION)] if one_orientation(self.table) else []
-        return replace(found, remarks=(*found.remarks, *remarks))
+        return replace(findings, remarks=(*findings.remarks, *remarks))
 
     def rejected(self, start: Fit, reason: Finding) -> Findings[Fit]:
-        """Data in which no effect can be searched for."""
+        """Findings for data that cannot be searched for effects, for this reason."""
         return Findings(
             data=self.data, start=start, origin=start, baseline=start, left=reason.text, spoilt=True,
             unresponsive=reason.verdict == Verdict.NO_RESPONSE,
@@ -77,14 +85,14 @@ class RowSearch:
     def addition(
         self, effect: Effect, start: Fit, outliers: tuple[int, ...], effects: Mapping[str, Effect]
     ) -> Findings[Fit]:
-        """One chosen effect, with what the data cannot separate from it."""
+        """One chosen effect, with the effects that the data cannot separate from it."""
         before = start.in_floor(start.noise.floor)
         step = self.data.step(effect, before)
         if (reason := rejection(step.after)) is not None:
             return replace(self.rejected(step.before, reason), steps=(step,))
         ranked = candidates(before, effects)
-        own = next((with_rivals(c, ranked, before) for c in ranked if c.name == effect.name), None)
-        rivals = own.indistinguishable_from if own is not None else ()
+        candidate = next((with_rivals(c, ranked, before) for c in ranked if c.name == effect.name), None)
+        rivals = candidate.indistinguishable_from if candidate is not None else ()
         return self._findings(
             step.before, step.after, outliers, _material_structure(step.after),
             steps=(step,),
@@ -95,96 +103,102 @@ class RowSearch:
         )  # fmt: skip
 
     def _searchable(self, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
-        """The effects that act at none of the places that are left out; at one orientation those that it can show."""
+        """The effects at places that are not excluded; at one orientation, only those that the data can show."""
         if one_orientation(self.table):
             effects = {name: effect for name, effect in effects.items() if shown_at_rest(name)}
         return {name: effect for name, effect in effects.items() if place_of_effect(name) not in self.table.left_out}
 
-    def _among(
+    def _search_model(
         self, start: Fit, outliers: tuple[int, ...], origin: Fit, effects: Mapping[str, Effect]
     ) -> Findings[Fit]:
         moving = self.table.type.moving
-        path = find_path(start, outliers, effects, most=1 if self._shows_places or moving else MOST_EFFECTS)
-        if moving and plainer(path.start, path.end) is None:
-            path = continued(path, effects)
+        path = find_path(start, outliers, effects, max_steps=1 if self._shows_places or moving else MOST_EFFECTS)
+        if moving and competing_pattern(path.start, path.end) is None:
+            path = continue_path(path, effects)
         if not self._shows_places or _explained(path):
-            return self._on_path(path, effects, origin)
+            return self._path_findings(path, effects, origin)
         from calibrations.discovery.structural import search_structure  # only this search needs it
 
-        searched = search_structure(start, effects)
-        if searched.steps and path.steps and _unseen_error(path.end) <= _unseen_error(searched.end):
-            return self._on_path(path, effects, origin)  # what needs more must foretell more
-        found = self._with_structure(searched, outliers, searched.start if origin is start else origin)
-        if not (found.steps or path.steps) and structure_of(path.end) is None:
-            return self._on_path(path, effects, origin)  # slow noise looks like a pattern in white noise
-        return found
+        structural = search_structure(start, effects)
+        if structural.steps and path.steps and _unseen_error(path.end) <= _unseen_error(structural.end):
+            return self._path_findings(path, effects, origin)  # the larger model must predict unseen rows better
+        findings = self._structural_findings(structural, outliers, structural.start if origin is start else origin)
+        if not (findings.steps or path.steps) and structure_of(path.end) is None:
+            return self._path_findings(path, effects, origin)  # slow noise looks like a pattern in white noise
+        return findings
 
     @property
     def _shows_places(self) -> bool:
-        """Whether the rows can show where in the signal chain something acts: enough poses at known angles.
+        """Whether the rows can show at which place of the signal chain an effect acts: enough poses at known angles.
 
-        Slow noise that is known from a still record is not yet among what that search can take for given.
+        The structural search does not support slow noise from a still record yet.
         """
         return self.table.type.stage_angles and self.table.n >= FEWEST_FOR_PLACES and not self.table.noise
 
-    def _on_path(self, path: Path, effects: Mapping[str, Effect], origin: Fit) -> Findings[Fit]:
-        stand = settled(path, effects)
-        path, stand = recounted(path, stand.end), replace(stand, end=stand.end.in_floor(stand.end.noise.scatter))
-        if (reason := rejection(stand.end)) is not None:
+    def _path_findings(self, path: Path, effects: Mapping[str, Effect], origin: Fit) -> Findings[Fit]:
+        final = final_model(path, effects)
+        path, final = in_final_floor(path, final.end), replace(final, end=final.end.in_floor(final.end.noise.scatter))
+        if (reason := rejection(final.end)) is not None:
             return self.rejected(path.start, reason)
-        better = plainer(path.start, stand.end)
-        steps = _in_order(path.start, stand, effects)
+        pattern = competing_pattern(path.start, final.end)
+        steps = _ordered_steps(path.start, final, effects)
         causes = _causes(steps, len(path.first))
-        inseparable = {name: stand.beside[name].indistinguishable_from for name in causes if name in stand.beside}
-        rivals = {name: others for name, others in inseparable.items() if others}
-        left = (better or structure_of(stand.end)) if stand.end.pooled_excess > MATERIAL else None
-        left = left or poorly_predicted(stand.end)
-        found = self._findings(
-            path.start, stand.end, path.outliers, left,
+        inseparable = {
+            name: final.effect_candidates[name].indistinguishable_from
+            for name in causes
+            if name in final.effect_candidates
+        }
+        rivals = {name: names for name, names in inseparable.items() if names}
+        remainder = (pattern or structure_of(final.end)) if final.end.pooled_excess > MATERIAL else None
+        remainder = remainder or poorly_predicted(final.end)
+        findings = self._findings(
+            path.start, final.end, path.outliers, remainder,
             origin=origin,
             steps=steps,
-            candidates=_next_first(path, stand),
+            candidates=_start_candidates(path, final),
             causes=causes,
             alternatives=rivals,
-            spoilt=left is not None and better is not None,
+            spoilt=remainder is not None and pattern is not None,
             separations=self._separations(rivals),
-            settled=stand.tested,
+            settled=final.tested,
         )  # fmt: skip
-        if steps and found.given.verdict is Verdict.UNEXPLAINED:
-            return found.without_steps()
-        return _with_outliers(found)
+        if steps and findings.given.verdict is Verdict.UNEXPLAINED:
+            return findings.without_steps()
+        return _with_outliers(findings)
 
-    def _with_structure(self, searched: StructuralSearch, outliers: tuple[int, ...], origin: Fit) -> Findings[Fit]:
-        start, end = searched.start, searched.end
+    def _structural_findings(
+        self, structural: StructuralSearch, outliers: tuple[int, ...], origin: Fit
+    ) -> Findings[Fit]:
+        start, end = structural.start, structural.end
         if (reason := rejection(end)) is not None:
             return self.rejected(start, reason)
-        better = plainer(start, end, searched.causes_alone if searched.causes else None)
-        left = better or _material_structure(end)
-        if left is None and any(place.unknown for place in searched.structure.places):
-            left = structure_of(searched.causes_alone)
-        known = {c.name for c in searched.candidates}
-        found = self._findings(
-            start, end, outliers, left,
+        pattern = competing_pattern(start, end, structural.causes_alone if structural.causes else None)
+        remainder = pattern or _material_structure(end)
+        if remainder is None and any(place.unknown for place in structural.structure.places):
+            remainder = structure_of(structural.causes_alone)
+        known = {c.name for c in structural.candidates}
+        findings = self._findings(
+            start, end, outliers, remainder,
             origin=origin,
-            steps=searched.steps,
-            candidates=searched.candidates,
-            causes=searched.causes,
-            alternatives=searched.alternatives,
-            places=searched.structure.places,
-            spoilt=better is not None,
+            steps=structural.steps,
+            candidates=structural.candidates,
+            causes=structural.causes,
+            alternatives=structural.alternatives,
+            places=structural.structure.places,
+            spoilt=pattern is not None,
             separations=self._separations(
                 {
-                    name: tuple(other for other in others if other in known)
-                    for name, others in searched.alternatives.items()
-                    if known & set(others)
+                    name: tuple(rival for rival in rivals if rival in known)
+                    for name, rivals in structural.alternatives.items()
+                    if known & set(rivals)
                 }
             ),
-            remarks=searched.remarks,
+            remarks=structural.remarks,
         )  # fmt: skip
-        spoilt = better is not None or (found.final.share_left > MOST_UNEXPLAINED and not found.final.unknown)
-        if searched.steps and spoilt:
-            return found.without_steps()
-        return _with_outliers(found)
+        spoilt = pattern is not None or (findings.final.share_left > MOST_UNEXPLAINED and not findings.final.unknown)
+        if structural.steps and spoilt:
+            return findings.without_steps()
+        return _with_outliers(findings)
 
     def _separations(self, rivals: Mapping[str, tuple[str, ...]]) -> dict[str, Experiment]:
         """By effect, the experiment that separates it from the others."""
@@ -192,28 +206,28 @@ class RowSearch:
             return {}
         from calibrations.design.experiment import separating_experiment  # few effects have rivals
 
-        return {name: separating_experiment(name, others, self.table) for name, others in rivals.items()}
+        return {name: separating_experiment(name, names, self.table) for name, names in rivals.items()}
 
     def _findings(
-        self, start: Fit, end: Fit, outliers: tuple[int, ...], left: Pattern | None, **rest: Any
+        self, start: Fit, end: Fit, outliers: tuple[int, ...], remainder: Pattern | None, **members: Any
     ) -> Findings[Fit]:
-        """What every search states; `rest` holds the members of `Findings` that differ."""
-        members: dict[str, Any] = {
+        """The findings with the members common to every search; `members` are those that differ."""
+        common: dict[str, Any] = {
             "origin": start,
-            "left": left.text if left else None,
-            "pattern": left,
+            "left": remainder.text if remainder else None,
+            "pattern": remainder,
             "undetermined": (undetermined(start), undetermined(end)),
             "set_aside": caution(outliers),
             "outliers": outliers,
         }
-        return Findings(data=self.data, start=start, baseline=start, **members | rest)
+        return Findings(data=self.data, start=start, baseline=start, **common | members)
 
 
-def _with_outliers(found: Findings[Fit]) -> Findings[Fit]:
-    """Rows that stand out are the unexplained part where nothing else is."""
-    if found.outliers and not found.steps and found.left is None:
-        return replace(found, left=told(found.outliers), spoilt=True)
-    return found
+def _with_outliers(findings: Findings[Fit]) -> Findings[Fit]:
+    """The findings with the outliers as the unexplained part, if there is no other effect or pattern."""
+    if findings.outliers and not findings.steps and findings.left is None:
+        return replace(findings, left=outlier_text(findings.outliers), spoilt=True)
+    return findings
 
 
 def _material_structure(end: Fit) -> Pattern | None:
@@ -222,14 +236,14 @@ def _material_structure(end: Fit) -> Pattern | None:
 
 
 def _explained(path: Path) -> bool:
-    """Whether the effects of a path leave no more and no less than the noise of the samples, and no pattern.
+    """Whether the residual of a path has the size of the samples' noise, and no pattern.
 
-    Where the samples of a mean may be correlated, more than their noise may be left. Not at one orientation: a lag of
-    the temperature looks like a hysteresis in slow noise.
+    If the samples of a mean may be correlated, the residual may be larger than their noise. At one orientation it may
+    not: there, a lag of the temperature looks like a hysteresis in slow noise.
     """
     end = path.end
-    most = NO_MORE_THAN_NOISE if correlation_known(end.table) or one_orientation(end.table) else np.inf
-    as_noise = end.noise.known and LEAST_NOISE < end.pooled_excess < most
+    largest_excess = NO_MORE_THAN_NOISE if correlation_known(end.table) or one_orientation(end.table) else np.inf
+    as_noise = end.noise.known and LEAST_NOISE < end.pooled_excess < largest_excess
     return as_noise and structure_of(end) is None and is_complete(path)
 
 
@@ -238,36 +252,36 @@ def _unseen_error(fit: Fit) -> float:
     return fit.held_out_excess * float(np.sqrt(np.mean(fit.noise.floor**2)))
 
 
-def _next_first(path: Path, stand: Settled) -> tuple[Candidate, ...]:
-    """Candidates on the given model; the first is the effect of the first step, with its alternatives."""
+def _start_candidates(path: Path, final: FinalModel) -> tuple[Candidate, ...]:
+    """Candidates on the given model, that of the first effect first, with its alternatives."""
     first = path.first
-    name = next((name for name in stand.names), None)
-    own = next((c for c in first if c.name == name), None)
-    if own is None:
+    name = next((name for name in final.names), None)
+    leading = next((c for c in first if c.name == name), None)
+    if leading is None:
         return first
-    if name in stand.beside:
-        own = replace(own, indistinguishable_from=stand.beside[own.name].indistinguishable_from)
-    return own, *(c for c in first if c.name != name)
+    if name in final.effect_candidates:
+        leading = replace(leading, indistinguishable_from=final.effect_candidates[leading.name].indistinguishable_from)
+    return leading, *(c for c in first if c.name != name)
 
 
-def _in_order(start: Fit, stand: Settled, effects: Mapping[str, Effect]) -> tuple[Step[Fit], ...]:
-    """The effects one after another: first those that free a value that the model already has, then new ones."""
+def _ordered_steps(start: Fit, final: FinalModel, effects: Mapping[str, Effect]) -> tuple[Step[Fit], ...]:
+    """One step an effect: first the effects that free a value which the model already has, then new ones."""
     freed = {term.name for term in start.model.terms}
-    order = sorted(stand.names, key=lambda name: name not in freed)
+    order = sorted(final.names, key=lambda name: name not in freed)
     steps: list[Step[Fit]] = []
     present = start
     for name in order:
         last = len(steps) == len(order) - 1
-        after = stand.end if last else refit(present, present.model.with_effect(effects[name]))
+        after = final.end if last else refit(present, present.model.with_effect(effects[name]))
         steps.append(Step(name, present, after))
         present = after
     return tuple(steps)
 
 
-def _causes(steps: tuple[Step[Fit], ...], tried: int) -> tuple[str, ...]:
-    """The effects of a search that are causes; one alone is."""
+def _causes(steps: tuple[Step[Fit], ...], trials: int) -> tuple[str, ...]:
+    """The effects of a search that are causes; a single effect always is one."""
     if len(steps) < 2:
         return tuple(step.name for step in steps)
     from calibrations.discovery.refinements import causes  # most searches end at one effect
 
-    return causes(steps, tried)
+    return causes(steps, trials)

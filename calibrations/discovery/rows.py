@@ -13,7 +13,7 @@ from calibrations.discovery.candidates import candidates, with_planned
 from calibrations.discovery.dataset import Dataset
 from calibrations.discovery.findings import Candidate, Findings, Place, Step
 from calibrations.discovery.fit_doubts import fit_doubts
-from calibrations.discovery.outliers import fit_without, kept
+from calibrations.discovery.outliers import fit_without, outliers_in_fit
 from calibrations.discovery.places import places
 from calibrations.discovery.plausibility import Finding, refusal, rejection
 from calibrations.discovery.row_search import ONE_ORIENTATION, RowSearch
@@ -123,13 +123,13 @@ class Rows(Dataset[Fit]):
         """The model with its values."""
         return evaluate(model, self.table)
 
-    def noise_known(self, found: Fit) -> bool:
+    def noise_known(self, fit: Fit) -> bool:
         """Whether it follows from the samples of each row."""
-        return found.noise.known
+        return fit.noise.known
 
-    def places(self, found: Fit) -> tuple[Place, ...]:
+    def places(self, fit: Fit) -> tuple[Place, ...]:
         """Stretches of columns."""
-        return places(found)
+        return places(fit)
 
     def search(self, model: Model, effects: Mapping[str, Effect]) -> Findings[Fit]:
         """One effect if it explains all, else places that act and their causes; of other kinds forward steps."""
@@ -140,7 +140,7 @@ class Rows(Dataset[Fit]):
 
     def search_on(self, start: Fit, origin: Fit, effects: Mapping[str, Effect]) -> Findings[Fit]:
         """The same from a fitted model."""
-        return self._search.findings(start, self._left_out(start), origin, effects)
+        return self._search.findings(start, self._outliers_of(start), origin, effects)
 
     def addition(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> Findings[Fit]:
         """One effect, with what the data cannot separate from it."""
@@ -150,46 +150,46 @@ class Rows(Dataset[Fit]):
     def _search(self) -> RowSearch:
         return RowSearch(self, self.table)
 
-    def until(self, found: Findings[Fit], enough: Enough) -> Findings[Fit]:
+    def until(self, findings: Findings[Fit], enough: Enough) -> Findings[Fit]:
         """The findings up to the first model whose error on unseen rows is small enough. Raises ModelError."""
         from calibrations.discovery.enough import until  # few searches stop before their end
 
-        return until(found, enough)
+        return until(findings, enough)
 
     def candidates(self, before: Fit, plan: Findings[Fit], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:
         """One round of the search, the next effect of the plan first."""
-        found = candidates(before, effects)
-        return tuple(with_planned(found, plan.steps[0]) if plan.steps else found)
+        ranked = candidates(before, effects)
+        return tuple(with_planned(ranked, plan.steps[0]) if plan.steps else ranked)
 
     def beginning(self, model: Model) -> tuple[Rows, Fit]:
         """(the table without gross outliers, the model fitted to it)."""
         start, outliers = fit_without(model, self.table)
         return (Rows(start.table) if outliers else self), start
 
-    def _left_out(self, found: Fit) -> tuple[int, ...]:
+    def _outliers_of(self, fit: Fit) -> tuple[int, ...]:
         """Numbers of the rows that a fit leaves out."""
         if not self.table.type.stage_angles:
             return ()
-        every = np.arange(self.table.n)
-        kept = found.table.numbered(np.arange(found.table.n))
-        return tuple(map(int, np.setdiff1d(self.table.numbered(every), kept)))
+        all_rows = np.arange(self.table.n)
+        numbers = fit.table.numbered(np.arange(fit.table.n))
+        return tuple(map(int, np.setdiff1d(self.table.numbered(all_rows), numbers)))
 
-    def undetermined(self, found: Fit) -> str | None:
+    def undetermined(self, fit: Fit) -> str | None:
         """Why a small residual proves nothing on these data."""
-        return undetermined(found)
+        return undetermined(fit)
 
-    def untestable(self, found: Fit, effects: Mapping[str, Effect]) -> str | None:
+    def untestable(self, fit: Fit, effects: Mapping[str, Effect]) -> str | None:
         """The effects that these data cannot show together with the model."""
-        hidden = blind_to(found, effects)
+        hidden = blind_to(fit, effects)
         if not hidden:
             return None
         if self.at_rest:
             return None  # the verdict and the cautions say it for all effects of the force
-        angles = found.table.column("alpha_deg") if found.table.type.stage_angles else np.arange(2.0)
-        one = f" The data has only one inclination, alpha = {angles[0]:g} deg; measure at other inclinations."
+        angles = fit.table.column("alpha_deg") if fit.table.type.stage_angles else np.arange(2.0)
+        hint = f" The data has only one inclination, alpha = {angles[0]:g} deg; measure at other inclinations."
         return (
-            f"With the model {found.model.name}, these effects cannot be tested on this data: {', '.join(hidden)}."
-            f"{'' if np.ptp(angles) else one}"
+            f"With the model {fit.model.name}, these effects cannot be tested on this data: {', '.join(hidden)}."
+            f"{'' if np.ptp(angles) else hint}"
         )
 
     def expression(self, name: str, text: str) -> Effect:
@@ -201,29 +201,29 @@ class Rows(Dataset[Fit]):
         """Of poses, whose angles are planned."""
         return self.table.type.stage_angles
 
-    def rejection(self, found: Fit) -> Finding | None:
+    def rejection(self, fit: Fit) -> Finding | None:
         """What speaks against these poses, or against the values of a fit."""
-        return rejection(found)
+        return rejection(fit)
 
-    def covered(self, found: Fit) -> dict[str, tuple[float, float]]:
+    def covered(self, fit: Fit) -> dict[str, tuple[float, float]]:
         """Those of every sensor, and the model's own."""
-        table = found.table
-        own = {name for term in found.model.terms for name in term.effect.needs if name not in NUMBERS}
-        there = [name for name in (*INFLUENCES, *sorted(own)) if name in table and table.n]
-        return {name: (float(table.column(name).min()), float(table.column(name).max())) for name in there}
+        table = fit.table
+        model_columns = {name for term in fit.model.terms for name in term.effect.needs if name not in NUMBERS}
+        names = [name for name in (*INFLUENCES, *sorted(model_columns)) if name in table and table.n]
+        return {name: (float(table.column(name).min()), float(table.column(name).max())) for name in names}
 
-    def correlations(self, found: Fit) -> Correlations | None:
+    def correlations(self, fit: Fit) -> Correlations | None:
         """Those of the identified parameters, by the noise; of a large free form, without its coefficients."""
         from calibrations.model.correlations import MOST, Correlations  # only what writes a model needs them
 
-        known = {key: e for key, e in found.params.items() if e.identified and e.std}
+        known = {key: e for key, e in fit.params.items() if e.identified and e.std}
         if len(known) > MOST:
-            whole = [e for term in found.model.terms for e in term.quantities]
-            known = {key: e for key, e in known.items() if any(e is each for each in whole)}
+            quantities = [e for term in fit.model.terms for e in term.quantities]
+            known = {key: e for key, e in known.items() if any(e is quantity for quantity in quantities)}
         if not 1 < len(known) <= MOST:
             return None
-        places = [k for k, key in enumerate(found.params) if key in known]
-        return Correlations.of(list(known), found.correlation[np.ix_(places, places)])
+        places = [k for k, key in enumerate(fit.params) if key in known]
+        return Correlations.of(list(known), fit.correlation[np.ix_(places, places)])
 
     def step(self, effect: Effect, before: Fit) -> Step[Fit]:
         """The effect added; both errors are counted in one floor. Raises ModelError where it adds nothing."""
@@ -248,43 +248,46 @@ class Rows(Dataset[Fit]):
                 raise ModelError(f"{effect.name} {why} ({t.source})")
             raise ModelError(f"{effect.name} {why}; {t.source} is a table of {t.kind}: {', '.join(t.columns)}")
 
-    def errors_document(self, found: Fit) -> dict[str, Any]:
+    def errors_document(self, fit: Fit) -> dict[str, Any]:
         """rmse, noise floor, slow noise and excess by axis."""
         return {
-            "rmse": _by_axis(found, found.rmse),
-            "noise_floor": _by_axis(found, found.noise.floor),
-            "slow_noise": _by_axis(found, found.noise.slow),
-            "excess": _by_axis(found, found.excess),
+            "rmse": _by_axis(fit, fit.rmse),
+            "noise_floor": _by_axis(fit, fit.noise.floor),
+            "slow_noise": _by_axis(fit, fit.noise.slow),
+            "excess": _by_axis(fit, fit.excess),
         }
 
-    def remarks(self, found: Fit) -> list[str]:
+    def remarks(self, fit: Fit) -> list[str]:
         """A residual below the noise floor, which only a wrong floor leaves."""
-        if not found.noise.known or found.pooled_excess > WRONG_FLOOR or found.table.n < FEWEST_FOR_FLOOR:
+        if not fit.noise.known or fit.pooled_excess > WRONG_FLOOR or fit.table.n < FEWEST_FOR_FLOOR:
             return []
         return ["The error is smaller than the noise floor: check the standard deviations and n of these means."]
 
-    def cautions(self, found: Fit) -> list[str]:
+    def cautions(self, fit: Fit) -> list[str]:
         """Why a fit of all rows may mislead: a model that the data do not determine, rows that stand out."""
-        one = ONE_ORIENTATION if self.at_rest else None
-        return [*filter(None, (one, undetermined(found), kept(found))), *self.doubts(found)]
+        one_orientation_text = ONE_ORIENTATION if self.at_rest else None
+        return [*filter(None, (one_orientation_text, undetermined(fit), outliers_in_fit(fit))), *self.doubts(fit)]
 
-    def doubts(self, found: Fit) -> list[str]:
+    def doubts(self, fit: Fit) -> list[str]:
         """Noise that is stated wrongly, and parameters that no sensor has."""
-        return list(fit_doubts(found))
+        return list(fit_doubts(fit))
 
 
-def _require_new(found: Fit, name: str, model: str) -> None:
+def _require_new(fit: Fit, name: str, model: str) -> None:
     """An expression has to add something that `model` does not have. Raises ModelError."""
-    estimates = found.model.estimates(name)
+    estimates = fit.model.estimates(name)
     if all(e.std is None for e in estimates):
         e = estimates[0]
         where = f" of {e.axis}" if e.axis else ""
         raise ModelError(f"{name} changes nothing that {model} cannot already describe: {e.name}{where}: {e.why}")
 
 
-def _by_axis(found: Fit, values: Array) -> dict[str, float]:
+def _by_axis(fit: Fit, values: Array) -> dict[str, float]:
     """By axis; of the parts of a motion their root mean square."""
     by_axis: dict[str, list[float]] = {}
-    for channel, value in zip(found.channels, np.asarray(values), strict=True):
+    for channel, value in zip(fit.channels, np.asarray(values), strict=True):
         by_axis.setdefault(axis_of(channel), []).append(float(value))
-    return {axis: each[0] if len(each) == 1 else float(rms(np.array(each))) for axis, each in by_axis.items()}
+    return {
+        axis: channel_values[0] if len(channel_values) == 1 else float(rms(np.array(channel_values)))
+        for axis, channel_values in by_axis.items()
+    }

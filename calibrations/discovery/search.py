@@ -1,10 +1,11 @@
 """The search for missing effects: forward steps, then exchanges.
 
-Forward: the best candidate is added as long as it is significant and lowers the error on unseen rows.
+Forward: the search adds the best candidate as long as it is significant and lowers the error on unseen rows.
 
-Exchange: the first effects were added while all others were still missing, so one may stand in another's place, have a
-bad start, or be needless. Each is taken out in turn. It is dropped where the model does as well without it, and
-exchanged where another candidate makes the model clearly likelier (Miller, Subset Selection in Regression).
+Exchange: the first effects were added while all others were still missing. Such an effect may describe what another one
+causes, have a bad start, or be needless. The search removes each effect in turn. It drops the effect if the model does
+as well without it, and exchanges it if another candidate makes the model clearly likelier (Miller, Subset Selection in
+Regression).
 """
 
 from __future__ import annotations
@@ -35,13 +36,13 @@ from calibrations.means.noise import rms
 
 
 @dataclass(frozen=True)
-class Taken:
-    """One forward step: the fits before and after, all candidates of that moment, and the one that was taken."""
+class ForwardStep:
+    """One forward step: the fits before and after it, all candidates on the fit before, and the selected one."""
 
     before: Fit
     after: Fit
     candidates: tuple[RowCandidate, ...]
-    taken: RowCandidate
+    selected: RowCandidate
 
     @cached_property
     def held_out_before(self) -> float:
@@ -51,16 +52,16 @@ class Taken:
     @property
     def held_out_after(self) -> float:
         """Pooled excess on unseen poses with it."""
-        return self.taken.held_out_after
+        return self.selected.held_out_after
 
 
 @dataclass(frozen=True)
 class Path:
-    """The way from a model to the last one that an effect could be added to."""
+    """The forward steps from a model to the last one to which the search could add an effect."""
 
     start: Fit
-    steps: tuple[Taken, ...]
-    left: tuple[RowCandidate, ...]  # candidates of the last search
+    steps: tuple[ForwardStep, ...]
+    last_candidates: tuple[RowCandidate, ...]  # candidates of the last search
     outliers: tuple[int, ...] = ()  # poses that were set aside
 
     @property
@@ -70,177 +71,194 @@ class Path:
 
     @cached_property
     def first(self) -> tuple[RowCandidate, ...]:
-        """Candidates on top of the model that was given; before them the one that was taken, with all its rivals."""
+        """Candidates on the given model: first the selected one with all its rivals, then the others."""
         if not self.steps:
-            return self.left
+            return self.last_candidates
         step = self.steps[0]
-        best = with_rivals(step.taken, step.candidates, step.before)
-        return best, *(c for c in step.candidates if c is not step.taken)
+        best = with_rivals(step.selected, step.candidates, step.before)
+        return best, *(c for c in step.candidates if c is not step.selected)
 
 
-def find_path(start: Fit, outliers: tuple[int, ...], effects: Mapping[str, Effect], most: int = MOST_EFFECTS) -> Path:
-    """Add the best effect to a fit until none is significant, `most` effects at most."""
-    path = grown(Path(start.in_floor(start.noise.floor), (), (), outliers), effects, most)
-    return recounted(path, path.end)
+def find_path(
+    start: Fit, outliers: tuple[int, ...], effects: Mapping[str, Effect], max_steps: int = MOST_EFFECTS
+) -> Path:
+    """Add the best effect to a fit until none is significant, `max_steps` effects at most."""
+    path = extend_path(Path(start.in_floor(start.noise.floor), (), (), outliers), effects, max_steps)
+    return in_final_floor(path, path.end)
 
 
 def is_complete(path: Path) -> bool:
     """Whether no candidate on top of the last model is significant and helps."""
     explained = bool(path.steps) and path.end.share_left(path.start) <= 0  # no further candidates were asked for
-    return explained or _next(path.end, list(path.left)) is None
+    return explained or _next(path.end, list(path.last_candidates)) is None
 
 
-def grown(path: Path, effects: Mapping[str, Effect], most: int = MOST_EFFECTS) -> Path:
+def extend_path(path: Path, effects: Mapping[str, Effect], max_steps: int = MOST_EFFECTS) -> Path:
     """Continue the forward search from the last model."""
     present, steps = path.end, list(path.steps)
-    found = candidates(present, effects)
-    while len(steps) < most:
-        step = _next(present, found)
+    ranked = candidates(present, effects)
+    while len(steps) < max_steps:
+        step = _next(present, ranked)
         if step is None:
             break
         steps.append(step)
         present = step.after
         if not present.residual_is_noise and present.share_left(path.start) <= 0:
             break
-        found = candidates(present, effects)
-    return Path(path.start, tuple(steps), tuple(found), path.outliers)
+        ranked = candidates(present, effects)
+    return Path(path.start, tuple(steps), tuple(ranked), path.outliers)
 
 
-def continued(path: Path, effects: Mapping[str, Effect]) -> Path:
-    """The forward search from the last model of a path that has ended after its first step."""
+def continue_path(path: Path, effects: Mapping[str, Effect]) -> Path:
+    """Continue the forward search of a path that ended after its first step."""
     done = not path.steps or path.end.share_left(path.start) <= 0
-    return path if done else recounted(further := grown(path, effects), further.end)
+    return path if done else in_final_floor(further := extend_path(path, effects), further.end)
 
 
-def recounted(path: Path, end: Fit) -> Path:
-    """The path with all errors as multiples of the residual of `end`, where that is the only measure of noise."""
+def in_final_floor(path: Path, end: Fit) -> Path:
+    """The path with all errors in multiples of the residual of `end`, if that residual is the only measure of noise."""
     if not end.residual_is_noise:
         return path
     floor = end.noise.scatter
     times = float(rms(path.end.noise.floor) / rms(floor))
 
-    def of(c: RowCandidate) -> RowCandidate:
+    def rescaled(c: RowCandidate) -> RowCandidate:
         return replace(c, excess_after=times * c.excess_after, held_out_after=times * c.held_out_after)
 
-    def step(s: Taken) -> Taken:
-        found = tuple(map(of, s.candidates))
-        taken = next(c for c, before in zip(found, s.candidates, strict=True) if before is s.taken)
-        return Taken(s.before.in_floor(floor), s.after.in_floor(floor), found, taken)
+    def rescaled_step(s: ForwardStep) -> ForwardStep:
+        rescaled_candidates = tuple(map(rescaled, s.candidates))
+        selected = next(c for c, before in zip(rescaled_candidates, s.candidates, strict=True) if before is s.selected)
+        return ForwardStep(s.before.in_floor(floor), s.after.in_floor(floor), rescaled_candidates, selected)
 
-    return Path(path.start.in_floor(floor), tuple(map(step, path.steps)), tuple(map(of, path.left)), path.outliers)
+    return Path(
+        path.start.in_floor(floor),
+        tuple(map(rescaled_step, path.steps)),
+        tuple(map(rescaled, path.last_candidates)),
+        path.outliers,
+    )
 
 
-def _next(present: Fit, found: list[RowCandidate]) -> Taken | None:
-    """The best candidate that is significant and still helps on unseen poses once refitted.
+def _next(present: Fit, ranked: list[RowCandidate]) -> ForwardStep | None:
+    """The step with the best candidate that is significant and, refitted, lowers the error on unseen poses.
 
-    Where there is none though much is left, the stronger of the best pair: the other then follows by itself.
+    If there is none and the residual is large, the stronger candidate of the best pair: the next step adds the other.
     """
-    for c in found[:3]:
-        if c.p_value >= SIGNIFICANT or _share(present, c.excess_after) < LEAST_SHARE / 2:
+    for c in ranked[:3]:
+        if c.p_value >= SIGNIFICANT or _explained_share(present, c.excess_after) < LEAST_SHARE / 2:
             continue
-        step = _taken(present, found, c)
+        step = _forward_step(present, ranked, c)
         if lets_go(present, step.after):
             continue
-        if step.held_out_after < step.held_out_before and _share(present, step.after.pooled_excess) >= LEAST_SHARE:
+        if (
+            step.held_out_after < step.held_out_before
+            and _explained_share(present, step.after.pooled_excess) >= LEAST_SHARE
+        ):
             return step
     if present.table.type.stage_angles or present.pooled_excess <= MATERIAL:
-        return None  # with known orientation an effect is seen beside others
-    pair = best_pair(present, found)
-    return _taken(present, found, pair[0]) if pair else None
+        return None  # with known orientation, one effect is visible while another is missing
+    pair = best_pair(present, ranked)
+    return _forward_step(present, ranked, pair[0]) if pair else None
 
 
-def _share(present: Fit, excess_after: float) -> float:
-    """Part of what is left beyond the noise floor that an effect explains; 1 where hardly anything is left."""
+def _explained_share(present: Fit, excess_after: float) -> float:
+    """Part of the excess variance over the noise floor that an effect explains; 1 if there is hardly any excess."""
     before = present.pooled_excess**2
     return (before - excess_after**2) / (before - 1) if before > MATERIAL**2 else 1.0
 
 
-def _taken(present: Fit, found: list[RowCandidate], c: RowCandidate) -> Taken:
-    """The step that adds `c`; its errors are then those of the full fit."""
+def _forward_step(present: Fit, ranked: list[RowCandidate], c: RowCandidate) -> ForwardStep:
+    """The step that adds `c`, with the errors of the full fit."""
     after = added(present, c)
     full = replace(c, excess_after=after.pooled_excess, held_out_after=after.held_out_excess)
-    return Taken(present, after, tuple(full if other is c else other for other in found), full)
+    return ForwardStep(present, after, tuple(full if candidate is c else candidate for candidate in ranked), full)
 
 
 @dataclass(frozen=True)
-class Settled:
+class FinalModel:
     """The final fit, and the effects that it needs beyond the first model."""
 
     end: Fit
     names: tuple[str, ...]
-    found: Mapping[str, tuple[RowCandidate, ...]]  # by effect: candidates once all others are in
+    candidates_by_effect: Mapping[str, tuple[RowCandidate, ...]]  # on the model without the effect
     tested: bool = True  # whether the effects were tested against each other
 
     @cached_property
-    def beside(self) -> Mapping[str, RowCandidate]:
+    def effect_candidates(self) -> Mapping[str, RowCandidate]:
         """Each effect of the model as a candidate, with its rivals."""
-        own = {name: c for name, others in self.found.items() for c in others if c.name == name}
-        return {name: with_rivals(c, self.found[name], _without(self.end, name)) for name, c in own.items()}
+        added_effects = {
+            name: c for name, ranked in self.candidates_by_effect.items() for c in ranked if c.name == name
+        }
+        return {
+            name: with_rivals(c, self.candidates_by_effect[name], _without(self.end, name))
+            for name, c in added_effects.items()
+        }
 
 
-def settled(path: Path, effects: Mapping[str, Effect]) -> Settled:
-    """What stands of the effects of `path`, and what comes in their place."""
+def final_model(path: Path, effects: Mapping[str, Effect]) -> FinalModel:
+    """The model at the end of `path` after exchanges: without needless effects, and with better ones in their place."""
     freed = {term.name for term in path.start.model.terms}
-    end, names = path.end, tuple(step.taken.name for step in path.steps)
-    found: Mapping[str, tuple[RowCandidate, ...]] = {}
+    end, names = path.end, tuple(step.selected.name for step in path.steps)
+    candidates_by_effect: Mapping[str, tuple[RowCandidate, ...]] = {}
     for _ in range(EXCHANGE_ROUNDS):
-        end, names = _needed(end, names, freed)
+        end, names = _drop_needless(end, names, freed)
         if len(names) > MOST_EXCHANGED:
-            return Settled(end, names, {}, tested=False)
-        found = _beside(path, end, tuple(name for name in names if name not in freed), effects)
-        after = _exchanged(end, names, found, freed)
+            return FinalModel(end, names, {}, tested=False)
+        candidates_by_effect = _candidates_by_effect(
+            path, end, tuple(name for name in names if name not in freed), effects
+        )
+        after = _first_exchange(end, names, candidates_by_effect, freed)
         if after is None:
             break
-        further = grown(Path(after[0], (), ()), effects)
-        end, names = further.end, (*after[1], *(step.taken.name for step in further.steps))
-    return Settled(end, names, found)
+        further = extend_path(Path(after[0], (), ()), effects)
+        end, names = further.end, (*after[1], *(step.selected.name for step in further.steps))
+    return FinalModel(end, names, candidates_by_effect)
 
 
-def _needed(present: Fit, names: tuple[str, ...], freed: set[str]) -> tuple[Fit, tuple[str, ...]]:
-    """Without those of the added effects that the model does as well without, the least first."""
-    while len(names) > 1 and (new := [name for name in names if name not in freed]):
-        of = cost if len(names) <= MOST_EXCHANGED else first_order
-        costs = {name: of(present, name) for name in new}
+def _drop_needless(present: Fit, names: tuple[str, ...], freed: set[str]) -> tuple[Fit, tuple[str, ...]]:
+    """The model without the added effects that it does not need; the effect of least cost goes first."""
+    while len(names) > 1 and (removable := [name for name in names if name not in freed]):
+        cost_of = cost if len(names) <= MOST_EXCHANGED else first_order
+        costs = {name: cost_of(present, name) for name in removable}
         name = min(costs, key=lambda n: costs[n][0] / max(costs[n][1], 1))
-        smaller = _without(present, name)
-        if chance(*costs[name]) < SIGNIFICANT and smaller.held_out_excess > present.held_out_excess:
+        reduced = _without(present, name)
+        if chance(*costs[name]) < SIGNIFICANT and reduced.held_out_excess > present.held_out_excess:
             break
-        names = tuple(other for other in names if other != name)
-        present = smaller
+        names = tuple(n for n in names if n != name)
+        present = reduced
     return present, names
 
 
-def _beside(
+def _candidates_by_effect(
     path: Path, end: Fit, names: tuple[str, ...], effects: Mapping[str, Effect]
 ) -> Mapping[str, tuple[RowCandidate, ...]]:
-    """For each effect, all candidates once every other one is in the model."""
-    if len(path.steps) == 1 and names == (path.steps[0].taken.name,):
+    """By effect, all candidates on the model without that effect."""
+    if len(path.steps) == 1 and names == (path.steps[0].selected.name,):
         return {names[0]: path.steps[0].candidates}
     return {name: tuple(candidates(_without(end, name), effects)) for name in names}
 
 
-def _exchanged(
-    end: Fit, names: tuple[str, ...], beside: Mapping[str, tuple[RowCandidate, ...]], freed: set[str]
+def _first_exchange(
+    end: Fit, names: tuple[str, ...], candidates_by_effect: Mapping[str, tuple[RowCandidate, ...]], freed: set[str]
 ) -> tuple[Fit, tuple[str, ...]] | None:
-    """The first exchange that makes the model clearly likelier; None where there is none.
+    """The first exchange that makes the model clearly likelier; None if no exchange does.
 
-    One that is as good counts as well if it makes another effect needless.
+    An exchange for an equally likely effect counts as well if it makes a third effect needless.
     """
     present = likelihood(end)
-    for name, found in beside.items():
-        for c in _promising(found):
+    for name, ranked in candidates_by_effect.items():
+        for c in _promising(ranked):
             after = added(_without(end, name), c)
-            others = tuple(c.name if other == name else other for other in names)
+            exchanged_names = tuple(c.name if n == name else n for n in names)
             if present - CLEARLY_BETTER < likelihood(after) <= present + CLEARLY_BETTER and c.name != name:
-                after, others = _needed(after, others, freed)
+                after, exchanged_names = _drop_needless(after, exchanged_names, freed)
             if likelihood(after) > present + CLEARLY_BETTER and not lets_go(end, after):
-                return after, others
+                return after, exchanged_names
     return None
 
 
-def _promising(found: tuple[RowCandidate, ...]) -> list[RowCandidate]:
-    """The best, and those that explain nearly as much."""
-    return [c for c in found[:CANDIDATES_FOR_A_PLACE] if c.gain > NEARLY_AS_GOOD * found[0].gain]
+def _promising(ranked: tuple[RowCandidate, ...]) -> list[RowCandidate]:
+    """The best candidate, and those that explain nearly as much."""
+    return [c for c in ranked[:CANDIDATES_FOR_A_PLACE] if c.gain > NEARLY_AS_GOOD * ranked[0].gain]
 
 
 @lru_cache(maxsize=16)
@@ -249,19 +267,19 @@ def _without(end: Fit, name: str) -> Fit:
 
 
 def cost(end: Fit, name: str) -> tuple[float, int]:
-    """Growth of the whitened sum of squares when the model does without the effect, and the parameters that it has."""
-    left = end.noise.whiten(_without(end, name).residual[:, :, None])[:, 0]
+    """Growth of the whitened sum of squares without the effect, and the number of its parameters."""
+    residual_without = end.noise.whiten(_without(end, name).residual[:, :, None])[:, 0]
     present = end.whitened[:, 0]
-    return float(left @ left - present @ present), int(end.problem.layout.of_effect(name).sum())
+    return float(residual_without @ residual_without - present @ present), int(end.problem.layout.of_effect(name).sum())
 
 
 def first_order(end: Fit, name: str, shared: bool = False) -> tuple[float, int]:
-    """The same to first order; `shared`: when the axes only share one value of each of its parameters."""
-    white, mine = end.whitened[:, 1:], end.problem.layout.of_effect(name)
+    """The same to first order. `shared`: growth if the axes share one value of each parameter, instead of without."""
+    white, mask = end.whitened[:, 1:], end.problem.layout.of_effect(name)
     size = np.linalg.norm(white, axis=0)
     white = white / np.where(size > 0, size, 1.0)
-    value = end.theta[mine] - (end.theta[mine].mean() if shared else 0.0)
-    signal = white[:, mine] @ (value * size[mine])
-    others = white[:, ~mine]
-    lost = signal - others @ np.linalg.lstsq(others, signal, rcond=1e-9)[0]
-    return float(lost @ lost), int(mine.sum())
+    value = end.theta[mask] - (end.theta[mask].mean() if shared else 0.0)
+    signal = white[:, mask] @ (value * size[mask])
+    other_columns = white[:, ~mask]
+    lost_signal = signal - other_columns @ np.linalg.lstsq(other_columns, signal, rcond=1e-9)[0]
+    return float(lost_signal @ lost_signal), int(mask.sum())

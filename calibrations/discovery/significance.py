@@ -1,8 +1,8 @@
-"""Score tests: how much of a residual a set of columns could take up, and how often noise alone would show as much.
+"""Score tests: the part of a residual that a set of columns can explain, and the chance that noise shows as much.
 
-Columns are made white under the fitted noise and freed of what the model already explains (Frisch, Waugh and Lovell);
-the statistic is then a sum of squares, chi-squared under the null. The chance that the best of a whole search does as
-well on noise is estimated from noise sets drawn under the fitted null, not from a bound.
+Columns are whitened under the fitted noise, and projected off the model's columns (Frisch, Waugh and Lovell). The
+statistic is then a sum of squares, chi-squared under the null. Noise sets drawn under the fitted null, and not a bound,
+give the chance that the best of a whole search reaches the statistic on noise.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from calibrations.fitting.noise_fit import deviance
 from calibrations.table import Array
 
 DRAWS = 300
-ROUNDING = 1e-11  # of a column's length: what rounding leaves of a column that the model holds
-NEARLY = 1e-6  # least eigenvalue of a Gram matrix of columns of length 1: less has too few digits left for 1e-9
+ROUNDING = 1e-11  # of a column's length: remainder by rounding of a column that the model spans
+NEARLY = 1e-6  # least eigenvalue of a Gram matrix of unit columns: a smaller one has too few digits for 1e-9
 
 
 @dataclass(frozen=True)
@@ -37,26 +37,26 @@ class Screen:
 
     @cached_property
     def residual(self) -> Array:
-        """The whitened residual, freed of the model, shape (rows,)."""
+        """The whitened residual, projected off the model's columns, shape (rows,)."""
         return _freed(self.fit.whitened[:, 0], self.explained)
 
     def freed(self, residual: Array) -> Array:
-        """What the model cannot explain of a residual (channels, n), whitened, shape (rows,)."""
+        """The part of a residual (channels, n) that the model cannot explain, whitened, shape (rows,)."""
         return _freed(self.fit.noise.whiten(residual[:, :, None])[:, 0], self.explained)
 
     def basis(self, columns: Array) -> Array:
-        """Orthonormal basis of what `columns` (channels, n, k) could add to the model, shape (rows, rank)."""
-        return _beside(self.fit.noise.whiten(columns), self.explained, NOT_SHOWN)
+        """Orthonormal basis of the directions that `columns` (channels, n, k) add to the model, shape (rows, rank)."""
+        return _added_basis(self.fit.noise.whiten(columns), self.explained, NOT_SHOWN)
 
     def reductions(self, columns: Sequence[Array]) -> Array:
-        """What the residual's sum of squares falls by with each of `columns`, (channels, n, k) each."""
+        """Reduction of the residual's sum of squares by each of `columns`, (channels, n, k) each."""
         white = self.fit.noise.whiten(np.concatenate(columns, axis=2))
-        ends = np.cumsum([each.shape[2] for each in columns])[:-1]
+        ends = np.cumsum([block.shape[2] for block in columns])[:-1]
         return reductions(self.fit.whitened[:, 1:], self.fit.whitened[:, 0], np.split(white, ends, axis=1))
 
     @property
     def free(self) -> int:
-        """Rows that the model leaves free."""
+        """Degrees of freedom of the residual."""
         rows, explained = self.explained.shape
         return max(int(rows - explained), 1)
 
@@ -85,20 +85,20 @@ class Search:
     @cached_property
     def trials(self) -> float:
         """Effective number of independent tests: the least p-value of the search on noise is Beta(1, trials)."""
-        some = [k for k, b in enumerate(self.bases) if b.shape[1]]
-        if not some:
+        nonempty = [k for k, b in enumerate(self.bases) if b.shape[1]]
+        if not nonempty:
             return 1.0
         rng = np.random.default_rng(20031)
         noise = rng.standard_normal((len(self.screen.residual), DRAWS))
-        squares = (np.hstack([self.bases[k] for k in some]).T @ noise) ** 2
-        edges = np.concatenate([[0], np.cumsum(self.ranks[some])]).astype(int)
+        squares = (np.hstack([self.bases[k] for k in nonempty]).T @ noise) ** 2
+        edges = np.concatenate([[0], np.cumsum(self.ranks[nonempty])]).astype(int)
         sums = np.add.reduceat(squares, edges[:-1], axis=0)
-        least = np.min(chdtrc(self.ranks[some][:, None], sums), axis=0)
-        return max(1.0, -DRAWS / float(np.sum(np.log1p(-np.minimum(least, 1 - 1e-12)))))
+        lowest_p = np.min(chdtrc(self.ranks[nonempty][:, None], sums), axis=0)
+        return max(1.0, -DRAWS / float(np.sum(np.log1p(-np.minimum(lowest_p, 1 - 1e-12)))))
 
     @cached_property
     def p_values(self) -> Array:
-        """Chance that the best of this search does as well as each basis, on noise alone (F: its level is fitted)."""
+        """Chance that the best of this search reaches each statistic on noise alone (F: its level is fitted)."""
         ranks = np.maximum(self.ranks, 1)
         free = min(self.screen.free, self.screen.fit.noise.freedom)
         single = np.where(self.ranks > 0, fdtrc(ranks, free, self.statistics / ranks), 1.0)
@@ -111,41 +111,41 @@ def of_search(p: Array | float, trials: float) -> Array:
 
 
 def reductions(model: Array, residual: Array, candidates: Sequence[Array]) -> Array:
-    """What the sum of squares of `residual` (rows,) falls by when each of `candidates` (rows, k) joins the model.
+    """Reduction of the sum of squares of `residual` (rows,) when each of `candidates` (rows, k) joins the model.
 
-    As a least-squares solution each would give it, with `model` (rows, p) worked out once. Gram matrices are enough, of
-    the columns as they are, or freed of the model where they are nearly its own; a basis is made where neither has the
-    digits.
+    The result is that of one least-squares solution a candidate; `model` (rows, p) is decomposed once. Gram matrices of
+    the columns suffice, or of the columns projected off the model where the model nearly spans them. Where neither has
+    enough digits, the function makes a basis.
     """
     Q = _basis(model)
-    left = _freed(residual, Q)
-    known = np.column_stack([Q, left]).T
+    remainder = _freed(residual, Q)
+    known = np.column_stack([Q, remainder]).T
     products = [(_gram(columns), known @ columns) for columns in candidates]
-    sums, least = _by_gram(products)
-    near = list(map(int, np.flatnonzero(least < NEARLY)))
-    sizes = [np.sqrt(np.diagonal(products[k][0])) for k in near]
-    sums[near] = _near_reductions([_freed(candidates[k], Q) for k in near], left, sizes)
+    sums, least_eigenvalues = _by_gram(products)
+    nearly_spanned = list(map(int, np.flatnonzero(least_eigenvalues < NEARLY)))
+    sizes = [np.sqrt(np.diagonal(products[k][0])) for k in nearly_spanned]
+    sums[nearly_spanned] = _freed_reductions([_freed(candidates[k], Q) for k in nearly_spanned], remainder, sizes)
     return sums
 
 
-def _near_reductions(free: Sequence[Array], left: Array, sizes: Sequence[Array]) -> Array:
-    """The same for candidates freed of the model; `sizes` are their columns' lengths before, to know rounding by."""
-    products = [(_gram(columns), (left @ columns)[None]) for columns in free]
-    sums, least = _by_gram(products)
+def _freed_reductions(free: Sequence[Array], remainder: Array, sizes: Sequence[Array]) -> Array:
+    """The same for candidates projected off the model; `sizes`: column lengths before, which show rounding."""
+    products = [(_gram(columns), (remainder @ columns)[None]) for columns in free]
+    sums, least_eigenvalues = _by_gram(products)
     for k, (gram, _) in enumerate(products):
-        kept = np.sqrt(np.diagonal(gram)) > ROUNDING * sizes[k]
-        if least[k] < NEARLY or not kept.all():
-            sums[k] = np.sum((_basis(free[k][:, kept]).T @ left) ** 2)
+        independent = np.sqrt(np.diagonal(gram)) > ROUNDING * sizes[k]
+        if least_eigenvalues[k] < NEARLY or not independent.all():
+            sums[k] = np.sum((_basis(free[k][:, independent]).T @ remainder) ** 2)
     return sums
 
 
 def _gram(columns: Array) -> Array:
-    """Products of columns with each other. Of a copy: the routine for a matrix with itself is slow on narrow ones."""
+    """Gram matrix of columns. By a copy: the routine for a matrix with itself is slow on narrow matrices."""
     return np.asarray(columns.T @ columns.copy())
 
 
 def _by_gram(products: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """Reductions, and the least eigenvalue of each candidate's Gram matrix freed of the model, columns of length 1.
+    """Reductions, and the least eigenvalue of each candidate's Gram matrix off the model, for columns of length 1.
 
     Products of each candidate: with itself (k, k), and with the model's basis and, last, the residual (p + 1, k).
     """
@@ -156,17 +156,17 @@ def _by_gram(products: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
         grams[k, : len(gram), : len(gram)], along[k, :, : len(gram)] = gram, projections
     scale = 1 / np.sqrt(np.maximum(np.diagonal(grams, axis1=1, axis2=2), np.finfo(float).tiny))[:, None]
     along *= scale
-    model, sides = along[:, :-1], along[:, -1:]
+    model, residual_products = along[:, :-1], along[:, -1:]
     values, vectors = np.linalg.eigh(grams * scale * scale.swapaxes(1, 2) - model.swapaxes(1, 2) @ model)
-    squares = (sides @ vectors)[:, 0] ** 2 / np.maximum(values, NEARLY)
+    squares = (residual_products @ vectors)[:, 0] ** 2 / np.maximum(values, NEARLY)
     return squares.sum(axis=1), np.min(values, axis=1, initial=1.0)
 
 
-def _beside(columns: Array, basis: Array, least: float) -> Array:
-    """Orthonormal basis of what columns add to those of `basis`, without those of which less than `least` is left."""
+def _added_basis(columns: Array, basis: Array, smallest_share: float) -> Array:
+    """Orthonormal basis of the part of `columns` off `basis`; drops columns with a smaller share than this off it."""
     size = np.linalg.norm(columns, axis=0)
     free = _freed(columns, basis)
-    return _basis(free[:, np.linalg.norm(free, axis=0) > least * np.where(size > 0, size, 1.0)])
+    return _basis(free[:, np.linalg.norm(free, axis=0) > smallest_share * np.where(size > 0, size, 1.0)])
 
 
 def _basis(columns: Array) -> Array:
@@ -190,10 +190,10 @@ def chance(statistic: float, rank: int) -> float:
 
 
 def twice_log_likelihood(fit: Fit) -> float:
-    """Restricted, up to a constant of the data."""
+    """Twice the restricted log-likelihood, up to a constant of the data."""
     return -deviance(fit.noise, fit.residual, fit.jacobian, np.zeros((fit.table.n, 0)))
 
 
 def likelihood(fit: Fit) -> float:
-    """The same, a parameter costing log(rows) (Schwarz)."""
+    """The same minus log(rows) for each parameter (Schwarz)."""
     return twice_log_likelihood(fit) - len(fit.theta) * float(np.log(fit.residual.size))

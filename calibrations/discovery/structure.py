@@ -1,8 +1,8 @@
-"""What a residual shows, in words: the plainest pattern, the poses that stand out, or more noise than a sensor has.
+"""The structure of a residual, in words: the best pattern, the poses that stand out, or more noise than a sensor has.
 
-A pattern is found under the fitted noise, and compared with others by likelihood under the noise without its slow part,
-which would take up steps and ramps alike. The best few are sharpened before: which row a step is at, how wide a sector,
-whether from one side only. Poses that stand out compete with them, and pay for each pose and for the choice of it.
+The fitted noise decides which patterns are significant. The likelihood under the noise without its slow part compares
+them, because slow noise would absorb steps and ramps. The best few are sharpened first: the row of a step, the width of
+a sector, one side or both. Poses that stand out compete with them; each pose and the choice of it has a price.
 
 Patterns compete with effects as well: a step in time looks like a drift to a catalogue without steps. A pattern that
 describes the residual better than all effects found means that the cause is not in the catalogue.
@@ -26,7 +26,7 @@ from calibrations.criteria import (
     PATTERN_CONTAINED,
     SIGNIFICANT,
 )
-from calibrations.discovery.outliers import told
+from calibrations.discovery.outliers import outlier_text
 from calibrations.discovery.patterns import Pattern, at_attitudes, one_sided, patterns, per_channel
 from calibrations.discovery.plausibility import UNEXPLAINED, Finding
 from calibrations.discovery.significance import Screen, Search
@@ -35,111 +35,117 @@ from calibrations.means.noise import correlation_known, rms
 from calibrations.table import Array
 
 FINALISTS = 6  # patterns that are sharpened
-NAMED = 6  # poses that are told one by one
+NAMED = 6  # poses that the text lists one by one
 
 
 def structure_of(fit: Fit) -> Pattern | None:
-    """The plainest pattern in a fit's residual; None where there is none beyond noise."""
-    screen, noise = Screen(without_slow(fit)), _patternless(fit)
-    every = patterns(fit.table, fit.channels)
-    found = _significant(every, Screen(fit)) or ([p for p in every if p.slow] if noise else [])
-    found = sorted(found, key=lambda p: worth(p, screen), reverse=True)[:FINALISTS]
-    sharp = [sharpened(pattern, screen) for pattern in (*found, *_out(fit))]
-    sharp = [p for p in sharp if not (p.slow and noise) or _share_left(p, screen) < MOST_UNDER_SLOW_PATTERN]
-    return max(sharp, key=lambda p: worth(p, screen), default=noise)
+    """The best pattern in a fit's residual; None if the residual is noise."""
+    screen, noise = Screen(without_slow(fit)), _excess_noise(fit)
+    all_patterns = patterns(fit.table, fit.channels)
+    significant = _significant(all_patterns, Screen(fit)) or ([p for p in all_patterns if p.slow] if noise else [])
+    significant = sorted(significant, key=lambda p: score(p, screen), reverse=True)[:FINALISTS]
+    finalists = [sharpened(pattern, screen) for pattern in (*significant, *_outlier_pattern(fit))]
+    finalists = [
+        p for p in finalists if not (p.slow and noise) or _remaining_share(p, screen) < MOST_UNDER_SLOW_PATTERN
+    ]
+    return max(finalists, key=lambda p: score(p, screen), default=noise)
 
 
-def _share_left(pattern: Pattern, screen: Screen) -> float:
-    """Part of the residual's excess over white noise that the pattern leaves: slow noise leaves much of its own."""
+def _remaining_share(pattern: Pattern, screen: Screen) -> float:
+    """Share of the residual's excess over white noise that remains with the pattern; of slow noise much remains."""
     fit, columns = screen.fit, pattern.columns.reshape(screen.fit.residual.size, -1)
     J = np.hstack([fit.jacobian.reshape(fit.residual.size, -1), columns])
     size = np.linalg.norm(J, axis=0)
     J = J / np.where(size > 0, size, 1.0)
     r = fit.residual.ravel()
-    left = (r - J @ np.linalg.lstsq(J, r, rcond=1e-9)[0]).reshape(fit.residual.shape)
-    after = float(np.mean((rms(left) / fit.noise.floor) ** 2))
+    remainder = (r - J @ np.linalg.lstsq(J, r, rcond=1e-9)[0]).reshape(fit.residual.shape)
+    after = float(np.mean((rms(remainder) / fit.noise.floor) ** 2))
     return max(after - 1, 0.0) / max(fit.pooled_excess**2 - 1, 1e-9)
 
 
 def without_slow(fit: Fit) -> Fit:
-    """The fit with the slow part of its noise left out."""
+    """The fit with noise that has no slow part."""
     return replace(fit, noise=replace(fit.noise, ratio=np.zeros_like(fit.noise.ratio)))
 
 
-def worth(pattern: Pattern, screen: Screen) -> float:
-    """Twice the log-likelihood with the pattern less the price of its parameters, up to a constant."""
+def score(pattern: Pattern, screen: Screen) -> float:
+    """Twice the log-likelihood with the pattern, minus the price of its parameters, up to a constant."""
     basis = screen.basis(pattern.columns)
-    left = float(screen.residual @ screen.residual) - screen.statistic(basis)
-    return likelihood(left, basis.shape[1], screen.fit) - pattern.price
+    squares = float(screen.residual @ screen.residual) - screen.statistic(basis)
+    return likelihood(squares, basis.shape[1], screen.fit) - pattern.price
 
 
 def likelihood(squares: float, parameters: int, fit: Fit) -> float:
-    """Twice the log-likelihood of a sum of whitened squares, less log(rows) for each parameter (Schwarz)."""
+    """Twice the log-likelihood of a sum of whitened squares, minus log(rows) for each parameter (Schwarz)."""
     rows = fit.residual.size
     return -rows * float(np.log(max(squares, 1e-300) / rows)) - parameters * float(np.log(rows))
 
 
-def _significant(every: list[Pattern], screen: Screen) -> list[Pattern]:
-    """The patterns that noise alone would hardly show."""
-    tried = [(p, screen.basis(p.columns)) for p in every]
-    tried = [(p, basis) for p, basis in tried if basis.shape[1]]
-    chances = Search(screen, [basis for _, basis in tried]).p_values
-    return [p for (p, _), chance in zip(tried, chances, strict=True) if chance < SIGNIFICANT]
+def _significant(all_patterns: list[Pattern], screen: Screen) -> list[Pattern]:
+    """The patterns that are significant against noise alone."""
+    tested = [(p, screen.basis(p.columns)) for p in all_patterns]
+    tested = [(p, basis) for p, basis in tested if basis.shape[1]]
+    chances = Search(screen, [basis for _, basis in tested]).p_values
+    return [p for (p, _), chance in zip(tested, chances, strict=True) if chance < SIGNIFICANT]
 
 
 def sharpened(pattern: Pattern, screen: Screen) -> Pattern:
-    """The best of the pattern and those between it and its neighbours, on both sides or on one."""
+    """The best of the pattern and the finer ones up to its neighbours, for both directions of turning or for one."""
     table, channels = screen.fit.table, len(screen.fit.channels)
-    near = [pattern, *(per_channel(p, channels) for p in pattern.finer() if np.ptp(p.columns) > 0)]
-    best = near[int(np.argmax(screen.reductions([p.columns for p in near])))]
-    return max([best, *one_sided(best, table)], key=lambda p: worth(p, screen))
+    neighbours = [pattern, *(per_channel(p, channels) for p in pattern.finer() if np.ptp(p.columns) > 0)]
+    best = neighbours[int(np.argmax(screen.reductions([p.columns for p in neighbours])))]
+    return max([best, *one_sided(best, table)], key=lambda p: score(p, screen))
 
 
-def _out(fit: Fit) -> list[Pattern]:
-    """The poses that stand out; none where there are none, or too many."""
+def _outlier_pattern(fit: Fit) -> list[Pattern]:
+    """The poses that stand out, as one pattern; empty if there are none, or too many."""
     rows, n = standing_out(fit.residual, np.hypot(fit.noise.floor, fit.noise.wander)), fit.table.n
     if fit.table.type.moving or not 0 < len(rows) <= max(1, MOST_ROWS_STAND_OUT * n):
         return []
     columns = per_channel(Pattern("", np.eye(n)[:, rows]), len(fit.channels)).columns
     choices = gammaln(n + 1) - gammaln(len(rows) + 1) - gammaln(n - len(rows) + 1)
     numbers = tuple(map(int, fit.table.numbered(rows)))
-    return [Pattern(told(numbers, fit.table.kind, NAMED), columns, price=2 * float(choices), poses=numbers)]
+    return [Pattern(outlier_text(numbers, fit.table.kind, NAMED), columns, price=2 * float(choices), poses=numbers)]
 
 
 def standing_out(residual: Array, noise: Array) -> NDArray[np.intp]:
-    """Rows whose residual (channels, n) is too large to be noise of the others' spread, by medians.
+    """Rows whose residual (channels, n) is too large for noise with the spread of the other rows, by medians.
 
-    The spread is not less than `noise` (channels,), the white and the slow: medians of slow noise are uncertain.
+    The spread is at least `noise` (channels,), white and slow together: medians of slow noise are uncertain.
     """
     middle = np.median(residual, axis=1, keepdims=True)
     spread = 1.4826 * np.median(np.abs(residual - middle), axis=1, keepdims=True)
     spread = np.maximum(spread, noise[:, None])
-    most = -ndtri(SIGNIFICANT / 2 / residual.size)
-    return np.flatnonzero(np.any(np.abs(residual - middle) > most * spread, axis=0))
+    limit = -ndtri(SIGNIFICANT / 2 / residual.size)
+    return np.flatnonzero(np.any(np.abs(residual - middle) > limit * spread, axis=0))
 
 
 def unexplained_scatter(fit: Fit) -> Finding | None:
-    """Scatter of a fit that neither its samples' noise nor a pattern explains; None where there is none."""
-    if _patternless(fit) is None or (found := structure_of(fit)) is None or found.columns.size:
+    """Scatter of a fit that neither the samples' noise nor a pattern explains; None if there is none."""
+    if _excess_noise(fit) is None or (pattern := structure_of(fit)) is None or pattern.columns.size:
         return None
-    return Finding(UNEXPLAINED, found.text)
+    return Finding(UNEXPLAINED, pattern.text)
 
 
-def _fewest_samples(fit: Fit) -> float:
-    """Noise of a mean over the noise floor where all its samples are one: more they cannot be correlated."""
+def _fully_correlated_ratio(fit: Fit) -> float:
+    """Noise of a mean over the noise floor if all its samples are fully correlated: the upper limit."""
     return float(np.sqrt(np.median(fit.table.optional("n", 1.0))))
 
 
-def _patternless(fit: Fit) -> Pattern | None:
-    """More noise than a sensor makes by itself. On positions it is how well a hand repeats them, and no effect."""
+def _excess_noise(fit: Fit) -> Pattern | None:
+    """Noise above that of any sensor, as a pattern. On positions it is the repeatability of the hand, and no effect."""
     excess = rms(fit.rmse / np.hypot(fit.noise.floor, fit.noise.known_slow))
     if fit.table.type.magnitude or not fit.noise.known or excess <= MOST_SLOW_NOISE:
         return None
     slow, scatter = (float(np.max(noise / fit.noise.floor)) for noise in (fit.noise.slow, fit.noise.scatter))
-    if scatter > slow and not correlation_known(fit.table) and scatter <= MOST_SLOW_NOISE * _fewest_samples(fit):
+    if (
+        scatter > slow
+        and not correlation_known(fit.table)
+        and scatter <= MOST_SLOW_NOISE * _fully_correlated_ratio(fit)
+    ):
         return None  # the means may be of so few independent samples
-    what = "slow drift" if slow > scatter else "scatter"
-    return Pattern(f"{what} without a pattern, {max(slow, scatter):.1f} x the noise floor", np.zeros((0, 0, 0)))
+    noise_name = "slow drift" if slow > scatter else "scatter"
+    return Pattern(f"{noise_name} without a pattern, {max(slow, scatter):.1f} x the noise floor", np.zeros((0, 0, 0)))
 
 
 def poorly_predicted(fit: Fit) -> Pattern | None:
@@ -150,48 +156,48 @@ def poorly_predicted(fit: Fit) -> Pattern | None:
     return Pattern(text, np.zeros((0, 0, 0)))
 
 
-def plainer(begin: Fit, end: Fit, named: Fit | None = None) -> Pattern | None:
-    """The pattern that explains what the model of `begin` misses better than the effects added up to `end`.
+def competing_pattern(start: Fit, end: Fit, named: Fit | None = None) -> Pattern | None:
+    """The pattern that explains the residual of `start` better than the effects added up to `end`; None if none does.
 
-    Both are compared by likelihood under the noise without its slow part, which would take up either; a parameter
-    costs log(rows), and so does the choice among the patterns. In a motion, whose rows repeat each other, a step at the
-    beginning is an effect that is always there: only an offset at one attitude competes, where it leaves noise: of few
-    attitudes it takes up part of most effects. `named`: the effects without free forms, which follow any pattern and
-    tell nothing of its cause.
+    The likelihood under the noise without its slow part compares the two, because slow noise would absorb either. A
+    parameter costs log(rows), and so does the choice among the patterns. The rows of a motion repeat each other, so
+    that a step at its beginning is an effect that is always there. There, only an offset at one attitude competes, and
+    only if its residual is noise: with few attitudes it absorbs a part of most effects. `named`: the fit without free
+    forms, which follow any pattern and do not show its cause.
     """
-    if end is begin:
+    if end is start:
         return None
-    start = without_slow(begin)
-    screen = Screen(start)
-    price = float(np.log(start.residual.size))
-    every = patterns(start.table, start.channels)
-    if start.table.type.moving:
-        every = [p for p in at_attitudes(start.table, start.channels) if _leaves_noise(p, screen)]
-    tried = [(worth(p, screen) - price, p) for p in every]
-    best, pattern = max(tried, key=lambda each: each[0], default=(-np.inf, None))
+    white_start = without_slow(start)
+    screen = Screen(white_start)
+    price = float(np.log(white_start.residual.size))
+    all_patterns = patterns(white_start.table, white_start.channels)
+    if white_start.table.type.moving:
+        all_patterns = [p for p in at_attitudes(white_start.table, white_start.channels) if _leaves_noise(p, screen)]
+    scored = [(score(p, screen) - price, p) for p in all_patterns]
+    best, pattern = max(scored, key=lambda item: item[0], default=(-np.inf, None))
     if (
         pattern is None
-        or not best > _by_effects(end, start) + PATTERN_BETTER
-        or _contains(pattern, begin, named or end, screen)
+        or not best > _likelihood_with_effects(end, white_start) + PATTERN_BETTER
+        or _contains(pattern, start, named or end, screen)
     ):
         return None
     return sharpened(pattern, screen)
 
 
 def _leaves_noise(pattern: Pattern, screen: Screen) -> bool:
-    """Whether what a pattern leaves is no more than noise."""
+    """Whether the residual with the pattern is noise."""
     basis = screen.basis(pattern.columns)
-    left = float(screen.residual @ screen.residual) - screen.statistic(basis)
-    return bool(left <= MATERIAL**2 * max(screen.free - basis.shape[1], 1))
+    squares = float(screen.residual @ screen.residual) - screen.statistic(basis)
+    return bool(squares <= MATERIAL**2 * max(screen.free - basis.shape[1], 1))
 
 
-def _contains(pattern: Pattern, begin: Fit, end: Fit, screen: Screen) -> bool:
-    """Whether what the effects explain is part of the pattern: it then tells more of their form, and no other cause."""
-    explained = screen.freed(begin.residual - end.residual)
+def _contains(pattern: Pattern, start: Fit, end: Fit, screen: Screen) -> bool:
+    """Whether the signal of the effects is part of the pattern, which then describes their form and no other cause."""
+    explained = screen.freed(start.residual - end.residual)
     inside = screen.basis(pattern.columns).T @ explained
     return float(inside @ inside) > PATTERN_CONTAINED * float(explained @ explained)
 
 
-def _by_effects(end: Fit, start: Fit) -> float:
-    white = start.noise.whiten(end.residual[:, :, None])[:, 0]
-    return likelihood(float(white @ white), len(end.theta) - len(start.theta), start)
+def _likelihood_with_effects(end: Fit, white_start: Fit) -> float:
+    white = white_start.noise.whiten(end.residual[:, :, None])[:, 0]
+    return likelihood(float(white @ white), len(end.theta) - len(white_start.theta), white_start)

@@ -20,14 +20,14 @@ from calibrations.means.noise import rms
 from calibrations.table import Array
 
 UNKNOWN = "unknown form"
-NO_VARIANCE = 0.1  # of the noise's: a model that leaves less beyond it has nothing to share out
+NO_VARIANCE = 0.1  # of the noise's: with less excess variance there are no shares
 
 
 @dataclass(frozen=True)
 class Line:
-    """One cause. `size` in thousandths of what is sensed, rms; `certainty`: 1 less the chance that noise does as much.
+    """One cause. `size`: rms in thousandths of the sensed unit; `certainty`: 1 minus the chance of it by noise alone.
 
-    `effects`: () where the form is unknown. `in_another_form`: a free form beside them follows what they leave.
+    `effects`: () if the form is unknown. `in_another_form`: a free form describes the remainder of the effects.
     """
 
     place: str
@@ -46,40 +46,40 @@ class Line:
         return f"{names} (another form)" if self.in_another_form else names
 
 
-def step_shares(found: Discovery[Fit]) -> list[float | None]:
-    """By step, the share that it explains of the variance beyond the noise, on unseen data; below 0 where it rises.
+def step_shares(discovery: Discovery[Fit]) -> list[float | None]:
+    """By step, its share of the variance beyond the noise, on unseen data; below 0 if the error rises.
 
-    None where the given model leaves no more than noise.
+    None if the residual of the given model is noise.
     """
 
-    def beyond(excess: float) -> float:
+    def excess_variance(excess: float) -> float:
         return max(float(excess) ** 2 - 1, 0.0)
 
-    whole = beyond(found.start.held_out_excess)
-    if whole < NO_VARIANCE:
-        return [None for _ in found.steps]
-    return [(beyond(s.held_out_before) - beyond(s.held_out_after)) / whole for s in found.steps]
+    total = excess_variance(discovery.start.held_out_excess)
+    if total < NO_VARIANCE:
+        return [None for _ in discovery.steps]
+    return [(excess_variance(s.held_out_before) - excess_variance(s.held_out_after)) / total for s in discovery.steps]
 
 
-def summary_lines(found: Discovery[Fit]) -> list[Line]:
+def summary_lines(discovery: Discovery[Fit]) -> list[Line]:
     """The lines, largest first."""
-    if not found.steps:
-        return []  # where the output does not respond there is no scale either
-    findings, end = found.findings, found.end
+    if not discovery.steps:
+        return []  # an output that does not respond has no scale
+    findings, end = discovery.findings, discovery.end
     floor, unit = pooled_milli(end)[1], milli_unit(end)
-    added = {step.name for step in found.steps}
-    alternatives = found.alternatives
-    lines, told = [], set[str]()
+    added = {step.name for step in discovery.steps}
+    alternatives = discovery.alternatives
+    lines, listed = [], set[str]()
     for place in findings.places:
         effects = tuple(c for c in place.causes if c in added)
         if not effects and f"{PREFIX}{place.name}" not in added:
-            continue  # a cause of another name takes it up, or the search stopped before
+            continue  # an effect with another name explains it, or the search stopped before
         rivals = dict.fromkeys([*place.inseparable_from, *(r for e in effects for r in alternatives.get(e, ()))])
         certainty = 1 - place.p_value
         lines.append((place.name, effects, place.size * floor, certainty, tuple(rivals)))
-        told |= {*effects, f"{PREFIX}{place.name}"}
-    for step in found.steps:
-        if step.name in told or (step.name in found.refinements and not step.name.startswith(PREFIX)):
+        listed |= {*effects, f"{PREFIX}{place.name}"}
+    for step in discovery.steps:
+        if step.name in listed or (step.name in discovery.refinements and not step.name.startswith(PREFIX)):
             continue
         change = rms(in_milli_rows(step.after.residual - step.before.residual, end))
         p = chance(*first_order(end, step.name))
@@ -87,15 +87,15 @@ def summary_lines(found: Discovery[Fit]) -> list[Line]:
         at = place_of_effect(step.name) or "-"
         lines.append((at, effects, float(np.sqrt(np.mean(change**2))), 1 - p, tuple(alternatives.get(step.name, ()))))
     total = sum(size**2 for _, _, size, _, _ in lines) or 1.0
-    made = [
+    summary = [
         Line(at, e, size, unit, size**2 / total, certainty, rivals, bool(e) and f"{PREFIX}{at}" in added)
         for at, e, size, certainty, rivals in lines
     ]
-    return sorted(made, key=lambda line: -line.size)
+    return sorted(summary, key=lambda line: -line.size)
 
 
 def in_milli_rows(values: Array, fit: Fit) -> Array:
-    """Residuals (channels, n) in thousandths of what is sensed."""
+    """Residuals (channels, n) in thousandths of the sensed unit."""
     return np.asarray(in_milli(values.T, fit).T)
 
 

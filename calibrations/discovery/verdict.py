@@ -107,8 +107,8 @@ class Judgement:
     @property
     def summary(self) -> str:
         """The text; where many effects are missing, a sentence with their number."""
-        many = len(self.missing) > MOST_NAMED and self.verdict in (Verdict.EFFECT_MISSING, Verdict.AMBIGUOUS)
-        return f"The model {self.model} misses {len(self.missing)} effects." if many else self.text
+        is_long = len(self.missing) > MOST_NAMED and self.verdict in (Verdict.EFFECT_MISSING, Verdict.AMBIGUOUS)
+        return f"The model {self.model} misses {len(self.missing)} effects." if is_long else self.text
 
 
 class Residual(Enum):
@@ -195,9 +195,9 @@ def _details(j: Judgement) -> Iterator[str]:
         elif j.added:
             yield f"The model {j.model} also misses {joined(j.added)}."
         if j.unknown and not j.spoilt:
-            yield _remaining(j)
+            yield _remaining_error(j)
     elif not (j.missing or j.enough) and j.closest is None and j.undetermined is None:
-        yield _remaining(j)
+        yield _remaining_error(j)
     elif j.left is not None and not j.spoilt:
         yield f"Remaining with them: {j.left}."
     if j.refinements:
@@ -214,12 +214,14 @@ def _incomplete(j: Judgement) -> bool:
     return not j.searched and j.error > MATERIAL
 
 
-def _remaining(j: Judgement) -> str:
-    with_them = f"With {joined(j.added)}, no effect is missing. " if j.added and j.verdict is Verdict.ADEQUATE else ""
-    error = f"{with_them}Remaining error: {j.error:.3g} times {j.floor}"
+def _remaining_error(j: Judgement) -> str:
+    completeness = (
+        f"With {joined(j.added)}, no effect is missing. " if j.added and j.verdict is Verdict.ADEQUATE else ""
+    )
+    error = f"{completeness}Remaining error: {j.error:.3g} times {j.floor}"
     if j.left is None:
         noise = " The part above it is slow noise or scatter between rows: it has no pattern."
-        rest = noise if j.error > MATERIAL else ""
-        return f"{error}. No search for further effects was made." if _incomplete(j) else f"{error}.{rest}"
+        noise_text = noise if j.error > MATERIAL else ""
+        return f"{error}. No search for further effects was made." if _incomplete(j) else f"{error}.{noise_text}"
     causes = f" The cause may be the exact form of {joined(j.added, 'or')}, or one more effect." if j.added else ""
     return f"{error}: {j.left}.{causes}"

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from calibrations.criteria import NOT_SHOWN, POSSIBLY_SLOW
-from calibrations.discovery.candidates import askable
+from calibrations.discovery.candidates import testable_effects
 from calibrations.discovery.outliers import fit_without
 from calibrations.discovery.patterns import patterns
 from calibrations.discovery.significance import Screen, Search, of_search
@@ -107,7 +107,7 @@ def _once(cache: dict[Key, V], key: Key, make: Callable[[], V]) -> V:
 
 
 def _asked(fit: Fit, effects: Mapping[str, Effect]) -> tuple[Effect, ...]:
-    return tuple(effect for effect in askable(fit, effects) if effect.searched(fit.table) <= 1)
+    return tuple(effect for effect in testable_effects(fit, effects) if effect.searched(fit.table) <= 1)
 
 
 def _key(table: Table, needs: tuple[str, ...]) -> Key:
