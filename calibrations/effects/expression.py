@@ -100,11 +100,11 @@ class Expression:
     @property
     def names(self) -> dict[str, int]:
         """Every name in it, in order, and its first column."""
-        found: dict[str, int] = {}
+        columns: dict[str, int] = {}
         for node in nodes(self.root):
             if isinstance(node, Name):
-                found.setdefault(node.name, node.at)
-        return found
+                columns.setdefault(node.name, node.at)
+        return columns
 
     def fault(self, at: int, what: str) -> ExpressionError:
         """What is wrong at column `at`, shown in the text."""
@@ -154,16 +154,16 @@ def may_be_column(name: str) -> bool:
 
 def variables(names: Iterable[str], table: Table) -> dict[str, Array]:
     """Those of the names that are columns of the table or short names of one, shape (n,); not the forces."""
-    found: dict[str, Array] = {}
+    values: dict[str, Array] = {}
     for name in names:
         if name in FORCES:
             continue
         if name in COLUMNS:
             column = table.column(COLUMNS[name])
-            found[name] = np.radians(column) if name in ANGLES else column
+            values[name] = np.radians(column) if name in ANGLES else column
         elif name in table:
-            found[name] = table.column(name)
-    return found
+            values[name] = table.column(name)
+    return values
 
 
 def forces(a: Array) -> dict[str, Array]:
@@ -203,10 +203,17 @@ def _statement(text: str) -> tuple[str, ast.expr]:
 
 def _degrees(node: Node) -> str | None:
     """The first name of an angle in degrees that nothing makes rad of."""
-    inside = list(nodes(node))
-    if any(isinstance(each, Number) and each.value == np.pi for each in inside):
+    inner_nodes = list(nodes(node))
+    if any(isinstance(inner_node, Number) and inner_node.value == np.pi for inner_node in inner_nodes):
         return None
-    return next((each.name for each in inside if isinstance(each, Name) and each.name.endswith("_deg")), None)
+    return next(
+        (
+            inner_node.name
+            for inner_node in inner_nodes
+            if isinstance(inner_node, Name) and inner_node.name.endswith("_deg")
+        ),
+        None,
+    )
 
 
 class _Reader:
@@ -259,8 +266,8 @@ class _Reader:
             raise self._fault(read, f'there is no function "{name}"{nearest(name, FUNCTIONS)}')
         operation = FUNCTIONS[name]
         if not operation.least <= len(arguments) <= operation.most:
-            wanted = f"{operation.least}" if operation.least == operation.most else f"{operation.least} or more"
-            raise self._fault(read, f"{name} takes {wanted} between its brackets, not {len(arguments)}")
+            expected = f"{operation.least}" if operation.least == operation.most else f"{operation.least} or more"
+            raise self._fault(read, f"{name} takes {expected} between its brackets, not {len(arguments)}")
         applied = self._apply(read, operation, arguments, depth)
         if name in OF_ANGLES and (degrees := _degrees(applied)):
             right = f"write {degrees.removesuffix('_deg')}, the same in rad, or {degrees}*pi/180"
@@ -281,7 +288,7 @@ class _Reader:
         return product
 
     def _apply(self, read: ast.expr, operation: Operation, inner: list[ast.expr], depth: int) -> Node:
-        return Apply(operation, tuple(self.node(each, depth + 1) for each in inner), self._at(read))
+        return Apply(operation, tuple(self.node(argument, depth + 1) for argument in inner), self._at(read))
 
     def _at(self, read: ast.expr) -> int:
         """The column in characters; Python counts bytes."""
@@ -324,38 +331,38 @@ def _where(condition: Array, yes: Array, no: Array) -> Array:
     return np.where(condition != 0, yes, no)
 
 
-def _least(*each: Array) -> Array:
-    return np.asarray(np.minimum.reduce(np.broadcast_arrays(*each)))
+def _least(*values: Array) -> Array:
+    return np.asarray(np.minimum.reduce(np.broadcast_arrays(*values)))
 
 
-def _greatest(*each: Array) -> Array:
-    return np.asarray(np.maximum.reduce(np.broadcast_arrays(*each)))
+def _greatest(*values: Array) -> Array:
+    return np.asarray(np.maximum.reduce(np.broadcast_arrays(*values)))
 
 
-def _one(name: str, apply: Callable[..., Array]) -> Operation:
+def _unary(name: str, apply: Callable[..., Array]) -> Operation:
     return Operation(name, apply, 1, 1)
 
 
 FUNCTIONS: Mapping[str, Operation] = {
     operation.name: operation
     for operation in (
-        _one("sin", np.sin),
-        _one("cos", np.cos),
-        _one("tan", np.tan),
-        _one("exp", _exp),
-        _one("log", _log),
-        _one("sqrt", np.sqrt),
-        _one("abs", np.abs),
-        _one("sign", np.sign),
-        _one("step", _step),
+        _unary("sin", np.sin),
+        _unary("cos", np.cos),
+        _unary("tan", np.tan),
+        _unary("exp", _exp),
+        _unary("log", _log),
+        _unary("sqrt", np.sqrt),
+        _unary("abs", np.abs),
+        _unary("sign", np.sign),
+        _unary("step", _step),
         Operation("min", _least, 2, MANY),
         Operation("max", _greatest, 2, MANY),
         Operation("where", _where, 3, 3),
     )
 }
 SIGNS: Mapping[type[ast.unaryop], Operation] = {
-    ast.USub: _one("neg", np.negative),
-    ast.UAdd: _one("pos", np.positive),
+    ast.USub: _unary("neg", np.negative),
+    ast.UAdd: _unary("pos", np.positive),
 }
 OPERATORS: Mapping[type[ast.operator], Operation] = {
     ast.Add: Operation("+", np.add),

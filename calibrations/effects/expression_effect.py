@@ -48,9 +48,11 @@ def effect_for(name: str, text: str, table: Table) -> Effect:
     expression = parse(text)
     known = {*COLUMNS, *FORCES, *(column for column in table.columns if column not in MEASURED)}
     for word, at in expression.names.items():
-        near = difflib.get_close_matches(word, known | {*FUNCTIONS}, n=1, cutoff=MISSPELT)
-        if near and word not in known and len(word) > 3 and not word.startswith(near[0]):
-            raise expression.fault(at, f'"{word}" is no column; did you mean "{near[0]}"? Name a parameter otherwise')
+        similar = difflib.get_close_matches(word, known | {*FUNCTIONS}, n=1, cutoff=MISSPELT)
+        if similar and word not in known and len(word) > 3 and not word.startswith(similar[0]):
+            raise expression.fault(
+                at, f'"{word}" is no column; did you mean "{similar[0]}"? Name a parameter otherwise'
+            )
     effect = own_effect(name, expression.text, tuple(w for w in expression.names if w in table and may_be_column(w)))
     for column in effect.needs:
         if column not in table:
@@ -133,8 +135,8 @@ class _OnAngle(_FromExpression):
         values = variables(self._expression.names, table)
         values |= {"alpha": pose.alpha, "beta": pose.beta, "mount": pose.mount}
         angle = self._expression.target.removesuffix("_deg")
-        own = {q.name: p[q.name] for q in self.parameters}
-        return replace(pose, **{angle: getattr(pose, angle) + np.radians(self._value(values, own, (table.n,)))})
+        parameters = {q.name: p[q.name] for q in self.parameters}
+        return replace(pose, **{angle: getattr(pose, angle) + np.radians(self._value(values, parameters, (table.n,)))})
 
 
 class _OnOutput(_FromExpression):
@@ -148,11 +150,11 @@ class _OnOutput(_FromExpression):
         columns = variables(self._expression.names, table) | forces(a)
         values = {name: column[:, None] for name, column in columns.items()}
         target, out, axes = self._expression.target, np.zeros(a.shape), len(table.axes)
-        own = {q.name: p[q.name] for q in self.parameters}
+        parameters = {q.name: p[q.name] for q in self.parameters}
         if target == "v":
-            out[:, :axes] = self._value(values, {name: v[:axes] for name, v in own.items()}, (len(a), axes))
+            out[:, :axes] = self._value(values, {name: v[:axes] for name, v in parameters.items()}, (len(a), axes))
         else:
-            out[:, [AXES.index(target[1])]] = self._value(values, own, (len(a), 1))
+            out[:, [AXES.index(target[1])]] = self._value(values, parameters, (len(a), 1))
         return out
 
 

@@ -1,8 +1,8 @@
-"""Where the fit of an expression begins: values tried over all that its parameters could mean on the data.
+"""Start values for the fit of an expression, from trials over the plausible range of its parameters.
 
-A parameter's range follows from what it stands beside: a time constant from the length of the record, a threshold from
-the range of its column, a frequency from how many waves the rows could show. For each trial of the parameters that
-bend the expression, the others follow by least squares beside bias and forces (variable projection: Golub and Pereyra,
+The range of a parameter follows from its operands: a time constant from the length of the record, a threshold from the
+range of its column, a frequency from the number of waves that the rows can show. For each trial of the nonlinear
+parameters, least squares together with bias and forces give the linear ones (variable projection: Golub and Pereyra,
 1973).
 """
 
@@ -19,11 +19,11 @@ from calibrations.effects.expression import Apply, Expression, Name, Node, evalu
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.table import AXES, Array, Table
 
-MOST_TRIALS = 800
+LARGEST_TRIALS = 800
 ZOOMS = 7  # rounds about the best trial, each three times as fine
-ANGLE_DEG = 10.0  # what could be added to a stage angle at most
-FAINT = 0.01  # of a parameter's size, to begin with where nothing can be tried
-REAL = 1e-9  # of a column's length: what is left of less is rounding
+ANGLE_DEG = 10.0  # largest addition to a stage angle
+FAINT = 0.01  # of a parameter's size: its start where no trial is possible
+REAL = 1e-9  # of a column's length: a smaller remainder is rounding
 WAVES = ("sin", "cos", "tan")
 LEVELS = 80
 HALF_WAVES = 120  # along a column
@@ -37,27 +37,27 @@ Names = tuple[str, ...]
 def best_start(expression: Expression, parameters: Names, table: Table) -> Mapping[str, Array]:
     """The best start of each parameter, shape (axes,): the same for all axes unless the output of all is added to."""
     axes = len(table.axes)
-    known = scales(expression, parameters, table)
-    straight = linear(expression.root, parameters)
+    sizes = scales(expression, parameters, table)
+    linear_names = linear(expression.root, parameters)
     if table.type.magnitude:  # the forces are not known beforehand
-        return {p: np.full(axes, known[p] * (FAINT if p in straight else 1.0)) for p in parameters}
+        return {p: np.full(axes, sizes[p] * (FAINT if p in linear_names else 1.0)) for p in parameters}
     groups = [(k,) for k in range(axes)] if expression.target == "v" else [tuple(range(axes))]
-    found = [_Search(expression, parameters, table, group).best() for group in groups]
-    return {p: np.array([each[p] for each in found * (axes // len(found))]) for p in parameters}
+    starts = [_Search(expression, parameters, table, group).best() for group in groups]
+    return {p: np.array([start[p] for start in starts * (axes // len(starts))]) for p in parameters}
 
 
 @lru_cache(maxsize=32)
 def scales(expression: Expression, parameters: Names, table: Table) -> Mapping[str, float]:
-    """What each parameter may be worth at most; of one that multiplies, what moves the output over all its range."""
-    straight, root = linear(expression.root, parameters), expression.root
+    """The largest plausible size of each parameter; a linear one of this size moves the output over its range."""
+    linear_names, root = linear(expression.root, parameters), expression.root
     values = {**dict.fromkeys(parameters, np.zeros(1)), **_variables(expression, table)}
-    found = {p: float(np.median(np.abs(trials(root, p, values)))) or 1.0 for p in parameters if p not in straight}
-    values |= {p: np.full(1, scale) for p, scale in found.items()}
-    whole = ANGLE_DEG if expression.target.endswith("_deg") else _output_range(table)
-    for p in straight:
+    sizes = {p: float(np.median(np.abs(trials(root, p, values)))) or 1.0 for p in parameters if p not in linear_names}
+    values |= {p: np.full(1, scale) for p, scale in sizes.items()}
+    output_range = ANGLE_DEG if expression.target.endswith("_deg") else _output_range(table)
+    for p in linear_names:
         column = evaluate(root, {**values, p: np.ones(1)}) - evaluate(root, values)
-        found[p] = whole / (_spread(column) or 1.0)
-    return found
+        sizes[p] = output_range / (_spread(column) or 1.0)
+    return sizes
 
 
 def _output_range(table: Table) -> float:
@@ -65,7 +65,7 @@ def _output_range(table: Table) -> float:
 
 
 def _spread(column: Array) -> float:
-    """How far a column moves; its size where it does not move; 0 where it is none."""
+    """Range of a column; its size if it is constant; 0 if it is not finite."""
     spread = float(np.ptp(column)) or float(np.max(np.abs(column)))
     return spread if np.isfinite(spread) else 0.0
 
@@ -76,7 +76,7 @@ def _variables(expression: Expression, table: Table) -> dict[str, Array]:
 
 @dataclass(frozen=True)
 class _Search:
-    """The outputs of some axes, freed of bias and forces, and an expression to be laid through them."""
+    """A search for the parameters of an expression that fit the outputs of some axes without bias and forces."""
 
     expression: Expression
     parameters: Names
@@ -102,37 +102,40 @@ class _Search:
     def best(self) -> dict[str, float]:
         """The parameters of the best trial."""
         names, grids = list(self.grids), list(self.grids.values())
-        tried = [dict(zip(names, each, strict=True)) for each in _combinations(grids)]
-        found = min(tried, key=lambda each: self.fitted(each)[0])
-        steps = {name: _spacing(grid, found[name]) for name, grid in self.grids.items()}
+        points = [dict(zip(names, point, strict=True)) for point in _combinations(grids)]
+        best_point = min(points, key=lambda point: self.fitted(point)[0])
+        steps = {name: _spacing(grid, best_point[name]) for name, grid in self.grids.items()}
         for k, name in product(range(ZOOMS), names):
-            near = found[name] + steps[name] / 3**k * np.linspace(-1, 1, 9)
-            found = min([{**found, name: float(value)} for value in near], key=lambda each: self.fitted(each)[0])
-        return {**found, **dict(zip(self.straight, self.fitted(found)[1], strict=True))}
+            values = best_point[name] + steps[name] / 3**k * np.linspace(-1, 1, 9)
+            points = [{**best_point, name: float(value)} for value in values]
+            best_point = min(points, key=lambda point: self.fitted(point)[0])
+        return {**best_point, **dict(zip(self.straight, self.fitted(best_point)[1], strict=True))}
 
     def fitted(self, curved: Mapping[str, float]) -> tuple[float, Array]:
-        """(sum of squares left, the straight parameters); infinite where the expression is no number."""
-        at = {**self.values, **{name: np.full(1, value) for name, value in curved.items()}}
-        alone = self.column(at)
-        each = [self.column({**at, name: np.ones(1)}) - alone for name in self.straight]
-        columns, rest = np.column_stack([*each, alone])[:, :-1], self.free(self.outputs - alone)
-        if not (np.isfinite(columns).all() and np.isfinite(rest).all()):
+        """(residual sum of squares, linear parameters); infinite where the expression has no value."""
+        values = {**self.values, **{name: np.full(1, value) for name, value in curved.items()}}
+        constant_part = self.column(values)
+        columns_by_name = [self.column({**values, name: np.ones(1)}) - constant_part for name in self.straight]
+        columns = np.column_stack([*columns_by_name, constant_part])[:, :-1]
+        remainder = self.free(self.outputs - constant_part)
+        if not (np.isfinite(columns).all() and np.isfinite(remainder).all()):
             return np.inf, np.zeros(len(self.straight))
         size = np.linalg.norm(columns, axis=0)
-        freed = np.column_stack([*(self.free(c) for c in columns.T), rest])[:, :-1]
-        real = np.linalg.norm(freed, axis=0) > REAL * size
-        scaled = np.where(real, freed / np.where(real, size, 1.0), 0.0)
-        by = np.linalg.lstsq(scaled, rest, rcond=REAL)[0]
-        return float(np.sum((rest - scaled @ by) ** 2)), np.where(real, by / np.where(real, size, 1.0), 0.0)
+        free_columns = np.column_stack([*(self.free(c) for c in columns.T), remainder])[:, :-1]
+        independent = np.linalg.norm(free_columns, axis=0) > REAL * size
+        scaled = np.where(independent, free_columns / np.where(independent, size, 1.0), 0.0)
+        coefficients = np.linalg.lstsq(scaled, remainder, rcond=REAL)[0]
+        unscaled = np.where(independent, coefficients / np.where(independent, size, 1.0), 0.0)
+        return float(np.sum((remainder - scaled @ coefficients) ** 2)), unscaled
 
     def column(self, values: Mapping[str, Array]) -> Array:
-        """What the expression adds to the outputs, axis after axis, shape (axes * n,)."""
+        """Contribution of the expression to the outputs, axis after axis, shape (axes * n,)."""
         added = np.broadcast_to(evaluate(self.expression.root, values), (self.table.n,))
         return (self.weights * added[:, None])[:, self.axes].T.ravel()
 
     @cached_property
     def weights(self) -> Array:
-        """What one unit of the target does to each output, shape (n, axes)."""
+        """Change of each output by one unit of the target, shape (n, axes)."""
         target, table = self.expression.target, self.table
         if target == "v":
             return np.ones((table.n, len(table.axes)))
@@ -154,18 +157,18 @@ class _Search:
         return np.asarray(np.linalg.qr(np.column_stack([np.ones(len(a)), a]))[0])
 
     def free(self, column: Array) -> Array:
-        """The column without what bias and forces of each axis explain."""
-        each = column.reshape(len(self.axes), -1)
-        return np.asarray(each - (each @ self._model) @ self._model.T).ravel()
+        """The column projected off bias and forces of each axis."""
+        by_axis = column.reshape(len(self.axes), -1)
+        return np.asarray(by_axis - (by_axis @ self._model) @ self._model.T).ravel()
 
 
 def _combinations(grids: list[Array]) -> list[tuple[float, ...]]:
-    """All combinations, or as many as there is time for, chosen alike every time."""
-    if np.prod([float(len(grid)) for grid in grids]) <= MOST_TRIALS:
-        return [tuple(map(float, each)) for each in product(*grids)]
+    """All combinations, or LARGEST_TRIALS of them by a fixed random choice."""
+    if np.prod([float(len(grid)) for grid in grids]) <= LARGEST_TRIALS:
+        return [tuple(map(float, values)) for values in product(*grids)]
     rng = np.random.default_rng(len(grids))
-    chosen = [rng.choice(grid, MOST_TRIALS) for grid in grids]
-    return [tuple(map(float, each)) for each in zip(*chosen, strict=True)]
+    chosen = [rng.choice(grid, LARGEST_TRIALS) for grid in grids]
+    return [tuple(map(float, values)) for values in zip(*chosen, strict=True)]
 
 
 def _spacing(grid: Array, at: float) -> float:
@@ -178,41 +181,42 @@ def trials(root: Node, name: str, values: Mapping[str, Array]) -> Array:
     """Values to try for the parameter `name`, shape (k,); `values` has all names, 0 for the parameters."""
     path = _path(root, name)
     if not path:
-        return _both(ANY)
+        return _both_signs(ANY)
     operation, inner = path[-1].operation.name, path[-1].inner
     first = _is(inner[0], name)
-    in_wave = any(each.operation.name in WAVES for each in path)
+    in_wave = any(node.operation.name in WAVES for node in path)
     if in_wave and operation in "+-":
         return np.linspace(-np.pi, np.pi, 24, endpoint=False)
-    others = [evaluate(each, values) for each in inner if not _is(each, name)]
-    beside = np.unique(np.concatenate([np.ravel(each) for each in others])) if others else np.zeros(0)
-    beside = beside[np.isfinite(beside)]
-    if not len(beside) or not np.any(beside):
-        return _both(ANY)
-    span = float(np.ptp(beside)) or float(np.max(np.abs(beside)))
+    operands = [evaluate(node, values) for node in inner if not _is(node, name)]
+    operand_values = np.unique(np.concatenate([np.ravel(node) for node in operands])) if operands else np.zeros(0)
+    operand_values = operand_values[np.isfinite(operand_values)]
+    if not len(operand_values) or not np.any(operand_values):
+        return _both_signs(ANY)
+    span = float(np.ptp(operand_values)) or float(np.max(np.abs(operand_values)))
     match operation:
         case "+":
-            return -_levels(beside)
+            return -_levels(operand_values)
         case "-" | "<" | "<=" | ">" | ">=" | "min" | "max" | "where":
-            return _levels(beside)
+            return _levels(operand_values)
         case "*" if in_wave:
-            return np.arange(1.0, max(2, min(HALF_WAVES, len(beside)))) * np.pi / span  # no faster than rows can show
+            half_waves = np.arange(1.0, max(2, min(HALF_WAVES, len(operand_values))))
+            return half_waves * np.pi / span  # no faster than the rows can show
         case "*":
-            return _both(np.logspace(-1.5, 1.5, 25) / span)
+            return _both_signs(np.logspace(-1.5, 1.5, 25) / span)
         case "/" if not first:
-            return _both(np.logspace(-2.5, 1, 29) * span)
+            return _both_signs(np.logspace(-2.5, 1, 29) * span)
         case "**" if not first:
             return np.array(EXPONENTS)
-    return _both(ANY * span)
+    return _both_signs(ANY * span)
 
 
 def _path(node: Node, name: str) -> list[Apply]:
     """The operations from `node` down to that which has the parameter among its arguments."""
     if not isinstance(node, Apply):
         return []
-    if any(_is(each, name) for each in node.inner) and node.operation.name not in ("neg", "pos"):
+    if any(_is(inner_node, name) for inner_node in node.inner) and node.operation.name not in ("neg", "pos"):
         return [node]
-    return next(([node, *below] for each in node.inner if (below := _path(each, name))), [])
+    return next(([node, *below] for inner_node in node.inner if (below := _path(inner_node, name))), [])
 
 
 def _is(node: Node, name: str) -> bool:
@@ -225,22 +229,22 @@ def _is(node: Node, name: str) -> bool:
 def _levels(column: Array) -> Array:
     """Levels between neighbouring values of a column of sorted values."""
     if len(column) == 1:
-        return np.unique(np.append(_both(ANY * abs(column[0])), column))
+        return np.unique(np.append(_both_signs(ANY * abs(column[0])), column))
     between = (column[1:] + column[:-1]) / 2
     return np.asarray(between[np.unique(np.linspace(0, len(between) - 1, LEVELS).astype(int))])
 
 
-def _both(positive: Array) -> Array:
+def _both_signs(positive: Array) -> Array:
     return np.concatenate([-positive[::-1], positive])
 
 
 def linear(root: Node, parameters: Sequence[str]) -> tuple[str, ...]:
-    """The first parameters, as many as go, in which together the expression is of the first degree."""
-    found: list[str] = []
+    """The longest list of leading parameters in which together the expression is of the first degree."""
+    linear_names: list[str] = []
     for name in parameters:
-        if degree(root, {*found, name}) < CURVED:
-            found.append(name)
-    return tuple(found)
+        if degree(root, {*linear_names, name}) < CURVED:
+            linear_names.append(name)
+    return tuple(linear_names)
 
 
 def degree(node: Node, names: set[str]) -> int:
@@ -249,14 +253,14 @@ def degree(node: Node, names: set[str]) -> int:
         return int(node.name in names)
     if not isinstance(node, Apply):
         return 0
-    each = [degree(inner, names) for inner in node.inner]
+    degrees = [degree(inner, names) for inner in node.inner]
     match node.operation.name:
         case "+" | "-" | "neg" | "pos":
-            return max(each)
+            return max(degrees)
         case "*":
-            return min(sum(each), CURVED)
+            return min(sum(degrees), CURVED)
         case "/":
-            return each[0] if not each[1] else CURVED
+            return degrees[0] if not degrees[1] else CURVED
         case "where":
-            return max(each[1:]) if not each[0] else CURVED
-    return CURVED if any(each) else 0
+            return max(degrees[1:]) if not degrees[0] else CURVED
+    return CURVED if any(degrees) else 0

@@ -43,20 +43,20 @@ def check_forms(forms: tuple[Form, ...], place: str) -> tuple[Form, ...]:
     if not forms:
         raise ModelError("the list of forms is empty; `rig add` and `rig discover` write it")
     for form in forms:
-        where = f"the form {form.name}"
+        subject = f"the form {form.name}"
         if form.place != place:
-            raise ModelError(f"{where} acts at {form.place}, and the effect at {place}; each place has one effect")
+            raise ModelError(f"{subject} acts at {form.place}, and the effect at {place}; each place has one effect")
         if not form.sizes or min(form.sizes) < 0 or max(form.sizes) == 0:
-            raise ModelError(f"{where} has no size; the size is the standard deviation of its coefficients")
+            raise ModelError(f"{subject} has no size; the size is the standard deviation of its coefficients")
         counts = {"bases": len(form.bases), "kept": len(form.kept) or 1}
         if wrong := next((key for key, n in counts.items() if n not in (1, len(form.sizes))), None):
             raise ModelError(
-                f"{where}: {wrong} has {counts[wrong]} entries for {len(form.sizes)} axes; give 1, or 1 an axis"
+                f"{subject}: {wrong} has {counts[wrong]} entries for {len(form.sizes)} axes; give 1, or 1 an axis"
             )
         if any(
             not (size > 0) <= form.count(k) <= form.basis(k).count * (size > 0) for k, size in enumerate(form.sizes)
         ):
-            raise ModelError(f"{where} keeps more columns than its basis has, or none, or some of size 0")
+            raise ModelError(f"{subject} keeps more columns than its basis has, or none, or some of size 0")
     return forms
 
 
@@ -70,8 +70,8 @@ def dump_forms(effect: Effect) -> list[dict[str, Any]]:
     """The forms of an effect as a model file keeps them; none of an effect of another kind."""
     if not isinstance(effect, FreeForm):
         return []
-    made: list[dict[str, Any]] = TypeAdapter(list[Form]).dump_python(list(effect.forms), mode="json")
-    return made
+    document: list[dict[str, Any]] = TypeAdapter(list[Form]).dump_python(list(effect.forms), mode="json")
+    return document
 
 
 @lru_cache(maxsize=128)

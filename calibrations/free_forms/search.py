@@ -30,7 +30,7 @@ COARSE = (1e-3, 2e-5)  # of the misfit, at each linearisation: less may be a sec
 ROUNDS = 7
 LARGEST = 4.0  # of the mean square of the first misfit: more is two components against each other
 HALVINGS = 6  # of a step that overshoots
-NOISE_ALONE, FEW = 1.04, 3  # residual over noise and components of a search that needs no second beginning
+NOISE_ALONE, FEW_COMPONENTS = 1.04, 3  # residual over noise and components of a search that needs no second beginning
 SLOW_MOST = 0.5  # slow noise, in noise floors, at most (rms)
 SLOW_FIRST = 0.15  # the same while the first components are found: it would take up part of them
 
@@ -65,11 +65,11 @@ class SearchResult:
     @property
     def freedom(self) -> float:
         """Degrees of freedom that the residual keeps: rows less those that base and components take."""
-        taken = sum(
+        parameters = sum(
             self.gram.blocks[name].stop - self.gram.blocks[name].start - self.sizes.shrinkage(self.gram, name)
             for name in self.sizes.variances
         )
-        return float(max(len(self.columns) - self.gram.base_rank - taken, 1.0))
+        return float(max(len(self.columns) - self.gram.base_rank - parameters, 1.0))
 
     @property
     def active(self) -> list[str]:
@@ -102,7 +102,7 @@ def search(data: PoseData, white: Array, given: Given, general: bool = True) -> 
         return _descent(data, white, given, general, catalogue_first, loops)
 
     by_name = descent(catalogue_first=True)
-    if by_name.ratio < NOISE_ALONE and len(by_name.active) <= FEW:
+    if by_name.ratio < NOISE_ALONE and len(by_name.active) <= FEW_COMPONENTS:
         return by_name
     best = min(by_name, descent(catalogue_first=False), key=lambda end: end.criterion)
     if any(best.component(name).place == "history" for name in best.active):
@@ -141,26 +141,26 @@ def _descent(
         most |= dict.fromkeys(noise, (slow * floor) ** 2)
         limit = caution * (max(ENTER, COARSE[number] * g.squares) if number < len(COARSE) else ENTER)
         before = set(variances)
-        kept = values, dict(variances), state
+        previous = values, dict(variances), state
         sizes = estimate(g, variances, most)
         pools = pools_of(components, catalogue_first and number < len(COARSE))
         sizes, steps = select(g, sizes, components, pools, most, limit, number >= len(COARSE))
         path += steps
         variances = dict(sizes.variances)
-        values, moved = _damped(data, given, kept[0], coefficients(g, sizes), components, white)
+        values, moved = _damped(data, given, previous[0], coefficients(g, sizes), components, white)
         reshaped = _refined(components, g, sizes, X, b, state, scales, white)
         if reshaped is not None:
-            X, blocks, scales = whitened(state, given, kept[0], reshaped, scales, white)
+            X, blocks, scales = whitened(state, given, previous[0], reshaped, scales, white)
             g = gram(X, blocks, scales, b)
             sizes = estimate(g, variances, most)
-            other = coefficients(g, sizes)
-            tried = state_at(data, given, other, reshaped)
-            if _misfit(tried, white) < _misfit(moved, white):
-                components, values, moved, variances = reshaped, other, tried, dict(sizes.variances)
+            reshaped_values = coefficients(g, sizes)
+            reshaped_state = state_at(data, given, reshaped_values, reshaped)
+            if _misfit(reshaped_state, white) < _misfit(moved, white):
+                components, values, moved, variances = reshaped, reshaped_values, reshaped_state, dict(sizes.variances)
         change = float(np.sqrt(np.mean(((moved.predicted - state.predicted) / white) ** 2)))
         state = moved
         if _misfit(moved, white) > 1.5 * g.squares / g.rows + 10.0:  # components against each other: no step
-            values, variances, state = kept
+            values, variances, state = previous
             saws = {c.name for c in components if c.cause == "quantisation"} & set(sizes.variances)
             rejected += [c.shape[0] for c in components if c.name in saws]
             components = [c for c in components if c.name not in saws]
@@ -195,10 +195,10 @@ def _damped(
     state = state_at(data, given, after, components)
     for _ in range(HALVINGS):
         half = _between(before, after)
-        other = state_at(data, given, half, components)
-        if _misfit(other, white) >= _misfit(state, white):
+        half_state = state_at(data, given, half, components)
+        if _misfit(half_state, white) >= _misfit(state, white):
             break
-        after, state = half, other
+        after, state = half, half_state
     return after, state
 
 
@@ -256,11 +256,11 @@ def climb(
             for _ in range(5):
                 sides = []
                 for sign in (-1.0, 1.0):
-                    tried = tuple(v + sign * size if j == k else v for j, v in enumerate(best))
-                    sides.append((gained(tried), tried))
-                value, tried = max(sides)
+                    trial = tuple(v + sign * size if j == k else v for j, v in enumerate(best))
+                    sides.append((gained(trial), trial))
+                value, trial = max(sides)
                 if value > top:
-                    top, best = value, list(tried)
+                    top, best = value, list(trial)
                 else:
                     size *= 0.4
         step = tuple(0.2 * s for s in step)

@@ -13,8 +13,8 @@ ENTER = 16.0  # gain in -2 log restricted likelihood for one component more: 1 %
 LEAVE = 12.0
 SAME_PLACE = 6.0  # less for a component at a place that acts already: it is another form of one mechanism
 MOST_COMPONENTS = 24
-SPILL = 0.03  # of the misfit that is left: a place that gains less takes up part of what acts elsewhere
-CANCELS = 1.5  # of the squares of the first misfit: more in one component is taken off by others
+SPILL = 0.03  # of the remaining misfit: a place of less gain absorbs a part of another place
+CANCELS = 1.5  # of the squares of the first misfit: other components cancel a larger component
 
 
 def acting_places(names: Iterable[str], by_name: Mapping[str, Component]) -> set[str]:
@@ -23,15 +23,15 @@ def acting_places(names: Iterable[str], by_name: Mapping[str, Component]) -> set
 
 
 def price(component: Component, acting: Collection[str]) -> float:
-    """What a component must gain more than another beside the places that act; less at one of them.
+    """Least gain of a component beyond ENTER, given the acting places; it is smaller at one of these.
 
-    A component that can follow almost anything is no other form of what acts there.
+    A general component, which can follow almost anything, does not count as another form of the same mechanism.
     """
     return component.price - (SAME_PLACE if component.place in acting and not component.general else 0.0)
 
 
 def prices(components: Iterable[Component]) -> float:
-    """What components must gain more, each beside those before it."""
+    """Sum of the prices of components, each given those before it."""
     total, acting = 0.0, set[str]()
     for component in components:
         total += price(component, acting)
@@ -43,11 +43,11 @@ Pools = Sequence[Mapping[str, Component]]
 
 
 def pools_of(components: Sequence[Component], catalogue_first: bool) -> Pools:
-    """Components in the order in which they are tried: the next pool once none of one gains."""
+    """Pools of components in the order of trials: the next pool follows when no component of a pool gains."""
     simple = {c.name: c for c in components if not c.general}
-    named = {c.name: c for c in simple.values() if c.cause}
-    every = {c.name: c for c in components}
-    return [named, simple, every] if catalogue_first else [simple, every]
+    with_cause = {c.name: c for c in simple.values() if c.cause}
+    all_components = {c.name: c for c in components}
+    return [with_cause, simple, all_components] if catalogue_first else [simple, all_components]
 
 
 def select(
@@ -62,7 +62,7 @@ def select(
     """Components added, exchanged and removed until nothing gains more than `limit`."""
     by_name = {c.name: c for c in components}
     steps: list[str] = []
-    seen: set[frozenset[str]] = set()
+    visited: set[frozenset[str]] = set()
     sizes = _pruned(g, sizes, by_name, most, steps)
     stale: list[dict[str, float]] = [{} for _ in pools]
     pools = [dict(pool) for pool in pools]
@@ -78,21 +78,21 @@ def select(
             if by_name[best[0]].reshaped is not None:
                 break  # its shape is found first: its misfit looks like other places
             sizes = _pruned(g, sizes, by_name, most, steps)
-            if frozenset(sizes.variances) not in seen:
-                seen.add(frozenset(sizes.variances))
+            if frozenset(sizes.variances) not in visited:
+                visited.add(frozenset(sizes.variances))
                 continue
         if not last:
             break
         after = _exchanged(g, sizes, by_name, most, steps)
-        if set(after.variances) == set(sizes.variances) or frozenset(after.variances) in seen:
+        if set(after.variances) == set(sizes.variances) or frozenset(after.variances) in visited:
             break
-        seen.add(frozenset(after.variances))
+        visited.add(frozenset(after.variances))
         sizes = _pruned(g, after, by_name, most, steps)
     return estimate(g, sizes.variances, most), steps
 
 
 def _cancels(g: Gram, sizes: Sizes) -> bool:
-    """Whether a component adds far more than there is to explain, so that another one takes it off again."""
+    """Whether a component is far larger than the signal, so that another one cancels it."""
     at = 0
     for name in sizes.variances:
         block = g.blocks[name]
@@ -104,15 +104,15 @@ def _cancels(g: Gram, sizes: Sizes) -> bool:
 
 
 def _next(
-    g: Gram, sizes: Sizes, pools: Pools, stale: Sequence[dict[str, float]], enough: float
+    g: Gram, sizes: Sizes, pools: Pools, stale: Sequence[dict[str, float]], threshold: float
 ) -> tuple[str, float, float] | None:
-    """The component of the first pool that gains enough; None where none does."""
+    """The first component, by pool, whose gain is above the threshold; None if there is none."""
     for pool, known in zip(pools, stale, strict=True):
         best = _best(g, sizes, pool, known)
-        if known and (best is None or best[1] <= enough):
+        if known and (best is None or best[1] <= threshold):
             known.clear()
             best = _best(g, sizes, pool, known)
-        if best is not None and best[1] > enough:
+        if best is not None and best[1] > threshold:
             return best
     return None
 
@@ -120,13 +120,13 @@ def _next(
 def _best(
     g: Gram, sizes: Sizes, by_name: Mapping[str, Component], stale: dict[str, float] | None = None
 ) -> tuple[str, float, float] | None:
-    """The component that gains most, price taken off, and its variance.
+    """The component of largest gain minus price, with this value and its variance.
 
-    Gains mostly fall when components are added: with `stale` gains of an earlier call the most promising are computed
-    first, until none of the others promises more.
+    Gains mostly fall when components are added. With `stale` gains of an earlier call the function computes the most
+    promising first, and stops when no other one promises more.
     """
-    taken = {by_name[name].family for name in sizes.variances if name in by_name} - {""}
-    names = [n for n, c in by_name.items() if n not in sizes.variances and c.family not in taken and n in g.blocks]
+    families = {by_name[name].family for name in sizes.variances if name in by_name} - {""}
+    names = [n for n, c in by_name.items() if n not in sizes.variances and c.family not in families and n in g.blocks]
     known = {} if stale is None else stale
     names.sort(key=lambda n: -known.get(n, np.inf))
     acting = acting_places(sizes.variances, by_name)
@@ -144,18 +144,18 @@ def _best(
 def _pruned(
     g: Gram, sizes: Sizes, by_name: Mapping[str, Component], most: Mapping[str, float], steps: list[str]
 ) -> Sizes:
-    """Without components whose loss costs less than they must gain, the least first."""
+    """The sizes without components whose removal costs less than their price, those of least cost first."""
     while True:
-        each = {n: price(c, acting_places(sizes.variances.keys() - {n}, by_name)) for n, c in by_name.items()}
-        costs = {n: loss(g, sizes, n) - each[n] for n in sizes.variances if not by_name[n].noise}
+        prices_by_name = {n: price(c, acting_places(sizes.variances.keys() - {n}, by_name)) for n, c in by_name.items()}
+        costs = {n: loss(g, sizes, n) - prices_by_name[n] for n in sizes.variances if not by_name[n].noise}
         if not costs:
             return sizes
         name = min(costs, key=lambda n: costs[n])
         if costs[name] > LEAVE:
             return sizes
-        rest = {k: v for k, v in sizes.variances.items() if k != name}
-        after = estimate(g, rest, most, 12)
-        if after.deviance - sizes.deviance - each[name] > LEAVE:
+        remaining = {k: v for k, v in sizes.variances.items() if k != name}
+        after = estimate(g, remaining, most, 12)
+        if after.deviance - sizes.deviance - prices_by_name[name] > LEAVE:
             return sizes
         steps.append(f"-{name}")
         sizes = after
@@ -164,27 +164,27 @@ def _pruned(
 def _exchanged(
     g: Gram, sizes: Sizes, by_name: Mapping[str, Component], most: Mapping[str, float], steps: list[str]
 ) -> Sizes:
-    """With each component replaced where another one in its stead is likelier."""
+    """The sizes with each component replaced by a likelier one, if there is one."""
     for name in [n for n in sizes.variances if not by_name[n].noise]:
         if name not in sizes.variances:
             continue
-        others = without(g, sizes, name)
-        beside = acting_places(others.variances, by_name)
-        own = price(by_name[name], beside)
-        alone = estimate(g, others.variances, most, 12, sizes.deviance + own + LEAVE)
-        if alone.deviance - sizes.deviance - own <= LEAVE:  # the others take its part
+        reduced = without(g, sizes, name)
+        acting = acting_places(reduced.variances, by_name)
+        component_price = price(by_name[name], acting)
+        alone = estimate(g, reduced.variances, most, 12, sizes.deviance + component_price + LEAVE)
+        if alone.deviance - sizes.deviance - component_price <= LEAVE:  # the others take its part
             steps.append(f"-{name}")
             sizes = alone
             continue
-        lost = others.deviance - sizes.deviance - own
-        best = _best(g, others, by_name)
-        if best is None or best[0] == name or best[1] < lost + 1.0:
+        loss_of_component = reduced.deviance - sizes.deviance - component_price
+        best = _best(g, reduced, by_name)
+        if best is None or best[0] == name or best[1] < loss_of_component + 1.0:
             continue
-        tried = estimate(g, {**others.variances, best[0]: best[2]}, most, 12)
-        if _cancels(g, tried):
+        exchanged = estimate(g, {**reduced.variances, best[0]: best[2]}, most, 12)
+        if _cancels(g, exchanged):
             continue
-        better = sizes.deviance + own - tried.deviance - price(by_name[best[0]], beside)
-        if better > 1.0:
+        improvement = sizes.deviance + component_price - exchanged.deviance - price(by_name[best[0]], acting)
+        if improvement > 1.0:
             steps.append(f"{name}>{best[0]}")
-            sizes = tried
+            sizes = exchanged
     return sizes

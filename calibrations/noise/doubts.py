@@ -196,7 +196,7 @@ def separating_record(search: Search, named: tuple[str, ...]) -> Experiment | No
 
 def _information(search: Search, name: str, rivals: tuple[str, ...], length_s: float) -> float:
     """Lambda of the pair that is hardest to separate, in the direction with less information."""
-    effects = {effect.name: effect for effect in search.mixtures.others}
+    effects = {effect.name: effect for effect in search.mixtures.missing}
     remaining = [effect for effect in search.mixture.effects if effect.name != name]
     deviances = []
     for rival in rivals:

@@ -76,10 +76,10 @@ def _spectrum_estimates(fit: ChannelFit, effect: Effect, unit: str, deviations: 
 def _unidentified(fit: ChannelFit, effect: Effect, unit: str) -> Iterator[Estimate]:
     """A process that may be absent: the bound of its strength; its shape means nothing."""
     strength, values, axis = effect.parameters[0], fit.values[effect.name], fit.channel.axis
-    value, below, _ = upper_bound(fit, effect, [e for e in fit.effects if e is not effect])
-    own = strength.unit.replace("{out}", unit)
-    why = f"the process may be absent: {strength.name} is below {below:.2g} {own} (95 %)"
-    yield Estimate(strength.name, axis, value, (below - value) / INTERVAL_STDS, own, False, why)
+    value, bound, _ = upper_bound(fit, effect, [e for e in fit.effects if e is not effect])
+    strength_unit = strength.unit.replace("{out}", unit)
+    why = f"the process may be absent: {strength.name} is below {bound:.2g} {strength_unit} (95 %)"
+    yield Estimate(strength.name, axis, value, (bound - value) / INTERVAL_STDS, strength_unit, False, why)
     for p in effect.parameters[1:]:
         yield Estimate(p.name, axis, values[p.name], None, p.unit, False, "the process may be absent")
 
@@ -94,22 +94,24 @@ def gain_of(fit: ChannelFit, effect: Effect) -> float:
     remaining = [e for e in fit.effects if e is not effect]
     if not remaining:
         return np.inf
-    lost = 2 * (fit.log_likelihood - fit_effects(fit, remaining).log_likelihood)
-    return float(lost / max(1.0, fit.excess) ** 2)
+    loss = 2 * (fit.log_likelihood - fit_effects(fit, remaining).log_likelihood)
+    return float(loss / max(1.0, fit.excess) ** 2)
 
 
-def upper_bound(fit: ChannelFit, effect: Effect, beside: Sequence[Effect]) -> tuple[float, float, dict[str, float]]:
+def upper_bound(
+    fit: ChannelFit, effect: Effect, other_effects: Sequence[Effect]
+) -> tuple[float, float, dict[str, float]]:
     """(most likely coefficient, its upper bound with 95 %, all its parameters), other effects beside it refitted.
 
     At the bound, twice the log-likelihood is criteria.IDENTIFIED below its maximum, times the squared excess where the
     model does not describe the spectrum.
     """
-    most = fit_effects(fit, (*beside, effect))
-    fall = IDENTIFIED * max(1.0, fit.excess) ** 2
-    column, *columns = (unit_spectrum(e, fit.parts, _shape(e, most)) for e in (effect, *beside))
-    power = most.values[effect.name][effect.parameters[0].name] ** 2
+    likeliest = fit_effects(fit, (*other_effects, effect))
+    threshold = IDENTIFIED * max(1.0, fit.excess) ** 2
+    column, *columns = (unit_spectrum(e, fit.parts, _shape(e, likeliest)) for e in (effect, *other_effects))
+    power = likeliest.values[effect.name][effect.parameters[0].name] ** 2
     G = np.column_stack(columns) if columns else None
-    start = np.array([most.values[e.name][e.parameters[0].name] ** 2 for e in beside])
+    start = np.array([likeliest.values[e.name][e.parameters[0].name] ** 2 for e in other_effects])
 
     def loss(log_power: float) -> float:
         base = np.exp(log_power) * column
@@ -117,15 +119,15 @@ def upper_bound(fit: ChannelFit, effect: Effect, beside: Sequence[Effect]) -> tu
             value = log_likelihood(base, fit.seen, fit.freedom)
         else:
             value = maximise_from(start.copy(), G, fit.seen, fit.freedom, base)[1]
-        return 2 * (most.log_likelihood - float(value)) - fall
+        return 2 * (likeliest.log_likelihood - float(value)) - threshold
 
-    weight = column / most.expected
+    weight = column / likeliest.expected
     low = float(np.log(max(power, 1e-3 / np.sqrt(np.sum(fit.freedom * weight**2)))))
     high = low + 1.0
     while loss(high) < 0:
         low, high = high, high + 1.0
     bound = float(brentq(loss, low, high, xtol=0.02)) if loss(low) < 0 else low
-    return float(np.sqrt(power)), float(np.exp(bound / 2)), most.values[effect.name]
+    return float(np.sqrt(power)), float(np.exp(bound / 2)), likeliest.values[effect.name]
 
 
 def _shape(effect: Effect, fit: ChannelFit) -> Values:
@@ -141,8 +143,8 @@ def power_covariance(fit: ChannelFit) -> tuple[list[tuple[str, str]], Array]:
         columns[effect.name, strength] = effect_spectrum(effect, fit.parts, {**values, strength: 1.0})
         for p in effect.parameters[1:]:
             step = DERIVATIVE_STEP * values[p.name]
-            ahead, behind = ({**values, p.name: values[p.name] + side * step} for side in (1, -1))
-            columns[effect.name, p.name] = (fit.part_of(effect, ahead) - fit.part_of(effect, behind)) / (2 * step)
+            forward, backward = ({**values, p.name: values[p.name] + side * step} for side in (1, -1))
+            columns[effect.name, p.name] = (fit.part_of(effect, forward) - fit.part_of(effect, backward)) / (2 * step)
     J = information(np.column_stack(list(columns.values())), fit.expected, fit.freedom)
     scale = np.sqrt(np.maximum(np.diag(J), np.finfo(float).tiny))
     wider = max(1.0, fit.excess)
@@ -182,11 +184,11 @@ class NoiseFit:
         """The model with its values; uncertainties take as long as the fit."""
         if not self.fitted:
             return self.stated
-        every = [(pair, power_deviations(pair) if pair.effects else {}) for pair in self.channels]
+        fits = [(pair, power_deviations(pair) if pair.effects else {}) for pair in self.channels]
         terms = tuple(
             Term(
                 term.effect,
-                estimates=tuple(e for pair in every for e in estimates(pair[0], term.effect, self.still.unit, pair[1])),
+                estimates=tuple(e for pair in fits for e in estimates(pair[0], term.effect, self.still.unit, pair[1])),
             )
             if term.effect.is_noise
             else term
@@ -214,7 +216,7 @@ class NoiseFit:
         """Pooled excess on each half of the record with the model fitted to the other half."""
         effects = tuple(term.effect for term in noise_terms(self.stated))
         excesses = [
-            _excess_on_other(pair, effects) for c in self.still.channels for pair in (c.halves(), c.halves()[::-1])
+            _unseen_excess(pair, effects) for c in self.still.channels for pair in (c.halves(), c.halves()[::-1])
         ]
         return float(np.sqrt(np.mean(np.square(excesses))))
 
@@ -224,12 +226,12 @@ class NoiseFit:
         return (self.pooled_excess**2 - 1) / excess if excess > 0 else 1.0
 
 
-def _excess_on_other(halves: tuple[Channel, Channel], effects: Sequence[Effect]) -> float:
+def _unseen_excess(halves: tuple[Channel, Channel], effects: Sequence[Effect]) -> float:
     """Excess on the second half with the fit to the first; lines have the phase there that fits."""
-    fitted_half, other_half = halves
+    fitted_half, unseen_half = halves
     fit = fit_channel(fitted_half, effects)
-    spectrum = without_effects(other_half, fit.lines)
-    return ChannelFit(other_half, spectrum.parts, fit.lines, fit.effects, fit.values).excess
+    spectrum = without_effects(unseen_half, fit.lines)
+    return ChannelFit(unseen_half, spectrum.parts, fit.lines, fit.effects, fit.values).excess
 
 
 def noise_terms(model: Model) -> tuple[Term, ...]:
@@ -256,27 +258,27 @@ def fit(model: Model, still: Still) -> NoiseFit:
 def fit_channel(channel: Channel, effects: Sequence[Effect]) -> ChannelFit:
     """Effects fitted to one channel; lines are looked for where one of the effects has them."""
     smooth = tuple(effect for effect in effects if "spectrum" in effect.places)
-    most = most_lines(effects)
-    if not most:
+    max_lines = line_capacity(effects)
+    if not max_lines:
         return fit_effects(without_effects(channel), smooth)
-    return fit_effects(find_lines(channel, smooth, most), smooth)
+    return fit_effects(find_lines(channel, smooth, max_lines), smooth)
 
 
-def most_lines(effects: Iterable[Effect]) -> int:
+def line_capacity(effects: Iterable[Effect]) -> int:
     """How many lines the effects can hold."""
     return sum(len(effect.parameters) // 2 for effect in effects if "lines" in effect.places)
 
 
-def find_lines(channel: Channel, beside: Sequence[Effect], most: int) -> ChannelFit:
-    """The channel less the lines that exceed the effects' spectrum, strongest first, `most` of them.
+def find_lines(channel: Channel, effects: Sequence[Effect], max_lines: int) -> ChannelFit:
+    """The channel less the lines that exceed the effects' spectrum, strongest first, `max_lines` of them.
 
     `line_bound` is the amplitude that one more might have.
     """
     lines: list[Line] = []
     while True:
         remaining = without_effects(channel, lines)
-        strongest = strongest_line(channel, tuple(lines), fit_effects(remaining, beside).level)
-        if isinstance(strongest, float) or len(lines) == most:
+        strongest = strongest_line(channel, tuple(lines), fit_effects(remaining, effects).level)
+        if isinstance(strongest, float) or len(lines) == max_lines:
             bound = strongest if isinstance(strongest, float) else strongest.amplitude
             ordered = tuple(sorted(lines, key=lambda line: -line.amplitude))
             remaining = remaining if ordered == remaining.lines else without_effects(channel, ordered)

@@ -1,7 +1,7 @@
-"""Every mixture of noise effects added to a model, and the mixture that the record supports best for its price.
+"""Every mixture of noise effects added to a model, and the mixture with the best gain for its price.
 
-The price of an effect is a gain in log-likelihood that noise alone rarely reaches, so that over the whole search
-nothing is named by chance. Mixtures are few, and all are tried: what is named does not depend on the order.
+The price of an effect is a gain in log-likelihood that noise alone rarely reaches, so that the whole search rarely
+names an effect by chance. Mixtures are few, and the search tries all: the result does not depend on an order.
 
 A power is not negative: where an effect is absent, twice its gain in log-likelihood is 0 or, half of the time,
 chi-squared. If its shape is searched for, the gain is the maximum of many correlated gains along a curve on the unit
@@ -34,7 +34,7 @@ MOST_GAIN = 1e3
 
 
 def chance(gain: float, tubes: Sequence[float]) -> float:
-    """Of such a gain, summed over channels, where nothing is there; `tubes` has L / (2 pi) of each channel."""
+    """Chance of such a gain, summed over channels, without an effect; `tubes` has L / (2 pi) of each channel."""
     weights = np.ones(1)  # of chi-square with 0, 1, 2 ... degrees of freedom
     for tube in tubes:
         weights = np.convolve(weights, [0.5, 0.5, tube])
@@ -49,28 +49,26 @@ def least_gain(of_chance: float, tubes: tuple[float, ...]) -> float:
     return float(brentq(lambda gain: chance(gain, tubes) - of_chance, 1e-3, MOST_GAIN))
 
 
-def tube(beside: ChannelFit, effect: Effect) -> float:
+def tube(fit: ChannelFit, effect: Effect) -> float:
     """L / (2 pi) of an effect's shapes beside the effects of a fit; 0 for one that has no shape to be searched for."""
     if len(effect.parameters) < 2:
         return 0.0
     strength, shape = (p.name for p in effect.parameters[:2])
-    ends = shape_grid(effect, shape, beside.channel)
+    ends = shape_grid(effect, shape, fit.channel)
     shapes = np.geomspace(ends[0], ends[-1], STEPS_PER_SHAPE * len(ends)).tolist()
-    columns = np.column_stack(
-        [effect_spectrum(effect, beside.parts, {strength: 1.0, shape: value}) for value in shapes]
-    )
-    unit = _orthogonal_units(columns, beside)
+    columns = np.column_stack([effect_spectrum(effect, fit.parts, {strength: 1.0, shape: value}) for value in shapes])
+    unit = _orthogonal_units(columns, fit)
     steps = np.clip(np.sum(unit[:, 1:] * unit[:, :-1], axis=0), -1.0, 1.0)
     return float(np.sum(np.arccos(steps)) / (2 * np.pi))
 
 
 def _orthogonal_units(columns: Array, fit: ChannelFit) -> Array:
-    """Columns (b, k) of spectra as unit vectors of what they tell beside the fit's own effects."""
+    """Columns (b, k) of spectra as unit vectors off the effects of the fit."""
     weight = (np.sqrt(fit.freedom / 2) / fit.expected)[:, None]
-    own = np.column_stack(
+    effect_columns = np.column_stack(
         [effect_spectrum(e, fit.parts, {**fit.values[e.name], e.parameters[0].name: 1.0}) for e in fit.effects]
     )
-    basis, _ = np.linalg.qr(own * weight / np.linalg.norm(own * weight, axis=0))
+    basis, _ = np.linalg.qr(effect_columns * weight / np.linalg.norm(effect_columns * weight, axis=0))
     free = columns * weight
     free = free - basis @ (basis.T @ free)
     return np.asarray(free / np.linalg.norm(free, axis=0))
@@ -78,26 +76,26 @@ def _orthogonal_units(columns: Array, fit: ChannelFit) -> Array:
 
 @dataclass(frozen=True)
 class Mixture:
-    """Effects beside a model, fitted to each channel; the gain over the model, and that less the effects' prices."""
+    """Effects added to a model, fitted to each channel; the gain over the model; the gain minus the prices (score)."""
 
     effects: tuple[Effect, ...]
     channels: tuple[ChannelFit, ...]
     gain: float
-    worth: float
+    score: float
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the effects beside the model."""
+        """Names of the added effects."""
         return tuple(effect.name for effect in self.effects)
 
 
 @dataclass(frozen=True)
 class Mixtures:
-    """What is seen in each channel, the effects of the model, and those that might be missing."""
+    """The spectra of the channels, the effects of the model, and those that may be missing."""
 
     seen: tuple[ChannelFit, ...]
     given: tuple[Effect, ...]
-    others: tuple[Effect, ...]
+    missing: tuple[Effect, ...]
 
     @cached_property
     def base(self) -> tuple[ChannelFit, ...]:
@@ -106,17 +104,17 @@ class Mixtures:
 
     @cached_property
     def tubes(self) -> dict[str, tuple[float, ...]]:
-        """Of each of the others, per channel."""
-        return {effect.name: tuple(tube(fit, effect) for fit in self.base) for effect in self.others}
+        """L / (2 pi) of each missing effect, by channel."""
+        return {effect.name: tuple(tube(fit, effect) for fit in self.base) for effect in self.missing}
 
     @cached_property
     def prices(self) -> dict[str, float]:
-        """Of each of the others."""
-        chance = SIGNIFICANT / max(1, len(self.others))
+        """Price of each missing effect."""
+        chance = SIGNIFICANT / max(1, len(self.missing))
         return {name: max(LEAST_GAINS.get(name, 0.0), least_gain(chance, tubes)) for name, tubes in self.tubes.items()}
 
     def of(self, effects: Iterable[Effect]) -> Mixture:
-        """The model with some of the others."""
+        """The model with some of the missing effects."""
         effects = tuple(effects)
         channels = self._fitted(effects)
         gain = 2 * (likelihood(channels) - likelihood(self.base))
@@ -124,18 +122,18 @@ class Mixtures:
 
     @cached_property
     def best(self) -> Mixture:
-        """The one that is worth most.
+        """The mixture with the highest score.
 
-        No mixture gains more than one that contains it, so that a mixture whose price leaves too little is not fitted.
+        No mixture gains more than one that contains it: this bound saves the fit of mixtures with too high a price.
         Shapes take longest to fit: mixtures with few of them come first.
         """
-        best, fitted = self.of(()), [self.of(self.others)]
-        subsets = [subset for k in range(1, len(self.others) + 1) for subset in combinations(self.others, k)]
+        best, fitted = self.of(()), [self.of(self.missing)]
+        subsets = [subset for k in range(1, len(self.missing) + 1) for subset in combinations(self.missing, k)]
         for subset in sorted(subsets, key=lambda subset: sum(len(effect.parameters) > 1 for effect in subset)):
-            most = min(wider.gain for wider in fitted if set(subset) <= set(wider.effects))
-            if most - sum(self.prices[effect.name] for effect in subset) > best.worth:
+            highest_gain = min(wider.gain for wider in fitted if set(subset) <= set(wider.effects))
+            if highest_gain - sum(self.prices[effect.name] for effect in subset) > best.score:
                 fitted.append(self.of(subset))
-                best = max(best, fitted[-1], key=lambda mixture: mixture.worth)
+                best = max(best, fitted[-1], key=lambda mixture: mixture.score)
         return best
 
     def lost_without(self, mixture: Mixture, name: str) -> float:
@@ -148,5 +146,5 @@ class Mixtures:
 
 
 def likelihood(channels: Iterable[ChannelFit]) -> float:
-    """Logarithm, of all channels together."""
+    """Log-likelihood of all channels together."""
     return sum(channel.log_likelihood for channel in channels)

@@ -25,7 +25,7 @@ from calibrations.noise.fit import (
     find_lines,
     fit,
     gain_of,
-    most_lines,
+    line_capacity,
     noise_terms,
     shape_grid,
     without_effects,
@@ -87,12 +87,12 @@ class Search:
         present: list[Effect] = []
         while waiting:
             remaining = [effect for effect in self.mixture.effects if effect.name in waiting]
-            tried = {effect.name: self.mixtures.of([*present, effect]).gain - level for effect in remaining}
-            best = max(waiting, key=lambda name: tried.get(name, losses[name]))
+            gains_by_name = {effect.name: self.mixtures.of([*present, effect]).gain - level for effect in remaining}
+            best = max(waiting, key=lambda name: gains_by_name.get(name, losses[name]))
             yield best
             waiting.remove(best)
             present += [effect for effect in remaining if effect.name == best]
-            level += tried.get(best, 0.0)
+            level += gains_by_name.get(best, 0.0)
 
     @cached_property
     def rivals(self) -> dict[str, tuple[str, ...]]:
@@ -110,7 +110,7 @@ class Search:
     def _rivals(self, effect: Effect) -> list[str]:
         remaining = [e for e in self.mixture.effects if e is not effect]
         names_of_rivals = []
-        for candidate in self.mixtures.others:
+        for candidate in self.mixtures.missing:
             if candidate in self.mixture.effects:
                 continue
             swapped = self.mixtures.of([*remaining, candidate])
@@ -142,63 +142,69 @@ def _at_longest_shape(mixture: Mixture, effect: Effect) -> bool:
 
 def search(still: Still, model: Model, effects: Mapping[str, Effect]) -> Search:
     """Raises ModelError for a model without noise."""
-    own = tuple(term.effect for term in noise_terms(model))
+    model_effects = tuple(term.effect for term in noise_terms(model))
     noises = {name: effect for name, effect in effects.items() if effect.is_noise}
-    noises |= {effect.name: effect for effect in own}
-    result = _search_once(still, model, noises, own)
+    noises |= {effect.name: effect for effect in model_effects}
+    result = _search_once(still, model, noises, model_effects)
     if result.mixture.effects:
         result = replace(result, telegraphs=tuple(filter(None, map(telegraph_of, result.mixture.channels))))
     first = result
     while len(result.patterns) < MOST_PATTERNS * len(still.channels):
-        more = _remove_next_pattern(still, result, own)
-        if more is result:
+        cleaned = _remove_next_pattern(still, result, model_effects)
+        if cleaned is result:
             break
-        result = more
-    return replace(_with_common_amounts(still, result, own), uncleaned=first) if result.patterns else result
+        result = cleaned
+    return replace(_with_common_amounts(still, result, model_effects), uncleaned=first) if result.patterns else result
 
 
-def _with_common_amounts(still: Still, search: Search, own: tuple[Effect, ...]) -> Search:
-    """With the amounts of all patterns fitted at once, beside the processes that are left."""
-    beside = search.mixture.channels
-    patterns = _with_amounts(still, search.patterns, beside)
-    patterns = _with_amounts(still, tuple(pattern for pattern in patterns if not pattern.needless), beside)
+def _with_common_amounts(still: Still, search: Search, model_effects: tuple[Effect, ...]) -> Search:
+    """The search with the amounts of all patterns fitted together with the processes."""
+    channel_fits = search.mixture.channels
+    patterns = _with_amounts(still, search.patterns, channel_fits)
+    patterns = _with_amounts(still, tuple(pattern for pattern in patterns if not pattern.needless), channel_fits)
     cleaned = with_cleaned_curves(without_patterns(still, patterns), {pattern.axis for pattern in patterns})
-    result = _search_once(cleaned, search.model, search.effects, own)
+    result = _search_once(cleaned, search.model, search.effects, model_effects)
     return replace(result, patterns=patterns, telegraphs=search.telegraphs)
 
 
-def _with_amounts(still: Still, patterns: tuple[Pattern, ...], beside: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
-    """The patterns with their amounts fitted together, channel by channel, to the record that holds them all."""
+def _with_amounts(
+    still: Still, patterns: tuple[Pattern, ...], channel_fits: tuple[ChannelFit, ...]
+) -> tuple[Pattern, ...]:
+    """The patterns with their amounts fitted together, channel by channel, to the record with all patterns."""
     fitted: list[Pattern] = []
-    for channel, present in zip(still.channels, beside, strict=True):
-        own = tuple(pattern for pattern in patterns if pattern.axis == channel.axis)
-        fitted += refitted(own, present, channel) if own else ()
+    for channel, present in zip(still.channels, channel_fits, strict=True):
+        channel_patterns = tuple(pattern for pattern in patterns if pattern.axis == channel.axis)
+        fitted += refitted(channel_patterns, present, channel) if channel_patterns else ()
     return tuple(fitted)
 
 
-def _remove_next_pattern(still: Still, search: Search, own: tuple[Effect, ...]) -> Search:
-    """The search without the patterns that stand out, if that explains the record better; otherwise `search`.
+def _remove_next_pattern(still: Still, search: Search, model_effects: tuple[Effect, ...]) -> Search:
+    """The search on a record without the next patterns, if it explains the record better; otherwise `search`.
 
-    A form that is searched for in the record itself must also make a process unnecessary, or be no chance beside the
-    best mixture: noise that jumps has steps and slopes of its own. A logged column is independent of the noise.
+    A pattern found in the record itself must also make a process unnecessary, or be significant together with the best
+    mixture: noise that jumps has steps and slopes of its own. A logged column is independent of the noise.
     """
-    sure, likely = (_patterns(search, channels) for channels in (search.mixture.channels, search.mixtures.base))
-    tried = [_search_without(still, search, patterns, own) for patterns in (sure, likely) if patterns]
-    best = max(tried, key=_worth, default=search)
+    significant, likely = (_patterns(search, channels) for channels in (search.mixture.channels, search.mixtures.base))
+    searches = [
+        _search_without(still, search, patterns, model_effects) for patterns in (significant, likely) if patterns
+    ]
+    best = max(searches, key=_score, default=search)
     logged = any(pattern.kind == FOLLOWS for pattern in best.patterns[len(search.patterns) :])
-    least = _worth(search) + (0.0 if logged else INSEPARABLE)
-    if _worth(best) <= least or likelihood(best.mixtures.base) < likelihood(search.mixtures.base):
+    threshold = _score(search) + (0.0 if logged else INSEPARABLE)
+    if _score(best) <= threshold or likelihood(best.mixtures.base) < likelihood(search.mixtures.base):
         return search  # without it the model explains less: it was noise
-    fewer = len(best.gains) < len(search.gains)
-    return best if fewer or logged or any(pattern.certain for pattern in sure) else search
+    is_smaller = len(best.gains) < len(search.gains)
+    return best if is_smaller or logged or any(pattern.certain for pattern in significant) else search
 
 
-def _search_without(still: Still, search: Search, patterns: tuple[Pattern, ...], own: tuple[Effect, ...]) -> Search:
-    """The search without further patterns. A curvature changes the slope beside it, so that amounts are fitted anew."""
-    together = search.patterns + patterns
-    together = _with_amounts(still, together, search.mixture.channels) if search.patterns else together
-    result = _search_once(without_patterns(still, together), search.model, search.effects, own)
-    return replace(result, patterns=together, telegraphs=search.telegraphs)
+def _search_without(
+    still: Still, search: Search, patterns: tuple[Pattern, ...], model_effects: tuple[Effect, ...]
+) -> Search:
+    """The search without further patterns. It refits all amounts, because a curvature changes the slope."""
+    all_patterns = search.patterns + patterns
+    all_patterns = _with_amounts(still, all_patterns, search.mixture.channels) if search.patterns else all_patterns
+    result = _search_once(without_patterns(still, all_patterns), search.model, search.effects, model_effects)
+    return replace(result, patterns=all_patterns, telegraphs=search.telegraphs)
 
 
 def _patterns(search: Search, channels: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
@@ -216,20 +222,24 @@ def without_patterns(still: Still, patterns: tuple[Pattern, ...]) -> Still:
     return replace(still, channels=channels)
 
 
-def _worth(search: Search) -> float:
-    """Twice the log-likelihood of the best mixture, less the prices of its effects and of the patterns."""
+def _score(search: Search) -> float:
+    """Twice the log-likelihood of the best mixture, minus the prices of its effects and of the patterns."""
     price = sum(search.mixtures.prices[name] for name in search.mixture.names)
     price += sum(pattern.price for pattern in search.patterns)
     return 2 * sum(channel.log_likelihood for channel in search.mixture.channels) - price
 
 
-def _search_once(still: Still, model: Model, noises: Mapping[str, Effect], own: tuple[Effect, ...]) -> Search:
-    smooth = tuple(effect for effect in own if "spectrum" in effect.places)
+def _search_once(still: Still, model: Model, noises: Mapping[str, Effect], model_effects: tuple[Effect, ...]) -> Search:
+    smooth = tuple(effect for effect in model_effects if "spectrum" in effect.places)
     missing = tuple(e for e in noises.values() if "spectrum" in e.places and e not in smooth)
-    plain = tuple(effect for effect in (*smooth, *missing) if len(effect.parameters) == 1)
-    most = most_lines(noises.values())
-    shown = tuple(find_lines(c, plain, most) if most else without_effects(c) for c in still.channels)
-    return Search(still, model, noises, tuple(fit.lines for fit in shown), (), Mixtures(shown, smooth, missing))
+    simple_effects = tuple(effect for effect in (*smooth, *missing) if len(effect.parameters) == 1)
+    max_lines = line_capacity(noises.values())
+    channel_fits = tuple(
+        find_lines(c, simple_effects, max_lines) if max_lines else without_effects(c) for c in still.channels
+    )
+    return Search(
+        still, model, noises, tuple(fit.lines for fit in channel_fits), (), Mixtures(channel_fits, smooth, missing)
+    )
 
 
 def candidates(search: Search, before: NoiseFit, doubts: Mapping[str, tuple[str, ...]]) -> tuple[Candidate, ...]:
@@ -240,8 +250,8 @@ def candidates(search: Search, before: NoiseFit, doubts: Mapping[str, tuple[str,
     if search.liner is not None:
         gains[search.liner.name] = max(gains[search.liner.name], search.gains[search.liner.name])
     bands = sum(len(extended.seen) for extended in before.channels)
-    worth = np.array([_schwarz(effect, gains[effect.name], before, bands) for effect in missing])
-    odds = np.exp(np.minimum(np.append(worth, 0.0) - max([*worth, 0.0]), 0.0) / 2)
+    scores = np.array([_schwarz(effect, gains[effect.name], before, bands) for effect in missing])
+    odds = np.exp(np.minimum(np.append(scores, 0.0) - max([*scores, 0.0]), 0.0) / 2)
     probability = odds / odds.sum()
     result = [
         Candidate(
@@ -261,14 +271,14 @@ def candidates(search: Search, before: NoiseFit, doubts: Mapping[str, tuple[str,
 
 
 def _schwarz(effect: Effect, gain: float, before: NoiseFit, bands: int) -> float:
-    """Gain less the price of the parameters, log(bands) each; of lines, those that it takes for one."""
+    """Gain minus the price of the parameters, log(bands) each; of lines, the parameters of one line."""
     count = 2 if "lines" in effect.places else len(effect.parameters)
     return gain - len(before.channels) * count * float(np.log(bands))
 
 
-def _p_value(effect: Effect, gain: float, before: NoiseFit, tried: int) -> float:
-    """Chance of such a gain anywhere in the search where nothing is missing."""
+def _p_value(effect: Effect, gain: float, before: NoiseFit, trials: int) -> float:
+    """Chance of such a gain anywhere in the search for a complete model."""
     if "lines" in effect.places:
         ordinates = sum(channel.channel.n / 2 for channel in before.channels)
-        return float(min(1.0, tried * ordinates * np.exp(-gain / 2)))
-    return min(1.0, tried * chance(gain, [tube(channel, effect) for channel in before.channels]))
+        return float(min(1.0, trials * ordinates * np.exp(-gain / 2)))
+    return min(1.0, trials * chance(gain, [tube(channel, effect) for channel in before.channels]))

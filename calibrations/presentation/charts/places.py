@@ -47,7 +47,7 @@ LEAST_SHARE = 0.3  # of a curve's variance that a form must take up to be drawn
 COVERAGE = 1.96  # standard uncertainties: a band of 95 %
 FEWEST_BARS, ROW = 4, 0.42  # rows that there is room for; inches a row
 BASE = ("bias", "scale-factor")
-REST, LINEAR, OTHERS = "not explained", "bias, scale factor and geometry", "other places"
+UNEXPLAINED, LINEAR, MINOR_PLACES = "not explained", "bias, scale factor and geometry", "other places"
 MOST_SHARES = 5  # places with a colour of their own
 SHARES_CAPTION = (
     "Variance of the residual beyond the noise, by the place of the signal chain that causes it; each model leaves "
@@ -103,8 +103,8 @@ def forms_through(end: Fit, curve: PlaceCurve) -> list[Through]:
     if not end.model.holds(f"{PREFIX}{curve.place}"):
         return []
     steps = end.problem.layout.steps(end.theta)
-    own = [step for step in steps if step[0].name in BASE or place_of_effect(step[0].name) == curve.place]
-    predicted = forward(end.table, own)
+    steps_of_place = [step for step in steps if step[0].name in BASE or place_of_effect(step[0].name) == curve.place]
+    predicted = forward(end.table, steps_of_place)
     outputs = dict(zip(end.table.output_names, predicted.T, strict=True))
     table = replace(end.table, columns={**end.table.columns, **outputs})
     table = table.rows(np.arange(0, table.n, max(1, table.n // MOST_ROWS)))  # without noise, a part of the poses does
@@ -120,17 +120,17 @@ def _through(base: Model, effect: Effect, end: Fit, table: Table, curve: PlaceCu
     if effect.excluded(end.table) is not None:
         return None
     try:
-        own = place_curve(fit(base.with_effect(effect), table), curve.place)
+        form_curve = place_curve(fit(base.with_effect(effect), table), curve.place)
     except (CalibrationError, np.linalg.LinAlgError):
         return None
-    if own is None:
+    if form_curve is None:
         return None
     unexplained = total = 0.0
     for axis, value in curve.value.items():
-        form = np.interp(curve.at[axis], own.at[axis], own.value[axis])
+        form = np.interp(curve.at[axis], form_curve.at[axis], form_curve.value[axis])
         unexplained += float(np.sum((value - form - np.mean(value - form)) ** 2))
         total += float(np.sum((value - np.mean(value)) ** 2))
-    return Through(effect.name, own, 1 - unexplained / total if total > 0 else 0.0)
+    return Through(effect.name, form_curve, 1 - unexplained / total if total > 0 else 0.0)
 
 
 def curve_chart(curve: PlaceCurve, forms: Sequence[Through] = ()) -> Chart:
@@ -148,9 +148,9 @@ def curve_panel(curve: PlaceCurve, axis: str, forms: Sequence[Through] = ()) -> 
         Line(at, value, "curve", INK, 1.8, markers=len(at) < 12),
     ]
     for colour, form in zip(FORM_COLOURS, forms, strict=False):
-        own = form.curve
+        form_curve = form.curve
         label = f"{form.name}: {100 * max(form.share, 0.0):.0f} %"
-        series.append(Line(own.at[axis], scale * own.value[axis], label, colour, 1.4, "dash"))
+        series.append(Line(form_curve.at[axis], scale * form_curve.value[axis], label, colour, 1.4, "dash"))
     driver = f"{curve.driver.removesuffix('_deg').removesuffix('_c').replace('_', ' ')}"
     x = Axis(f"{driver}, {curve.driver_unit}" if curve.driver_unit else driver)
     first = axis == next(iter(curve.value))
@@ -168,7 +168,9 @@ def shares_chart(steps: Falling) -> Chart:
     series = []
     for k in range(len(names) - 1, -1, -1):  # the longest bars below the others
         texts = texts_of_models if k == len(names) - 1 else [""] * rows
-        colour = {REST: BAND, LINEAR: QUIET, OTHERS: INK}.get(names[k], PLACE_COLOURS[k % len(PLACE_COLOURS)])
+        colour = {UNEXPLAINED: BAND, LINEAR: QUIET, MINOR_PLACES: INK}.get(
+            names[k], PLACE_COLOURS[k % len(PLACE_COLOURS)]
+        )
         series.append(Bars(0.0, 100 * ends[:, k], [colour] * rows, texts, [False] * rows, names[k]))
     models = (steps.start.model.name, *(f"+ {step.name}" for step in steps.steps))
     y = Axis(low=-0.5, high=max(rows, FEWEST_BARS) - 0.5, names=models, reverse=True)
@@ -188,15 +190,15 @@ def shares_by_place(steps: Falling) -> tuple[list[str], Array]:
     at = [_named(step.name) for step in steps.steps]
     size = {name: sum(g for g, a in zip(gains, at, strict=True) if a == name) for name in at}
     names = sorted(size, key=lambda name: (name == LINEAR, -size[name]))
-    few = [name for name in names if name != LINEAR][MOST_SHARES:]
-    at = [OTHERS if name in few else name for name in at]
-    names = [*(name for name in names if name not in few), *([OTHERS] if few else [])]
+    minor = [name for name in names if name != LINEAR][MOST_SHARES:]
+    at = [MINOR_PLACES if name in minor else name for name in at]
+    names = [*(name for name in names if name not in minor), *([MINOR_PLACES] if minor else [])]
     shares = np.zeros((len(errors), len(names) + 1))
     for row in range(len(errors)):
         for k in range(row, len(gains)):
             shares[row, names.index(at[k])] += gains[k] / total
     shares[:, -1] = unexplained / total
-    return [*names, REST], shares
+    return [*names, UNEXPLAINED], shares
 
 
 def _named(effect: str) -> str:
