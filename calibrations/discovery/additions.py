@@ -20,21 +20,21 @@ from calibrations.model.chain import forward
 from calibrations.table import Array, Table
 
 BASIC = ("bias", "scale-factor")
-BASE_STEPS = 2  # of Gauss and Newton's: hardly anything of the base is not linear
-SMALL = 0.1  # of the value of a cause that led the fit astray
-NO_WORSE = 1.02  # of the error before: a parameter more costs a degree of freedom, a fit gone astray more
+BASE_STEPS = 2  # of Gauss and Newton: the base is nearly linear
+SMALL = 0.1  # of the value of a cause with which the fit diverged
+NO_WORSE = 1.02  # of the error before: one more parameter costs a degree of freedom, a diverged fit costs more
 
 
 @dataclass(frozen=True)
 class Addition:
-    """An effect that the structure adds to a model, with constants and values to start from that are known from it."""
+    """An effect that the structure adds to a model, with its constants and start values."""
 
     effect: Effect
     constants: Mapping[str, float] = field(default_factory=dict)
     estimates: tuple[Estimate, ...] = ()
 
     def to(self, model: Model) -> Model:
-        """The model with the effect, its parameters at the values to start from."""
+        """The model with the effect, its parameters at their start values."""
         larger = model.with_effect(self.effect)
         return replace(larger, terms=tuple(self._started(t) if t.name == self.effect.name else t for t in larger.terms))
 
@@ -60,10 +60,10 @@ def free_additions(structure: Structure, model: Model) -> list[Addition]:
     return [a for a in free if not model.holds(a.effect.name)]
 
 
-def separately(base: Fit, structure: Structure, added: list[Addition]) -> list[Addition]:
-    """The additions with values to start from: each place's causes fitted to what the other places leave.
+def fit_separately(base: Fit, structure: Structure, added: list[Addition]) -> list[Addition]:
+    """The additions with start values: each place's causes fitted to the data minus the other places.
 
-    Beside other effects that are missing, the search for a nonlinear parameter goes astray.
+    While other effects are missing, the search for a nonlinear parameter diverges.
     """
     names = {a.effect.name: a for a in added}
     model = _with(base.model, [a for name, a in names.items() if name in GEOMETRY])
@@ -77,10 +77,10 @@ def separately(base: Fit, structure: Structure, added: list[Addition]) -> list[A
     return [replace(a, estimates=known.get(name, a.estimates)) for name, a in names.items()]
 
 
-def together(base: Fit, added: list[Addition]) -> Fit:
-    """All additions fitted at once, in white noise first.
+def fit_together(base: Fit, added: list[Addition]) -> Fit:
+    """Joint fit of all additions, in white noise first.
 
-    The noise of `base` has taken up what the additions explain, and free forms give way to a noise that is so large.
+    The noise of `base` contains the signal of the additions, and a noise of that size suppresses free forms.
     """
     if not added:
         return base
@@ -91,9 +91,9 @@ def together(base: Fit, added: list[Addition]) -> Fit:
 
 
 def _start_values(base: Fit, model: Model, noise: Noise) -> Array:
-    """The values of a model to start from, those of its base fitted beside the others.
+    """Start values of a model, with those of its base fitted again, given the additions.
 
-    Each addition was fitted alone, and took its own bias and scale factor with it.
+    The fit of a single addition has its own bias and scale factor.
     """
     problem = Problem.of(model, base.table)
     theta = problem.layout.starts()[0]
@@ -114,12 +114,11 @@ def fitted(base: Fit, end: Fit, added: list[Addition]) -> list[Fit]:
     return [*fits, end] if added else []
 
 
-def gradually(base: Fit, added: list[Addition], end: Fit | None = None) -> tuple[list[Addition], list[Fit]]:
-    """The additions that make the error no larger, each beside those before it, and the fits, the first of them `base`.
+def fit_gradually(base: Fit, added: list[Addition], end: Fit | None = None) -> tuple[list[Addition], list[Fit]]:
+    """The additions that do not increase the error, added one by one, and the fits, the first of them `base`.
 
-    An effect far from the truth can lead the fit of all to a place from which no way leads back. One that does not help
-    yet, such as a quantiser beside a drift that is missing, is tried again beside the others. `end` is the fit of all
-    where that is known.
+    An effect far from its true values can make the joint fit diverge. An addition that does not help yet, such as a
+    quantiser while a drift is missing, gets another trial after the others. `end`: the joint fit, if it is known.
     """
     accepted: list[Addition] = []
     fits = [base]
@@ -139,7 +138,7 @@ def gradually(base: Fit, added: list[Addition], end: Fit | None = None) -> tuple
 
 
 def causes_alone(end: Fit, forms: list[Addition]) -> Fit:
-    """The model without the free forms, at the values that it has beside them."""
+    """The model without the free forms, at its values in the fit with them."""
     model = end.model
     for form in forms:
         model = model.without(form.effect.name)
@@ -149,7 +148,7 @@ def causes_alone(end: Fit, forms: list[Addition]) -> Fit:
 
 
 def without_forms(end: Fit) -> Fit:
-    """The causes fitted to the data less what the free forms of the model add; `end` itself where it has none."""
+    """The causes fitted to the data minus the free forms of the model; `end` itself if it has none."""
     forms = [term.name for term in end.model.terms if term.name.startswith(PREFIX)]
     if not forms:
         return end
@@ -169,10 +168,10 @@ def at_values_of(end: Fit, added: list[Addition]) -> list[Addition]:
 
 
 def small_beside_forms(causes: list[Addition], forms: list[Addition]) -> list[Addition]:
-    """The causes with those small at whose place a free form acts; none where there is no such place.
+    """The causes, with small start values at places with a free form; empty if there is no such place.
 
-    The form can hold what the cause describes. A cause that begins large, at a wrong value of what is not linear, keeps
-    both from the best fit.
+    The form can describe the signal of the cause. A cause with a large start value and a wrong nonlinear parameter
+    keeps both from the best fit.
     """
     places = {a.effect.name.removeprefix(PREFIX) for a in forms}
     if not any(place_of_effect(a.effect.name) in places for a in causes):
@@ -181,14 +180,14 @@ def small_beside_forms(causes: list[Addition], forms: list[Addition]) -> list[Ad
 
 
 def _small(cause: Addition) -> Addition:
-    """The cause with those parameters small that it is linear in: of either sign, and 0 where nothing is known."""
+    """The cause with small values of its linear parameters: those of either sign that start at 0."""
     linear = {p.name for p in cause.effect.parameters if p.low == -np.inf and p.starts == (0.0,) and p.guess is None}
     estimates = [replace(e, value=SMALL * e.value) if e.name in linear else e for e in cause.estimates]
     return replace(cause, estimates=tuple(estimates))
 
 
 def largest_first(added: list[Addition], end: Fit, structure: Structure) -> list[Addition]:
-    """The additions by the size of their place; those of the geometry by what they contribute to the outputs."""
+    """The additions by the size of their place; those of the geometry by their contribution to the outputs."""
     sizes = {c: place.size for place in structure.places for c in (*place.causes, *structure.refinements(place))}
     for name in (a.effect.name for a in added if a.effect.name not in sizes):
         mask = end.problem.layout.of_effect(name)
@@ -201,7 +200,7 @@ def largest_first(added: list[Addition], end: Fit, structure: Structure) -> list
 
 
 def _residual_of(values: Array, columns: Array) -> Array:
-    """Values (channels, n) without what columns (channels, n, k) explain of each channel."""
+    """Residual of values (channels, n) after least squares on columns (channels, n, k) of each channel."""
     return np.stack([v - c @ np.linalg.lstsq(c, v, rcond=None)[0] for v, c in zip(values, columns, strict=True)])
 
 
@@ -212,5 +211,5 @@ def _with(model: Model, added: list[Addition]) -> Model:
 
 
 def _without_part(table: Table, part: Array | float) -> Table:
-    """The table with a part (channels, n) taken off its outputs."""
+    """The table with a part (channels, n) subtracted from its outputs."""
     return table.with_outputs(table.outputs - np.broadcast_to(part, (len(table.axes), table.n)).T)

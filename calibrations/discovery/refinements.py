@@ -1,10 +1,10 @@
-"""Which effects of a found model are causes, and which only refine the form of a larger one.
+"""Causes among the effects of a final model, and refinements of the form of a larger cause.
 
-The form of a mechanism is never quite that of the catalogue, and what the formula leaves looks like further effects. So
-each effect is tested beside another form of every larger one: a smooth function at the same place, with a Gaussian
-prior of a tenth of the larger effect's size. An effect that such a form may replace stays in the model and is no cause.
+The form of a mechanism differs from that of the catalogue, and the difference looks like further effects. The test of
+an effect therefore includes another form of every larger one: a smooth function at the same place, with a Gaussian
+prior of a tenth of the larger effect's size. An effect that such a form can replace stays in the model as a refinement.
 
-Source  Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425: what a model misses as a random function.
+Source  Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425: the misfit of a model as a random function.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from calibrations.criteria import FORM_PART, REFINEMENT, SIGNIFICANT
 from calibrations.discovery.findings import Step
-from calibrations.discovery.search import cost, first_order
+from calibrations.discovery.search import cost, first_order_cost
 from calibrations.discovery.significance import chance, of_search
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.shown_forms import Shown, form_columns, forms_at, in_white_noise
@@ -54,7 +54,9 @@ def causes(steps: tuple[Step[Fit], ...], trials: int) -> tuple[str, ...]:
     """
     tied = {term.name for term in steps[0].before.model.terms if term.tied}
     end = steps[-1].after
-    costs = {s.name: (first_order(end, s.name, shared=True) if s.name in tied else cost(end, s.name))[0] for s in steps}
+    costs = {
+        s.name: (first_order_cost(end, s.name, shared=True) if s.name in tied else cost(end, s.name))[0] for s in steps
+    }
     approximate = [s.name for s in steps if not s.effect.exact]
     greatest = max((costs[name] for name in approximate), default=0.0)
     material = [name for name, growth in costs.items() if name not in approximate or growth >= REFINEMENT * greatest]
@@ -77,10 +79,9 @@ def causes(steps: tuple[Step[Fit], ...], trials: int) -> tuple[str, ...]:
 
 
 def _one_of_slow_pair(end: Fit, names: list[str]) -> list[str]:
-    """The effects without that of a temperature, or of the time, which a free form of the other one replaces.
+    """The effects without that of temperature, or of time, if a free form of the other one replaces it.
 
-    Where both go the same way, each of the two formulas makes up for what the other one leaves. The likelier place is
-    the cause.
+    If temperature and time change alike, each formula corrects the other one. The likelier place is the cause.
     """
     at = {place_of_effect(name): name for name in names}
     for pair in SLOW:
@@ -96,7 +97,7 @@ def _one_of_slow_pair(end: Fit, names: list[str]) -> list[str]:
 
 
 def _takes_up(shown: Shown) -> bool:
-    """Whether the forms leave little of what the effect that is set apart explains without them."""
+    """Whether the forms explain most of the signal of the effect that is fitted apart."""
     return shown.gain_apart(shown.selected) < max(ENTER, (1 - MOSTLY) * shown.gain_apart(shown.nothing))
 
 
@@ -105,7 +106,7 @@ def _is_smaller(growth: float, larger: float) -> bool:
 
 
 def _follows(end: Fit, name: str, larger: list[str]) -> bool:
-    """Whether free forms at the places of much larger effects, of the size that the data show, take up most of it."""
+    """Whether free forms of fitted size, at the places of much larger effects, explain most of the effect."""
     places = dict.fromkeys(place_of_effect(larger_name) for larger_name in larger)
     forms = {key: form for place in places if place in DRIVERS for key, form in forms_at(place, end).items()}
     if not forms:
@@ -148,7 +149,7 @@ def _freed(rows: Array, base: Array) -> Array:
 
 
 def _forms(end: Fit, name: str) -> Iterator[tuple[Form, float]]:
-    """The forms that an effect may have, and the size of each as a part of the effect's."""
+    """The other forms of an effect, and the size of each as a share of the effect's size."""
     place, table = place_of_effect(name), end.problem.samples
     if place not in DRIVERS:
         return

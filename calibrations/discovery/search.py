@@ -217,7 +217,7 @@ def final_model(path: Path, effects: Mapping[str, Effect]) -> FinalModel:
 def _drop_needless(present: Fit, names: tuple[str, ...], freed: set[str]) -> tuple[Fit, tuple[str, ...]]:
     """The model without the added effects that it does not need; the effect of least cost goes first."""
     while len(names) > 1 and (removable := [name for name in names if name not in freed]):
-        cost_of = cost if len(names) <= MOST_EXCHANGED else first_order
+        cost_of = cost if len(names) <= MOST_EXCHANGED else first_order_cost
         costs = {name: cost_of(present, name) for name in removable}
         name = min(costs, key=lambda n: costs[n][0] / max(costs[n][1], 1))
         reduced = _without(present, name)
@@ -273,7 +273,7 @@ def cost(end: Fit, name: str) -> tuple[float, int]:
     return float(residual_without @ residual_without - present @ present), int(end.problem.layout.of_effect(name).sum())
 
 
-def first_order(end: Fit, name: str, shared: bool = False) -> tuple[float, int]:
+def first_order_cost(end: Fit, name: str, shared: bool = False) -> tuple[float, int]:
     """The same to first order. `shared`: growth if the axes share one value of each parameter, instead of without."""
     white, mask = end.whitened[:, 1:], end.problem.layout.of_effect(name)
     size = np.linalg.norm(white, axis=0)

@@ -18,17 +18,17 @@ from calibrations.discovery.additions import (
     additions,
     at_values_of,
     causes_alone,
+    fit_gradually,
+    fit_separately,
+    fit_together,
     fitted,
     free_additions,
-    gradually,
     largest_first,
-    separately,
     small_beside_forms,
-    together,
 )
 from calibrations.discovery.candidates import RowCandidate, candidates, with_planned, with_rivals
 from calibrations.discovery.findings import Step
-from calibrations.discovery.search import first_order
+from calibrations.discovery.search import first_order_cost
 from calibrations.discovery.significance import chance
 from calibrations.effects import Effect
 from calibrations.fitting.fit import Fit, fit, refit
@@ -44,7 +44,7 @@ from calibrations.model.chain import force
 from calibrations.table import Array
 
 STAIRS = "quantisation"
-NEARLY = 1.5  # noise floors: with more the stairs were not the right ones
+NEARLY = 1.5  # noise floors: with a larger error, the stairs are wrong
 
 
 @dataclass(frozen=True)
@@ -75,97 +75,103 @@ class StructuralSearch:
 
     @property
     def alternatives(self) -> dict[str, tuple[str, ...]]:
-        """By cause, what the data cannot separate from it."""
-        found = {name: self.structure.alternatives.get(name, ()) for name in self.causes}
+        """By cause, the effects that the data cannot separate from it."""
+        rivals_by_cause = {name: self.structure.alternatives.get(name, ()) for name in self.causes}
         if self.candidates and self.causes == (self.candidates[0].name,):
-            name, rivals = self.candidates[0].name, self.candidates[0].indistinguishable_from
-            found[name] = tuple(dict.fromkeys([*found[name], *rivals]))
-        return {name: others for name, others in found.items() if others}
+            name, rivals_alone = self.candidates[0].name, self.candidates[0].indistinguishable_from
+            rivals_by_cause[name] = tuple(dict.fromkeys([*rivals_by_cause[name], *rivals_alone]))
+        return {name: rivals for name, rivals in rivals_by_cause.items() if rivals}
 
 
 def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSearch:
     """The effects and free forms that the model of `start` misses."""
     basic = [name for name in BASIC if name in effects and not start.model.holds(name)]
     base = _freed(start, basic, effects)
-    behind, share_left = _behind_stairs(base, effects)
+    from_stairs, remaining_share = _fit_before_stairs(base, effects)
     remarks: tuple[str, ...] = ()
-    if behind is not None and (behind.end.held_out_excess <= MATERIAL or share_left < MOST_UNEXPLAINED):
-        best = behind
+    if from_stairs is not None and (from_stairs.end.held_out_excess <= MATERIAL or remaining_share < MOST_UNEXPLAINED):
+        best = from_stairs
     else:
-        found = structure(base, effects)
-        if found.floor_source is not FloorSource.SAMPLES and start.noise.known:
-            start, base = (fit(f.model, with_white(f.table, found.white)) for f in (start, base))
-            remarks = (f"The noise floor is that of the residual: {found.floor_source}.",)
-        best = _named_and_fitted(base, found, effects)
-        if behind is not None and not remarks and behind.end.held_out_excess < min(best.end.held_out_excess, NEARLY):
-            best = behind
-    found, causes, forms, end = best.found, best.causes, best.forms, best.end
-    needed = [name for name in basic if chance(*first_order(end, name, shared=True)) < SIGNIFICANT]
-    chosen = [*largest_first(at_values_of(end, causes), end, found), *at_values_of(end, forms)]
+        places = structure(base, effects)
+        if places.floor_source is not FloorSource.SAMPLES and start.noise.known:
+            start, base = (fit(f.model, with_white(f.table, places.white)) for f in (start, base))
+            remarks = (f"The noise floor is that of the residual: {places.floor_source}.",)
+        best = _fit_structure(base, places, effects)
+        if (
+            from_stairs is not None
+            and not remarks
+            and from_stairs.end.held_out_excess < min(best.end.held_out_excess, NEARLY)
+        ):
+            best = from_stairs
+    places, causes, forms, end = best.structure, best.causes, best.forms, best.end
+    needed = [name for name in basic if chance(*first_order_cost(end, name, shared=True)) < SIGNIFICANT]
+    chosen = [*largest_first(at_values_of(end, causes), end, places), *at_values_of(end, forms)]
     if needed != basic:
         base = _freed(start, needed, effects)
-        end = together(base, chosen)
-    taken, fits = gradually(base, chosen, end)
+        end = fit_together(base, chosen)
+    accepted, fits = fit_gradually(base, chosen, end)
     if fits[-1].pooled_excess < NO_WORSE * end.pooled_excess:
-        chosen, end = taken, fits[-1]
+        chosen, end = accepted, fits[-1]
         forms = [a for a in chosen if a.effect.name.startswith(PREFIX)]
     else:
         fits = [base, *fitted(base, end, chosen)]
     steps = _steps(start, needed, base, effects)
     steps += [Step(a.effect.name, *pair) for a, pair in zip(chosen, pairwise(fits), strict=True)]
-    tried = _first(start, steps, candidates(start, effects))
-    return StructuralSearch(start, tuple(steps), found, tried, causes_alone(end, forms), remarks)
+    ranked = _first(start, steps, candidates(start, effects))
+    return StructuralSearch(start, tuple(steps), places, ranked, causes_alone(end, forms), remarks)
 
 
 @dataclass(frozen=True)
-class _Named:
+class _StructureFit:
     """A structure, the additions of its causes and of its free forms, and the fit of all of them."""
 
-    found: Structure
+    structure: Structure
     causes: list[Addition]
     forms: list[Addition]
     end: Fit
 
 
-def _named_and_fitted(base: Fit, found: Structure, effects: Mapping[str, Effect]) -> _Named:
-    """Causes and free forms of a structure, fitted; where that leaves more than noise, once more beside the causes."""
-    added = additions(found, base.model, effects)
-    causes = separately(base, found, added)
-    forms = free_additions(found, base.model)
-    end = together(base, [*causes, *forms])
-    if any(a.effect.rounds for a in added):  # the whole output is rounded, and not what the other places leave
+def _fit_structure(base: Fit, places: Structure, effects: Mapping[str, Effect]) -> _StructureFit:
+    """Fit of the causes and free forms of a structure; if its residual is more than noise, with the forms renewed."""
+    added = additions(places, base.model, effects)
+    causes = fit_separately(base, places, added)
+    forms = free_additions(places, base.model)
+    end = fit_together(base, [*causes, *forms])
+    if any(
+        a.effect.rounds for a in added
+    ):  # the converter rounds the whole output, and not the remainder of other places
         as_searched = [a if a.effect.rounds else alone for a, alone in zip(added, causes, strict=True)]
-        other = together(base, [*as_searched, *forms])
-        if other.pooled_excess < end.pooled_excess:
-            causes, end = as_searched, other
+        alternative = fit_together(base, [*as_searched, *forms])
+        if alternative.pooled_excess < end.pooled_excess:
+            causes, end = as_searched, alternative
         smooth = [a for a in causes if not a.effect.rounds]
-        other = together(base, [*smooth, *forms])
-        if other.pooled_excess < NO_WORSE * end.pooled_excess:  # as well without
-            causes, end = smooth, other
-    if end.pooled_excess > base.pooled_excess:  # all at once went astray
-        taken, fits = gradually(base, [*causes, *forms])
-        causes, forms = ([a for a in taken if a.effect.name.startswith(PREFIX) is free] for free in (False, True))
+        alternative = fit_together(base, [*smooth, *forms])
+        if alternative.pooled_excess < NO_WORSE * end.pooled_excess:  # as well without
+            causes, end = smooth, alternative
+    if end.pooled_excess > base.pooled_excess:  # the joint fit diverged
+        accepted, fits = fit_gradually(base, [*causes, *forms])
+        causes, forms = ([a for a in accepted if a.effect.name.startswith(PREFIX) is free] for free in (False, True))
         end = fits[-1]
     if end.held_out_excess > MATERIAL and not end.problem.rounds:
-        # forms are found again beside the causes as the catalogue has them, so that they hold what these leave
-        beside = structure(causes_alone(end, forms), effects)
-        refined = separately(base, beside, additions(beside, end.model, effects))
-        others = [*refined, *free_additions(beside, base.model)]
-        other = together(base, [*at_values_of(end, causes), *others])
-        if other.held_out_excess < end.held_out_excess:
-            causes, forms, end = at_values_of(end, causes), others, other
+        # a new search, given the fitted causes, so that the forms describe the remainder of these
+        places_beside = structure(causes_alone(end, forms), effects)
+        refined = fit_separately(base, places_beside, additions(places_beside, end.model, effects))
+        forms_beside = [*refined, *free_additions(places_beside, base.model)]
+        alternative = fit_together(base, [*at_values_of(end, causes), *forms_beside])
+        if alternative.held_out_excess < end.held_out_excess:
+            causes, forms, end = at_values_of(end, causes), forms_beside, alternative
     if end.held_out_excess > MATERIAL and (small := small_beside_forms(at_values_of(end, causes), forms)):
-        other = together(base, [*small, *forms])
-        if other.held_out_excess < end.held_out_excess:
-            causes, end = small, other
-    return _Named(found, causes, forms, end)
+        alternative = fit_together(base, [*small, *forms])
+        if alternative.held_out_excess < end.held_out_excess:
+            causes, end = small, alternative
+    return _StructureFit(places, causes, forms, end)
 
 
-def _behind_stairs(base: Fit, effects: Mapping[str, Effect]) -> tuple[_Named | None, float]:
-    """What acts before a coarse converter, searched for in the outputs before their rounding; None: no stairs show.
+def _fit_before_stairs(base: Fit, effects: Mapping[str, Effect]) -> tuple[_StructureFit | None, float]:
+    """(fit of the effects before a coarse converter, remaining share of the excess variance); (None, 1) without stairs.
 
-    Also the part of the excess variance of the same without the converter that they leave. Noise in front of a coarse
-    converter is magnified at the edges of its steps, so that more than the noise floor may be left.
+    The search uses the outputs before their rounding. The share is that of the same effects without the converter. The
+    edges of a coarse converter's steps magnify noise in front of it, so that the error may exceed the noise floor.
     """
     white = base.problem.white
     if STAIRS not in effects or base.model.holds(STAIRS) or white is None or "output" in base.table.left_out:
@@ -174,23 +180,23 @@ def _behind_stairs(base: Fit, effects: Mapping[str, Effect]) -> tuple[_Named | N
     if stairs is None:
         return None, 1.0
     smooth = fit(base.model, before_stairs(base.table, white, stairs))
-    found = structure(smooth, effects)
-    causes = separately(smooth, found, additions(found, smooth.model, effects))
-    forms = free_additions(found, smooth.model)
-    stairs = fitted_stairs(base.table, found.result.state.predicted, white, stairs)
+    places = structure(smooth, effects)
+    causes = fit_separately(smooth, places, additions(places, smooth.model, effects))
+    forms = free_additions(places, smooth.model)
+    stairs = fitted_stairs(base.table, places.result.state.predicted, white, stairs)
     values = {"step": stairs.step, "offset": stairs.offset, "noise": stairs.noise}
     rounding = Addition(
         effects[STAIRS], {}, tuple(Estimate(name, "", value, None, "") for name, value in values.items())
     )
-    end, without = (together(base, [*causes, *stage, *forms]) for stage in ([rounding], []))
+    end, without = (fit_together(base, [*causes, *stage, *forms]) for stage in ([rounding], []))
     if without.pooled_excess < NO_WORSE * end.pooled_excess:
         return None, 1.0  # as well without: a regular sweep gathers outputs by itself
-    named = _Named(with_stairs(found, base.residual, stairs, white), [*causes, rounding], forms, end)
+    named = _StructureFit(with_stairs(places, base.residual, stairs, white), [*causes, rounding], forms, end)
     return named, end.share_left(without)
 
 
 def _freed(start: Fit, names: list[str], effects: Mapping[str, Effect]) -> Fit:
-    """The fit in which each axis has a value of its own of these effects."""
+    """The fit in which each axis has its own value of these effects."""
     model = start.model
     for name in names:
         model = model.with_effect(effects[name])
@@ -203,18 +209,18 @@ def _steps(start: Fit, names: list[str], base: Fit, effects: Mapping[str, Effect
     return [Step(name, *pair) for name, pair in zip(names, pairwise(fits[: len(names) + 1]), strict=True)]
 
 
-def _first(start: Fit, steps: list[Step[Fit]], found: list[RowCandidate]) -> tuple[RowCandidate, ...]:
-    """The candidates on top of the given model; the effect of the first step first, as its full fit shows it.
+def _first(start: Fit, steps: list[Step[Fit]], ranked: list[RowCandidate]) -> tuple[RowCandidate, ...]:
+    """The candidates on the given model, that of the first step first, with the errors of its full fit.
 
-    The rivals of an effect are those of the search that adds effects; beside others they are not asked.
+    A single cause has the rivals of the search that adds effects; several causes have none here.
     """
     if not steps:
-        return tuple(found)
-    own, *others = with_planned(found, steps[0])
+        return tuple(ranked)
+    first_effect, *other_candidates = with_planned(ranked, steps[0])
     alone = sum(not step.name.startswith(PREFIX) for step in steps) == 1
-    if alone and not own.name.startswith(PREFIX):
-        own = with_rivals(own, found, start)
-    return own, *others
+    if alone and not first_effect.name.startswith(PREFIX):
+        first_effect = with_rivals(first_effect, ranked, start)
+    return first_effect, *other_candidates
 
 
 def structure(start: Fit, effects: Mapping[str, Effect]) -> Structure:
@@ -231,13 +237,13 @@ def _geometry_effects(start: Fit, effects: Mapping[str, Effect]) -> GeometryEffe
             model = model.with_effect(effects[name])
     layout = Problem.of(model, start.table).layout
     masks = {name: layout.of_effect(name) for name in GEOMETRY if model.holds(name)}
-    own = {name: mask for name, mask in masks.items() if mask.any()}  # one axis has no angle to another
+    masks_used = {name: mask for name, mask in masks.items() if mask.any()}  # one axis has no angle to another
 
     def forces(values: Mapping[str, Array]) -> Array:
         theta = layout.starts()[0]
         for name, value in values.items():
-            theta[own[name]] = value
+            theta[masks_used[name]] = value
         return force(start.table, [step for step in layout.steps(theta) if step[0].name in values])
 
-    counts = {name: int(mask.sum()) for name, mask in own.items()}
-    return GeometryEffects(counts, forces, frozenset(name for name in own if start.model.holds(name)))
+    counts = {name: int(mask.sum()) for name, mask in masks_used.items()}
+    return GeometryEffects(counts, forces, frozenset(name for name in masks_used if start.model.holds(name)))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibrations.discovery.results import Discovery
-from calibrations.discovery.search import first_order
+from calibrations.discovery.search import first_order_cost
 from calibrations.discovery.significance import chance
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.sensed import in_milli, milli_unit, pooled_milli
@@ -82,7 +82,7 @@ def summary_lines(discovery: Discovery[Fit]) -> list[Line]:
         if step.name in listed or (step.name in discovery.refinements and not step.name.startswith(PREFIX)):
             continue
         change = rms(in_milli_rows(step.after.residual - step.before.residual, end))
-        p = chance(*first_order(end, step.name))
+        p = chance(*first_order_cost(end, step.name))
         effects = () if step.name.startswith(PREFIX) else (step.name,)
         at = place_of_effect(step.name) or "-"
         lines.append((at, effects, float(np.sqrt(np.mean(change**2))), 1 - p, tuple(alternatives.get(step.name, ()))))

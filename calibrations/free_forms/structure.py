@@ -77,9 +77,13 @@ class Structure:
 
     def _same_as_one_of(self, cause: str, named: list[str]) -> bool:
         """Whether the data cannot separate a cause from one of those that are named, or from its place."""
-        own = set(self.alternatives.get(cause, ()))
-        at = {place.name for place in self.places if set(named) & set(place.causes) and cause not in place.causes}
-        return bool(own & (at | set(named))) or any(cause in self.alternatives.get(other, ()) for other in named)
+        alternatives = set(self.alternatives.get(cause, ()))
+        places_of_named = {
+            place.name for place in self.places if set(named) & set(place.causes) and cause not in place.causes
+        }
+        return bool(alternatives & (places_of_named | set(named))) or any(
+            cause in self.alternatives.get(named_cause, ()) for named_cause in named
+        )
 
     @property
     def unknown(self) -> tuple[ActingPlace, ...]:
@@ -89,30 +93,34 @@ class Structure:
     @property
     def alternatives(self) -> dict[str, tuple[str, ...]]:
         """By cause, what the data cannot separate from it."""
-        found = {c: p.inseparable_from for p in self.places if p.material for c in p.causes if p.inseparable_from}
+        alternatives_by_cause = {
+            c: p.inseparable_from for p in self.places if p.material for c in p.causes if p.inseparable_from
+        }
         if any("hysteresis" in place.causes for place in self.places):
-            found |= {c: tuple(sorted({*found.get(c, ()), "hysteresis"})) for c in self._short_lived}
-        return found | dict(self.geometry.alternatives or {})
+            alternatives_by_cause |= {
+                c: tuple(sorted({*alternatives_by_cause.get(c, ()), "hysteresis"})) for c in self._short_lived
+            }
+        return alternatives_by_cause | dict(self.geometry.alternatives or {})
 
     @property
     def _short_lived(self) -> tuple[str, ...]:
         """Causes that decay within the first poses, as the memory of what came before them does."""
         if not self.result.data.timed:
             return ()
-        beginning = self.result.data.since < FIRST_POSES
-        found: list[str] = []
+        first_poses = self.result.data.since < FIRST_POSES
+        causes: list[str] = []
         for place in self.places:
             curve = max(place.curve, key=np.ptp)
             squares = (curve - np.median(curve)) ** 2
-            if squares[beginning].sum() > OVER_SOON * squares.sum():
-                found += [c for c in place.causes if c.startswith("warm-up")]
-        return tuple(found)
+            if squares[first_poses].sum() > OVER_SOON * squares.sum():
+                causes += [c for c in place.causes if c.startswith("warm-up")]
+        return tuple(causes)
 
     def others(self, place: ActingPlace | None) -> Array:
         """What all places but one add to the output through the chain, (channels, n), in its unit; None: all places."""
         result = self.result
-        kept = {name: result.values.of[name] for name in (place.components if place else ())}
-        alone = state_at(result.data, result.given, Coefficients(result.values.base, kept), result.components)
+        coefficients = {name: result.values.of[name] for name in (place.components if place else ())}
+        alone = state_at(result.data, result.given, Coefficients(result.values.base, coefficients), result.components)
         return result.state.predicted - alone.predicted
 
     def refinements(self, place: ActingPlace) -> tuple[str, ...]:
@@ -178,18 +186,18 @@ def with_size(form: Form, size: float, added: Array, channels: int) -> Form:
     channels  axes that have a function of their own; 1 where one is for all
     """
     at = 0
-    sizes, kept = [], []
+    sizes, counts = [], []
     for k in range(channels):
         count = form.count(k)
-        rest = np.cumsum(added[at : at + count][::-1])[::-1]  # from each column on
-        whole = form.basis(k).kind in ("clips", "play", "preisach", "products", "ramp")
+        tail_squares = np.cumsum(added[at : at + count][::-1])[::-1]  # from each column on
+        is_indivisible = form.basis(k).kind in ("clips", "play", "preisach", "products", "ramp")
         sizes.append(size if count else 0.0)
-        kept.append(count if whole else max(min(count, 1), int(np.sum(rest > KEPT**2))))
+        counts.append(count if is_indivisible else max(min(count, 1), int(np.sum(tail_squares > KEPT**2))))
         at += count
-    return replace(form, sizes=tuple(sizes), kept=tuple(kept))
+    return replace(form, sizes=tuple(sizes), kept=tuple(counts))
 
 
-def with_stairs(found: Structure, left: Array, stairs: Stairs, white: Array) -> Structure:
+def with_stairs(structure: Structure, residual: Array, stairs: Stairs, white: Array) -> Structure:
     """The structure of the outputs before their rounding, with the converter's stairs as one more cause.
 
     left    residual of the linear model, (channels, n), whose part that the stairs may be is their curve
@@ -197,18 +205,22 @@ def with_stairs(found: Structure, left: Array, stairs: Stairs, white: Array) -> 
     """
     floor = float(np.sqrt(np.mean(white**2)))
     size = stairs.rms / floor
-    largest = max([size, *(place.rms / floor for place in found.places)])
+    largest = max([size, *(place.rms / floor for place in structure.places)])
     places = [
         replace(p, size=p.rms / floor, own=p.own * p.rms / (floor * p.size), largest=largest)
-        for p in found.places
+        for p in structure.places
         if p.name != "output"
     ]
-    own = next((p for p in found.places if p.name == "output"), None)
-    causes = ("quantisation", *(own.causes if own and own.material else ()))
-    components, gain = (own.components, own.gain) if own else ((), 2 * left.size * float(np.log1p(size)))
-    curve = np.clip(left, -stairs.step / 2, stairs.step / 2)
+    output_place = next((p for p in structure.places if p.name == "output"), None)
+    causes = ("quantisation", *(output_place.causes if output_place and output_place.material else ()))
+    components, gain = (
+        (output_place.components, output_place.gain)
+        if output_place
+        else ((), 2 * residual.size * float(np.log1p(size)))
+    )
+    curve = np.clip(residual, -stairs.step / 2, stairs.step / 2)
     places.append(ActingPlace("output", size, size, largest, components, causes, 1.0, True, gain, (), curve))
-    return replace(found, places=tuple(sorted(places, key=lambda p: -p.size)), white=white)
+    return replace(structure, places=tuple(sorted(places, key=lambda p: -p.size)), white=white)
 
 
 def find_structure(table: Table, white: Array | None, given: Given, effects: GeometryEffects) -> Structure:
@@ -223,26 +235,26 @@ def find_structure(table: Table, white: Array | None, given: Given, effects: Geo
     if white is None:
         white, source = _neighbours(data), FloorSource.NEIGHBOURS
     usual = np.sqrt(np.mean(white**2, axis=1, keepdims=True))
-    if np.any(one_code := white < NO_NOISE * usual):  # these rows have less noise than others, and contradict nothing
-        result = search(data, np.where(one_code, LEAST_WHITE * usual, white), given)
+    if np.any(noiseless := white < NO_NOISE * usual):  # these rows have less noise than others, and contradict nothing
+        result = search(data, np.where(noiseless, LEAST_WHITE * usual, white), given)
     elif SAW in table.left_out:  # the noise is what the stairs hide of each row: never the same for all
         result = search(data, white, given)
     else:
         result, source = _searched(data, white, given, source)
     white = result.white
     result, factor = _in_larger_noise(result, given)
-    found = places(result)
-    shape = geometry(result, _curves(found), effects)
-    acting = [replace(p, size=p.size * factor, own=p.own * factor, largest=p.largest * factor) for p in found]
-    return Structure(result, tuple(acting), shape, white, source)
+    acting = places(result)
+    shape = geometry(result, _curves(acting), effects)
+    scaled_places = [replace(p, size=p.size * factor, own=p.own * factor, largest=p.largest * factor) for p in acting]
+    return Structure(result, tuple(scaled_places), shape, white, source)
 
 
-def _curves(found: Sequence[ActingPlace]) -> dict[str, Array]:
+def _curves(acting: Sequence[ActingPlace]) -> dict[str, Array]:
     """The curve of each place that acts, and of each place at which an inseparable effect may act in its stead."""
-    curves = {place.name: place.curve for place in found}
-    for place in found:
-        for other in filter(None, map(place_of_effect, place.inseparable_from)):
-            curves.setdefault(other, place.curve)
+    curves = {place.name: place.curve for place in acting}
+    for place in acting:
+        for alternative_place in filter(None, map(place_of_effect, place.inseparable_from)):
+            curves.setdefault(alternative_place, place.curve)
     return curves
 
 
@@ -252,17 +264,17 @@ def _searched(data: PoseData, white: Array, given: Given, source: FloorSource) -
     Components that can follow almost anything wait until the noise is known, because they follow noise as well.
     """
     result = search(data, white, given)
-    found = _scatter(result, source, alike=True)
-    if found is None:
+    noise = _scatter(result, source, uniform=True)
+    if noise is None:
         return result, source
     source = FloorSource.CONTRADICTED if source is FloorSource.SAMPLES else source
     for _ in range(FLOOR_ROUNDS):
-        result = search(data, found, given, general=False)
-        again = _scatter(result, source, alike=False)
-        if again is None:
+        result = search(data, noise, given, general=False)
+        next_noise = _scatter(result, source, uniform=False)
+        if next_noise is None:
             break
-        found = again
-    return (result if result.ratio < NOISE_ALONE else search(data, found, given)), source
+        noise = next_noise
+    return (result if result.ratio < NOISE_ALONE else search(data, noise, given)), source
 
 
 def _in_larger_noise(result: SearchResult, given: Given) -> tuple[SearchResult, float]:
@@ -276,11 +288,11 @@ def _in_larger_noise(result: SearchResult, given: Given) -> tuple[SearchResult, 
         factor *= best[1].ratio
         if best[1].ratio < LARGER_NOISE:
             break
-        other = search(result.data, factor * white, given)
-        scale = 2 * (other.gram.rows - other.gram.base_rank) * float(np.log(factor))
-        if other.criterion + scale + ENTER >= best[0]:
+        larger = search(result.data, factor * white, given)
+        scale = 2 * (larger.gram.rows - larger.gram.base_rank) * float(np.log(factor))
+        if larger.criterion + scale + ENTER >= best[0]:
             break
-        best = other.criterion + scale + ENTER, other, factor
+        best = larger.criterion + scale + ENTER, larger, factor
     return best[1], best[2]
 
 
@@ -298,20 +310,20 @@ def _neighbours(data: PoseData) -> Array:
     return np.tile(np.maximum(std, 1e-9 * np.ptp(y, axis=1))[:, None], (1, data.n))
 
 
-def _scatter(result: SearchResult, source: FloorSource, alike: bool) -> Array | None:
+def _scatter(result: SearchResult, source: FloorSource, uniform: bool) -> Array | None:
     """White noise as the residual has it; None where the noise that was used agrees.
 
     Noise from the samples is only replaced where the residual is clearly smaller: a larger one may hold more effects.
-    Rows are `alike` at first: what follows the samples' variance may be an effect that the search has not seen yet.
+    Rows are `uniform` at first: what follows the samples' variance may be an effect that the search has not seen yet.
     """
-    left = result.residual
+    residual = result.residual
     ratio = result.ratio
     agrees = ratio > TOO_SMALL and not _noisy_rows_contradict(result)
     if agrees and (source is FloorSource.SAMPLES or ratio < 1 / TOO_SMALL):
         return None
-    r = left.reshape(result.white.shape) * result.white
-    white = np.stack([_rows_noise(result, k, row, alike) for k, row in enumerate(r)])
-    return white * np.sqrt(left.size / result.freedom) if np.all(white > 0) else None
+    r = residual.reshape(result.white.shape) * result.white
+    white = np.stack([_rows_noise(result, k, row, uniform) for k, row in enumerate(r)])
+    return white * np.sqrt(residual.size / result.freedom) if np.all(white > 0) else None
 
 
 def _noisy_rows_contradict(result: SearchResult) -> bool:
@@ -319,18 +331,18 @@ def _noisy_rows_contradict(result: SearchResult) -> bool:
 
     A misfit of the other rows, which weigh more, hides this in the ratio of all rows.
     """
-    white, left = result.white, result.residual.reshape(result.white.shape)
+    white, residual = result.white, result.residual.reshape(result.white.shape)
     noisy = white > np.sqrt(np.mean(white**2, axis=1, keepdims=True))
     rows = int(noisy.sum())
-    squares = float(np.sum(left[noisy] ** 2)) * left.size / result.freedom
+    squares = float(np.sum(residual[noisy] ** 2)) * residual.size / result.freedom
     return rows > 0 and squares < min(TOO_SMALL**2 * rows, float(chi2.ppf(SIGNIFICANT, rows)))
 
 
-def _rows_noise(result: SearchResult, k: int, residual: Array, alike: bool) -> Array:
+def _rows_noise(result: SearchResult, k: int, residual: Array, uniform: bool) -> Array:
     """Noise of each row of one channel, (n,): a constant part, and parts that follow the samples' variance."""
     usual = np.median(np.abs(residual - np.median(residual))) / 0.6745
     spread = result.data.spread
-    if alike or spread is None or np.ptp(spread[k]) == 0:
+    if uniform or spread is None or np.ptp(spread[k]) == 0:
         return np.full(len(residual), usual)
     power = spread[k] ** 2 / np.mean(spread[k] ** 2)
     shares = np.column_stack([np.ones(len(residual)), power, power**2])  # the last: an effect of a noisy variance

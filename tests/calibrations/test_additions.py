@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from calibrations.discovery.additions import NO_WORSE, Addition, gradually, together
+from calibrations.discovery.additions import NO_WORSE, Addition, fit_gradually, fit_together
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit, fit
 from calibrations.model.file import read_model
@@ -26,16 +26,16 @@ def base() -> Fit:
 
 
 def test_the_last_fit_is_that_of_all_where_it_is_known(base: Fit) -> None:
-    end = together(base, ADDED)
-    taken, fits = gradually(base, ADDED, end)
+    end = fit_together(base, ADDED)
+    taken, fits = fit_gradually(base, ADDED, end)
     assert [a.effect.name for a in taken] == ["cubic-nonlinearity", "z-axis-bias"]
     assert fits[-1] is end
     assert all(after.pooled_excess < NO_WORSE * before.pooled_excess for before, after in pairwise(fits))
-    fitted_anew = gradually(base, ADDED)[1]
+    fitted_anew = fit_gradually(base, ADDED)[1]
     assert [f.pooled_excess for f in fits] == pytest.approx([f.pooled_excess for f in fitted_anew], rel=1e-3)
 
 
 def test_a_fit_of_all_that_went_astray_is_not_taken(base: Fit) -> None:
-    taken, fits = gradually(base, ADDED, base)  # in place of a fit with the error of the model without additions
+    taken, fits = fit_gradually(base, ADDED, base)  # in place of a fit with the error of the model without additions
     assert [a.effect.name for a in taken] == ["cubic-nonlinearity"]
     assert fits[-1].pooled_excess < base.pooled_excess

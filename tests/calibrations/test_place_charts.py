@@ -11,7 +11,7 @@ from calibrations.model.file import read_model
 from calibrations.presentation.chart import Band, Bars, Line
 from calibrations.presentation.charts.places import (
     LINEAR,
-    REST,
+    UNEXPLAINED,
     curve_chart,
     forms_through,
     model_curves,
@@ -39,7 +39,7 @@ def found() -> Found:
 
 def test_shares_of_a_model_are_those_of_its_places_and_of_what_is_not_explained(found: Found) -> None:
     names, shares = shares_by_place(found)
-    assert names == ["own-response", REST]
+    assert names == ["own-response", UNEXPLAINED]
     assert shares.sum(axis=1)[0] == pytest.approx(1.0)
     assert shares[1, 0] == 0.0
     assert shares[1, 1] == shares[0, 1] < 0.05
@@ -51,7 +51,7 @@ def test_shares_of_a_model_are_those_of_its_places_and_of_what_is_not_explained(
 def test_parts_of_the_base_have_no_place_of_their_own(found: Found) -> None:
     renamed = Found.__new__(Found)
     renamed.start, renamed.steps = found.start, (Step("scale-factor", found.start, found.steps[0].after),)
-    assert shares_by_place(renamed)[0] == [LINEAR, REST]
+    assert shares_by_place(renamed)[0] == [LINEAR, UNEXPLAINED]
 
 
 def test_forms_of_the_catalogue_are_drawn_through_a_curve(found: Found) -> None:
