@@ -1,4 +1,4 @@
-"""Measured data as the loop sees them: all that one kind of data does differently from another."""
+"""The interface of measured data in the loop: the operations that differ between kinds of data."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 
 class Dataset(ABC, Generic[F]):
-    """Data of one kind. A subclass says how they are fitted, searched, judged and described."""
+    """Data of one kind. A subclass implements fit, search, judgement and description."""
 
-    form: str  # "rows" or "samples": which pictures show them
+    form: str  # "rows" or "samples": the kind of pictures
     default_model: str
-    floor: str  # what errors are multiples of
+    floor: str  # unit of errors, in words
     unseen: str  # data that a fit did not use
     complete: str  # a comparison without a failing place, in words
 
@@ -60,7 +60,7 @@ class Dataset(ABC, Generic[F]):
 
     @property
     def note(self) -> str:
-        """What the comparison is, where there is another one; "" where there is none."""
+        """A remark on the comparison, if there is another one; "" if not."""
         return ""
 
     @property
@@ -103,7 +103,7 @@ class Dataset(ABC, Generic[F]):
 
     @abstractmethod
     def search_on(self, start: F, origin: F, effects: Mapping[str, Effect]) -> Findings[F]:
-        """All effects that a fitted model misses; shares are those of the error of `origin`."""
+        """All effects that a fitted model misses; shares are relative to the error of `origin`."""
 
     @abstractmethod
     def candidates(self, before: F, plan: Findings[F], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:
@@ -114,7 +114,7 @@ class Dataset(ABC, Generic[F]):
         return self, self.fit(model)
 
     def followed(self, plan: Findings[F], k: int, effects: Mapping[str, Effect]) -> Findings[F]:
-        """The rest of a search once its first `k` steps are taken."""
+        """The remaining findings of a search after its first `k` steps."""
         start = plan.steps[k - 1].after
         remaining = replace(plan, added=(*plan.added, *plan.names[:k]), steps=plan.steps[k:])
         return replace(
@@ -126,15 +126,15 @@ class Dataset(ABC, Generic[F]):
         )
 
     def rejection(self, fit: F) -> Finding | None:  # noqa: ARG002
-        """Why neither the data nor the values of a fit can be used; None where they can."""
+        """The reason not to use the data or the values of a fit; None if they can be used."""
         return None
 
     def covered(self, fit: F) -> dict[str, tuple[float, float]]:  # noqa: ARG002
-        """Lowest and highest value of each influence over which a fit is valid; {} where none was measured."""
+        """Lowest and highest value of each influence for which a fit is valid; {} if none was measured."""
         return {}
 
     def correlations(self, fit: F) -> Correlations | None:  # noqa: ARG002
-        """How the parameters of a fit go together; None where it is not known."""
+        """The correlations of the parameters of a fit; None if they are unknown."""
         return None
 
     def undetermined(self, fit: F) -> str | None:  # noqa: ARG002
@@ -142,7 +142,7 @@ class Dataset(ABC, Generic[F]):
         return None
 
     def untestable(self, fit: F, effects: Mapping[str, Effect]) -> str | None:  # noqa: ARG002
-        """The effects that these data cannot show, in words; None where they show all."""
+        """The effects that these data cannot show, in words; None if they show all."""
         return None
 
     def expression(self, name: str, text: str) -> Effect:  # noqa: ARG002
@@ -154,7 +154,7 @@ class Dataset(ABC, Generic[F]):
 
     @property
     def foreseeable(self) -> bool:
-        """Whether the data of an experiment can be computed beforehand."""
+        """Whether the program can compute the expected data of an experiment."""
         return False
 
     @abstractmethod
@@ -190,17 +190,17 @@ class Dataset(ABC, Generic[F]):
         return []
 
     def doubts(self, fit: F) -> list[str]:  # noqa: ARG002
-        """What a fit shows to be wrong with its input."""
+        """Doubts about the input of a fit."""
         return []
 
     def noise_known(self, fit: F) -> bool:  # noqa: ARG002
-        """Whether the noise is known independently of what a fit leaves."""
+        """Whether the noise is known independently of the residual."""
         return True
 
     def compare(self, model: Model, effects: Mapping[str, Effect] | None = None) -> Comparison[F]:
-        """The model as it is, or fitted first where it has no values yet.
+        """The model against the data, fitted first if it has no values.
 
-        `effects` are searched for where only the residual measures the noise.
+        If only the residual measures the noise, the method searches for `effects`.
         """
         fit = self.evaluate(model) or self.fit(model)
         compared = Comparison(self, fit, self.places(fit), self.rejection(fit))
@@ -209,7 +209,7 @@ class Dataset(ABC, Generic[F]):
         return replace(compared, given=self.diagnose(model, effects).judgement)
 
     def diagnose(self, model: Model, effects: Mapping[str, Effect]) -> Diagnosis[F]:
-        """What the model misses."""
+        """The effects that the model misses."""
         return Diagnosis.of(self.search(model, effects))
 
     def discover(self, model: Model, effects: Mapping[str, Effect], enough: Enough | None = None) -> Discovery[F]:

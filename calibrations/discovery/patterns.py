@@ -1,7 +1,7 @@
-"""Patterns that a residual may show, whatever their cause: harmonics, steps, ramps, sectors, trends.
+"""Patterns of a residual, whatever their cause: harmonics, steps, ramps, sectors, trends.
 
-They are not effects: they explain nothing. They tell whether something is left that the catalogue does not hold,
-describe it in words that a person can start from, and give the expression that takes it into a model.
+Patterns are not effects and explain nothing. They show that the residual has a structure which no effect of the
+catalogue explains, describe it in words, and give an expression that adds it to a model.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ SECTORS = 24
 SECTOR_WIDTH_DEG = 30.0
 FINER_WIDTHS_DEG = (10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
 LEVELS = 12  # of a column, that a step could be at
-NEIGHBOURS = 200  # of a step, at most, once it is found
+NEIGHBOURS = 200  # of a step, at most, in its refinement
 MOST_WAVES = 40  # along the record
 FINER_WAVES = 21
 
 
 @dataclass(frozen=True)
 class Pattern:
-    """Columns, shape (channels, n, k), and what they mean.
+    """Columns, shape (channels, n, k), and their meaning in words.
 
-    `expression` is what adds it to a model ("" where none could), `finer` gives patterns between it and its neighbours,
-    `price` is what having chosen it by the data costs, as twice a log-likelihood; `slow` ones look like slow noise,
+    `expression` adds the pattern to a model ("" if none can), `finer` gives patterns between it and its neighbours,
+    `price` is the cost of its choice by the data, as twice a log-likelihood. A `slow` pattern looks like slow noise.
     `poses` are rows that stand out.
     """
 
@@ -51,12 +51,12 @@ class Pattern:
 
     @property
     def name(self) -> str:
-        """Its words as the name of an effect."""
+        """The text as the name of an effect."""
         words = re.sub(r"\b(of|the|at|around|t|only)\b", "", self.text.lower())
         return re.sub(r"[^a-z0-9]+", "-", words).strip("-")
 
 
-FEWEST_ATTITUDES = 3  # of a motion: of two, an offset at one is as good as at the other
+FEWEST_ATTITUDES = 3  # of a motion: with two, offsets at either are equivalent
 
 # words for columns and their units, and their short names in expressions
 WORDS = {
@@ -92,7 +92,7 @@ def at_attitudes(table: Table, channels: tuple[str, ...]) -> list[Pattern]:
 
 
 def per_channel(pattern: Pattern, channels: int) -> Pattern:
-    """Columns given as (n, k) serve each channel on its own."""
+    """The pattern with columns (n, k) repeated for each channel."""
     if pattern.columns.ndim == 3:
         return pattern
     n, k = pattern.columns.shape
@@ -103,7 +103,7 @@ def per_channel(pattern: Pattern, channels: int) -> Pattern:
 
 
 def one_sided(pattern: Pattern, table: Table) -> list[Pattern]:
-    """The same on approaches from one side only, where both are in the table."""
+    """The pattern for one direction of turning only, if the table has both."""
     if "direction" in pattern.text or pattern.poses or pattern.slow:
         return []
     direction = table.optional("direction", 0.0)
@@ -147,7 +147,7 @@ def _oscillations(t: Array, waves: float) -> list[Pattern]:
 
 
 def _oscillation(t: Array, waves: float) -> Pattern:
-    """So many waves along the record: mains beside the sampling's clock, a room that is heated in turns."""
+    """A number of waves along the record: mains against the sampling clock, a room with intermittent heating."""
     period = (float(np.ptp(t)) or 1.0) / waves
     rate = 2 * np.pi / period
     expression = f"a*sin({rate:.6g}*t) + b*cos({rate:.6g}*t)"
@@ -161,13 +161,13 @@ def _ramps(t: Array, low: float, high: float) -> list[Pattern]:
 
 
 def _ramp(t: Array, start: float) -> Pattern:
-    """Nothing up to `start`, and then more and more."""
+    """0 up to `start`, then a linear rise."""
     since: Array = np.maximum(0.0, t - start) / (float(np.ptp(t)) or 1.0)
     return Pattern(f"ramp from t = {start:.0f} s on", since[:, None], f"a*max(0, t - {start:.6g})", slow=True)
 
 
 def _between(places: Array, n: int) -> list[Array]:
-    """For each of the places in a row of n the rows up to its neighbours."""
+    """For each of the places among n rows, the rows up to its neighbours."""
     edges = np.concatenate([[1], places, [n - 1]])
     rows = [np.arange(a, b + 1) for a, b in zip(edges[:-2], edges[2:], strict=True)]
     return [span[:: 1 + len(span) // NEIGHBOURS] for span in rows]
@@ -178,7 +178,7 @@ def _steps(table: Table, rows: Array) -> list[Pattern]:
 
 
 def _step(table: Table, k: int) -> Pattern:
-    """Before row k, and from it on."""
+    """0 before row k, 1 from it on."""
     at = (table.time_s[k - 1] + table.time_s[k]) / 2
     named = "t_s" in table
     text = f"step at t = {at:.0f} s" if named else f"step at row {at:.0f}"
@@ -210,14 +210,14 @@ def _levels(levelled: Callable[[int], Pattern], places: Array) -> list[Pattern]:
 
 
 def _level(values: Array, levels: Array, words: tuple[str, str, str], k: int) -> Pattern:
-    """Below a level of a column, and above it."""
+    """0 below a level of a column, 1 above it."""
     (word, unit, short), at = words, (levels[k - 1] + levels[k]) / 2
     expression = f"a*step({short} - {at:.7g})" if short else ""
     return Pattern(f"step at {word} = {at:.4g}{unit}", (values >= at)[:, None] * 1.0, expression)
 
 
 def _in_parts(table: Table, channels: tuple[str, ...]) -> Iterator[Pattern]:
-    """A part of the motion that is off alike in every stretch."""
+    """A part of the motion with the same error in every stretch."""
     for channel, indicator in zip(channels, np.eye(len(channels)), strict=True):
         yield Pattern(f"{channel} is off throughout", np.tile(indicator[:, None, None], (1, table.n, 1)))
 
@@ -258,9 +258,9 @@ def _sector(beta: Array, centre_deg: float, width_deg: float) -> Pattern:
 
 
 def _in_stage(table: Table, channels: int) -> Iterator[Pattern]:
-    """An error of a stage angle turns gravity in the sensor, so that all axes err together.
+    """Errors of a stage angle, which turn gravity in the sensor and so act on all axes together.
 
-    It returns with the stage's own angle or, where the table rocks as the other turns, with that of beta.
+    They repeat with the stage's own angle or, if the table rocks while the other stage turns, with beta.
     """
     pose = nominal_pose(table)
     for angle, along, numbers in (

@@ -1,10 +1,10 @@
 """The answers of the loop, the same for every kind of data.
 
-    Comparison  a model beside data, and the places where it fails
+    Comparison  a model against data, and the places where it fails
     Diagnosis   the findings as an answer on the given model
     Discovery   the findings as an answer on the final model
 
-What a kind of data does differently is in its `Dataset`; what it shows differently is in its view.
+The class `Dataset` has the operations that differ between kinds of data; views have the pictures that differ.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class Comparison(Result, Generic[F]):
-    """A model beside data: its fit, and the places where it fails, worst first.
+    """A model against data: its fit, and the places where it fails, worst first.
 
-    Where the residual is the only measure of the noise it cannot fail, and a search for effects judges the model.
+    If the residual is the only measure of the noise, no place fails, and a search for effects judges the model.
     """
 
     data: Dataset[F]
@@ -71,7 +71,7 @@ class Comparison(Result, Generic[F]):
         return draw(view_of(self.data).fit_chart(self.fit))
 
     def pictures(self) -> list[Picture]:
-        """The model beside the data."""
+        """The model and the data."""
         from calibrations.presentation.views import view_of
 
         return view_of(self.data).fit_album(self.fit)
@@ -79,7 +79,7 @@ class Comparison(Result, Generic[F]):
 
 @dataclass(frozen=True, repr=False)
 class _Answer(Result, Generic[F]):
-    """What diagnosis and discovery have in common. `next_experiment` may be planned on a bench later."""
+    """The common part of diagnosis and discovery. A bench may plan `next_experiment` later."""
 
     findings: Findings[F]
     next_experiment: Experiment | None
@@ -112,7 +112,7 @@ class _Answer(Result, Generic[F]):
 
 @dataclass(frozen=True, repr=False)
 class Diagnosis(_Answer[F]):
-    """What the given model misses."""
+    """The effects that the given model misses."""
 
     @classmethod
     def of(cls, findings: Findings[F]) -> Diagnosis[F]:
@@ -144,7 +144,7 @@ class Diagnosis(_Answer[F]):
         return draw(view_of(self.findings.data).fit_chart(self.fit))
 
     def pictures(self) -> list[Picture]:
-        """The given model beside the data."""
+        """The given model and the data."""
         from calibrations.presentation.views import view_of
 
         return view_of(self.findings.data).fit_album(self.fit)
@@ -228,7 +228,7 @@ class Discovery(_Answer[F]):
         return draw(view_of(self.findings.data).steps_chart(self))
 
     def pictures(self) -> list[Picture]:
-        """Error by model, and what each effect explains."""
+        """Error by model, and the signal of each effect."""
         from calibrations.presentation.views import view_of
 
         return view_of(self.findings.data).steps_album(self)

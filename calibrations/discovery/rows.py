@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from calibrations.discovery.enough import Enough
     from calibrations.model.correlations import Correlations
 
-INFLUENCES = ("temperature_c", "supply_v", "t_s")  # that a product may know
+INFLUENCES = ("temperature_c", "supply_v", "t_s")  # that a product may measure
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ class Rows(Dataset[Fit]):
 
     @property
     def note(self) -> str:
-        """That of a motion: the report also shows the models of its sweep."""
+        """The remark on a motion: the report also shows the models of its sweep."""
         return self.table.type.note
 
     @property
@@ -132,18 +132,18 @@ class Rows(Dataset[Fit]):
         return places(fit)
 
     def search(self, model: Model, effects: Mapping[str, Effect]) -> Findings[Fit]:
-        """One effect if it explains all, else places that act and their causes; of other kinds forward steps."""
+        """One effect if it explains all, else acting places and their causes; for other kinds, forward steps."""
         if (reason := refusal(self.table)) is not None:
             return self._search.rejected(self.fit(model), reason)
         start, outliers = fit_without(model, self.table)
         return self._search.findings(start, outliers, start, effects)
 
     def search_on(self, start: Fit, origin: Fit, effects: Mapping[str, Effect]) -> Findings[Fit]:
-        """The same from a fitted model."""
+        """The search from a fitted model."""
         return self._search.findings(start, self._outliers_of(start), origin, effects)
 
     def addition(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> Findings[Fit]:
-        """One effect, with what the data cannot separate from it."""
+        """One effect, with the effects that the data cannot separate from it."""
         return self._search.addition(effect, *fit_without(model, self.table), effects)
 
     @property
@@ -175,7 +175,7 @@ class Rows(Dataset[Fit]):
         return tuple(map(int, np.setdiff1d(self.table.numbered(all_rows), numbers)))
 
     def undetermined(self, fit: Fit) -> str | None:
-        """Why a small residual proves nothing on these data."""
+        """The reason why a small residual proves nothing on these data."""
         return undetermined(fit)
 
     def untestable(self, fit: Fit, effects: Mapping[str, Effect]) -> str | None:
@@ -198,22 +198,22 @@ class Rows(Dataset[Fit]):
 
     @property
     def foreseeable(self) -> bool:
-        """Of poses, whose angles are planned."""
+        """Whether the table has poses, whose angles are planned."""
         return self.table.type.stage_angles
 
     def rejection(self, fit: Fit) -> Finding | None:
-        """What speaks against these poses, or against the values of a fit."""
+        """The reason not to use these poses, or the values of a fit."""
         return rejection(fit)
 
     def covered(self, fit: Fit) -> dict[str, tuple[float, float]]:
-        """Those of every sensor, and the model's own."""
+        """Lowest and highest value of the influences of every sensor, and of the model's own."""
         table = fit.table
         model_columns = {name for term in fit.model.terms for name in term.effect.needs if name not in NUMBERS}
         names = [name for name in (*INFLUENCES, *sorted(model_columns)) if name in table and table.n]
         return {name: (float(table.column(name).min()), float(table.column(name).max())) for name in names}
 
     def correlations(self, fit: Fit) -> Correlations | None:
-        """Those of the identified parameters, by the noise; of a large free form, without its coefficients."""
+        """Correlations of the identified parameters, by the noise; without the coefficients of a large free form."""
         from calibrations.model.correlations import MOST, Correlations  # only what writes a model needs them
 
         known = {key: e for key, e in fit.params.items() if e.identified and e.std}
@@ -226,7 +226,7 @@ class Rows(Dataset[Fit]):
         return Correlations.of(list(known), fit.correlation[np.ix_(places, places)])
 
     def step(self, effect: Effect, before: Fit) -> Step[Fit]:
-        """The effect added; both errors are counted in one floor. Raises ModelError where it adds nothing."""
+        """The effect added, with both errors in one floor. Raises ModelError if it adds nothing."""
         after = refit(before, before.model.with_effect(effect))
         if effect.expression:
             _require_new(after, effect.name, before.model.name)
@@ -234,7 +234,7 @@ class Rows(Dataset[Fit]):
         return Step(effect.name, before.in_floor(floor), after.in_floor(floor))
 
     def in_one_floor(self, start: Fit, steps: tuple[Step[Fit], ...]) -> tuple[Fit, tuple[Step[Fit], ...]]:
-        """All errors in what the last model leaves, where that is the only measure of noise."""
+        """All errors in multiples of the last residual, if that is the only measure of noise."""
         floor = (steps[-1].after if steps else start).noise.scatter
         return start.in_floor(floor), tuple(
             replace(step, before=step.before.in_floor(floor), after=step.after.in_floor(floor)) for step in steps
@@ -258,18 +258,18 @@ class Rows(Dataset[Fit]):
         }
 
     def remarks(self, fit: Fit) -> list[str]:
-        """A residual below the noise floor, which only a wrong floor leaves."""
+        """A remark on a residual below the noise floor: then the floor is wrong."""
         if not fit.noise.known or fit.pooled_excess > WRONG_FLOOR or fit.table.n < FEWEST_FOR_FLOOR:
             return []
         return ["The error is smaller than the noise floor: check the standard deviations and n of these means."]
 
     def cautions(self, fit: Fit) -> list[str]:
-        """Why a fit of all rows may mislead: a model that the data do not determine, rows that stand out."""
+        """Reasons why a fit of all rows may mislead: an undetermined model, outliers."""
         one_orientation_text = ONE_ORIENTATION if self.at_rest else None
         return [*filter(None, (one_orientation_text, undetermined(fit), outliers_in_fit(fit))), *self.doubts(fit)]
 
     def doubts(self, fit: Fit) -> list[str]:
-        """Noise that is stated wrongly, and parameters that no sensor has."""
+        """Doubts about the stated noise, and about parameters that no sensor has."""
         return list(fit_doubts(fit))
 
 

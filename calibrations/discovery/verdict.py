@@ -112,7 +112,7 @@ class Judgement:
 
 
 class Residual(Enum):
-    """What a residual is, by the part of the excess variance that no effect explains.
+    """The class of a residual, by the share of the excess variance that no effect explains.
 
     The forms of effects are approximate, so that a small part may belong to a named cause. A larger one is a further
     cause. Where it is larger still, the named effects have not explained the data, and any of them may be wrong.
@@ -157,7 +157,7 @@ def decide(j: Judgement) -> Verdict:
 
 
 def sentences(j: Judgement) -> str:
-    """The verdict in words, alike for terminal, page, report and JSON."""
+    """The verdict in words, the same for terminal, page, report and JSON."""
     return " ".join([headline(j), *_details(j), *j.remarks])
 
 
@@ -210,7 +210,7 @@ def _details(j: Judgement) -> Iterator[str]:
 
 
 def _incomplete(j: Judgement) -> bool:
-    """Whether the residual is more than noise, and nobody searched for what it holds."""
+    """Whether the residual is more than noise, and no search for further effects was made."""
     return not j.searched and j.error > MATERIAL
 
 
