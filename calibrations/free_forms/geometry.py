@@ -83,25 +83,25 @@ def geometry(result: SearchResult, curves: Mapping[str, Array], effects: Geometr
     b = own_base_size(data)
     sizes = {place: float(np.sqrt(np.mean(curve**2))) for place, curve in curves.items()}
     lines_of = {place: _linear_part(result, place, curve) for place, curve in curves.items()}
-    shift, covariance = _beside_forms(result, sizes)
+    shift, covariance = _base_with_forms(result, sizes)
     C = pick @ covariance[:b, :b] @ pick.T
     C += np.diag(np.full(len(pick), (IMMATERIAL * floor / mean_gain) ** 2))
-    own = [2 * max((lines_of.get(place, 0.0) for place in places), default=0.0) / mean_gain for places in over]
+    line_angles = [2 * max((lines_of.get(place, 0.0) for place in places), default=0.0) / mean_gain for places in over]
     outputs = partial(_linear_outputs, result, effects)
     linear = state_at(data, Given.nothing(data), Coefficients(result.values.base[:b], {}), ()).predicted
     to_angles = pick @ (result.gram.base_inverse @ result.columns[:, : len(covariance)].T)[:b]
 
-    def angles_left(values: Mapping[str, Array]) -> Array:
+    def remaining_angles(values: Mapping[str, Array]) -> Array:
         return np.asarray(to_angles @ ((linear - outputs(values)) / result.white).ravel() + pick @ shift[:b])
 
-    values, alternatives, _ = _chosen(angles_left, C + np.diag(np.square(own)), effects, effects.given)
+    values, alternatives, _ = _chosen(remaining_angles, C + np.diag(np.square(line_angles)), effects, effects.given)
     sizes_of = {
         name: float(np.sqrt(np.mean((outputs(values) - outputs(_without(values, name))) ** 2))) / floor
         for name in values
     }
-    refinements, _, left = _chosen(angles_left, C, effects, effects.given | values.keys())
+    refinements, _, residual_angles = _chosen(remaining_angles, C, effects, effects.given | values.keys())
     lines: dict[str, float] = {}
-    for places, angle, uncertainty in zip(over, left, np.sqrt(np.diag(C)), strict=True):
+    for places, angle, uncertainty in zip(over, residual_angles, np.sqrt(np.diag(C)), strict=True):
         if places and abs(angle) > max(LEAST_LINE * floor / mean_gain, SEEN * uncertainty):
             lines[places[0]] = max(lines.get(places[0], 0.0), float(abs(angle)) * mean_gain)
     return Geometry(tuple(values), sizes_of, tuple(refinements), alternatives, lines)
@@ -116,28 +116,28 @@ def _linear_outputs(result: SearchResult, effects: GeometryEffects, values: Mapp
 
 
 def _without(values: Mapping[str, Array], name: str) -> dict[str, Array]:
-    return {other: value for other, value in values.items() if other != name}
+    return {key: value for key, value in values.items() if key != name}
 
 
 def _linear_part(result: SearchResult, place: str, curve: Array) -> float:
     """Standard deviation of the linear part that a place's mechanism may have, in the output's unit."""
     force = result.state.force
     drivers = {"cross-response": force[:, list(CROSS)].T, "z-response": out_of_plane(force).T}
-    whole = float(np.mean(curve**2))
+    total = float(np.mean(curve**2))
     if place not in drivers:
-        return float(LINEAR_PART * np.sqrt(whole))
+        return float(LINEAR_PART * np.sqrt(total))
     even = 0.0
     for d, row in zip(drivers[place], curve, strict=False):
         X = np.column_stack([np.ones(len(d)), d, *(d**k for k in (*EVEN, *ODD))])
         u = np.linalg.lstsq(X, row, rcond=1e-9)[0]
         part = X[:, 2 : 2 + len(EVEN)] @ u[2 : 2 + len(EVEN)]
         even += float(np.var(part)) / len(curve)
-    even = min(even, whole)
-    return float(np.sqrt(LINEAR_PART**2 * (whole - even) + EVEN_PART**2 * even))
+    even = min(even, total)
+    return float(np.sqrt(LINEAR_PART**2 * (total - even) + EVEN_PART**2 * even))
 
 
-def _beside_forms(result: SearchResult, sizes: Mapping[str, float]) -> tuple[Array, Array]:
-    """The base where each place that acts may have another form: by how much it differs, (b,), and covariance, (b, b).
+def _base_with_forms(result: SearchResult, sizes: Mapping[str, float]) -> tuple[Array, Array]:
+    """(change of the base, (b,), covariance, (b, b)) if each acting place may have another form.
 
     The prior size of such a form is a tenth of the place's size. The data reduce it to the posterior.
     """
@@ -180,51 +180,55 @@ def _angles(result: SearchResult, gain: Array) -> tuple[Array, list[tuple[str, .
 
 
 def _chosen(
-    angles_left: Callable[[Mapping[str, Array]], Array], C: Array, effects: GeometryEffects, free: AbstractSet[str]
+    remaining_angles: Callable[[Mapping[str, Array]], Array], C: Array, effects: GeometryEffects, free: AbstractSet[str]
 ) -> tuple[dict[str, Array], dict[str, tuple[str, ...]], Array]:
-    """The cheapest effects that explain the angles, of covariance C, by their values; their rivals; the angles left.
+    """(values of the cheapest effects that explain the angles of covariance C, their rivals, remaining angles).
 
-    `free`: effects that cost nothing, and are not among those that are returned.
+    `free`: effects without a price, which the result does not include.
     """
     root = np.linalg.cholesky(C)
 
     def scaled_angles(values: Mapping[str, Array]) -> Array:
-        return np.linalg.solve(root, angles_left(values))
+        return np.linalg.solve(root, remaining_angles(values))
 
-    own = [name for name in effects.parameters if name in free]
-    others = [name for name in effects.parameters if name not in free]
+    free_effects = [name for name in effects.parameters if name in free]
+    priced_effects = [name for name in effects.parameters if name not in free]
     scored: list[tuple[float, tuple[str, ...], Array, dict[str, Array]]] = []
-    for count in range(len(others) + 1):
-        for names in combinations(others, count):
-            values, left, rank = _fitted(scaled_angles, {n: effects.parameters[n] for n in (*own, *names)})
+    for count in range(len(priced_effects) + 1):
+        for names in combinations(priced_effects, count):
+            values, residual_angles, rank = _fitted(
+                scaled_angles, {n: effects.parameters[n] for n in (*free_effects, *names)}
+            )
             price = CAUSE_PRICE * count + PARAMETER_PRICE * rank
-            scored.append((float(left @ left) + price, names, left, values))
+            scored.append((float(residual_angles @ residual_angles) + price, names, residual_angles, values))
     scored.sort(key=lambda s: s[0])
-    best, chosen, left, values = scored[0]
+    best, chosen, residual_angles, values = scored[0]
     close = [names for score, names, *_ in scored[1:] if score < best + CLOSE and len(names) <= len(chosen)]
     rivals = {name for names in close for name in names} - set(chosen)
     return (
         {name: values[name] for name in chosen},
         {name: tuple(sorted(rivals)) for name in chosen if rivals},
-        root @ left,
+        root @ residual_angles,
     )
 
 
 def _fitted(
-    angles_left: Callable[[Mapping[str, Array]], Array], counts: Mapping[str, int]
+    remaining_angles: Callable[[Mapping[str, Array]], Array], counts: Mapping[str, int]
 ) -> tuple[dict[str, Array], Array, float]:
-    """Values of effects by least squares, the angles that they leave, and the number of values that these show."""
+    """(values of effects by least squares, remaining angles, number of values that the angles determine)."""
     ends = np.cumsum(list(counts.values()), dtype=int)
 
     def by_effect(p: Array) -> dict[str, Array]:
         return dict(zip(counts, np.split(p, ends[:-1]), strict=True)) if counts else {}
 
     p = np.zeros(ends[-1] if counts else 0)
-    left, rank = angles_left(by_effect(p)), 0.0
+    residual_angles, rank = remaining_angles(by_effect(p)), 0.0
     for _ in range(STEPS if counts else 0):
-        ways = [(angles_left(by_effect(p - e)), angles_left(by_effect(p + e))) for e in SMALL_DEG * np.eye(len(p))]
-        A = np.column_stack([(before - after) / (2 * SMALL_DEG) for before, after in ways])
-        answer, _, shown, _ = np.linalg.lstsq(A, left, rcond=1e-6)
-        p, rank = p + answer, float(shown)
-        left = angles_left(by_effect(p))
-    return by_effect(p), left, rank
+        differences = [
+            (remaining_angles(by_effect(p - e)), remaining_angles(by_effect(p + e))) for e in SMALL_DEG * np.eye(len(p))
+        ]
+        A = np.column_stack([(before - after) / (2 * SMALL_DEG) for before, after in differences])
+        step, _, rank_shown, _ = np.linalg.lstsq(A, residual_angles, rcond=1e-6)
+        p, rank = p + step, float(rank_shown)
+        residual_angles = remaining_angles(by_effect(p))
+    return by_effect(p), residual_angles, rank

@@ -50,7 +50,7 @@ def components(data: PoseData, first: State) -> list[Component]:
     every = [
         *slow_noise(data),
         *_stages(data, first),
-        *_own(data, first),
+        *_own_response(data, first),
         *_other_axes(data, first),
         *_history(data, first),
         *over_temperature(data, first),
@@ -65,19 +65,21 @@ def components(data: PoseData, first: State) -> list[Component]:
 
 
 def _stages(data: PoseData, first: State) -> list[Component]:
-    found: list[Component] = []
+    components: list[Component] = []
     place = "stage-angle-beta"
     angles = len(np.unique(np.round(np.mod(data.beta, 2 * np.pi), 3)))
     if angles > FEWEST_ANGLES:
         eccentricity = Harmonics(1, 1)(data.beta)
-        found.append(Component(f"{place}/stage-eccentricity", place, "beta", "stage-eccentricity", angle=eccentricity))
-        found.append(free(Form(place, "curve", "beta", (Harmonics(2, 9),), shared=True), first))
+        components.append(
+            Component(f"{place}/stage-eccentricity", place, "beta", "stage-eccentricity", angle=eccentricity)
+        )
+        components.append(free(Form(place, "curve", "beta", (Harmonics(2, 9),), shared=True), first))
         if angles > FINE_ANGLES:
             fine = Form(place, "fine", "beta", (Harmonics(4, 16, power=0.0),), shared=True)
-            found.append(free(fine, first, price=PRODUCT))
+            components.append(free(fine, first, price=PRODUCT))
     for approach, turn in data.sides.items():
         if np.ptp(turn) > 0:
-            found.append(
+            components.append(
                 Component(
                     f"{place}/stage-backlash@{SIDES[approach]}", place, "beta", "stage-backlash",
                     angle=turn[:, None], constants=(("approach_deg", approach),),
@@ -86,11 +88,11 @@ def _stages(data: PoseData, first: State) -> list[Component]:
             form = Form(
                 place, f"side-{SIDES[approach]}", "beta", (Harmonics(1, 4),), "side", shared=True, approach_deg=approach
             )
-            found.append(free(form, first, price=PRODUCT))
+            components.append(free(form, first, price=PRODUCT))
     if len(np.unique(np.round(data.alpha, 4))) >= FEWEST_INCLINATIONS:
         form = Form("stage-angle-alpha", "curve", "alpha", (spline(data.alpha, 10, order=1),), shared=True)
-        found.append(free(form, first, price=PRODUCT))
-    return found
+        components.append(free(form, first, price=PRODUCT))
+    return components
 
 
 def _over(forces: Array, count: int, intervals: int) -> tuple[Any, ...]:
@@ -98,13 +100,13 @@ def _over(forces: Array, count: int, intervals: int) -> tuple[Any, ...]:
     return tuple(spline(forces[:, k], intervals) for k in range(count))
 
 
-def _own(data: PoseData, first: State) -> list[Component]:
+def _own_response(data: PoseData, first: State) -> list[Component]:
     place = "own-response"
 
     def form(cause: str, basis: Basis) -> Component:
         return Component(f"{place}/{cause}", place, "response", cause, columns=per_axis(basis))
 
-    found = [
+    components = [
         form("quadratic-nonlinearity", lambda s, k: s.force[:, k, None] ** 2),
         form("cubic-nonlinearity", lambda s, k: s.force[:, k, None] ** 3),
         form("odd-quadratic-nonlinearity", lambda s, k: (s.force[:, k] * np.abs(s.force[:, k]))[:, None]),
@@ -113,16 +115,16 @@ def _own(data: PoseData, first: State) -> list[Component]:
     ]
     price = 2 * np.log(len(DEAD_G))
 
-    def dead(name: str) -> Make:
+    def dead_zone(name: str) -> Make:
         return lambda shape: Component(
             name, place, "response", "dead-zone", f"{place}/dead-zone", price, per_axis(_dead(shape)),
-            shape=shape, step=tuple(0.3 * w for w in shape), reshaped=dead(name),
+            shape=shape, step=tuple(0.3 * w for w in shape), reshaped=dead_zone(name),
             starts=lambda _: tuple(("width", axis, abs(w)) for axis, w in zip(data.axes, shape, strict=True)),
         )  # fmt: skip
 
-    found += [dead(f"{place}/dead-zone@{width:.4f}")((width,) * data.channels) for width in DEAD_G]
-    found.append(free(Form(place, "thresholds", "own", (Clips(THRESHOLDS_G),)), first, "dead-zone", PRODUCT))
-    return found + _saturations(data, first)
+    components += [dead_zone(f"{place}/dead-zone@{width:.4f}")((width,) * data.channels) for width in DEAD_G]
+    components.append(free(Form(place, "thresholds", "own", (Clips(THRESHOLDS_G),)), first, "dead-zone", PRODUCT))
+    return components + _saturations(data, first)
 
 
 def _dead(widths: tuple[float, ...]) -> Basis:
@@ -142,7 +144,7 @@ def _saturations(data: PoseData, first: State) -> list[Component]:
             starts=lambda loss: (*_levels(first, shape, side), ("loss", "", float(np.clip(-loss[0], 0.01, 1.0)))),
         )  # fmt: skip
 
-    found = []
+    components = []
     for side, name in ((1, "high"), (-1, "low"), (0, "both")):
         for end in ENDS:
             levels = [(m + end * h, m - end * h) for m, h in ranges[: data.channels]]
@@ -151,28 +153,30 @@ def _saturations(data: PoseData, first: State) -> list[Component]:
                 for high, low in levels
                 for level in ((high, low) if side == 0 else (high,) if side > 0 else (low,))
             )
-            found.append(saturated(f"{place}/saturation@{name}{end}", side)(shape))
-    return found
+            components.append(saturated(f"{place}/saturation@{name}{end}", side)(shape))
+    return components
 
 
 def _levels(first: State, shape: tuple[float, ...], side: int) -> tuple[tuple[str, str, float], ...]:
     """The outputs at which saturation begins, from its specific forces, g; the end of the outputs on the other side."""
-    found: list[tuple[str, str, float]] = []
+    start_values: list[tuple[str, str, float]] = []
     for k, axis in enumerate(first.data.axes):
         slope, offset = np.polyfit(first.force[:, k], first.response[k], 1)
         outputs = first.data.outputs[k]
         ends = {"high": outputs.max(), "low": outputs.min()}
         levels = shape[2 * k : 2 * k + 2] if side == 0 else shape[k : k + 1]
-        found += [(name, axis, float(ends[name])) for name in ends if side and name != ("high" if side > 0 else "low")]
+        start_values += [
+            (name, axis, float(ends[name])) for name in ends if side and name != ("high" if side > 0 else "low")
+        ]
         names = ("high", "low") if side == 0 else ("high",) if side > 0 else ("low",)
-        found += [(name, axis, float(slope * a + offset)) for name, a in zip(names, levels, strict=True)]
-    return tuple(found)
+        start_values += [(name, axis, float(slope * a + offset)) for name, a in zip(names, levels, strict=True)]
+    return tuple(start_values)
 
 
 def _saturated(levels: tuple[float, ...], side: int) -> Columns:
-    """What is lost above the high level and below the low one of each channel, g; one share for all of it.
+    """Loss of output above the high level and below the low one of each channel, g; one share for all levels.
 
-    One pose at the end of an axis's range may be all that shows a level: the share lost is common to all ends.
+    Often a single pose at the end of an axis's range shows a level: so the share of loss is common to all ends.
     """
 
     def columns(s: State) -> Array:
@@ -198,10 +202,12 @@ def _other_axes(data: PoseData, first: State) -> list[Component]:
     def named(place: str, cause: str, basis: Basis, price: float = 0.0) -> Component:
         return Component(f"{place}/{cause}", place, "response", cause, price=price, columns=per_axis(basis))
 
-    def curve(place: str, driver: str, forces: Array, most: int, factor: Factor = "", price: float = 0.0) -> Component:
-        return free(Form(place, "curve", driver, _over(forces, c, most), factor), first, price=price)
+    def curve(
+        place: str, driver: str, forces: Array, intervals: int, factor: Factor = "", price: float = 0.0
+    ) -> Component:
+        return free(Form(place, "curve", driver, _over(forces, c, intervals), factor), first, price=price)
 
-    found = [
+    components = [
         named("cross-response", "cross-axis-bias", lambda s, k: s.force[:, CROSS[k], None] ** 2),
         curve("cross-response", "cross", cross, 14),
         named(
@@ -211,47 +217,50 @@ def _other_axes(data: PoseData, first: State) -> list[Component]:
         curve("scale-over-cross", "cross", cross, 14, "force", PRODUCT),
     ]  # fmt: skip
     if inclinations < FEWEST_INCLINATIONS - 1:
-        return found
+        return components
 
     def square(s: State, k: int) -> Array:
         return out_of_plane(s.force)[:, k, None] ** 2
 
     def product(s: State, k: int) -> Array:
-        over = out_of_plane(s.force)[:, k]
-        return np.column_stack([s.force[:, k] * over, s.force[:, k] * over**2])
+        perpendicular = out_of_plane(s.force)[:, k]
+        return np.column_stack([s.force[:, k] * perpendicular, s.force[:, k] * perpendicular**2])
 
-    found += [named("z-response", "z-axis-bias", square), named("scale-over-z", "z-axis-scale", product, PRODUCT)]
+    components += [named("z-response", "z-axis-bias", square), named("scale-over-z", "z-axis-scale", product, PRODUCT)]
     if inclinations >= FEWEST_INCLINATIONS:
-        found += [
+        components += [
             curve("z-response", "out-of-plane", z, 10),
             curve("scale-over-z", "out-of-plane", z, 10, "force", PRODUCT),
         ]
-    return found
+    return components
 
 
 def _history(data: PoseData, first: State) -> list[Component]:
-    """Slip elements with free weights, the same pressed by the other axis, and branches."""
+    """Slip elements with free weights, slip elements pressed by the other axis, and branches."""
     if not data.sides:
         return []
     stated = "approach_deg" in data.table.constants
-    begin = (AS_STATED if stated else LOGGED_DEG,)
-    found = [_slipping(first, "slip", "", stated)(begin), _slipping(first, "pressed-slip", "pressed", stated)(begin)]
-    found.append(_loops(first, stated)(begin))
-    cross, own = first.force[:, list(CROSS)], first.force
+    start_shape = (AS_STATED if stated else LOGGED_DEG,)
+    components = [
+        _slipping(first, "slip", "", stated)(start_shape),
+        _slipping(first, "pressed-slip", "pressed", stated)(start_shape),
+    ]
+    components.append(_loops(first, stated)(start_shape))
+    cross, own_force = first.force[:, list(CROSS)], first.force
     for approach, turn in data.sides.items():
         if np.ptp(turn) == 0:
             continue
-        for name, driver, forces in (("branch-over-cross", "cross", cross), ("branch-over-own", "own", own)):
+        for name, driver, forces in (("branch-over-cross", "cross", cross), ("branch-over-own", "own", own_force)):
             splines = _over(forces, data.channels, 10)
             form = Form("history", f"{name}-{SIDES[approach]}", driver, splines, "side", approach_deg=approach)
-            found.append(free(form, first, "hysteresis", PRODUCT))
+            components.append(free(form, first, "hysteresis", PRODUCT))
         friction = Form("history", f"friction-{SIDES[approach]}", "cross", (Ramp(),), "side", approach_deg=approach)
-        found.append(free(friction, first, "hysteresis", constants=(("approach_deg", approach),)))
-    return found
+        components.append(free(friction, first, "hysteresis", constants=(("approach_deg", approach),)))
+    return components
 
 
 def _slipping(first: State, name: str, factor: Factor, stated: bool) -> Make:
-    """Slip elements by how many degrees before a pose its approach begins."""
+    """Slip elements; the shape is the angle in degrees before a pose at which its approach starts."""
 
     def at(shape: tuple[float, ...]) -> Component:
         widths = Play(WIDTHS_G, memory=not factor and first.data.timed)
@@ -265,7 +274,7 @@ def _slipping(first: State, name: str, factor: Factor, stated: bool) -> Make:
 
 
 def _loops(first: State, stated: bool) -> Make:
-    """Hysteresis whose loops differ from place to place, by how many degrees before a pose its approach begins."""
+    """Hysteresis with loops that depend on the force; the shape is the start of the approach, degrees before a pose."""
 
     def at(shape: tuple[float, ...]) -> Component:
         approach = AS_STATED if stated else abs(shape[0])
@@ -278,5 +287,5 @@ def _loops(first: State, stated: bool) -> Make:
 
 
 def _general(first: State) -> list[Component]:
-    """Polynomials on the sphere that no sum of functions of single axes is."""
+    """Polynomials on the sphere that are no sum of functions of single axes."""
     return [free(Form("force", "curve", "force", (Products(DEGREE),)), first, price=GENERAL)]

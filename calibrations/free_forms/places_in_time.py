@@ -45,7 +45,7 @@ def _fixed(columns: Array) -> Columns:
 
 
 def _timed(basis: Array) -> Columns:
-    """A function of the row alone, for each axis one."""
+    """A function of the row alone, one for each axis."""
     return per_axis(lambda *_: basis)
 
 
@@ -56,7 +56,7 @@ def _times_force(basis: Array) -> Columns:
 def over_temperature(data: PoseData, first: State) -> list[Component]:
     if "temperature_c" not in data.table or np.ptp(data.table.column("temperature_c")) == 0:
         return []
-    found: list[Component] = []
+    components: list[Component] = []
     leads = LEADS_S if data.timed else (0.0,)
     if data.timed and data.at_rest:
         leads = (*leads, *LONG_LEADS_S)
@@ -68,33 +68,33 @@ def over_temperature(data: PoseData, first: State) -> list[Component]:
     for place, factor, price in factors:
         for lead in leads:
             more = price + chosen if lead else price
-            found.append(_warmer(data, first, f"{place}/{place}@{lead:g}", place, factor, more)((lead,)))
-        found.append(_curve_over_temperature(data, first, place, factor, price)((0.0,)))
+            components.append(_warmer(data, first, f"{place}/{place}@{lead:g}", place, factor, more)((lead,)))
+        components.append(_curve_over_temperature(data, first, place, factor, price)((0.0,)))
     if data.timed:
         temperature = leading_temperature(data.table, 0.0)
         for part in PLAYS:
             name = f"temperature-bias/temperature-hysteresis@{part}"
-            found.append(_behind_play(name, temperature)((part * float(np.ptp(temperature)),)))
+            components.append(_lagging_by_play(name, temperature)((part * float(np.ptp(temperature)),)))
         widths = tuple(part * float(np.ptp(temperature)) for part in BRANCHES)
         form = Form("temperature-bias", "branches", "temperature", (Play(widths),))
         more = {"general": True, "contains": "temperature-bias", "starts": _middle_play(widths)}
-        found.append(
+        components.append(
             free(form, first, "temperature-hysteresis", GENERAL, **more)
         )  # after transients: it settles as they do
-    return found
+    return components
 
 
 def _middle_play(widths: tuple[float, ...]) -> Callable[[Array], Starts]:
-    """Where the fit of one play begins: the mean of the plays, by their weights."""
+    """Start value for the fit of one play: the mean of the plays, by their weights."""
 
-    def starts(found: Array) -> Starts:
-        weights = np.abs(found.reshape(-1, len(widths))).sum(axis=0)
+    def starts(coefficients: Array) -> Starts:
+        weights = np.abs(coefficients.reshape(-1, len(widths))).sum(axis=0)
         return (("play", "", float(weights @ widths / max(float(weights.sum()), np.finfo(float).tiny))),)
 
     return starts
 
 
-def _behind_play(name: str, temperature: Array) -> Make:
+def _lagging_by_play(name: str, temperature: Array) -> Make:
     """A line over the temperature behind a play, K."""
 
     def at(shape: tuple[float, ...]) -> Component:
@@ -102,7 +102,7 @@ def _behind_play(name: str, temperature: Array) -> Make:
         return Component(
             name, "temperature-bias", "response", "temperature-hysteresis", "temperature-bias/play", GENERAL,
             _timed(play(temperature, width)[:, None]), contains="temperature-bias",
-            shape=shape, step=(0.05 * float(np.ptp(temperature)),), reshaped=_behind_play(name, temperature),
+            shape=shape, step=(0.05 * float(np.ptp(temperature)),), reshaped=_lagging_by_play(name, temperature),
             starts=lambda _: (("play", "", width),),
         )  # fmt: skip
 
@@ -110,7 +110,7 @@ def _behind_play(name: str, temperature: Array) -> Make:
 
 
 def _warmer(data: PoseData, first: State, name: str, place: str, factor: Factor, price: float) -> Make:
-    """A line over the temperature that the thermometer will show so many seconds later."""
+    """A line over the temperature that the thermometer shows some seconds later."""
 
     def at(shape: tuple[float, ...]) -> Component:
         T = leading_temperature(data.table, shape[0])
@@ -126,15 +126,17 @@ def _warmer(data: PoseData, first: State, name: str, place: str, factor: Factor,
 
 
 def _curve_over_temperature(data: PoseData, first: State, place: str, factor: Factor, price: float) -> Make:
-    """A curve over the same."""
+    """A curve over the temperature that the thermometer shows some seconds later."""
 
     def at(shape: tuple[float, ...]) -> Component:
         error = reading_error(data.table, "temperature_c", lead_s=shape[0]) if data.timed else 0.0
         smooth = spline(leading_temperature(data.table, shape[0]), 8)
         form = Form(place, "curve", "temperature", (smooth,), factor, lead_s=shape[0])
-        made = free(form, first, price=price, family=f"{place}/curve", shape=shape, step=(30.0,), error=error)
+        component = free(form, first, price=price, family=f"{place}/curve", shape=shape, step=(30.0,), error=error)
         return (
-            replace(made, reshaped=_curve_over_temperature(data, first, place, factor, price)) if data.timed else made
+            replace(component, reshaped=_curve_over_temperature(data, first, place, factor, price))
+            if data.timed
+            else component
         )
 
     return at
@@ -145,7 +147,7 @@ def over_time(data: PoseData, first: State) -> list[Component]:
         return []
     t, u = data.table.time_s, data.since
     begin, span = float(t.min()), float(np.ptp(t)) or 1.0
-    found: list[Component] = []
+    components: list[Component] = []
     places: tuple[tuple[str, Factor, str, str, float], ...] = (
         ("time-bias", "", "warm-up-bias", "bias-drift", 0.0),
         ("time-scale", "force", "warm-up-scale", "", PRODUCT),
@@ -153,27 +155,27 @@ def over_time(data: PoseData, first: State) -> list[Component]:
     for place, factor, cause, drift, price in places:
         for tau in WARMING:
             name = f"{place}/{cause}@{tau:.3f}"
-            more = price + 2 * np.log(len(WARMING))
-            found.append(_warming(data.axes, u, span, name, place, cause, more, factor)((tau,)))
+            price_with_choice = price + 2 * np.log(len(WARMING))
+            components.append(_warming(data.axes, u, span, name, place, cause, price_with_choice, factor)((tau,)))
         line = Form(place, "line", "time", (Line(begin, begin + span),), factor)
-        found.append(free(line, first, drift, price))
-        found.append(free(Form(place, "curve", "time", (spline(t, 12),), factor), first, price=price))
+        components.append(free(line, first, drift, price))
+        components.append(free(Form(place, "curve", "time", (spline(t, 12),), factor), first, price=price))
         settling = Settling(begin, span, span / data.n, AGES)
-        found.append(free(Form(place, "settling", "time", (settling,), factor), first, price=price))
+        components.append(free(Form(place, "settling", "time", (settling,), factor), first, price=price))
         if drift:
             walk = Waves(begin, span, min(WALK_WAVES, data.n // 3), 2.0)
             for k, axis in enumerate(data.axes):
-                kept = tuple(walk.count if j == k else 0 for j in range(data.channels))
-                found.append(
+                counts = tuple(walk.count if j == k else 0 for j in range(data.channels))
+                components.append(
                     free(
-                        Form(place, f"walk-{axis}", "time", (walk,), factor, kept=kept),
+                        Form(place, f"walk-{axis}", "time", (walk,), factor, kept=counts),
                         first,
                         drift,
                         price,
                         general=True,
                     )
                 )
-    return found
+    return components
 
 
 def _warming(
@@ -183,9 +185,9 @@ def _warming(
 
     def at(shape: tuple[float, ...]) -> Component:
         part = max(shape[0], SHORTEST_PART)
-        left = np.exp(-u / part)[:, None]
+        decay = np.exp(-u / part)[:, None]
         return Component(
-            name, place, "response", cause, f"{place}/{cause}", price, _times_force(left) if factor else _timed(left),
+            name, place, "response", cause, f"{place}/{cause}", price, _times_force(decay) if factor else _timed(decay),
             shape=shape, step=(0.2 * shape[0],), reshaped=_warming(axes, u, span_s, name, place, cause, price, factor),
             starts=lambda amplitudes: (
                 *(("amplitude", axis, float(a)) for axis, a in zip(axes, amplitudes, strict=True)),
