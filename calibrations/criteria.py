@@ -156,6 +156,7 @@ FOLLOWS_GRAVITY = 0.5  # of an output's variance: sensors with 5 % nonlinearity 
 EXPLAINED_BY_GEOMETRY = 0.9  # of an output's variance: the geometry is right, and effects remain
 FAR_BETTER_GEOMETRY = 0.1  # of the variance that the stated geometry leaves: another geometry with less is right
 WEAK_RESPONSE = 1e-3  # chance in an F test: a response as weak as noise, but present
+FAR_LESS_VARIATION = 0.02  # of another output's: axes of one sensor have scale factors within 5 %
 STUCK_ROWS = 0.2  # of the rows at one value, where gravity changes: noise has no such value
 STUCK_CHANGE = 0.1  # of the expected change: a healthy output changes as expected
 LEAST_OTHER_SIDE = 0.1  # of the stuck rows: a saturated output has none on the other side

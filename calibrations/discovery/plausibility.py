@@ -25,6 +25,7 @@ from scipy.special import fdtrc
 from calibrations.criteria import (
     EXCITED_G,
     EXPLAINED_BY_GEOMETRY,
+    FAR_LESS_VARIATION,
     FAR_BETTER_GEOMETRY,
     FEWEST_RESPONSE_ROWS,
     FOLLOWS_GRAVITY,
@@ -81,10 +82,14 @@ def findings(table: Table) -> tuple[Finding, ...]:
     if not table.type.stage_angles:
         return ()
     stated = response(table, specific_force(nominal_pose(table)))
+    dead = tuple(_dead(table, stated))
+    variation = table.outputs.std(axis=0)
+    if dead and variation.min() < FAR_LESS_VARIATION * variation.max():
+        return dead  # no other reading of the angles makes a response of it
     geometry = _geometry(table, stated)
     if geometry is not None and geometry.verdict == UNEXPLAINED:
         return (geometry,)
-    if dead := tuple(_dead(table, stated)):
+    if dead:
         return dead
     groups = _two_groups(table)
     return tuple(finding for finding in (groups, geometry) if finding is not None)

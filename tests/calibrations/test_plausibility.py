@@ -66,6 +66,12 @@ DEAD: dict[str, tuple[Callable[[Data], Data], str]] = {
         lambda d: replace(d, vy=2.5 + NOISE_V * np.random.default_rng(7).standard_normal(len(d.vy))),
         "vy_v is only noise",
     ),
+    "slow drift": (
+        lambda d: replace(
+            d, vy=2.5 + 1e-3 * np.linspace(0, 1, len(d.vy)) + NOISE_V * np.sin(np.arange(len(d.vy)) ** 2)
+        ),
+        "vy_v does not follow the poses",
+    ),
     "noise of unknown level": (
         lambda d: replace(d, vy=2.5 + np.random.default_rng(7).standard_normal(len(d.vy)), samples=False),
         "vy_v does not follow the poses",
