@@ -25,8 +25,8 @@ from scipy.special import fdtrc
 from calibrations.criteria import (
     EXCITED_G,
     EXPLAINED_BY_GEOMETRY,
-    FAR_LESS_VARIATION,
     FAR_BETTER_GEOMETRY,
+    FAR_LESS_VARIATION,
     FEWEST_RESPONSE_ROWS,
     FOLLOWS_GRAVITY,
     GROUPS_APART,
@@ -39,6 +39,7 @@ from calibrations.criteria import (
     STUCK_CHANGE,
     STUCK_ROWS,
     TURNED_DEG,
+    V_PER_G,
     WEAK_RESPONSE,
 )
 from calibrations.discovery.readings import other_reading
@@ -81,10 +82,11 @@ def findings(table: Table) -> tuple[Finding, ...]:
         return tuple(_of_rates(table))
     if not table.type.stage_angles:
         return ()
-    stated = response(table, specific_force(nominal_pose(table)))
+    force = specific_force(nominal_pose(table))
+    stated, variation = response(table, force), table.outputs.std(axis=0)
     dead = tuple(_dead(table, stated))
-    variation = table.outputs.std(axis=0)
-    if dead and variation.min() < FAR_LESS_VARIATION * variation.max():
+    least = V_PER_G[0] * force.std(axis=0).max() if table.unit == "V" else 0.0
+    if dead and variation.min() < max(least, FAR_LESS_VARIATION * variation.max()):
         return dead  # no other reading of the angles makes a response of it
     geometry = _geometry(table, stated)
     if geometry is not None and geometry.verdict == UNEXPLAINED:

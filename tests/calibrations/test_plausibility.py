@@ -60,17 +60,20 @@ def two_scales(d: Data) -> Data:
     return replace(d, vx=2.5 + (d.vx - 2.5) * factor, vy=2.5 + (d.vy - 2.5) * factor)
 
 
+def jump(n: int) -> Array:
+    """1 mV in the second half."""
+    return 1e-3 * (np.arange(n) > n / 2)
+
+
 DEAD: dict[str, tuple[Callable[[Data], Data], str]] = {
     "constant": (lambda d: replace(d, vx=0 * d.vx + 2.5), "vx_v is constant"),
     "noise": (
         lambda d: replace(d, vy=2.5 + NOISE_V * np.random.default_rng(7).standard_normal(len(d.vy))),
         "vy_v is only noise",
     ),
-    "slow drift": (
-        lambda d: replace(
-            d, vy=2.5 + 1e-3 * np.linspace(0, 1, len(d.vy)) + NOISE_V * np.sin(np.arange(len(d.vy)) ** 2)
-        ),
-        "vy_v does not follow the poses",
+    "unplugged, with a jump in mid-run": (
+        lambda d: replace(d, vx=2.4 + jump(len(d.vx)), vy=2.5 + 0.9 * jump(len(d.vx))),
+        "vx_v does not follow the poses",
     ),
     "noise of unknown level": (
         lambda d: replace(d, vy=2.5 + np.random.default_rng(7).standard_normal(len(d.vy)), samples=False),
