@@ -213,6 +213,7 @@ LARGEST_ALPHA_DEG = 360.0  # an inclination lies within one turn
 LARGEST_BETA_DEG = 3600.0  # ten turns: cables allow fewer
 FEWEST_ANGLES = 6  # distinct values: all lie on whole arc minutes by chance with odds of one in millions
 STILL_G = (0.3, 3.0)  # a sensor at rest shows 1 g, its bias and scale factor within reason
+SHOWN_OF_RATE = (0.3, 3.0)  # of an output to its rate, its scale factor within reason: rad/s are off by 57
 EARTH_UT = (20.0, 70.0)  # on the ground 22 to 67 uT (World Magnetic Model)
 MOST_MAGNITUDE_SPREAD = 0.3  # interquartile range over median: scale factors of cheap sensors differ by tenths
 LEAST_DIRECTION_SHARE = 0.01  # mean square of directions along their weakest axis; 1/3 over the whole sphere

@@ -58,6 +58,9 @@ KNOWN_BINARY = (  # first bytes, name, and a way to CSV with the tools of the fi
 CONTROLS = frozenset(range(32)) - set(b"\t\n\r\f") - {0x1A}  # 0x1A ends a text file in old Windows programs
 
 
+MOST_GARBLED = 0.01  # of the bytes: lines that were garbled on a wire
+
+
 @dataclass(frozen=True)
 class Source:
     """A text that can be read several times, and its name in messages."""
@@ -82,8 +85,11 @@ class Source:
             raise DataError(f"{self.name}: cannot be read as text: {_reason(error)}") from None
 
 
-def open_text_file(path: Path) -> Source:
-    """The file `path` as text. Raises DataError at once for a folder, a binary file, and a file that is too large."""
+def open_text_file(path: Path, garbled: bool = False) -> Source:
+    """The file `path` as text; `garbled` allows a few bytes that are not text, as in a log from a wire.
+
+    Raises DataError at once for a folder, a binary file, and a file that is too large.
+    """
     if path.is_dir():
         raise DataError(f"{path}: cannot be read: Is a directory; name a file in it")
     try:
@@ -98,7 +104,7 @@ def open_text_file(path: Path) -> Source:
     except (OSError, EOFError, zlib.error) as error:
         what = "cannot be read as text" if path.suffix == ".gz" else "cannot be read"
         raise DataError(f"{path}: {what}: {_reason(error)}") from None
-    encoding = _encoding(head, path)
+    encoding = _encoding(head, path, MOST_GARBLED if garbled else 0.0)
     return Source(
         str(path),
         lambda: io.TextIOWrapper(_bytes(path), encoding=encoding),
@@ -146,13 +152,17 @@ class _Unpacked(gzip.GzipFile):
         return data
 
 
-def _encoding(head: bytes, path: Path) -> str:
-    """The encoding by its byte-order mark; else UTF-8, then Excel's cp1252. Raises DataError for binary content."""
+def _encoding(head: bytes, path: Path, most_garbled: float) -> str:
+    """The encoding by its byte-order mark; else UTF-8, then Excel's cp1252. Raises DataError for binary content.
+
+    At most a share `most_garbled` of the bytes may be no text, below the first line.
+    """
     for mark, encoding in MARKS.items():
         if head.startswith(mark):
             return encoding
-    binary = next((k for k, byte in enumerate(head) if byte in CONTROLS), None)
-    if binary is not None:
+    controls = [k for k, byte in enumerate(head) if byte in CONTROLS]
+    if controls and (len(controls) > most_garbled * len(head) or controls[0] < len(head.splitlines()[0])):
+        binary = controls[0]
         for first, what, remedy in KNOWN_BINARY:
             if head.startswith(first):
                 raise DataError(f"{path}: is {what}, not text; {remedy}, and import the CSV file")
@@ -166,6 +176,8 @@ def _encoding(head: bytes, path: Path) -> str:
         except UnicodeDecodeError:
             continue
         return encoding
+    if head.decode("ascii", "replace").count("\ufffd") <= most_garbled * len(head):
+        return "utf-8"
     raise DataError(f"{path}: is not text in UTF-8; is it really a CSV file? From a spreadsheet, save the sheet as CSV")
 
 

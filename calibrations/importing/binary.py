@@ -45,7 +45,7 @@ def open_sheet(path: Path, topic: str | None = None) -> Sheet:
     """
     topics = _topics(path)
     if topics is None:
-        sheet = read_sheet(open_text_file(path))
+        sheet = read_sheet(open_text_file(path, garbled=True))
         if topic is not None:
             raise DataError(f'{path}: has no topics, for it is a text; leave out --topic "{topic}"')
         return sheet

@@ -17,7 +17,8 @@ import numpy as np
 from calibrations.errors import DataError, MissingColumn, nearest
 from calibrations.files import text_source
 from calibrations.importing.binary import open_sheet
-from calibrations.importing.plausible import check_at_rest, find_unit_doubts
+from calibrations.importing.plausible import check_at_rest, check_turning, find_log_time_doubt, find_unit_doubts
+from calibrations.importing.raw_logs import is_raw_log
 from calibrations.importing.sessions import RATE, is_session, sample_rates
 from calibrations.importing.sheet import Sheet, is_number, look_like_names, read_cells, read_sheet
 from calibrations.importing.units import UNITS, ColumnMapping, column_unit
@@ -118,6 +119,7 @@ def _import_with(
     table = Table.from_columns(kind, columns, merged, laid.name, labels)
     _check_units(table, laid, chosen)
     check_at_rest(table)
+    check_turning(table)
     return ImportedTable(table, laid, tuple(chosen), tuple(notes))
 
 
@@ -189,7 +191,11 @@ def _converted(values: Array, m: ColumnMapping) -> Array:
 
 def _check_units(table: Table, laid: Sheet, chosen: Sequence[ColumnMapping]) -> None:
     """Raises DataError for numbers that are unlikely in their unit, with the import command for a better one."""
-    doubts = find_unit_doubts(table, {m.name for m in chosen if m.unit})
+    stated = {m.name for m in chosen if m.unit}
+    doubts = find_unit_doubts(table, stated)
+    is_timed = is_raw_log(table) and "t_s" in table and "t_s" not in stated
+    if is_timed and (doubt := find_log_time_doubt(table.column("t_s"))) is not None:
+        doubts["t_s"] = doubt
     if not doubts:
         return
     from calibrations.importing.proposal import import_command  # as above

@@ -21,18 +21,22 @@ from calibrations.criteria import (
     LEAST_DIRECTION_SHARE,
     LONGEST_M,
     MOST_MAGNITUDE_SPREAD,
+    RATE_AGREES,
+    SHOWN_OF_RATE,
     STILL_G,
 )
 from calibrations.errors import DataError
+from calibrations.geometry.rate_table import turn_axes
 from calibrations.geometry.sphere import sphere_centre
-from calibrations.importing.units import column_unit
+from calibrations.importing.units import UNITS, column_unit
 from calibrations.table import NUMBERS, Array, Table
 
 ARC_MINUTE_DEG = 1 / 60
 ROUNDING_DEG = 1e-3
-FEWEST_RATES = 3  # on one grid by chance: one table in ten thousand
+FEWEST_RATES = 2  # on one grid by chance, and off the grid of round numbers: one table in a thousand
 FASTEST_RAD_S = 60.0
 RATE_ROUNDING = 1e-3
+ROUND_DEG_S = 0.05
 Doubt = tuple[str, str]  # the reason, and the unit that would fit, "" for none
 
 
@@ -117,6 +121,8 @@ def _rate(values: Array) -> Doubt | None:
     some = some[some > ROUNDING_DEG]
     if len(some) < FEWEST_RATES or some[-1] > FASTEST_RAD_S or not _on_grid(some, np.pi / 36, RATE_ROUNDING):
         return None
+    if _on_grid(some, ROUND_DEG_S, ROUNDING_DEG / 2):
+        return None
     return (
         f"runs from {values.min():.4g} to {values.max():.4g}, in whole multiples of 5 deg/s if it is in rad/s",
         "rad/s",
@@ -153,6 +159,8 @@ UNIT_CHECKS: Mapping[str, Callable[[Array], Doubt | None]] = {
 }
 
 
+# Times and sample rates.
+
 SHORTEST_POSE_S = 1.0  # to turn to a pose and to measure there
 LONGEST_POSE_S = 3600.0
 TIME_UNITS = {"ms": 1e-3, "min": 60.0, "h": 3600.0}
@@ -174,6 +182,66 @@ def find_time_doubt(time_s: Array, poses: Array) -> Doubt | None:
     fits = next((u for u, s in TIME_UNITS.items() if SHORTEST_POSE_S <= step * s <= LONGEST_POSE_S), "")
     low, high = float(time_s[0]), float(time_s[-1])
     return f"runs from {low:g} to {high:g}; in s this is {step:.2g} s from one pose to the next", fits
+
+
+SLOWEST_LOG_HZ = 2.0  # of samples: a hand moves within less than a second
+LIKELY_LOG_HZ = (10.0, 20_000.0)
+
+
+def find_log_time_doubt(time_s: Array) -> Doubt | None:
+    """The doubt that the time column of a log of samples is in s: no log of a sensor is so slow."""
+    step = _step_s(time_s)
+    if not step or 1 / step >= SLOWEST_LOG_HZ:
+        return None
+    low, high = LIKELY_LOG_HZ
+    fits = next((unit for unit in ("ms", "us") if low <= 1 / (step * UNITS[unit][1]) <= high), "")
+    return f"gives {1 / step:.3g} samples a second if it is in s", fits
+
+
+def log_rate_hz(time_s: Array | None, stated_hz: float, source: str) -> float:
+    """The sample rate of a log, Hz: by its times, else as stated; 0 if neither gives it.
+
+    Raises DataError if the two differ.
+    """
+    step = 0.0 if time_s is None else _step_s(time_s)
+    if step and stated_hz > 0 and abs(1 / step / stated_hz - 1) > RATE_AGREES:
+        raise DataError(
+            f"{source}: t_s gives {1 / step:.4g} samples a second, and the constant sample_rate_hz is {stated_hz:g}; "
+            f"correct the unit of t_s (in `rig import`, --column t_s=...:ms), or give --constant "
+            f"sample_rate_hz={1 / step:.4g}"
+        )
+    return 1 / step if step else max(stated_hz, 0.0)
+
+
+def _step_s(time_s: Array) -> float:
+    """The time from one sample to the next, also of a clock that began again; 0 for times that do not go on."""
+    return max(float(np.median(np.diff(time_s))), 0.0) if len(time_s) > 1 else 0.0
+
+
+# Outputs in a stated unit, against what they sense.
+
+
+def check_turning(table: Table) -> None:
+    """Check that outputs in deg/s and rates are not one in deg/s, one in rad/s. Raises DataError. Counts pass."""
+    if table.content != "rates" or table.unit != "deg/s":
+        return
+    try:
+        along = table.column("rate_deg_s")[:, None] * turn_axes(table)
+    except DataError:  # the axes are not known
+        return
+    slopes, *_ = np.linalg.lstsq(np.column_stack([np.ones(table.n), along]), table.outputs, rcond=None)
+    per_rate = float(np.linalg.norm(slopes[1:], axis=0).max())
+    degrees = UNITS["rad/s"][1]
+    hints = {
+        degrees: "rate_deg_s looks like rad/s: give --column rate_deg_s=...:rad/s",
+        1 / degrees: "gx, gy, gz look like rad/s: give --column gx=...:rad/s, likewise gy and gz",
+    }
+    for size, hint in hints.items():
+        if SHOWN_OF_RATE[0] <= per_rate / size <= SHOWN_OF_RATE[1]:
+            raise DataError(
+                f"{table.source}: gx, gy, gz show {per_rate:.3g} deg/s for each deg/s of rate_deg_s; {hint}; "
+                "if the units are right, import the outputs as counts: --column gx=...:counts"
+            )
 
 
 def check_at_rest(table: Table) -> None:

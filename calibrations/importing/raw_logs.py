@@ -25,6 +25,7 @@ from calibrations.criteria import (
 )
 from calibrations.errors import DataError, MissingConstant
 from calibrations.geometry.sphere import sphere_centre
+from calibrations.importing.plausible import log_rate_hz
 from calibrations.importing.sessions import average_sections, is_section_log
 from calibrations.means.noise import autocovariance, measured_inflation
 from calibrations.table import Array, Constant, Table, std_column
@@ -36,6 +37,7 @@ from calibrations.table import Array, Constant, Table, std_column
 
 WINDOW_S = 0.5
 TRIM_S = 0.2
+SHORTEST_LOG_S = 2 * SHORTEST_STILL_S  # two still intervals
 QUIET_QUANTILE = 0.05  # of the windows are certainly still
 
 
@@ -332,9 +334,13 @@ def average_raw_log(log: Table) -> Table:
 
 
 def _rate_hz(log: Table) -> float:
-    """Sample rate, Hz. Raises MissingConstant where the log does not give it."""
-    by_time = "t_s" in log and np.ptp(log.time_s) > 0
-    rate_hz = (log.n - 1) / float(np.ptp(log.time_s)) if by_time else log.number("sample_rate_hz", 0.0)
+    """Sample rate, Hz. Raises MissingConstant where the log does not give it, DataError for one that does not fit."""
+    rate_hz = log_rate_hz(log.columns.get("t_s"), log.number("sample_rate_hz", 0.0), log.source)
+    if rate_hz > 0 and log.n < SHORTEST_LOG_S * rate_hz:
+        raise DataError(
+            f"{log.source}: at {rate_hz:g} samples a second this log of {log.n} samples lasts "
+            f"{log.n / rate_hz:.2g} s, too short for still intervals; correct sample_rate_hz or t_s"
+        )
     if rate_hz > 0:
         return rate_hz
     name, likely = _likely_rate(log.constants)

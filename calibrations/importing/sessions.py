@@ -18,6 +18,7 @@ import numpy as np
 
 from calibrations.criteria import FEWEST_SECTION_SAMPLES, LEAST_TURN_NOISE, LEAST_TURN_SHARE
 from calibrations.errors import DataError, MissingConstant
+from calibrations.importing.plausible import log_rate_hz
 from calibrations.table import Array, Constant, Table
 
 OUTPUTS = ("gx", "gy", "gz")
@@ -92,11 +93,12 @@ def _length_s(
     columns: Mapping[str, Array], constants: Mapping[str, Constant], bound: tuple[int, int], source: str
 ) -> float:
     """Duration of a section: number of samples times sample interval. Raises MissingConstant without times and sample
-    rate.
+    rate, DataError if the two differ.
     """
     a, b = bound
     rate_hz = constants.get("sample_rate_hz")
     if isinstance(rate_hz, (int, float)) and rate_hz > 0:
+        log_rate_hz(columns.get("t_s"), float(rate_hz), source)
         return (b - a) / float(rate_hz)
     if "t_s" in columns and b - a > 1 and columns["t_s"][b - 1] > columns["t_s"][a]:
         return float((columns["t_s"][b - 1] - columns["t_s"][a]) * (b - a) / (b - a - 1))

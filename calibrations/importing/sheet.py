@@ -142,7 +142,7 @@ def _whole(rows: list[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
 
 def as_lines(source: Source) -> Source:
     """The source itself, or its JSON document as comma-separated lines. Raises DataError."""
-    with source.lines() as lines:
+    with source.lines(marked=True) as lines:
         first = next((line for line in lines if line.strip()), "").lstrip()
     if not first.startswith(("{", "[")):
         return source
@@ -189,7 +189,7 @@ def number_or_text(cell: str) -> Constant:
 def _head(source: Source) -> tuple[dict[str, Constant], int, list[str]]:
     """The `# key: value` lines, their count, and the first lines below them."""
     constants: dict[str, Constant] = {}
-    with source.lines() as lines:
+    with source.lines(marked=True) as lines:
         for start, line in enumerate(lines):
             plain = line.strip(BLANK)
             if plain and not plain.startswith("#"):
@@ -321,10 +321,10 @@ def _at_once(sheet: Sheet) -> Array | None:
         return None
     comma = sheet.separator != "," and any("," in cell for row in sheet.sample for cell in row)
     with sheet.source.lines() as lines:
-        for _ in range(sheet.first - 1):
-            next(lines)
         numeric = (line.replace(",", ".") for line in lines) if comma else lines
         try:
+            for _ in range(sheet.first - 1):
+                next(numeric)
             first = next(numeric)  # numpy warns of an iterator without any
             numbers = np.loadtxt(
                 chain([first], numeric), delimiter=sheet.separator, ndmin=2, comments=None, quotechar='"'

@@ -27,7 +27,7 @@ def lines() -> list[str]:
 def imported(tmp_path: Path, given: list[str | bytes], policy: Policy = "few") -> ImportedTable:
     path = tmp_path / "log.csv"
     path.write_bytes(b"\n".join(line.encode() if isinstance(line, str) else line for line in given) + b"\n")
-    return import_sheet(replace(read_sheet(open_text_file(path)), skipped=SHARES[policy]), "still")
+    return import_sheet(replace(read_sheet(open_text_file(path, garbled=True)), skipped=SHARES[policy]), "still")
 
 
 @pytest.mark.parametrize(
@@ -51,6 +51,18 @@ def test_a_damaged_line_is_skipped_and_shown(tmp_path: Path, damaged: str | byte
     (note,) = found.notes
     assert note.endswith(f"1 of {N} lines is damaged and was skipped: {shown}.")
     assert "damaged_lines" in found.settings
+
+
+@pytest.mark.parametrize("garbled", [b"\x00\x13arb,led", b"\xff\x00\x00\x81,0.1,\x9d2,0.9", b"\x811.00,0.1,0.2,0.9"])
+@pytest.mark.parametrize("line", [12, 300, 3900])
+def test_a_line_garbled_on_the_wire_is_skipped_wherever_it_is(tmp_path: Path, garbled: bytes, line: int) -> None:
+    given: list[str | bytes] = [*lines()]
+    given[line] = garbled
+    found = imported(tmp_path, given)
+    assert found.table.n == N - 1
+    assert f"1 of {N} lines is damaged and was skipped: line {line + 1} (" in found.notes[0]
+    with pytest.raises(DataError, match=r"log\.csv"):
+        imported(tmp_path, given, "refuse")
 
 
 def test_a_log_without_damage_has_no_remark(tmp_path: Path) -> None:

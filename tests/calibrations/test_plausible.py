@@ -11,7 +11,8 @@ import pytest
 from calibrations.errors import DataError
 from calibrations.files import text_source
 from calibrations.importing.foreign import drop_duplicate_rows, import_sheet
-from calibrations.importing.plausible import gravity_unit, looks_like_radians
+from calibrations.importing.plausible import gravity_unit, log_rate_hz, looks_like_radians
+from calibrations.importing.raw_logs import average_raw_log
 from calibrations.importing.sheet import read_sheet
 from calibrations.importing.units import ColumnMapping
 from calibrations.table import Table
@@ -119,6 +120,79 @@ def test_a_sensor_at_rest_shows_gravity() -> None:
         read(content.replace("9.8", "17"), "ax=ax:g", "ay=ay:g", "az=az:g")
     assert read(content, *(f"{a}={a}:m/s2" for a in ("ax", "ay", "az"))).unit == "m/s2"
     assert read(content, *(f"{a}={a}:counts" for a in ("ax", "ay", "az"))).unit == "count"
+
+
+TURNS = 3 * [40.0, -40.0, 75.0, -75.0, 0.0]
+
+
+def rates(rate: float = 1.0, output: float = 1.0) -> str:
+    """Turns about x, y and z at rates off every grid, as CSV; `rate` and `output` times the values in deg/s."""
+    rows = [(k // 5, 0.91 * turn) for k, turn in enumerate(TURNS)]
+    cells = [[*np.eye(3)[k], rate * turn, *(output * turn * np.eye(3)[k] + output * 0.4)] for k, turn in rows]
+    text = "\n".join(",".join(f"{v:.6g}" for v in row) for row in cells)
+    return f"axis_x,axis_y,axis_z,rate_deg_s,gx,gy,gz\n{text}\n"
+
+
+def test_rates_in_radians_are_known_by_a_gyroscope_in_degrees() -> None:
+    degrees = [f"{name}={name}:deg/s" for name in ("gx", "gy", "gz")]
+    with pytest.raises(DataError, match=r"show 57\.\d deg/s for each deg/s of rate_deg_s; rate_deg_s looks like rad/s"):
+        read(rates(rate=np.pi / 180), *degrees)
+    with pytest.raises(DataError, match=r"show 0\.017\d deg/s .*; gx, gy, gz look like rad/s: give --column gx="):
+        read(rates(output=np.pi / 180), *degrees)
+    right = read(rates(rate=np.pi / 180), *degrees, "rate_deg_s=rate_deg_s:rad/s")
+    np.testing.assert_allclose(right.column("rate_deg_s"), 0.91 * np.array(TURNS), rtol=1e-5)
+    assert read(rates(output=16.4)).unit == "count"
+
+
+@pytest.mark.parametrize(
+    ("turns", "doubtful"),
+    [([30.0, 90.0], True), ([10.0, 20.0, 45.0], True), ([30.0], False), ([4.8, 0.35], False)],
+)
+def test_rates_that_are_round_in_radians_are_asked_about(turns: list[float], doubtful: bool) -> None:
+    values = np.radians(turns) if doubtful else np.array(turns)
+    content = "rate_deg_s,gx,gy,gz\n" + "".join(f"{sign * v:.5f},{v},0,0\n" for v in values for sign in (1, -1))
+    if not doubtful:
+        assert read(content, kind="rates").n == 2 * len(turns)
+        return
+    with pytest.raises(DataError, match="in whole multiples of 5 deg/s if it is in rad/s"):
+        read(content, kind="rates")
+
+
+def log(step: float, n: int = 1200) -> str:
+    """A log of a sensor on two of its sides in turn, with a time step, as CSV."""
+    noise = np.random.default_rng(1).normal(scale=1e-3, size=(n, 3))
+    sides = np.eye(3)[np.arange(n) // 300 % 3] + noise
+    rows = (f"{step * k:.9g},{x:.5f},{y:.5f},{z:.5f}" for k, (x, y, z) in enumerate(sides))
+    return "\n".join(["t_s,ax,ay,az", *rows]) + "\n"
+
+
+@pytest.mark.parametrize(("step", "unit"), [(10.0, "ms"), (1.0, "ms"), (1e4, "us"), (250.0, "us")])
+def test_a_log_too_slow_in_seconds_is_asked_about(step: float, unit: str) -> None:
+    with pytest.raises(
+        DataError, match=rf'column "t_s" gives \S+ samples a second if it is in s\nIf .*{unit}'
+    ) as error:
+        read(log(step))
+    (option,) = re.findall(r"--column (t_s=\S+)", str(error.value).splitlines()[3])
+    assert option == f"t_s=t_s:{unit}"
+    assert read(log(step), option).n == 1200
+    assert read(log(step), "t_s=t_s:s").n == 1200
+
+
+def test_a_stated_sample_rate_that_does_not_fit_is_refused() -> None:
+    with pytest.raises(DataError, match="t_s gives 100 samples a second, and the constant sample_rate_hz is 200"):
+        average_raw_log(read("# sample_rate_hz: 200\n" + log(0.01)))
+    assert average_raw_log(read("# sample_rate_hz: 100.5\n" + log(0.01))).n == 4
+    timeless = "\n".join(line.partition(",")[2] for line in log(0.01).splitlines())
+    with pytest.raises(DataError, match=r"at 100000 samples a second this log of 1200 samples lasts 0\.012 s"):
+        average_raw_log(read("# sample_rate_hz: 100000\n" + timeless))
+
+
+def test_a_clock_that_began_again_does_not_change_the_sample_rate() -> None:
+    time_s = np.concatenate([0.01 * np.arange(700), 0.01 * np.arange(500)])
+    assert log_rate_hz(time_s, 0.0, "some.csv") == pytest.approx(100.0)
+    assert log_rate_hz(time_s, 100.0, "some.csv") == pytest.approx(100.0)
+    assert log_rate_hz(None, 50.0, "some.csv") == 50.0
+    assert log_rate_hz(np.zeros(5), 0.0, "some.csv") == 0.0
 
 
 def test_rows_that_are_there_twice() -> None:
