@@ -23,7 +23,7 @@ from drivers.transport.link import Link
 Settings = TypeVar("Settings", bound=DigitalSettings)
 QUIET_S = 2.0  # silence that ends a record; at least ten samples
 POLL_S = 0.4  # samples that wait in the buffers of the system are read so often
-STUCK = 100  # equal samples of one axis, while another changes
+STUCK = 100  # equal samples of one axis in successive records, while another changes
 RATE_OFF = 0.05  # of the stated rate
 TEST_S = 2.0
 SHOWN = 3  # damaged lines or messages before a share of them can be judged
@@ -66,6 +66,7 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         self.name, self.settings = name, settings
         self._link, self._clock = link, link.clock
         self._tally, self._warmth = self._new_tally(), Thermometer()
+        self._equal: dict[str, tuple[float, int]] = {}  # of outputs: the last value, and its successive samples
 
     @property
     @abstractmethod
@@ -232,13 +233,23 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
                 f"{self.name}: {over[0]} reached the end of its range, {end:g} {self.settings.units[over[0]]}",
                 "Keep the sensor still, set a wider range in it, or correct `range` in the bench file",
             )
-        still = np.ptp(values, axis=0) == 0
-        if len(values) >= STUCK and still.any() and not still.all():
-            name = names[int(np.argmax(still))]
+        if stuck := self._stuck(values, names):
             raise SensorFault(
-                f"{self.name}: {name} gave the same value {len(values)} times while others changed: it is stuck",
-                "Switch the sensor off and on; check that the output is the right one",
+                f"{self.name}: {stuck} gave the same value {self._equal[stuck][1]} times while others changed: it is "
+                "stuck",
+                "Switch the sensor off and on; check that the output is the right one; measure the poses since then "
+                "again",
             )
+
+    def _stuck(self, values: NDArray[np.float64], names: Sequence[str]) -> str:
+        """The first output that gave STUCK equal samples; "" for none. Short records count together."""
+        still = np.ptp(values, axis=0) == 0
+        if still.all():  # of a coarse sensor at rest; it says nothing
+            return ""
+        for name, value, same in zip(names, values[0].tolist(), still.tolist(), strict=True):
+            before, count = self._equal.get(name, (value, 0))
+            self._equal[name] = (value, count * (before == value) + len(values)) if same else (value, 0)
+        return next((name for name in names if self._equal[name][1] >= STUCK), "")
 
 
 def _most(values: NDArray[np.float64]) -> float:

@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from drivers.errors import SensorFault
+from drivers.imu_lines import driver as imu_lines
 from drivers.mavlink_imu import driver as mavlink_imu
 from drivers.transport.faults import Fault
 from drivers.world.config import WorldConfig
@@ -19,6 +21,28 @@ SETTINGS = {"mavlink_imu": mavlink_imu.Settings, "xsens_mti": xsens_mti.Settings
 
 def connect(digital: DigitalSensors, driver: str, *faults: Fault, world: Any = None, **keys: Any) -> Any:
     return digital.connect(driver, SETTINGS[driver](**keys), *faults, world=world)
+
+
+@pytest.mark.parametrize("driver", ["imu_lines", *SETTINGS])
+def test_a_stuck_axis_is_noticed_over_short_records(digital: DigitalSensors, driver: str) -> None:
+    settings = (SETTINGS | {"imu_lines": imu_lines.Settings})[driver](rate_hz=100.0)
+    adc = digital.connect(driver, settings, Fault("stuck-axis", at_s=2.0))
+    adc.acquire(0.2)
+    adc._clock.sleep(4.0)
+    for _ in range(4):
+        adc.acquire(0.2)
+        adc._clock.sleep(3.0)
+    with pytest.raises(SensorFault, match="ax gave the same value 100 times while others changed"):
+        adc.acquire(0.2)
+
+
+@pytest.mark.parametrize("driver", ["imu_lines", *SETTINGS])
+def test_an_axis_that_repeats_a_value_between_changes_is_not_stuck(digital: DigitalSensors, driver: str) -> None:
+    settings = (SETTINGS | {"imu_lines": imu_lines.Settings})[driver](rate_hz=100.0)
+    adc = digital.connect(driver, settings, *(Fault("stuck-axis", at_s=float(t), for_s=3.0) for t in range(2, 60, 12)))
+    for _ in range(12):
+        adc.acquire(0.2)
+        adc._clock.sleep(3.0)
 
 
 @pytest.mark.slow
