@@ -92,7 +92,7 @@ def named(found: Optimal, model: Model) -> dict[str, bool]:
         config = rigs.scaled(DEFECTS[mechanism], rigs.IDEAL, 1, TIMES_NOISE * rigs.noise_floor_v())
         table = measured(config, 1, found.equal.poses, found.equal.dwell_s)
         path = diagnose(table, model, catalogue()).path
-        said[mechanism] = bool(path.steps) and path.steps[0].taken.name in effects
+        said[mechanism] = bool(path.steps) and path.steps[0].selected.name in effects
     return said
 
 

@@ -82,7 +82,7 @@ def test_an_effect_that_later_ones_make_needless_is_dropped() -> None:
     first = find_path(found.start, (), catalogue()).steps
     assert len(first) > 2  # another was taken first, which explained a part of both
     assert found.end.pooled_excess < 1.15
-    assert not found.end.model.holds(first[0].taken.name)
+    assert not found.end.model.holds(first[0].selected.name)
 
 
 @pytest.mark.parametrize("alpha_deg", [90.0, None])
