@@ -208,6 +208,7 @@ def test_a_run_without_poses_is_made_by_keyboard_and_leads_to_its_results(workbe
     page.keyboard.press("Enter")
     expect(page.get_by_role("dialog")).to_be_visible()
     tab_to(page, "Cancel")  # over all checks, which enables Begin before it
+    expect(page.get_by_role("dialog").get_by_role("button", name="Begin")).to_be_enabled()
     page.keyboard.press("Shift+Tab")
     expect(page.get_by_role("dialog").get_by_role("button", name="Begin")).to_be_focused()
     page.keyboard.press("Enter")
