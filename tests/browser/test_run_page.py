@@ -59,15 +59,15 @@ def test_a_newcomer_gets_from_the_empty_record_to_the_falling_error(workbench: W
     expect(page.get_by_text("There are no measurements yet")).to_be_visible()
     workbench.shot(page, "empty")
     page.get_by_role("button", name="Measure").click()
-    page.get_by_label("step (deg)").fill("30")  # long enough that the run lasts while its page is looked at
+    page.get_by_label("step (deg)").fill("15")  # long enough that the run lasts while its page is looked at
     page.get_by_label("inclinations (deg)").fill("90,30,150,60")
-    expect(page.get_by_text("104 poses")).to_be_visible()
+    expect(page.get_by_text("200 poses")).to_be_visible()
     workbench.shot(page, "plan")
     begin(page)
     phase(page, "running")
+    expect(page.get_by_role("button", name="Stop")).to_have_count(2)  # at the run, and in the head of every page
     expect(page.locator(".tiles").get_by_text("as usual").first).to_be_visible()
     expect(page.locator(".tiles").get_by_text("−20 to 85 °C")).to_be_visible()
-    expect(page.get_by_role("button", name="Stop")).to_have_count(2)  # at the run, and in the head of every page
     workbench.shot(page, "running")
     phase(page, "complete")
     expect(page.locator(".live .q-linear-progress__model")).to_have_class(re.compile("without-transition"))
