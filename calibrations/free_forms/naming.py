@@ -117,10 +117,7 @@ def _excess(result: SearchResult) -> float:
 
 
 def _with_substitutes(result: SearchResult, acting: Sequence[ActingPlace]) -> list[ActingPlace]:
-    """The places, the larger of two material of which each can take up most of the other.
-
-    The smaller one is what the data cannot separate from it.
-    """
+    """The places. If two explain most of each other, the larger one counts, and the smaller one is its alternative."""
     out = list(acting)
     for i, place in enumerate(out):
         if (place.material and place.own >= LEAST_SIZE) or place.size < max(LEAST_SIZE, LEAST_SHARE * place.largest):

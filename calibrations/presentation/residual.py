@@ -141,7 +141,7 @@ def nearest_axis(fit: Fit) -> Column:
 
 
 def first_choices(names: Sequence[str], table: Table) -> tuple[str, str]:
-    """What to draw against, and what to colour by, at first.
+    """The first abscissa of the residual chart, and the first column for its colours.
 
     A few poses that are held again and again, as in a soak, are drawn over time.
     """

@@ -1,4 +1,4 @@
-"""Imports and pushes that are killed at moments drawn by a seeded generator, and what must hold after each kill."""
+"""Kill imports and pushes at random moments (seeded), and check the record after each kill."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
-"""Results and verdicts: a limit is met or passed only where the uncertainty leaves no doubt."""
+"""Results: their verdicts, which allow for the uncertainty, and their meanings in words."""
 
+import importlib
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +16,9 @@ from rig.bench import DEFAULT
 from rig.record import Record
 from rig.record.measured import table_of
 from rig.results import Result, documents, returned
-from rig.results.evaluate import names
+from rig.results.evaluate import MODULES, names
+from rig.results.result import EVALUATIONS
+from rig.services.result_meaning import meaning
 
 Rig = Callable[..., Any]
 
@@ -141,3 +144,22 @@ def test_what_was_measured_is_complete_even_if_nothing_comes_of_it(rig: Rig, mon
     assert (ended.status, document["state"], document["results"]) == (1, "complete", {})
     assert "results: none: the stretches are too short" in ended.err
     assert "results: none: the stretches are too short" in rig("show", document["run"]).out
+
+
+@pytest.mark.parametrize("procedure", MODULES)
+def test_each_result_of_a_procedure_has_a_meaning(procedure: str) -> None:
+    importlib.import_module(f"rig.results.{MODULES[procedure]}")
+    results = [name.replace("{axis}", "x") for name in EVALUATIONS[procedure].names]
+    assert results
+    for name in results:
+        assert meaning(name).endswith("."), name
+        assert meaning(f"a1/{name}") == meaning(name)
+
+
+def test_a_meaning_names_the_axes() -> None:
+    assert meaning("theta-xz") == "Component of sensing axis x along reference axis z."
+    assert meaning("bias-x") != meaning("bias-drift-x")
+
+
+def test_a_result_of_a_users_procedure_has_none() -> None:
+    assert meaning("a1/my-own-result") == ""
