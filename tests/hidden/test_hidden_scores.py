@@ -55,3 +55,9 @@ def test_most_sensors_of_another_simulation_get_the_right_answer(kind: str, leas
     scores = [score(n, causes, *timed(shipped, FOLDER / "sets" / f"{n}.csv.gz", 120)) for n, causes in sets.items()]
     wrong = [f"{s.name}: {s.answer}" for s in scores if not s.is_good(kind)]
     assert 1 - len(wrong) / len(scores) >= least, wrong
+
+
+@pytest.mark.slow
+def test_a_small_cause_that_other_places_explain_in_part_is_named() -> None:
+    truth = json.loads((FOLDER / "truth.json").read_text())["triple-315"]["causes"]
+    assert set(shipped(FOLDER / "sets" / "triple-315.csv.gz").causes) == set(truth)
