@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibrations.criteria import LEAST_MAIN_SLOPE, LEAST_OTHER_AXIS, UPRIGHT_COSINE
+from calibrations.criteria import LEAST_MAIN_SLOPE, LEAST_OTHER_AXIS, MOST_MAGNITUDE_SPREAD, UPRIGHT_COSINE
 from calibrations.errors import DataError
 from calibrations.geometry.faces import estimate_faces
 from calibrations.table import AXES, Array, Table
@@ -73,16 +73,21 @@ def is_turned(table: Table, axis: int) -> float:
 def specific_force_g(table: Table) -> Array:
     """Specific force from the columns ax, ay, az, g, shape (n, 3): calibrated by six faces, or else by its magnitude.
 
-    Raises DataError where it is 0 throughout.
+    Raises DataError where it is 0 throughout, or its magnitude is not that of gravity.
     """
     a = np.column_stack([table.column(f"a{axis}") for axis in AXES])
     still = table.column("rate_deg_s") == 0
     faces = estimate_faces(a[still]) if still.any() else None
     if faces is not None:
         return (a - faces.bias) / faces.scale
-    gravity = float(np.median(np.linalg.norm(a, axis=1)))
+    low, gravity, high = np.quantile(np.linalg.norm(a, axis=1), [0.25, 0.5, 0.75])
     if not gravity > 0:
         raise DataError(f"{table.source}: ax, ay and az are 0; remove the columns if there was no accelerometer")
+    if high - low > MOST_MAGNITUDE_SPREAD * gravity:
+        raise DataError(
+            f"{table.source}: ax, ay, az have magnitudes from {low:.3g} to {high:.3g} in half of the rows, and "
+            "gravity has one; exchange them with gx, gy, gz if these hold the accelerations, or remove them"
+        )
     return np.asarray(a / gravity)
 
 

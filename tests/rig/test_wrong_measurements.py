@@ -72,6 +72,7 @@ def test_what_a_file_cannot_show_is_listed_as_such(kind: str, name: str, tmp_pat
     [
         ("beta with wrong steps a turn", "beta_deg is multiplied by 0.8"),
         ("time in milliseconds", "in which no stage turns"),
+        ("both outputs are saturated at the supply", "at its highest value the output or the converter is saturated"),
     ],
 )
 def test_every_command_says_it(rig: Callable[..., Any], tmp_path: Path, command: str, name: str, said: str) -> None:
