@@ -7,6 +7,8 @@ import numpy as np
 
 def main() -> None:
     """Run every compiled kernel once on a small sweep of the simulated rig."""
+    from calibrations.fitting.budget import make_budget
+    from calibrations.fitting.fit import fit
     from calibrations.loop import diagnose
     from calibrations.model.file import read_model
     from calibrations.noise.analysis import analyse
@@ -24,7 +26,9 @@ def main() -> None:
     codes_of_volts(volts, [Calibration(3.2e-4, -3.2e-4, 33523.0, -10.6)] * 3)
     still = [np.random.default_rng(1).standard_normal(1000)]
     analyse(reduce_record([Samples("x", still, 1000.0, "V")], "warm", every_deviation=True))
-    diagnose(Table.from_columns("poses", columns, {}, "warm"), read_model("linear"))
+    table = Table.from_columns("poses", columns, {}, "warm")
+    make_budget(fit(read_model("linear"), table), ())
+    diagnose(table, read_model("linear"))
 
 
 if __name__ == "__main__":

@@ -96,10 +96,10 @@ def repeated(fit: Fit) -> tuple[float, int]:
     names = [name for name in ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip") if name in fit.table]
     angles = np.column_stack([fit.table.column(name) for name in names])
     _, group = np.unique(np.round(angles, 6), axis=0, return_inverse=True)
-    membership = np.eye(int(group.max()) + 1)[group.ravel()]  # (n, groups)
-    white = fit.residual / _white(fit.problem)
-    deviation = white - (white @ membership / membership.sum(axis=0)) @ membership.T
-    return float(np.sum(deviation**2)), len(white) * (fit.table.n - membership.shape[1])
+    group, white = group.ravel(), fit.residual / _white(fit.problem)
+    count = np.bincount(group)
+    means = np.array([np.bincount(group, channel) / count for channel in white])
+    return float(np.sum((white - means[:, group]) ** 2)), len(white) * (fit.table.n - len(count))
 
 
 def _standardised(fit: Fit, problem: Problem) -> Array:

@@ -32,6 +32,8 @@ from calibrations.table import Array, Table
 
 SCALES = (0.1, 0.25, 0.5, 0.8, 0.9, 1.0, 1.1, 1.25, 2.0, 4.0, 10.0)  # where the search for a stage's scale begins
 SHIFTS = (1, -1, 2, -2)  # rows
+CHANGE_STEPS = 24  # between the rows at which a round of the search for a change looks
+ENOUGH_ROWS = 2000  # for the start of a search of a stage's scale
 COLUMNS = ("alpha_deg", "beta_deg")
 
 
@@ -80,12 +82,13 @@ class _Angle(NamedTuple):
 def _scaled(table: Table, limit: float) -> str | None:
     """A stage angle with a wrong factor, or with a zero that is wrong by tens of degrees."""
     angles = []
+    some = _some_rows(table)
     for column in COLUMNS:
         if np.ptp(table.column(column)) == 0:
             continue
         shifted = _refined(_Angle(column, 1.0, 0.0), table, free_scale=False)
-        starts = [_best_zero(column, scale, table) for scale in SCALES]
-        start = starts[int(np.argmin([_worst_share(angle, table) for angle in starts]))]
+        starts = [_best_zero(column, scale, some) for scale in SCALES]
+        start = starts[int(np.argmin([_worst_share(angle, some) for angle in starts]))]
         scaled = _refined(start, table, free_scale=True)
         angles += [(_worst_share(shifted, table), shifted), (_worst_share(scaled, table), scaled)]
     angles = [(share, angle) for share, angle in angles if share <= limit]
@@ -105,6 +108,14 @@ def _scaled(table: Table, limit: float) -> str | None:
             "unit of this stage"
         )
     return None
+
+
+def _some_rows(table: Table) -> Table:
+    """Rows drawn at random, since a fixed step could fall on the same angles each time; all rows of a short table."""
+    if table.n <= ENOUGH_ROWS:
+        return table
+    drawn = np.random.default_rng(0).choice(table.n, ENOUGH_ROWS, replace=False)
+    return table.rows(np.sort(drawn))
 
 
 def _by_sensor(table: Table) -> float:
@@ -175,10 +186,12 @@ def _changed(table: Table, limit: float) -> str | None:
     first, last = FEWEST_RESPONSE_ROWS, table.n - FEWEST_RESPONSE_ROWS
     if last <= first:
         return None
-    coarse = range(first, last, max(1, (last - first) // 24))
-    best = min(coarse, key=lambda k: _two_responses(columns, outputs, k)[0])
-    fine = range(max(first, best - coarse.step), min(last, best + coarse.step) + 1)
-    best = min(fine, key=lambda k: _two_responses(columns, outputs, k)[0])
+    rows = range(first, last, max(1, (last - first) // CHANGE_STEPS))
+    best = min(rows, key=lambda k: _two_responses(columns, outputs, k)[0])
+    while rows.step > 1:  # about the best row, ever finer
+        finer = max(1, rows.step // CHANGE_STEPS)
+        rows = range(max(first, best - rows.step), min(last, best + rows.step) + 1, finer)
+        best = min(rows, key=lambda k: _two_responses(columns, outputs, k)[0])
     share, change = _two_responses(columns, outputs, best)
     if share > limit or change < LEAST_RESPONSE_CHANGE:
         return None

@@ -32,7 +32,6 @@ from calibrations.means.noise import Noise
 from calibrations.table import Array
 
 SLOW_NOISE = "slow noise"
-CHUNK = 512  # columns whitened at a time
 MOST_CORRELATED_ROWS = 400  # rows that the freedom of slow noise is worked out on
 
 
@@ -111,12 +110,7 @@ def row_gains(fit: Fit) -> Array:
     channels, n = fit.residual.shape
     rows = np.vstack([fit.whitened[:, 1:], fit.problem.layout.prior_rows])
     inverse = gain(rows, fit.problem.layout.typical)[:, : channels * n].reshape(-1, channels, n)
-    G = np.empty_like(inverse)
-    for first in range(0, n, CHUNK):
-        unit = np.eye(n)[:, first : first + CHUNK]
-        white = fit.noise.whiten(np.broadcast_to(unit, (channels, *unit.shape))).reshape(channels, n, -1)
-        G[:, :, first : first + CHUNK] = np.einsum("pcn,cnk->pck", inverse, white)
-    return G
+    return fit.noise.whiten_transposed(inverse.transpose(1, 2, 0)).transpose(2, 0, 1)
 
 
 def _of_type_a(fit: Fit, G: Array, square: float) -> list[Line]:

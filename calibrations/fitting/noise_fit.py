@@ -17,6 +17,7 @@ Source  Patterson and Thompson, Biometrika 58 (1971): restricted likelihood; Hoe
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -32,6 +33,7 @@ from calibrations.table import Array
 
 # Compiled loops over a grid of noises: on matrices of a few columns each, calls would cost more than the sums.
 
+LONG = 5000  # rows from which channels are worth a thread each
 LEVEL_ROUNDS = 3  # in which levels settle
 RIDGE = 1e-13  # of each diagonal element
 TINY = np.finfo(np.float64).tiny
@@ -248,7 +250,14 @@ class NoiseSearch:
         columns = np.concatenate([smooth, basis, self.residual[:, :, None]], axis=2)
         fast, gap_s, k = self.noise.fast, self.noise.gap_s, self.smooth.shape[1]
         known = self.noise.given or ((),) * len(basis)
-        return [_grams(gap_s, fast[c], columns[c], self.grid, k, known[c]) for c in range(len(basis))]
+
+        def of(c: int) -> Grams:
+            return _grams(gap_s, fast[c], columns[c], self.grid, k, known[c])
+
+        if len(fast[0]) < LONG:
+            return [of(c) for c in range(len(basis))]
+        with ThreadPoolExecutor() as pool:
+            return list(pool.map(of, range(len(basis))))
 
     @cached_property
     def _flickers(self) -> NDArray[np.bool_]:

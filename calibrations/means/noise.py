@@ -24,7 +24,7 @@ from functools import cached_property
 import numpy as np
 
 from calibrations.criteria import NO_SCATTER
-from calibrations.means.whitening import whiten
+from calibrations.means.whitening import whiten, whiten_transposed
 from calibrations.table import Array, Table, std_column
 
 Processes = tuple[tuple[float, float], ...]  # (standard deviation, time constant in s) of Gauss-Markov processes
@@ -113,9 +113,21 @@ class Noise:
         """(channels, n, k) -> (channels * n, k), each row of unit variance and independent of the others."""
         return np.concatenate([self._whiten_channel(c, columns[c])[0] for c in range(len(columns))])
 
+    def whiten_transposed(self, columns: Array) -> Array:
+        """(channels, n, k), multiplied by the transpose of the matrix by which `whiten` multiplies each channel."""
+        return np.stack(
+            [
+                whiten_transposed(np.ascontiguousarray(of), self.gap_s, self.fast[c], *_arrays(self._processes(c)))
+                for c, of in enumerate(columns)
+            ]
+        )
+
     def _whiten_channel(self, c: int, columns: Array) -> tuple[Array, float]:
         known_processes = self.given[c] if self.given else ()
         return correlated(columns, self.gap_s, self.fast[c], float(self.slow[c]), self.taus_s[c], known_processes)
+
+    def _processes(self, c: int) -> Processes:
+        return processes(float(self.slow[c]), self.taus_s[c], self.given[c] if self.given else ())
 
     @cached_property
     def logdet(self) -> float:
@@ -128,8 +140,7 @@ def correlated(
     columns: Array, gap_s: Array, fast: Array, slow: float, taus_s: tuple[float, ...], known: Processes = ()
 ) -> tuple[Array, float]:
     """Columns (n, k) of one channel made white, and log det Sigma."""
-    stds, times_s = (np.array(values) for values in zip(*processes(slow, taus_s, known), strict=True))
-    out, logdet = whiten(np.ascontiguousarray(columns), gap_s, fast, stds, times_s)
+    out, logdet = whiten(np.ascontiguousarray(columns), gap_s, fast, *_arrays(processes(slow, taus_s, known)))
     return out, float(logdet)
 
 
@@ -137,6 +148,12 @@ def processes(slow: float, taus_s: tuple[float, ...], known: Processes = ()) -> 
     """Those that make up slow noise of a standard deviation, evenly shared, and those that are given."""
     std = slow / len(taus_s) ** 0.5
     return (*((std, tau_s) for tau_s in taus_s if slow or not known), *known)
+
+
+def _arrays(processes: Processes) -> tuple[Array, Array]:
+    """Standard deviations and time constants."""
+    stds, times_s = (np.array(values) for values in zip(*processes, strict=True))
+    return stds, times_s
 
 
 def _about_mean(processes: Processes, span_s: float) -> float:

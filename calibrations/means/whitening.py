@@ -1,4 +1,4 @@
-"""The compiled filter that makes columns white. It lets other threads go on (nogil)."""
+"""The compiled filter that makes columns white, and its transpose. They let other threads go on (nogil)."""
 
 from __future__ import annotations
 
@@ -60,3 +60,40 @@ def whiten(columns: Array, gap_s: Array, white: Array, slow: Array, tau_s: Array
                 P[p, q] -= gain[p] * gain[q] / total
         logdet += np.log(total)
     return out, logdet
+
+
+@njit(cache=True, nogil=True)
+def whiten_transposed(columns: Array, gap_s: Array, white: Array, slow: Array, tau_s: Array) -> Array:
+    """W^T times columns (n, k), where W is the matrix by which `whiten` multiplies; arguments as there.
+
+    The same filter with its steps in reverse order, so that W (n, n) is not made.
+    """
+    n, k = columns.shape
+    m = len(slow)
+    gains, phis, scales = np.zeros((n, m)), np.zeros((n, m)), np.zeros(n)
+    P = np.diag(slow * slow)
+    for i in range(n):
+        if i:
+            for p in range(m):
+                phis[i, p] = np.exp(-gap_s[i] / tau_s[p])
+            for p in range(m):
+                for q in range(m):
+                    P[p, q] *= phis[i, p] * phis[i, q]
+                P[p, p] += slow[p] * slow[p] * (1.0 - phis[i, p] * phis[i, p])
+        gain = P.sum(axis=1)
+        total = white[i] * white[i] + gain.sum()
+        scales[i] = 1.0 / np.sqrt(total)
+        for p in range(m):
+            gains[i, p] = gain[p] / total
+            for q in range(m):
+                P[p, q] -= gain[p] * gain[q] / total
+    out = np.empty_like(columns)
+    later = np.zeros((m, k))  # what the rows after this one add to the state
+    for i in range(n - 1, -1, -1):
+        for j in range(k):
+            out[i, j] = columns[i, j] * scales[i]
+            for p in range(m):
+                out[i, j] += gains[i, p] * later[p, j]
+            for p in range(m):
+                later[p, j] = phis[i, p] * (later[p, j] - out[i, j])
+    return out

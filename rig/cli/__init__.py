@@ -5,6 +5,7 @@ It returns nothing, or the exit status (1: done, and a limit or check was not me
 
 from __future__ import annotations
 
+import gc
 import importlib
 import os
 import sys
@@ -99,6 +100,7 @@ class Commands(click.Group):
                 formatter.write_dl([(name.ljust(width), summary) for name, (_, summary) in section.items()])
 
 
+NEW_OBJECTS = 50_000  # between two collections of garbage: imports make many objects, and none of them is garbage
 COMPLETE = "_RIG_COMPLETE"  # set by the completion script of a shell
 
 
@@ -116,6 +118,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command and exit with its status; an error is one message."""
     # Before numpy is imported: the matrices are small, and threads that wait for each other slow a busy machine.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    gc.set_threshold(NEW_OBJECTS)
 
     if instruction := os.environ.get(COMPLETE):  # the shell asks what may follow
         from click.shell_completion import shell_complete

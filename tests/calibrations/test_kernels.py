@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from calibrations.effects.kernels import slip
 from calibrations.means.noise import Noise, rms, white_only
-from calibrations.means.whitening import whiten
+from calibrations.means.whitening import whiten, whiten_transposed
 from calibrations.table import Array
 
 
@@ -37,6 +37,8 @@ def test_whiten_is_the_dense_covariance(seed: int, processes: list[tuple[float, 
     np.testing.assert_allclose(out, dense, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(out.T @ out, columns.T @ np.linalg.solve(sigma, columns), rtol=1e-9, atol=1e-9)
     assert logdet == pytest.approx(2 * np.sum(np.log(np.diag(lower))), rel=1e-9, abs=1e-9)
+    transposed = np.linalg.solve(lower.T, columns)
+    np.testing.assert_allclose(whiten_transposed(columns, gap_s, white, slow, taus_s), transposed, rtol=1e-9, atol=1e-9)
 
 
 def test_noise_value_agrees_with_its_formula() -> None:

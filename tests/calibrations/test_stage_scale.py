@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.discovery.plausibility import rejection
+from calibrations.discovery.plausibility import refusal, rejection
 from calibrations.fitting.fit import fit
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.model.file import read_model
@@ -38,3 +38,16 @@ def test_a_scale_of_a_stage_that_is_off_is_named(scale: float) -> None:
 @pytest.mark.parametrize("size", [-0.012, 0.008])
 def test_a_scale_factor_over_the_third_axis_is_no_scale_of_a_stage(size: float) -> None:
     assert rejection(fit(read_model("linear"), table(ALPHA_DEG, size))) is None
+
+
+@pytest.mark.parametrize("turns", [3, 20])
+def test_the_row_is_named_at_which_a_sensor_moved_on_its_mount(turns: int) -> None:
+    short = table(ALPHA_DEG, 0.0)
+    columns = {name: np.tile(values, turns) for name, values in short.columns.items()}
+    columns["t_s"] = 8.0 * np.arange(turns * short.n)
+    row = turns * short.n * 2 // 3 + 5
+    columns["vx_v"][row:] = 2.5 + 0.8 * (columns["vx_v"][row:] - 2.5) + 0.3 * (columns["vy_v"][row:] - 2.5)
+    moved = Table.from_columns("poses", columns)
+    found = refusal(moved)
+    assert found is not None
+    assert f"the rows from #{row} on" in found.text
