@@ -244,7 +244,7 @@ class Findings(Generic[F]):
     def _closest(self) -> Closest | None:
         """The best candidate if no effect is significant, and if chance alone seldom shows as much."""
         best = next(iter(self.candidates), None)
-        if self.steps or best is None or best.held_out_after >= self.baseline.held_out_excess:
+        if self.steps or self.added or best is None or best.held_out_after >= self.baseline.held_out_excess:
             return None
         noteworthy = best.p_value < NOTEWORTHY or best.probability > LIKELY
         return Closest(best.name, best.p_value) if noteworthy else None

@@ -106,9 +106,22 @@ class Judgement:
 
     @property
     def summary(self) -> str:
-        """The text; where many effects are missing, a sentence with their number."""
+        """The text, or a short sentence: that the added effects complete the model, or how many effects are missing."""
+        if self._complete:
+            return "No effect is missing."
         is_long = len(self.missing) > MOST_NAMED and self.verdict in (Verdict.EFFECT_MISSING, Verdict.AMBIGUOUS)
         return f"The model {self.model} misses {len(self.missing)} effects." if is_long else self.text
+
+    @property
+    def rest(self) -> str:
+        """The part of the text that the summary leaves out."""
+        if self._complete:
+            return " ".join([*_details(self), *self.remarks])
+        return "" if self.summary == self.text else self.text
+
+    @property
+    def _complete(self) -> bool:
+        return bool(self.added) and self.verdict is Verdict.ADEQUATE
 
 
 class Residual(Enum):

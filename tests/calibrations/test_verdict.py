@@ -45,6 +45,16 @@ def test_a_candidate_that_chance_seldom_shows_is_named_with_its_threshold(clean:
     assert replace(clean.findings, candidates=(unseen,)).given.text == clean.judgement.text
 
 
+def test_effects_that_complete_a_model_are_not_called_missing_from_it(clean: Diagnosis[Fit]) -> None:
+    judgement = Judgement(model="linear", added=("a", "b"))
+    assert judgement.summary == "No effect is missing."
+    assert judgement.rest == "With a and b, no effect is missing. Remaining error: 1 times the noise floor."
+    best = replace(clean.candidates[0], p_value=0.009, held_out_after=0.9 * clean.held_out_before)
+    followed = replace(clean.findings, candidates=(best,), added=("a",))
+    assert "With a, no effect is missing." in followed.given.text  # as `rig discover` writes it
+    assert Judgement(model="linear", missing=("a",)).rest == ""
+
+
 @pytest.mark.parametrize(
     ("facts", "verdict"),
     [
