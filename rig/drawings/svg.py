@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from html import escape
 
@@ -61,6 +62,7 @@ def text(
     at: Point, words: str, size: float = 12.0, colour: str = INK, anchor: str = "middle", bold: bool = False
 ) -> str:
     """One line of words with its middle at the height `at`, on a halo of paper that keeps it legible."""
+    words = re.sub(r"(?<!\w)-(?=\d)", "−", words)
     look = {"font_size": size, "fill": colour, "text_anchor": anchor, "font_weight": "600" if bold else "400"}
     halo = {"stroke": PAPER, "stroke_width": 3, "stroke_linejoin": "round", "paint_order": "stroke"}
     return element("text", escape(words), x=at[0], y=at[1] + 0.35 * size, **look, **halo)
