@@ -144,6 +144,16 @@ def test_a_setting_that_takes_one_of_a_few_is_a_list_and_what_they_mean_is_told(
     expect(page.get_by_text("252 poses")).to_be_visible()
 
 
+def test_procedure_and_settings_are_in_the_address(workbench: Workbench) -> None:
+    page = workbench.visit("/run")
+    page.get_by_label("step (deg)").fill("90")
+    expect(page).to_have_url(re.compile(r"/run\?procedure=sweep&step_deg=90$"))
+    page.reload()
+    expect(page.get_by_label("step (deg)")).to_have_value("90")
+    page.get_by_label("step (deg)").fill("10")
+    expect(page).to_have_url(re.compile("/run$"))
+
+
 def test_the_bench_is_checked(workbench: Workbench) -> None:
     page = workbench.visit("/run")
     page.get_by_role("button", name="Check the instruments").click()

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlencode
 
 from fastapi import Request
 from nicegui import ui
@@ -147,7 +148,7 @@ class Planning:
         self.bench_file, self.bench = bench_file, bench
         self.given = {name: value for name, value in settings.items() if name != "procedure"}
         self.started: Callable[[], Awaitable[None]] | None = None
-        self.turn = 0
+        self.turn, self.address = 0, ""
         self.planned: Plan | None = None
         names = {name: f"{name}: {summary(path)}" for name, path in paths(bench.folders.procedures).items()}
         chosen = settings.get("procedure", DEFAULT_PROCEDURE)
@@ -209,11 +210,20 @@ class Planning:
         texts = {name: str(field.value or "").strip() for name, field in self.inputs.items()}
         return {name: text for name, text in texts.items() if text != setting_text(defaults[name])}
 
+    def _tell_address(self) -> None:
+        """Write procedure and settings into the address, so that they survive a reload and can be passed on."""
+        query = {"procedure": self.procedure.name, **self.settings()}
+        address = "/run" if query == {"procedure": DEFAULT_PROCEDURE} else f"/run?{urlencode(query)}"
+        if address != self.address:
+            self.address = address
+            ui.navigate.history.replace(address)
+
     async def replan(self) -> None:
         """Plan the run with the present settings."""
         self.turn += 1
         turn, self.planned = self.turn, None
         self.button.disable()
+        self._tell_address()
         self.plan.clear()
         with self.plan:
             waiting("Planning; nothing moves")

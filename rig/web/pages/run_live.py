@@ -64,6 +64,7 @@ class Live:
                 self.attitude = div("attitude").on("click", self._enlarge)
                 self.values = div("")
                 self.over_time = OverTime()
+        self.box.set_visibility(False)  # until the first look: no button of a run that is not there
         ui.timer(LOOK_S, self.look)
 
     def buttons(self) -> None:
