@@ -70,6 +70,12 @@ def test_a_hidden_effect_is_found_added_saved_and_undone(workbench: Workbench, t
     expect(page.get_by_text("written:")).to_be_visible()
     model = read_model(workbench.home / "models" / "sensor-17.yaml")
     assert model.effects == ("bias", "scale-factor", "axis-misalignment")
+    page.get_by_role("button", name="Save model").click()  # nothing is replaced unasked
+    page.get_by_role("dialog").get_by_label("Name").fill("sensor 17")
+    page.get_by_role("button", name="Save", exact=True).click()
+    expect(page.get_by_text("sensor-17.yaml exists already.")).to_be_visible()
+    page.get_by_role("button", name="Replace").click()
+    expect(page.get_by_role("dialog")).to_have_count(0)
     workbench.shot(page, "nothing-missing")
     workbench.fits(page)
     sentence, figures = (page.locator(f".verdict > .{part}").bounding_box() for part in ("grow", "numbers"))

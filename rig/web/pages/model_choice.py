@@ -120,10 +120,16 @@ class Choice:
             if self.page.session is not None:
                 words(f"Fitted to {self.page.session.data.description}.", "small")
             where = words(f"Folder: {home() / MODELS}", "quiet small")
+            name.on_value_change(lambda: button.set_text("Save"))
 
             def save() -> None:
+                path = _file_of(str(name.value))
+                if path.exists() and button.text == "Save":
+                    where.set_text(f"{path.name} exists already. Replace it, or choose another name.")
+                    button.set_text("Replace")
+                    return
                 try:
-                    path = self._saved(str(name.value))
+                    self._write(path)
                 except (RigError, CalibrationError, OSError) as error:
                     where.set_text(message(error))
                     return
@@ -132,7 +138,7 @@ class Choice:
                 ui.notify(f"written: {path}", type="positive")
 
             with ui.element("div").classes("row-of"):
-                ui.button("Save", on_click=save)
+                button = ui.button("Save", on_click=save)
                 ui.button("Download", on_click=lambda: ui.download.content(self._text(), f"{name.value}.yaml")).props(
                     "outline"
                 )
@@ -146,14 +152,11 @@ class Choice:
         assert session is not None  # noqa: S101 the button is enabled with the session
         return dump_model(session.complete_model())
 
-    def _saved(self, name: str) -> Path:
+    def _write(self, path: Path) -> None:
         from rig.files import write_whole
 
-        plain = "".join(c if c.isalnum() or c in "-_." else "-" for c in name.strip()).strip(".") or "model"
-        folder = home() / MODELS
-        folder.mkdir(parents=True, exist_ok=True)
-        write_whole(path := folder / f"{plain}.yaml", self._text())
-        return path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, self._text())
 
     async def _report(self) -> None:
         """Download the report, as from `rig report`."""
@@ -182,6 +185,12 @@ class Choice:
             ui.notify(message(error), type="negative", multi_line=True, timeout=0, close_button="Close")
         finally:
             hint.dismiss()
+
+
+def _file_of(name: str) -> Path:
+    """The file of a saved model with this name."""
+    plain = "".join(c if c.isalnum() or c in "-_." else "-" for c in name.strip()).strip(".") or "model"
+    return home() / MODELS / f"{plain}.yaml"
 
 
 def _runs() -> dict[str, str]:
