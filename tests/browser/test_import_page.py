@@ -93,7 +93,7 @@ def test_a_time_that_fits_minutes_is_asked_about(workbench: Workbench, tmp_path:
 def test_a_file_that_needs_names_leads_from_the_model_page(workbench: Workbench, tmp_path: Path) -> None:
     page = workbench.visit(f"/?data={quote(str(foreign(tmp_path)))}")
     alert = page.get_by_role("alert")
-    expect(alert).to_contain_text("Cannot use this model")
+    expect(alert).to_contain_text("Cannot analyse")
     assert "rig import" not in alert.inner_text()
     alert.get_by_role("button", name="Import").click()
     expect(page.get_by_text("Import theirs.csv")).to_be_visible()

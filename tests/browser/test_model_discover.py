@@ -27,6 +27,9 @@ def test_all_effects_are_added_at_a_click_and_any_can_be_removed(workbench: Work
     page.set_viewport_size(TABLET)
     discover = page.get_by_role("button", name="Discover: add all 2 effects")
     expect(discover).to_be_in_viewport()
+    page.set_viewport_size({"width": TABLET["height"], "height": TABLET["width"]})
+    for name in ("Discover: add all 2 effects", "Add "):
+        expect(page.get_by_role("button", name=name).first).to_be_in_viewport()
     discover.click()
     expect(page.get_by_text("Step 1 of 2: adding").or_(page.get_by_text("Step 2 of 2: adding"))).to_be_visible()
     expect(page.locator(BARS)).to_have_count(3)

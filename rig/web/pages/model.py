@@ -149,7 +149,7 @@ class Workbench:
             self.body.clear()
             with self.body:
                 to = {IMPORT: address(IMPORT, self.data)} if Path(self.data).is_file() else {}
-                failed(f"Cannot use this model with {self.data}", error, self.data, to)
+                failed(f"Cannot analyse {self.data}", error, self.data, to)
             return
         if session.data.form != "rows":  # what is laid out already may hold what a person wrote
             self._lay_out(session.data.form)
@@ -328,12 +328,10 @@ class Workbench:
 
 def _nothing() -> None:
     """The page of an empty record."""
-    why = (
-        "Measure on the rig (simulated, until a bench file names your instruments), or open your own table in the "
-        "field above."
-    )
+    why = "Measure on the rig (simulated, until a bench file names your instruments), or open a table of your own."
     with state("There are no measurements yet", why):
         ui.button("Measure", icon="play_arrow", on_click=lambda: ui.navigate.to("/run?procedure=sweep"))
+        ui.button("Open a file", icon="upload_file", on_click=lambda: ui.navigate.to("/import")).props("outline")
 
 
 def _newest() -> str:

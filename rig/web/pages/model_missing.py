@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -16,7 +17,18 @@ from calibrations.presentation.report.report import next_takes, next_words
 from calibrations.presentation.views import view_of
 from calibrations.text import capital, probability, rounded
 from rig.web.calculations import off_loop
-from rig.web.parts import box, div, facts, failed, message, waiting, words
+from rig.web.parts import (
+    box,
+    buttons,
+    div,
+    facts,
+    failed,
+    message,
+    setting_label,
+    setting_text,
+    waiting,
+    words,
+)
 
 if TYPE_CHECKING:
     from calibrations.discovery.findings import Candidate, Step
@@ -157,23 +169,28 @@ class Missing:
         assert page.session is not None  # noqa: S101 a diagnosis is of a trail
         with box("note"):
             words("Next experiment", "title")
-            hint = waiting("Planning on the bench")
+            place = div("stack")
+            with place:
+                waiting("Planning on the bench")
         try:
             planned = await off_loop(page.session.with_next, result, notes.append)
-            if hint.is_deleted:  # the page shows another model by now
-                return
-            experiment = planned.next_experiment
-            assert experiment is not None  # noqa: S101 it had one before
-            hint.set_text(" ".join([next_words(experiment), next_takes(experiment), *notes]))
-            settings = {name: _written(value) for name, value in experiment.settings.items()}
-            to = f"/run?{urlencode({'procedure': experiment.procedure, **settings})}"
-            with hint.parent_slot.parent:  # type: ignore[union-attr]
-                ui.button("Prepare this run", icon="science", on_click=lambda: ui.navigate.to(to)).props(
-                    "outline dense"
-                )
         except Exception as error:
-            if not hint.is_deleted:
-                hint.set_text(message(error))
+            if not place.is_deleted:  # else the page shows another model by now
+                place.clear()
+                with place:
+                    words(message(error), "quiet")
+            return
+        if place.is_deleted:
+            return
+        experiment = planned.next_experiment
+        assert experiment is not None  # noqa: S101 it had one before
+        settings = {name: setting_text(value) for name, value in experiment.settings.items()}
+        labelled = replace(experiment, settings={setting_label(name): text for name, text in settings.items()})
+        to = f"/run?{urlencode({'procedure': experiment.procedure, **settings})}"
+        place.clear()
+        with place:
+            words(" ".join([next_words(labelled), next_takes(experiment), *notes]), "quiet")
+            buttons({"Prepare this run": to})
 
     async def look_at(self, c: Candidate, look: bool = False) -> None:
         """Draw the candidate in the residual; with `look`, against the column that it follows."""
@@ -218,14 +235,14 @@ class Card:
             self.body = div("body")
             self.body.set_visibility(False)
             with self.body:
-                self._describe(result)
+                words(capital(c.effect.summary))
                 with div("row-of"):
                     ui.button(f"Add {c.name}", icon="add", on_click=lambda: side.add(c)).props("dense unelevated")
                     ui.button("Show the curve", on_click=lambda: side.look_at(c, look=True)).props("dense flat")
+                self._describe(result)
 
     def _describe(self, result: Diagnosis[Any]) -> None:
         c = self.c
-        words(capital(c.effect.summary))
         ui.html(formula_html(c.effect.formula, self.side.unit), sanitize=False).classes("formula")  # it escapes
         with div("chance"):
             div("").style(f"width: {100 * c.probability:.1f}%")
@@ -252,11 +269,6 @@ class Card:
             self.head.props("aria-expanded=false")
         else:
             self.open()
-
-
-def _written(value: object) -> str:
-    """A setting as it is written on the command line."""
-    return ",".join(f"{part:g}" for part in value) if isinstance(value, (list, tuple)) else str(value)
 
 
 def chances(c: Candidate) -> str:

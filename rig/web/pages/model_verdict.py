@@ -63,9 +63,8 @@ class VerdictBox:
         """Show the verdict."""
         judgement = result.judgement
         self.headline.set_text(for_page(judgement.summary))
-        rest = "" if judgement.summary == judgement.text else judgement.text
         caution = f"Caution: {result.caution}." if result.caution else ""
-        self._show(" ".join(filter(None, (caution, rest, self.described))))
+        self._show(" ".join(filter(None, (caution, judgement.rest, self.described))))
         self.box.classes(remove="good bad doubt", add=LOOKS[result.verdict])
 
     def cancelled(self) -> None:
