@@ -120,7 +120,6 @@ class Choice:
             if self.page.session is not None:
                 words(f"Fitted to {self.page.session.data.description}.", "small")
             where = words(f"Folder: {home() / MODELS}", "quiet small")
-            name.on_value_change(lambda: button.set_text("Save"))
 
             def save() -> None:
                 path = _file_of(str(name.value))
@@ -138,7 +137,8 @@ class Choice:
                 ui.notify(f"written: {path}", type="positive")
 
             with ui.element("div").classes("row-of"):
-                button = ui.button("Save", on_click=save)
+                button: ui.button = ui.button("Save", on_click=save)
+                name.on_value_change(lambda: button.set_text("Save"))
                 ui.button("Download", on_click=lambda: ui.download.content(self._text(), f"{name.value}.yaml")).props(
                     "outline"
                 )
