@@ -71,6 +71,7 @@ from rig.record.schema import (
 from rig.record.values import Event, Kept, Line, Run
 
 MOST_LISTED = 5
+MOST_SUGGESTED = 20  # names of a kind from which a suggestion is chosen
 MOST_LINES = 1000  # of the log in memory
 
 
@@ -280,7 +281,7 @@ class Record:
             listed = ", ".join(sorted(row.run for row in rows)[:MOST_LISTED])
             raise UnknownRun(f"{len(rows)} runs in {self.where} begin with {name!r}: {listed}; write more of the id")
         sensor = name.removeprefix(f"{LAST} ")
-        if of_sensor := runs_of_sensor(self.runs(), name):
+        if of_sensor := runs_of_sensor(all_runs := self.runs(), name):
             if len(of_sensor) == 1 or sensor != name:
                 return of_sensor[0]
             listed = ", ".join(match.run for match in of_sensor[:MOST_LISTED])
@@ -288,7 +289,9 @@ class Record:
                 f"{len(of_sensor)} runs in {self.where} are of the sensor {name!r}: {listed}"
                 f"{' ...' if of_sensor[MOST_LISTED:] else ''}; write an id, or '{LAST} {name}' for the newest one"
             )
-        raise UnknownRun(f"no run {name!r} in {self.where}.{did_you_mean(sensor, list(dict.fromkeys(known))[-20:])}")
+        newest_sensors = list(dict.fromkeys(own for run in all_runs for own in run.sensors))[:MOST_SUGGESTED]
+        names = [*list(dict.fromkeys(known))[-MOST_SUGGESTED:], *newest_sensors]
+        raise UnknownRun(f"no run {name!r} in {self.where}.{did_you_mean(sensor, names)}")
 
     def poses(self, run: str) -> list[Pose]:
         """The poses in order, without the excluded ones."""

@@ -50,6 +50,13 @@ def test_a_sensor_names_its_only_run_and_last_names_the_newest_of_several() -> N
                 record.run(odd)
 
 
+def test_a_misspelt_sensor_is_suggested() -> None:
+    with Record() as record:
+        of_sensor(record, "soak", "ADXL203", "simulated")
+        with pytest.raises(UnknownRun, match=r"Did you mean 'simulated'\?"):
+            record.run("simulat")
+
+
 def test_the_name_of_a_sensor_of_a_batch_chooses_it_in_its_run() -> None:
     bench = {"sensors": {"a": {"name": "ADXL", "serial": "17"}, "b": {"name": "ADXL", "serial": "18"}}}
     with Record() as record:
