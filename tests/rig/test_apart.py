@@ -282,3 +282,17 @@ def test_a_process_that_ended_before_its_run_began_has_no_run_to_resume() -> Non
     assert ended.error.endswith("it was stopped before the run began")
     assert stop_words(ended) == "Stopped before the run began."
     assert stop_words(replace(ended, error="its process ended: a fault")) == ""
+
+
+def test_the_last_status_counts_the_poses_of_the_record() -> None:
+    """A signal can end the run after a pose is stored and before it is counted."""
+    folder().mkdir(parents=True)
+    writer = status_file.StatusWriter(KEY, "sweep", read_bench(None))
+    with Record() as record:
+        name = record.begin("sweep", {}, bench={}, identities={}, configuration="", source="a test", constants={})
+        writer.begun(name)
+        writer.expect(10, 7)
+        writer.ended(replace(record.run(name), rows=8, state="stopped"), "stopped")
+    last = read(KEY)
+    assert last is not None
+    assert (last.phase, last.done, last.state, last.error) == ("ended", 8, "stopped", "stopped")

@@ -119,7 +119,7 @@ class PublishingObserver(Observer):
     def _end(self) -> None:
         with Record() as record:
             run = record.run(self._run)
-        self._writer.publish(phase="ended", state=run.state, asked=None, error=run.message or "")
+        self._writer.ended(run, run.message or "")
 
 
 # Control of background runs. Every process can control every run.

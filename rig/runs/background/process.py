@@ -105,13 +105,7 @@ def main(text: str) -> None:
         except Exception as error:
             writer.publish(phase="ended", state="failed", asked=None, error=str(error))
             raise
-        writer.publish(
-            phase="ended",
-            state=outcome.run.state,
-            asked=None,
-            error=str(outcome.error or outcome.run.message or ""),
-            moving=outcome.moving,
-        )
+        writer.ended(outcome.run, str(outcome.error or outcome.run.message or ""), moving=outcome.moving)
         push_after(record, outcome.run, Bench.model_validate(outcome.run.bench).lab, print)
 
 

@@ -18,6 +18,7 @@ from rig.bench import Bench, read_bench
 from rig.drawings import drawing_of
 from rig.files import home, write_whole
 from rig.lease import is_held
+from rig.record import Run
 from rig.runs.observer import RunViewer, values
 
 FOLDER = "apart"
@@ -217,6 +218,12 @@ class StatusWriter(RunViewer):
             **changes,
         )
         self._status.write()
+
+    def ended(self, run: Run, error: str, **changes: Any) -> None:
+        """Write the last status, with the poses of the record: a signal can come before a stored one is counted."""
+        done = max(run.rows, self.view.progress.done) if self.view.progress.total else 0
+        self.view = replace(self.view, progress=replace(self.view.progress, done=done))
+        self.publish(phase="ended", state=run.state, asked=None, error=error, **changes)
 
     def begun(self, run: str) -> None:
         super().begun(run)
