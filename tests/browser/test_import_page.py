@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rig.record import Record
-from rig.web.pages.import_file import MOST_BYTES
+from rig.web.pages.import_file import MOST_BYTES, given_name
 from tests.browser.conftest import Workbench
 
 pytestmark = pytest.mark.slow
@@ -97,6 +97,13 @@ def test_a_file_that_needs_names_leads_from_the_model_page(workbench: Workbench,
     assert "rig import" not in alert.inner_text()
     alert.get_by_role("button", name="Import").click()
     expect(page.get_by_text("Import theirs.csv")).to_be_visible()
+
+
+def test_an_uploaded_file_replaces_no_other_of_its_name(tmp_path: Path) -> None:
+    for content, name in (("a", "log.csv"), ("b", "log-2.csv"), ("a", "log.csv"), ("c", "log-3.csv")):
+        (draft := tmp_path / "draft").write_text(content)
+        path = given_name(draft, tmp_path / "log.csv")
+        assert (path.name, path.read_text(), draft.exists()) == (name, content, False)
 
 
 def test_a_file_that_cannot_be_read_says_why(workbench: Workbench, tmp_path: Path) -> None:

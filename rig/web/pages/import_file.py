@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import filecmp
+import secrets
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from urllib.parse import urlencode
@@ -100,17 +103,30 @@ async def _go(path: Path) -> None:
     ui.navigate.to(address(IMPORT, str(path)))
 
 
+def given_name(draft: Path, path: Path) -> Path:
+    """Give an uploaded file its name. With another content than the file of that name, it has a number as well."""
+    number, place = 1, path
+    while place.exists() and not filecmp.cmp(place, draft, shallow=False):
+        number += 1
+        place = path.with_stem(f"{path.stem}-{number}")
+    return draft.replace(place)
+
+
 def upload(done: Callable[[Path], Awaitable[None]]) -> None:
     """A field that takes a file from this computer; `done` receives its path on the server."""
 
     async def received(event: events.UploadEventArguments) -> None:
-        folder = home() / FILES
-        path = folder / Path(event.file.name).name
+        folder, name = home() / FILES, Path(event.file.name).name
+        draft = folder / f".{secrets.token_hex(4)}"
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            await event.file.save(path)
+            await event.file.save(draft)
+            path = given_name(draft, folder / name)
         except OSError as error:  # for example a full disk
-            ui.notify(message(error), type="negative", multi_line=True, timeout=0, close_button="Close")
+            with suppress(OSError):
+                draft.unlink(missing_ok=True)
+            text = f"{name}: cannot be stored: {(error.strerror or str(error)).lower()}"
+            ui.notify(text, type="negative", multi_line=True, timeout=0, close_button="Close")
             return
         await done(path)
 
