@@ -130,7 +130,8 @@ class Choice:
                 try:
                     self._write(path)
                 except (RigError, CalibrationError, OSError) as error:
-                    where.set_text(message(error))
+                    where.set_text(f"{message(error)}. Download keeps the model on this computer.")
+                    where.classes(replace="fault")
                     return
                 dialog.close()
                 self.model.set_options({**self.model.options, **saved_models()})  # type: ignore[dict-item]
