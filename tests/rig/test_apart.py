@@ -14,6 +14,7 @@ from procedures.catalogue import find
 from procedures.errors import SettingError
 from procedures.settings import parse
 from rig.bench import read_bench
+from rig.bench.file import DEMO
 from rig.cli.terminal.watch import Quiet
 from rig.errors import Busy, RigError
 from rig.files import home
@@ -282,6 +283,26 @@ def test_a_process_that_ended_before_its_run_began_has_no_run_to_resume() -> Non
     assert ended.error.endswith("it was stopped before the run began")
     assert stop_words(ended) == "Stopped before the run began."
     assert stop_words(replace(ended, error="its process ended: a fault")) == ""
+
+
+def test_a_process_that_a_full_disk_has_silenced_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    folder().mkdir(parents=True)
+    Status(KEY, 0, "sweep", "the rig", "running", run="a run").write()
+    ended = read(KEY)
+    monkeypatch.setattr(status_file, "free_bytes", lambda _: 0)
+    full = read(KEY)
+    assert ended is not None
+    assert full is not None
+    assert (ended.state, full.state) == ("stopped", "stopped")
+    assert "it was killed" in ended.error
+    assert "the disk is full; free some space" in full.error
+
+
+def test_the_order_to_resume_has_the_bench_of_its_run() -> None:
+    bench = read_bench(DEMO).model_dump(mode="json")
+    with Record() as record:
+        run = record.begin("sweep", {}, bench=bench, identities={}, configuration="", source="a test", constants={})
+    assert Order(KEY, "sweep", resume=run).bench().name == read_bench(DEMO).name
 
 
 def test_the_last_status_counts_the_poses_of_the_record() -> None:

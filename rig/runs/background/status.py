@@ -16,9 +16,9 @@ from typing import Any, Literal
 from procedures.questions import Choice, Confirm, Question
 from rig.bench import Bench, read_bench
 from rig.drawings import drawing_of
-from rig.files import home, write_whole
+from rig.files import free_bytes, home, write_whole
 from rig.lease import is_held
-from rig.record import Run
+from rig.record import Record, Run
 from rig.runs.observer import RunViewer, values
 
 FOLDER = "apart"
@@ -43,7 +43,10 @@ class Order:
     answers: Mapping[str, str] = field(default_factory=dict)
 
     def bench(self) -> Bench:
-        """The bench with the sensor of the order. Raises BenchError."""
+        """The bench with the sensor of the order, or that of the run to resume. Raises BenchError, RecordError."""
+        if self.resume and self.bench_path is None:
+            with Record.to_read() as record:
+                return Bench.model_validate(record.run(self.resume).bench)
         bench = read_bench(self.bench_path)
         return bench.model_copy(update={"sensor": bench.sensor.model_copy(update=dict(self.sensor))})
 
@@ -128,6 +131,7 @@ class Status:
         write_whole(file(self.key, "json"), json.dumps(asdict(self)))
 
 
+LEAST_FREE = 1 << 18  # bytes; with fewer, a process may have ended without words
 NOT_BEGUN = "it was stopped before the run began"
 
 
@@ -185,7 +189,11 @@ def _last_words(key: str, run: str) -> str:
     log = path.read_text(encoding="utf-8", errors="replace").strip() if path.exists() else ""
     if log:
         return log.splitlines()[-1]
-    return "it was killed; `rig resume` continues its run" if run else NOT_BEGUN
+    if not run:
+        return NOT_BEGUN
+    if free_bytes(home()) < LEAST_FREE:
+        return "the disk is full; free some space, then `rig resume` continues its run"
+    return "it was killed; `rig resume` continues its run"
 
 
 class StatusWriter(RunViewer):

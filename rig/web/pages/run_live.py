@@ -5,6 +5,7 @@ The page reads the status of the process and the record again, so a page that is
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
@@ -36,6 +37,7 @@ SEATS = {
 }
 STOPPED = "Stopped by a person. Resume continues at the same pose."
 STOPPED_EARLY = "Stopped before the run began."
+RESUME = re.compile(r"`rig resume[^`]*`")  # a button of this page does it
 ENDS = {"complete": "good", "stopped": "doubt", "failed": "bad"}
 
 
@@ -166,8 +168,10 @@ class Live:
                 failed("Not at rest", "\n".join(status.moving))
             if stopped := stop_words(status):
                 words(stopped, "quiet")
+            elif status.phase == "paused" and status.error:
+                failed("Reason for the pause", RESUME.sub("Continue", status.error))
             elif status.error:
-                failed("Reason for the pause" if status.phase == "paused" else "Reason for the end", status.error)
+                failed("Reason for the end", RESUME.sub("Resume", status.error))
 
     def _ask(self, question: Asked | None, here: bool) -> None:
         self.question.clear()
