@@ -10,7 +10,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test test-all setup bench docs lint audit clean
 
-demo: setup
+demo: .venv/program
 	$(BIN)/rig demo --folder out/demo --force
 
 # Worksteal: neighbours in a file run in one process, which then works out only once what they share.
@@ -42,9 +42,14 @@ audit: setup
 
 setup: .venv/ready
 
-# The stamp is newer than what it was made from, so that a second call starts at once.
-.venv/ready: pyproject.toml constraints.txt
+# Each stamp is newer than what it was made from, so that a second call starts at once. The demo needs the program alone,
+# and compiles those kernels that it uses.
+.venv/program: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	touch $@
+
+.venv/ready: .venv/program
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,fleet,docs]'
 	for tool in mbpoll gcc clang chromium; do [ "$$(id -u)" != 0 ] || command -v $$tool >/dev/null || { apt-get -qq update && apt-get -qq install -y $$tool || true; }; done
 	command -v chromium >/dev/null || $(BIN)/python -m playwright install chromium || true
