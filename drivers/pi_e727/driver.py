@@ -23,6 +23,7 @@ POLL_S = 0.01
 PATIENCE_S = 5.0  # for an arrival: a full travel at any sensible speed
 STOPPING_S = 1.0
 FEWEST_POINTS = 20  # of a period: coarser is no sine
+SLOWEST_HZ = 1e-3  # a period of 1000 s; slower is a mistyped setting
 
 
 @dataclass(frozen=True)
@@ -48,10 +49,10 @@ class Settings:
     def wave(self, name: str, frequency_hz: float, cycle_s: float = e727.USUAL_CYCLE_S) -> Wave:
         """How the controller `name` plays a frequency. Raises LimitError for one that it cannot play."""
         fastest_hz = 1 / (FEWEST_POINTS * cycle_s)
-        if not 0 < frequency_hz <= fastest_hz:
+        if not SLOWEST_HZ <= frequency_hz <= fastest_hz:
             raise LimitError(
                 f"{name}: the wave tables cannot play {frequency_hz:g} Hz; nothing was moved",
-                f"Ask for a positive frequency of at most {fastest_hz:g} Hz",
+                f"Ask for a frequency of at least {SLOWEST_HZ:g} Hz and of at most {fastest_hz:g} Hz",
             )
         if frequency_hz > self.limit_hz:
             raise LimitError(

@@ -84,6 +84,7 @@ def test_its_plan_takes_as_long_as_the_run(rig_home: Path) -> None:
     ("settings", "error", "said"),
     [
         ({"frequency_hz": "2000"}, LimitError, "the wave tables cannot play 2000 Hz; nothing was moved"),
+        ({"frequency_hz": "1e-300"}, LimitError, "cannot play 1e-300 Hz; nothing was moved"),
         ({"frequency_hz": "10,-4"}, SettingError, "motion: amplitude, frequencies and times must be above 0"),
         ({"peak_to_peak_um": "120"}, LimitError, "positioner: x = -10 um is outside its limits 0 .. 100 um"),
         ({"centre_um": "20"}, LimitError, "positioner: x = -10 um is outside its limits"),
