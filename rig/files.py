@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -78,9 +77,12 @@ RECORD = "RIG_RECORD"  # URL of a lab's record, to read it instead of the rig's 
 LAB = "RIG_LAB"  # URL of the lab's record for `rig push`
 
 
+SHARED = Path("/tmp")  # noqa: S108 not TMPDIR: two shells with different ones would not see each other's locks
+
+
 def machine() -> Path:
     """The folder of locks that all users and all folders of records on this machine share."""
-    folder = Path(tempfile.gettempdir()) / "inertial-rig"
+    folder = SHARED / "inertial-rig"
     folder.mkdir(parents=True, exist_ok=True)
     with suppress(OSError):  # another user made it
         folder.chmod(0o777)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import signal
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -264,5 +265,7 @@ def test_two_folders_of_records_do_not_share_a_wire(
     bench = read_bench(bench_file({"instruments": parts}))
     with wired(bench):
         monkeypatch.setenv("RIG_HOME", str(tmp_path / "another"))
+        monkeypatch.setenv("TMPDIR", str(tmp_path))
+        monkeypatch.setattr(tempfile, "tempdir", None)  # as in another process
         with pytest.raises(Busy, match="uses serial:"), wired(bench):
             pass
