@@ -144,7 +144,7 @@ def _after_decision(record: Record, outcome: Outcome, observer: Observer, trace:
         try:
             outcome = _resumed(record, run, observer, trace=trace)
         except (DriverError, RigError) as error:  # such as an instrument that still does not answer
-            outcome = Outcome(record.run(run), error)
+            outcome = Outcome(record.run(run), error, outcome.moving)  # nothing has stopped these since
     return outcome
 
 

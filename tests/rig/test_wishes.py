@@ -125,10 +125,12 @@ def test_an_instrument_that_does_not_come_back_is_told_and_asked_about_again(mon
     def gone(*arguments: object) -> None:
         raise InstrumentFailed("beta does not answer")
 
+    monkeypatch.setattr("rig.runs.runner._stop", lambda _: ["beta may still move"])
     watch = Disturbed(lambda: (monkeypatch.setattr("rig.runs.runner._same_instruments", gone), alarm()), "resume")
     with Record() as record:
         outcome = start(record, read_bench(), *small_sweep(), watch)
     assert [str(seen.error) for seen in watch.outcomes][1:] == ["beta does not answer"]
+    assert [seen.moving for seen in watch.outcomes] == [("beta may still move",)] * 2  # until something stops it
     assert (outcome.run.state, outcome.run.rows) == ("failed", 7)
 
 

@@ -59,7 +59,7 @@ class Live:
             self.bar = ui.linear_progress(0.0, show_value=False).props("aria-label=progress instant-feedback")
             self.count = words("", "small number")
             self.hint = words("", "quiet small")
-            self.alarm = div("")
+            self.alarm = div("stack")
             self.question = div("")
             with div("stack") as self.details:
                 self.tiles = div("tiles").props('role=group aria-label="Live values and their limits"')
@@ -149,8 +149,8 @@ class Live:
         self.stop.set_visibility(active)
         self.see.set_visibility(status.state == "complete")
         self.see.set_text("Open the model" if status.done else "Open the results")
-        self.again.set_visibility(not active and status.state == "stopped" and bool(status.run))
-        if before is None or (before.error, before.moving) != (status.error, status.moving):
+        self.again.set_visibility(not active and status.state in ("stopped", "failed") and bool(status.run))
+        if before is None or (before.error, before.moving, before.phase) != (status.error, status.moving, status.phase):
             self._alarm(status)
         if before is None or before.asked != status.asked:
             self._ask(status.asked if status.phase == "asking" else None, status.seat == "page")
