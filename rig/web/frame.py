@@ -17,7 +17,7 @@ from rig.errors import RigError
 from rig.runs.background import control
 from rig.runs.background.status import Status
 from rig.web.desk import Desk, lab_read
-from rig.web.parts import message
+from rig.web.parts import message, named_dialog
 
 # The present run in the head of every page: progress, pause and stop.
 
@@ -216,7 +216,7 @@ def _keys(keys: Mapping[str, Key]) -> None:
     """Run the actions of keys, and list the keys under `?`."""
 
     def listed() -> None:
-        with ui.dialog() as dialog, ui.card():
+        with named_dialog("Keys") as dialog, ui.card():
             ui.label("Keys").classes("title")
             with ui.element("div").classes("facts"):
                 for name, key in keys.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import logging
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,6 +28,11 @@ LINKED = """<q-td :props="props">
 </q-td>"""
 
 
+def named_dialog(title: str) -> ui.dialog:
+    """A dialog with the name that a screen reader says; the caller adds its card."""
+    return ui.dialog().props(f'aria-label="{html.escape(title)}"')
+
+
 def box(classes: str = "") -> Element:
     """A sheet of paper on the page."""
     return ui.element("section").classes(f"box {classes}")
@@ -35,6 +41,11 @@ def box(classes: str = "") -> Element:
 def div(classes: str) -> Element:
     """A plain container."""
     return ui.element("div").classes(classes)
+
+
+def wide_table() -> Element:
+    """A place for a table that scrolls sideways; the keyboard scrolls it as well."""
+    return div("wide-table").props('tabindex=0 role=group aria-label="Table"')
 
 
 def words(text: str, classes: str = "") -> ui.label:

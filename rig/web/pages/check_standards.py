@@ -13,7 +13,7 @@ from rig.record import Run
 from rig.services.control import HEAD, OUT, PROCEDURE, controlled, row, signals, worst
 from rig.services.history import when
 from rig.web.pages.history_results import CLICKED, bare
-from rig.web.parts import box, div, failed, for_page, table, words
+from rig.web.parts import box, div, failed, for_page, table, wide_table, words
 from rig.web.pictures import downloads, draw, empty_plot
 
 LOOKS = {OUT: "bad", "in control": "good", "baseline": "plain"}
@@ -41,7 +41,7 @@ class CheckStandards:
             verdict.set_text(worst(self.standards))
             verdict.classes(LOOKS[worst(self.standards)])
             self.days = {run.run: when(run).date().isoformat() for run in runs}
-            with div("wide-table"):
+            with wide_table():
                 table(HEAD, [tuple(map(for_page, row(standard))) for standard in self.standards])
             for line in (line for standard in self.standards for line in signals(standard)):
                 words(for_page(line), "small")

@@ -26,7 +26,7 @@ from rig.services.two_runs import Pair, again, both, parameters_of, results_of
 from rig.web.calculations import Visit
 from rig.web.desk import Desk, models
 from rig.web.frame import Key, frame
-from rig.web.parts import box, div, failed, noted, state, table, waiting, words
+from rig.web.parts import box, div, failed, noted, state, table, waiting, wide_table, words
 from rig.web.pictures import downloads, draw, empty_plot, remember
 
 # Pictures of one axis: for two tables, or for two still records.
@@ -194,7 +194,7 @@ def _results(first: str, second: str) -> None:
         failed("Cannot compare the results", error)
         return
     if pairs:
-        with div("wide-table"):
+        with wide_table():
             table(HEAD, [_row(pair) for pair in pairs])
     else:
         words("These runs have no results in common.", "quiet")
@@ -215,7 +215,7 @@ def _parameters(model: str, pairs: list[Pair]) -> None:
             words("Second minus first, with ± two standard uncertainties; ◆ differs by more.", "quiet small")
         with box("stack"):
             words(f"Parameters of {model}", "title")
-            with div("wide-table"):
+            with wide_table():
                 table(HEAD, [_row(pair) for pair in pairs])
 
 

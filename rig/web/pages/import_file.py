@@ -23,7 +23,7 @@ from rig.services.page_words import IMPORT, address
 from rig.web.calculations import off_loop
 from rig.web.desk import FILES, Desk
 from rig.web.frame import frame
-from rig.web.parts import box, div, facts, failed, message, noted, waiting, words
+from rig.web.parts import box, div, facts, failed, message, noted, waiting, wide_table, words
 from rig.web.pictures import downloads, draw, empty_plot
 
 MOST_BYTES = 200_000_000
@@ -223,7 +223,7 @@ class ImportPage:
                 words("Columns", "title")
                 words("Each column of the file, what it means, and its unit. The proposals come from names and values; "
                       "check them. Other columns are stored with their own names.", "quiet small")  # fmt: skip
-                with div("wide-table"), ui.element("table").classes("plain-table mapping"):
+                with wide_table(), ui.element("table").classes("plain-table mapping"):
                     with ui.element("tr"):
                         for head in ("column of the file", "values", "meaning", "unit"):
                             with ui.element("th"):

@@ -16,7 +16,7 @@ from calibrations.presentation.parameter_table import HEAD, STRONG, correlations
 from calibrations.text import minus, unit
 from rig.web.calculations import off_loop
 from rig.web.pages.model_documents import CertificateDialog, CompensationDialog
-from rig.web.parts import box, div, for_page, message, table, words
+from rig.web.parts import box, div, for_page, message, table, wide_table, words
 
 if TYPE_CHECKING:
     from calibrations.discovery.results import Diagnosis
@@ -50,7 +50,7 @@ class ParametersBox:
                 ]
                 for button in self.buttons:
                     button.props("outline dense").disable()
-            self.values = div("wide-table")
+            self.values = wide_table()
             self.pairs = div("stack")
             self.noise = div("stack")
 
@@ -92,7 +92,7 @@ class ParametersBox:
             for axis, noise in NoiseAnalysis(still, findings.search).channels.items():
                 words(f"Noise coefficients of {axis}, by all processes that the search found", "title")
                 head, rows = coefficient_table(noise, still.sensed.get(axis))
-                with div("wide-table"):
+                with wide_table():
                     table(("", *head), [(SYMBOLS.get(row[0], ""), *map(_written, row)) for row in rows])
                 words(_written(density(noise, still.sensed.get(axis))), "quiet small")
 

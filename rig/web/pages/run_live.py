@@ -21,7 +21,7 @@ from rig.web.calculations import off_loop
 from rig.web.frame import control_run
 from rig.web.pages.run_begin import BeginDialog, before_resume
 from rig.web.pages.run_record import OverTime
-from rig.web.parts import box, div, failed, for_page, table, words
+from rig.web.parts import box, div, failed, for_page, named_dialog, table, words
 
 LOOK_S = 0.4
 PHASES = {
@@ -94,7 +94,10 @@ class Live:
     def _enlarge(self) -> None:
         """Show the drawing in the whole window."""
         if self.status is not None and self.status.attitude:
-            with ui.dialog() as dialog, ui.card().classes("enlarged attitude").on("click", dialog.close):
+            with (
+                named_dialog("The present pose") as dialog,
+                ui.card().classes("enlarged attitude").on("click", dialog.close),
+            ):
                 ui.html(page(Attitude(**self.status.attitude)), sanitize=False)
             dialog.open()
 

@@ -37,6 +37,7 @@ from rig.web.parts import (
     failed,
     for_page,
     message,
+    named_dialog,
     setting_label,
     setting_text,
     step_row,
@@ -61,7 +62,7 @@ def ask(data: str, numbers: Sequence[int], done: Callable[[], None]) -> None:
     """Ask for a reason, exclude the poses, and call `done`."""
     named = joined([str(number) for number in numbers[:MOST_NAMED]])
     more = f" and {len(numbers) - MOST_NAMED} more" if len(numbers) > MOST_NAMED else ""
-    with ui.dialog() as dialog, ui.card().style("min-width: 420px"):
+    with named_dialog("Exclude poses") as dialog, ui.card().style("min-width: 420px"):
         words(f"Exclude pose {named}{more}" if len(numbers) == 1 else f"Exclude poses {named}{more}", "title")
         words("The record keeps the poses and the reason; you can include them again.", "quiet small")
         reason = ui.input("Reason").props("autofocus").classes("grow")
