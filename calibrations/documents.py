@@ -12,9 +12,9 @@ import numpy as np
 
 from calibrations.discovery.dataset import Dataset
 from calibrations.discovery.findings import Candidate, F, Step
-from calibrations.discovery.plausibility import Finding
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
 from calibrations.discovery.summary import step_shares, summary_lines
+from calibrations.discovery.verdict import Finding
 from calibrations.model import Model
 from calibrations.table import Array
 

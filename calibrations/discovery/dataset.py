@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Generic
 
 from calibrations.discovery.findings import Candidate, F, Findings, Place, Step
-from calibrations.discovery.plausibility import Finding
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
+from calibrations.discovery.verdict import Finding
 from calibrations.effects import Effect
 from calibrations.errors import ModelError
 from calibrations.model import Model

@@ -4,7 +4,7 @@ A model fits some parameters to any numbers. These checks need no model: gravity
 
 no response      an output that is constant, holds noise only, is stuck in many rows, or does not follow gravity
 two groups       rows that belong to two sensors: without a pattern in pose or time, and nothing between them
-wrong geometry   outputs that follow another axis, mirrored axes, angles that are exchanged or reversed
+wrong geometry   outputs that follow the poses in another reading of the table (`readings.py`)
 
 Tables of poses are checked, and tables of rates whose axes of turn are stated: elsewhere the input is not known.
 
@@ -13,10 +13,8 @@ Source  Wald and Wolfowitz (1940), runs of two kinds of rows; DeSarbo and Cron (
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from functools import lru_cache
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +23,6 @@ from scipy.special import fdtrc
 from calibrations.criteria import (
     EXCITED_G,
     EXPLAINED_BY_GEOMETRY,
-    FAR_BETTER_GEOMETRY,
     FAR_LESS_VARIATION,
     FEWEST_RESPONSE_ROWS,
     FOLLOWS_GRAVITY,
@@ -42,35 +39,16 @@ from calibrations.criteria import (
     V_PER_G,
     WEAK_RESPONSE,
 )
-from calibrations.discovery.readings import other_reading
-from calibrations.discovery.verdict import Verdict
+from calibrations.discovery.readings import Response, geometry_finding, response
+from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.fitting.fit import Fit
-from calibrations.geometry.orientation import Pose, nominal_pose, specific_force
+from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.geometry.rate_table import turn_axes
 from calibrations.means.noise import rms, white_std
 from calibrations.table import AXES, Array, Table
 
-NO_RESPONSE, UNEXPLAINED, DOUBTFUL = Verdict.NO_RESPONSE.value, Verdict.UNEXPLAINED.value, "doubtful"
-
 ROUNDS = 20  # of a regression in two clusters
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One reason not to believe the data as stated. `verdict`: NO_RESPONSE, UNEXPLAINED, or DOUBTFUL (a warning)."""
-
-    verdict: str
-    text: str
-
-
-@dataclass(frozen=True)
-class Response:
-    """Outputs as linear functions of the specific force: `slope` (axes, 3) in V/g, `share` (axes,) of the variance that
-    it explains, `residual` (axes, n) in V."""
-
-    slope: Array
-    share: Array
-    residual: Array
+CHECK_WIRING = "check the sensor's supply, the cable and the channel of"
 
 
 @lru_cache(maxsize=8)
@@ -83,13 +61,13 @@ def findings(table: Table) -> tuple[Finding, ...]:
     if not table.type.stage_angles:
         return ()
     force = specific_force(nominal_pose(table))
-    stated, variation = response(table, force), table.outputs.std(axis=0)
+    stated, variation = response(table.outputs, force), table.outputs.std(axis=0)
     dead = tuple(_dead(table, stated))
     least = V_PER_G[0] * force.std(axis=0).max() if table.unit == "V" else 0.0
     if dead and variation.min() < max(least, FAR_LESS_VARIATION * variation.max()):
         return dead  # no other reading of the angles makes a response of it
-    geometry = _geometry(table, stated)
-    if geometry is not None and geometry.verdict == UNEXPLAINED:
+    geometry = geometry_finding(table, stated)
+    if geometry is not None and geometry.verdict is not None:
         return (geometry,)
     if dead:
         return dead
@@ -99,12 +77,12 @@ def findings(table: Table) -> tuple[Finding, ...]:
 
 def refusal(table: Table) -> Finding | None:
     """The finding that forbids to use the table; None if there is none, or only a warning."""
-    return next((finding for finding in findings(table) if finding.verdict != DOUBTFUL), None)
+    return next((finding for finding in findings(table) if finding.verdict is not None), None)
 
 
 def doubt(table: Table) -> str | None:
     """A warning about a table that can be used; None if there is none."""
-    return next((finding.text for finding in findings(table) if finding.verdict == DOUBTFUL), None)
+    return next((finding.text for finding in findings(table) if finding.verdict is None), None)
 
 
 def rejection(fit: Fit) -> Finding | None:
@@ -117,25 +95,11 @@ def _implausible_zero(fit: Fit) -> Finding | None:
     for e in fit.model.estimates("stage-zero-offset"):
         if e.identified and abs(e.value) > TURNED_DEG:
             return Finding(
-                UNEXPLAINED,
+                Verdict.UNEXPLAINED,
                 f"only a zero of {e.name} that is {e.value:+.3g} deg off would explain these poses, and no stage "
                 f"has that; check the column {e.name}_deg, its zero and its sign, and the channels",
             )
     return None
-
-
-def response(table: Table, a: Array) -> Response:
-    """The response to a specific force `a` (n, 3) in g, along the directions in which it changes enough."""
-    about = a - a.mean(axis=0)
-    U, size, Vt = np.linalg.svd(about, full_matrices=False)
-    excited = size > EXCITED_G * np.sqrt(table.n)
-    outputs = table.outputs - table.outputs.mean(axis=0)
-    part = U[:, excited].T @ outputs
-    slope = (Vt[excited].T / size[excited]) @ part
-    residual = outputs - U[:, excited] @ part
-    total = np.sum(outputs**2, axis=0)
-    share = 1 - np.sum(residual**2, axis=0) / np.where(total > 0, total, np.inf)
-    return Response(slope.T, np.where(total > 0, share, 0.0), residual.T)
 
 
 def _dead(table: Table, stated: Response) -> Iterator[Finding]:
@@ -148,7 +112,7 @@ def _dead(table: Table, stated: Response) -> Iterator[Finding]:
         floor = None if white is None else float(rms(white[:, k]))
         why = _stuck(table.outputs[:, k], a, name) or _silent(table.outputs[:, k], stated, k, name, floor)
         if why is not None:
-            yield Finding(NO_RESPONSE, f"{why}; check the sensor's supply, the cable and the channel of {AXES[k]}")
+            yield Finding(Verdict.NO_RESPONSE, f"{why}; {CHECK_WIRING} {AXES[k]}")
 
 
 def _silent(output: Array, stated: Response, k: int, name: str, floor: float | None) -> str | None:
@@ -174,25 +138,26 @@ def _of_rates(table: Table) -> Iterator[Finding]:
         return
     rate = table.column("rate_deg_s")[:, None] * turn_axes(table)
     about = rate / max(float(np.abs(rate).max()), np.finfo(float).tiny)
-    stated = response(table, about)
+    stated = response(table.outputs, about)
     turned = [k for k in range(len(table.axes)) if about[:, k].std() > EXCITED_G]
     remedy = "check the columns, the sign of rate_deg_s, and the sensor's mount and cable"
     for k in turned:
         name, share, slope = table.output_names[k], float(stated.share[k]), stated.slope[k]
         if (why := _stuck(table.outputs[:, k], about, name, table.unit, "the rate")) is not None:
-            yield Finding(NO_RESPONSE, f"{why}; check the sensor's supply, the cable and the channel of {AXES[k]}")
+            yield Finding(Verdict.NO_RESPONSE, f"{why}; {CHECK_WIRING} {AXES[k]}")
         elif share < FOLLOWS_GRAVITY:
             yield Finding(
-                NO_RESPONSE, f"{name} does not follow the rate, which explains {share:.0%} of its variation; {remedy}"
+                Verdict.NO_RESPONSE,
+                f"{name} does not follow the rate, which explains {share:.0%} of its variation; {remedy}",
             )
         elif abs(slope[k]) < np.cos(np.radians(TURNED_DEG)) * np.linalg.norm(slope):
             axis = AXES[int(np.argmax(np.abs(slope)))]
-            yield Finding(UNEXPLAINED, f"{name} follows the rate about {axis}, not about {AXES[k]}; {remedy}")
+            yield Finding(Verdict.UNEXPLAINED, f"{name} follows the rate about {axis}, not about {AXES[k]}; {remedy}")
     if (groups := _two_groups(table, about)) is not None:
         yield groups
     if reversed_ := [table.output_names[k] for k in turned if stated.slope[k, k] < 0]:
         yield Finding(
-            DOUBTFUL,
+            None,
             f"{' and '.join(reversed_)} fall{'s' if len(reversed_) == 1 else ''} where the rate rises, as of a table "
             "that turns the other way or an inverted output; rates are positive by the right-hand rule about the "
             "sensor's axis: check the sign of rate_deg_s and of the outputs",
@@ -246,7 +211,7 @@ def _two_groups(table: Table, about: Array | None = None) -> Finding | None:
         return None
     times = "" if white is None else f", {distance[axis] / 2 / float(rms(white[:, axis])):.0f} times the noise floor"
     return Finding(
-        UNEXPLAINED,
+        Verdict.UNEXPLAINED,
         f"scatter without a pattern{times}: two groups of rows ({(~labels).sum()} and {labels.sum()}) differ by "
         f"{_distance_text(float(distance[axis]), table.unit)} in {table.axes[axis]}, as if two sensors were in one "
         "table; separate them",
@@ -329,118 +294,3 @@ def _order_along(angle: Array, fixed_angle: Array) -> tuple[NDArray[np.intp], ND
     """(order of the rows by an angle within equal values of the other, mask of neighbours that differ in it alone)."""
     order = np.lexsort((angle, fixed_angle))
     return order, (np.diff(fixed_angle[order]) == 0) & (np.diff(angle[order]) != 0)
-
-
-def _geometry(table: Table, stated: Response) -> Finding | None:
-    """The geometry that explains the outputs better than the stated one; None if there is none."""
-    if (reading := other_reading(table, 1 - stated.share)) is not None:
-        return Finding(UNEXPLAINED, f"the outputs do not follow the poses as stated; they do if {reading}")
-    explained = bool(np.all(stated.share >= EXPLAINED_BY_GEOMETRY))
-    assignment = _assignment(table, stated, specific_force(nominal_pose(table))) if explained else None
-    if explained and (assignment is None or assignment.verdict == DOUBTFUL):
-        return assignment
-    angle_readings = " or if ".join(_other_angles(table, stated, explained))
-    if assignment is not None:
-        return (
-            Finding(UNEXPLAINED, f"{assignment.text}; the outputs fit as well if {angle_readings}")
-            if angle_readings
-            else assignment
-        )
-    return (
-        Finding(UNEXPLAINED, f"the outputs do not follow the poses as stated; they do if {angle_readings}")
-        if angle_readings
-        else None
-    )
-
-
-def _other_angles(table: Table, stated: Response, explained: bool) -> list[str]:
-    """Readings of the angle columns by which each output follows its own axis, unlike by the stated ones."""
-    texts = []
-    for text, pose in _readings(nominal_pose(table)).items():
-        a = specific_force(pose)
-        candidate = response(table, a)
-        far_better = np.max(1 - candidate.share) <= FAR_BETTER_GEOMETRY * np.max(1 - stated.share)
-        if (
-            np.all(candidate.share >= EXPLAINED_BY_GEOMETRY)
-            and (explained or far_better)
-            and _assignment(table, candidate, a) is None
-        ):
-            texts.append(text)
-    return texts
-
-
-def _readings(pose: Pose) -> Mapping[str, Pose]:
-    """Other meanings of the angles, in words."""
-
-    def with_angles(alpha: Array, beta: Array) -> Pose:
-        return Pose(alpha, beta, pose.mount, pose.flip, pose.up)
-
-    return MappingProxyType(
-        {
-            "the columns alpha_deg and beta_deg are exchanged": with_angles(pose.beta, pose.alpha),
-            "beta counts backwards (change the sign of beta_deg)": with_angles(pose.alpha, -pose.beta),
-            "alpha counts backwards (change the sign of alpha_deg)": with_angles(-pose.alpha, pose.beta),
-            "alpha is counted from the horizontal (take 90 - alpha_deg)": with_angles(
-                np.pi / 2 - pose.alpha, pose.beta
-            ),
-            "the angles are in radians": with_angles(np.degrees(pose.alpha), np.degrees(pose.beta)),
-        }
-    )
-
-
-def _assignment(table: Table, stated: Response, a: Array) -> Finding | None:
-    """Outputs that do not follow their own axes, or follow them backwards; None if there are none."""
-    about = a - a.mean(axis=0)
-    eigen = np.linalg.eigh(about.T @ about / table.n)
-    excited_directions = eigen[1][:, eigen[0] > EXCITED_G**2]
-    projector = excited_directions @ excited_directions.T
-    excited_axes = projector[: len(stated.slope)]  # excited part of each axis
-    size = np.linalg.norm(stated.slope, axis=1)
-    if not size.max() > 0:
-        return None
-    reach = np.linalg.norm(excited_axes, axis=1)
-    responding = [k for k in range(len(size)) if stated.share[k] >= FOLLOWS_GRAVITY and size[k] > 0]
-    cosine = {k: float(stated.slope[k] @ excited_axes[k] / size[k] / reach[k]) for k in responding if reach[k] > 0.5}
-    limit = np.cos(np.radians(TURNED_DEG))
-    astray = [k for k, c in cosine.items() if abs(c) < limit]
-    astray += [k for k in responding if k not in cosine and size[k] > 0.5 * size.max()]
-    if astray:
-        return Finding(UNEXPLAINED, _astray(table, stated, astray))
-    reversed_ = [k for k, c in cosine.items() if c < 0]
-    if not reversed_:
-        return None
-    names = " and ".join(AXES[k] for k in reversed_)
-    if len(reversed_) == len(cosine) or (len(cosine) > 2 and reversed_ == [0, 1]):
-        return Finding(
-            DOUBTFUL,
-            f"the scale factor of {names} is negative, as of a sensor turned by 180 deg on the stage; if it is, state "
-            "mount_deg = 180; if not, check the sign of alpha_deg and the wiring",
-        )
-    return Finding(
-        DOUBTFUL,
-        f"the scale factor of {names} is negative and that of the others is not, as of a mirrored sensor: beta counts "
-        "backwards (change the sign of beta_deg), the sensor is mounted face down (state flip = 1), or the output of "
-        f"{names} is inverted",
-    )
-
-
-def _astray(table: Table, stated: Response, rows: list[int]) -> str:
-    """The axis that each output follows, and a hint on the wiring to check."""
-    follow = []
-    for k in rows:
-        slope = stated.slope[k]
-        axis = int(np.argmax(np.abs(slope)))
-        if abs(slope[axis]) > np.cos(np.radians(TURNED_DEG)) * np.linalg.norm(slope):
-            follow.append(f"{table.output_names[k]} follows gravity along {'-' if slope[axis] < 0 else ''}{AXES[axis]}")
-        else:
-            angle = float(np.degrees(np.arctan2(slope[1 - k], slope[k]))) if k < 2 else 0.0
-            follow.append(f"{table.output_names[k]} follows gravity {abs(angle):.0f} deg away from {AXES[k]}")
-    swapped = len(rows) == 2 and rows == [0, 1] and np.argmax(np.abs(stated.slope[:2]), axis=1).tolist() == [1, 0]
-    exchanged = swapped and stated.slope[0, 1] * stated.slope[1, 0] > 0
-    remedy = (
-        f"the channels are exchanged: exchange the columns {' and '.join(table.output_names[:2])}, or the channels in "
-        "the bench file"
-        if exchanged
-        else "check how the sensor is mounted on the stage (mount_deg) and the assignment of the channels"
-    )
-    return f"{' and '.join(follow)}; {remedy}"

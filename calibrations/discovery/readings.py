@@ -1,8 +1,9 @@
-"""Other readings of a table of poses: angles by another scale or zero, rows that are shifted, a change in mid-run.
+"""Other readings of a table of poses: other angles or axes, rows that are shifted, a change in mid-run.
 
-A reading corrects one mistake of a person, a cable or a stage: a wrong number of steps a turn, a column pasted one row
-too low, a stage that lost steps. The module names a reading only if its residual is a small part of that of the stated
-reading. Effects of a sensor pass: they follow the stated poses better than any other reading.
+A reading corrects one mistake of a person, a cable or a stage: a wrong number of steps a turn, exchanged or reversed
+angles, exchanged channels, a column pasted one row too low, a stage that lost steps. The module names a reading only if
+its residual is a small part of that of the stated reading. Effects of a sensor pass: they follow the stated poses
+better than any other reading.
 
 Source  Chow, Econometrica 28 (1960): a linear response before a row and another one after it; Golub and Pereyra,
         SIAM J. Numer. Anal. 10 (1973): parameters that enter linearly are projected out.
@@ -10,7 +11,9 @@ Source  Chow, Econometrica 28 (1960): a linear response before a row and another
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -21,14 +24,16 @@ from calibrations.criteria import (
     EXPLAINED_BY_GEOMETRY,
     FAR_BETTER_GEOMETRY,
     FEWEST_RESPONSE_ROWS,
+    FOLLOWS_GRAVITY,
     LEAST_RESPONSE_CHANGE,
     LEAST_STAGE_SCALE,
     TURNED_DEG,
     UNTOUCHED_BY_READINGS,
 )
-from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.discovery.verdict import Finding, Verdict
+from calibrations.geometry.orientation import Pose, nominal_pose, specific_force
 from calibrations.means.noise import rms, white_std
-from calibrations.table import Array, Table
+from calibrations.table import AXES, Array, Table
 
 SCALES = (0.1, 0.25, 0.5, 0.8, 0.9, 1.0, 1.1, 1.25, 2.0, 4.0, 10.0)  # where the search for a stage's scale begins
 SHIFTS = (1, -1, 2, -2)  # rows
@@ -37,7 +42,47 @@ ENOUGH_ROWS = 2000  # for the start of a search of a stage's scale
 COLUMNS = ("alpha_deg", "beta_deg")
 
 
-def other_reading(table: Table, residual_shares: Array) -> str | None:
+@dataclass(frozen=True)
+class Response:
+    """Outputs as linear functions of the specific force: `slope` (axes, 3) in V/g, `share` (axes,) of the variance that
+    it explains, `residual` (axes, n) in V."""
+
+    slope: Array
+    share: Array
+    residual: Array
+
+
+def response(outputs: Array, a: Array) -> Response:
+    """The response of outputs (n, axes) to a specific force `a` (n, 3) in g, in the directions that it excites."""
+    about = a - a.mean(axis=0)
+    U, size, Vt = np.linalg.svd(about, full_matrices=False)
+    excited = size > EXCITED_G * np.sqrt(len(a))
+    centred = outputs - outputs.mean(axis=0)
+    part = U[:, excited].T @ centred
+    slope = (Vt[excited].T / size[excited]) @ part
+    residual = centred - U[:, excited] @ part
+    total = np.sum(centred**2, axis=0)
+    share = 1 - np.sum(residual**2, axis=0) / np.where(total > 0, total, np.inf)
+    return Response(slope.T, np.where(total > 0, share, 0.0), residual.T)
+
+
+def geometry_finding(table: Table, stated: Response) -> Finding | None:
+    """The geometry that explains the outputs better than the stated one; None if there is none."""
+    if (reading := _other_columns(table, 1 - stated.share)) is not None:
+        return Finding(Verdict.UNEXPLAINED, f"the outputs do not follow the poses as stated; they do if {reading}")
+    explained = bool(np.all(stated.share >= EXPLAINED_BY_GEOMETRY))
+    assignment = _assignment(table, stated, specific_force(nominal_pose(table))) if explained else None
+    if explained and (assignment is None or assignment.verdict is None):
+        return assignment
+    angle_readings = " or if ".join(_other_angles(table, stated, explained))
+    if not angle_readings:
+        return assignment
+    if assignment is not None:
+        return Finding(Verdict.UNEXPLAINED, f"{assignment.text}; the outputs fit as well if {angle_readings}")
+    return Finding(Verdict.UNEXPLAINED, f"the outputs do not follow the poses as stated; they do if {angle_readings}")
+
+
+def _other_columns(table: Table, residual_shares: Array) -> str | None:
     """The reading of the table that explains its outputs far better, with a check to make; None if there is none.
 
     `residual_shares`: residual share of each output's variance after a linear response at the stated poses, (axes,).
@@ -53,17 +98,9 @@ def other_reading(table: Table, residual_shares: Array) -> str | None:
     return _scaled(table, limit) or _shifted(table, limit) or _changed(table, limit)
 
 
-def _residual_share(force: Array, outputs: Array) -> Array:
-    """Residual share of each output's variance after a linear response to the specific force, shape (axes,)."""
-    residual = _residual(force, outputs)
-    return np.asarray(np.sum(residual**2, axis=0) / np.maximum(outputs.var(axis=0) * len(outputs), 1e-300))
-
-
-def _residual(force: Array, outputs: Array) -> Array:
-    about, centred = force - force.mean(axis=0), outputs - outputs.mean(axis=0)
-    U, size, _ = np.linalg.svd(about, full_matrices=False)
-    U = U[:, size > EXCITED_G * np.sqrt(len(about))]
-    return np.asarray(centred - U @ (U.T @ centred))
+def _unexplained_share(outputs: Array, force: Array) -> Array:
+    """Share of each output's variance that a linear response to the specific force does not explain, (axes,)."""
+    return 1 - response(outputs, force).share
 
 
 class _Angle(NamedTuple):
@@ -131,7 +168,8 @@ def _by_sensor(table: Table) -> float:
         [x * z, x * z**2, y * z, y * z**2],
         [x * y, x * y**2, y * x**2],
     ]
-    return min(float(np.max(_residual_share(np.column_stack([force, *terms]), table.outputs))) for terms in mechanisms)
+    inputs = [np.column_stack([force, *terms]) for terms in mechanisms]
+    return min(float(np.max(_unexplained_share(table.outputs, driver))) for driver in inputs)
 
 
 def _best_zero(column: str, scale: float, table: Table) -> _Angle:
@@ -142,7 +180,7 @@ def _best_zero(column: str, scale: float, table: Table) -> _Angle:
 
 
 def _worst_share(angle: _Angle, table: Table) -> float:
-    return float(np.max(_residual_share(angle.force(table), table.outputs)))
+    return float(np.max(_unexplained_share(table.outputs, angle.force(table))))
 
 
 def _refined(angle: _Angle, table: Table, *, free_scale: bool) -> _Angle:
@@ -156,7 +194,7 @@ def _refined(angle: _Angle, table: Table, *, free_scale: bool) -> _Angle:
         return _Angle(angle.column, float(scale), float(angle.zero_deg + step[0]))
 
     def error(step: Array) -> Array:
-        return np.ravel(_residual(moved(step).force(table), table.outputs) / size)
+        return np.ravel(response(table.outputs, moved(step).force(table)).residual.T / size)
 
     return moved(scipy.optimize.least_squares(error, np.zeros(2 if free_scale else 1), x_scale=10.0, max_nfev=30).x)
 
@@ -169,10 +207,10 @@ def _shifted(table: Table, limit: float) -> str | None:
         overlap = slice(max(-shift, 0), table.n - max(shift, 0))
         moved = np.roll(table.outputs, -shift, axis=0)
         displacement = f"{abs(shift)} row{'s' if abs(shift) > 1 else ''} too {'late' if shift > 0 else 'early'}"
-        shifted_shares = _residual_share(force[overlap], moved[overlap])
+        shifted_shares = _unexplained_share(moved[overlap], force[overlap])
         if np.max(shifted_shares) <= limit:
             return f"the outputs stand {displacement} in the file; shift their columns, or those of the angles"
-        stated_shares = _residual_share(force[overlap], table.outputs[overlap])
+        stated_shares = _unexplained_share(table.outputs[overlap], force[overlap])
         for k, name in enumerate(names):
             if shifted_shares[k] <= limit and np.max(np.delete(stated_shares, k), initial=0.0) <= limit:
                 return f"{name} stands {displacement} in the file; shift this column"
@@ -220,3 +258,96 @@ def _two_responses(columns: Array, outputs: Array, k: int) -> tuple[float, float
         slopes = [excited * answer[1:] for answer in answers]
         change = float(np.linalg.norm(slopes[1] - slopes[0]) / np.linalg.norm(slopes[0]))
     return float(np.max(squares)) / len(columns), change
+
+
+def _other_angles(table: Table, stated: Response, explained: bool) -> list[str]:
+    """Readings of the angle columns by which each output follows its own axis, unlike by the stated ones."""
+    texts = []
+    for text, pose in _angle_readings(nominal_pose(table)).items():
+        a = specific_force(pose)
+        candidate = response(table.outputs, a)
+        far_better = np.max(1 - candidate.share) <= FAR_BETTER_GEOMETRY * np.max(1 - stated.share)
+        if (
+            np.all(candidate.share >= EXPLAINED_BY_GEOMETRY)
+            and (explained or far_better)
+            and _assignment(table, candidate, a) is None
+        ):
+            texts.append(text)
+    return texts
+
+
+def _angle_readings(pose: Pose) -> Mapping[str, Pose]:
+    """Other meanings of the angles, in words."""
+
+    def with_angles(alpha: Array, beta: Array) -> Pose:
+        return Pose(alpha, beta, pose.mount, pose.flip, pose.up)
+
+    return MappingProxyType(
+        {
+            "the columns alpha_deg and beta_deg are exchanged": with_angles(pose.beta, pose.alpha),
+            "beta counts backwards (change the sign of beta_deg)": with_angles(pose.alpha, -pose.beta),
+            "alpha counts backwards (change the sign of alpha_deg)": with_angles(-pose.alpha, pose.beta),
+            "alpha is counted from the horizontal (take 90 - alpha_deg)": with_angles(
+                np.pi / 2 - pose.alpha, pose.beta
+            ),
+            "the angles are in radians": with_angles(np.degrees(pose.alpha), np.degrees(pose.beta)),
+        }
+    )
+
+
+def _assignment(table: Table, stated: Response, a: Array) -> Finding | None:
+    """Outputs that do not follow their own axes, or follow them backwards; None if there are none."""
+    about = a - a.mean(axis=0)
+    eigen = np.linalg.eigh(about.T @ about / table.n)
+    excited_directions = eigen[1][:, eigen[0] > EXCITED_G**2]
+    projector = excited_directions @ excited_directions.T
+    excited_axes = projector[: len(stated.slope)]  # excited part of each axis
+    size = np.linalg.norm(stated.slope, axis=1)
+    if not size.max() > 0:
+        return None
+    reach = np.linalg.norm(excited_axes, axis=1)
+    responding = [k for k in range(len(size)) if stated.share[k] >= FOLLOWS_GRAVITY and size[k] > 0]
+    cosine = {k: float(stated.slope[k] @ excited_axes[k] / size[k] / reach[k]) for k in responding if reach[k] > 0.5}
+    limit = np.cos(np.radians(TURNED_DEG))
+    astray = [k for k, c in cosine.items() if abs(c) < limit]
+    astray += [k for k in responding if k not in cosine and size[k] > 0.5 * size.max()]
+    if astray:
+        return Finding(Verdict.UNEXPLAINED, _astray(table, stated, astray))
+    reversed_ = [k for k, c in cosine.items() if c < 0]
+    if not reversed_:
+        return None
+    names = " and ".join(AXES[k] for k in reversed_)
+    if len(reversed_) == len(cosine) or (len(cosine) > 2 and reversed_ == [0, 1]):
+        return Finding(
+            None,
+            f"the scale factor of {names} is negative, as of a sensor turned by 180 deg on the stage; if it is, state "
+            "mount_deg = 180; if not, check the sign of alpha_deg and the wiring",
+        )
+    return Finding(
+        None,
+        f"the scale factor of {names} is negative and that of the others is not, as of a mirrored sensor: beta counts "
+        "backwards (change the sign of beta_deg), the sensor is mounted face down (state flip = 1), or the output of "
+        f"{names} is inverted",
+    )
+
+
+def _astray(table: Table, stated: Response, rows: list[int]) -> str:
+    """The axis that each output follows, and a hint on the wiring to check."""
+    follow = []
+    for k in rows:
+        slope = stated.slope[k]
+        axis = int(np.argmax(np.abs(slope)))
+        if abs(slope[axis]) > np.cos(np.radians(TURNED_DEG)) * np.linalg.norm(slope):
+            follow.append(f"{table.output_names[k]} follows gravity along {'-' if slope[axis] < 0 else ''}{AXES[axis]}")
+        else:
+            angle = float(np.degrees(np.arctan2(slope[1 - k], slope[k]))) if k < 2 else 0.0
+            follow.append(f"{table.output_names[k]} follows gravity {abs(angle):.0f} deg away from {AXES[k]}")
+    swapped = len(rows) == 2 and rows == [0, 1] and np.argmax(np.abs(stated.slope[:2]), axis=1).tolist() == [1, 0]
+    exchanged = swapped and stated.slope[0, 1] * stated.slope[1, 0] > 0
+    remedy = (
+        f"the channels are exchanged: exchange the columns {' and '.join(table.output_names[:2])}, or the channels in "
+        "the bench file"
+        if exchanged
+        else "check how the sensor is mounted on the stage (mount_deg) and the assignment of the channels"
+    )
+    return f"{' and '.join(follow)}; {remedy}"

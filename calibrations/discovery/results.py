@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic
 
 from calibrations.discovery.findings import Candidate, F, Findings, Place, Step
-from calibrations.discovery.verdict import Judgement, Verdict
+from calibrations.discovery.verdict import Finding, Judgement, Verdict
 from calibrations.model import Model
 from calibrations.result import Result
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from calibrations.design.experiment import Experiment
     from calibrations.discovery.dataset import Dataset
     from calibrations.discovery.patterns import Pattern
-    from calibrations.discovery.plausibility import Finding
     from calibrations.presentation.chart import Picture
 
 

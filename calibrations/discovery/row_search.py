@@ -24,7 +24,7 @@ from calibrations.criteria import (
 from calibrations.discovery.candidates import candidates, with_rivals
 from calibrations.discovery.findings import Candidate, Findings, Step
 from calibrations.discovery.outliers import caution, outlier_text
-from calibrations.discovery.plausibility import Finding, rejection
+from calibrations.discovery.plausibility import rejection
 from calibrations.discovery.search import (
     FinalModel,
     Path,
@@ -35,7 +35,7 @@ from calibrations.discovery.search import (
     is_complete,
 )
 from calibrations.discovery.structure import competing_pattern, poorly_predicted, structure_of
-from calibrations.discovery.verdict import Verdict
+from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.effects import Effect
 from calibrations.fitting.determined import undetermined
 from calibrations.fitting.fit import Fit, refit

@@ -15,8 +15,9 @@ from calibrations.discovery.findings import Candidate, Findings, Place, Step
 from calibrations.discovery.fit_doubts import fit_doubts
 from calibrations.discovery.outliers import fit_without, outliers_in_fit
 from calibrations.discovery.places import places
-from calibrations.discovery.plausibility import Finding, refusal, rejection
+from calibrations.discovery.plausibility import refusal, rejection
 from calibrations.discovery.row_search import ONE_ORIENTATION, RowSearch
+from calibrations.discovery.verdict import Finding
 from calibrations.effects import Effect
 from calibrations.effects.expression_effect import effect_for
 from calibrations.errors import ModelError, nearest

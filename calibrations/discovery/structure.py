@@ -28,8 +28,8 @@ from calibrations.criteria import (
 )
 from calibrations.discovery.outliers import outlier_text
 from calibrations.discovery.patterns import Pattern, at_attitudes, one_sided, patterns, per_channel
-from calibrations.discovery.plausibility import UNEXPLAINED, Finding
 from calibrations.discovery.significance import Screen, Search
+from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.fitting.fit import Fit
 from calibrations.means.noise import correlation_known, rms
 from calibrations.table import Array
@@ -124,7 +124,7 @@ def unexplained_scatter(fit: Fit) -> Finding | None:
     """Scatter of a fit that neither the samples' noise nor a pattern explains; None if there is none."""
     if _excess_noise(fit) is None or (pattern := structure_of(fit)) is None or pattern.columns.size:
         return None
-    return Finding(UNEXPLAINED, pattern.text)
+    return Finding(Verdict.UNEXPLAINED, pattern.text)
 
 
 def _fully_correlated_ratio(fit: Fit) -> float:

@@ -39,6 +39,14 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
+class Finding:
+    """One reason not to believe the data as stated; without a verdict it is a warning."""
+
+    verdict: Verdict | None
+    text: str
+
+
+@dataclass(frozen=True)
 class Closest:
     """The best candidate that is not significant: chance alone seldom shows as much."""
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from calibrations.discovery.plausibility import NO_RESPONSE, UNEXPLAINED, doubt, findings, refusal
+from calibrations.discovery.plausibility import doubt, findings, refusal
+from calibrations.discovery.verdict import Verdict
 from calibrations.documents import comparison_document, diagnosis_document, discovery_document, fit_document
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import UnusableData
@@ -108,7 +109,7 @@ def test_an_output_without_response(name: str) -> None:
     spoil, reason = DEAD[name]
     found = refusal(spoil(healthy()).table())
     assert found is not None
-    assert (found.verdict, reason in found.text) == (NO_RESPONSE, True), found.text
+    assert (found.verdict, reason in found.text) == (Verdict.NO_RESPONSE, True), found.text
 
 
 @pytest.mark.parametrize("name", WRONG)
@@ -116,7 +117,7 @@ def test_a_wrong_assignment(name: str) -> None:
     spoil, reason = WRONG[name]
     found = refusal(spoil(healthy()).table())
     assert found is not None
-    assert (found.verdict, reason in found.text) == (UNEXPLAINED, True), found.text
+    assert (found.verdict, reason in found.text) == (Verdict.UNEXPLAINED, True), found.text
 
 
 @pytest.mark.parametrize("name", MIRRORED)
