@@ -155,7 +155,7 @@ def _in_doubt(result: Diagnosis[F] | Discovery[F]) -> Document:
 
 
 def places_document(result: Diagnosis[F] | Discovery[F]) -> list[Document]:
-    """The places of the signal chain that act, the largest first; none where the search does not tell."""
+    """The places of the signal chain that act, the largest first; none where the search has no places."""
     acting, data = result.findings.places, result.findings.data
     total = sum(place.rms**2 for place in acting) or 1.0
     if not acting:

@@ -1,4 +1,4 @@
-"""What can be wrong with what this library is given.
+"""Errors of this library: wrong data, models, effects and expressions.
 
 CalibrationError
 ├── DataError            a table: its file, line and column

@@ -1,4 +1,4 @@
-"""Several tables of one sensor as one: what was measured before counts together with what was measured since."""
+"""Several tables of one sensor as one: earlier and later measurements are analysed together."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ LINEAR: Mapping[str, Callable[[Array, Sampling], Array]] = MappingProxyType(
         "quantisation-noise": quantisation,
     }
 )
-GAUSS_MARKOV, SINUSOIDAL = "gauss-markov-noise", "sinusoidal-noise"
+GAUSS_MARKOV = "gauss-markov-noise"
 
 
 SINGLE = 16  # lowest coefficients, that stand for themselves

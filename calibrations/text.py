@@ -69,7 +69,7 @@ def in_prefix(value: float, std: float | None, of: str) -> tuple[float, str]:
 
 
 def time_text(value: float, std: float | None) -> str:
-    """A time since a beginning: `2.86(42)`, or `at most 7.7` where it cannot be told from the beginning (k = 2)."""
+    """A time since a beginning: `2.86(42)`, or `at most 7.7` where its expanded uncertainty (k = 2) is larger."""
     if _known(std) and value < 2 * std:
         return f"at most {rounded(value + 2 * std, 2)}"
     return estimate_text(value, std)

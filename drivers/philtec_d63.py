@@ -55,7 +55,7 @@ class Curve:
 
     @classmethod
     def from_file(cls, path: Path) -> Curve:
-        """A curve in a YAML file of one's own. Raises ValueError with the file's name."""
+        """A curve in a YAML file that the user wrote. Raises ValueError with the file's name."""
         try:
             document = yaml.safe_load(path.read_text(encoding="utf-8"))
             if not isinstance(document, dict):

@@ -126,7 +126,7 @@ class HandCourse(Protocol):
 
     @property
     def up(self) -> tuple[float, float, float]:
-        """The orientation that tells most."""
+        """The most informative orientation."""
 
     @property
     def words(self) -> str:

@@ -60,13 +60,13 @@ class HandCourse:
 
     @property
     def up(self) -> tuple[float, float, float]:
-        """The direction upward of the orientation that tells most."""
+        """The upward direction of the most informative orientation."""
         x, y, z = (float(part) for part in self.next.up)
         return x, y, z
 
     @property
     def words(self) -> str:
-        """The orientation that tells most, in words."""
+        """The most informative orientation, in words."""
         return self.next.words
 
     @property
@@ -86,7 +86,7 @@ class HandCourse:
 
     @cached_property
     def next(self) -> Next:
-        """The orientation that tells most."""
+        """The most informative orientation."""
         last = self.ups[-1] if len(self.ups) else None
         return next_orientation(np.vstack([self.ups, self.skipped]), last, FIRST_SIDES + len(self.skipped))
 

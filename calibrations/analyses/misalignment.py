@@ -1,4 +1,4 @@
-"""Where the sensing axes point, estimated from the brackets of a search, with what else acts on them.
+"""Directions of the sensing axes, estimated from the brackets of a search, with other effects on them.
 
 In the frame that is turned to the bracket's centre, with beta counted from the sensing axis, an output is
 

@@ -49,7 +49,7 @@ class Plane:
 
     @property
     def scale(self) -> float:
-        """V/g. Ang (1), which holds at 90 deg, over sin(alpha) at any other inclination."""
+        """V/g. Ang (1) holds at 90 deg; at another inclination the result is divided by sin(alpha)."""
         return (self.up - self.down) / (2 * float(np.sqrt(1 - self.a_z**2)))
 
 

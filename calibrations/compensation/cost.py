@@ -71,7 +71,7 @@ def result_uncertainty(
 
 
 def _found_in(name: str, stated: Span, model: Model) -> Span:
-    """Where an input was while the parameters were found, as far as that is within the stated range.
+    """The range of an input during the measurement of the parameters, limited to the stated range.
 
     The range that the data covered, by the model file, or its reference; the whole range if neither is known.
     """

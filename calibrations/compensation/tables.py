@@ -129,13 +129,13 @@ def _part(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, k: i
             clips = [x.clipped(number(-width), number(width)) for width in basis.widths]
             f = _weighted([c / width for c, width in zip(u, basis.widths, strict=False)], clips)
         else:
-            raise NotTraced(f"a product cannot follow its {basis.kind}")
+            raise NotTraced(f"its basis {basis.kind} cannot be written as code")
     if form.factor == "force":
         return a[k] * f
     if form.factor == "load":
         return abs(a[CROSS[k]]) * f
     if form.factor:
-        raise NotTraced(f"a product does not know the {form.factor}")
+        raise NotTraced(f"the {form.factor} is not known at run time")
     return f
 
 
@@ -150,7 +150,7 @@ def _driver(form: Form, a: Sequence[Node], v: Node, table: RunTime, k: int) -> N
         return as_traced(column).nodes[0]  # type: ignore[no-any-return]
     if form.driver.startswith("column:"):
         return table.column(form.driver.removeprefix("column:")).nodes[0]  # type: ignore[no-any-return]
-    raise NotTraced(f"a product does not know the {form.driver}")
+    raise NotTraced(f"the {form.driver} is not known at run time")
 
 
 def _weighted(weights: Iterable[float], nodes: Sequence[Node]) -> Node:

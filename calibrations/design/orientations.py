@@ -1,4 +1,4 @@
-"""The next orientation of a sensor that a person turns: which of 26 tells most, and how to turn the sensor there.
+"""The next orientation of a sensor that a person turns: the most informative of 26, and how to turn to it.
 
 The magnitude of what a triad measures is a sum of nine spherical harmonics over the directions (`geometry/sphere.py`):
 bias, scale factors and angles are nine numbers that follow from them. An orientation has a row of their values, and
@@ -58,7 +58,7 @@ def directions_up(outputs: Array, named: Array) -> Array:
 
 
 def next_orientation(measured: Array, last: Array | None = None, sides: int = FIRST_SIDES) -> Next:
-    """The orientation that tells most after those `measured` (n, 3). Among equals it is the nearest to `last` (3,).
+    """The most informative orientation after those `measured` (n, 3). Among equals it is the nearest to `last` (3,).
 
     Of the first `sides` orientations each is a whole side, as long as there is one that is not taken.
     """

@@ -146,7 +146,7 @@ class Dataset(ABC, Generic[F]):
         return None
 
     def expression(self, name: str, text: str) -> Effect:  # noqa: ARG002
-        """An effect of one's own. Raises ModelError, ExpressionError with the place in the text."""
+        """An effect that the user wrote. Raises ModelError, ExpressionError with the place in the text."""
         raise ModelError(
             f"{name}: an expression cannot be added to a noise model, and {self.source} is a still record; use "
             "poses, positions or rates"

@@ -194,7 +194,7 @@ class Rows(Dataset[Fit]):
         )
 
     def expression(self, name: str, text: str) -> Effect:
-        """An effect of one's own on the columns of this table."""
+        """An effect that the user wrote, on the columns of this table."""
         return effect_for(name, text, self.table)
 
     @property

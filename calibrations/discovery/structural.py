@@ -33,7 +33,7 @@ from calibrations.discovery.significance import chance
 from calibrations.effects import Effect
 from calibrations.fitting.fit import Fit, fit, refit
 from calibrations.fitting.problem import Problem
-from calibrations.fitting.requested_forms import beyond_base
+from calibrations.fitting.requested_forms import effects_beyond_base
 from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
 from calibrations.free_forms.place_names import PREFIX
 from calibrations.free_forms.stairs import before_stairs, find_stairs, fitted_stairs
@@ -226,7 +226,7 @@ def _first(start: Fit, steps: list[Step[Fit]], ranked: list[RowCandidate]) -> tu
 def structure(start: Fit, effects: Mapping[str, Effect]) -> Structure:
     """The places that act beyond the model of `start`."""
     geometry = _geometry_effects(start, effects)
-    return find_structure(start.table, start.problem.white, beyond_base(start), geometry)
+    return find_structure(start.table, start.problem.white, effects_beyond_base(start), geometry)
 
 
 def _geometry_effects(start: Fit, effects: Mapping[str, Effect]) -> GeometryEffects:

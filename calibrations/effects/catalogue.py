@@ -236,7 +236,7 @@ def _check(result: Any, given: np.ndarray, where: str) -> None:
     if np.shape(result) != given.shape:
         raise ModelError(f"{where} must give an array of shape {given.shape}, and gave {_described(result)}")
     if not np.isfinite(result).all():
-        raise ModelError(f"{where} gave numbers that are not finite; see what it divides by or takes a root of")
+        raise ModelError(f"{where} gave numbers that are not finite; check its divisions and roots")
 
 
 def _described(result: Any) -> str:

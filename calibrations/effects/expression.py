@@ -125,7 +125,7 @@ def parse(text: str) -> Expression:
             f"the expression has {len(text)} characters, more than {LONGEST}; write a Python file instead"
         )
     if not text.isprintable():
-        raise ExpressionError("the expression holds characters that cannot be printed; type it anew")
+        raise ExpressionError("the expression contains invisible characters; type it again")
     target, value = _statement(text)
     return Expression(text, target, _Reader(text).node(value, 0))
 
@@ -198,7 +198,7 @@ def _statement(text: str) -> tuple[str, ast.expr]:
             return name, value
         case ast.AugAssign(target=ast.Name(id=name), op=ast.Add()):
             raise fault(text, 0, f'nothing can be added to "{name}"{nearest(name, TARGETS)}')
-    raise fault(text, 0, "is not an expression; write what is added, as in v += a*sin(5*beta)")
+    raise fault(text, 0, "is not an expression; write the added term, as in v += a*sin(5*beta)")
 
 
 def _degrees(node: Node) -> str | None:

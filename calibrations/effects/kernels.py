@@ -12,11 +12,11 @@ from calibrations.table import Array
 
 
 @njit(cache=True, nogil=True)
-def _moved(held: Array, last: float, here: float, limits: Array, pressed: float) -> None:
-    """Move all elements from the force `last` to `here`, each as far as its limit."""
+def _move(forces: Array, previous: float, present: float, limits: Array, pressed: float) -> None:
+    """Move all elements from the force `previous` to `present`, each as far as its limit."""
     for e in range(len(limits)):
         limit = limits[e] * pressed
-        held[e] = min(limit, max(-limit, held[e] + here - last))
+        forces[e] = min(limit, max(-limit, forces[e] + present - previous))
 
 
 @njit(cache=True, nogil=True)
@@ -32,14 +32,14 @@ def slip_elements(a: Array, on_the_way: Array, pressed: Array, limits: Array, be
     n, axes = a.shape
     state = np.zeros((n, len(limits), axes))
     for k in range(axes):
-        held = begun[k] * limits
-        last = 0.0
+        forces = begun[k] * limits
+        previous = 0.0
         for i in range(n):
             for j in range(on_the_way.shape[1] + 1):
-                here = on_the_way[i, j, k] if j < on_the_way.shape[1] else a[i, k]
-                _moved(held, last, here, limits, pressed[i, k])
-                last = here
-            state[i, :, k] = held
+                present = on_the_way[i, j, k] if j < on_the_way.shape[1] else a[i, k]
+                _move(forces, previous, present, limits, pressed[i, k])
+                previous = present
+            state[i, :, k] = forces
     return state
 
 
@@ -48,28 +48,28 @@ def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array, begun: Arra
     """Force held by all elements of `slip_elements`, shape (n, 3), 1 where all slip."""
     n, axes = a.shape
     total = limits.sum()
-    found = np.empty((n, axes))
+    shares = np.empty((n, axes))
     for k in range(axes):
-        held = begun[k] * limits
-        last = 0.0
+        forces = begun[k] * limits
+        previous = 0.0
         for i in range(n):
             for j in range(on_the_way.shape[1] + 1):
-                here = on_the_way[i, j, k] if j < on_the_way.shape[1] else a[i, k]
-                _moved(held, last, here, limits, pressed[i, k])
-                last = here
-            together = held[0]
+                present = on_the_way[i, j, k] if j < on_the_way.shape[1] else a[i, k]
+                _move(forces, previous, present, limits, pressed[i, k])
+                previous = present
+            together = forces[0]
             for e in range(1, len(limits)):
-                together += held[e]
-            found[i, k] = together / total
-    return found
+                together += forces[e]
+            shares[i, k] = together / total
+    return shares
 
 
 @njit(cache=True, nogil=True)
 def play(values: Array, width: float) -> Array:
     """What follows `values` (n,) behind a play of `width` to either side, rows in order of time, shape (n,)."""
-    held = values[0]
+    follower = values[0]
     lagging = np.empty_like(values)
     for i in range(len(values)):
-        held = min(max(held, values[i] - width), values[i] + width)
-        lagging[i] = held
+        follower = min(max(follower, values[i] - width), values[i] + width)
+        lagging[i] = follower
     return lagging

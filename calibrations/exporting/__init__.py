@@ -1,4 +1,4 @@
-"""Exporting: a calibrated model in the file formats of other programs, with the error of what a format cannot hold.
+"""Exporting: a calibrated model in the file formats of other programs, and the error of the effects left out.
 
 simulated       outputs of a model over the range of its data
 linear_form     the equation that other programs apply, fitted to these outputs

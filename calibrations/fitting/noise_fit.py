@@ -157,7 +157,7 @@ def gains(noise: Noise, residual: Array, jacobian: Array, extras: Sequence[Array
 
 
 def candidate_noises(noise: Noise) -> list[Point]:
-    """Slow noise to try beside what is known: none where a still record has told it."""
+    """Slow noise to try in addition to known noise; none if a still record has determined it."""
     return [NO_SLOW] if noise.given else grid(noise.gap_s)
 
 
@@ -176,7 +176,7 @@ def grid(gap_s: Array) -> list[Point]:
 
 
 def long_enough(gap_s: Array) -> bool:
-    """Whether rows so far apart can tell slow noise from white."""
+    """Whether rows at this distance can separate slow noise from white noise."""
     gap = float(np.median(gap_s[1:])) if len(gap_s) > 1 else 0.0
     return len(gap_s) >= FEWEST_FOR_SLOW and gap > 0 and float(np.sum(gap_s)) >= 20 * gap
 
@@ -265,7 +265,7 @@ class NoiseSearch:
         return np.array([len(taus) > 1 or ratio == 0 for ratio, taus in self.grid])
 
     def _choose(self, score: Array) -> int:
-        """The best point; flicker noise where the data cannot tell it from the best.
+        """The best point; flicker noise where the data cannot separate it from the best.
 
         Electronics flickers, and has more to say at long times than one process: steps and trends are then judged
         with caution.

@@ -16,7 +16,7 @@ from calibrations.effects import Effect
 from calibrations.errors import ModelError
 from calibrations.fitting.shown_forms import estimated_by_residual
 from calibrations.free_forms.bases import Harmonics, Line
-from calibrations.free_forms.chain import Given, State, base_size, start, state_at
+from calibrations.free_forms.chain import ModelEffects, State, base_size, start, state_at
 from calibrations.free_forms.components import Component, free
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.form import Factor, Form
@@ -65,18 +65,18 @@ def with_sizes(model: Model, before: Fit) -> Model:
     return model
 
 
-def beyond_base(fit: Fit) -> Given:
+def effects_beyond_base(fit: Fit) -> ModelEffects:
     """What the model's effects beyond bias, scale factor and geometry contribute."""
     problem = fit.problem
     others = [term.name for term in fit.model.terms if term.name not in BASE]
     shape = fit.residual.shape
     if not others:
-        return Given(np.zeros(shape), np.zeros((*shape, 0)))
+        return ModelEffects(np.zeros(shape), np.zeros((*shape, 0)))
     steps = problem.layout.steps(fit.theta)
     base = [step for step in steps if step[0].name in BASE]
     contribution = (forward(fit.table, steps) - forward(fit.table, base)).T
     mask = np.any([problem.layout.of_effect(name) for name in others], axis=0)
-    return Given(contribution, -fit.jacobian[:, :, mask])
+    return ModelEffects(contribution, -fit.jacobian[:, :, mask])
 
 
 def estimated(before: Fit, effect: RequestedForm) -> Effect:
@@ -87,14 +87,14 @@ def estimated(before: Fit, effect: RequestedForm) -> Effect:
     if not table.type.stage_angles:
         return estimated_by_residual(before, effect.place)
     table = replace(table, left_out=())
-    data, given = PoseData.of(table), beyond_base(before)
-    first = state_at(data, given, start(data, given), ())
+    data, model_effects = PoseData.of(table), effects_beyond_base(before)
+    first = state_at(data, model_effects, start(data, model_effects), ())
     every = components(data, first)
     forms = [c for c in every if c.place == effect.place and c.form is not None and not c.general]
     forms = [*_completing(effect.place, data, first), *forms]
     if not forms:
-        raise ModelError(f"{effect.name} cannot be estimated from {table.source}: what drives it does not change there")
-    result = _estimated(before, data, given, [c for c in every if c.noise], forms)
+        raise ModelError(f"{effect.name} cannot be estimated from {table.source}: its driver does not change there")
+    result = _estimated(before, data, model_effects, [c for c in every if c.noise], forms)
     whole = Structure(result, (), Geometry(), result.white, FloorSource.SAMPLES)
     return free_form(tuple(whole._sized(name) for name in result.active))
 
@@ -114,13 +114,13 @@ def _completing(place: str, data: PoseData, first: State) -> list[Component]:
 
 
 def _estimated(
-    before: Fit, data: PoseData, given: Given, noise: list[Component], forms: list[Component]
+    before: Fit, data: PoseData, model_effects: ModelEffects, noise: list[Component], forms: list[Component]
 ) -> SearchResult:
     """The forms that act, with their sizes; where the noise is not known, that of the residual."""
     stated = before.problem.white
     white = np.tile(before.noise.floor[:, None], (1, data.n)) if stated is None else stated
     for _ in range(ROUNDS):
-        result = _sized(data, given, white, noise, forms)
+        result = _sized(data, model_effects, white, noise, forms)
         if stated is not None:
             break
         scaled = white * result.ratio
@@ -131,20 +131,22 @@ def _estimated(
     return result
 
 
-def _sized(data: PoseData, given: Given, white: Array, noise: list[Component], forms: list[Component]) -> SearchResult:
+def _sized(
+    data: PoseData, model_effects: ModelEffects, white: Array, noise: list[Component], forms: list[Component]
+) -> SearchResult:
     """Selection among the forms and Gauss-Newton steps."""
     every = [*noise, *forms]
-    values = start(data, given)
-    state = state_at(data, given, values, ())
+    values = start(data, model_effects)
+    state = state_at(data, model_effects, values, ())
     floor = float(np.sqrt(np.mean(white**2)))
     most = {c.name: (0.5 * floor) ** 2 for c in noise}
     variances = {c.name: (0.1 * floor) ** 2 for c in noise}
     scales: dict[str, float] = {}
-    b = base_size(data, given)
+    b = base_size(data, model_effects)
     by_name = {c.name: c for c in forms}
     pools = [by_name]
     for number in range(ROUNDS):
-        X, blocks, scales = whitened(state, given, values, every, scales, white)
+        X, blocks, scales = whitened(state, model_effects, values, every, scales, white)
         g = gram(X, blocks, scales, b)
         if number == 0:
             X, scales = beside_base(X, g, b)
@@ -158,12 +160,12 @@ def _sized(data: PoseData, given: Given, white: Array, noise: list[Component], f
             sizes = estimate(g, {**sizes.variances, best: max(gained[best][1], least)}, most)
         variances = dict(sizes.variances)
         values = coefficients(g, sizes)
-        moved = state_at(data, given, values, every)
+        moved = state_at(data, model_effects, values, every)
         change = float(np.sqrt(np.mean(((moved.predicted - state.predicted) / white) ** 2)))
         state = moved
         if number > 0 and change < FLOOR_KNOWN:
             break
-    X, blocks, scales = whitened(state, given, values, every, scales, white)
+    X, blocks, scales = whitened(state, model_effects, values, every, scales, white)
     g = gram(X, blocks, scales, b)
     sizes = estimate(g, variances, most)
-    return SearchResult(data, given, white, every, g, X, sizes, coefficients(g, sizes), state, ())
+    return SearchResult(data, model_effects, white, every, g, X, sizes, coefficients(g, sizes), state, ())

@@ -34,11 +34,11 @@ PER_DECADE = 2.0  # processes of flicker
 def with_noise(table: Table, model: Model) -> Table:
     """The table, its slow noise known. Raises DataError, ModelError where the model does not know its channels.
 
-    The noise of its outputs is then no longer guessed from what a model leaves.
+    The noise of its outputs is then no longer estimated from the residual of a model.
     """
     if not table.type.known_input:
         known = " and ".join(name for name, kind in KINDS.items() if kind.known_input)
-        raise DataError(f"{table.source}: a noise model is for {known}, and this is of {table.content}")
+        raise DataError(f"{table.source}: a noise model is for {known}, but this table is of {table.content}")
     if "t_s" not in table:
         raise DataError(f"{table.source}: slow noise needs the column t_s: when each row was measured")
     if model.unit != table.unit:

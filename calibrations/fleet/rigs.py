@@ -1,4 +1,4 @@
-"""A table with its stage's errors taken out: where the sensor truly stood, as far as the fleet knows it.
+"""A table without the errors of its stage: the true angles, by the fleet's estimate of these errors.
 
 The direction of gravity is all that an orientation is to a still sensor, so any error of pose, a tilted base too, is a
 change of alpha and beta.

@@ -43,17 +43,17 @@ class State:
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
+class ModelEffects:
     """Effects of the given model beyond the base: their contribution, and their columns (channels, n, m)."""
 
     contribution: Array
     columns: Array
 
     @staticmethod
-    def nothing(data: PoseData) -> Given:
+    def nothing(data: PoseData) -> ModelEffects:
         """No effect."""
         shape = data.channels, data.n
-        return Given(np.zeros(shape), np.zeros((*shape, 0)))
+        return ModelEffects(np.zeros(shape), np.zeros((*shape, 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +64,9 @@ class Coefficients:
     of: Mapping[str, Array]
 
 
-def base_size(data: PoseData, given: Given) -> int:
+def base_size(data: PoseData, model_effects: ModelEffects) -> int:
     """Number of base columns: bias, three sensitivities per axis, alpha, tilt, beta if remounted, given columns."""
-    return own_base_size(data) + int(given.columns.shape[2])
+    return own_base_size(data) + int(model_effects.columns.shape[2])
 
 
 def own_base_size(data: PoseData) -> int:
@@ -74,19 +74,21 @@ def own_base_size(data: PoseData) -> int:
     return 4 * data.channels + 2 + int(data.remounted)
 
 
-def start(data: PoseData, given: Given) -> Coefficients:
+def start(data: PoseData, model_effects: ModelEffects) -> Coefficients:
     """The base fitted to the nominal poses by ordinary least squares; at one orientation a bias alone."""
-    rest = np.zeros(2 + int(data.remounted) + given.columns.shape[2])
+    zeros = np.zeros(2 + int(data.remounted) + model_effects.columns.shape[2])
     if data.at_rest:
-        bias = np.mean(data.outputs - given.contribution, axis=1)
-        return Coefficients(np.concatenate([bias, np.zeros(3 * data.channels), rest]), {})
+        bias = np.mean(data.outputs - model_effects.contribution, axis=1)
+        return Coefficients(np.concatenate([bias, np.zeros(3 * data.channels), zeros]), {})
     a = specific_force(Pose(data.alpha, data.beta, data.mount, data.flip, UP))
     X = np.column_stack([np.ones(data.n), a])
-    answer = np.linalg.lstsq(X, (data.outputs - given.contribution).T, rcond=1e-9)[0]  # (4, channels)
-    return Coefficients(np.concatenate([answer[0], answer[1:].T.ravel(), rest]), {})
+    answer = np.linalg.lstsq(X, (data.outputs - model_effects.contribution).T, rcond=1e-9)[0]  # (4, channels)
+    return Coefficients(np.concatenate([answer[0], answer[1:].T.ravel(), zeros]), {})
 
 
-def state_at(data: PoseData, given: Given, values: Coefficients, components: Sequence[Component]) -> State:
+def state_at(
+    data: PoseData, model_effects: ModelEffects, values: Coefficients, components: Sequence[Component]
+) -> State:
     """All signals; `components` must hold every component that has a coefficient."""
     c = data.channels
     bias, rows = values.base[:c], values.base[c : 4 * c].reshape(c, 3)
@@ -104,8 +106,8 @@ def state_at(data: PoseData, given: Given, values: Coefficients, components: Seq
         return specific_force(Pose(alpha, beta, data.mount, data.flip, up))
 
     a = at(alpha, beta, tilt)
-    extra = given.columns @ values.base[own_base_size(data) :]
-    linear = rows @ a.T + bias[:, None] + given.contribution + extra
+    extra = model_effects.columns @ values.base[own_base_size(data) :]
+    linear = rows @ a.T + bias[:, None] + model_effects.contribution + extra
     by_alpha = rows @ (at(alpha + SMALL, beta, tilt) - at(alpha - SMALL, beta, tilt)).T / (2 * SMALL)
     by_beta = rows @ (at(alpha, beta + SMALL, tilt) - at(alpha, beta - SMALL, tilt)).T / (2 * SMALL)
     by_tilt = rows @ (at(alpha, beta, tilt + SMALL) - at(alpha, beta, tilt - SMALL)).T / (2 * SMALL)
@@ -120,9 +122,9 @@ def state_at(data: PoseData, given: Given, values: Coefficients, components: Seq
             of_force += part if comp.of_force else 0.0
     if drifts := [comp for comp in active if comp.stage == "response" and comp.scales]:
         # a drift of the sensitivity multiplies all that the sensor makes of the force
-        whole = force.copy()
-        whole[:, :c] += (of_force / np.linalg.norm(rows, axis=1)[:, None]).T
-        drifting = replace(bare, force=whole)
+        total_force = force.copy()
+        total_force[:, :c] += (of_force / np.linalg.norm(rows, axis=1)[:, None]).T
+        drifting = replace(bare, force=total_force)
         response += sum(comp.jacobian(drifting) @ values.of[comp.name] for comp in drifts)
 
     def output(response: Array) -> Array:
@@ -135,11 +137,11 @@ def state_at(data: PoseData, given: Given, values: Coefficients, components: Seq
     return State(data, force, a, by_alpha, by_beta, by_tilt, response, output(response), gain)
 
 
-def base_jacobian(state: State, given: Given) -> Array:
+def base_jacobian(state: State, model_effects: ModelEffects) -> Array:
     """d output / d base coefficients, (channels, n, p)."""
     data = state.data
     c, n = data.channels, data.n
-    out = np.zeros((c, n, base_size(data, given)))
+    out = np.zeros((c, n, base_size(data, model_effects)))
     for k in range(c):
         out[k, :, k] = 1.0
         if not data.at_rest:
@@ -149,7 +151,7 @@ def base_jacobian(state: State, given: Given) -> Array:
     if data.remounted:
         out[:, :, 4 * c + 2] = state.by_beta
     out *= state.gain[:, :, None]
-    out[:, :, own_base_size(data) :] = given.columns
+    out[:, :, own_base_size(data) :] = model_effects.columns
     return out
 
 

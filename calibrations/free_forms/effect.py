@@ -56,7 +56,9 @@ def check_forms(forms: tuple[Form, ...], place: str) -> tuple[Form, ...]:
         if any(
             not (size > 0) <= form.count(k) <= form.basis(k).count * (size > 0) for k, size in enumerate(form.sizes)
         ):
-            raise ModelError(f"{subject} keeps more columns than its basis has, or none, or some of size 0")
+            raise ModelError(
+                f"{subject}: `kept` must be 1 or more and not above the columns of the basis; 0 for an axis of size 0"
+            )
     return forms
 
 
@@ -127,21 +129,21 @@ class FreeForm(Effect):
             return form.columns(table, force, np.zeros(len(force)), k)
         if self._of_table is None or self._of_table[0] is not table:
             self._of_table = (table, {})
-        kept = self._of_table[1]
-        if (i, k) not in kept:
-            kept[i, k] = form.columns(table, force, np.zeros(len(force)), k)
-        return kept[i, k]
+        cached = self._of_table[1]
+        if (i, k) not in cached:
+            cached[i, k] = form.columns(table, force, np.zeros(len(force)), k)
+        return cached[i, k]
 
     def _summed(self, table: Table, force: Array, response: Array, k: int, coefficients: Array) -> Array:
         """The sum of all columns for axis k with these coefficients, shape (n,)."""
         out, at = np.zeros(len(force)), 0
         for i, form in enumerate(self.forms):
-            own = coefficients[at : at + form.count(k)]
-            at += len(own)
+            form_coefficients = coefficients[at : at + form.count(k)]
+            at += len(form_coefficients)
             if form.of_table:
-                out += self._columns_of(i, table, force, k) @ own
+                out += self._columns_of(i, table, force, k) @ form_coefficients
             else:
-                out += form.summed(table, force, response, k, own)
+                out += form.summed(table, force, response, k, form_coefficients)
         return out
 
     def _kept_columns(self, table: Table, force: Array) -> list[Array]:

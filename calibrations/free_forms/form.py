@@ -79,8 +79,8 @@ class Form:
         """Columns without which the form cannot be computed."""
         named = self.driver.removeprefix("column:")
         by_driver = {"temperature": ("temperature_c",), "time": ("t_s",)}
-        own = by_driver.get(self.driver, (named,) if named != self.driver else ())
-        return (*own, *(("direction",) if self.factor == "side" and self.approach_deg else ()))
+        required = by_driver.get(self.driver, (named,) if named != self.driver else ())
+        return (*required, *(("direction",) if self.factor == "side" and self.approach_deg else ()))
 
     @property
     def of_force(self) -> bool:
@@ -102,7 +102,7 @@ class Form:
 
         From the force along the sensing axes (n, 3), g, and the output of the axis before the form (n,).
         """
-        basis, kept = self.basis(k), self.count(k)
+        basis, count = self.basis(k), self.count(k)
         if isinstance(basis, Products):
             out = basis(force)
         elif isinstance(basis, Preisach):
@@ -112,9 +112,9 @@ class Form:
             pressed = self.factor == "pressed"
             out = np.asarray(_slipping(table, basis, self.approach_deg, pressed)[k]) if lagging is None else lagging
         elif self.driver in MODELLED:
-            out = basis(self.drive(table, force, response, k))[:, :kept]
+            out = basis(self.drive(table, force, response, k))[:, :count]
         else:
-            out = _of_table(self, table, k)[:, :kept]
+            out = _of_table(self, table, k)[:, :count]
         multiplied = self.factor not in ("", "pressed")
         return np.asarray(out * self._factor(table, force, k)[:, None]) if multiplied else out
 
@@ -174,8 +174,8 @@ def _hysteretic(table: Table, basis: Preisach, approach_deg: float) -> Array:
     """Columns of a Preisach hysteresis of the force along each axis, shape (3, n, count)."""
     driver = specific_force(nominal_pose(table))
     widths = np.array(basis.widths)
-    held = slip_elements(driver, way(table, approach_deg), np.ones_like(driver), widths, np.zeros(3))
-    plays = np.moveaxis(driver[:, None, :] - held, 2, 0)
+    forces = slip_elements(driver, way(table, approach_deg), np.ones_like(driver), widths, np.zeros(3))
+    plays = np.moveaxis(driver[:, None, :] - forces, 2, 0)
     return np.ascontiguousarray([basis.over(followers) for followers in plays])
 
 
@@ -186,8 +186,8 @@ def _slipping(table: Table, basis: Play, approach_deg: float, pressed: bool) -> 
     driver = specific_force(nominal_pose(table))
     path, even = way(table, approach_deg), np.ones_like(driver)
     by_load = even + np.abs(other_in_plane(driver)) if pressed else even
-    held = slip_elements(driver, path, by_load, widths, np.zeros(3))
-    columns = np.moveaxis(held, 2, 0) / widths
+    forces = slip_elements(driver, path, by_load, widths, np.zeros(3))
+    columns = np.moveaxis(forces, 2, 0) / widths
     if basis.memory:
         first = np.moveaxis(slip_elements(driver, path, by_load, widths, np.ones(3)), 2, 0) / widths
         columns = np.concatenate([columns, first - columns], axis=2)

@@ -18,7 +18,7 @@ from itertools import combinations
 import numpy as np
 
 from calibrations.criteria import FORM_PART
-from calibrations.free_forms.chain import Coefficients, Given, own_base_size, state_at
+from calibrations.free_forms.chain import Coefficients, ModelEffects, own_base_size, state_at
 from calibrations.free_forms.form import CROSS
 from calibrations.free_forms.search import SearchResult
 from calibrations.geometry.orientation import out_of_plane
@@ -88,7 +88,7 @@ def geometry(result: SearchResult, curves: Mapping[str, Array], effects: Geometr
     C += np.diag(np.full(len(pick), (IMMATERIAL * floor / mean_gain) ** 2))
     line_angles = [2 * max((lines_of.get(place, 0.0) for place in places), default=0.0) / mean_gain for places in over]
     outputs = partial(_linear_outputs, result, effects)
-    linear = state_at(data, Given.nothing(data), Coefficients(result.values.base[:b], {}), ()).predicted
+    linear = state_at(data, ModelEffects.nothing(data), Coefficients(result.values.base[:b], {}), ()).predicted
     to_angles = pick @ (result.gram.base_inverse @ result.columns[:, : len(covariance)].T)[:b]
 
     def remaining_angles(values: Mapping[str, Array]) -> Array:

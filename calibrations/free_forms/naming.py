@@ -66,13 +66,13 @@ class ActingPlace:
     @property
     def unknown(self) -> bool:
         """Whether no effect of the catalogue is its cause, and it is no remainder of the form of a larger one."""
-        seen = self.size >= LEAST_UNKNOWN and self.own >= LEAST_UNKNOWN_SHARE * self.largest
-        return self.material and not self.causes and seen
+        visible = self.size >= LEAST_UNKNOWN and self.own >= LEAST_UNKNOWN_SHARE * self.largest
+        return self.material and not self.causes and visible
 
 
 def places(result: SearchResult) -> list[ActingPlace]:
     """Every place that acts, largest first."""
-    b = base_size(result.data, result.given)
+    b = base_size(result.data, result.model_effects)
     by_place: dict[str, list[str]] = {}
     for name in result.active:
         by_place.setdefault(result.component(name).place, []).append(name)
@@ -91,18 +91,20 @@ def places(result: SearchResult) -> list[ActingPlace]:
         followed = _followed(result, curves, place, Q, 0.0 if walks else share) if curved else None
         if followed is not None:
             causes, share = (followed[0].cause,), followed[1]
-        gain, others = _rivals(result, names, {other for other in sizes if sizes[place] < FORM_OF * sizes[other]})
+        gain, alternatives = _rivals(
+            result, names, {larger_place for larger_place in sizes if sizes[place] < FORM_OF * sizes[larger_place]}
+        )
         least = LEAST_SHARE * largest
         if walks:
             least = max(LEAST_UNKNOWN_SHARE * largest, READING_ERRORS * _reading_errors(result, sizes))
         # a place without a form of the catalogue, or smaller than the excess of the residual, is more often a remainder
         least_own = min(LEAST_SIZE, max(LEAST_OWN, _excess(result))) if causes else LEAST_SIZE
-        own = _own_size(result, gain)
-        material = own >= least_own and sizes[place] >= max(LEAST_SIZE, least)
+        own_size = _own_size(result, gain)
+        material = own_size >= least_own and sizes[place] >= max(LEAST_SIZE, least)
         curve = curves[place].reshape(result.white.shape) * result.white
         constants = followed[0].constants if followed else ()
-        acting = tuple(names), causes, share, material, gain, others, curve, constants
-        out.append(ActingPlace(place, sizes[place], own, largest, *acting))
+        acting = tuple(names), causes, share, material, gain, alternatives, curve, constants
+        out.append(ActingPlace(place, sizes[place], own_size, largest, *acting))
     return _with_substitutes(result, sorted(out, key=lambda p: -p.size))
 
 
@@ -122,12 +124,12 @@ def _with_substitutes(result: SearchResult, acting: Sequence[ActingPlace]) -> li
     for i, place in enumerate(out):
         if (place.material and place.own >= LEAST_SIZE) or place.size < max(LEAST_SIZE, LEAST_SHARE * place.largest):
             continue
-        for other in (o for o in out[i + 1 :] if not o.material):
-            gain = _lost(result, (*place.components, *other.components))
+        for substitute in (o for o in out[i + 1 :] if not o.material):
+            gain = _lost(result, (*place.components, *substitute.components))
             if _own_size(result, gain) >= LEAST_SIZE:
-                names = other.causes or (other.name,)
-                others = tuple(sorted({*place.inseparable_from, *names} - set(place.causes)))
-                out[i] = replace(place, material=True, gain=gain, inseparable_from=others)
+                names = substitute.causes or (substitute.name,)
+                alternatives = tuple(sorted({*place.inseparable_from, *names} - set(place.causes)))
+                out[i] = replace(place, material=True, gain=gain, inseparable_from=alternatives)
                 break
     return out
 
@@ -176,31 +178,33 @@ def _named(
     total = float(curve @ curve) or 1.0
     acting = dict.fromkeys(result.component(name).cause for name in names)
     if all(result.component(name).form is None for name in names):
-        needed, share = _needed({cause: columns[cause][0] for cause in acting}, curve, total)
-        return _one_name(result, names, needed, curve, Q), share
+        needed_causes, share = _necessary({cause: columns[cause][0] for cause in acting}, curve, total)
+        return _one_name(result, names, needed_causes, curve, Q), share
     chosen: dict[str, Array] = {}
     share = 0.0
     walks = {result.component(name).cause for name in names if "/walk-" in name}
     first = [cause for cause in acting if cause and cause not in walks] if walks else []  # a walk follows anything
     while True:
         full = len(set(chosen) - acting.keys()) >= MOST_FORMS
-        tried: dict[str, tuple[float, Array]] = {}
+        trials: dict[str, tuple[float, Array]] = {}
         for cause in first or columns:
             if cause in chosen or (full and cause not in acting):
                 continue
-            beside = list(chosen.values())
+            chosen_columns = list(chosen.values())
             options = columns[cause]
             if cause not in acting:
-                options = [*options, *_at_best_shapes(result, forms[cause], curve, beside, Q)]
-            left, X = min(((_left([*beside, X], curve), X) for X in options), key=lambda option: option[0])
-            tried[cause] = 1 - left / total, X
-        best = max(tried, key=lambda c: tried[c][0], default="")
-        if not best or tried[best][0] - share < (NEXT_FORM if chosen else 0.2):
+                options = [*options, *_at_best_shapes(result, forms[cause], curve, chosen_columns, Q)]
+            squares, X = min(
+                ((_residual_squares([*chosen_columns, X], curve), X) for X in options), key=lambda option: option[0]
+            )
+            trials[cause] = 1 - squares / total, X
+        best = max(trials, key=lambda c: trials[c][0], default="")
+        if not best or trials[best][0] - share < (NEXT_FORM if chosen else 0.2):
             if not first:
                 break
             first = []
             continue
-        share, chosen[best] = tried[best]
+        share, chosen[best] = trials[best]
     causes = _one_name(result, names, tuple(chosen), curve, Q)
     return (causes, share) if share >= NAMED else ((), share)
 
@@ -215,16 +219,16 @@ def _one_name(
     """
     causes = dict.fromkeys(chosen)
 
-    def left(comps: Sequence[Component], beside: Sequence[Array]) -> float:
-        squares = min((_left_at_best(result, c, curve, Q, beside)[0] for c in comps), default=np.inf)
+    def residual_rms(comps: Sequence[Component], companions: Sequence[Array]) -> float:
+        squares = min((_residual_at_best(result, c, curve, Q, companions)[0] for c in comps), default=np.inf)
         return float(np.sqrt(squares / len(curve)))
 
     for outer in (comp for comp in map(result.component, names) if comp.contains):
-        here = [c for c in result.components if c.place == outer.place and not c.form]
-        inner, wider = ([c for c in here if c.cause == cause] for cause in (outer.contains, outer.cause))
+        at_place = [c for c in result.components if c.place == outer.place and not c.form]
+        inner, wider = ([c for c in at_place if c.cause == cause] for cause in (outer.contains, outer.cause))
         plain = [c.reshaped((0.0,) * len(c.shape)) if c.reshaped else c for c in inner[:1]]
-        clear = CLEARLY_LESS * left(wider, [_columns_of(result, c, Q) for c in plain])
-        name = outer.cause if left(inner, []) > max(UNSEEN, clear) else outer.contains
+        clear = CLEARLY_LESS * residual_rms(wider, [_columns_of(result, c, Q) for c in plain])
+        name = outer.cause if residual_rms(inner, []) > max(UNSEEN, clear) else outer.contains
         causes = dict.fromkeys(name if cause in (outer.cause, outer.contains) else cause for cause in causes)
     return tuple(causes)
 
@@ -239,38 +243,38 @@ def _followed(
     """
     if place not in FOLLOWERS:
         return None
-    curve = curves[place] + sum(curves[other] for other in FOLLOWERS[place] if other in curves)
+    curve = curves[place] + sum(curves[follower] for follower in FOLLOWERS[place] if follower in curves)
     total, least = float(curve @ curve) or 1.0, 1 - max(FOLLOWS, share)
     best = None
     for comp in result.components:
         if comp.cause and comp.place in FOLLOWERS[place] and comp.form is None and not comp.contains:
-            left, shaped = _left_at_best(result, comp, curve, Q)
-            if left / total < least:
-                best, least = shaped, left / total
+            squares, shaped = _residual_at_best(result, comp, curve, Q)
+            if squares / total < least:
+                best, least = shaped, squares / total
     return None if best is None else (best, 1 - least)
 
 
-def _left_at_best(
-    result: SearchResult, comp: Component, curve: Array, Q: Array, beside: Sequence[Array] = ()
+def _residual_at_best(
+    result: SearchResult, comp: Component, curve: Array, Q: Array, companions: Sequence[Array] = ()
 ) -> tuple[float, Component]:
     """What a component leaves of a curve, sum of squares, at the shape that leaves least, and in that shape."""
 
-    def left(shape: tuple[float, ...]) -> float:
-        made = comp.reshaped(shape) if comp.reshaped is not None else comp
-        return _left([*beside, _columns_of(result, made, Q)], curve)
+    def squares(shape: tuple[float, ...]) -> float:
+        shaped = comp.reshaped(shape) if comp.reshaped is not None else comp
+        return _residual_squares([*companions, _columns_of(result, shaped, Q)], curve)
 
     if comp.reshaped is None:
-        return left(comp.shape), comp
-    best = climb(lambda shape: -left(shape), comp.shape, comp.step)
-    return left(best), comp.reshaped(best)
+        return squares(comp.shape), comp
+    best = climb(lambda shape: -squares(shape), comp.shape, comp.step)
+    return squares(best), comp.reshaped(best)
 
 
 def _at_best_shapes(
-    result: SearchResult, comps: Sequence[Component], curve: Array, beside: Sequence[Array], Q: Array
+    result: SearchResult, comps: Sequence[Component], curve: Array, companions: Sequence[Array], Q: Array
 ) -> list[Array]:
     """Columns of the components of one cause that have one value of shape, each at the shape that leaves least."""
     shaped = [c for c in comps if c.reshaped and len(c.shape) == 1 and c.form is None and not c.contains]
-    return [_columns_of(result, _left_at_best(result, c, curve, Q, beside)[1], Q) for c in shaped]
+    return [_columns_of(result, _residual_at_best(result, c, curve, Q, companions)[1], Q) for c in shaped]
 
 
 def _columns_of(result: SearchResult, comp: Component, Q: Array) -> Array:
@@ -279,13 +283,13 @@ def _columns_of(result: SearchResult, comp: Component, Q: Array) -> Array:
     return _freed(Q, X.reshape(-1, X.shape[2]))
 
 
-def _needed(columns: Mapping[str, Array], curve: Array, total: float) -> tuple[tuple[str, ...], float]:
+def _necessary(columns: Mapping[str, Array], curve: Array, total: float) -> tuple[tuple[str, ...], float]:
     """Of the catalogue forms that act without a free form beside them, those that the curve needs, and their share."""
-    share = 1 - _left(list(columns.values()), curve) / total
+    share = 1 - _residual_squares(list(columns.values()), curve) / total
 
     def lost(cause: str) -> float:
-        rest = [X for other, X in columns.items() if other != cause]
-        return share - (1 - _left(rest, curve) / total if rest else 0.0)
+        remaining = [X for name, X in columns.items() if name != cause]
+        return share - (1 - _residual_squares(remaining, curve) / total if remaining else 0.0)
 
     needs = {cause: lost(cause) for cause in columns}
     least = min(LEAST_NEEDED, max(needs.values()))
@@ -321,11 +325,11 @@ def _columns(result: SearchResult, comps: Sequence[Component], names: Sequence[s
     return [np.hstack(acting)] if acting else parts
 
 
-def _left(columns: Sequence[Array], y: Array) -> float:
+def _residual_squares(columns: Sequence[Array], y: Array) -> float:
     X = np.hstack(columns)
     scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
-    rest = y - X @ (np.linalg.lstsq(X / scale, y, rcond=1e-8)[0] / scale)
-    return float(rest @ rest)
+    residual = y - X @ (np.linalg.lstsq(X / scale, y, rcond=1e-8)[0] / scale)
+    return float(residual @ residual)
 
 
 def _rivals(result: SearchResult, names: Sequence[str], larger: set[str]) -> tuple[float, tuple[str, ...]]:
@@ -334,16 +338,16 @@ def _rivals(result: SearchResult, names: Sequence[str], larger: set[str]) -> tup
     Of one component those that gain nearly as much. At a `larger` place that acts, also a form that gains most of it:
     the form of a mechanism is never quite that of the catalogue.
     """
-    others = _without(result, names)
-    lost = others.deviance - result.sizes.deviance
+    reduced = _without(result, names)
+    lost = reduced.deviance - result.sizes.deviance
     acting = [result.component(name) for name in names]
-    rest = [c for c in result.components if c.name not in result.sizes.variances and c.place != acting[0].place]
-    gained = gains(result.gram, others, [c.name for c in rest])
-    near = lost - acting[0].price - CLOSE if len(names) == 1 else np.inf
+    inactive = [c for c in result.components if c.name not in result.sizes.variances and c.place != acting[0].place]
+    gained = gains(result.gram, reduced, [c.name for c in inactive])
+    limit = lost - acting[0].price - CLOSE if len(names) == 1 else np.inf
     most = MOSTLY * lost
     close = {
         c.cause or c.place
-        for c in rest
-        if gained[c.name][0] - c.price > (min(near, most) if c.place in larger and not c.general else near)
+        for c in inactive
+        if gained[c.name][0] - c.price > (min(limit, most) if c.place in larger and not c.general else limit)
     }
     return lost, tuple(sorted(close - {component.cause for component in acting}))

@@ -49,13 +49,13 @@ def acts_at_rest(place: str) -> bool:
 
 
 def place_of_effect(name: str) -> str:
-    """The place at which an effect of a model acts; "" for bias, scale factor and effects of one's own."""
+    """The place at which an effect of a model acts; "" for bias, scale factor and effects that the user wrote."""
     if name.startswith(PREFIX):
         return name.removeprefix(PREFIX)
     return next((place for place, effects in EFFECTS_AT.items() if name in effects), "")
 
 
 def shown_at_rest(name: str) -> bool:
-    """Whether data at one orientation can show a catalogue effect, or may show an effect of one's own."""
+    """Whether data at one orientation can show a catalogue effect, or may show an effect that the user wrote."""
     place = place_of_effect(name)
     return acts_at_rest(place) or name == "quantisation" or (not place and name != "scale-factor")

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpotri, dpotrs
 
-from calibrations.free_forms.chain import Coefficients, Given, State, base_jacobian
+from calibrations.free_forms.chain import Coefficients, ModelEffects, State, base_jacobian
 from calibrations.free_forms.components import Component
 from calibrations.table import Array
 
@@ -57,7 +57,7 @@ class Gram:
 
 def whitened(
     state: State,
-    given: Given,
+    model_effects: ModelEffects,
     values: Coefficients,
     components: Sequence[Component],
     scales: Mapping[str, float],
@@ -65,22 +65,22 @@ def whitened(
 ) -> tuple[Array, dict[str, slice], dict[str, float]]:
     """[base, components, data] over the white noise, (channels * n, b + p + 1), blocks, scales."""
     data = state.data
-    base = base_jacobian(state, given)
+    base = base_jacobian(state, model_effects)
     target = data.outputs - state.predicted + base @ values.base
-    blocks, at, parts, used = {}, 0, [base], dict(scales)
+    blocks, at, parts, column_scales = {}, 0, [base], dict(scales)
     for comp in components:
         J = comp.jacobian(state)
-        if comp.name not in used:
-            used[comp.name] = float(np.sqrt(np.mean(np.sum(J * J, axis=2)))) or 1.0
-        J = J / used[comp.name]
+        if comp.name not in column_scales:
+            column_scales[comp.name] = float(np.sqrt(np.mean(np.sum(J * J, axis=2)))) or 1.0
+        J = J / column_scales[comp.name]
         if comp.name in values.of and not comp.noise:
-            target = target + J @ (values.of[comp.name] * used[comp.name])
+            target = target + J @ (values.of[comp.name] * column_scales[comp.name])
         parts.append(J)
         blocks[comp.name] = slice(at, at + J.shape[2])
         at += J.shape[2]
     X = np.concatenate([*parts, target[:, :, None]], axis=2)
     X /= white[:, :, None]
-    return X.reshape(-1, X.shape[2]), blocks, used
+    return X.reshape(-1, X.shape[2]), blocks, column_scales
 
 
 def gram(X: Array, blocks: Mapping[str, slice], scales: Mapping[str, float], b: int) -> Gram:
@@ -93,12 +93,15 @@ def eliminated(G: Array, blocks: Mapping[str, slice], scales: Mapping[str, float
     size = np.sqrt(np.maximum(np.diag(G)[:b], 1e-300))
     size = np.where(size > NOTHING * size.max(), size, np.inf)
     values, vectors = np.linalg.eigh(G[:b, :b] / np.outer(size, size))
-    kept = values > RANK * values[-1]
-    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T / np.outer(size, size)
+    independent = values > RANK * values[-1]
+    inverse = (vectors[:, independent] / values[independent]) @ vectors[:, independent].T / np.outer(size, size)
     cross = G[:b, b:]
-    rest = G[b:, b:] - cross.T @ inverse @ cross
-    return Gram(rest[:-1, :-1], rest[:-1, -1], max(float(rest[-1, -1]), 1e-300), blocks, scales, inverse, cross[:, :-1],
-                cross[:, -1], rows, int(kept.sum()))  # fmt: skip
+    remainder = G[b:, b:] - cross.T @ inverse @ cross
+    squares = max(float(remainder[-1, -1]), 1e-300)
+    return Gram(
+        remainder[:-1, :-1], remainder[:-1, -1], squares, blocks, scales, inverse, cross[:, :-1], cross[:, -1], rows,
+        int(independent.sum()),
+    )  # fmt: skip
 
 
 def beside_base(X: Array, g: Gram, b: int) -> tuple[Array, dict[str, float]]:
@@ -125,9 +128,9 @@ class Sizes:
     def of(self, g: Gram, name: str) -> Array:
         """Coefficients of one active component (of normalised columns)."""
         at = 0
-        for other in self.variances:
-            m = g.blocks[other].stop - g.blocks[other].start
-            if other == name:
+        for component in self.variances:
+            m = g.blocks[component].stop - g.blocks[component].start
+            if component == name:
                 return self.coefficients[at : at + m]
             at += m
         raise KeyError(name)
@@ -188,15 +191,15 @@ class _Products:
 
 def _root(K: Array) -> tuple[Array, bool]:
     """Cholesky factor; where rounding made K indefinite, of K with a little more on its diagonal."""
-    more = 0.0
+    ridge = 0.0
     if not np.isfinite(K).all():
         raise ArithmeticError("the products of the columns are not finite")
     while True:
         try:
-            factor: tuple[Array, bool] = cho_factor(K + more * np.eye(len(K)), lower=True, check_finite=False)
+            factor: tuple[Array, bool] = cho_factor(K + ridge * np.eye(len(K)), lower=True, check_finite=False)
             return factor
         except np.linalg.LinAlgError:
-            more = max(100 * more, 1e-12 * float(np.max(np.diag(K))))
+            ridge = max(100 * ridge, 1e-12 * float(np.max(np.diag(K))))
 
 
 def estimate(
@@ -204,11 +207,11 @@ def estimate(
     variances: Mapping[str, float],
     most: Mapping[str, float],
     rounds: int = ROUNDS,
-    wanted: float = np.inf,
+    target: float = np.inf,
 ) -> Sizes:
     """Variances of greatest restricted likelihood, none above `most`, by Fellner-Schall steps with extrapolation.
 
-    The steps end early where the deviance will not fall to `wanted`: each gains less than the one before.
+    The steps end early where the deviance will not fall to `target`: each gains less than the one before.
     """
     present = {name: min(v, most.get(name, np.inf)) for name, v in variances.items()}
     products = _Products.of(g, list(present))
@@ -232,7 +235,7 @@ def estimate(
         if gained < -0.5:
             break
         present, fit = changed, after
-        if moved < SETTLED or abs(gained) < 0.01 or fit.deviance - REACH * gained > wanted:
+        if moved < SETTLED or abs(gained) < 0.01 or fit.deviance - REACH * gained > target:
             break
     return fit.sizes
 
@@ -244,10 +247,10 @@ def gains(g: Gram, fit: Sizes, names: Sequence[str]) -> dict[str, tuple[float, f
     """By inactive component: gain in -2 log likelihood at its best variance, the others held, and this variance."""
     if not names:
         return {}
-    active, rest = g.indices(fit.variances), g.indices(names)
-    cross = g.products[np.ix_(active, rest)]
+    active, inactive = g.indices(fit.variances), g.indices(names)
+    cross = g.products[np.ix_(active, inactive)]
     solved = fit.inverse @ cross
-    side = g.with_data[rest] - cross.T @ fit.coefficients
+    side = g.with_data[inactive] - cross.T @ fit.coefficients
     answer, at = {}, 0
     for name in names:
         block = g.blocks[name]
@@ -279,14 +282,14 @@ def gain(M: Array, side: Array) -> tuple[float, float]:
 def gain_beside(g: Gram, fit: Sizes, X: Array, b: int) -> Callable[[Array], float]:
     """The gain of whitened columns (rows, m) that are not in g; X are the columns that g was made of."""
     active = g.indices(fit.variances)
-    beside, by_products = X[:, b + active].T, g.base_products[:, active].T  # of all columns that are tried
+    active_columns, by_products = X[:, b + active].T, g.base_products[:, active].T  # of all columns that are tried
 
     def gained(N: Array) -> float:
         with_base = X[:, :b].T @ N
         by_base = g.base_inverse @ with_base
         M = N.T @ N - with_base.T @ by_base
         side = N.T @ X[:, -1] - by_base.T @ g.base_with_data
-        cross = beside @ N - by_products @ by_base
+        cross = active_columns @ N - by_products @ by_base
         return gain(M - cross.T @ fit.inverse @ cross, side - cross.T @ fit.coefficients)[0]
 
     return gained
@@ -294,9 +297,9 @@ def gain_beside(g: Gram, fit: Sizes, X: Array, b: int) -> Callable[[Array], floa
 
 def _part(g: Gram, fit: Sizes, name: str) -> slice:
     at = 0
-    for other in fit.variances:
-        m = g.blocks[other].stop - g.blocks[other].start
-        if other == name:
+    for component in fit.variances:
+        m = g.blocks[component].stop - g.blocks[component].start
+        if component == name:
             return slice(at, at + m)
         at += m
     raise KeyError(name)
@@ -315,10 +318,10 @@ def loss(g: Gram, fit: Sizes, name: str) -> float:
 def without(g: Gram, fit: Sizes, name: str) -> Sizes:
     """The fit without one active component, the other variances held."""
     part = _part(g, fit, name)
-    rest = np.r_[0 : part.start, part.stop : len(fit.coefficients)]
-    solved = cho_solve(_root(fit.inverse[part, part]), fit.inverse[part][:, rest], check_finite=False)
-    inverse = fit.inverse[np.ix_(rest, rest)] - fit.inverse[part][:, rest].T @ solved
-    answer = fit.coefficients[rest] - solved.T @ fit.coefficients[part]
+    remaining = np.r_[0 : part.start, part.stop : len(fit.coefficients)]
+    solved = cho_solve(_root(fit.inverse[part, part]), fit.inverse[part][:, remaining], check_finite=False)
+    inverse = fit.inverse[np.ix_(remaining, remaining)] - fit.inverse[part][:, remaining].T @ solved
+    answer = fit.coefficients[remaining] - solved.T @ fit.coefficients[part]
     variances = {k: v for k, v in fit.variances.items() if k != name}
     return Sizes(variances, answer, inverse, fit.deviance + loss(g, fit, name))
 

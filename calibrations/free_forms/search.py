@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibrations.free_forms.chain import Coefficients, Given, State, base_size, start, state_at
+from calibrations.free_forms.chain import Coefficients, ModelEffects, State, base_size, start, state_at
 from calibrations.free_forms.components import Component
 from calibrations.free_forms.places import components as all_components
 from calibrations.free_forms.poses import PoseData
@@ -40,7 +40,7 @@ class SearchResult:
     """The end of the search."""
 
     data: PoseData
-    given: Given
+    model_effects: ModelEffects
     white: Array
     components: Sequence[Component]
     gram: Gram
@@ -86,7 +86,7 @@ class SearchResult:
         return self.sizes.deviance + ENTER * len(self.active) + prices(self.component(name) for name in self.active)
 
 
-def search(data: PoseData, white: Array, given: Given, general: bool = True) -> SearchResult:
+def search(data: PoseData, white: Array, model_effects: ModelEffects, general: bool = True) -> SearchResult:
     """Places that act, with their sizes, from several beginnings: the likeliest end counts.
 
     First forms of the catalogue begin, and free forms follow; where that leaves more than noise, or many components,
@@ -99,7 +99,7 @@ def search(data: PoseData, white: Array, given: Given, general: bool = True) -> 
     """
 
     def descent(catalogue_first: bool, loops: bool = False) -> SearchResult:
-        return _descent(data, white, given, general, catalogue_first, loops)
+        return _descent(data, white, model_effects, general, catalogue_first, loops)
 
     by_name = descent(catalogue_first=True)
     if by_name.ratio < NOISE_ALONE and len(by_name.active) <= FEW_COMPONENTS:
@@ -112,11 +112,11 @@ def search(data: PoseData, white: Array, given: Given, general: bool = True) -> 
 
 
 def _descent(
-    data: PoseData, white: Array, given: Given, general: bool, catalogue_first: bool, loops: bool
+    data: PoseData, white: Array, model_effects: ModelEffects, general: bool, catalogue_first: bool, loops: bool
 ) -> SearchResult:
     """Rounds of selection and Gauss-Newton steps from the base."""
-    values = start(data, given)
-    state = state_at(data, given, values, ())
+    values = start(data, model_effects)
+    state = state_at(data, model_effects, values, ())
     components = [c for c in all_components(data, state) if (general or not c.general) and (loops or not c.has_loops)]
     scales: dict[str, float] = {}
     noise = [c.name for c in components if c.noise]
@@ -124,13 +124,13 @@ def _descent(
     variances = dict.fromkeys(noise, (0.1 * floor) ** 2)
     most: dict[str, float] = dict.fromkeys(noise, (SLOW_MOST * floor) ** 2)
     path: list[str] = []
-    b = base_size(data, given)
+    b = base_size(data, model_effects)
     rejected: list[float] = []
     first = find_saw(data, state, white, data.outputs - state.predicted, rejected, ENTER)
     components += [first] if first is not None else []
     caution = 1.0
     for number in range(ROUNDS):
-        X, blocks, scales = whitened(state, given, values, components, scales, white)
+        X, blocks, scales = whitened(state, model_effects, values, components, scales, white)
         g = gram(X, blocks, scales, b)
         if number == 0:
             X, scales = beside_base(X, g, b)
@@ -147,14 +147,14 @@ def _descent(
         sizes, steps = select(g, sizes, components, pools, most, limit, number >= len(COARSE))
         path += steps
         variances = dict(sizes.variances)
-        values, moved = _damped(data, given, previous[0], coefficients(g, sizes), components, white)
+        values, moved = _damped(data, model_effects, previous[0], coefficients(g, sizes), components, white)
         reshaped = _refined(components, g, sizes, X, b, state, scales, white)
         if reshaped is not None:
-            X, blocks, scales = whitened(state, given, previous[0], reshaped, scales, white)
+            X, blocks, scales = whitened(state, model_effects, previous[0], reshaped, scales, white)
             g = gram(X, blocks, scales, b)
             sizes = estimate(g, variances, most)
             reshaped_values = coefficients(g, sizes)
-            reshaped_state = state_at(data, given, reshaped_values, reshaped)
+            reshaped_state = state_at(data, model_effects, reshaped_values, reshaped)
             if _misfit(reshaped_state, white) < _misfit(moved, white):
                 components, values, moved, variances = reshaped, reshaped_values, reshaped_state, dict(sizes.variances)
         change = float(np.sqrt(np.mean(((moved.predicted - state.predicted) / white) ** 2)))
@@ -175,27 +175,27 @@ def _descent(
                 continue
         if number >= len(COARSE) and set(variances) == before and change < 0.03:
             break
-    X, blocks, scales = whitened(state, given, values, components, scales, white)
+    X, blocks, scales = whitened(state, model_effects, values, components, scales, white)
     g = gram(X, blocks, scales, b)
     sizes = estimate(g, variances, most)
     values = coefficients(g, sizes)
-    state = state_at(data, given, values, components)
-    return SearchResult(data, given, white, components, g, X, sizes, values, state, path)
+    state = state_at(data, model_effects, values, components)
+    return SearchResult(data, model_effects, white, components, g, X, sizes, values, state, path)
 
 
 def _damped(
     data: PoseData,
-    given: Given,
+    model_effects: ModelEffects,
     before: Coefficients,
     after: Coefficients,
     components: Sequence[Component],
     white: Array,
 ) -> tuple[Coefficients, State]:
     """The step from `before` to `after`, halved as long as half of it leaves less."""
-    state = state_at(data, given, after, components)
+    state = state_at(data, model_effects, after, components)
     for _ in range(HALVINGS):
         half = _between(before, after)
-        half_state = state_at(data, given, half, components)
+        half_state = state_at(data, model_effects, half, components)
         if _misfit(half_state, white) >= _misfit(state, white):
             break
         after, state = half, half_state

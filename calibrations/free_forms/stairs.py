@@ -23,11 +23,13 @@ from calibrations.table import Array, Table
 
 FEWEST_STEPS = 3  # in the range of the outputs
 POINTS = 4.0  # in a resolved interval of frequency
-MOST = 20_000  # frequencies
+MOST_FREQUENCIES = 20_000  # frequencies
 GATHERED = 0.28  # more than the linear model's outputs gather at the same codes: |mean of exp(2 pi i V / step)|
 BY_CHANCE = 3.0  # times the most that outputs at random gather: sqrt(log(frequencies) / outputs)
 FINEST = 3.0  # sample noises in a step: finer steps leave nothing in a mean
-WHOLE = 0.4  # of the outputs, beyond an equal share: at codes of one remainder; some lie on the edge between two
+SAME_REMAINDER = (
+    0.4  # of the outputs, beyond an equal share: at codes of one remainder; some lie on the edge between two
+)
 SAW = "output/quantisation"  # the component that a search without stairs leaves out
 GRID = np.linspace(-1.0, 1.0, 401)  # of a step, about a code
 REACH = 3  # codes to either side that noise may reach
@@ -65,19 +67,19 @@ def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
     """
     noise = float(np.median(table.optional(table.std_names[0], 0.0)))
     values, span = table.outputs.T.ravel(), float(np.ptp(table.outputs)) or 1.0
-    highest = min(1 / (FINEST * noise) if noise > 0 else np.inf, MOST / POINTS / span)
+    highest = min(1 / (FINEST * noise) if noise > 0 else np.inf, MOST_FREQUENCIES / POINTS / span)
     f = np.arange(FEWEST_STEPS / span, highest, 1 / (POINTS * span))
     if not len(f):
         return None
-    more = _gathered(values, f) - _gathered(linear.ravel(), f)
-    best = int(np.argmax(more))
-    if more[best] < max(GATHERED, BY_CHANCE * float(np.sqrt(np.log(len(f)) / len(values)))):
+    excess = _gathered(values, f) - _gathered(linear.ravel(), f)
+    best = int(np.argmax(excess))
+    if excess[best] < max(GATHERED, BY_CHANCE * float(np.sqrt(np.log(len(f)) / len(values)))):
         return None
     fine = f[best] + np.linspace(-1, 1, 81) / (POINTS * span)
     at = float(fine[int(np.argmax(_gathered(values, fine)))])
     middle = float(values.mean())
     phase = float(np.angle(np.mean(np.exp(2j * np.pi * at * (values - middle)))))
-    step, offset = _whole(values, 1 / at, middle + phase / (2 * np.pi * at))
+    step, offset = _with_every_code(values, 1 / at, middle + phase / (2 * np.pi * at))
     width = max(3 * float(np.sqrt(np.mean(white**2))), 0.01 * step)
     step, offset = _sharpened(values, step, offset, middle, width)
     return Stairs(step, offset, noise or _sample_noise(table.outputs.T, white, step, offset))
@@ -91,22 +93,22 @@ def _sample_noise(outputs: Array, white: Array, step: float, offset: float) -> f
     Of steps so coarse that most means are samples of one code, their standard deviations tell nothing of it. Outputs
     before the rounding are taken to lie anywhere between two codes with the same probability.
     """
-    seen, std = ((outputs - offset) / step).ravel()[:, None], np.maximum(white / step, NARROWEST).ravel()[:, None]
+    fraction, std = ((outputs - offset) / step).ravel()[:, None], np.maximum(white / step, NARROWEST).ravel()[:, None]
 
     def likelihood(share: float) -> float:
-        beyond = _mean_code(TREAD, 1.0, 0.0, share) - seen
-        density = np.mean(np.exp(-0.5 * ((beyond - np.round(beyond)) / std) ** 2), axis=1)
+        deviation = _mean_code(TREAD, 1.0, 0.0, share) - fraction
+        density = np.mean(np.exp(-0.5 * ((deviation - np.round(deviation)) / std) ** 2), axis=1)
         return float(np.sum(np.log(np.maximum(density, OUTLIER))))
 
     return step * max(NOISES, key=likelihood)
 
 
-def _whole(values: Array, step: float, offset: float) -> tuple[float, float]:
+def _with_every_code(values: Array, step: float, offset: float) -> tuple[float, float]:
     """Step and offset where every code is used, and not only each second or third of them."""
     for times in (2, 3):
         code = np.round((values - offset) / step).astype(int) % times
         counts = np.bincount(code, minlength=times)
-        if counts.max() / len(values) > 1 / times + WHOLE * (1 - 1 / times):
+        if counts.max() / len(values) > 1 / times + SAME_REMAINDER * (1 - 1 / times):
             return times * step, offset + step * int(np.argmax(counts))
     return step, offset
 
@@ -115,13 +117,13 @@ def _sharpened(values: Array, step: float, offset: float, middle: float, width: 
     """Step and offset near those given at which most outputs lie within `width` of a code: on a tread."""
     spread, best = float(np.ptp(values)), (-np.inf, step, offset)
     for at in 1 / step + np.linspace(-0.5, 0.5, 41) / spread:
-        turned = (values - middle) * at
+        cycles = (values - middle) * at
         for shift in np.linspace(-0.25, 0.25, 101):
-            begins = (offset - middle) * at + shift
-            beyond = turned - begins
-            beyond = (beyond - np.round(beyond)) / at
-            score = float(np.sum(np.exp(-0.5 * (beyond / width) ** 2)))
-            best = max(best, (score, 1 / at, middle + begins / at))
+            phase = (offset - middle) * at + shift
+            deviation = cycles - phase
+            deviation = (deviation - np.round(deviation)) / at
+            score = float(np.sum(np.exp(-0.5 * (deviation / width) ** 2)))
+            best = max(best, (score, 1 / at, middle + phase / at))
     return best[1], best[2]
 
 
@@ -137,10 +139,10 @@ def before_stairs(table: Table, white: Array, stairs: Stairs) -> Table:
     white   of each mean, (channels, n)
     """
     code = np.round((table.outputs.T - stairs.offset) / stairs.step)
-    seen = (table.outputs.T - stairs.offset) / stairs.step - code  # of a step, beyond the code
+    fraction = (table.outputs.T - stairs.offset) / stairs.step - code  # of a step, beyond the code
     mean = _mean_code(GRID, 1.0, 0.0, stairs.noise / stairs.step)
     std = np.maximum(white / stairs.step, 1e-3)
-    weights = np.exp(-0.5 * ((mean - seen[..., None]) / std[..., None]) ** 2)
+    weights = np.exp(-0.5 * ((mean - fraction[..., None]) / std[..., None]) ** 2)
     total = weights.sum(axis=2)
     middle = (weights @ GRID) / total
     spread = np.sqrt(np.maximum((weights @ GRID**2) / total - middle**2, 0.0))
@@ -157,12 +159,12 @@ def fitted_stairs(table: Table, before: Array, white: Array, stairs: Stairs) -> 
     begins = float(np.round((middle - stairs.offset) / stairs.step))
     code = stairs.offset + begins * stairs.step  # the code in the middle: there step and offset are independent
 
-    def left(u: Array) -> Array:
+    def residual(u: Array) -> Array:
         step, offset = stairs.step * (1 + u[1] * stairs.step / np.ptp(outputs)), code + u[0] * stairs.step
         return ((outputs - _mean_code(before, step, offset, stairs.noise)) / white).ravel()
 
     grid = np.linspace(-0.1, 0.1, 21)
-    start = min(((a, b) for a in grid for b in grid), key=lambda u: float(np.sum(np.abs(left(np.array(u))))))
+    start = min(((a, b) for a in grid for b in grid), key=lambda u: float(np.sum(np.abs(residual(np.array(u))))))
     step = stairs.step * (1 + start[1] * stairs.step / float(np.ptp(outputs)))
     return Stairs(step, code + start[0] * stairs.step - begins * step, stairs.noise)
 
@@ -171,17 +173,17 @@ def _mean_code(values: Array, step: float, offset: float, noise: float) -> Array
     """Means of samples of such noise, rounded."""
     codes = (values - offset) / step
     nearest = np.round(codes)
-    beyond, share = codes - nearest, max(noise / step, LEAST_NOISE)
+    deviation, share = codes - nearest, max(noise / step, LEAST_NOISE)
     mean = nearest
     for j in range(REACH):
-        mean = mean + ndtr((beyond - 0.5 - j) / share) - ndtr((-beyond - 0.5 - j) / share)
+        mean = mean + ndtr((deviation - 0.5 - j) / share) - ndtr((-deviation - 0.5 - j) / share)
     return np.asarray(offset + step * mean)
 
 
 def find_saw(
-    data: PoseData, state: State, white: Array, left: Array, rejected: Sequence[float], enter: float
+    data: PoseData, state: State, white: Array, residual: Array, rejected: Sequence[float], enter: float
 ) -> Component | None:
-    """The significant saw of a quantiser that the residual `left` (channels, n) shows best.
+    """The significant saw of a quantiser that the residual `residual` (channels, n) shows best.
 
     rejected  frequencies of rejected saws; one with more than SAW_REJECTIONS is not proposed again
     """
@@ -195,14 +197,14 @@ def find_saw(
     if not len(frequencies):
         return None
     at = state.response.ravel()
-    values = (left / white**2).ravel()
+    values = (residual / white**2).ravel()
     weights = (1 / white**2).ravel()
     power = _spectrum(at, values, step, int(highest / step))[-len(frequencies) :] * 2 / np.sum(weights)
     amplitude = np.sqrt(2 * power / np.sum(weights))
     power[amplitude < LEAST_OF_SAW * _fundamental(frequencies, noise)] = 0.0  # no saw: a step has a height
     for f in rejected:
         close = np.abs(frequencies - f) * span < 1.0
-        if sum(abs(other - f) * span < 1.0 for other in rejected) > SAW_REJECTIONS:
+        if sum(abs(earlier - f) * span < 1.0 for earlier in rejected) > SAW_REJECTIONS:
             power[close] = 0.0
     best = int(np.argmax(power))
     price = 2 * np.log(len(frequencies) / SAW_POINTS)
@@ -241,7 +243,7 @@ def saw(frequency: float, harmonics: int, price: float, step: float) -> Componen
 
         return Component(
             name, "output", "output", "quantisation", "output/quantisation", price, columns,
-            shape=shape, step=(step,), reshaped=at, starts=lambda found: _steps(shape[0], found[0], found[harmonics]),
+            shape=shape, step=(step,), reshaped=at, starts=lambda x: _steps(shape[0], x[0], x[harmonics]),
         )  # fmt: skip
 
     return at((frequency,))

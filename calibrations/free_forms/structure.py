@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from calibrations.criteria import SIGNIFICANT
 from calibrations.free_forms.bases import Line
-from calibrations.free_forms.chain import Coefficients, Given, state_at
+from calibrations.free_forms.chain import Coefficients, ModelEffects, state_at
 from calibrations.free_forms.form import CROSS, Form
 from calibrations.free_forms.geometry import LINEAR_PART, Geometry, GeometryEffects, geometry
 from calibrations.free_forms.naming import ActingPlace, places
@@ -120,7 +120,9 @@ class Structure:
         """What all places but one add to the output through the chain, (channels, n), in its unit; None: all places."""
         result = self.result
         coefficients = {name: result.values.of[name] for name in (place.components if place else ())}
-        alone = state_at(result.data, result.given, Coefficients(result.values.base, coefficients), result.components)
+        alone = state_at(
+            result.data, result.model_effects, Coefficients(result.values.base, coefficients), result.components
+        )
         return result.state.predicted - alone.predicted
 
     def refinements(self, place: ActingPlace) -> tuple[str, ...]:
@@ -223,11 +225,13 @@ def with_stairs(structure: Structure, residual: Array, stairs: Stairs, white: Ar
     return replace(structure, places=tuple(sorted(places, key=lambda p: -p.size)), white=white)
 
 
-def find_structure(table: Table, white: Array | None, given: Given, effects: GeometryEffects) -> Structure:
+def find_structure(
+    table: Table, white: Array | None, model_effects: ModelEffects, effects: GeometryEffects
+) -> Structure:
     """Places that act in poses, rows in order of time.
 
     white    standard deviation of each mean, (channels, n); None where it is not known
-    given    effects of the given model beyond bias, scale factor and geometry
+    model_effects    effects of the given model beyond bias, scale factor and geometry
     effects  those of the geometry
     """
     data = PoseData.of(table)
@@ -236,13 +240,13 @@ def find_structure(table: Table, white: Array | None, given: Given, effects: Geo
         white, source = _neighbours(data), FloorSource.NEIGHBOURS
     usual = np.sqrt(np.mean(white**2, axis=1, keepdims=True))
     if np.any(noiseless := white < NO_NOISE * usual):  # these rows have less noise than others, and contradict nothing
-        result = search(data, np.where(noiseless, LEAST_WHITE * usual, white), given)
+        result = search(data, np.where(noiseless, LEAST_WHITE * usual, white), model_effects)
     elif SAW in table.left_out:  # the noise is what the stairs hide of each row: never the same for all
-        result = search(data, white, given)
+        result = search(data, white, model_effects)
     else:
-        result, source = _searched(data, white, given, source)
+        result, source = _searched(data, white, model_effects, source)
     white = result.white
-    result, factor = _in_larger_noise(result, given)
+    result, factor = _in_larger_noise(result, model_effects)
     acting = places(result)
     shape = geometry(result, _curves(acting), effects)
     scaled_places = [replace(p, size=p.size * factor, own=p.own * factor, largest=p.largest * factor) for p in acting]
@@ -258,26 +262,28 @@ def _curves(acting: Sequence[ActingPlace]) -> dict[str, Array]:
     return curves
 
 
-def _searched(data: PoseData, white: Array, given: Given, source: FloorSource) -> tuple[SearchResult, FloorSource]:
+def _searched(
+    data: PoseData, white: Array, model_effects: ModelEffects, source: FloorSource
+) -> tuple[SearchResult, FloorSource]:
     """The search, and where its noise is known from: again with the noise of the residual where that contradicts.
 
     Components that can follow almost anything wait until the noise is known, because they follow noise as well.
     """
-    result = search(data, white, given)
+    result = search(data, white, model_effects)
     noise = _scatter(result, source, uniform=True)
     if noise is None:
         return result, source
     source = FloorSource.CONTRADICTED if source is FloorSource.SAMPLES else source
     for _ in range(FLOOR_ROUNDS):
-        result = search(data, noise, given, general=False)
+        result = search(data, noise, model_effects, general=False)
         next_noise = _scatter(result, source, uniform=False)
         if next_noise is None:
             break
         noise = next_noise
-    return (result if result.ratio < NOISE_ALONE else search(data, noise, given)), source
+    return (result if result.ratio < NOISE_ALONE else search(data, noise, model_effects)), source
 
 
-def _in_larger_noise(result: SearchResult, given: Given) -> tuple[SearchResult, float]:
+def _in_larger_noise(result: SearchResult, model_effects: ModelEffects) -> tuple[SearchResult, float]:
     """The search in noise as large as what it left, where that is likelier, and the factor on the noise; else 1.
 
     Scatter that nothing explains makes every component significant that follows it a little.
@@ -288,7 +294,7 @@ def _in_larger_noise(result: SearchResult, given: Given) -> tuple[SearchResult, 
         factor *= best[1].ratio
         if best[1].ratio < LARGER_NOISE:
             break
-        larger = search(result.data, factor * white, given)
+        larger = search(result.data, factor * white, model_effects)
         scale = 2 * (larger.gram.rows - larger.gram.base_rank) * float(np.log(factor))
         if larger.criterion + scale + ENTER >= best[0]:
             break

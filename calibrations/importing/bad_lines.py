@@ -41,7 +41,7 @@ class BadLines:
             self.shown.append(f"line {line} ({reason})")
 
     def end(self, tell: Callable[[str], None]) -> None:
-        """At the end of the file: `tell` what was skipped. Raises DataError where that is too much."""
+        """Report the skipped lines to `tell` at the end of the file. Raises DataError if too many were skipped."""
         if not self.bad:
             return
         total = self.good + self.bad

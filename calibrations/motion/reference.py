@@ -85,17 +85,17 @@ def fit_four_parameter(t_s: Array, x: Array, frequency_hz: float | None = None) 
 
 def find_sines(t_s: Array, x: Array) -> tuple[Sine, ...]:
     """The significant lines of a record, the most prominent first, fitted jointly."""
-    found: list[Sine] = []
-    left = x
-    while len(found) < MOST_SINES:
-        frequency, prominence = strongest_line(t_s, left)
-        again = any(abs(s.frequency_hz - frequency) < 1 / np.ptp(t_s) for s in found)
+    sines: list[Sine] = []
+    residual = x
+    while len(sines) < MOST_SINES:
+        frequency, prominence = strongest_line(t_s, residual)
+        again = any(abs(s.frequency_hz - frequency) < 1 / np.ptp(t_s) for s in sines)
         if again or prominence < PROMINENT * np.log(len(x)):
             break
-        found.append(fit_four_parameter(t_s, left, frequency))
-        found = _refit_each(t_s, x, found)
-        left = x - sum((s.at(t_s) for s in found), np.zeros(len(x)))
-    return tuple(found)
+        sines.append(fit_four_parameter(t_s, residual, frequency))
+        sines = _refit_sines(t_s, x, sines)
+        residual = x - sum((s.at(t_s) for s in sines), np.zeros(len(x)))
+    return tuple(sines)
 
 
 def strongest_line(t_s: Array, x: Array) -> tuple[float, float]:
@@ -106,19 +106,19 @@ def strongest_line(t_s: Array, x: Array) -> tuple[float, float]:
     first = min(FEWEST_MOTION_PERIODS, len(f) - 2)
     k = first + int(np.argmax(power[first:-1]))
     around = np.median(power[max(first, k - NEIGHBOURS) : k + NEIGHBOURS]) or np.finfo(float).tiny
-    low, here, high = np.log(np.maximum(power[k - 1 : k + 2], np.finfo(float).tiny))
-    curvature = low - 2 * here + high
+    low, peak, high = np.log(np.maximum(power[k - 1 : k + 2], np.finfo(float).tiny))
+    curvature = low - 2 * peak + high
     shift = (low - high) / (2 * curvature) if curvature < 0 else 0.0
     return float(f[k] + shift * f[1]), float(power[k] / around)
 
 
-def _refit_each(t_s: Array, x: Array, found: list[Sine]) -> list[Sine]:
-    """Each line fitted anew to what the others leave; twice is enough for lines that a record resolves."""
-    for _ in range(2 if len(found) > 1 else 0):
-        for k, sine in enumerate(found):
-            others = sum((s.at(t_s) for j, s in enumerate(found) if j != k), np.zeros(len(x)))
-            found[k] = fit_four_parameter(t_s, x - others, sine.frequency_hz)
-    return found
+def _refit_sines(t_s: Array, x: Array, sines: list[Sine]) -> list[Sine]:
+    """Fit each line to the residual of the others. Two rounds are enough for lines that a record resolves."""
+    for _ in range(2 if len(sines) > 1 else 0):
+        for k, sine in enumerate(sines):
+            other_sines = sum((s.at(t_s) for j, s in enumerate(sines) if j != k), np.zeros(len(x)))
+            sines[k] = fit_four_parameter(t_s, x - other_sines, sine.frequency_hz)
+    return sines
 
 
 def _as_sine(a: float, b: float, offset: float, turn: float, cov: Array, middle: float, density: float) -> Sine:
@@ -188,8 +188,8 @@ def smooth(x: Array) -> Smoothed:
     def deviance(log_ratio: float) -> float:
         return _solved(x, penalty, float(np.exp(log_ratio)))[2]
 
-    found = scipy.optimize.minimize_scalar(deviance, bounds=LOG_RANGE, method="bounded", options={"xatol": 0.05})
-    ratio = float(np.exp(found.x))
+    optimum = scipy.optimize.minimize_scalar(deviance, bounds=LOG_RANGE, method="bounded", options={"xatol": 0.05})
+    ratio = float(np.exp(optimum.x))
     values, noise_std, _ = _solved(x, penalty, ratio)
     return Smoothed(values, ratio, noise_std)
 
@@ -246,8 +246,8 @@ class Reference:
         """Peak acceleration and its standard uncertainty, m/s^2: of the strongest line, else the greatest of all."""
         if not self.lines:
             corner_hz = self.rest.corner_hz(self.rate_hz)
-            left = self.rest.noise_std * np.sqrt(2 * corner_hz / self.rate_hz)  # noise that the smoother lets through
-            return float(np.max(np.abs(self.acceleration_m_s2))), float(left * (2 * np.pi * corner_hz) ** 2)
+            noise = self.rest.noise_std * np.sqrt(2 * corner_hz / self.rate_hz)  # noise that the smoother lets through
+            return float(np.max(np.abs(self.acceleration_m_s2))), float(noise * (2 * np.pi * corner_hz) ** 2)
         line = self.lines[0]
         turn, turn_std = 2 * np.pi * line.frequency_hz, 2 * np.pi * line.frequency_std_hz
         std = np.hypot(turn**2 * line.amplitude_std, 2 * turn * line.amplitude * turn_std)
@@ -287,17 +287,17 @@ class Bias:
 
 def reference_acceleration(t_s: Array, displacement_m: Array, rate_hz: float) -> Reference:
     """The acceleration by sines and smoother. Shapes (n,)."""
-    found = find_sines(t_s, displacement_m)
-    left = displacement_m - sum((line.at(t_s) for line in found), np.zeros(len(t_s)))
-    rest = smooth(left - left.mean())
+    sines = find_sines(t_s, displacement_m)
+    residual = displacement_m - sum((line.at(t_s) for line in sines), np.zeros(len(t_s)))
+    smoothed = smooth(residual - residual.mean())
     most = (
-        max(HIGHEST_MOTION_HZ, HIGHEST_MOTION * max(found, key=lambda line: line.amplitude).frequency_hz)
-        if found
+        max(HIGHEST_MOTION_HZ, HIGHEST_MOTION * max(sines, key=lambda line: line.amplitude).frequency_hz)
+        if sines
         else 0.0
     )
-    lines = sorted((line for line in found if line.frequency_hz <= most), key=line_prominence, reverse=True)
+    lines = sorted((line for line in sines if line.frequency_hz <= most), key=line_prominence, reverse=True)
     moving = sum((-((2 * np.pi * s.frequency_hz) ** 2) * s.at(t_s) for s in lines), np.zeros(len(t_s)))
-    return Reference(moving + second_derivative(rest.values, rate_hz, STENCIL), tuple(lines), rest, rate_hz)
+    return Reference(moving + second_derivative(smoothed.values, rate_hz, STENCIL), tuple(lines), smoothed, rate_hz)
 
 
 def line_prominence(line: Sine) -> float:
@@ -318,20 +318,20 @@ def second_derivative(x: Array, rate_hz: float, stencil: Array) -> Array:
     return np.pad(inner, reach, mode="edge")
 
 
-def reference_biases(found: Reference) -> tuple[Bias, ...]:
+def reference_biases(reference: Reference) -> tuple[Bias, ...]:
     """What each step to a reference does by itself: the paper's filter and the sines at the motion's frequency, the
     smoother at a quarter of its corner. An amplitude is never negative: noise makes it longer, by half its variance.
     """
-    at_hz, rate_hz, periods = found.at_hz, found.rate_hz, 1 / found.duration_s
+    at_hz, rate_hz, periods = reference.at_hz, reference.rate_hz, 1 / reference.duration_s
 
     def paper(f: Array) -> Complex:
         return np.asarray(correct_at(butterworth(rate_hz), at_hz)(f) * _differences(f, rate_hz, (-2.0, 2.0)))
 
     def smoother(f: Array) -> Complex:
-        return np.asarray(found.rest.response(f, rate_hz) * _differences(f, rate_hz, (-2.5, 16 / 6, -1 / 6)))
+        return np.asarray(reference.rest.response(f, rate_hz) * _differences(f, rate_hz, (-2.5, 16 / 6, -1 / 6)))
 
-    quarter, edge_s = found.rest.corner_hz(rate_hz) / 4, found.rest.edge_s(rate_hz)
-    longer = [(line.amplitude_std / line.amplitude) ** 2 / 2 for line in found.lines[:1]]
+    quarter, edge_s = reference.rest.corner_hz(rate_hz) / 4, reference.rest.edge_s(rate_hz)
+    longer = [(line.amplitude_std / line.amplitude) ** 2 / 2 for line in reference.lines[:1]]
     return (
         filter_bias("Butterworth low-pass, two differences", paper, at_hz, rate_hz, 4 / PAPER_CORNER_HZ),
         *(Bias("sine approximation", at_hz, share, 0.0, (at_hz - periods, at_hz + periods), 0.0) for share in longer),
@@ -341,14 +341,14 @@ def reference_biases(found: Reference) -> tuple[Bias, ...]:
 
 def filter_bias(name: str, response: Response, at_hz: float, rate_hz: float, edge_s: float) -> Bias:
     """The bias of a filter given by its response relative to the true one."""
-    there = complex(response(np.array([at_hz]))[0])
+    response_at_line = complex(response(np.array([at_hz]))[0])
     f = np.linspace(at_hz / 100, rate_hz / 2, 20001)
     right = np.abs(np.abs(response(f)) - 1) < 0.01
     k = int(np.argmin(np.abs(f - at_hz)))
     wrong = np.flatnonzero(~right)
     below, above = wrong[wrong < k], wrong[wrong > k]
     band = (float(f[below[-1]]) if len(below) else 0.0, float(f[above[0]]) if len(above) else rate_hz / 2)
-    return Bias(name, at_hz, abs(there) - 1, float(np.angle(there)), band, edge_s)
+    return Bias(name, at_hz, abs(response_at_line) - 1, float(np.angle(response_at_line)), band, edge_s)
 
 
 def _differences(f: Array, rate_hz: float, cosines: tuple[float, ...]) -> Array:

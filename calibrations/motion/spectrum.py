@@ -131,9 +131,9 @@ def correct_at(response: Response, at_hz: float) -> Response:
 
     The mean passes as it is: corrected like the motion, an offset would grow.
     """
-    there = response(np.array([at_hz]))[0]
-    late_s = -np.angle(there) / (2 * np.pi * at_hz)
-    return lambda f: np.where(f > 0, response(f) / np.abs(there) * np.exp(2j * np.pi * f * late_s), 1.0)
+    response_at_line = response(np.array([at_hz]))[0]
+    late_s = -np.angle(response_at_line) / (2 * np.pi * at_hz)
+    return lambda f: np.where(f > 0, response(f) / np.abs(response_at_line) * np.exp(2j * np.pi * f * late_s), 1.0)
 
 
 def periodogram(x: Array, rate_hz: float) -> tuple[Array, Array]:

@@ -35,26 +35,28 @@ class Line:
     in_quadrature: Array
 
 
-def residual_lines(samples: Table, made: Sequence[Reference], expected: Array, length_s: float) -> tuple[Line, ...]:
+def residual_lines(
+    samples: Table, references: Sequence[Reference], expected: Array, length_s: float
+) -> tuple[Line, ...]:
     """The lines that a stretch of this length resolves, strongest first, and what they leave of the motion."""
-    found: list[Line] = []
-    left = expected.copy()
-    for f in _frequencies(made, length_s):
+    lines: list[Line] = []
+    residual = expected.copy()
+    for f in _frequencies(references, length_s):
         in_phase, in_quadrature = np.zeros(samples.n), np.zeros(samples.n)
         for record in find_records(samples):
             turn = 2 * np.pi * f * samples.time_s[record.rows]
             waves = np.column_stack([np.cos(turn), np.sin(turn), np.ones(len(turn))])
-            c, s, _ = np.linalg.lstsq(waves, left[record.rows], rcond=None)[0]
-            left[record.rows] -= waves[:, :2] @ (c, s)
+            c, s, _ = np.linalg.lstsq(waves, residual[record.rows], rcond=None)[0]
+            residual[record.rows] -= waves[:, :2] @ (c, s)
             c, s = np.array([c, s]) / np.hypot(c, s)
             in_phase[record.rows] = waves[:, :2] @ (c, s)
             in_quadrature[record.rows] = waves[:, :2] @ (s, -c)
-        found.append(Line(f"at {f:.4g} Hz", f, in_phase, in_quadrature))
-    return (*found, _rest(samples, left, bool(found)))
+        lines.append(Line(f"at {f:.4g} Hz", f, in_phase, in_quadrature))
+    return (*lines, _broadband(samples, residual, bool(lines)))
 
 
-def _frequencies(made: Sequence[Reference], length_s: float) -> list[float]:
-    lines = [line for each in made for line in each.lines]
+def _frequencies(references: Sequence[Reference], length_s: float) -> list[float]:
+    lines = [line for reference in references for line in reference.lines]
     chosen: list[float] = []
     for line in sorted(lines, key=line_prominence, reverse=True):
         if all(abs(line.frequency_hz - f) * length_s > 0.9 for f in (0.0, *chosen)):
@@ -62,14 +64,16 @@ def _frequencies(made: Sequence[Reference], length_s: float) -> list[float]:
     return chosen
 
 
-def _rest(samples: Table, left: Array, beside: bool) -> Line:
+def _broadband(samples: Table, residual: Array, has_lines: bool) -> Line:
     """Motion that is no line: its own form, and its derivative; noise as at the middle of its spectrum."""
     slope, middle = np.zeros(samples.n), []
     for record in find_records(samples):
-        slope[record.rows] = np.gradient(left[record.rows])
-        f, power = periodogram(left[record.rows], record.rate_hz)
+        slope[record.rows] = np.gradient(residual[record.rows])
+        f, power = periodogram(residual[record.rows], record.rate_hz)
         middle.append(float(np.sum(f * power) / max(float(np.sum(power)), np.finfo(float).tiny)))
-    return Line("with the rest of the motion" if beside else "with the motion", float(np.mean(middle)), left, -slope)
+    return Line(
+        "with the rest of the motion" if has_lines else "with the motion", float(np.mean(middle)), residual, -slope
+    )
 
 
 def noise_density(samples: Table, lines: Sequence[Line], axis: int) -> Array:
@@ -79,12 +83,12 @@ def noise_density(samples: Table, lines: Sequence[Line], axis: int) -> Array:
     f = np.concatenate([piece[0] for piece in pieces])
     density = np.concatenate([piece[1] for piece in pieces]) / np.abs(low_pass(f)) ** 2
 
-    def beside(at_hz: float) -> float:
-        near = density[np.abs(f - at_hz) < BESIDE_HZ]
-        inlying = near[near < LEAST_LINE * np.median(near)]
+    def density_near(at_hz: float) -> float:
+        neighbours = density[np.abs(f - at_hz) < BESIDE_HZ]
+        inlying = neighbours[neighbours < LEAST_LINE * np.median(neighbours)]
         return float(np.mean(inlying) / INLYING_MEAN * np.abs(low_pass(np.array([at_hz]))[0]) ** 2)
 
-    return np.array([beside(at_hz) for at_hz in (0.0, *(line.at_hz for line in lines))])
+    return np.array([density_near(at_hz) for at_hz in (0.0, *(line.at_hz for line in lines))])
 
 
 def _spectrum(samples: Table, lines: Sequence[Line], axis: int, rows: slice, rate_hz: float) -> tuple[Array, Array]:
@@ -95,11 +99,11 @@ def _spectrum(samples: Table, lines: Sequence[Line], axis: int, rows: slice, rat
     follows = np.column_stack([c for c in columns if np.any(c)])
     size = np.linalg.norm(follows, axis=0)
     f, density = periodogram(v - follows / size @ np.linalg.lstsq(follows / size, v, rcond=None)[0], rate_hz)
-    own = np.zeros(len(f), dtype=bool)
+    excluded = np.zeros(len(f), dtype=bool)
     for at_hz in (0.0, *(line.at_hz for line in lines)):
-        own |= np.abs(f - at_hz) < OWN_LINES * f[1]
-    own[-1] = True  # half the sampling rate has another distribution
-    return f[~own], density[~own]
+        excluded |= np.abs(f - at_hz) < OWN_LINES * f[1]
+    excluded[-1] = True  # half the sampling rate has another distribution
+    return f[~excluded], density[~excluded]
 
 
 # A record of motion as rows that a model can be fitted to: what each stretch of it holds of the motion.
@@ -148,28 +152,30 @@ def make_stretches(table: Table) -> Stretches:
     """The record's rows for a fit. Raises DataError, TooFewRows."""
     if isinstance(table, Stretches):
         return table
-    found = find_records(table)
-    made = [
+    records = find_records(table)
+    references = [
         reference_acceleration(r.times_s(table.time_s), table.column("displacement_m")[r.rows], r.rate_hz)
-        for r in found
+        for r in records
     ]
-    samples = _averaged(table, found, made)
+    samples = _averaged(table, records, references)
     expected = _expected(samples)
     slope = _slope(samples, expected)
-    length_s = _length_s(found, made)
+    length_s = _length_s(records, references)
     cuts = list(_cuts(samples, length_s))
     if len(cuts) < FEWEST_MOTION_STRETCHES:
         raise TooFewRows(f"{table.source}: the record has only {len(cuts)} stretches of motion; record it longer")
-    lines = _shown(samples, residual_lines(samples, made, expected, length_s), cuts, slope * expected)
+    lines = _visible_lines(samples, residual_lines(samples, references, expected, length_s), cuts, slope * expected)
     return _rows(table, samples, lines, cuts, slope)
 
 
-def _shown(samples: Table, lines: tuple[Line, ...], cuts: list[tuple[int, int]], expected: Array) -> tuple[Line, ...]:
+def _visible_lines(
+    samples: Table, lines: tuple[Line, ...], cuts: list[tuple[int, int]], expected: Array
+) -> tuple[Line, ...]:
     """The lines above a row's noise in at least one stretch; the strongest line always."""
-    there = np.abs((_weights(lines, cuts, samples.n) @ expected).reshape(-1, len(cuts)))
-    white = _white(samples, lines, cuts)[: len(there)]
-    seen = np.any(there > LEAST_LINE_WEIGHT * white, axis=1)
-    return tuple(line for k, line in enumerate(lines) if k == 0 or seen[2 * k + 1])
+    amplitudes = np.abs((_weights(lines, cuts, samples.n) @ expected).reshape(-1, len(cuts)))
+    white = _white(samples, lines, cuts)[: len(amplitudes)]
+    visible = np.any(amplitudes > LEAST_LINE_WEIGHT * white, axis=1)
+    return tuple(line for k, line in enumerate(lines) if k == 0 or visible[2 * k + 1])
 
 
 def _rows(table: Table, samples: Table, lines: Sequence[Line], cuts: list[tuple[int, int]], slope: float) -> Stretches:
@@ -189,21 +195,21 @@ def _rows(table: Table, samples: Table, lines: Sequence[Line], cuts: list[tuple[
     )
 
 
-def _averaged(table: Table, found: Sequence[Record], made: Sequence[Reference]) -> Table:
+def _averaged(table: Table, records: Sequence[Record], references: Sequence[Reference]) -> Table:
     """Block means of all columns and of the reference, as many as the fastest line allows.
 
     Measurement and reference are averaged alike, so that the averaging has no share in what is compared.
     """
-    fastest = max((line.frequency_hz for each in made for line in each.lines), default=0.0)
+    fastest = max((line.frequency_hz for reference in references for line in reference.lines), default=0.0)
     rate_hz = max(SAMPLES_A_PERIOD * fastest, SLOWEST_RATE_HZ)
     pieces: dict[str, list[Array]] = {name: [] for name in (*table.columns, "acceleration_m_s2", "record")}
-    for number, (record, each) in enumerate(zip(found, made, strict=True)):
+    for number, (record, reference) in enumerate(zip(records, references, strict=True)):
         block = max(1, int(record.rate_hz / rate_hz))
         n = (record.end - record.first) // block
         even = {**table.columns, "t_s": np.append(np.zeros(record.first), record.times_s(table.time_s))}
         for name, values in even.items():
             pieces[name].append(values[record.first : record.first + n * block].reshape(n, block).mean(axis=1))
-        pieces["acceleration_m_s2"].append(each.acceleration_m_s2[: n * block].reshape(n, block).mean(axis=1))
+        pieces["acceleration_m_s2"].append(reference.acceleration_m_s2[: n * block].reshape(n, block).mean(axis=1))
         pieces["record"].append(np.full(n, float(number)))
     columns = {name: np.concatenate(values) for name, values in pieces.items()}
     return Table("motion", MappingProxyType(columns), table.constants, table.source)
@@ -224,14 +230,14 @@ def _slope(samples: Table, expected: Array) -> float:
     return float(h @ v / max(float(h @ h), np.finfo(float).tiny)) or 1.0
 
 
-def _length_s(found: Sequence[Record], made: Sequence[Reference]) -> float:
+def _length_s(records: Sequence[Record], references: Sequence[Reference]) -> float:
     """Length of a stretch: whole periods of the strongest line."""
-    wanted = sum((r.end - r.first) / r.rate_hz - 2 * EDGE_S for r in found) / STRETCHES
-    lines = [line for each in made for line in each.lines]
+    target_s = sum((r.end - r.first) / r.rate_hz - 2 * EDGE_S for r in records) / STRETCHES
+    lines = [line for reference in references for line in reference.lines]
     if not lines:
-        return wanted
+        return target_s
     at_hz = max(lines, key=line_prominence).frequency_hz
-    return max(1, round(wanted * at_hz)) / at_hz
+    return max(1, round(target_s * at_hz)) / at_hz
 
 
 def _cuts(samples: Table, length_s: float) -> Iterator[tuple[int, int]]:
@@ -253,7 +259,7 @@ def _weights(lines: Sequence[Line], cuts: list[tuple[int, int]], n: int) -> csr_
         values.append(Q * np.where(np.diag(R) < 0, -1.0, 1.0) * size)
         columns.append(np.arange(a, b))
     data = [value[:, k] for k in range(templates.shape[1]) for value in values]
-    starts = np.concatenate([[0], np.cumsum([len(each) for each in data])])
+    starts = np.concatenate([[0], np.cumsum([len(products) for products in data])])
     where = np.concatenate(columns * templates.shape[1])
     return csr_array((np.concatenate(data), where, starts), shape=(len(data), n))
 

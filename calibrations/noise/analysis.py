@@ -138,7 +138,7 @@ class ChannelNoise:
         if strength and strength.identified and not (effect.name in SLOW and set(rivals) & set(SLOW)):
             time_s = shape[0].value if shape else None
             return Coefficient(strength.value, strength.std or 0.0, unit, None, time_s, None, rivals)
-        value, upper, values = upper_bound(self.fit, effect, self._beside(effect))
+        value, upper, values = upper_bound(self.fit, effect, self._companions(effect))
         time_s = next(iter(list(values.values())[1:]), None)
         return Coefficient(value, (upper - value) / INTERVAL_STDS, unit, upper, time_s, None, rivals)
 
@@ -146,7 +146,7 @@ class ChannelNoise:
         """Of an effect's parameters in this channel, as every command shows them; none for an effect not in the fit."""
         return [estimate for estimate in self.search.end.model.estimates(effect.name) if estimate.axis == self.axis]
 
-    def _beside(self, effect: Effect) -> list[Effect]:
+    def _companions(self, effect: Effect) -> list[Effect]:
         """The other processes of the fit, and those that may be present beside any."""
         slow = [self.search.effects[name] for name in SLOW if name in self.search.effects]
         processes = (*self.fit.effects, *(process for process in slow if process not in self.fit.effects))

@@ -61,7 +61,7 @@ class Calibration:
         """By cause, what the record cannot separate from it."""
         names = self.signal.names
         rivals = {CAUSES.get((r.kind, r.cause)) for pattern in self.patterns for r in pattern.rivals}
-        by_search = self.signal.found.alternatives
+        by_search = self.signal.findings.alternatives
         by_cause = {  # a wider effect whose further shape vanishes is no other cause
             name: tuple(r for r in by_search.get(name, ()) if name not in self.containing.get(r, ()))
             for name in self.signal.causes
@@ -80,17 +80,17 @@ class Calibration:
 
 def calibrated(search_before: Search, start: NoiseFit, effects: Mapping[str, Effect]) -> Calibration | None:
     """What the temperature does to the record of `search_before`; None where it does nothing beyond the model."""
-    own = signal_terms(start.model)
+    model_terms = signal_terms(start.model)
     warm = tuple(
         pattern for pattern in search_before.patterns if pattern.kind == FOLLOWS and pattern.cause == TEMPERATURE
     )
-    if not (warm or own):
+    if not (warm or model_terms):
         return None
-    unrelated = () if own else tuple(pattern for pattern in search_before.patterns if pattern not in warm)
+    unrelated = () if model_terms else tuple(pattern for pattern in search_before.patterns if pattern not in warm)
     still = without_patterns(start.still, unrelated)
     lag_s = max(warm, key=lambda pattern: pattern.gain).lag_s if warm else 0.0
-    signal = search_signal(still, effects, lag_s, own)
-    signal = _needed(signal, start.model, still, effects) if signal.steps else signal
+    signal = search_signal(still, effects, lag_s, model_terms)
+    signal = _without_costly_curves(signal, start.model, still, effects) if signal.steps else signal
     if not signal.names:
         return None
     model = with_terms(start.model, signal.steps[-1])
@@ -98,7 +98,9 @@ def calibrated(search_before: Search, start: NoiseFit, effects: Mapping[str, Eff
     return Calibration(start, signal, warm, after, {name: effect.contains for name, effect in effects.items()})
 
 
-def _needed(signal: SignalSearch, model: Model, still: Still, effects: Mapping[str, Effect]) -> SignalSearch:
+def _without_costly_curves(
+    signal: SignalSearch, model: Model, still: Still, effects: Mapping[str, Effect]
+) -> SignalSearch:
     """Without a curve beside the causes that gains no more likelihood than its coefficients cost (Schwarz)."""
     for name in signal.names:
         if name in signal.causes:
@@ -121,5 +123,5 @@ def with_terms(model: Model, terms: tuple[Term, ...]) -> Model:
     """The model with these terms as they are, in place of its own of the same names, or behind them."""
     named = {term.name: term for term in terms}
     new = [term for term in terms if term.name not in model.effects]
-    own = tuple(named.get(term.name, term) for term in model.terms)
-    return replace(model, name="+".join([model.name, *(term.name for term in new)]), terms=(*own, *new))
+    replaced = tuple(named.get(term.name, term) for term in model.terms)
+    return replace(model, name="+".join([model.name, *(term.name for term in new)]), terms=(*replaced, *new))

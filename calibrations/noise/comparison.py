@@ -40,7 +40,7 @@ from calibrations.table import Array
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 SLOWEST = 1e-7  # in cycles to an averaging time
-WHOLE = 8.0  # cycles beyond which a fourth power of a sine is its mean
+MANY_CYCLES = 8.0  # cycles beyond which a fourth power of a sine is its mean
 MEAN = 3 / 8
 
 
@@ -54,7 +54,7 @@ def quadrature(m: float, rate_hz: float, corner_hz: float) -> tuple[Bands, Array
     cycles, width = _nodes(m / 2)
     f = cycles * rate_hz / m
     sine = np.sin(np.pi * f / rate_hz)
-    power = np.where(cycles < WHOLE, np.sin(np.pi * cycles) ** 4, MEAN)
+    power = np.where(cycles < MANY_CYCLES, np.sin(np.pi * cycles) ** 4, MEAN)
     none = np.zeros(len(f))
     at = Bands(f, none, none, Sampling(rate_hz), none, corner_hz)
     return at, 2 * width * rate_hz / m * 2 * power / (m * sine) ** 2
@@ -67,8 +67,8 @@ def line_variance(turns: float, m: Array) -> Array:
 
 def _nodes(end: float) -> tuple[Array, Array]:
     """Gauss's nodes and weights from 0 to `end` cycles, in panels: fine where the sine turns, else by decades."""
-    fine = np.arange(0.25, min(end, WHOLE) + 0.25, 0.25)
-    slow, fast = np.geomspace(SLOWEST, 0.25, 30), np.geomspace(WHOLE, max(end, WHOLE), 60)
+    fine = np.arange(0.25, min(end, MANY_CYCLES) + 0.25, 0.25)
+    slow, fast = np.geomspace(SLOWEST, 0.25, 30), np.geomspace(MANY_CYCLES, max(end, MANY_CYCLES), 60)
     edges = np.unique(np.concatenate([[0.0], slow, fine, fast]))
     edges = np.append(edges[edges < end], end)
     half = np.diff(edges)[:, None] / 2
@@ -186,18 +186,20 @@ def stretches(fit: ChannelFit, most: int = 3) -> list[Stretch]:
     f, nu = fit.frequency_hz[order], fit.freedom[order]
     power = nu * (fit.seen / fit.expected)[order]
     sums = [np.concatenate([[0.0], np.cumsum(x)]) for x in (nu, power)]
-    tried = []
+    candidates = []
     for length in (size for size in LENGTHS if size <= len(f)):
         freedom, scaled = (x[length:] - x[:-length] for x in sums)
         chance = 2 * np.minimum(chdtr(freedom, scaled), chdtrc(freedom, scaled))
         chance = np.where(np.abs(scaled / freedom - 1) < NEGLIGIBLE, 1.0, chance)
-        tried += [
+        candidates += [
             (float(p), k, k + length, float(g / n))
             for k, (p, g, n) in enumerate(zip(chance, scaled, freedom, strict=True))
         ]
-    tried.sort(key=lambda stretch: (stretch[0], -abs(np.log(stretch[3])) * (sums[0][stretch[2]] - sums[0][stretch[1]])))
+    candidates.sort(
+        key=lambda stretch: (stretch[0], -abs(np.log(stretch[3])) * (sums[0][stretch[2]] - sums[0][stretch[1]]))
+    )
     chosen: list[tuple[float, int, int, float]] = []
-    for stretch in tried:
+    for stretch in candidates:
         if len(chosen) == most:
             break
         if all(stretch[2] <= wider[1] or stretch[1] >= wider[2] for wider in chosen):
@@ -205,7 +207,7 @@ def stretches(fit: ChannelFit, most: int = 3) -> list[Stretch]:
     return [
         Stretch(
             fit.channel.axis, float(f[a]), float(f[b - 1]), ratio,
-            float((ratio - 1) * np.sqrt((sums[0][b] - sums[0][a]) / 2)), min(1.0, p * len(tried)),
+            float((ratio - 1) * np.sqrt((sums[0][b] - sums[0][a]) / 2)), min(1.0, p * len(candidates)),
         )
         for p, a, b, ratio in chosen
     ]  # fmt: skip
@@ -323,7 +325,7 @@ class Levels:
 
 
 def noise_levels(fit: ChannelFit) -> Levels | None:
-    """Of one channel; None where its record is too short to tell."""
+    """The same of one channel; None if its record is too short."""
     channel = fit.channel
     means, step_s = means_without(channel, fit.lines), channel.sampling.interval_s
     length = len(means) // PARTS

@@ -104,11 +104,11 @@ class StillRecord(Dataset[NoiseFit]):
 
     def search(self, model: Model, effects: Mapping[str, Effect]) -> NoiseFindings:
         """What the temperature does, then lines, disturbances and every mixture of processes."""
-        return self._found(self.fit(model), effects)
+        return self._searched(self.fit(model), effects)
 
     def search_on(self, start: NoiseFit, origin: NoiseFit, effects: Mapping[str, Effect]) -> NoiseFindings:
         """The same from a fitted model."""
-        return self._found(fit(start.model, start.still), effects, origin)
+        return self._searched(fit(start.model, start.still), effects, origin)
 
     def candidates(
         self, before: NoiseFit, plan: Findings[NoiseFit], effects: Mapping[str, Effect]
@@ -118,7 +118,9 @@ class StillRecord(Dataset[NoiseFit]):
         planned = tuple(c for c in plan.candidates if not c.effect.is_noise and c.name in plan.names)
         return (*planned, *sorted(processes, key=lambda c: c.name not in plan.names[:1]))
 
-    def _found(self, start: NoiseFit, effects: Mapping[str, Effect], origin: NoiseFit | None = None) -> NoiseFindings:
+    def _searched(
+        self, start: NoiseFit, effects: Mapping[str, Effect], origin: NoiseFit | None = None
+    ) -> NoiseFindings:
         missing = search(start.still, start.model, effects)
         calibration = calibrated(missing, start, effects)
         missing = calibration.after if calibration else missing
@@ -207,7 +209,7 @@ class StillRecord(Dataset[NoiseFit]):
             return
         noises = ", ".join(sorted(name for name, e in catalogue().items() if e.is_noise))
         raise ModelError(
-            f"{effect.name} is not noise, and a still record shows only noise, and what a logged temperature does to "
+            f"{effect.name} is not noise; a still record shows only noise and the effects of a logged temperature on "
             f"the bias; effects of noise: {noises}"
         )
 

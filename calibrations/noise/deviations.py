@@ -151,7 +151,7 @@ def _ends(tree: Tree, level: int, bins: int) -> float:
 
 
 def _octave_noise_type(tree: Tree, octave: int) -> int:
-    """The noise type at an averaging time: of the longest time up to it that can tell."""
+    """The noise type at an averaging time, estimated at the longest time up to it that has enough means."""
     for level in range(octave, -1, -1):
         alpha = noise_type(int(tree.seen[level]), tree.moments[level])
         if alpha is not None:
@@ -313,7 +313,7 @@ def _steps(tau_s: float, n: int, rate_hz: float, source: str) -> int:
 
 
 def _noise_type_at(values: Array, m: int) -> int:
-    """The noise type at m samples, or at the longest time below of which the record has means enough to tell."""
+    """The noise type at m samples, or at the longest shorter time for which the record has enough means."""
     m = max(1, min(m, len(values) // FEWEST_MEANS))
     means = values[: len(values) // m * m].reshape(-1, m).mean(axis=1)
     return noise_type(len(means), moments_of(means - means.mean())) or 0

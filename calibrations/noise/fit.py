@@ -338,10 +338,10 @@ def _unit_columns(at: ChannelFit, effects: Sequence[Effect], shapes: Mapping[str
 def _best_shape(at: ChannelFit, effect: Effect, grid: Array, shapes: Mapping[str, Values]) -> Values:
     """The most likely shape of one effect beside the others, near the best of a grid (g,)."""
     name = effect.parameters[1].name
-    beside = [e for e in at.effects if e is not effect]
-    G = np.column_stack([_unit_columns(at, beside, shapes), at.seen]) if beside else at.seen[:, None].copy()
-    tried = np.array([unit_spectrum(effect, at.parts, {name: value}) for value in grid.tolist()])
-    thetas, values = profile(G, tried, at.seen, at.freedom)
+    companions = [e for e in at.effects if e is not effect]
+    G = np.column_stack([_unit_columns(at, companions, shapes), at.seen]) if companions else at.seen[:, None].copy()
+    spectra = np.array([unit_spectrum(effect, at.parts, {name: value}) for value in grid.tolist()])
+    thetas, values = profile(G, spectra, at.seen, at.freedom)
     best = int(np.argmax(values))
     logs = np.log(grid)
     ends = logs[max(0, best - 1)], logs[min(len(logs) - 1, best + 1)]

@@ -191,16 +191,16 @@ def _window_density(off_hz: Array, rate_hz: float) -> Array:
     return np.asarray(np.abs(np.exp(-2j * np.pi * turns) @ WINDOW) ** 2 / (4 * rate_hz * np.sum(WINDOW**2)))
 
 
-def strongest_line(channel: Channel, beside: Lines, level: Callable[[Array], Array]) -> Line | float:
+def strongest_line(channel: Channel, known_lines: Lines, level: Callable[[Array], Array]) -> Line | float:
     """The strongest line beside those that are known, above the `level` of the means' continuous spectrum at f (k,).
 
     Where none stands out, the amplitude that one might have.
     """
-    means, sampling = means_without(channel, beside), channel.sampling
+    means, sampling = means_without(channel, known_lines), channel.sampling
     power = windowed_density(means, sampling)
     around = _level_around(power, len(means) * sampling.interval_s)
     slow = without_line(means, power, sampling, lambda f: np.maximum(level(f), around(f)), channel.corner_hz / 2)
-    f, density = fast_without(channel, beside)
+    f, density = fast_without(channel, known_lines)
     fast = fast_lines(f, density, channel.segments.freedom, 0.0, channel.length_s)[1] if len(f) else []
     if isinstance(slow, float):
         return fast[0] if fast else slow

@@ -104,21 +104,21 @@ def pattern_of(fit: ChannelFit, removed: Iterable[Pattern] = ()) -> Pattern | No
     if hidden_in(fit.channel.oddities) is not None:
         return None  # rounding makes steps and slopes
     spectrum, unit = _Ordinates.of(fit), fit.channel.unit
-    every = [
+    candidates = [
         _step(fit.channel, spectrum, unit), *_courses(fit.channel, spectrum, unit),
         *_followed(fit.channel, spectrum, unit, removed), *_further(fit.channel, spectrum, unit, removed),
     ]  # fmt: skip
-    kinds = {(pattern.kind, pattern.cause) for pattern in every}
-    best, *weaker = sorted((_best(every, *kind) for kind in kinds), key=lambda pattern: -pattern.worth)
+    kinds = {(pattern.kind, pattern.cause) for pattern in candidates}
+    best, *weaker = sorted((_best(candidates, *kind) for kind in kinds), key=lambda pattern: -pattern.worth)
     if best.worth <= 0:
         return None
     return replace(best, rivals=tuple(pattern for pattern in weaker if best.worth - pattern.worth < INSEPARABLE))
 
 
-def _best(every: Iterable[Pattern], kind: str, cause: str) -> Pattern:
+def _best(candidates: Iterable[Pattern], kind: str, cause: str) -> Pattern:
     """The best pattern of one kind."""
     return max(
-        (pattern for pattern in every if (pattern.kind, pattern.cause) == (kind, cause)),
+        (pattern for pattern in candidates if (pattern.kind, pattern.cause) == (kind, cause)),
         key=lambda pattern: pattern.worth,
     )
 

@@ -281,8 +281,8 @@ def _channel(samples: Samples, reduction: Reduction) -> Channel:
 
 def logged_columns(blocks: Mapping[str, Sequence[Array]], n: int) -> dict[str, Logged]:
     """Columns read with n samples, in blocks, without constant ones."""
-    every = {name: logged_column(block, n) for name, block in blocks.items()}
-    return {name: column for name, column in every.items() if column is not None}
+    columns = {name: logged_column(block, n) for name, block in blocks.items()}
+    return {name: column for name, column in columns.items() if column is not None}
 
 
 def of_record(still: Still) -> str:

@@ -62,7 +62,7 @@ class Hidden:
 
     @property
     def text(self) -> str:
-        """In words, with what to do."""
+        """The description in words, with the remedy."""
         at = f"{self.levels} values" if self.all else "values"
         slow = "" if self.all else "; slow noise is larger, and its coefficients are given"
         fast = "" if self.all else ", from sample to sample,"

@@ -106,7 +106,7 @@ class SignalSearch:
     """The signal terms that a record shows, after each step that adds one, and the findings that they come from."""
 
     steps: tuple[tuple[Term, ...], ...]
-    found: Findings[Fit]
+    findings: Findings[Fit]
     table: Table
     given: tuple[str, ...] = ()
 
@@ -126,7 +126,7 @@ class SignalSearch:
         return float(np.median(np.diff(self.table.time_s)))
 
     def with_line(self, name: str, effects: Mapping[str, Effect], still: Still) -> SignalSearch:
-        """The same with a straight line in the place of one effect, the others fitted anew from their own starts."""
+        """The same with a straight line in place of one effect; the others are fitted again from their own starts."""
         line = Term(effects[PLACE])
         last = tuple(line if term.name == name else replace(term, estimates=()) for term in self.steps[-1])
         fit = fit_rows(_biased(last, effects), self.table)
@@ -139,7 +139,7 @@ class SignalSearch:
         return replace(self, steps=tuple(steps))
 
     def without(self, name: str, effects: Mapping[str, Effect], still: Still) -> SignalSearch:
-        """The same without one effect, the others fitted anew."""
+        """The same without one effect; the others are fitted again."""
         at = self.names.index(name)
         remaining = [tuple(term for term in terms if term.name != name) for terms in self.steps]
         fit = fit_rows(_biased(_relabelled(remaining[-1], still.axes, AXES), effects), self.table)
@@ -160,21 +160,21 @@ class SignalSearch:
     @property
     def causes(self) -> tuple[str, ...]:
         """Those that are causes; a curve alone is its own."""
-        return tuple(name for name in self.names if name in self.found.causes) or self.names[:1]
+        return tuple(name for name in self.names if name in self.findings.causes) or self.names[:1]
 
 
 def search_signal(
-    still: Still, effects: Mapping[str, Effect], lag_s: float, own: tuple[Term, ...] = ()
+    still: Still, effects: Mapping[str, Effect], lag_s: float, model_terms: tuple[Term, ...] = ()
 ) -> SignalSearch:
-    """What the temperature does to outputs that follow it beyond the `own` terms, by the search at one orientation.
+    """What the temperature does to outputs beyond the terms of the model, by the search at one orientation.
 
     Beside slow noise that search may see nothing: then a straight line, with the lag that was found beside that noise.
     """
     from calibrations.discovery.rows import Rows  # noise alone needs no search in rows
 
     table = table_of_means(without_signal(still, ()))
-    search = Rows(table).search(_biased(_relabelled(own, still.axes, AXES), effects), effects)
-    names_so_far = {term.name for term in own}
+    search = Rows(table).search(_biased(_relabelled(model_terms, still.axes, AXES), effects), effects)
+    names_so_far = {term.name for term in model_terms}
     steps: list[tuple[Term, ...]] = []
     for step in search.steps:
         if place_of_effect(step.name) == PLACE:
@@ -182,10 +182,10 @@ def search_signal(
             steps.append(_terms(step.after, names_so_far, still))
     if steps:
         steps[-1] = _terms(search.end, names_so_far, still)
-    elif not own:
+    elif not model_terms:
         line = Term(effects[PLACE], constants={"lead_s": -lag_s})
         steps.append(_terms(fit_rows(_biased((line,), effects), table), {PLACE}, still))
-    return SignalSearch(tuple(steps), search, table, tuple(term.name for term in own))
+    return SignalSearch(tuple(steps), search, table, tuple(term.name for term in model_terms))
 
 
 def fit_signal(model: Model, still: Still, effects: Mapping[str, Effect]) -> Model:

@@ -38,8 +38,8 @@ def diagnosis_text(result: Diagnosis[Any], model: str = "") -> str:
     """The verdict on the given model, its candidates, and the best of them. `model`: another name for the model."""
     data = result.findings.data
     parts = [f"{model or result.fit.model.name} on {data.description}", result.judgement.text]
-    if shown := result.candidates[:MOST_CANDIDATES]:
-        parts.append(columns(*view_of(data).candidate_table(result, shown)))
+    if listed := result.candidates[:MOST_CANDIDATES]:
+        parts.append(columns(*view_of(data).candidate_table(result, listed)))
     if result.missing:
         best = result.candidates[0]
         parts += [

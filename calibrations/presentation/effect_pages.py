@@ -105,13 +105,13 @@ def _caption(effect: Effect) -> str:
     kind = effect.first_kind
     plain, turned = kind.perfect_sensor, kind.field or kind.turning
     values = [_value(p, effect) for p in effect.parameters if turned or not p.where]
-    model, shown = incomplete.get(effect.name, plain), ", ".join(values)
-    return f"Residual of {model} for a sensor{kind.nominal} with {shown}, without noise."
+    model, names = incomplete.get(effect.name, plain), ", ".join(values)
+    return f"Residual of {model} for a sensor{kind.nominal} with {names}, without noise."
 
 
 def _caption_of_noise(effect: Effect) -> str:
-    own = {p.name: p.unit.replace("{out}", "V") for p in effect.parameters}
-    values = [f"{name.replace('_', ' ')} {value:g} {own[name]}" for name, value in shown_noise(effect).items()]
+    units = {p.name: p.unit.replace("{out}", "V") for p in effect.parameters}
+    values = [f"{name.replace('_', ' ')} {value:g} {units[name]}" for name, value in shown_noise(effect).items()]
     return (
         "Allan deviation, and one-sided density, of a still record at 10 Hz: broken line: white noise alone "
         "(coefficient "
@@ -124,8 +124,8 @@ def _value(p: Parameter, effect: Effect) -> str:
     unit = "" if p.unit == "1" else f" {p.unit.replace('{out}', 'V')}"
     if effect.first_kind.field:
         unit = ""  # a share of the field
-    own = f" ({value[1]:g} for y)" if len(value) > 1 and value[1] != value[0] else ""
-    return f"{p.name.replace('_', ' ')} {value[0]:g}{unit}{own}"
+    of_y = f" ({value[1]:g} for y)" if len(value) > 1 and value[1] != value[0] else ""
+    return f"{p.name.replace('_', ' ')} {value[0]:g}{unit}{of_y}"
 
 
 def _gallery(e: Effect) -> str:

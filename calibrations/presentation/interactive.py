@@ -180,8 +180,8 @@ def _marks(axis: c.Axis) -> dict[str, Any]:
         return {}
     powers = range(exponent(axis.low), exponent(axis.high) + 1)
     values = [digit * 10.0**power for power in powers for digit in (1, 2, 5)]
-    shown = [value for value in values if axis.low <= value * (1 + ROUNDING) and value <= axis.high * (1 + ROUNDING)]
-    return {"tickmode": "array", "tickvals": shown, "ticktext": [tick_text(value) for value in shown]}
+    visible = [value for value in values if axis.low <= value * (1 + ROUNDING) and value <= axis.high * (1 + ROUNDING)]
+    return {"tickmode": "array", "tickvals": visible, "ticktext": [tick_text(value) for value in visible]}
 
 
 Parts = tuple[list[Trace], list[dict[str, Any]], list[dict[str, Any]]]  # traces, shapes, annotations

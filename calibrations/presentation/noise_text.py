@@ -47,9 +47,9 @@ def coefficient_table(noise: ChannelNoise, sensed: Sensed | None) -> Cells:
     """Head and rows of the coefficients of one channel: in its unit, and in that of what is sensed if it is known."""
     rows: list[tuple[str, ...]] = []
     for name, coefficient in noise.coefficients.items():
-        second = () if sensed is None else (_shown(coefficient, sensed.factor, sensed.unit, noise.unit),)
+        second = () if sensed is None else (_coefficient_text(coefficient, sensed.factor, sensed.unit, noise.unit),)
         meaning = MEANS.get(name, "") + _detail(coefficient)
-        rows.append((name, _shown(coefficient, 1.0, noise.unit, noise.unit), *second, meaning))
+        rows.append((name, _coefficient_text(coefficient, 1.0, noise.unit, noise.unit), *second, meaning))
     return ("process", "coefficient", *(() if sensed is None else ("or",)), ""), rows
 
 
@@ -77,8 +77,8 @@ def _disturbances(analysis: NoiseAnalysis) -> Iterable[str]:
         }
         for name, coefficient in noise.coefficients.items():
             if name in spoilt:
-                shown = _shown(coefficient, 1.0, noise.unit, noise.unit)
-                yield f"  {axis}: {name} {shown}{_detail(coefficient)}"
+                text = _coefficient_text(coefficient, 1.0, noise.unit, noise.unit)
+                yield f"  {axis}: {name} {text}{_detail(coefficient)}"
     yield ""
 
 
@@ -91,7 +91,7 @@ def _detail(coefficient: Coefficient) -> str:
     return f", time constant {time_s:.3g} s" if time_s and coefficient.identified else ""
 
 
-def _shown(coefficient: Coefficient, factor: float, unit: str, base: str) -> str:
+def _coefficient_text(coefficient: Coefficient, factor: float, unit: str, base: str) -> str:
     """`12.34(56) uV/sqrt(Hz)`, or the upper bound. `base` is the unit of the channel, `unit` that of the result."""
     per = coefficient.unit.removeprefix(base)
     if coefficient.upper is not None and np.isinf(coefficient.upper):
@@ -115,10 +115,10 @@ def density(noise: ChannelNoise, sensed: Sensed | None) -> str:
     if not white.identified:
         return "No white noise was identified."
     scaled = Coefficient(white.value * np.sqrt(2), white.std * np.sqrt(2), white.unit)
-    shown = [_shown(scaled, 1.0, noise.unit, noise.unit)]
+    texts = [_coefficient_text(scaled, 1.0, noise.unit, noise.unit)]
     if sensed is not None:
-        shown.append(_shown(scaled, sensed.factor, sensed.unit, noise.unit))
-    return f"Noise density as in data sheets (one-sided): {' or '.join(shown)}."
+        texts.append(_coefficient_text(scaled, sensed.factor, sensed.unit, noise.unit))
+    return f"Noise density as in data sheets (one-sided): {' or '.join(texts)}."
 
 
 def _allan(noise: ChannelNoise) -> str:

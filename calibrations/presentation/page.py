@@ -34,7 +34,7 @@ def templates() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"kind": _kind, "drawn": _drawn}
+    environment.filters |= {"kind": _kind, "drawn": _markup}
     return environment
 
 
@@ -43,6 +43,6 @@ def _kind(block: Block) -> str:
     return "paragraph" if isinstance(block, str) else type(block).__name__.lower()
 
 
-def _drawn(picture: Picture) -> Markup:
+def _markup(picture: Picture) -> Markup:
     """The picture as SVG, with words for screen readers."""
     return Markup(inline(picture.chart, picture.name, f"{picture.title}. {picture.caption}"))  # noqa: S704 made here

@@ -19,7 +19,7 @@ from calibrations.table import Array
 from calibrations.text import minus, prefixed, rounded, unit, value_text
 
 HEAD = ("effect", "parameter", "axis", "value", "standard uncertainty", "unit", "last change")
-TOLD = 0.05  # standard uncertainties: a smaller change is none
+LEAST_CHANGE = 0.05  # standard uncertainties: a smaller change is none
 WHOLE = 10.0  # a value keeps its unit down to a tenth of it: 0.97 V/g, 97 mV/g
 STRONG = 0.1  # correlations that are listed
 NEW, SAME, NOT_IDENTIFIED = "new", "unchanged", "not identified"
@@ -117,21 +117,21 @@ def _change(e: Estimate, before: Estimate | None) -> str:
     if not e.identified:
         return SAME
     by, std = e.value - before.value, before.std or e.std or 0.0
-    if abs(by) <= TOLD * std:
+    if abs(by) <= LEAST_CHANGE * std:
         return SAME
     factor, of = prefixed(unit(e.unit), abs(by))
-    beyond = f" ({rounded(abs(by) / std, 2)} × its uncertainty)" if std else ""
-    return f"{'+' if by > 0 else ''}{minus(rounded(by * factor, 2))} {of}".rstrip() + beyond
+    ratio = f" ({rounded(abs(by) / std, 2)} × its uncertainty)" if std else ""
+    return f"{'+' if by > 0 else ''}{minus(rounded(by * factor, 2))} {of}".rstrip() + ratio
 
 
 def _matrices(fit: FittedModel) -> Iterator[tuple[list[str], Array]]:
     """Names and correlation matrix of parameters that were fitted together."""
     if isinstance(fit, Fit):
-        every = [(term, e) for term in fit.model.terms for e in term.estimates]
-        shown = [k for k, (term, e) in enumerate(every) if e.identified and e.std and e in term.quantities]
-        if shown:
-            names = [_name(every[k][0].name, every[k][1].name, every[k][1].axis) for k in shown]
-            yield names, _of_rows(fit)[np.ix_(shown, shown)]
+        estimates = [(term, e) for term in fit.model.terms for e in term.estimates]
+        listed = [k for k, (term, e) in enumerate(estimates) if e.identified and e.std and e in term.quantities]
+        if listed:
+            names = [_name(estimates[k][0].name, estimates[k][1].name, estimates[k][1].axis) for k in listed]
+            yield names, _of_rows(fit)[np.ix_(listed, listed)]
     elif isinstance(fit, NoiseFit):
         for channel in fit.channels:
             if channel.effects:
@@ -141,8 +141,8 @@ def _matrices(fit: FittedModel) -> Iterator[tuple[list[str], Array]]:
 
 def _of_rows(fit: Fit) -> Array:
     inputs: Any = input_contributions(fit.table) if fit.table.type.budget else ()
-    if inputs and (drawn := make_budget(fit, inputs)).given:
-        return parameter_correlation(fit, drawn, inputs)
+    if inputs and (budget := make_budget(fit, inputs)).given:
+        return parameter_correlation(fit, budget, inputs)
     return normalised(covariance(cautiously(fit).information, fit.problem.layout.typical)[0])
 
 

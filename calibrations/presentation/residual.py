@@ -58,16 +58,16 @@ def columns(fit: Fit) -> list[Column]:
     first: list[Column] = []
     if table.type.drawn_over:
         name, label, column = table.type.drawn_over
-        first = [_same(name, label, table.column(column), n)]
+        first = [_column(name, label, table.column(column), n)]
     elif table.type.magnitude:
         first = _sensed(fit, "a")
-    return first + _others(table, n)
+    return first + _logged_columns(table, n)
 
 
 def _sensed(fit: Fit, letter: str) -> list[Column]:
     """What is sensed along each axis, named by a letter and the axis."""
     along, n = fit.table.type.sensed_along, len(fit.channels)
-    return [_same(letter + k, along.format(k), a, n) for k, a in zip(AXES, specific_force(fit).T, strict=True)]
+    return [_column(letter + k, along.format(k), a, n) for k, a in zip(AXES, specific_force(fit).T, strict=True)]
 
 
 def telling_columns(fit: Fit, effect: Effect) -> list[Column]:
@@ -76,13 +76,13 @@ def telling_columns(fit: Fit, effect: Effect) -> list[Column]:
     It cannot follow what it does not know, such as time: inclinations that follow one another would only seem so.
     """
     table, n = fit.table, len(fit.channels)
-    needed = [_needed(table, name, n) for name in effect.needs if name not in SHOWN_OTHERWISE]
+    drivers = [_driver(table, name, n) for name in effect.needs if name not in SHOWN_OTHERWISE]
     if table.type.moving:  # what it explains returns in every stretch
-        return columns(fit)[:1] + needed
+        return columns(fit)[:1] + drivers
     if table.type.turning:
-        return _sensed(fit, "w") + needed
+        return _sensed(fit, "w") + drivers
     if not table.type.stage_angles:
-        return columns(fit)[:3] + needed
+        return columns(fit)[:3] + drivers
     a = specific_force(fit)
     roles = {"own": a, "other": other_in_plane(a), "out": out_of_plane(a)}
     names = {"own": "xyz", "other": "yxx", "out": "zzy"}
@@ -90,32 +90,32 @@ def telling_columns(fit: Fit, effect: Effect) -> list[Column]:
         Column(role, tuple(f"specific force along {names[role][k]} (g)" for k in range(n)), values.T[:n])
         for role, values in roles.items()
     ]
-    return forces + columns(fit)[:1] + needed
+    return forces + columns(fit)[:1] + drivers
 
 
-def _needed(table: Table, name: str, n: int) -> Column:
+def _driver(table: Table, name: str, n: int) -> Column:
     if name == "t_s":
         return _time(table, n)
-    return _same(name, LABELS.get(name, f"{name} (as given)"), table.column(name), n)
+    return _column(name, LABELS.get(name, f"{name} (as given)"), table.column(name), n)
 
 
-def _others(table: Table, n: int) -> list[Column]:
+def _logged_columns(table: Table, n: int) -> list[Column]:
     """Time, and temperature where it was measured and moved."""
     columns = [_time(table, n)]
     if "temperature_c" in table and np.ptp(table.column("temperature_c")) > RESOLUTION_C:
-        columns.append(_needed(table, "temperature_c", n))
+        columns.append(_driver(table, "temperature_c", n))
     return columns
 
 
 def _time(table: Table, n: int) -> Column:
     if "t_s" not in table:
-        return _same("row", "row (number)", np.arange(1.0, table.n + 1), n)
+        return _column("row", "row (number)", np.arange(1.0, table.n + 1), n)
     size, unit = in_time(float(np.ptp(table.time_s)))
     zero_s, since = time_origin(table)
-    return _same("time", f"time{since} ({unit})", (table.time_s - zero_s) / size, n)
+    return _column("time", f"time{since} ({unit})", (table.time_s - zero_s) / size, n)
 
 
-def _same(name: str, label: str, values: Array, n: int) -> Column:
+def _column(name: str, label: str, values: Array, n: int) -> Column:
     return Column(name, (label,) * n, np.tile(values, (n, 1)))
 
 
@@ -127,9 +127,10 @@ def choices(fit: Fit) -> dict[str, Column]:
         by_name |= {column.name: column for column in _sensed(fit, "a")}
     elif not table.type.moving:
         by_name["axis"] = nearest_axis(fit)
-    drawn = {"beta_deg" if name == "beta" else name for name in by_name} | {"t_s", "temperature_c"} & set(table.columns)
+    chosen = {"beta_deg" if name == "beta" else name for name in by_name}
+    chosen |= {"t_s", "temperature_c"} & set(table.columns)
     for name, values in table.columns.items():
-        if name not in drawn:
+        if name not in chosen:
             by_name[name] = Column(name, (named(name),) * n, np.tile(values, (n, 1)))
     return by_name
 
@@ -262,7 +263,7 @@ class Shown:
 
 
 def _place(table: Table, row: int) -> Iterator[str]:
-    """The pose of a row, and when it was, as far as is known."""
+    """The pose and the time of a row, if known."""
     at = {name: float(values[row]) for name, values in table.columns.items()}
     number = int(table.numbers[row]) if table.numbers is not None else row
     if "beta_deg" in at:

@@ -218,13 +218,13 @@ def _of_two_and_five(value: float, _: int | None = None) -> str:
 
 
 def _second(ax: Axes, second: c.Second) -> None:
-    def there(value: c.Array) -> c.Array:
+    def converted(value: c.Array) -> c.Array:
         return (value - second.zero) / second.scale
 
     def back(value: c.Array) -> c.Array:
         return value * second.scale + second.zero
 
-    right = ax.secondary_yaxis("right", functions=(there, back))  # type: ignore[arg-type] # stubs want any array-like
+    right = ax.secondary_yaxis("right", functions=(converted, back))  # type: ignore[arg-type] # stubs want any array-like
     right.set_ylabel(second.label)
     right.spines["right"].set_visible(True)
 

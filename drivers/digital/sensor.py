@@ -199,7 +199,7 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         """Raises StreamError where too many samples were lost, or the rate is another."""
         if reception.back:
             raise StreamError(
-                f"{self.name}: the sensor's time went back: the sensor began anew during the record",
+                f"{self.name}: the sensor's time went back: the sensor restarted during the record",
                 "Check its supply and its cable; opening its port restarts some boards",
             )
         lost = self._lost(reception, decoder)

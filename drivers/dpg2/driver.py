@@ -35,7 +35,7 @@ REMEDY = "Check power and cable, and that the line has 9600 baud, 8 data bits an
 
 @dataclass(frozen=True)
 class Settings:
-    """How a reading is taken, and how far the level can be trusted. Raises ValueError for what cannot be."""
+    """How a reading is taken, and the accuracy of the level. Raises ValueError for impossible values."""
 
     readings: int = 10  # that are averaged
     interval_s: float = 0.1  # from one to the next
@@ -162,7 +162,7 @@ class Level:
                 return match[1].decode(), match[2].decode()
         where = f"{self.name}: asking for its {what} ({command.decode()}) on {self._link.url}"
         if heard:
-            raise BadFrame(f"{where}: {len(heard)} bytes came that are none ({heard[:24]!r})", REMEDY)
+            raise BadFrame(f"{where}: received {len(heard)} bytes that are not a reading ({heard[:24]!r})", REMEDY)
         raise LinkTimeout(f"{where}: no answer within {TIMEOUT_S:g} s, {ATTEMPTS} times", REMEDY)
 
     def _listen(self, answer: re.Pattern[bytes]) -> tuple[bytes, re.Match[bytes] | None]:

@@ -323,7 +323,7 @@ class MotorRecord:
         units = self._records.units(mr.TARGET)
         if units.lower() not in mr.UNITS_DEG:
             raise LimitError(
-                f"{self.name}: the units of {self._records.beginning} are {units!r} (EGU), which is no angle",
+                f"{self.name}: the units of {self._records.beginning} are {units!r} (EGU), which is not an angle",
                 "Name a rotary motor in the bench file, or set deg_per_unit there",
             )
         return mr.UNITS_DEG[units.lower()]

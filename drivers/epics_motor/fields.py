@@ -26,8 +26,7 @@ FIELDS = (
 )  # fmt: skip
 GO = 3  # of SPMG: stop, pause, move, go
 MODES = ("Stop", "Pause", "Move", "Go")
-PLUS_LS, SLIP_STALL, PROBLEM = 1 << 2, 1 << 6, 1 << 9  # bits of MSTA
-COMM_ERR, MINUS_LS, HOMED = 1 << 12, 1 << 13, 1 << 14
+SLIP_STALL, PROBLEM, COMM_ERR, HOMED = 1 << 6, 1 << 9, 1 << 12, 1 << 14  # bits of MSTA
 FAULTY = {
     SLIP_STALL: ("the motor slips or stalls", "Free the stage of what holds it, check the load's balance"),
     PROBLEM: ("the driver has stopped polling the controller", "Look at the controller, and restart the IOC"),

@@ -123,7 +123,7 @@ class LineSensor(DigitalSensor[Settings, LineDecoder]):
         return f"the lines have the columns {', '.join(map(str, decoder.assembly.seen))}{self._warm}"
 
     def _advice(self, decoder: LineDecoder, begun_s: float) -> list[Check]:
-        """Settings that fit the lines since `begun_s`, as far as the test goes; nothing where none do."""
+        """Settings that fit the lines since `begun_s`, after this test; none if no settings fit."""
         assembly = decoder.assembly
         while (left_s := begun_s + TEST_S - self._clock.now()) > 0 and (data := self._link.read(left_s)):
             assembly.take(data)

@@ -190,7 +190,7 @@ class Reception:
             self._late_s = clock.now() - asked_s
 
     def _drift_s(self) -> float:
-        """How far the clocks of device and computer may have run apart since the start."""
+        """The largest plausible difference between the clocks of device and computer since the start."""
         return CLOCKS_APART * (self._link.clock.now() - self._start_s)
 
     def _require_in_time(self) -> None:

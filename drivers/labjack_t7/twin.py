@@ -173,7 +173,7 @@ class Stream:
         return self._pack(samples[: count * self.per_packet].reshape(count, self.per_packet))
 
     def stand_still(self, seconds: float) -> None:
-        """All scans to come are so much later; nothing tells."""
+        """Delay all further scans by this time, without a sign in the data."""
         self._start_ns += round(1e9 * seconds)
 
     def due_s(self) -> float:

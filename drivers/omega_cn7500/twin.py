@@ -27,7 +27,7 @@ THINKING_S = 0.005
 
 
 class World(Protocol):
-    """What a temperature controller knows of physics."""
+    """The physics that a temperature controller acts on."""
 
     def advance(self, t_s: float) -> None: ...
 

@@ -239,7 +239,7 @@ class RotaryStage:
     def _require_coordinates(self, outputs: int) -> None:
         if not outputs & az.HOME_END:
             raise StageLost(
-                f"{self.name}: does not know where it is, and is not sent anywhere",
+                f"{self.name}: the position is unknown, so no move is allowed",
                 "Find out whether it was without power or was stopped while homing; it is homed when the run resumes",
             )
 

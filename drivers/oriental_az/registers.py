@@ -46,10 +46,10 @@ TRIGGER_ALL = 1
 
 # Remote inputs and outputs: one bit each in the lower word.
 INPUTS = Register(0x007D, "uint16", "driver input command")
-START, ZHOME, STOP, FREE, ALARM_RESET = (1 << bit for bit in (3, 4, 5, 6, 7))
+START, ZHOME, STOP, ALARM_RESET = (1 << bit for bit in (3, 4, 5, 7))
 OUTPUTS = Register(0x007F, "uint16", "driver output status")
 HOME_END = 1 << 4  # [M] on while coordinates are set
-READY, ALARM_ON, BUSY = (1 << bit for bit in (5, 7, 8))
+READY, ALARM_ON = 1 << 5, 1 << 7
 MOVE, IN_POSITION = (1 << bit for bit in (13, 14))
 
 # The drive's own limits; steps.

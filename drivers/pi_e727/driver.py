@@ -170,12 +170,12 @@ class Positioner:
         return wave.frequency_hz
 
     def recorded(self, axis: str) -> Recording:
-        """What the recorder holds of the axis' last oscillation so far. Raises StreamError when that is nothing."""
+        """The recorded values of the axis' last oscillation so far. Raises StreamError if there are none."""
         place = self._place(axis)
         count = int(self._gcs.number(f"{e727.RECORDED_POINTS} {place}"))
         if not count:
             remedy = "Let the axis oscillate first, for longer than one sample of the recorder"
-            raise StreamError(f"{self.name}: there is no record of {axis}", remedy)
+            raise StreamError(f"{self.name}: the recorder has no values of {axis}", remedy)
         header, rows = self._gcs.rows(f"{e727.RECORDED} 1 {count} {place}")
         if len(rows) != count or not all(len(row) == 1 for row in rows) or "SAMPLE_TIME" not in header:
             what = f"{self.name}: the record of {axis} has {len(rows)} rows instead of {count}"

@@ -10,7 +10,7 @@ MOVING, READY, WAVES, STOP = 5, 7, 9, 24  # bits of the axes that move; "±" for
 IS_READY = "\xb1"
 
 # Who it is, and how.
-IDENTITY, SYNTAX_VERSION, AXES = "*IDN?", "CSV?", "SAI?"
+IDENTITY, AXES = "*IDN?", "SAI?"
 TRAVEL_LOW, TRAVEL_HIGH = "TMN?", "TMX?"  # um
 SERVO, ASK_SERVO = "SVO", "SVO?"
 

@@ -63,7 +63,7 @@ class Reading:
 
 
 class Circuit:
-    """The connection to one server. After a loss, the next request opens it and its channels anew."""
+    """The connection to one server. After a loss, the next request opens it and its channels again."""
 
     def __init__(self, link: Link, place: tuple[str, int]) -> None:
         self.link, self.place = link, place
@@ -202,7 +202,7 @@ class Circuit:
             raise LinkRefused(f"{who}: the IOC has removed the record", "Restart the IOC, then resume the run")
 
     def _forget(self) -> None:
-        """Begin anew with the next request: what comes on this connection cannot be told apart any more."""
+        """Reconnect at the next request: the answers on this connection can no longer be assigned to requests."""
         self._circuit, self._channels = None, {}
         self.link.hang_up()
 

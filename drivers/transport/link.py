@@ -103,7 +103,7 @@ class Link:
         if not data and line.lossy:  # an empty datagram, or a damaged one
             return b""
         if not data:
-            raise self._lost("the other side closed it")
+            raise self._lost("the instrument closed it")
         line.received += len(data)
         if self._tap:
             self._tap(self.clock.now(), self._names, "heard", data)
@@ -120,7 +120,7 @@ class Link:
         return count
 
     def hang_up(self) -> None:
-        """Close the connection; what is sent next opens it anew."""
+        """Close the connection; the next write opens it again."""
         self._drop()
 
     def close(self) -> None:

@@ -159,7 +159,7 @@ class Bus:
             data = data[used:]
         self._owed = self._url.rtu
         if data:
-            raise self._bad_frame(what, f"{len(data)} bytes came that are no answer ({data[:16].hex(' ')})")
+            raise self._bad_frame(what, f"received {len(data)} bytes that are not an answer ({data[:16].hex(' ')})")
         raise LinkTimeout(
             f"{what}: no answer within {TIMEOUT_S:g} s on {self.link.url}",
             f"Check power, cable and unit id, and {self._look_at[0]}",

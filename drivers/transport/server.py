@@ -93,7 +93,7 @@ class Connection:
             self._last_s = pieces[-1].due_s
 
     def emit(self, now_s: float) -> None:
-        """Write what is due, as far as the kernel takes it."""
+        """Write the due data that the kernel accepts."""
         self._full = False
         while self._outbox and not self._full and self._outbox[0][0] <= now_s:
             due_s, order, data = heapq.heappop(self._outbox)
@@ -113,7 +113,7 @@ class Connection:
         return (self.received, self.emitted) if key == self.key else None
 
     def is_behind(self, now_s: float) -> bool:
-        """Whether something that was due by `now_s` has not been written yet."""
+        """Whether data that was due by `now_s` is still unwritten."""
         return bool(self._outbox) and self._outbox[0][0] <= now_s
 
     def _write(self, data: bytes) -> int:

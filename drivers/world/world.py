@@ -116,7 +116,7 @@ class World:
         return float(heat.die_c(self._world.warmth))
 
     def level_deg(self) -> tuple[float, float]:
-        """What a level on the turntable shows now: how far the positive ends of its x and y axis are up, in deg."""
+        """What a level on the turntable shows now: elevation of the positive ends of its x and y axis, deg."""
         angles_rad = mechanics.true_angles_rad(self._world, self._numbers.stages)
         inclined_deg = gravity.inclination_deg(self._world.up, *angles_rad)
         return gravity.shown_deg(self.config.level, inclined_deg, self._seed, int(self._world.now_ns))

@@ -25,7 +25,7 @@ def answer(question: Question, rig: Rig) -> str | None:
 
 
 def follow(guidance: Guidance, rig: Rig) -> None:
-    """Let the simulated hand begin with what it is told. There is none on a bench with a real instrument."""
+    """Start the simulated hand with this instruction. A bench with a real instrument has none."""
     if isinstance(rig.world, HandheldWorld) and rig.bench.simulated and guidance.moves:
         rig.world.advance(max(rig.clock.now(), rig.world.now_s))
         rig.world.turn_by_hand(guidance.up)

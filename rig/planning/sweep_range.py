@@ -76,7 +76,7 @@ SIDE = 0.2  # how far the two directions of one pose count as apart, beside dist
 
 @dataclass(frozen=True)
 class Judged:
-    """A plan, and what a fit to its poses will know: `errors` (p,), V at full scale, infinite where it cannot tell."""
+    """A plan and the expected standard uncertainties `errors` (p,), V at full scale, infinite if not determined."""
 
     plan: Plan
     errors: Array
@@ -88,7 +88,7 @@ class Judged:
 
     @property
     def told(self) -> NDArray[np.bool_]:
-        """Mask of the parameters that it tells, shape (p,)."""
+        """Mask of the parameters that the plan determines, shape (p,)."""
         return np.isfinite(self.errors)
 
     @property
@@ -142,7 +142,7 @@ class Range:
         return np.column_stack([specific_force(nominal_pose(table)), SIDE * table.column("direction")])
 
     def judged(self, settings: Mapping[str, Any]) -> Judged:
-        """The sweep with other settings; check poses tell its fit nothing. Raises what a plan raises."""
+        """The sweep with other settings; its fit does not use the check poses. Raises what a plan raises."""
         planned = plan(self.bench, self.sweep, settings)
         fitted = replace(planned, held=tuple(held for held in planned.held if not held.pose.path.startswith(MARK)))
         rows = information(self.fit, predict_data(self.fit, _columns(fitted)))

@@ -24,8 +24,6 @@ from calibrations.exporting.simulated import Exported
 from rig.files import program
 from rig.services.provenance import today
 
-LANGUAGES = ("c", "python", "json")
-
 
 def origin_of(model: str, name: str | None, text: str) -> Origin:
     """Where the code comes from. `model`: name or file; `text`: the model as a file has it."""
@@ -35,7 +33,7 @@ def origin_of(model: str, name: str | None, text: str) -> Origin:
 
 
 def source_files(compensation: Compensation, language: str, origin: Origin) -> dict[str, str]:
-    """The files by name. `language`: one of `LANGUAGES`."""
+    """The files by name. `language`: c, python or json."""
     return _writer(language)(compensation, origin, make_vectors(compensation))
 
 

@@ -221,7 +221,7 @@ def _makers(fault: Curve, effects: Sequence[Curve], floor: float) -> list[Curve]
 
 
 def _left(fault: Curve, effects: Sequence[Curve]) -> float:
-    """Rms of what the effects cannot make of a fault's curve."""
+    """Rms of the part of a fault's curve that the effects cannot describe."""
     spans = [e.span.reshape(fault.curve.size, -1) for e in effects if e.span is not None]
     columns_ = np.hstack(spans)
     length = np.linalg.norm(columns_, axis=0)

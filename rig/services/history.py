@@ -163,7 +163,7 @@ def history(
     baseline: int = BASELINE_RUNS,
     tell: Callable[[str], None] = lambda _: None,
 ) -> History:
-    """The history of `sensor` by `model`, see `judged`; `tell` hears which run is calibrated.
+    """The history of `sensor` by `model`, see `judged`; `tell` receives the run that is calibrated.
 
     Raises RecordError where the record has no calibration of it, naming the nearest sensor.
     """

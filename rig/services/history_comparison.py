@@ -74,7 +74,7 @@ def _compared(a: Mapping[str, Value], b: Mapping[str, Value], one: str, other: s
 
 
 def _mean(values: Sequence[Value]) -> Value:
-    """The mean; uncertain by the calibrations' own uncertainty, which they may share, and by what they scatter."""
+    """The mean. Its uncertainty has the calibrations' own, which may be common to all, and their scatter."""
     x = np.array([value.value for value in values])
     own = float(rms(np.array([value.std for value in values])))
     scatter = float(x.std(ddof=1) / np.sqrt(len(x))) if len(x) > 1 else 0.0

@@ -69,7 +69,7 @@ def _failed(run: Run) -> Iterator[str]:
 
 
 def _marginal(run: Run) -> Iterator[str]:
-    """Neither inside nor outside beyond doubt: a longer measurement tells."""
+    """The value is too close to the limit; a longer measurement decides."""
     if names := _with_verdict(run.results, "marginal"):
         setting = next((name for name in LENGTHS if name in run.settings), None)
         longer = f" (--{setting.replace('_', '-')} {LONGER * run.settings[setting]:g})" if setting else ""

@@ -80,7 +80,7 @@ class ModelSession(Generic[F]):
         return self.data.step(effect, self.end)
 
     def written(self, name: str, text: str) -> Effect:
-        """An effect of one's own: an expression, or a free form as `free:PLACE`.
+        """An effect that the user wrote: an expression, or a free form as `free:PLACE`.
 
         Raises ModelError, ExpressionError with the place in the text.
         """
@@ -176,7 +176,7 @@ class ModelSession(Generic[F]):
         return self.data.search_on(self.end, self.start, self.effects)
 
     def with_next(self, result: Diagnosis[F], tell: Callable[[str], None]) -> Diagnosis[F]:
-        """The diagnosis with its next experiment planned on the bench; `tell` hears where that is another bench."""
+        """The diagnosis with its next experiment planned on the bench; `tell` is called if it is another bench."""
         return planned(result, self.request, self.effects, tell)
 
 

@@ -91,8 +91,7 @@ def named(found: Optimal, model: Model) -> dict[str, bool]:
     for mechanism, effects in HIDDEN.items():
         config = rigs.scaled(DEFECTS[mechanism], rigs.IDEAL, 1, TIMES_NOISE * rigs.noise_floor_v())
         table = measured(config, 1, found.equal.poses, found.equal.dwell_s)
-        path = diagnose(table, model, catalogue()).path
-        said[mechanism] = bool(path.steps) and path.steps[0].selected.name in effects
+        said[mechanism] = next(iter(diagnose(table, model, catalogue()).missing), None) in effects
     return said
 
 

@@ -217,7 +217,7 @@ def test_a_model_file_keeps_a_free_form_to_the_last_bit() -> None:
     [
         ({"sizes": ()}, "has no size"),
         ({"place": "time-bias"}, "acts at time-bias, and the effect at own-response"),
-        ({"kept": (40, 40)}, "keeps more columns than its basis has"),
+        ({"kept": (40, 40)}, "not above the columns of the basis"),
         ({"kept": (1, 1, 1)}, "for 2 axes"),
     ],
 )
@@ -322,7 +322,7 @@ def test_sizes_that_end_early_decide_as_those_that_do_not(beyond: float) -> None
     g = gram(X, {"large": slice(0, 5), "small": slice(5, 10)}, {"large": 1.0, "small": 1.0}, 2)
     variances = {"large": 1e-3, "small": 1e-1}
     whole = estimate(g, variances, {})
-    early = estimate(g, variances, {}, wanted=whole.deviance + beyond)
+    early = estimate(g, variances, {}, target=whole.deviance + beyond)
     assert (early.deviance <= whole.deviance + beyond) is (beyond > 0)
 
 

@@ -11,7 +11,7 @@ from calibrations.discovery.rows import Rows
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import CalibrationError, ModelError
 from calibrations.fitting.fit import Fit, evaluate, fit
-from calibrations.free_forms.chain import Given, start, state_at
+from calibrations.free_forms.chain import ModelEffects, start, state_at
 from calibrations.free_forms.place_names import EFFECTS_AT, GEOMETRY_PLACE, PLACES, place_of_effect
 from calibrations.free_forms.places import components
 from calibrations.free_forms.poses import PoseData
@@ -128,7 +128,7 @@ def test_every_place_has_a_driver_and_an_entry_of_effects() -> None:
 
 def test_effects_of_the_search_are_listed_at_their_places() -> None:
     data = PoseData.of(table(temperature_c=WARMING, supply_v=5 + 0.01 * WARMING, vx_std_v=WARMING, vy_std_v=WARMING))
-    nothing = Given.nothing(data)
+    nothing = ModelEffects.nothing(data)
     for c in components(data, state_at(data, nothing, start(data, nothing), ())):
         assert not c.cause or place_of_effect(c.cause) == c.place
 

@@ -309,7 +309,9 @@ def test_units_that_cannot_be_are_refused(bench: Bench) -> None:
     port = records_port("tcp://127.0.0.1:0", [Millimetres()])
     bench.serve(Server([port], {}, {}))
     at = Address(f"ca://{port.url.removeprefix('tcp://')}/sim:x")
-    with pytest.raises(LimitError, match=r"the units of sim:x are 'mm' \(EGU\), which is no angle.*set deg_per_unit"):
+    with pytest.raises(
+        LimitError, match=r"the units of sim:x are 'mm' \(EGU\), which is not an angle.*set deg_per_unit"
+    ):
         motor_driver.connect(at, bench.links, motor_driver.Settings(), "beta")
     with pytest.raises(LimitError, match=r"units of sim:xai1 are 'mm' \(EGU\), which is no voltage.*volts_per_unit"):
         adc_driver.connect(at, bench.links, adc_driver.Settings(), "adc")

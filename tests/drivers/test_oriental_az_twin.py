@@ -123,7 +123,7 @@ def test_an_exchange_costs_its_line_time(ask: Ask, clock: SimulatedClock) -> Non
 
 def test_a_stage_must_be_homed_before_it_moves(bench: Any) -> None:
     assert not bench.alpha.referenced()
-    with pytest.raises(StageLost, match="alpha: does not know where it is"):
+    with pytest.raises(StageLost, match="alpha: the position is unknown"):
         bench.alpha.move_to(10.0)
     bench.alpha.home()
     assert bench.alpha.referenced()

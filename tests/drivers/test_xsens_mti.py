@@ -82,7 +82,7 @@ def test_a_tracker_that_already_sends_is_not_configured(connect: Connect) -> Non
         (Fault("lost-message", at_s=2.0, for_s=0.2), {}, StreamError, "samples were lost"),
         (Fault("stuck-axis"), {}, SensorFault, "ax gave the same value"),
         (Fault("clipping", at_s=2.0), {}, OverRange, "the sensor reports ax at the end of its range"),
-        (Fault("restart", at_s=2.0), {}, StreamError, "began anew during the record"),
+        (Fault("restart", at_s=2.0), {}, StreamError, "restarted during the record"),
         (None, {"range": 9.0}, OverRange, "az reached the end of its range, 9 m/s"),
         (None, {"rate_hz": 200.0, "outputs": FIELDS}, StreamError, "sends MagneticField at 100 Hz, and rate_hz is 200"),
         (None, {"rate_hz": 2000.0}, StreamError, "sends AccelerationHR at 1000 Hz"),

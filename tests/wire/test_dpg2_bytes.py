@@ -124,7 +124,7 @@ def test_silence_is_told_with_its_cause(level: Levels, clock: SimulatedClock) ->
 def test_garbage_without_end_is_told_in_bounded_time(level: Levels, clock: SimulatedClock, babble: bytes) -> None:
     found = level({}, babble=babble)
     began_s = clock.now()
-    with pytest.raises(BadFrame, match=r"level: asking for its reading .* bytes came that are none"):
+    with pytest.raises(BadFrame, match=r"level: asking for its reading .* received .* bytes that are not a reading"):
         found.read()
     assert clock.now() - began_s < 4.0
 

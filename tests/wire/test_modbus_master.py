@@ -91,7 +91,7 @@ def test_a_wrong_checksum_is_a_bad_frame(unit: Units) -> None:
 
 
 def test_half_an_answer_is_a_bad_frame(unit: Units) -> None:
-    with pytest.raises(BadFrame, match=r"5 bytes came that are no answer \(01 03 04 00 00\)"):
+    with pytest.raises(BadFrame, match=r"received 5 bytes that are not an answer \(01 03 04 00 00\)"):
         unit([(ASK_ALARM, "01 03 04 00 00")] * 3).read(ALARM)
 
 

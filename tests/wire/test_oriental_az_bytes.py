@@ -92,7 +92,7 @@ def test_with_an_alarm_no_move_is_started(stage: Stages) -> None:
 
 
 def test_without_coordinates_it_is_not_moved_blindly(stage: Stages) -> None:
-    with pytest.raises(StageLost, match=r"alpha: does not know where it is, and is not sent anywhere\. Find out"):
+    with pytest.raises(StageLost, match=r"alpha: the position is unknown, so no move is allowed\. Find out"):
         stage([(ASK_STATUS, STANDING)]).move_to(85.0)
 
 

@@ -213,7 +213,7 @@ def test_a_record_has_a_header_and_rows(positioner: Positioners) -> None:
 
 
 def test_a_record_of_nothing(positioner: Positioners) -> None:
-    with pytest.raises(StreamError, match=r"positioner: there is no record of x. Let the axis oscillate first"):
+    with pytest.raises(StreamError, match=r"positioner: the recorder has no values of x. Let the axis oscillate first"):
         positioner(*told("DRL? 1\n", "1=0\n")).recorded("x")
 
 

@@ -75,10 +75,10 @@ def tolerance(std: float) -> float:
 
 def verdict(value: float, expanded: float, std: float, low: float, high: float) -> str:
     """The verdict of the simulated interval (low, high) on value +- expanded."""
-    beyond = expanded - (value - low), expanded - (high - value)
-    if min(beyond) < -tolerance(std):
+    margins = expanded - (value - low), expanded - (high - value)
+    if min(margins) < -tolerance(std):
         return WIDENED
-    return CONSERVATIVE if max(beyond) > tolerance(std) else CONFIRMED
+    return CONSERVATIVE if max(margins) > tolerance(std) else CONFIRMED
 
 
 def _estimate(fit: Fit, G: Array, disturbed: Array) -> Array:
@@ -120,26 +120,26 @@ def figures(fit: Fit, before: Model | None, limits: Mapping[str, Limit], trials:
     """
     require_reference(fit.table.source, fit.table.kind)
     if (reason := rejection(fit) or unexplained_scatter(fit)) is not None:
-        raise UnusableData(f"{fit.table.source}: no certificate is drawn up: {reason.verdict}: {reason.text}")
+        raise UnusableData(f"{fit.table.source}: no certificate: {reason.verdict}: {reason.text}")
     inputs = input_contributions(fit.table)
-    drawn = make_budget(fit, inputs)
+    budget = make_budget(fit, inputs)
     trial = simulate(fit, inputs, trials)
     weights = _weights(fit)
     earlier = _values(before) if before is not None else {}
     certified = [k for k, (_, e) in enumerate(_estimates(fit.model)) if e.identified and e.std]
     outcomes = tuple(
-        _outcome(k, t, e, drawn, trial[:, k], weights[k], fit, earlier, limits)
+        _outcome(k, t, e, budget, trial[:, k], weights[k], fit, earlier, limits)
         for k, (t, e) in enumerate(_estimates(fit.model))
         if k in certified
     )
     if not outcomes:
         raise ModelError(f"{fit.table.source}: the data determine no parameter of {fit.model.name}: nothing to certify")
-    joint = parameter_correlation(fit, drawn, inputs)[np.ix_(certified, certified)]
+    joint = parameter_correlation(fit, budget, inputs)[np.ix_(certified, certified)]
     return Figures(
         fit.model.name,
         outcomes,
         tuple(_errors(fit, before)),
-        drawn.not_given,
+        budget.not_given,
         trials,
         tuple(_remarks(fit)),
         tuple(map(tuple, joint.tolist())),
@@ -167,24 +167,24 @@ def _outcome(
     k: int,
     of: Term,
     e: Estimate,
-    drawn: Budget,
+    budget: Budget,
     trial: Array,
     weights: Array,
     fit: Fit,
     earlier: Mapping[tuple[str, str, str], tuple[float, float | None]],
     limits: Mapping[str, Limit],
 ) -> Outcome:
-    std, coverage = float(drawn.combined[k]), max(CERTAIN_K, float(drawn.coverage[k]))
+    std, coverage = float(budget.combined[k]), max(CERTAIN_K, float(budget.coverage[k]))
     low, high = (float(end) for end in interval(trial))
     judgement = verdict(e.value, coverage * std, std, low, high)
-    why = _why_further(k, coverage, std, float(trial.std()), drawn) if judgement == CONSERVATIVE else ""
+    why = _why_further(k, coverage, std, float(trial.std()), budget) if judgement == CONSERVATIVE else ""
     if judgement == WIDENED:
         coverage = max(coverage, (e.value - low) / std, (high - e.value) / std)
-    limit = limits.get(own := name(of.effect, e.name, e.axis))
+    limit = limits.get(parameter_name := name(of.effect, e.name, e.axis))
     order = np.argsort(-weights)
     numbers = fit.table.numbered(np.arange(fit.table.n))
     return Outcome(
-        name=own,
+        name=parameter_name,
         term=term(of.effect, next(p for p in of.effect.parameters if p.name == e.name)),
         effect=of.name,
         parameter=e.name,
@@ -193,8 +193,8 @@ def _outcome(
         value=e.value,
         std=std,
         coverage=coverage,
-        freedom=float(drawn.freedom[k]),
-        sources=sources(drawn, k),
+        freedom=float(budget.freedom[k]),
+        sources=sources(budget, k),
         simulated=Simulated(float(trial.std()), low, high, judgement, why),
         found=earlier.get((of.name, e.name, e.axis)),
         decision=None if limit is None else decide(e.value, std, coverage * std, limit),
@@ -202,9 +202,9 @@ def _outcome(
     )
 
 
-def _why_further(k: int, coverage: float, std: float, simulated: float, drawn: Budget) -> str:
-    """By what a budget reaches further than the simulation, as far as it is known."""
-    slow = any(line.source == SLOW_NOISE and line.std is not None and line.std[k] > 0 for line in drawn.given)
+def _why_further(k: int, coverage: float, std: float, simulated: float, budget: Budget) -> str:
+    """Why the interval of the budget is wider than that of the simulation, if a reason is known."""
+    slow = any(line.source == SLOW_NOISE and line.std is not None and line.std[k] > 0 for line in budget.given)
     reasons = [
         "slow noise is not well known" if slow and CERTAIN_K * (std - simulated) > tolerance(std) else "",
         "few degrees of freedom" if (coverage - CERTAIN_K) * std > tolerance(std) else "",

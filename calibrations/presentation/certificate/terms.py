@@ -118,8 +118,8 @@ def term(effect: Effect, parameter: Parameter) -> str:
 
 def name(effect: Effect, parameter: str, axis: str) -> str:
     """The name that limits are given by."""
-    own = [] if len(effect.parameters) == 1 else [parameter.replace("_", "-")]
-    return "-".join([effect.name, *own, *([axis] if axis else [])])
+    suffix = [] if len(effect.parameters) == 1 else [parameter.replace("_", "-")]
+    return "-".join([effect.name, *suffix, *([axis] if axis else [])])
 
 
 def names(effect: Effect) -> list[str]:

@@ -113,11 +113,11 @@ def failure_chart(fit: Fit) -> Chart:
 
 def drawn_channels(fit: Fit, values: Array) -> list[int]:
     """All channels; of a motion those with the largest rms of `values`, shape (channels, n), over the noise floor."""
-    every = range(len(fit.channels))
+    channels = range(len(fit.channels))
     if not fit.table.type.moving:
-        return list(every)
+        return list(channels)
     size = rms(values) / fit.noise.floor
-    return sorted(sorted(every, key=lambda c: -float(size[c]))[:MOST_ROWS])
+    return sorted(sorted(channels, key=lambda c: -float(size[c]))[:MOST_ROWS])
 
 
 def row_height(fit: Fit) -> float:
@@ -293,7 +293,7 @@ def change_of(step: Step[Fit]) -> Array:
 
 
 def most_telling(step: Step[Fit]) -> Column:
-    """The plainest column that the change follows; the change itself where it follows none."""
+    """The simplest column that explains the change; the change itself if no column explains it."""
     change, sides = change_of(step) / step.before.noise.floor[:, None], _sides(step)
     effect = next(term.effect for term in step.after.model.terms if term.name == step.name)
     candidates = telling_columns(step.before, effect)

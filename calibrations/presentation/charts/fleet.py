@@ -83,15 +83,17 @@ def spreads(quantities: Mapping[str, Sequence[Spread]]) -> Chart:
 
 def _spread(place: int, spread: Spread) -> Iterator[Band | Points | Note]:
     rng = np.random.default_rng(place)
-    shown = np.sort(rng.permutation(len(spread.values))[:MOST_DOTS])
-    shown = np.union1d(shown, np.flatnonzero(spread.apart))
+    drawn_rows = np.sort(rng.permutation(len(spread.values))[:MOST_DOTS])
+    drawn_rows = np.union1d(drawn_rows, np.flatnonzero(spread.apart))
     x = place + WIDE * rng.uniform(-1, 1, len(spread.values))
     if spread.band is not None:
         low, high = (np.full(2, end) for end in spread.band)
         yield Band(np.array([place - 0.4, place + 0.4]), low, high)
-    values, expanded = spread.values[shown], spread.expanded[shown]
-    colours = [VERMILION if is_unlike else BLUE for is_unlike in spread.apart[shown]]
-    hover = [spread.sensors[k] for k in shown]
-    yield Points(x[shown], values, colour=colours, size=4, low=values - expanded, high=values + expanded, hover=hover)
+    values, expanded = spread.values[drawn_rows], spread.expanded[drawn_rows]
+    colours = [VERMILION if is_unlike else BLUE for is_unlike in spread.apart[drawn_rows]]
+    hover = [spread.sensors[k] for k in drawn_rows]
+    yield Points(
+        x[drawn_rows], values, colour=colours, size=4, low=values - expanded, high=values + expanded, hover=hover
+    )
     for k in np.flatnonzero(spread.apart)[:MOST_NAMED]:
         yield Note(spread.sensors[k], float(x[k]), float(spread.values[k]), vertical="middle")

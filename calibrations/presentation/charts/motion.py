@@ -38,19 +38,19 @@ ROOM, LEGEND_ROOM = 0.05, 0.25  # below and above the curves, as shares of their
 def evaluation(result: MotionResult) -> Chart:
     """Fig. 12 of the paper: the acceleration by each model and the reference above, the error of the model below."""
     first = result.t_s[0]
-    shown = (result.t_s - first) < SHOWN_S
-    t = result.t_s[shown] - first
-    curves = [values[shown] for values in (result.linear, result.physical, result.reference)]
+    visible = (result.t_s - first) < SHOWN_S
+    t = result.t_s[visible] - first
+    curves = [values[visible] for values in (result.linear, result.physical, result.reference)]
     low, high = float(np.min(curves)), float(np.max(curves))
     axis = Axis("acceleration (mm/s²)", low=low - ROOM * (high - low), high=high + LEGEND_ROOM * (high - low))
     above, below = [], []
     for k, (name, values, error) in enumerate(_models(result)):
         colour = (VERMILION, BLUE)[k]
-        sensor = Line(t, values[shown], f"sensor, {name} model", colour, 1.8)
-        reference = Line(t, result.reference[shown], "displacement sensor", INK, 1.8, "dot")
+        sensor = Line(t, values[visible], f"sensor, {name} model", colour, 1.8)
+        reference = Line(t, result.reference[visible], "displacement sensor", INK, 1.8, "dot")
         title = f"{'ab'[k]}  {name} model: rmse {written(error.value, error.std)} mm/s²"
         above.append(Panel((sensor, reference), Axis(), axis, title, legend="upper right"))
-        error_line = Line(t, (values - result.reference)[shown], colour=colour)
+        error_line = Line(t, (values - result.reference)[visible], colour=colour)
         series = (*floor_band(result.noise_limit.value), error_line)
         below.append(Panel(series, Axis("time (s)"), Axis("sensor − reference (mm/s²)")))
     return Chart((tuple(above), tuple(below)), 2.8, share_x=True, share_y=True)

@@ -257,8 +257,8 @@ def _named(panels: Sequence[Panel], end: NoiseFit) -> Chart:
 
 def _alike(end: NoiseFit, start: NoiseFit) -> bool:
     """Whether both are one curve: the same effects with the same values, on the same record."""
-    same = [after.values == before.values for after, before in zip(end.channels, start.channels, strict=True)]
-    return all(same) and end.model.effects == start.model.effects
+    unchanged = [after.values == before.values for after, before in zip(end.channels, start.channels, strict=True)]
+    return all(unchanged) and end.model.effects == start.model.effects
 
 
 def _name(end: NoiseFit, start: NoiseFit) -> str:

@@ -86,10 +86,10 @@ def _left(table: Table, change: Array, v: Array, name: str) -> Array:
 
     For bias and scale factor, the model has all effects but these.
     """
-    once = table.optional("beta_deg", 0.0) < 360.0  # the end of a turn is its beginning
+    one_turn = table.optional("beta_deg", 0.0) < 360.0  # the end of a turn is its beginning
     line = np.column_stack([np.ones(len(v)), v])
     line = {"bias": line[:, :0], "scale-factor": line[:, :1]}.get(name, line)
-    residual = change - line @ np.linalg.lstsq(line[once], change[once], rcond=None)[0]
+    residual = change - line @ np.linalg.lstsq(line[one_turn], change[one_turn], rcond=None)[0]
     return np.asarray(np.round(1e3 * residual, DIGITS) + 0.0)
 
 
@@ -100,13 +100,13 @@ def _panel(effect: Effect, table: Table, a: Array, k: int, residual: Array) -> P
         close = (table.time_s >= CLOSE_S[0]) & (table.time_s <= CLOSE_S[1])
         rows = np.flatnonzero(close) if "output" in effect.places else np.arange(0, table.n, 8)
         return Part(axis, residual, table.time_s, "time (s)", (Curve("", BLUE, "-", rows),))
-    if needed := [name for name in effect.needs if name in LABELS]:
-        over = table.column(needed[0]) / (60.0 if needed[0] == "t_s" else 1.0)
-        return Part(axis, residual, over, LABELS[needed[0]], tuple(_by_inclination(table, ("-", "-"))))
-    for name, felt in ((axis, a[:, k]), (other_axis, other_in_plane(a)[:, k])):
-        _, rows, group = np.unique(np.round(felt, 6), return_index=True, return_inverse=True)
+    if drivers := [name for name in effect.needs if name in LABELS]:
+        over = table.column(drivers[0]) / (60.0 if drivers[0] == "t_s" else 1.0)
+        return Part(axis, residual, over, LABELS[drivers[0]], tuple(_by_inclination(table, ("-", "-"))))
+    for name, component in ((axis, a[:, k]), (other_axis, other_in_plane(a)[:, k])):
+        _, rows, group = np.unique(np.round(component, 6), return_index=True, return_inverse=True)
         if np.max(np.abs(residual - residual[rows][group])) < SAME * np.ptp(residual) and _smooth(residual[rows]):
-            return Part(axis, residual, felt, f"specific force along {name} (g)", (Curve("", BLUE, "-", rows),))
+            return Part(axis, residual, component, f"specific force along {name} (g)", (Curve("", BLUE, "-", rows),))
     styles = ("-", "--") if "direction" in effect.needs else ("-",)
     return Part(axis, residual, table.column("beta_deg"), "β (deg)", tuple(_by_inclination(table, styles)))
 
@@ -329,9 +329,9 @@ def _with_white(effect: Effect | None) -> ChannelFit:
     effects, values = [white], {white.name: dict(WHITE)}
     lines: tuple[Sinusoid, ...] = ()
     if effect is not None:
-        own = shown_noise(effect)
+        spectrum = shown_noise(effect)
         effects += [effect] if "spectrum" in effect.places and effect is not white else []
-        values[effect.name] = own
-        lines = effect_lines(effect, own)
+        values[effect.name] = spectrum
+        lines = effect_lines(effect, spectrum)
     parts = (slow_bands(nothing.means, Sampling(RATE_HZ)),)
     return ChannelFit(nothing, parts, lines, tuple(effects), values)

@@ -180,7 +180,7 @@ def _steady(course: Course) -> Iterator[Rule | Note]:
     if course.state and course.state.from_start:
         words = "steady from the first reversal on"
     elif time is not None:
-        words = f"steady after {time_text(*(each / HOUR_S for each in time))} h"
+        words = f"steady after {time_text(*(value_s / HOUR_S for value_s in time))} h"
     up = course.values[0] > course.values[-1]
     yield Note(words, 1, 1 if up else 0, "xy", "right", "top" if up else "bottom")
 

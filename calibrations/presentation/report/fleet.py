@@ -25,12 +25,12 @@ SHARED = (
 def population_report(population: Population, model: str, facts: Mapping[str, str]) -> str:
     """The page of a discovery as HTML text; `facts` its provenance."""
     persons = [sensor for sensor in population.sensors if sensor.needs_a_person]
-    beyond = {error.rig for error in population.rigs if error.beyond}
+    faulty_rigs = {error.rig for error in population.rigs if error.beyond}
     missing = [batch for batch in population.batches if batch.effects]
-    state = "found" if missing or beyond or persons else "adequate"
+    state = "found" if missing or faulty_rigs or persons else "adequate"
     return html(
         Page(
-            headline=_headline(missing, beyond, persons),
+            headline=_headline(missing, faulty_rigs, persons),
             verdict=state,
             state=state,
             subject=f"Fleet, {len(population.sensors)} sensors",
@@ -39,7 +39,7 @@ def population_report(population: Population, model: str, facts: Mapping[str, st
             figures=[
                 ("sensors", str(len(population.sensors)), f"of {len(population.batches)} batches"),
                 ("batches that miss an effect", str(len(missing)), "in all their sensors"),
-                ("rigs in error", str(len(beyond)), "against the median of the rigs"),
+                ("rigs in error", str(len(faulty_rigs)), "against the median of the rigs"),
                 ("sensors to inspect", str(len(persons)), "unlike their batch, or without a verdict"),
             ],
             sections=[_batches(population), _rigs(population), *_persons(persons)],
@@ -73,13 +73,13 @@ def calibration_report(
     )
 
 
-def _headline(missing: list[BatchVerdict], beyond: set[str], persons: list[SensorVerdict]) -> str:
+def _headline(missing: list[BatchVerdict], faulty_rigs: set[str], persons: list[SensorVerdict]) -> str:
     parts = []
     if missing:
         effects = joined(list(dict.fromkeys(e.effect for batch in missing for e in batch.effects)))
         parts.append(f"{effects} missing in {_count(len(missing), 'batch', 'batches')}")
-    if beyond:
-        parts.append(f"{_count(len(beyond), 'rig', 'rigs')} in error")
+    if faulty_rigs:
+        parts.append(f"{_count(len(faulty_rigs), 'rig', 'rigs')} in error")
     if persons:
         parts.append(f"{_count(len(persons), 'sensor', 'sensors')} to inspect")
     text = joined(parts) or "no effect is missing in any sensor"

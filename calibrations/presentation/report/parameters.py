@@ -48,8 +48,8 @@ def matrices_section(fit: Fit) -> Section | None:
     ]
     head = ("axis", "M, x", "y", "z", f"S, {calibrated}/{raw}", f"b, {calibrated}")
     table = Table("General calibration", head, rows, range(1, 6), headed=False)
-    beyond = f"Effects that these matrices cannot hold: {', '.join(matrices.beyond)}."
-    remark = (Remark(beyond),) if matrices.beyond else ()
+    text = f"Effects that these matrices cannot hold: {', '.join(matrices.beyond)}."
+    remark = (Remark(text),) if matrices.beyond else ()
     return Section("General calibration", (GENERAL.format(raw=raw, calibrated=calibrated), table, *remark))
 
 
@@ -69,5 +69,5 @@ def verdicts(results: Mapping[str, Any]) -> Iterable[Section]:
 
 def _verdict(name: str, result: Mapping[str, Any]) -> tuple[str, ...]:
     value, std = result["value"], result["std"]
-    shown = estimate_text(value, std) if std else minus(f"{value:.3g}")
-    return name, f"{shown} {result['unit']}", bound(value, result["limit"]), result["verdict"]
+    text = estimate_text(value, std) if std else minus(f"{value:.3g}")
+    return name, f"{text} {result['unit']}", bound(value, result["limit"]), result["verdict"]

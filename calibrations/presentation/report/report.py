@@ -64,14 +64,14 @@ def key_figures(discovery: Discovery[Fit]) -> list[tuple[str, str, str]]:
     """The few numbers to remember: (what, value, remark)."""
     start, floor, unit = discovery.start, pooled_milli(discovery.start)[1], milli_unit(discovery.start)
     first = "error before" if discovery.steps else "rms error"
-    shown = [(first, f"{rounded(pooled_milli(start)[0], 2)} {unit}", _of_floor(start, start.held_out_excess))]
+    figures = [(first, f"{rounded(pooled_milli(start)[0], 2)} {unit}", _of_floor(start, start.held_out_excess))]
     if discovery.steps:
         held_out = discovery.steps[-1].held_out_after
-        shown.append(
+        figures.append(
             ("error after", f"{rounded(pooled_milli(discovery.end)[0], 2)} {unit}", _of_floor(discovery.end, held_out))
         )
     kind = "white noise of one mean" if start.noise.known else "from the scatter: the white noise is not known"
-    return [*shown, ("noise floor", f"{rounded(floor, 2)} {unit}", kind)]
+    return [*figures, ("noise floor", f"{rounded(floor, 2)} {unit}", kind)]
 
 
 def _of_floor(fit: Fit, held_out: float) -> str:
@@ -86,7 +86,7 @@ def next_words(e: Experiment) -> str:
 
 
 def next_takes(e: Experiment) -> str:
-    """Its duration and its probability of success, as far as they are known."""
+    """Its duration and its probability of success, if known."""
     if e.duration_s is None:
         return ""
     minutes = e.duration_s / 60
@@ -155,7 +155,7 @@ def report(
     `date` and `program` (name and version) go into the provenance: the same arguments give the same page.
     """
     album_of_all = album(discovery, comparison, motion) if pictures is None else pictures
-    shown = {picture.name: picture for picture in album_of_all}
+    by_name = {picture.name: picture for picture in album_of_all}
     page = Page(
         headline=discovery.judgement.headline,
         verdict=discovery.outcome.label,
@@ -163,22 +163,22 @@ def report(
         subject=f"Calibration report, model {comparison.fit.model.name}",
         summary=unbroken(summary(discovery)),
         figures=key_figures(discovery),
-        sections=[*verdicts(results), *_sections(discovery, comparison, shown)],
+        sections=[*verdicts(results), *_sections(discovery, comparison, by_name)],
         provenance=_provenance(discovery, date, program),
     )
-    return html(page if motion is None else motion_page(page, motion, shown["evaluation"]))
+    return html(page if motion is None else motion_page(page, motion, by_name["evaluation"]))
 
 
 def _sections(
-    discovery: Discovery[Fit], comparison: Comparison[Fit], shown: Mapping[str, Picture]
+    discovery: Discovery[Fit], comparison: Comparison[Fit], pictures: Mapping[str, Picture]
 ) -> Iterable[Section]:
     end, given_model = discovery.end, brief(comparison.fit.model.name)
-    yield Section("Error by model", (shown["waterfall"], _steps(discovery), _held_out(discovery)))
-    three = [shown[name] for name in ("measurement", "residual", "failure")]
+    yield Section("Error by model", (pictures["waterfall"], _steps(discovery), _held_out(discovery)))
+    three = [pictures[name] for name in ("measurement", "residual", "failure")]
     yield Section(f"Residuals of the model {given_model}", (*_places(comparison), _errors(comparison.fit), *three))
-    curves = [picture for name, picture in shown.items() if name.startswith("effect-")]
+    curves = [picture for name, picture in pictures.items() if name.startswith("effect-")]
     yield Section("Candidates", (*_candidates(discovery), *curves))
-    if places := [picture for name, picture in shown.items() if name.startswith("place-") or name == "shares"]:
+    if places := [picture for name, picture in pictures.items() if name.startswith("place-") or name == "shares"]:
         yield Section("Places of the signal chain", places)
     yield Section("The model, extended" if discovery.steps else "The model", _model(discovery))
     for section in (matrices_section(end), budget_section(end)):

@@ -40,7 +40,7 @@ def soak_report(
     """The page as HTML text. `results` are the run's, by name, each with value, std, unit, limit and verdict; `facts`
     its provenance; `forecasts` the forecasts of each quantity. The same arguments give the same page.
     """
-    shown = soak_album(soak, forecasts) if pictures is None else pictures
+    drawn_pictures = soak_album(soak, forecasts) if pictures is None else pictures
     steady = soak.time_s() is not None
     return html(
         Page(
@@ -51,7 +51,7 @@ def soak_report(
             summary=_summary(soak),
             figures=_figures(soak),
             sections=[
-                Section("Course", list(shown)),
+                Section("Course", list(drawn_pictures)),
                 _courses(soak),
                 *_forecasts(forecasts, soak.table.unit),
                 *verdicts(results),
@@ -96,15 +96,15 @@ def _headline(soak: Soak, forecasts: Mapping[str, ForecastHistory]) -> str:
     if any(course.state is None for course in soak.courses.values()):
         return "Too few reversals to decide whether bias and scale factor are steady."
     waiting = [name.replace("-", " of ") for name, course in soak.courses.items() if course.time_s is None]
-    shown = f"No steady state within {_span_h(soak)} h: {joined(waiting)} may still drift."
+    text = f"No steady state within {_span_h(soak)} h: {joined(waiting)} may still drift."
     bounds = steady_time(forecasts)
     if bounds is None:
-        return shown
+        return text
     low, value, high = (rounded(time_s / HOUR_S, 2) for time_s in bounds)
     if np.isfinite(bounds.high):
         between = f", {low} to {high} h (95 %)" if low != high else ""
-        return f"{shown} Forecast: {value} h after power-on{between}."
-    return f"{shown} Forecast: later than {low} h after power-on."
+        return f"{text} Forecast: {value} h after power-on{between}."
+    return f"{text} Forecast: later than {low} h after power-on."
 
 
 def _summary(soak: Soak) -> str:
@@ -128,7 +128,7 @@ def _summary(soak: Soak) -> str:
 
 def _figures(soak: Soak) -> list[tuple[str, str, str]]:
     """The few numbers to remember: (what, value, remark)."""
-    shown = []
+    figures = []
     for axis in soak.axes:
         time, bias = soak.time_s(axis), soak.courses[f"bias-{axis}"]
         if bias.state is not None:
@@ -136,13 +136,13 @@ def _figures(soak: Soak) -> list[tuple[str, str, str]]:
             change = f"{_signed(factor * bias.state.drift[0])} {unit}"
             drift = f"bias drifts by {change}" if bias.state.terms else "no drift of the bias beyond the noise"
             reached = "from the start" if soak.from_start(axis) else f"{_hours(time)} h" if time else "not reached"
-            shown.append((f"steady state, axis {axis}", reached, drift))
+            figures.append((f"steady state, axis {axis}", reached, drift))
     wander_k = soak.temperature_wander_k
     if wander_k is not None:
         low, high = (float(f(soak.holds.column("temperature_c"))) for f in (np.min, np.max))
         remark = f"{low:.1f} to {high:.1f} °C; ambient changed by {rounded(wander_k, 2)} K"
-        shown.append(("temperature at the end", f"{soak.holds.column('temperature_c')[-1]:.1f} °C", remark))
-    return shown
+        figures.append(("temperature at the end", f"{soak.holds.column('temperature_c')[-1]:.1f} °C", remark))
+    return figures
 
 
 def _course(course: Course, of: str) -> tuple[str, ...]:

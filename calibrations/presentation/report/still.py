@@ -120,12 +120,12 @@ def _off(fit: NoiseFit) -> str:
 
 def _figures(discovery: Discovery[NoiseFit]) -> list[tuple[str, str, str]]:
     remark = "mismatch of the spectrum, relative to chance"
-    shown = [("before" if discovery.steps else "mismatch", rounded(discovery.start.pooled_excess), remark)]
+    figures = [("before" if discovery.steps else "mismatch", rounded(discovery.start.pooled_excess), remark)]
     if discovery.steps:
         gained = discovery.end.log_likelihood - discovery.start.log_likelihood
-        shown.append(("after", rounded(discovery.end.pooled_excess), remark))
-        shown.append(("log-likelihood", f"+{rounded(gained)}", "gained by the effects added"))
-    return shown
+        figures.append(("after", rounded(discovery.end.pooled_excess), remark))
+        figures.append(("log-likelihood", f"+{rounded(gained)}", "gained by the effects added"))
+    return figures
 
 
 def _step(name: str, gained: float | None, alone: float | None, fit: NoiseFit) -> tuple[str, ...]:

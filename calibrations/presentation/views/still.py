@@ -67,9 +67,9 @@ class StillView(View[NoiseFit]):
         unit, rows = self.data.unit, []
         for axis, curve in compared_deviations(comparison.fit).items():
             for k, tau in enumerate(curve.tau_s):
-                shown = [quantity(float(x[k]), unit) for x in (curve.measured, curve.low, curve.high, curve.modelled)]
+                texts = [quantity(float(x[k]), unit) for x in (curve.measured, curve.low, curve.high, curve.modelled)]
                 off = f"{curve.deviations[k]:+.1f}" if abs(curve.deviations[k]) >= 0.05 else "0"
-                rows.append((axis, f"{tau:.4g}", shown[0], f"{shown[1]} .. {shown[2]}", shown[3], off))
+                rows.append((axis, f"{tau:.4g}", texts[0], f"{texts[1]} .. {texts[2]}", texts[3], off))
         return ("axis", "time (s)", "Allan deviation", "95 % interval", "model", "deviations off"), rows
 
     def step_table(self, discovery: Discovery[NoiseFit]) -> Cells:
@@ -138,5 +138,5 @@ def gains(discovery: Discovery[NoiseFit]) -> Iterator[tuple[str, float | None, f
 def _row(name: str, gained: float | None, alone: float | None, fit: NoiseFit) -> tuple[str, ...]:
     """In the order of HEAD."""
     off = ", ".join(f"{100 * value:.3g} %" for value in mismatch(fit).values())
-    shown = ["" if value is None else f"{value:+.5g}" for value in (gained, None if alone is None else -alone)]
-    return name, *shown, f"{fit.pooled_excess:.2f}", f"{fit.held_out_excess:.2f}", off
+    texts = ["" if value is None else f"{value:+.5g}" for value in (gained, None if alone is None else -alone)]
+    return name, *texts, f"{fit.pooled_excess:.2f}", f"{fit.held_out_excess:.2f}", off

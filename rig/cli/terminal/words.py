@@ -146,7 +146,7 @@ def own_effect(pattern: Pattern | None, model: str, request: Request) -> dict[st
 
 
 def pattern_advice(pattern: Pattern | None, model: str, request: Request) -> list[str]:
-    """What a person can do about a pattern of the residual."""
+    """The remedy for a pattern of the residual."""
     if effect := own_effect(pattern, model, request):
         return [
             "To add this pattern to the model as your own effect:",
