@@ -81,9 +81,9 @@ REFUSED = [
     ("9" * 390, "a number too large"),
     ("a" * 401, "401 characters, more than 400"),
     ("-" * 60 + "a", "operations within one another"),
-    ("a\x00", "cannot be printed"),
-    ("\ud800", "cannot be printed"),
-    ("a*\x1b[31mt", "cannot be printed"),
+    ("a\x00", "invisible characters"),
+    ("\ud800", "invisible characters"),
+    ("a*\x1b[31mt", "invisible characters"),
 ]
 
 
