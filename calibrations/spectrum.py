@@ -91,10 +91,10 @@ def gauss_markov(f: Array, by: Sampling, time_constant_s: float) -> Array:
     """First-order, of unit variance."""
     a, s = 1 / (by.rate_hz * time_constant_s), by.size
     phi, step = np.exp(-a), -np.expm1(-a)
-    whole = -np.expm1(-a * s)
-    variance = (1 + phi) / (step * s) - 2 * phi * whole / (s * step) ** 2
+    decay = -np.expm1(-a * s)
+    variance = (1 + phi) / (step * s) - 2 * phi * decay / (s * step) ** 2
     turn = np.exp(2j * np.pi * f * by.interval_s)
-    lagged = 2 * phi * (whole / (s * step)) ** 2 * (turn / (1 - (1 - whole) * turn)).real
+    lagged = 2 * phi * (decay / (s * step)) ** 2 * (turn / (1 - (1 - decay) * turn)).real
     return np.asarray(by.interval_s * (variance + lagged))
 
 
@@ -309,11 +309,11 @@ class Means:
             self._offset = float(samples.mean())
         waiting = np.concatenate([self._rest, samples - (self._offset or 0.0)])
         while len(waiting) >= self.size:
-            taken = min(len(waiting) // self.size, MOST_MEANS - self._filled)
-            sums = waiting[: taken * self.size].reshape(-1, self.size).sum(axis=1)
-            self._sums[self._filled : self._filled + taken] = sums
-            self._filled += taken
-            waiting = waiting[taken * self.size :]
+            count = min(len(waiting) // self.size, MOST_MEANS - self._filled)
+            sums = waiting[: count * self.size].reshape(-1, self.size).sum(axis=1)
+            self._sums[self._filled : self._filled + count] = sums
+            self._filled += count
+            waiting = waiting[count * self.size :]
             if self._filled == MOST_MEANS:
                 self._halve()
         self._rest = waiting

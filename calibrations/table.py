@@ -291,9 +291,9 @@ def _check_sizes(table: Table) -> None:
     for name, values in table.columns.items():
         bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
         if len(bad):
-            what = "not a finite number" if not np.isfinite(values[bad[0]]) else "more than anything measured"
+            fault = "not a finite number" if not np.isfinite(values[bad[0]]) else "more than anything measured"
             raise DataError(
-                f'{table.source}: row {bad[0] + 1}, column "{name}" is {values[bad[0]]:g}, {what}'
+                f'{table.source}: row {bad[0] + 1}, column "{name}" is {values[bad[0]]:g}, {fault}'
                 f"{f' (and {len(bad) - 1} more)' if len(bad) > 1 else ''}; remove the row or the column"
             )
 
@@ -352,13 +352,13 @@ def _check_columns(table: Table) -> None:
     sets = FILE_KINDS[table.kind].columns
     if any(all(name in table.columns for name in names) for names in sets):
         return
-    wanted = min(sets, key=lambda names: sum(name not in table.columns for name in names))
-    missing = [name for name in wanted if name not in table.columns]
-    given = [*table.columns, *table.labels]
-    others = [name for name in given if name not in wanted]
+    required = min(sets, key=lambda names: sum(name not in table.columns for name in names))
+    missing = [name for name in required if name not in table.columns]
+    present = [*table.columns, *table.labels]
+    unused = [name for name in present if name not in required]
     raise MissingColumn(
         f'{table.source}: a table of {table.kind} needs the column "{missing[0]}"'
-        f"{_nearest_given(missing[0], others)}; it has: {', '.join(given)}"
+        f"{_nearest_given(missing[0], unused)}; it has: {', '.join(present)}"
     )
 
 
@@ -382,8 +382,8 @@ def guess_kind(names: Iterable[str]) -> str:
     kind, wanted = max(each, key=lambda e: sum(name in names for name in e[1]))
     missing = [name for name in wanted if name not in names]
     if len(missing) < len(wanted):
-        there = f"{kind} need {', '.join(wanted)}; there are: {', '.join(names)}"
-        raise MissingColumn(f'the column "{missing[0]}" is missing: {there}')
+        expected = f"{kind} need {', '.join(wanted)}; there are: {', '.join(names)}"
+        raise MissingColumn(f'the column "{missing[0]}" is missing: {expected}')
     raise MissingColumn(
         f"columns {', '.join(names)} do not fit any kind of table; "
         "poses need alpha_deg, beta_deg and vx_v or ax; positions need ax, ay, az"

@@ -61,8 +61,8 @@ def _value(number: int, name: str, cell: str) -> str | float | int:
     except ValueError:
         value = math.nan
     if not math.isfinite(value) or (allowed and value not in allowed):
-        wanted = f"one of {', '.join(map(str, allowed))}" if allowed else "a number"
-        raise SettingError(f"pose_list, line {number}, column {name}: the value is {cell!r}; give {wanted}")
+        expected = f"one of {', '.join(map(str, allowed))}" if allowed else "a number"
+        raise SettingError(f"pose_list, line {number}, column {name}: the value is {cell!r}; give {expected}")
     return int(value) if allowed else value
 
 

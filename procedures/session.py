@@ -27,13 +27,13 @@ MOST_POSES = 50_000  # of a plan: about a week on a rig; more is a mistyped sett
 
 def bounded(poses: Iterable[Read]) -> list[Read]:
     """All `poses`, or their paths. Raises SettingError above MOST_POSES, before the others are made."""
-    found = list(islice(poses, MOST_POSES + 1))
-    if len(found) > MOST_POSES:
+    listed = list(islice(poses, MOST_POSES + 1))
+    if len(listed) > MOST_POSES:
         raise SettingError(
             f"the plan has more than {MOST_POSES} poses; give a larger step, a shorter duration, or fewer angles and "
             "repetitions"
         )
-    return found
+    return listed
 
 
 @dataclass(frozen=True)
@@ -230,11 +230,11 @@ class Session:
 
         Raises SettingError for more than MOST_POSES.
         """
-        kept = Counter(self.host.kept())
+        counts = Counter(self.host.kept())
         missing = []
         for pose in bounded(poses):
-            if kept[pose] > 0:
-                kept[pose] -= 1
+            if counts[pose] > 0:
+                counts[pose] -= 1
             else:
                 missing.append(pose)
         self.host.expect(len(missing))
@@ -278,15 +278,15 @@ class Session:
 
     def mount(self, mount_deg: float, flip: int, up: str = "z") -> None:
         """Ask a person for this mounting if it is a new one, at alpha = 0, where the table is horizontal."""
-        wanted = {"mount": mount_deg, "flip": flip, "edge": EDGES.index(up)}
-        if all((self.reading(name) or 0.0) == value for name, value in wanted.items()):
+        mount = {"mount": mount_deg, "flip": flip, "edge": EDGES.index(up)}
+        if all((self.reading(name) or 0.0) == value for name, value in mount.items()):
             return
         self.alpha.move_to(0.0)
         question = Mounting.of(mount_deg, flip, up)
         if self.host.ask(question) == "no":
             raise Declined(f"{question.name}: the sensor does not have this mounting; mount it, then resume the run")
         units = {"mount": "deg"}
-        self.keep_readings(*(Reading(name, value, units.get(name, "")) for name, value in wanted.items()))
+        self.keep_readings(*(Reading(name, value, units.get(name, "")) for name, value in mount.items()))
 
     def keep(self, pose: Pose, *, samples: Samples, temperature_c: float | None = None) -> None:
         """Store `pose` in the record. The temperature that the sensor reports replaces that of a thermometer beside it.

@@ -52,8 +52,8 @@ def _value(what: str, kind: Any, value: Value) -> Value:
         return _scalar(kind, value)
     except (ValueError, TypeError):
         listed = f"one of {', '.join(map(str, choices))}"
-        wanted = listed if choices else _WANTED.get(kind, "numbers such as 90,30")
-        raise SettingError(f"{what} is {value!r}; give {wanted}") from None
+        expected = listed if choices else _WANTED.get(kind, "numbers such as 90,30")
+        raise SettingError(f"{what} is {value!r}; give {expected}") from None
 
 
 def _parts(what: str, kind: Any, value: Value) -> Sequence[Value]:

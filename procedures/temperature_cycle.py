@@ -52,8 +52,8 @@ def staircase(temperatures_c: tuple[float, ...], cycles: int) -> list[tuple[str,
         raise SettingError(
             f"temperature-cycle: cycles is {cycles}; give 1 or more, 2 to separate hysteresis from drift"
         )
-    once = [*(("up", c) for c in rising), *(("down", c) for c in rising[-2::-1])]
-    return bounded((f"{branch} {c:g} cycle {k}", c) for k in range(1, cycles + 1) for branch, c in once)
+    steps = [*(("up", c) for c in rising), *(("down", c) for c in rising[-2::-1])]
+    return bounded((f"{branch} {c:g} cycle {k}", c) for k in range(1, cycles + 1) for branch, c in steps)
 
 
 def _warm(rig: Session, set_c: float, soak_s: float, begins: bool) -> None:

@@ -23,8 +23,8 @@ def require_out(out: Path, *inputs: str | Path | None) -> None:
 
 def require_new(*paths: Path) -> None:
     """Raises OutputError for a file that exists."""
-    if there := next((path for path in paths if path.exists()), None):
-        raise OutputError(f"{there}: this file exists; give another file, or replace this one with --force")
+    if existing := next((path for path in paths if path.exists()), None):
+        raise OutputError(f"{existing}: this file exists; give another file, or replace this one with --force")
 
 
 def _require_regular(out: Path) -> None:

@@ -72,8 +72,8 @@ def fit_separately(base: Fit, structure: Structure, added: list[Addition]) -> li
     for place in structure.places:
         place_additions = [names[cause] for cause in (*place.causes, *structure.refinements(place)) if cause in names]
         if place_additions:
-            alone = fit(_with(linear.model, place_additions), _without_part(base.table, structure.others(place)))
-            known |= {a.effect.name: alone.model.estimates(a.effect.name) for a in place_additions}
+            fitted = fit(_with(linear.model, place_additions), _without_part(base.table, structure.others(place)))
+            known |= {a.effect.name: fitted.model.estimates(a.effect.name) for a in place_additions}
     return [replace(a, estimates=known.get(name, a.estimates)) for name, a in names.items()]
 
 
@@ -142,9 +142,9 @@ def causes_alone(end: Fit, forms: list[Addition]) -> Fit:
     model = end.model
     for form in forms:
         model = model.without(form.effect.name)
-    alone = evaluate(model, end.table)
-    assert alone is not None  # noqa: S101 every parameter has been fitted
-    return alone
+    fitted = evaluate(model, end.table)
+    assert fitted is not None  # noqa: S101 every parameter has been fitted
+    return fitted
 
 
 def without_forms(end: Fit) -> Fit:
@@ -155,9 +155,9 @@ def without_forms(end: Fit) -> Fit:
     model = end.model
     for name in forms:
         model = model.without(name)
-    alone = evaluate(model, end.table)
-    assert alone is not None  # noqa: S101 every parameter has been fitted
-    steps = (fit_.problem.layout.steps(fit_.theta) for fit_ in (end, alone))
+    fitted = evaluate(model, end.table)
+    assert fitted is not None  # noqa: S101 every parameter has been fitted
+    steps = (fit_.problem.layout.steps(fit_.theta) for fit_ in (end, fitted))
     with_parts, without_parts = (forward(end.table, chain_steps).T for chain_steps in steps)
     return fit(model, _without_part(end.table, with_parts - without_parts))
 

@@ -47,7 +47,7 @@ def components(data: PoseData, first: State) -> list[Component]:
 
     At one orientation nothing over the force can be known, nor a scale factor over anything else.
     """
-    every = [
+    candidates = [
         *slow_noise(data),
         *_stages(data, first),
         *_own_response(data, first),
@@ -60,8 +60,8 @@ def components(data: PoseData, first: State) -> list[Component]:
         *_general(first),
     ]
     if data.at_rest:
-        every = [c for c in every if c.noise or (acts_at_rest(c.place) and not c.scales)]
-    return [c for c in every if c.place not in data.table.left_out]
+        candidates = [c for c in candidates if c.noise or (acts_at_rest(c.place) and not c.scales)]
+    return [c for c in candidates if c.place not in data.table.left_out]
 
 
 def _stages(data: PoseData, first: State) -> list[Component]:

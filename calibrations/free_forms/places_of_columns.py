@@ -78,17 +78,17 @@ def _readings(table: Table, names: Sequence[str], power: int = 1) -> list[Readin
 def over_columns(data: PoseData, first: State) -> list[Component]:
     """Components of the supply, of the scatter of the samples, and of every other column that changes."""
     table = data.table
-    made: list[Component] = []
+    components: list[Component] = []
     if "supply_v" in table and np.ptp(table.column("supply_v")) > 0:
         for supply in _readings(table, ("supply_v",)):
-            made += [_supplied(supply), *_over_column("column:supply_v", supply, first)]
+            components += [_supplied(supply), *_over_column("column:supply_v", supply, first)]
     if data.spread is not None and np.all(np.ptp(data.spread, axis=1) > 0):
         for squares in _readings(table, table.std_names, power=2):
-            made += _vibrating(squares, first)
+            components += _vibrating(squares, first)
     for name in data.logged:
         for reading in _readings(table, (name,)):
-            made += _over_column(f"column:{name}", reading, first)
-    return made
+            components += _over_column(f"column:{name}", reading, first)
+    return components
 
 
 def _supplied(supply: Reading) -> Component:
@@ -123,10 +123,10 @@ def _over_column(place: str, reading: Reading, first: State) -> list[Component]:
     (x,) = reading.values
     line, curve = (Line(float(x.min()), float(x.max())),), (spline(x, 8),)
     factors: tuple[tuple[str, Factor, float], ...] = (("", "", 0.0), ("scale-", "force", PRODUCT))
-    made = []
+    components = []
     for prefix, factor, price in factors:
         for kind, bases in (("line", line), ("curve", curve)):
             form = Form(place, reading.named(f"{prefix}{kind}"), place, bases, factor, level=reading.is_level)
             family = f"{place}/{prefix}{kind}"
-            made.append(free(form, first, price=price + reading.price, family=family, error=reading.error))
-    return made
+            components.append(free(form, first, price=price + reading.price, family=family, error=reading.error))
+    return components

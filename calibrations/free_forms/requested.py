@@ -120,7 +120,7 @@ def shortage(place: str, table: Table) -> str | None:
     )  # fmt: skip
 
 
-def _few(what: str, table: Table, column: str, fewest: int, advice: str) -> str | None:
+def _few(subject: str, table: Table, column: str, fewest: int, advice: str) -> str | None:
     if column not in table:
         return f"needs the column {column}"
     values = table.column(column)
@@ -129,7 +129,7 @@ def _few(what: str, table: Table, column: str, fewest: int, advice: str) -> str 
     if distinct >= fewest:
         return None
     has = f"one only, {values[0]:g}" if distinct == 1 else f"{distinct}"
-    return f"needs {fewest} different {what} or more, and the data has {has}; {advice}"
+    return f"needs {fewest} different {subject} or more, and the data has {has}; {advice}"
 
 
 def _short_sides(table: Table) -> str | None:
@@ -153,8 +153,8 @@ def _short_column(name: str, table: Table) -> str | None:
         constant = [n for n in names if not np.ptp(table.column(n)) > 0]
         return f"needs standard deviations that change, and {constant[0]} is constant" if constant else None
     if name not in table:
-        other = [c for c in table.columns if c not in table.output_names and c not in KNOWN_AS]
-        return f"needs the column {name}, which the data does not have{nearest(name, other)}"
+        logged = [c for c in table.columns if c not in table.output_names and c not in KNOWN_AS]
+        return f"needs the column {name}, which the data does not have{nearest(name, logged)}"
     if not np.ptp(table.column(name)) > 0:
         value = table.column(name)[0]
         return f"needs a column that changes, and {name} is constant ({value:g}); measure while it changes"

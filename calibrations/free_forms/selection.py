@@ -171,10 +171,10 @@ def _exchanged(
         reduced = without(g, sizes, name)
         acting = acting_places(reduced.variances, by_name)
         component_price = price(by_name[name], acting)
-        alone = estimate(g, reduced.variances, most, 12, sizes.deviance + component_price + LEAVE)
-        if alone.deviance - sizes.deviance - component_price <= LEAVE:  # the others take its part
+        replacement = estimate(g, reduced.variances, most, 12, sizes.deviance + component_price + LEAVE)
+        if replacement.deviance - sizes.deviance - component_price <= LEAVE:  # the others take its part
             steps.append(f"-{name}")
-            sizes = alone
+            sizes = replacement
             continue
         loss_of_component = reduced.deviance - sizes.deviance - component_price
         best = _best(g, reduced, by_name)

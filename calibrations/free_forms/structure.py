@@ -68,8 +68,8 @@ class Structure:
         for place in self.places:
             if place.material and (place.size >= largest or (place.share >= SEEN_FORM and not self._follows(place))):
                 named += [c for c in place.causes if not self._same_as_one_of(c, named)]
-        seen = [c for c in self.geometry.causes if self.geometry.sizes[c] >= LINEAR_PART * largest]
-        return tuple(dict.fromkeys([*named, *seen]))
+        visible = [c for c in self.geometry.causes if self.geometry.sizes[c] >= LINEAR_PART * largest]
+        return tuple(dict.fromkeys([*named, *visible]))
 
     def _follows(self, place: ActingPlace) -> bool:
         """Whether a place acts by components that follow many things: branches, slip elements, a random walk."""
@@ -120,10 +120,10 @@ class Structure:
         """What all places but one add to the output through the chain, (channels, n), in its unit; None: all places."""
         result = self.result
         coefficients = {name: result.values.of[name] for name in (place.components if place else ())}
-        alone = state_at(
+        state = state_at(
             result.data, result.model_effects, Coefficients(result.values.base, coefficients), result.components
         )
-        return result.state.predicted - alone.predicted
+        return result.state.predicted - state.predicted
 
     def refinements(self, place: ActingPlace) -> tuple[str, ...]:
         """Catalogue effects that act at a place, without a free form of theirs, and are not its causes."""

@@ -91,7 +91,7 @@ class Scanner(Twin):
             "TRIG:COUN": lambda rest, _now_s: self._set_count(rest),
             "SAMP:COUN": lambda rest, _now_s: self._set_count(rest),
             "INIT": lambda _rest, now_s: self._begin(now_s),
-            "READ?": lambda _rest, now_s: _told(self._scans(now_s, 0.0, 1, now_s).ravel()),
+            "READ?": lambda _rest, now_s: _numbers_text(self._scans(now_s, 0.0, 1, now_s).ravel()),
             "DATA:POIN?": lambda _rest, _now_s: str(len(self._memory)),
             "DATA:REM?": lambda rest, _now_s: self._remove(rest),
         }
@@ -131,7 +131,7 @@ class Scanner(Twin):
         if (count := int(rest)) > len(self._memory):
             self._fail(-222)
             return None
-        return _told([self._memory.popleft() for _ in range(count)])
+        return _numbers_text([self._memory.popleft() for _ in range(count)])
 
     def _scans(self, start_s: float, interval_s: float, n: int, now_s: float) -> NDArray[np.float64]:
         """Volts of `n` scans as they are shown, shape (n, inputs)."""
@@ -155,7 +155,7 @@ class Scanner(Twin):
         return f'{code:+d},"{TEXTS.get(code, "Device error") if code else "No error"}"'
 
 
-def _told(values: Sequence[float] | NDArray[np.float64]) -> str:
+def _numbers_text(values: Sequence[float] | NDArray[np.float64]) -> str:
     return ",".join(f"{value:+.9E}" for value in values)
 
 

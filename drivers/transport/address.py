@@ -83,13 +83,13 @@ class Url:
                 options.pop("library", PYVISA_PY),
             )
         except ValueError as error:
-            raise LinkRefused(f"{_shown(text)} is not the address of a wire ({error})", REMEDY) from error
+            raise LinkRefused(f"{_display_text(text)} is not the address of a wire ({error})", REMEDY) from error
         if "@" in parts.netloc:
-            raise LinkRefused(f"{_shown(text)} has a user name, which a wire does not need", REMEDY)
+            raise LinkRefused(f"{_display_text(text)} has a user name, which a wire does not need", REMEDY)
         if options or not url._complete():
-            raise LinkRefused(f"{_shown(text)} is not the address of a wire", REMEDY)
+            raise LinkRefused(f"{_display_text(text)} is not the address of a wire", REMEDY)
         if parts.port is None and url.scheme in NETWORK:
-            raise LinkRefused(f"{_shown(text)} has no port", f"Write {url.scheme}://{url.host}:PORT")
+            raise LinkRefused(f"{_display_text(text)} has no port", f"Write {url.scheme}://{url.host}:PORT")
         return url
 
     def _complete(self) -> bool:
@@ -154,6 +154,6 @@ class Url:
         return count * self.character_s + self.gap_s if self.rtu else TCP_LATENCY_S
 
 
-def _shown(text: str) -> str:
+def _display_text(text: str) -> str:
     """The address without user and password, for messages."""
     return repr(USER.sub("//***@", text))

@@ -236,8 +236,8 @@ class DatagramPort:
 
     @property
     def key(self) -> str:
-        own = self._socket.getsockname()
-        return datagram_key(own[1]) if self._listens else connection_key(own, self._socket.getpeername())
+        local = self._socket.getsockname()
+        return datagram_key(local[1]) if self._listens else connection_key(local, self._socket.getpeername())
 
     def fileno(self) -> int:
         return self._socket.fileno()

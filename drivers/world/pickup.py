@@ -94,8 +94,8 @@ def with_pickup_v(own: Pickup, noise: Noise, shaking: Floor, volts: float, t_ns:
     if gap_ns > 0:
         own.t_ns = t_ns
         stir(own, noise, gap_ns, random)
-    seen = volts + own.fast_v.sum() + hum_v(noise, t_ns) + shaken_v(own, noise, shaking, t_ns)
-    return pulsed_v(own, noise, seen, gap_ns)
+    total_v = volts + own.fast_v.sum() + hum_v(noise, t_ns) + shaken_v(own, noise, shaking, t_ns)
+    return pulsed_v(own, noise, total_v, gap_ns)
 
 
 @kernel
@@ -133,9 +133,9 @@ def pulsed_v(own: Pickup, noise: Noise, volts: float, gap_ns: int) -> float:
     if noise.pulse_v_s == 0 or gap_ns <= 0:
         return volts
     own.left_v_s += 1e-9 * gap_ns * volts
-    whole = math.floor(own.left_v_s / noise.pulse_v_s) * noise.pulse_v_s
-    own.left_v_s -= whole
-    return whole / (1e-9 * gap_ns)
+    pulses_v_s = math.floor(own.left_v_s / noise.pulse_v_s) * noise.pulse_v_s
+    own.left_v_s -= pulses_v_s
+    return pulses_v_s / (1e-9 * gap_ns)
 
 
 def sinusoid_mean(hz: float, lag: float, middle_s: Floats, interval_s: float, n: int) -> Floats:

@@ -127,10 +127,10 @@ class SampleDecoder(FrameDecoder):
         """Put the real numbers of a packet in their columns."""
         outputs = TRIADS.get(packet.kind, ())
         if outputs and packet.size == 3 * xbus.WIDTHS[packet.number & xbus.FORMAT]:
-            found = xbus.numbers(rows, packet)
+            numbers = xbus.numbers(rows, packet)
             for column, name in enumerate(self._names):
                 if name in outputs:
-                    values[places, column] = found[:, outputs.index(name)]
+                    values[places, column] = numbers[:, outputs.index(name)]
         elif packet.kind == xbus.TEMPERATURE and (warm_c := xbus.numbers(rows, packet)).size:
             self._warm_c.append(warm_c[:, 0])
 

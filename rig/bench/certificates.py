@@ -15,8 +15,8 @@ EXPIRED = "expired"
 
 def certificates(bench: Bench) -> dict[str, Certificate]:
     """Every certificate of the bench file: of an instrument by its role, of another thing by its name."""
-    own = {role: part.certificate for role, part in bench.instruments.items() if part.certificate is not None}
-    return {**own, **bench.certificates}
+    by_role = {role: part.certificate for role, part in bench.instruments.items() if part.certificate is not None}
+    return {**by_role, **bench.certificates}
 
 
 def expired(bench: Bench, on: date) -> list[str]:

@@ -131,10 +131,10 @@ def _claims(role: str, instrument: Instrument) -> list[_Claim]:
     if instrument.simulated:
         line = f"{instrument.driver} {instrument.listen or ''}"
         return [] if unit is None else [_Claim(f"{role}.unit", instrument.url, line, unit)]
-    own = [] if instrument.url == PERSON else [_Claim(f"{role}.unit", instrument.url, "", unit)]
+    claims = [] if instrument.url == PERSON else [_Claim(f"{role}.unit", instrument.url, "", unit)]
     if instrument.stream_url is not None:
-        own.append(_Claim(f"{role}.stream_url", instrument.stream_url, "", None))
-    return [replace(claim, line=Url.parse(claim.url).line) for claim in own]
+        claims.append(_Claim(f"{role}.stream_url", instrument.stream_url, "", None))
+    return [replace(claim, line=Url.parse(claim.url).line) for claim in claims]
 
 
 def _conflict(one: _Claim, other: _Claim) -> str | None:
@@ -161,13 +161,13 @@ def _check_addresses(key: str, instrument: Instrument) -> None:
 
     Modbus over serial line has units 1 to 247; unit 0 is a broadcast.
     """
-    own = None if instrument.simulated or instrument.url == PERSON else instrument.url
-    for name, url in (("url", own), ("stream_url", instrument.stream_url)):
+    address = None if instrument.simulated or instrument.url == PERSON else instrument.url
+    for name, url in (("url", address), ("stream_url", instrument.stream_url)):
         try:
             _ = url and Url.parse(url)
         except LinkRefused as refused:
             raise BenchError(f"{key}.{name}: {refused}") from None
-    if own is not None and Url.parse(own).rtu and not 1 <= instrument.unit <= 247:
+    if address is not None and Url.parse(address).rtu and not 1 <= instrument.unit <= 247:
         raise BenchError(f"{key}.unit: unit {instrument.unit} is not possible on a serial line; give 1 to 247")
 
 

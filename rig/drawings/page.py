@@ -70,9 +70,9 @@ def dial(centre: tuple[float, float], radius: float, clockwise: bool) -> Iterato
         ends = [svg.on_circle(centre, r, deg) for r in (radius - length, radius)]
         yield svg.line(ends, svg.QUIET if length == 8 else "#b8c2cc", 1.0)
     for deg in range(0, 360, NAMED_EVERY_DEG):
-        shown = deg if deg <= 180 else deg - 360
+        signed_deg = deg if deg <= 180 else deg - 360
         at = svg.on_circle(centre, radius + 13, -deg if clockwise else deg)
-        yield svg.text(at, str(shown), 12, svg.QUIET)
+        yield svg.text(at, str(signed_deg), 12, svg.QUIET)
 
 
 def marked_angle(
@@ -80,11 +80,11 @@ def marked_angle(
 ) -> Iterator[str]:
     """From zero to `deg`: a line at each end, and an arc between."""
     sign = -1 if clockwise else 1
-    shown = sign * (deg if abs(deg) <= 360 else deg % 360)
+    text_deg = sign * (deg if abs(deg) <= 360 else deg % 360)
     yield svg.line([centre, svg.on_circle(centre, radius, 0)], svg.QUIET, 1.0, stroke_dasharray="3 3")
-    yield svg.line([centre, svg.on_circle(centre, radius, shown)], svg.ORANGE, 1.4)
-    if abs(shown) > 1:
-        points = svg.arc(centre, inner * radius, 0, shown)
+    yield svg.line([centre, svg.on_circle(centre, radius, text_deg)], svg.ORANGE, 1.4)
+    if abs(text_deg) > 1:
+        points = svg.arc(centre, inner * radius, 0, text_deg)
         direction = [b - a for a, b in zip(points[-2], points[-1], strict=True)]
         yield svg.line(points, svg.ORANGE, 1.8) + svg.head(points[-1], direction, svg.ORANGE)
 

@@ -77,8 +77,8 @@ def unsent(own: Record, lab: Record, named: Sequence[str] = ()) -> list[str]:
     with own.engine.connect() as at:
         heads = {run: (uid_of(at, run), head(at, run)) for run in finished}
     with lab.engine.connect() as at:
-        there = {row.uid: row.head for row in at.execute(select(arrivals.c.uid, arrivals.c.head))}
-    return [run for run, (uid, here) in heads.items() if there.get(uid) != here]
+        lab_heads = {row.uid: row.head for row in at.execute(select(arrivals.c.uid, arrivals.c.head))}
+    return [run for run, (uid, here) in heads.items() if lab_heads.get(uid) != here]
 
 
 def push_all(own: Record, lab: Record, named: Sequence[str]) -> Iterator[Pushed | RecordError]:
@@ -195,6 +195,6 @@ def verify(lab: Record) -> Verified:
         rows = at.execute(select(arrivals.c.run, arrivals.c.digest).order_by(arrivals.c.run)).all()
         is_sound_by_run = {row.run: digest(at, row.run) == row.digest for row in rows if row.digest is not None}
     sound, changed = (
-        tuple(run for run, is_sound in is_sound_by_run.items() if is_sound is wanted) for wanted in (True, False)
+        tuple(run for run, is_sound in is_sound_by_run.items() if is_sound is state) for state in (True, False)
     )
     return Verified(sound, tuple(row.run for row in rows if row.digest is None), changed)

@@ -79,8 +79,8 @@ def _recovered(source: Path, target: Path) -> Recovered:
         changed = tuple(_checked(target))
         spoilt = tuple(_spoilt(new))
         for name, other in (("poses", "blocks"), ("blocks", "poses"), ("dwells", "poses")):
-            same = f"{other}.run = {name}.run AND {other}.number = {name}.number"
-            new.execute(f"DELETE FROM {name} WHERE NOT EXISTS (SELECT 1 FROM {other} WHERE {same})")  # noqa: S608
+            match = f"{other}.run = {name}.run AND {other}.number = {name}.number"
+            new.execute(f"DELETE FROM {name} WHERE NOT EXISTS (SELECT 1 FROM {other} WHERE {match})")  # noqa: S608
         new.commit()
         new.execute("PRAGMA journal_mode = DELETE")  # all is in one file, which gets its name now
         new.close()
@@ -128,9 +128,9 @@ def _checked(target: Path) -> Iterator[str]:
                     for row in rows
                     if is_damaged(table, row._mapping, row.run in checked)
                 ]
-                for run, which in bad:
-                    to.execute(delete(table).where(key[0] == run, key[1] == which))
-                    yield f"run {run}, {table.name}: {which}"
+                for run, number in bad:
+                    to.execute(delete(table).where(key[0] == run, key[1] == number))
+                    yield f"run {run}, {table.name}: {number}"
             yield from _mend_runs(to)
     finally:
         engine.dispose()

@@ -30,10 +30,10 @@ def is_sound(path: Path) -> bool:
     try:
         with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as file:
             names = {name for (name,) in file.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
-            found = {name: {row[1] for row in file.execute(f"PRAGMA table_info({name})")} for name in names & KNOWN}
+            columns = {name: {row[1] for row in file.execute(f"PRAGMA table_info({name})")} for name in names & KNOWN}
     except UNREADABLE:
         return False
-    return OLDEST <= names <= KNOWN and all(found[name] <= {*metadata.tables[name].c.keys()} for name in names)
+    return OLDEST <= names <= KNOWN and all(columns[name] <= {*metadata.tables[name].c.keys()} for name in names)
 
 
 def rewrite_schema(path: Path) -> None:
@@ -50,13 +50,13 @@ def rewrite_schema(path: Path) -> None:
 
 def _tables(entries: list[tuple[Any, ...]]) -> Iterator[tuple[str, int]]:
     """(name, root page) of each table. A changed name is the nearest one that no other entry has."""
-    made = [
+    created = [
         (str(name), root) for name, root, sql in entries if get_close_matches(str(sql)[:12], STATEMENTS, 1) == TABLE
     ]
-    left = set(KNOWN - {name for name, _ in made})
-    for name, root in made:
-        for match in [name] if name in KNOWN else get_close_matches(name, sorted(left), 1):
-            left.discard(match)
+    missing = set(KNOWN - {name for name, _ in created})
+    for name, root in created:
+        for match in [name] if name in KNOWN else get_close_matches(name, sorted(missing), 1):
+            missing.discard(match)
             yield match, root
 
 

@@ -113,8 +113,8 @@ def sound(row: Row[Any], *tables: SqlTable, required: bool) -> Row[Any]:
 
 def place_text(row: Row[Any], table: SqlTable) -> str:
     """The phrase about a row that changed on the disk."""
-    which = f" {table.name[:-1]} {row.name!r}" if "name" in table.c else f" pose {row.number}"
-    return f"run {row.run},{which}: its values changed on the disk ({table.name})"
+    place = f" {table.name[:-1]} {row.name!r}" if "name" in table.c else f" pose {row.number}"
+    return f"run {row.run},{place}: its values changed on the disk ({table.name})"
 
 
 def require_whole(at: Connection, run: str) -> set[int]:
@@ -150,8 +150,8 @@ def _incomplete(at: Connection, run: str) -> list[int]:
     places: tuple[list[int], list[int]] = ([], [])
     for place, number in at.execute(union_all(*parts)):
         places[place].append(number)
-    there, sampled = map(Counter, places)
-    wrong = {number for number in there.keys() | sampled.keys() if (there[number], sampled[number]) != (1, 1)}
+    expected, sampled = map(Counter, places)
+    wrong = {number for number in expected.keys() | sampled.keys() if (expected[number], sampled[number]) != (1, 1)}
     if not wrong:
         return []
     excluded = at.execute(select(poses.c.number).where(poses.c.run == run, poses.c.excluded.is_not(None))).scalars()
@@ -167,8 +167,8 @@ def require_rows(at: Connection, table: SqlTable, run: str) -> None:
     by_index = select(func.count()).where(table.c.run == run).scalar_subquery()
     other = cast(list(table.c)[2], String)  # is not in the index, so that this count reads the rows themselves
     by_table = select(func.count(other)).where(table.c.run.concat("") == run).scalar_subquery()
-    indexed, there = at.execute(select(by_index, by_table)).one()
-    if indexed != there:
+    indexed, counted = at.execute(select(by_index, by_table)).one()
+    if indexed != counted:
         raise RecordError(f"run {run}: a row of its {table.name} is lost on the disk; {RECOVER}")
 
 

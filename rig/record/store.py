@@ -333,8 +333,8 @@ class Record:
 
     def kept(self, run: str) -> Iterator[Kept]:
         """Every pose with its samples, in order, with the excluded ones. Only a few are in memory at a time."""
-        same = (poses.c.run == blocks.c.run) & (poses.c.number == blocks.c.number)
-        query = select(poses, blocks).join_from(poses, blocks, same).where(poses.c.run == run)
+        match = (poses.c.run == blocks.c.run) & (poses.c.number == blocks.c.number)
+        query = select(poses, blocks).join_from(poses, blocks, match).where(poses.c.run == run)
         with self._reading() as at:
             excluded = require_whole(at, run)
             required = has_checksums(at, run)
@@ -353,14 +353,14 @@ class Record:
 
         For runs of an older program they are computed from the samples, which is slower.
         """
-        same = (poses.c.run == dwells.c.run) & (poses.c.number == dwells.c.number)
-        query = select(poses, dwells).join_from(poses, dwells, same, isouter=True)
+        match = (poses.c.run == dwells.c.run) & (poses.c.number == dwells.c.number)
+        query = select(poses, dwells).join_from(poses, dwells, match, isouter=True)
         chosen = (poses.c.run == run) & (poses.c.number > after) & poses.c.excluded.is_(None)
         with self._reading() as at:
             excluded = require_whole(at, run) if after < 0 else set()
             required = has_checksums(at, run)
-            found = at.execute(query.where(chosen).order_by(poses.c.number))
-            rows = [sound(row, poses, dwells, required=required) for row in found]
+            selected = at.execute(query.where(chosen).order_by(poses.c.number))
+            rows = [sound(row, poses, dwells, required=required) for row in selected]
         for number in sorted(excluded - {row.number for row in rows}):
             raise lost(run, number)
         older = {kept.number: kept.dwell for kept in self.kept(run)} if any(row.n is None for row in rows) else {}

@@ -134,10 +134,10 @@ def _steady(soak: Soak, forecasts: Mapping[str, ForecastHistory], axis: str) -> 
     if time is not None:
         return results | {f"steady-state-time{end}": Result(time[0] / HOUR_S, "h", time[1] / HOUR_S)}
     bounds = steady_time(forecasts, axis)
-    shown = {} if bounds is None else {"earliest": bounds.low}
+    times = {} if bounds is None else {"earliest": bounds.low}
     if bounds is not None and np.isfinite(bounds.high):
-        shown |= {"expected": bounds.value, "latest": bounds.high}
-    return results | {f"steady-state-{name}{end}": Result(s / HOUR_S, "h") for name, s in shown.items()}
+        times |= {"expected": bounds.value, "latest": bounds.high}
+    return results | {f"steady-state-{name}{end}": Result(s / HOUR_S, "h") for name, s in times.items()}
 
 
 def _foreseen(forecasts: Mapping[str, ForecastHistory], of: str) -> dict[str, Result]:
@@ -154,9 +154,12 @@ def _foreseen(forecasts: Mapping[str, ForecastHistory], of: str) -> dict[str, Re
 
 
 def _drift(course: Course, state: SteadyState, of: str) -> dict[str, Result]:
-    unit, whole = (of, 1.0) if course.quantity == "bias" else ("", abs(state.final[0]))
+    unit, full_scale = (of, 1.0) if course.quantity == "bias" else ("", abs(state.final[0]))
     value, std = state.drift
-    results = {"drift": Result(value / whole, unit, std / whole), "tolerance": Result(state.tolerance / whole, unit)}
+    results = {
+        "drift": Result(value / full_scale, unit, std / full_scale),
+        "tolerance": Result(state.tolerance / full_scale, unit),
+    }
     named = {f"{course.quantity}-{name}-{course.axis}": result for name, result in results.items()}
     if state.terms:
         tau_s, tau_std = state.terms[0].tau_s

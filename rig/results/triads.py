@@ -95,8 +95,8 @@ def rate_turn(measured: Measured) -> dict[str, Result | Missing]:
             for e in (e for e in fit.model.estimates("gyro-g-sensitivity") if e.axis == axis):
                 results[f"gyro-g-sensitivity-{axis}{e.name}"] = result(e, "(deg/s)/g", scale.value)
             results[f"rate-residual-{axis}"] = Result(abs(float(residuals[axis]) / scale.value), "deg/s")
-    whole = measured.run.settings["mounts"] == len(EDGES)
-    return {name: value for name, value in results.items() if whole or isinstance(value, Result)}
+    complete = measured.run.settings["mounts"] == len(EDGES)
+    return {name: value for name, value in results.items() if complete or isinstance(value, Result)}
 
 
 SOFT = ("xx", "yy", "xy", "xz", "yz")

@@ -304,6 +304,6 @@ def _span(seconds: float) -> str:
 def lines(forecasts: Mapping[str, Forecast], of: str) -> str:
     """The forecasts of all quantities in lines, with the time since power-on; `of` is the unit of the outputs."""
     hours = max(forecast.t_s for forecast in forecasts.values()) / HOUR_S
-    shown = {name: f"{present(name, f, of)} now; {outlook(name, f, of)}" for name, f in forecasts.items()}
-    words = [f"  {name:<9} {text}" for name, text in shown.items()]
+    texts = {name: f"{present(name, f, of)} now; {outlook(name, f, of)}" for name, f in forecasts.items()}
+    words = [f"  {name:<9} {text}" for name, text in texts.items()]
     return "\n".join([f"{rounded(hours)} h after power-on", *words])

@@ -185,12 +185,12 @@ def life_of(q: Quantity) -> Life:
         due,
         f"due {q.due}",
         signals,
-        [_told(q, calibration, k in signals) for k, calibration in enumerate(q.of)],
+        [_quantity_text(q, calibration, k in signals) for k, calibration in enumerate(q.of)],
         [calibration.data for calibration in q.of],
     )
 
 
-def _told(q: Quantity, calibration: Calibration, signals: bool) -> str:
+def _quantity_text(q: Quantity, calibration: Calibration, signals: bool) -> str:
     """The text of a calibration under the pointer."""
     value = calibration.values[q.name]
     lines = [

@@ -39,8 +39,8 @@ def source_files(compensation: Compensation, language: str, origin: Origin) -> d
 
 def identifier(name: str) -> str:
     """A valid name in C and Python."""
-    made = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lower()
-    return made if made[:1].isalpha() else f"sensor_{made}".rstrip("_")
+    word = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lower()
+    return word if word[:1].isalpha() else f"sensor_{word}".rstrip("_")
 
 
 def how_to_test(language: str, folder: str, name: str) -> list[str]:

@@ -211,16 +211,16 @@ def _makers(fault: Curve, effects: Sequence[Curve], floor: float) -> list[Curve]
     chosen: list[Curve] = []
     left, unseen = fault.size, MATERIAL * floor
     while left > max(WHOLE * fault.size, unseen):
-        others = [e for e in effects if e not in chosen]
-        rests = [_left(fault, [*chosen, e]) for e in others]
+        remaining = [e for e in effects if e not in chosen]
+        rests = [_remainder_rms(fault, [*chosen, e]) for e in remaining]
         if min(rests, default=left) > ALIKE * left:
             break
         left = min(rests)
-        chosen.append(others[int(np.argmin(rests))])
+        chosen.append(remaining[int(np.argmin(rests))])
     return chosen if left <= max(LEFT * fault.size, unseen) else []
 
 
-def _left(fault: Curve, effects: Sequence[Curve]) -> float:
+def _remainder_rms(fault: Curve, effects: Sequence[Curve]) -> float:
     """Rms of the part of a fault's curve that the effects cannot describe."""
     spans = [e.span.reshape(fault.curve.size, -1) for e in effects if e.span is not None]
     columns_ = np.hstack(spans)
@@ -234,8 +234,8 @@ def _judged(group: Group, effects: Sequence[Curve]) -> list[Group]:
     """The group with the free forms of its effects, if what was found agrees with what was hidden; else its faults."""
     places = {place_of_effect(e.name) for e in group.effects}
     of_place = [e for e in effects if e.span is None and place_of_effect(e.name) in places]
-    whole = replace(group, effects=(*group.effects, *of_place))
-    for candidate in (whole, group):
+    extended = replace(group, effects=(*group.effects, *of_place))
+    for candidate in (extended, group):
         if candidate.effects and _alike(_together(candidate.faults), _together(candidate.effects)):
             return [candidate]
     return [Group((fault,)) for fault in group.faults]
@@ -266,8 +266,8 @@ def _visited(config: WorldConfig, seed: int, table: Table) -> Table:
         noise_free=True,
         interval_s=QUIET_S,
     )
-    held = {name: np.asarray(values, float) for name, values in visited.items() if name in table}
-    return Table.from_columns(table.kind, held, table.constants, table.source)
+    columns = {name: np.asarray(values, float) for name, values in visited.items() if name in table}
+    return Table.from_columns(table.kind, columns, table.constants, table.source)
 
 
 def _fault(
@@ -291,8 +291,8 @@ def _value(config: Any, path: str) -> float:
 
 
 def _nested(path: str, value: float) -> dict[str, Any]:
-    head, _, rest = path.partition(".")
-    return {head: _nested(rest, value) if rest else value}
+    head, _, tail = path.partition(".")
+    return {head: _nested(tail, value) if tail else value}
 
 
 def _effect(name: str, fitted: Fit, poses: Table) -> Curve:

@@ -76,6 +76,6 @@ def _compared(a: Mapping[str, Value], b: Mapping[str, Value], one: str, other: s
 def _mean(values: Sequence[Value]) -> Value:
     """The mean. Its uncertainty has the calibrations' own, which may be common to all, and their scatter."""
     x = np.array([value.value for value in values])
-    own = float(rms(np.array([value.std for value in values])))
+    std = float(rms(np.array([value.std for value in values])))
     scatter = float(x.std(ddof=1) / np.sqrt(len(x))) if len(x) > 1 else 0.0
-    return Value(float(x.mean()), max(own, scatter), values[0].unit)
+    return Value(float(x.mean()), max(std, scatter), values[0].unit)

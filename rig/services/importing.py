@@ -65,11 +65,11 @@ def asks(sheet: Sheet) -> bool:
 
 def proposal(sheet: Sheet, kind: str | None = None) -> Proposal:
     """The proposed mapping of a sheet, as `kind` or as the likely one."""
-    own = _own(sheet)
-    kind = kind or _kind(sheet, own)
+    mapping = _own(sheet)
+    kind = kind or _kind(sheet, mapping)
     allowed = column_names(kind)
-    proposed = propose_mapping(sheet, "poses" if kind == "still" else kind, own)
-    mappings = {m.theirs: m for m in proposed if m.name in allowed or m in own}
+    proposed = propose_mapping(sheet, "poses" if kind == "still" else kind, mapping)
+    mappings = {m.theirs: m for m in proposed if m.name in allowed or m in mapping}
     stated = [replace(m, unit=_stated(sheet, m.theirs)) if m.name == "t_s" else m for m in mappings.values()]
     return Proposal(kind, {name: mappings.get(name) for name in sheet.header}, time_doubt(sheet, stated))
 

@@ -157,11 +157,13 @@ def _facts(run: Run | None, table: Table) -> dict[str, str]:
     facts = {"rows": str(table.n), "columns": ", ".join(table.columns)}
     if run is None:
         return facts
-    settings = {name.replace("_", " "): _shown(value) for name, value in run.settings.items() if _shown(value)}
+    settings = {
+        name.replace("_", " "): _setting_text(value) for name, value in run.settings.items() if _setting_text(value)
+    }
     return {"run": run.run, "state": run.state, **facts, **settings}
 
 
-def _shown(value: object) -> str:
+def _setting_text(value: object) -> str:
     if isinstance(value, list | tuple):
         return ", ".join(str(part) for part in value)
     return "" if value is None or isinstance(value, Mapping) else str(value)

@@ -159,9 +159,9 @@ def result_rows(
     `value_text` writes a result by its name.
     """
     rows: list[ResultRow] = []
-    shown: set[str] = set()
+    listed: set[str] = set()
     for name, r in results.items():
-        if name in shown:
+        if name in listed:
             continue
         limit, verdict = "" if r["limit"] is None else bound(r["value"], r["limit"]), r["verdict"] or ""
         if (steady := STEADY.fullmatch(name)) is not None:
@@ -171,7 +171,7 @@ def result_rows(
                 for end in ("time", *FORECAST)
                 if (part := f"{sensor}steady-state-{end}{axis}") in results
             }
-            shown |= {f"{sensor}steady-state-{end}{axis}" for end, of in parts.items() if of["limit"] is None}
+            listed |= {f"{sensor}steady-state-{end}{axis}" for end, of in parts.items() if of["limit"] is None}
             value = _steady_sentence(bool(r["value"]), parts)
             rows.append(ResultRow(name, value, "must be reached" if limit else "", verdict))
         elif name.rpartition("/")[2] == "gap" and not r["value"]:

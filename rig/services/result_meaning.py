@@ -70,6 +70,6 @@ MEANINGS = {  # by the name of a result without its sensor; the first pattern th
 
 def meaning(name: str) -> str:
     """One sentence on a result; "" for a result that a procedure of a user names itself."""
-    own = name.rpartition("/")[2]
-    matches = ((re.fullmatch(pattern, own), text) for pattern, text in MEANINGS.items())
+    base_name = name.rpartition("/")[2]
+    matches = ((re.fullmatch(pattern, base_name), text) for pattern, text in MEANINGS.items())
     return next((match.expand(text) for match, text in matches if match), "")

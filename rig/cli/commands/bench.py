@@ -106,8 +106,8 @@ def _reset(driver: Instrument) -> None:
 
 
 def _check_rows(role: str, identity: Identity | None, tests: list[Check]) -> list[tuple[str, ...]]:
-    who = " ".join(part for part in asdict(identity).values() if part) if identity else "does not answer"
-    heads = [(role, who)] + [("", "")] * (len(tests) - 1)
+    identification = " ".join(part for part in asdict(identity).values() if part) if identity else "does not answer"
+    heads = [(role, identification)] + [("", "")] * (len(tests) - 1)
     verdicts = ["ok" if test.ok else "FAILED" for test in tests]
     return [
         (*head, test.name, verdict, test.detail) for head, test, verdict in zip(heads, tests, verdicts, strict=True)
@@ -150,12 +150,12 @@ def _signalled() -> Iterator[list[int]]:
     def end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
         received.append(number)
 
-    before = {each: signal.signal(each, end) for each in (signal.SIGINT, signal.SIGTERM)}
+    before = {caught: signal.signal(caught, end) for caught in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield received
     finally:
-        for each, handler in before.items():
-            signal.signal(each, handler)
+        for caught, handler in before.items():
+            signal.signal(caught, handler)
 
 
 def _addresses(bench: Bench, servers: list[Server]) -> dict[str, Address]:
@@ -220,5 +220,5 @@ def draw_command(alpha: float, beta: float, mount: float, flip: int, out: Path |
         emit({"schema": "rig.drawing/1", "out": str(out) if out else None, "specific_force_g": force_g})
         return
     specific_force = ", ".join(f"{axis} {value:+.4f}" for axis, value in force_g.items())
-    shown = [f"written: {out}"] if out else [*sketch(attitude), "o: pin 1; view from above the table"]
-    click.echo("\n".join([attitude.words, *shown, f"Specific force at rest, in g: {specific_force}"]))
+    lines = [f"written: {out}"] if out else [*sketch(attitude), "o: pin 1; view from above the table"]
+    click.echo("\n".join([attitude.words, *lines, f"Specific force at rest, in g: {specific_force}"]))

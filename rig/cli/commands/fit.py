@@ -131,14 +131,14 @@ def calibration_lines(fitted: Fit) -> Iterator[str]:
     """Tables and sentences; none for a sensor with fewer than three axes."""
     matrices = calibration_matrices(fitted)
     if matrices is not None:
-        beyond = f"; without {', '.join(matrices.beyond)}" if matrices.beyond else ""
-        yield f"General calibration, {EQUATION}, from {fitted.table.unit} to {matrices.unit} (Book 17.3){beyond}:"
+        remark = f"; without {', '.join(matrices.beyond)}" if matrices.beyond else ""
+        yield f"General calibration, {EQUATION}, from {fitted.table.unit} to {matrices.unit} (Book 17.3){remark}:"
         yield columns(("axis", "M", "", "", "S", "b"), _rows(matrices))
     if fitted.table.type.field:
         yield _book_text(fitted.table)
     if (faces := _accelerometer(fitted.table)) is not None:
-        shown = (", ".join(f"{value:.7g}" for value in parts) for parts in (faces.bias, faces.scale))
-        yield "The accelerometer, from its six faces: bias {}; scale factor {} per g.".format(*shown)
+        texts = (", ".join(f"{value:.7g}" for value in parts) for parts in (faces.bias, faces.scale))
+        yield "The accelerometer, from its six faces: bias {}; scale factor {} per g.".format(*texts)
 
 
 def calibration_document(fitted: Fit) -> dict[str, Any]:
@@ -200,8 +200,8 @@ def _by_hand(table: Table) -> dict[str, Any]:
 def _book_text(table: Table) -> str:
     """The result of the method of the Book in words."""
     values = _by_hand(table)["by_hand"]
-    shown = ", ".join(f"{value:.5g}" for value in values["hard_iron"] if value is not None)
-    text = f"Method of the Book, from the extremes: hard iron {shown} {table.unit}"
+    iron = ", ".join(f"{value:.5g}" for value in values["hard_iron"] if value is not None)
+    text = f"Method of the Book, from the extremes: hard iron {iron} {table.unit}"
     if soft := values.get("soft_iron"):
         text += (
             f"; soft iron in the plane: radii {soft['greatest']:.5g} and {soft['least']:.5g} {table.unit}, the greater "

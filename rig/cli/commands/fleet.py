@@ -179,8 +179,8 @@ def _shared(effects: Iterable[BatchEffect]) -> str:
 
 
 def _with_rivals(name: str, rivals: Iterable[str]) -> str:
-    others = list(rivals)
-    return f"{name} (or {joined(others)})" if others else name
+    rival_names = list(rivals)
+    return f"{name} (or {joined(rival_names)})" if rival_names else name
 
 
 def _shares(shares: Mapping[str, float], shared: set[str]) -> str:
@@ -188,11 +188,11 @@ def _shares(shares: Mapping[str, float], shared: set[str]) -> str:
 
 
 def _rigs(result: Population) -> Iterator[str]:
-    beyond = [error for error in result.rigs if error.beyond]
-    if beyond:
+    faulty = [error for error in result.rigs if error.beyond]
+    if faulty:
         yield ""
         yield "Errors of rigs relative to their median; the poses were corrected for them:"
-        rows = [(e.rig, e.effect, concise_in_prefix(e.value, e.std, e.unit), e.parameter, e.sensors) for e in beyond]
+        rows = [(e.rig, e.effect, concise_in_prefix(e.value, e.std, e.unit), e.parameter, e.sensors) for e in faulty]
         yield columns(("rig", "effect", "value", "parameter", "sensors"), rows)
     rigs = {rig for group in result.unconnected for rig in group}
     if len(rigs) == 1:
@@ -252,5 +252,5 @@ def _gains(batch: Calibrated) -> list[float]:
 
 
 def _named(sensors: list[str]) -> str:
-    shown = ", ".join(sensors[:5])
-    return f"{shown} and {len(sensors) - 5} more" if len(sensors) > 5 else shown or "-"
+    text = ", ".join(sensors[:5])
+    return f"{text} and {len(sensors) - 5} more" if len(sensors) > 5 else text or "-"

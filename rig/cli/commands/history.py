@@ -110,8 +110,8 @@ def _only(life: History, chosen: Sequence[str], limited: Iterable[str]) -> Histo
     for name in (*chosen, *limited):
         if name not in known:
             raise click.UsageError(f"the model {life.model} has no quantity {name!r}.{did_you_mean(name, known)}")
-    kept = tuple(q for q in life.quantities if not chosen or q.name in chosen)
-    return replace(life, quantities=kept)
+    quantities = tuple(q for q in life.quantities if not chosen or q.name in chosen)
+    return replace(life, quantities=quantities)
 
 
 def _of_chosen(compared: Compared, life: History) -> Compared:
@@ -154,8 +154,8 @@ def lines(life: History) -> Iterator[str]:
 
 def _row(calibration: Calibration, quantities: Sequence[Quantity]) -> tuple[str, ...]:
     values = (calibration.values.get(q.name) for q in quantities)
-    shown = ("-" if v is None else concise_in_prefix(v.value, v.std, v.unit) for v in values)
-    return calibration.day, calibration.data, calibration.rig, *shown
+    texts = ("-" if v is None else concise_in_prefix(v.value, v.std, v.unit) for v in values)
+    return calibration.day, calibration.data, calibration.rig, *texts
 
 
 def _stability(q: Quantity) -> tuple[str, ...]:

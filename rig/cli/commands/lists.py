@@ -65,24 +65,24 @@ def effects_command(effect: str | None, bench_file: Path | None, as_json: bool) 
             "source": e.source,
         }
 
-    shown = list(known.values())
+    listed = list(known.values())
     if effect:
         from calibrations.free_forms.requested import named  # slow to import; the list needs no free form
 
-        shown = [named(effect, known)]
+        listed = [named(effect, known)]
     if as_json:
-        emit({"schema": "rig.effects/1", "effects": [document(e) for e in shown]})
+        emit({"schema": "rig.effects/1", "effects": [document(e) for e in listed]})
     elif effect:
         from calibrations.compensation.forward import known_at_run_time
 
-        e = shown[0]
+        e = listed[0]
         formula = e.formula.replace("{out}", "V").replace("\n", "\n    ")  # as docs/effects does for an output in V
         click.echo(f"{e.name}: {e.summary}\n\n    {formula}\n")
         parts = (("Symptom", e.symptom), ("Excited by", e.excited_by), ("Confused with", e.confused_with))
         more = (("At run time", known_at_run_time(e)), ("Source", e.source))
         click.echo("\n".join(f"{title}: {text}" for title, text in (*parts, *more) if text))
     else:
-        click.echo(columns(("effect", "acts on", "description"), [(e.name, e.acts_on, e.summary) for e in shown]))
+        click.echo(columns(("effect", "acts on", "description"), [(e.name, e.acts_on, e.summary) for e in listed]))
 
 
 @click.command("models")

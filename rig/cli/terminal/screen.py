@@ -45,14 +45,14 @@ Row = tuple[RenderableType, ...]
 
 def screen(view: RunView, now_s: float) -> RenderableType:
     """The screen at `now_s` of the wall clock."""
-    shown = Table.grid(padding=(0, 2))
+    grid = Table.grid(padding=(0, 2))
     for row in _rows(view):
-        shown.add_row(*row)
+        grid.add_row(*row)
     body: list[RenderableType] = [
         _heading(view, now_s),
         ProgressBar(max(view.progress.total, 1), view.progress.done),
         Text(),
-        shown,
+        grid,
     ]
     if view.guidance is not None:
         body.insert(3, Text("\n".join([*orientation_map(view.guidance), ""])))
@@ -131,7 +131,7 @@ def _does(plan: Plan) -> list[str]:
 
 def drawn(attitude: Attitude, file: Path) -> RenderableType:
     """The sketch with its legend; `file` is the complete drawing."""
-    beside = Table.grid(padding=(0, 3))
+    grid = Table.grid(padding=(0, 3))
     legend = f"\n{attitude.words}\n\nTable at alpha 0, from above:\nx, y  axes of the sensor\no     pin 1\n\n{file}"
-    beside.add_row(Text("\n".join(sketch(attitude))), Text(legend, overflow="fold"))
-    return beside
+    grid.add_row(Text("\n".join(sketch(attitude))), Text(legend, overflow="fold"))
+    return grid
