@@ -1,22 +1,26 @@
-"""The state of an installation, for a maintainer: versions, the record, the bench, the log of the last run."""
+"""The state of an installation, for a maintainer: versions, the record, the bench, the log of the last run.
+
+A damaged installation has to be described too: a module that may need a damaged package is imported where it is used.
+"""
 
 from __future__ import annotations
 
+import importlib
 import os
 import platform
 import re
 import sqlite3
 import sys
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import PackageNotFoundError, packages_distributions, requires, version
 from pathlib import Path
 from typing import Any
 
 from rig.errors import RecordError
 from rig.files import free_bytes, home
-from rig.record import Record
 
 PACKAGE = "inertial-rig"
 LEAST_FREE_BYTES = 1 << 30  # a soak of a night takes half of it
@@ -51,15 +55,40 @@ def versions() -> dict[str, Any]:
 def findings(folder: Path | None = None) -> list[Finding]:
     """Checks of the packages, the folder of the record, its disk and its file."""
     folder = folder or home()
-    missing = [name for name, number in versions()["packages"].items() if number is None]
+    faults = list(package_faults())
     existing = next(place for place in (folder, *folder.parents) if place.is_dir())
     free = free_bytes(folder)
     return [
-        Finding("packages", not missing, f"missing: {', '.join(missing)}" if missing else "all installed"),
+        Finding("packages", not faults, "; ".join(faults) or "all installed"),
         Finding("folder", os.access(existing, os.W_OK), f"{folder}{'' if folder.is_dir() else ', not made yet'}"),
         Finding("disk", free > LEAST_FREE_BYTES, f"{free / 1e9:.1f} GB free"),
         _record_finding(folder / "record.db"),
     ]
+
+
+def package_faults() -> Iterator[str]:
+    """Each required package that is missing or cannot be imported."""
+    modules = defaultdict(list)
+    for module, names in packages_distributions().items():
+        for name in names:
+            modules[name.lower()].append(module)
+    for name, number in versions()["packages"].items():
+        if number is None:
+            yield f"missing: {name}"
+        for module in modules[name.lower()]:
+            if module.isidentifier() and not module.startswith("_"):
+                try:
+                    importlib.import_module(module)
+                except Exception as error:  # a damaged file may raise anything
+                    yield f"{name} {number} cannot be imported ({type(error).__name__}: {error}); install it again"
+
+
+def collected(part: Callable[[], Any]) -> Any:
+    """What `part` returns, or the error that it raises, as a document."""
+    try:
+        return part()
+    except Exception as error:  # one damaged part hides no other
+        return {"error": f"{type(error).__name__}: {error}"}
 
 
 def _record_finding(file: Path) -> Finding:
@@ -70,8 +99,12 @@ def _record_finding(file: Path) -> Finding:
         with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro", uri=True)) as connection:
             problems = [row[0] for row in connection.execute("PRAGMA integrity_check(10)")]
         if problems == ["ok"]:
+            from rig.record import Record
+
             with Record(file.parent) as record:
                 problems = [*record.damaged_runs(), *record.damaged_rows()] or ["ok"]
+    except ImportError as error:
+        return Finding("record", False, f"not checked: {error}")
     except (sqlite3.Error, RecordError) as error:
         problems = [str(error)]
     sound = problems == ["ok"]
@@ -87,6 +120,8 @@ def last_run(run: str | None = None) -> dict[str, Any] | None:
     """
     if not (home() / "record.db").is_file():
         return None
+    from rig.record import Record
+
     with Record() as record:
         chosen = record.run(run) if run else next((any_run for any_run in record.runs() if any_run.bench), None)
         if chosen is None:
@@ -99,6 +134,8 @@ def last_run(run: str | None = None) -> dict[str, Any] | None:
 
 def list_runs() -> list[dict[str, Any]]:
     """A summary of all runs, newest first; empty if the record cannot be read."""
+    from rig.record import Record
+
     try:
         with Record() as record:
             return [

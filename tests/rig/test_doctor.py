@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +21,7 @@ from rig.services.health import without_secrets
 from tests.rig.test_store import begin, block
 
 PAGE = 4096
+ROOT = Path(__file__).parents[2]
 
 
 def test_it_collects_versions_checks_runs_and_the_last_runs_log(rig: Callable[..., Any], tmp_path: Path) -> None:
@@ -42,6 +46,25 @@ def test_it_collects_versions_checks_runs_and_the_last_runs_log(rig: Callable[..
 def test_without_any_run_there_is_nothing_to_complain_about(rig: Callable[..., Any], tmp_path: Path) -> None:
     ended = rig("doctor", "--out", str(tmp_path / "doctor.zip"))
     assert (ended.status, "there is no run yet" in ended.out) == (0, True)
+
+
+@pytest.mark.parametrize("package", ["numpy", "sqlalchemy", "yaml"])
+def test_a_package_that_cannot_be_imported_is_named_in_an_archive(tmp_path: Path, package: str) -> None:
+    (tmp_path / f"{package}.py").write_text("raise ImportError('a damaged file')")
+    archive, words = tmp_path / "doctor.zip", "import sys; from rig.cli import main; main(sys.argv[1:])"
+    before = os.environ.get("PYTHONPATH", "")
+    ended = subprocess.run(
+        [sys.executable, "-c", words, "doctor", "--out", str(archive), "--bench", str(tmp_path / "none.yaml")],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, [str(tmp_path), str(ROOT), before]))},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == 1, ended.stderr
+    assert "cannot be imported (ImportError: a damaged file); install it again" in ended.stdout
+    with zipfile.ZipFile(archive) as file:
+        assert set(file.namelist()) == {"bench.json", "checks.json", "run.json", "runs.json", "versions.json"}
+        assert "error" in json.loads(file.read("bench.json"))
 
 
 def test_a_bench_goes_with_it_and_no_secret(rig: Callable[..., Any], tmp_path: Path, bench_file: Any) -> None:

@@ -12,14 +12,10 @@ from typing import Any
 import click
 from click.shell_completion import get_completion_class
 
-from calibrations.text import columns
-from rig.bench import read_bench
 from rig.cli import COMPLETE, rig
 from rig.cli.terminal.output import FOLDER, bench_option, emit, json_option, out_option, require_outputs
-from rig.errors import RecordError
 from rig.files import draft_of, home
-from rig.record.recover import recover
-from rig.services.health import Finding, findings, last_run, list_runs, versions, without_secrets
+from rig.services.health import Finding, collected, findings, last_run, list_runs, versions, without_secrets
 
 
 @click.command("doctor")
@@ -52,8 +48,9 @@ def doctor_command(
         checks = {finding.what: {"ok": finding.ok, "said": finding.detail} for finding in checked}
         emit({"schema": "rig.doctor/1", "checks": checks, "archive": str(archive), "files": sorted(parts)})
     else:
-        rows = [(finding.what, "ok" if finding.ok else "WRONG", finding.detail) for finding in checked]
-        click.echo(columns(("check", "", ""), rows))
+        click.echo("check")
+        for finding in checked:
+            click.echo(f"{finding.what:8}  {'ok' if finding.ok else 'WRONG':5}  {finding.detail}")
         click.echo(f"\n{archive}: {', '.join(sorted(parts))}. It has no samples; look at it before you send it.")
     return int(not all(finding.ok for finding in checked))
 
@@ -61,16 +58,17 @@ def doctor_command(
 def _parts(checked: list[Finding], run: str | None, bench_file: Path | None) -> Mapping[str, Any]:
     """The files of the archive: JSON documents by name."""
     parts: dict[str, Any] = {"versions.json": versions(), "checks.json": [vars(finding) for finding in checked]}
-    parts["runs.json"] = list_runs()
-    try:
-        parts["run.json"] = last_run(run)
-    except RecordError as error:
-        if run is not None:
-            raise
-        parts["run.json"] = {"error": str(error)}
+    parts["runs.json"] = collected(list_runs)
+    parts["run.json"] = last_run(run) if run is not None else collected(last_run)
     if bench_file is not None:
-        parts["bench.json"] = without_secrets(read_bench(bench_file).document())
+        parts["bench.json"] = collected(lambda: _bench_document(bench_file))
     return parts
+
+
+def _bench_document(bench_file: Path) -> Any:
+    from rig.bench import read_bench
+
+    return without_secrets(read_bench(bench_file).document())
 
 
 def _write(archive: Path, parts: Mapping[str, Any]) -> None:
@@ -81,6 +79,8 @@ def _write(archive: Path, parts: Mapping[str, Any]) -> None:
 
 def _recovered(folder: Path, as_json: bool) -> int:
     """Recover the record; print the copied and the lost rows."""
+    from rig.record.recover import recover
+
     done = recover(home() / "record.db", folder)
     lost = [*(f"some rows of {table}" for table in done.damaged), *(f"the samples of {pose}" for pose in done.spoilt)]
     lost += done.changed
