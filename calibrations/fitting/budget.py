@@ -28,11 +28,10 @@ from calibrations.criteria import COVERAGE
 from calibrations.fitting.fit import Fit, cautiously
 from calibrations.fitting.identifiability import covariance, gain
 from calibrations.fitting.inputs import Contribution
-from calibrations.means.noise import Noise
+from calibrations.means.noise import MOST_CORRELATED_ROWS, Noise
 from calibrations.table import Array
 
 SLOW_NOISE = "slow noise"
-MOST_CORRELATED_ROWS = 400  # rows that the freedom of slow noise is worked out on
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from calibrations.presentation.chart import Picture
 
 ROUNDS = 2
+LEAST_FREEDOM = 3.0  # degrees: below, Student's t has no variance
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -285,8 +286,8 @@ def _result(problem: Problem, theta: Array, noise: Noise) -> Fit:
 
 def _wider(cautious: Fit) -> Array:
     """Factors on the standard uncertainties."""
-    if not cautious.problem.widens:
-        return np.ones(len(cautious.theta))
+    if not cautious.problem.averages:
+        return _by_few_rows(cautious)
     layout = cautious.problem.layout
     wider, free = np.ones(len(cautious.theta)), ~np.isfinite(layout.prior)
     jacobian = _free(cautious.problem, cautious.jacobian)
@@ -301,6 +302,22 @@ def _wider(cautious: Fit) -> Array:
     else:
         wider[free] = widening(cautious.noise, cautious.residual, jacobian, typical)
     return wider
+
+
+def _by_few_rows(fit: Fit) -> Array:
+    """Factors on the standard uncertainties: what Student's t spreads beyond a normal distribution.
+
+    Each parameter has the degrees of freedom of its channels' noise, weighted by what each channel tells of it.
+    """
+    if fit.noise.given:
+        return np.ones(len(fit.theta))
+    informed = np.sum(fit.whitened[:, 1:].reshape(*fit.residual.shape, -1) ** 2, axis=1)
+    total = informed.sum(axis=0)
+    rows = np.where(
+        total > 0, fit.noise.effective_rows @ informed / np.where(total > 0, total, 1.0), fit.residual.shape[1]
+    )
+    freedom = np.maximum(rows - 1, LEAST_FREEDOM)
+    return np.asarray(np.sqrt(freedom / (freedom - 2)))
 
 
 def cautiously(result: Fit) -> Fit:

@@ -52,7 +52,7 @@ class Problem:
     layout: Layout
 
     keeps_starts: ClassVar[bool] = False  # whether a parameter that the data do not determine keeps its start
-    widens: ClassVar[bool] = True  # whether slow noise widens the standard uncertainties
+    averages: ClassVar[bool] = True  # whether uncertainties are averaged over the slow noise that the data allow
 
     @staticmethod
     def of(model: Model, table: Table) -> Problem:
@@ -324,7 +324,7 @@ class MotionProblem(Problem):
     table: Stretches
 
     keeps_starts = True  # at one attitude an axis that does not move cannot tell its scale factor from its bias
-    widens = False  # the parts of a stretch tell what is slow from what is not
+    averages = False  # some tens of stretches allow nearly any: Student's t of the noise found stands in its place
 
     @staticmethod
     def prepared(table: Table) -> Table:

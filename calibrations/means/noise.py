@@ -30,6 +30,7 @@ from calibrations.table import Array, Table, std_column
 Processes = tuple[tuple[float, float], ...]  # (standard deviation, time constant in s) of Gauss-Markov processes
 
 BEYOND = 10.0  # lengths of a record: the longest times at which it is said to flicker
+MOST_CORRELATED_ROWS = 400  # rows that degrees of freedom are computed on
 SLOW_FREEDOM = 60.0  # as a process has whose time constant is a hundredth of the record
 
 
@@ -89,6 +90,20 @@ class Noise:
     def freedom(self) -> float:
         """Degrees of freedom with which the noise is known: few where it is slow, as a record holds few long times."""
         return SLOW_FREEDOM if np.any(self.slow > 0.1 * rms(self.fast)) else float(self.white.size)
+
+    @cached_property
+    def effective_rows(self) -> Array:
+        """The number of independent rows that tell as much of each channel's noise, (channels,) (Satterthwaite)."""
+        step = max(1, len(self.gap_s) // MOST_CORRELATED_ROWS)
+        time_s = np.cumsum(self.gap_s)[::step]
+        apart_s, rows = np.abs(time_s[:, None] - time_s), []
+        for fast, slow, taus_s in zip(self.fast, self.slow, self.taus_s, strict=True):
+            covariance = np.diag(fast[::step] ** 2) + slow**2 * np.mean(
+                [np.exp(-apart_s / tau_s) for tau_s in taus_s], axis=0
+            )
+            squares = float(np.sum(covariance**2))
+            rows.append(np.trace(covariance) ** 2 / squares if squares > 0 else len(time_s))
+        return np.array(rows)
 
     def is_like(self, noise: Noise) -> bool:
         """Whether both weigh the rows alike, scatter within 1 % of the noise."""

@@ -21,6 +21,17 @@ def covariance(gap_s: Array, white: Array, slow: Sequence[float], taus_s: Sequen
     return np.diag(white**2) + sum(s**2 * np.exp(-apart / tau) for s, tau in zip(slow, taus_s, strict=True))
 
 
+def test_slow_noise_leaves_few_independent_rows() -> None:
+    rows = 240
+    noise = Noise(
+        np.ones((3, rows)), np.ones(rows), np.zeros(3), np.array([0.0, 100.0, 1.0]), ((1.0,), (10.0,), (10.0,))
+    )
+    white, slow, both = noise.effective_rows
+    assert white == pytest.approx(rows)
+    assert slow == pytest.approx(rows / 10.0, rel=0.1)  # the sum of exp(-2 |lag| / tau) over all lags
+    assert slow < both < white
+
+
 @given(
     st.integers(0, 10_000),
     st.lists(st.tuples(st.sampled_from([0.0, 0.1, 1.0, 30.0]), st.sampled_from([1.0, 100.0, 1e4])), max_size=3),
