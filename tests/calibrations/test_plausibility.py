@@ -140,6 +140,13 @@ def test_saturation_and_a_pattern_in_time_or_direction_are_effects() -> None:
         assert findings(spoiled.table()) == ()
 
 
+def test_two_groups_of_rows_that_differ_in_direction_are_an_effect() -> None:
+    table = two_sensors(healthy()).table()
+    direction = np.where(np.arange(table.n) % 2, 1.0, -1.0)
+    assert refusal(table) is not None
+    assert findings(replace(table, columns={**table.columns, "direction": direction})) == ()
+
+
 @pytest.mark.parametrize("spoil", [DEAD["noise"][0], two_sensors])
 def test_every_command_gives_the_same_verdict(spoil: Callable[[Data], Data]) -> None:
     table, model = spoil(healthy()).table(), read_model("linear")
