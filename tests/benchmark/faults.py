@@ -18,7 +18,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from drivers.errors import LimitError
 from drivers.transport.faults import EFFECTS, Fault, Kind, kinds_of
+from procedures.errors import ProcedureError
 from tests.rig.enduring import BENCH, FAULTS, OTHER_FAULTS, OTHER_PARTS, PROCEDURES, endured, moment
 
 PAGE = Path(__file__).parents[2] / "docs" / "faults.md"
@@ -26,6 +28,7 @@ KINDS = ("<!-- kinds -->\n", "<!-- end of kinds -->\n")
 TABLE = ("<!-- made by tests.benchmark.faults -->\n", "<!-- end -->\n")
 SHORT = {"complete": "c", "stopped": "s", "not begun": "n"}
 BROKEN = "BROKEN"
+IMPOSSIBLE = "impossible"  # the bench has not what the procedure needs; no part of the page
 DRIVERS = {role: part.driver for role, part in BENCH.instruments.items()}
 EVERY = [("", role, what) for role, what in FAULTS] + OTHER_FAULTS  # driver in place of the bench's, role, fault
 ROWS = {(driver or DRIVERS[role], what) for driver, role, what in EVERY}
@@ -53,7 +56,11 @@ class Case:
 def tried(case: Case) -> Case:
     """Run it."""
     try:
-        fault = Fault(case.what, at_s=moment(case.procedure, case.role, case.what, case.seed, case.driver))
+        at_s = moment(case.procedure, case.role, case.what, case.seed, case.driver)
+    except (LimitError, ProcedureError):  # without any fault, such as a magnetometer's turn of an accelerometer
+        return replace(case, end=IMPOSSIBLE)
+    try:
+        fault = Fault(case.what, at_s=at_s)
         end, why = endured(case.procedure, case.role, fault, case.driver, case.guided), ""
     except BaseException as error:  # whatever it is, the others are tried
         end, why = BROKEN, f"{type(error).__name__}: {error}".partition("\n")[0]
@@ -83,7 +90,8 @@ def main() -> int:
     with TemporaryDirectory() as home:
         os.environ["RIG_HOME"] = home
         with ProcessPoolExecutor(asked.processes) as pool:
-            done = [_kept(case, asked.out) for case in pool.map(tried, wanted)]
+            run = (case for case in pool.map(tried, wanted) if case.end != IMPOSSIBLE)
+            done = [_kept(case, asked.out) for case in run]
     if asked.out:
         done = [Case(**json.loads(line)) for line in asked.out.read_text(encoding="utf-8").splitlines()]
     if asked.page:
