@@ -38,12 +38,13 @@ from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
 from calibrations.free_forms.place_names import PREFIX
 from calibrations.free_forms.stairs import before_stairs, find_stairs, fitted_stairs
 from calibrations.free_forms.structure import FloorSource, Structure, find_structure, with_stairs
-from calibrations.means.noise import with_white
+from calibrations.means.noise import rms, with_white
 from calibrations.model import Estimate
 from calibrations.model.chain import force
 from calibrations.table import Array
 
 STAIRS = "quantisation"
+AS_SEARCHED = 1.1  # times the error of a search that follows noise: a fit of less leaves nothing to a new search
 NEARLY = 1.5  # noise floors: with a larger error, the stairs are wrong
 
 
@@ -152,7 +153,8 @@ def _fit_structure(base: Fit, places: Structure, effects: Mapping[str, Effect]) 
         accepted, fits = fit_gradually(base, [*causes, *forms])
         causes, forms = ([a for a in accepted if a.effect.name.startswith(PREFIX) is free] for free in (False, True))
         end = fits[-1]
-    if end.held_out_excess > MATERIAL and not end.problem.rounds:
+    reached = places.follows_noise and float(rms(end.residual.ravel())) <= AS_SEARCHED * places.result.error
+    if end.held_out_excess > MATERIAL and not end.problem.rounds and not reached:
         # a new search, given the fitted causes, so that the forms describe the remainder of these
         places_beside = structure(causes_alone(end, forms), effects)
         refined = fit_separately(base, places_beside, additions(places_beside, end.model, effects))

@@ -42,13 +42,14 @@ FEWEST_ANGLES, FINE_ANGLES = 8, 33  # different angles beta that can show harmon
 FEWEST_INCLINATIONS = 4
 
 
-def components(data: PoseData, first: State) -> list[Component]:
+def components(data: PoseData, first: State, flicker: bool = False) -> list[Component]:
     """Every component that this table can show, but those at places that the search leaves out.
 
-    At one orientation nothing over the force can be known, nor a scale factor over anything else.
+    At one orientation nothing over the force can be known, nor a scale factor over anything else. `flicker`: slow noise
+    of all frequencies.
     """
     candidates = [
-        *slow_noise(data),
+        *slow_noise(data, flicker),
         *_stages(data, first),
         *_own_response(data, first),
         *_other_axes(data, first),

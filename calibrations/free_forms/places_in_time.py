@@ -27,11 +27,12 @@ BRANCHES = (0.02, 0.035, 0.06, 0.1, 0.17, 0.28, 0.45)  # the same: plays that to
 FEWEST_TIMED, FEWEST_NOISE = 12, 20  # rows that can show a function of time, and slow noise
 
 
-def slow_noise(data: PoseData) -> list[Component]:
-    """Flicker noise of each channel: never a cause, always in the model."""
+def slow_noise(data: PoseData, whole: bool = False) -> list[Component]:
+    """Flicker noise of each channel: never a cause, always in the model; `whole`: of all frequencies."""
     if not data.timed or data.n < FEWEST_NOISE:
         return []
-    basis = Waves(0.0, 1.0, min(WAVES, data.n // 6), 1.0)(data.since)
+    count = min(WALK_WAVES, data.n // 2) if whole else min(WAVES, data.n // 6)
+    basis = Waves(0.0, 1.0, count, 1.0)(data.since)
     out = []
     for k in range(data.channels):
         columns = np.zeros((data.channels, *basis.shape))

@@ -15,8 +15,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
-from scipy.linalg.lapack import dpotri, dpotrs
+from scipy.linalg.lapack import dpotrf, dpotrs, dtrtri
 
 from calibrations.free_forms.chain import Coefficients, ModelEffects, State, base_jacobian
 from calibrations.free_forms.components import Component
@@ -27,6 +26,7 @@ NOTHING = 1e-9  # of the largest base column: a smaller one is rounding, as the 
 LEAST_BESIDE = 1e-3  # of a component's squares: less beside the base is not magnified
 ROUNDS = 40
 SETTLED = 0.02  # of a variance
+WHOLE = 64  # rows of a triangular matrix that is inverted at once
 REACH = 20.0  # times what a step gains: a deviance that is farther is out of reach
 
 
@@ -143,21 +143,24 @@ class Sizes:
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """Coefficients (p,) at some variances, the lower triangle of H^-1 in units of `std`, and the deviance."""
+    """Coefficients (p,) at some variances, L^-1 of H = L L' in units of `std`, and the deviance."""
 
     variances: Mapping[str, float]
     coefficients: Array
-    triangle: Array
+    inverse_root: Array
     std: Array
     deviance: float
 
     @property
+    def shrunk(self) -> Array:
+        """Diagonal of H^-1 in units of the variances, (p,)."""
+        return np.asarray(np.einsum("ij,ij->j", self.inverse_root, self.inverse_root))
+
+    @property
     def sizes(self) -> Sizes:
         """The same with the whole inverse."""
-        lower = self.triangle * self.std[:, None]
-        lower *= self.std
-        inverse = np.tril(lower) + np.tril(lower, -1).T
-        return Sizes(dict(self.variances), self.coefficients, inverse, self.deviance)
+        root = self.inverse_root * self.std
+        return Sizes(dict(self.variances), self.coefficients, root.T @ root, self.deviance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,24 +185,37 @@ class _Products:
         K = self.products * std[:, None]
         K *= std
         K[np.diag_indices_from(K)] += 1.0  # H = D^-1 K D^-1 with D the standard deviations: well conditioned
-        root, _ = _root(K)
+        root = _root(K)
         logdet = 2 * float(np.sum(np.log(np.diag(root))))
-        answer = std * dpotrs(root, std * self.with_data, lower=1)[0]
-        triangle, _ = dpotri(root, lower=1, overwrite_c=1)
-        return _Solved(variances, answer, triangle, std, self.squares - float(self.with_data @ answer) + logdet)
+        inverse_root = _inverse_root(root)
+        answer = std * (inverse_root.T @ (inverse_root @ (std * self.with_data)))
+        return _Solved(variances, answer, inverse_root, std, self.squares - float(self.with_data @ answer) + logdet)
 
 
-def _root(K: Array) -> tuple[Array, bool]:
-    """Cholesky factor; where rounding made K indefinite, of K with a little more on its diagonal."""
-    ridge = 0.0
+def _root(K: Array) -> Array:
+    """Lower Cholesky factor; where rounding made K indefinite, of K with a little more on its diagonal."""
     if not np.isfinite(K).all():
         raise ArithmeticError("the products of the columns are not finite")
-    while True:
-        try:
-            factor: tuple[Array, bool] = cho_factor(K + ridge * np.eye(len(K)), lower=True, check_finite=False)
-            return factor
-        except np.linalg.LinAlgError:
-            ridge = max(100 * ridge, 1e-12 * float(np.max(np.diag(K))))
+    root, failed = dpotrf(K, lower=1)
+    addition = 1e-12 * float(np.max(np.diag(K), initial=0.0))
+    while failed:
+        root, failed = dpotrf(K + addition * np.eye(len(K)), lower=1)
+        addition *= 100
+    return np.asarray(root)
+
+
+def _inverse_root(root: Array) -> Array:
+    """Inverse of a lower triangular matrix by halves, because products are faster than substitution."""
+    n = len(root)
+    if n <= WHOLE:
+        return np.asarray(dtrtri(root, lower=1)[0])
+    half = n // 2
+    first, second = _inverse_root(root[:half, :half]), _inverse_root(root[half:, half:])
+    inverse = np.zeros_like(root)
+    inverse[:half, :half] = first
+    inverse[half:, half:] = second
+    inverse[half:, :half] = -second @ (root[half:, :half] @ first)
+    return inverse
 
 
 def estimate(
@@ -218,7 +234,7 @@ def estimate(
     fit = products.solved(present)
     for _ in range(rounds):
         changed, at, moved = {}, 0, 0.0
-        shrunk = np.diag(fit.triangle)  # in units of the variances
+        shrunk = fit.shrunk
         for (name, v), m in zip(present.items(), products.widths, strict=True):
             part = slice(at, at + m)
             at += m
@@ -240,7 +256,8 @@ def estimate(
     return fit.sizes
 
 
-GRID = np.exp(np.linspace(-12.0, 6.0, 19))
+GRID, FINE_GRID = np.exp(np.linspace(-12.0, 6.0, 19)), np.exp(np.linspace(-0.8, 0.8, 9))  # of a variance
+NO_PRODUCTS, LEAST_VARIANCE = 1e-9, 1e-12  # what the active components leave of a component; the variance of nothing
 
 
 def gains(g: Gram, fit: Sizes, names: Sequence[str]) -> dict[str, tuple[float, float]]:
@@ -251,32 +268,39 @@ def gains(g: Gram, fit: Sizes, names: Sequence[str]) -> dict[str, tuple[float, f
     cross = g.products[np.ix_(active, inactive)]
     solved = fit.inverse @ cross
     side = g.with_data[inactive] - cross.T @ fit.coefficients
-    answer, at = {}, 0
+    by_width: dict[int, list[tuple[str, slice]]] = {}
+    at = 0
     for name in names:
-        block = g.blocks[name]
-        m = block.stop - block.start
-        part = slice(at, at + m)
+        m = g.blocks[name].stop - g.blocks[name].start
+        by_width.setdefault(m, []).append((name, slice(at, at + m)))
         at += m
-        M = g.products[block, block] - cross[:, part].T @ solved[:, part]
-        answer[name] = gain(M, side[part])
+    answer: dict[str, tuple[float, float]] = {}
+    for members in by_width.values():  # matrices of one size are decomposed together
+        blocks = [(g.blocks[name], part) for name, part in members]
+        M = np.stack([g.products[block, block] - cross[:, part].T @ solved[:, part] for block, part in blocks])
+        values, variances = _gains(M, np.stack([side[part] for _, part in members]))
+        answer |= {name: (float(v), float(t)) for (name, _), v, t in zip(members, values, variances, strict=True)}
     return answer
 
 
-def gain(M: Array, side: Array) -> tuple[float, float]:
-    """Greatest gain and its variance of a component with products M (m, m) and `side` (m,) given the others."""
-    d, V = np.linalg.eigh((M + M.T) / 2) if len(M) > 1 else (M[0], np.ones((1, 1)))
+def _gains(M: Array, side: Array) -> tuple[Array, Array]:
+    """Greatest gains and their variances, (k,), of k components with products M (k, m, m) and `side` (k, m)."""
+    d, V = np.linalg.eigh((M + M.transpose(0, 2, 1)) / 2)
     d = np.maximum(d, 0.0)
-    q = (V.T @ side) ** 2
-    top = float(d[-1])
-    if top <= 1e-9:
-        return 0.0, 1e-12
-    grid = GRID * max(float(q.sum() / top / max(top, 1e-300)), 1.0 / top) / max(len(d), 1)
-    value = np.sum(q * grid[:, None] / (1 + grid[:, None] * d) - np.log1p(grid[:, None] * d), axis=1)
-    k = int(np.argmax(value))
-    fine = grid[k] * np.exp(np.linspace(-0.8, 0.8, 9))
-    value = np.sum(q * fine[:, None] / (1 + fine[:, None] * d) - np.log1p(fine[:, None] * d), axis=1)
-    k = int(np.argmax(value))
-    return max(float(value[k]), 0.0), float(fine[k])
+    q = np.einsum("kij,ki->kj", V, side) ** 2
+    acts = d[:, -1] > NO_PRODUCTS
+    largest = np.where(acts, d[:, -1], 1.0)
+
+    def best(variances: Array) -> tuple[Array, Array]:
+        with_variance = variances[:, :, None] * d[:, None, :]
+        values = np.sum(q[:, None, :] * variances[:, :, None] / (1 + with_variance) - np.log1p(with_variance), axis=2)
+        rows = np.arange(len(values)), np.argmax(values, axis=1)
+        return values[rows], variances[rows]
+
+    usual = np.maximum(q.sum(axis=1) / largest, 1.0) / largest / d.shape[1]
+    _, variance = best(usual[:, None] * GRID)
+    value, variance = best(variance[:, None] * FINE_GRID)
+    return np.where(acts, np.maximum(value, 0.0), 0.0), np.where(acts, variance, LEAST_VARIANCE)
 
 
 def gain_beside(g: Gram, fit: Sizes, X: Array, b: int) -> Callable[[Array], float]:
@@ -290,7 +314,8 @@ def gain_beside(g: Gram, fit: Sizes, X: Array, b: int) -> Callable[[Array], floa
         M = N.T @ N - with_base.T @ by_base
         side = N.T @ X[:, -1] - by_base.T @ g.base_with_data
         cross = active_columns @ N - by_products @ by_base
-        return gain(M - cross.T @ fit.inverse @ cross, side - cross.T @ fit.coefficients)[0]
+        M -= cross.T @ fit.inverse @ cross
+        return float(_gains(M[None], (side - cross.T @ fit.coefficients)[None])[0][0])
 
     return gained
 
@@ -310,8 +335,8 @@ def loss(g: Gram, fit: Sizes, name: str) -> float:
     part = _part(g, fit, name)
     C, u = fit.inverse[part, part], fit.coefficients[part]
     root = _root(C)
-    logdet = 2 * float(np.sum(np.log(np.diag(root[0]))))
-    quadratic = float(u @ cho_solve(root, u, check_finite=False))
+    logdet = 2 * float(np.sum(np.log(np.diag(root))))
+    quadratic = float(u @ dpotrs(root, u, lower=1)[0])
     return quadratic + logdet - len(u) * float(np.log(fit.variances[name]))
 
 
@@ -319,8 +344,9 @@ def without(g: Gram, fit: Sizes, name: str) -> Sizes:
     """The fit without one active component, the other variances held."""
     part = _part(g, fit, name)
     remaining = np.r_[0 : part.start, part.stop : len(fit.coefficients)]
-    solved = cho_solve(_root(fit.inverse[part, part]), fit.inverse[part][:, remaining], check_finite=False)
-    inverse = fit.inverse[np.ix_(remaining, remaining)] - fit.inverse[part][:, remaining].T @ solved
+    shared = fit.inverse[part][:, remaining]
+    solved = dpotrs(_root(fit.inverse[part, part]), shared, lower=1)[0]
+    inverse = fit.inverse[np.ix_(remaining, remaining)] - shared.T @ solved
     answer = fit.coefficients[remaining] - solved.T @ fit.coefficients[part]
     variances = {k: v for k, v in fit.variances.items() if k != name}
     return Sizes(variances, answer, inverse, fit.deviance + loss(g, fit, name))

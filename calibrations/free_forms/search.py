@@ -9,6 +9,7 @@ import numpy as np
 
 from calibrations.free_forms.chain import Coefficients, ModelEffects, State, base_size, start, state_at
 from calibrations.free_forms.components import Component
+from calibrations.free_forms.flicker import is_flicker
 from calibrations.free_forms.places import components as all_components
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.reml import (
@@ -49,6 +50,7 @@ class SearchResult:
     values: Coefficients
     state: State
     path: Sequence[str]
+    flicker: bool
 
     def component(self, name: str) -> Component:
         return next(c for c in self.components if c.name == name)
@@ -61,6 +63,17 @@ class SearchResult:
         base = g.base_inverse @ (g.base_with_data - g.base_products[:, rows] @ self.sizes.coefficients)
         fitted = self.columns[:, :b] @ base + self.columns[:, b + rows] @ self.sizes.coefficients
         return np.asarray(self.columns[:, -1] - fitted)
+
+    @property
+    def error(self) -> float:
+        """Rms of what all components but slow noise leave, in the output's unit."""
+        b = self.columns.shape[1] - 1 - len(self.gram.with_data)
+        slow = np.zeros(len(self.columns))
+        for component in self.components:
+            if component.noise and component.name in self.sizes.variances:
+                block = self.gram.blocks[component.name]
+                slow += self.columns[:, b + block.start : b + block.stop] @ self.sizes.of(self.gram, component.name)
+        return float(np.sqrt(np.mean(((self.residual + slow) * self.white.ravel()) ** 2)))
 
     @property
     def freedom(self) -> float:
@@ -92,14 +105,24 @@ def search(data: PoseData, white: Array, model_effects: ModelEffects, general: b
     First forms of the catalogue begin, and free forms follow; where that leaves more than noise, or many components,
     all begin together. What is not smooth is found by the one, what has another form by the other. Where the history
     acts, loops that differ from place to place are tried too; without one they resemble most curves with a corner,
-    and where they gain little they take up part of what acts elsewhere.
+    and where they gain little they take up part of what acts elsewhere. Where flicker of any size is likelier than what
+    follows the time, all begins again with it, unless the given model has effects, whose misfit may look like flicker.
 
     white    standard deviation of each mean, (channels, n)
     general  whether components that can follow almost anything are tried
     """
 
+    best = _likeliest(data, white, model_effects, general, flicker=False)
+    if model_effects.columns.shape[2] or not is_flicker(best, (SLOW_MOST * float(np.sqrt(np.mean(white**2)))) ** 2):
+        return best
+    return min(best, _likeliest(data, white, model_effects, general, flicker=True), key=lambda end: end.criterion)
+
+
+def _likeliest(data: PoseData, white: Array, model_effects: ModelEffects, general: bool, flicker: bool) -> SearchResult:
+    """The likeliest end of several beginnings."""
+
     def descent(catalogue_first: bool, loops: bool = False) -> SearchResult:
-        return _descent(data, white, model_effects, general, catalogue_first, loops)
+        return _descent(data, white, model_effects, general, flicker, catalogue_first, loops)
 
     by_name = descent(catalogue_first=True)
     if by_name.ratio < NOISE_ALONE and len(by_name.active) <= FEW_COMPONENTS:
@@ -112,17 +135,25 @@ def search(data: PoseData, white: Array, model_effects: ModelEffects, general: b
 
 
 def _descent(
-    data: PoseData, white: Array, model_effects: ModelEffects, general: bool, catalogue_first: bool, loops: bool
+    data: PoseData,
+    white: Array,
+    model_effects: ModelEffects,
+    general: bool,
+    flicker: bool,
+    catalogue_first: bool,
+    loops: bool,
 ) -> SearchResult:
     """Rounds of selection and Gauss-Newton steps from the base."""
     values = start(data, model_effects)
     state = state_at(data, model_effects, values, ())
-    components = [c for c in all_components(data, state) if (general or not c.general) and (loops or not c.has_loops)]
+    components = [
+        c for c in all_components(data, state, flicker) if (general or not c.general) and (loops or not c.has_loops)
+    ]
     scales: dict[str, float] = {}
     noise = [c.name for c in components if c.noise]
     floor = float(np.sqrt(np.mean(white**2)))
     variances = dict.fromkeys(noise, (0.1 * floor) ** 2)
-    most: dict[str, float] = dict.fromkeys(noise, (SLOW_MOST * floor) ** 2)
+    most: dict[str, float] = {} if flicker else dict.fromkeys(noise, (SLOW_MOST * floor) ** 2)
     path: list[str] = []
     b = base_size(data, model_effects)
     rejected: list[float] = []
@@ -138,7 +169,7 @@ def _descent(
             largest = LARGEST * g.squares / g.rows * floor**2
             most |= {c.name: largest for c in components if not c.noise}
         slow = SLOW_FIRST if number < len(COARSE) else SLOW_MOST
-        most |= dict.fromkeys(noise, (slow * floor) ** 2)
+        most |= {} if flicker else dict.fromkeys(noise, (slow * floor) ** 2)
         limit = caution * (max(ENTER, COARSE[number] * g.squares) if number < len(COARSE) else ENTER)
         before = set(variances)
         previous = values, dict(variances), state
@@ -180,7 +211,7 @@ def _descent(
     sizes = estimate(g, variances, most)
     values = coefficients(g, sizes)
     state = state_at(data, model_effects, values, components)
-    return SearchResult(data, model_effects, white, components, g, X, sizes, values, state, path)
+    return SearchResult(data, model_effects, white, components, g, X, sizes, values, state, path, flicker)
 
 
 def _damped(

@@ -86,6 +86,11 @@ class Structure:
         )
 
     @property
+    def follows_noise(self) -> bool:
+        """Whether unseen rows differ by noise over time that no curve predicts: a random walk, or strong flicker."""
+        return self.result.flicker or any("/walk-" in name for name in self.result.active)
+
+    @property
     def unknown(self) -> tuple[ActingPlace, ...]:
         """Places that act without a catalogue effect as their cause."""
         return tuple(place for place in self.places if place.unknown)

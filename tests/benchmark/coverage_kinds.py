@@ -144,6 +144,11 @@ def _bent(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
 CAUSES = (None, _bent, sampled.ramp(1e-3))
 
 
+def bent_in_flicker(seed: int) -> Table:
+    """A bent sensor in flicker of 1.7 times the white noise."""
+    return _swept(seed, 1.7, _bent)[0]
+
+
 def discovered(seed: int, times: float) -> Made:
     """A sensor with no hidden cause, a bent one and a drifting one, in turn, by the model that a discovery chose."""
     table, exact = _swept(seed, times, CAUSES[seed % len(CAUSES)])
