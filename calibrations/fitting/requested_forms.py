@@ -168,4 +168,5 @@ def _sized(
     X, blocks, scales = whitened(state, model_effects, values, every, scales, white)
     g = gram(X, blocks, scales, b)
     sizes = estimate(g, variances, most)
-    return SearchResult(data, model_effects, white, every, g, X, sizes, coefficients(g, sizes), state, ())
+    values = coefficients(g, sizes)
+    return SearchResult(data, model_effects, white, every, g, X, sizes, values, state, (), flicker=False)
