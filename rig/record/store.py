@@ -289,9 +289,9 @@ class Record:
                 f"{len(of_sensor)} runs in {self.where} are of the sensor {name!r}: {listed}"
                 f"{' ...' if of_sensor[MOST_LISTED:] else ''}; write an id, or '{LAST} {name}' for the newest one"
             )
-        newest_sensors = list(dict.fromkeys(own for run in all_runs for own in run.sensors))[:MOST_SUGGESTED]
-        names = [*list(dict.fromkeys(known))[-MOST_SUGGESTED:], *newest_sensors]
-        raise UnknownRun(f"no run {name!r} in {self.where}.{did_you_mean(sensor, names)}")
+        newest = list(dict.fromkeys(known))[-MOST_SUGGESTED:]
+        sensors = list(dict.fromkeys(own for run in all_runs for own in run.sensors))[:MOST_SUGGESTED]
+        raise UnknownRun(f"no run {name!r} in {self.where}.{did_you_mean(sensor, newest, sensors)}")
 
     def poses(self, run: str) -> list[Pose]:
         """The poses in order, without the excluded ones."""

@@ -90,14 +90,18 @@ def main() -> int:
     with TemporaryDirectory() as home:
         os.environ["RIG_HOME"] = home
         with ProcessPoolExecutor(asked.processes) as pool:
-            run = (case for case in pool.map(tried, wanted) if case.end != IMPOSSIBLE)
-            done = [_kept(case, asked.out) for case in run]
+            run = [_kept(case, asked.out) for case in pool.map(tried, wanted)]
+    impossible = sorted({f"{case.procedure} with {case.row[0]}" for case in run if case.end == IMPOSSIBLE})
+    done = [case for case in run if case.end != IMPOSSIBLE]
     if asked.out:
         done = [Case(**json.loads(line)) for line in asked.out.read_text(encoding="utf-8").splitlines()]
+        done = [case for case in done if case.end != IMPOSSIBLE]
     if asked.page:
         write(done)
     broken = [case for case in done if case.end == BROKEN]
-    print(json.dumps({"runs": len(done), "seconds": time.perf_counter() - began, "ends": Counter(c.end for c in done)}))
+    ends = Counter(case.end for case in done)
+    seconds = time.perf_counter() - began
+    print(json.dumps({"runs": len(done), "seconds": seconds, "ends": ends, "impossible": impossible}))
     for case in broken:
         print(f"{case.procedure}, {case.row}, {case.what}, seed {case.seed}: {case.why}", file=sys.stderr)
     return int(bool(broken))

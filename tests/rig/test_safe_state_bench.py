@@ -63,7 +63,8 @@ def test_a_run_fails_is_repaired_and_goes_on(bench_file: Callable[..., Path], ri
     failed = rig("run", "sweep", *SMALL_ARGUMENTS, "--bench", str(broken), "--unattended", "--json")
     run = json.loads(failed.out)["run"]
     assert (failed.status, json.loads(failed.out)["state"]) == (3, "failed")
-    assert failed.err.splitlines()[-1].startswith("rig: beta: reading register 0x007F (driver output status): 11 bytes")
+    said = "rig: beta: reading register 0x007F (driver output status): received 11 bytes that are not an answer"
+    assert failed.err.splitlines()[-1].startswith(said)
     assert rig("resume", run, "--unattended").status == 3  # nobody has repaired it
     sound = bench_file({})
     assert rig("resume", run, "--unattended", "--bench", str(sound)).status == 0
