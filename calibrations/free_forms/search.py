@@ -32,6 +32,7 @@ ROUNDS = 7
 LARGEST = 4.0  # of the mean square of the first misfit: more is two components against each other
 HALVINGS = 6  # of a step that overshoots
 NOISE_ALONE, FEW_COMPONENTS = 1.04, 3  # residual over noise and components of a search that needs no second beginning
+MOST_MISFIT = 1.5  # residual over noise: what is left of more is no noise
 SLOW_MOST = 0.5  # slow noise, in noise floors, at most (rms)
 SLOW_FIRST = 0.15  # the same while the first components are found: it would take up part of them
 
@@ -99,21 +100,26 @@ class SearchResult:
         return self.sizes.deviance + ENTER * len(self.active) + prices(self.component(name) for name in self.active)
 
 
-def search(data: PoseData, white: Array, model_effects: ModelEffects, general: bool = True) -> SearchResult:
+def search(
+    data: PoseData, white: Array, model_effects: ModelEffects, general: bool = True, noise_known: bool = True
+) -> SearchResult:
     """Places that act, with their sizes, from several beginnings: the likeliest end counts.
 
     First forms of the catalogue begin, and free forms follow; where that leaves more than noise, or many components,
     all begin together. What is not smooth is found by the one, what has another form by the other. Where the history
     acts, loops that differ from place to place are tried too; without one they resemble most curves with a corner,
     and where they gain little they take up part of what acts elsewhere. Where flicker of any size is likelier than what
-    follows the time, all begins again with it, unless the given model has effects, whose misfit may look like flicker.
+    follows the time, all begins again with it. A misfit looks like flicker too, that of the given model's effects or a
+    large one, and is not asked.
 
     white    standard deviation of each mean, (channels, n)
     general  whether components that can follow almost anything are tried
+    noise_known  whether `white` is the noise of the means; else it is the misfit of an earlier search
     """
 
     best = _likeliest(data, white, model_effects, general, flicker=False)
-    if model_effects.columns.shape[2] or not is_flicker(best, (SLOW_MOST * float(np.sqrt(np.mean(white**2)))) ** 2):
+    limit = (SLOW_MOST * float(np.sqrt(np.mean(white**2)))) ** 2
+    if not noise_known or model_effects.columns.shape[2] or best.ratio > MOST_MISFIT or not is_flicker(best, limit):
         return best
     return min(best, _likeliest(data, white, model_effects, general, flicker=True), key=lambda end: end.criterion)
 

@@ -299,7 +299,7 @@ def _in_larger_noise(result: SearchResult, model_effects: ModelEffects) -> tuple
         factor *= best[1].ratio
         if best[1].ratio < LARGER_NOISE:
             break
-        larger = search(result.data, factor * white, model_effects)
+        larger = search(result.data, factor * white, model_effects, noise_known=False)
         scale = 2 * (larger.gram.rows - larger.gram.base_rank) * float(np.log(factor))
         if larger.criterion + scale + ENTER >= best[0]:
             break
