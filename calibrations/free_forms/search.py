@@ -32,7 +32,7 @@ ROUNDS = 7
 LARGEST = 4.0  # of the mean square of the first misfit: more is two components against each other
 HALVINGS = 6  # of a step that overshoots
 NOISE_ALONE, FEW_COMPONENTS = 1.04, 3  # residual over noise and components of a search that needs no second beginning
-MOST_MISFIT = 1.5  # residual over noise: what is left of more is no noise
+MOST_MISFIT = 1.5  # residual over noise: a larger residual contains effects that the search did not find
 SLOW_MOST = 0.5  # slow noise, in noise floors, at most (rms)
 SLOW_FIRST = 0.15  # the same while the first components are found: it would take up part of them
 
@@ -109,8 +109,8 @@ def search(
     all begin together. What is not smooth is found by the one, what has another form by the other. Where the history
     acts, loops that differ from place to place are tried too; without one they resemble most curves with a corner,
     and where they gain little they take up part of what acts elsewhere. Where flicker of any size is likelier than what
-    follows the time, all begins again with it. A misfit looks like flicker too, that of the given model's effects or a
-    large one, and is not asked.
+    follows the time, all begins again with it. This is not
+    tried where a misfit may look like flicker: beside effects of the given model, or with a large residual.
 
     white    standard deviation of each mean, (channels, n)
     general  whether components that can follow almost anything are tried

@@ -19,8 +19,8 @@ DATE = re.compile(r"\b\d{4}-\d\d-\d\d(?:([T ])\d\d:\d\d(:\d\d(?:\.\d+)?)?(Z|\+00
 NUMBER = re.compile(r"(?<![\w.])(\d+)(\.\d+)?(e[-+]?\d+)?")
 FILLER = re.compile(r"(?:[\s#─━═]|--+)+")
 RELATIVE, LAST_DIGITS = 0.01, 1.5  # by how much a number may differ: of itself, or of its last digit
-LOOSE = 0.25  # of a number in a line with one of these words: ill-conditioned, so that processors differ
-ILL_CONDITIONED = ("steady-state", "its value from gravity has an error")
+LOOSE = 0.1  # of a number in a line with one of these words: ill-conditioned, so that processors differ
+ILL_CONDITIONED = ("steady-state-latest", "its value from gravity has an error")
 
 
 def commands(transcript: str) -> list[str]:

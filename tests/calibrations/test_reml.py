@@ -1,0 +1,55 @@
+"""Sizes of components by restricted likelihood."""
+
+import numpy as np
+import pytest
+
+from calibrations.free_forms.reml import estimate, gains, gram
+
+
+@pytest.mark.parametrize("beyond", [-50.0, -0.1, 0.1, 50.0])
+def test_sizes_that_end_early_decide_as_those_that_do_not(beyond: float) -> None:
+    rng = np.random.default_rng(4)
+    X = rng.standard_normal((200, 13))
+    X[:, 12] += X[:, 2:12] @ np.repeat([1.0, 0.03], 5)
+    g = gram(X, {"large": slice(0, 5), "small": slice(5, 10)}, {"large": 1.0, "small": 1.0}, 2)
+    variances = {"large": 1e-3, "small": 1e-1}
+    whole = estimate(g, variances, {})
+    early = estimate(g, variances, {}, target=whole.deviance + beyond)
+    assert (early.deviance <= whole.deviance + beyond) is (beyond > 0)
+
+
+def test_gains_are_the_greatest_falls_of_the_deviance() -> None:
+    rng = np.random.default_rng(5)
+    X = rng.standard_normal((120, 16))
+    X[:, 15] += X[:, 2:15] @ np.repeat([1.0, 0.4, 0.02], [5, 5, 3])
+    blocks = {"acting": slice(0, 5), "strong": slice(5, 10), "weak": slice(10, 13)}
+    g = gram(X, blocks, dict.fromkeys(blocks, 1.0), 2)
+    acting = estimate(g, {"acting": 1.0}, {})
+    for name, (gained, variance) in gains(g, acting, ["strong", "weak"]).items():
+        falls = [
+            acting.deviance - estimate(g, dict(acting.variances) | {name: v}, {}, rounds=0).deviance
+            for v in variance * np.geomspace(0.5, 2.0, 9)
+        ]
+        assert gained == pytest.approx(falls[4], abs=1e-9)
+        assert gained > max(falls) - 0.05
+
+
+def test_the_inverse_of_many_products_is_their_inverse() -> None:
+    rng = np.random.default_rng(6)
+    X = rng.standard_normal((300, 203))
+    g = gram(X, {"first": slice(0, 120), "second": slice(120, 200)}, {"first": 1.0, "second": 1.0}, 2)
+    variances = {"first": 0.01, "second": 2.0}
+    fitted = estimate(g, variances, {}, rounds=0)
+    H = g.products + np.diag(1 / np.repeat([0.01, 2.0], [120, 80]))
+    np.testing.assert_allclose(fitted.inverse, np.linalg.inv(H), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(fitted.coefficients, np.linalg.solve(H, g.with_data), rtol=1e-9, atol=1e-12)
+
+
+def test_a_base_column_of_rounding_takes_up_nothing() -> None:
+    rng = np.random.default_rng(1)
+    X = rng.standard_normal((50, 4))  # two columns of the base, one of a component, the data
+    X[:, 1] *= 1e-14
+    g = gram(X, {"curve": slice(0, 1)}, {"curve": 1.0}, 2)
+    alone = gram(X[:, [0, 2, 3]], {"curve": slice(0, 1)}, {"curve": 1.0}, 1)
+    assert (g.base_rank, g.base_inverse[1, 1]) == (1, 0.0)
+    assert g.squares == pytest.approx(alone.squares)
