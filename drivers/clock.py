@@ -22,8 +22,9 @@ from weakref import WeakKeyDictionary
 
 from drivers.errors import ClockStuck
 
-STUCK_S = 10.0  # real seconds after which bytes in flight are taken for lost
+STUCK_S = 30.0  # real seconds after which bytes in flight are taken for lost
 DROPPED_S = 0.05  # the same on a wire where the kernel drops some
+FULL_S = 0.2  # real seconds without a further byte after which the kernel is taken to have no room for more
 SLICE_S = 10.0  # longest simulated step while a stream runs: bounds what its server must hold
 TICK_S = 0.02  # how often `serve_forever` looks whether it shall end
 
@@ -34,7 +35,7 @@ class Wire(Protocol):
     key: str  # names the connection; its server knows the same name
     sent: int  # bytes written so far
     received: int  # bytes read so far
-    chunk: int  # so many bytes the kernel surely holds for one read
+    chunk: int  # so many bytes the kernel usually holds for one read
     lossy: bool  # the kernel drops what finds no room
 
     def fileno(self) -> int: ...
@@ -150,12 +151,18 @@ class SimulatedClock:
     def _arrived(self, wire: Wire, count: int) -> bool:
         """Wait until all that was emitted can be read at once: how the kernel cuts it up must not matter.
 
-        A backlog that is longer than one read comes as the kernel has room. Of a connection that has ended nothing is
-        to come. False if the kernel has dropped all of it, which is counted no longer.
+        A backlog comes as the kernel has room: one that is longer than one read, or one for which the kernel opens no
+        window before something is read. Of a connection that has ended nothing is to come. False if the kernel has
+        dropped all of it, which is counted no longer.
         """
-        begun = time.monotonic()
-        while count > 0 and _pending(wire.fileno()) < (count if count <= wire.chunk else 1):
+        begun = grown = time.monotonic()
+        pending = 0
+        while count > 0 and (now_pending := _pending(wire.fileno())) < (count if count <= wire.chunk else 1):
             time.sleep(0)
+            if now_pending != pending:
+                pending, grown = now_pending, time.monotonic()
+            if pending and not wire.lossy and time.monotonic() - grown > FULL_S:
+                return True
             waited_s = time.monotonic() - begun
             if waited_s > DROPPED_S and wire.lossy:
                 self._bases[wire] = self._bases[wire][0], self._bases[wire][1] + count

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 import time
 
@@ -147,6 +148,35 @@ def test_a_server_holds_what_the_kernel_does_not_take() -> None:
         received += link.read(1.0)
     assert received == block
     assert clock.now() == 1.0
+
+
+@pytest.mark.parametrize("room", [4096, 20_000])
+def test_a_kernel_with_little_room_gives_a_short_answer_in_parts(monkeypatch: pytest.MonkeyPatch, room: int) -> None:
+    def connect(address: tuple[str, int], timeout_s: float) -> socket.socket:
+        client = socket.socket()
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, room)
+        client.settimeout(timeout_s)
+        client.connect(address)
+        return client
+
+    monkeypatch.setattr(clock_module, "FULL_S", 0.01)
+    monkeypatch.setattr(socket, "create_connection", connect)
+    clock = SimulatedClock()
+    block = bytes(range(256)) * 120  # less than one read takes, more than the kernel holds
+
+    def answer(connection: Connection, now_s: float) -> None:
+        connection.inbox.clear()
+        connection.send(block, now_s)
+
+    port = Port(LISTEN, answer)
+    clock.attach(Server([port], {}, {}))
+    link = open_link(port.url, clock)
+    link.write(b"?")
+    received = b""
+    while len(received) < len(block):
+        received += link.read(1.0)
+    assert received == block
+    assert clock.now() == 0.0
 
 
 def test_bytes_that_nobody_takes_are_an_error_of_ours(monkeypatch: pytest.MonkeyPatch) -> None:
