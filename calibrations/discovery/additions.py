@@ -8,13 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from calibrations.effects import Effect
-from calibrations.fitting.fit import Fit, evaluate, fit, refit
+from calibrations.fitting.fit import Fit, evaluate, fit, in_white_noise, refit
 from calibrations.fitting.problem import Problem
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.geometry import GEOMETRY
 from calibrations.free_forms.place_names import PREFIX, place_of_effect
 from calibrations.free_forms.structure import Structure
-from calibrations.means.noise import Noise, white_only
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.chain import forward
 from calibrations.table import Array, Table
@@ -78,24 +77,19 @@ def fit_separately(base: Fit, structure: Structure, added: list[Addition]) -> li
 
 
 def fit_together(base: Fit, added: list[Addition]) -> Fit:
-    """Joint fit of all additions, in white noise first.
-
-    The noise of `base` contains the signal of the additions, and a noise of that size suppresses free forms.
-    """
+    """Joint fit of all additions."""
     if not added:
         return base
-    problem = base.problem
-    white = white_only(problem.white, problem.gap_s, len(problem.channels), problem.given)
     model = _with(base.model, added)
-    return refit(replace(base, noise=white), model, _start_values(base, model, white))
+    return refit(base, model, _start_values(base, model))
 
 
-def _start_values(base: Fit, model: Model, noise: Noise) -> Array:
+def _start_values(base: Fit, model: Model) -> Array:
     """Start values of a model, with those of its base fitted again, given the additions.
 
     The fit of a single addition has its own bias and scale factor.
     """
-    problem = Problem.of(model, base.table)
+    problem, noise = Problem.of(model, base.table), in_white_noise(base).noise
     theta = problem.layout.starts()[0]
     base_mask = np.any([problem.layout.of_effect(term.name) for term in base.model.terms], axis=0)
     for _ in range(BASE_STEPS):

@@ -17,8 +17,8 @@ from calibrations.criteria import FORM_PART, REFINEMENT, SIGNIFICANT
 from calibrations.discovery.findings import Step
 from calibrations.discovery.search import cost, first_order_cost
 from calibrations.discovery.significance import chance, of_search
-from calibrations.fitting.fit import Fit
-from calibrations.fitting.shown_forms import Shown, form_columns, forms_at, in_white_noise
+from calibrations.fitting.fit import Fit, in_white_noise
+from calibrations.fitting.shown_forms import Shown, form_columns, forms_at
 from calibrations.free_forms.bases import Basis, Line, Spline, spline
 from calibrations.free_forms.form import Factor, Form
 from calibrations.free_forms.naming import FORM_OF, MOSTLY

@@ -221,17 +221,28 @@ def fit(model: Model, table: Table) -> Fit:
 
 
 def refit(before: Fit, model: Model, start: Array | None = None) -> Fit:
-    """A changed model on the data of `before`, from the noise found there; `start` for all its parameters.
+    """A changed model on the data of `before`; `start` for all its parameters.
 
     Raises ModelError where a free form of the model has no sizes yet, and the data cannot show them.
     """
     if _requests(model):
         from calibrations.fitting.requested_forms import with_sizes
-        from calibrations.fitting.shown_forms import in_white_noise
 
-        model, before = with_sizes(model, before), in_white_noise(before)
+        model = with_sizes(model, before)
     problem = Problem.of(model, before.table)
-    return _alternate(problem, before.noise, problem.layout.starts() if start is None else [start])
+    return _alternate(problem, in_white_noise(before).noise, problem.layout.starts() if start is None else [start])
+
+
+def in_white_noise(before: Fit) -> Fit:
+    """The fit in the white noise of its rows, where that is known.
+
+    Its slow noise contains what the next effect explains. And a fit that begins in white noise depends on the model
+    and the data alone, not on the fits before it.
+    """
+    problem = before.problem
+    if problem.white is None:
+        return before
+    return replace(before, noise=white_only(problem.white, problem.gap_s, len(problem.channels), problem.given))
 
 
 def _alternate(problem: Problem, noise: Noise, starts: list[Array]) -> Fit:

@@ -8,14 +8,14 @@ them, and the sizes follow as those of poses do.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.effects import Effect
-from calibrations.fitting.fit import Fit
+from calibrations.fitting.fit import Fit, in_white_noise
 from calibrations.free_forms.bases import Clips, Line, Products, Settling, spline
 from calibrations.free_forms.components import GENERAL, PRODUCT, Component
 from calibrations.free_forms.effect import free_form
@@ -26,7 +26,6 @@ from calibrations.free_forms.reml import Gram, Sizes, beside_base, eliminated, e
 from calibrations.free_forms.selection import ENTER, select
 from calibrations.free_forms.structure import with_size
 from calibrations.geometry.orientation import out_of_plane
-from calibrations.means.noise import white_only
 from calibrations.table import Array, Table
 
 INTERVALS = {"own": 14, "cross": 10, "out-of-plane": 10, "temperature": 10, "time": 12, "output": 14}  # of a spline
@@ -123,14 +122,6 @@ def forms_at(place: str, fit: Fit) -> dict[str, Form]:
     """The free forms of a place over the range of the fit's samples, by the names that they have in a search."""
     table, force = fit.problem.samples, fit.problem.sensed(fit.theta)
     return {f"{place}/{form.name}": form for form in _forms(place, table, force)}
-
-
-def in_white_noise(before: Fit) -> Fit:
-    """The fit in the white noise of its rows, where that is known: its slow noise took up what a form explains."""
-    problem = before.problem
-    if problem.white is None:
-        return before
-    return replace(before, noise=white_only(problem.white, problem.gap_s, len(problem.channels), problem.given))
 
 
 def estimated_by_residual(before: Fit, place: str) -> Effect:
