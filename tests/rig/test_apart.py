@@ -317,3 +317,23 @@ def test_the_last_status_counts_the_poses_of_the_record() -> None:
     last = read(KEY)
     assert last is not None
     assert (last.phase, last.done, last.state, last.error) == ("ended", 8, "stopped", "stopped")
+
+
+def test_the_status_of_a_killed_process_is_that_of_its_record() -> None:
+    """A process can be killed after a pose is stored and before it is published."""
+    folder().mkdir(parents=True)
+    bench, sweep = read_bench(None), find("sweep")
+    with Record() as record:
+        whole = start(record, bench, sweep, parse(sweep, SMALL), Quiet({})).run.run
+        part = record.begin("sweep", {}, bench={}, identities={}, configuration="", source="a test", constants={})
+        for number, kept in zip(range(3), record.kept(whole), strict=False):
+            record.keep(part, number, kept, None)
+    for run, done in ((part, 2), (whole, POSES - 1)):
+        Status(f"{KEY}-{run}", 4711, "sweep", bench.name, "running", run, done=done, total=POSES).write()
+    stopped, complete = read(f"{KEY}-{part}"), read(f"{KEY}-{whole}")
+    assert stopped is not None
+    assert complete is not None
+    assert (stopped.phase, stopped.state, stopped.done) == ("ended", "stopped", 3)
+    assert "it was killed" in stopped.error
+    assert (complete.phase, complete.state, complete.done, complete.error) == ("ended", "complete", POSES, "")
+    assert read(f"{KEY}-{part}") == stopped

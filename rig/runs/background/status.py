@@ -8,6 +8,7 @@ import os
 import secrets
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,6 +17,7 @@ from typing import Any, Literal
 from procedures.questions import Choice, Confirm, Question
 from rig.bench import Bench, read_bench
 from rig.drawings import drawing_of
+from rig.errors import RigError
 from rig.files import free_bytes, home, write_whole
 from rig.lease import is_held
 from rig.record import Record, Run
@@ -137,16 +139,42 @@ NOT_BEGUN = "it was stopped before the run began"
 
 def read(key: str) -> Status | None:
     """The status of the process `key`; None before its first status. A killed process has ended."""
+    status = _published(key)
+    if status is None or status.phase == "ended" or is_held(home(), lock(key)) or _is_starting(status):
+        return status
+    status = _published(key) or status  # the process may have ended in the meantime
+    return status if status.phase == "ended" else _killed(status)
+
+
+def _published(key: str) -> Status | None:
+    """The last status that the process `key` wrote."""
     try:
         document = json.loads(file(key, "json").read_text(encoding="utf-8"))
     except FileNotFoundError:
         return None
     question = document.pop("asked")
-    status = Status(**document, asked=Asked(**question) if question else None)
-    if status.phase == "ended" or is_held(home(), lock(key)) or _is_starting(status):
+    return Status(**document, asked=Asked(**question) if question else None)
+
+
+def _killed(status: Status) -> Status:
+    """The last status of a killed process. The record says how many poses it stored and whether it was complete."""
+    error = f"its process ended: {_last_words(status.key, status.run)}"
+    status = replace(status, phase="ended", state="stopped", asked=None, error=error)
+    if not status.run:
         return status
-    error = f"its process ended: {_last_words(key, status.run)}"
-    return replace(status, phase="ended", state="stopped", asked=None, error=error)
+    with suppress(RigError, OSError):
+        with Record.to_find(status.run, own=True) as record:
+            run = record.run(status.run)
+        if run.state == "complete":
+            status = replace(status, state=run.state, error="")
+        status = replace(status, done=_stored(run, status.done, status.total))
+        status.write()  # later readers need not look into the record
+    return status
+
+
+def _stored(run: Run, done: int, total: int) -> int:
+    """The poses of a run that has ended. A signal can come before a stored one is counted."""
+    return max(run.rows, done) if total else 0
 
 
 def _is_starting(status: Status) -> bool:
@@ -228,8 +256,8 @@ class StatusWriter(RunViewer):
         self._status.write()
 
     def ended(self, run: Run, error: str, **changes: Any) -> None:
-        """Write the last status, with the poses of the record: a signal can come before a stored one is counted."""
-        done = max(run.rows, self.view.progress.done) if self.view.progress.total else 0
+        """Write the last status, with the poses of the record."""
+        done = _stored(run, self.view.progress.done, self.view.progress.total)
         self.view = replace(self.view, progress=replace(self.view.progress, done=done))
         self.publish(phase="ended", state=run.state, asked=None, error=error, **changes)
 
