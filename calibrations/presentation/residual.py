@@ -199,12 +199,12 @@ class Shown:
         """Output per g, field or deg/s."""
         return float(scales(self.fit)[self.c])
 
-    @property
+    @cached_property
     def factor(self) -> float:
         """From the residual's own unit to `unit`."""
         return 1e3 / self.scale if self.in_g else 1e3
 
-    @property
+    @cached_property
     def unit(self) -> str:
         """What the residual is drawn in."""
         return milli_unit(self.fit) if self.in_g else residual_unit(self.fit)
@@ -214,7 +214,7 @@ class Shown:
         """Of the rows drawn, in `unit`."""
         return np.asarray(self.factor * self.fit.residual[self.c, self.rows])
 
-    @property
+    @cached_property
     def floor(self) -> float:
         """The noise floor in `unit`."""
         return self.factor * float(self.fit.noise.floor[self.c])
@@ -256,9 +256,9 @@ class Shown:
         return "<br>".join(_place(self.fit.table, row))
 
     def _text(self, row: int) -> str:
-        residual = float(self.fit.residual[self.c, row])
-        times = rounded(abs(residual) / float(self.fit.noise.floor[self.c]), 2)
-        error = f"residual {minus(f'{self.factor * residual:+.3g}')} {self.unit}, {times} × the noise floor"
+        residual = self.factor * float(self.fit.residual[self.c, row])
+        times = rounded(abs(residual) / self.floor, 2)
+        error = f"residual {minus(f'{residual:+.3g}')} {self.unit}, {times} × the noise floor"
         return f"{self.place(row)}<br>{error}"
 
 

@@ -102,7 +102,7 @@ class Pictures:
             self.selected = [k for k in self.first if k < fit.table.n]
         elif self.fit.table.n != fit.table.n:
             self.selected = []
-        self.fit, self.session, self.step = fit, session, None
+        self.fit, self.session, self.step = fit, None, None  # nothing is drawn before all fields are set
         self.columns = choices(fit)
         x, colour = first_choices(list(self.columns), fit.table)
         self._offer(fit.channels)
@@ -112,6 +112,7 @@ class Pictures:
             value = select.value if select.value in self.columns else first
             select.set_options({name: column.labels[0] for name, column in self.columns.items()}, value=value)
         self.considered.set_visibility(False)
+        self.session = session
         self.draw()
 
     def _offer(self, channels: Sequence[str]) -> None:
@@ -144,7 +145,9 @@ class Pictures:
         value = self.x.value if self.x.value in self.columns else next(iter(self.columns))
         if step is not None and look:
             value = same or FOLLOWED
+        session, self.session = self.session, None  # draw once
         self.x.set_options({name: column.labels[self.c] for name, column in self.columns.items()}, value=value)
+        self.session = session
         self.draw()
 
     @property
