@@ -39,14 +39,16 @@ def catalogue(folder: Path | None = None) -> Mapping[str, Effect]:
             raise ModelError(f"{folder}: the folder of your own effects does not exist")
         if any(folder.glob("[!_]*.py")):
             LOG.warning("the Python files in %s are run: the bench file names this folder for effects", folder)
-        own = {e.name: e for e in _read_folder(folder, None)}
-        if taken := sorted(effects.keys() & own.keys()):
-            raise ModelError(f"{folder}: {', '.join(taken)} is already in the catalogue; give your effect another name")
-        effects |= own
+        user_effects = {e.name: e for e in _read_folder(folder, None)}
+        if duplicates := sorted(effects.keys() & user_effects.keys()):
+            raise ModelError(
+                f"{folder}: {', '.join(duplicates)} is already in the catalogue; give your effect another name"
+            )
+        effects |= user_effects
     for effect in effects.values():
-        for other in (*effect.after, *effect.contains):
-            if other not in effects:
-                raise ModelError(f'{effect.name}: there is no effect "{other}"{nearest(other, effects)}')
+        for name in (*effect.after, *effect.contains):
+            if name not in effects:
+                raise ModelError(f'{effect.name}: there is no effect "{name}"{nearest(name, effects)}')
     return effects
 
 
@@ -57,29 +59,29 @@ def find(name: str, effects: Mapping[str, Effect]) -> Effect:
     return effects[name]
 
 
-def with_own(given: Iterable[Effect | type[Effect] | str | Path]) -> Mapping[str, Effect]:
-    """The catalogue, and effects of a user's own beside it. Raises ModelError as `chosen` does."""
-    if isinstance(given, (str, Path, Effect, type)):
-        given = (given,)
-    own = {effect.name: effect for effect in map(chosen, given)}
-    return {**catalogue(), **own}
+def with_own(user_effects: Iterable[Effect | type[Effect] | str | Path]) -> Mapping[str, Effect]:
+    """The catalogue, and effects of a user's own beside it. Raises ModelError as `resolve_effect` does."""
+    if isinstance(user_effects, (str, Path, Effect, type)):
+        user_effects = (user_effects,)
+    by_name = {effect.name: effect for effect in map(resolve_effect, user_effects)}
+    return {**catalogue(), **by_name}
 
 
-def chosen(given: Effect | type[Effect] | str | Path) -> Effect:
+def resolve_effect(source: Effect | type[Effect] | str | Path) -> Effect:
     """An effect by its name in the catalogue, its file (.py), or as a class, such as one of a notebook's cell.
 
     Raises UnknownName with the nearest, ModelError for what is no whole effect, and for the name of a shipped one.
     """
-    if isinstance(given, Path) or (isinstance(given, str) and given.endswith(".py")):
-        return read_effect(Path(given))
-    if isinstance(given, str):
-        return find(given, catalogue())
-    if isinstance(given, Effect) and (given is catalogue().get(given.name) or vars(given).get(CHOSEN)):
-        return given
-    cls = type(given) if isinstance(given, Effect) else given
+    if isinstance(source, Path) or (isinstance(source, str) and source.endswith(".py")):
+        return read_effect(Path(source))
+    if isinstance(source, str):
+        return find(source, catalogue())
+    if isinstance(source, Effect) and (source is catalogue().get(source.name) or vars(source).get(CHOSEN)):
+        return source
+    cls = type(source) if isinstance(source, Effect) else source
     if not (isinstance(cls, type) and issubclass(cls, Effect)):
         raise ModelError(
-            f"{given!r} is not an effect; give its name, its file, or a class that derives from cal.Effect"
+            f"{source!r} is not an effect; give its name, its file, or a class that derives from cal.Effect"
         )
     return _of_class(cls)
 
@@ -113,7 +115,7 @@ def read_effect(path: Path) -> Effect:
     """A user's effect from its file. Raises ModelError for a file without one, and for the name of a shipped one."""
     if not path.is_file():
         raise ModelError(f"{path}: there is no such file; an effect of your own is a Python file")
-    effect = _own(path)
+    effect = _user_effect(path)
     if effect.name in catalogue():
         raise ModelError(f"{path}: {effect.name} is already in the catalogue; give the file another name")
     return effect
@@ -121,10 +123,10 @@ def read_effect(path: Path) -> Effect:
 
 def _read_folder(folder: Path, package: str | None) -> Iterable[Effect]:
     for path in sorted(folder.glob("[!_]*.py")):
-        yield _of_module(importlib.import_module(f"{package}.{path.stem}"), path) if package else _own(path)
+        yield _of_module(importlib.import_module(f"{package}.{path.stem}"), path) if package else _user_effect(path)
 
 
-def _own(path: Path) -> Effect:
+def _user_effect(path: Path) -> Effect:
     """A user's effect, whose errors name the user's file."""
     effect = _of_module(_load(path), path)
     for method in (*HOOKS, "follow"):
@@ -149,29 +151,29 @@ def _load(path: Path) -> ModuleType:
 
 def _of_module(module: ModuleType, path: Path) -> Effect:
     """The effect of the one class in a module."""
-    wanted = class_name(path)
+    expected_name = class_name(path)
     classes = [v for v in vars(module).values() if isinstance(v, type) and v.__module__ == module.__name__]
-    found = [cls for cls in classes if issubclass(cls, Effect)]
-    if [cls.__name__ for cls in found] != [wanted]:
-        names = ", ".join(cls.__name__ for cls in found) or "no effect"
-        raise ModelError(f"{path}: must define one effect, `class {wanted}(Effect):`; it defines {names}")
-    effect = found[0]()
+    effects = [cls for cls in classes if issubclass(cls, Effect)]
+    if [cls.__name__ for cls in effects] != [expected_name]:
+        names = ", ".join(cls.__name__ for cls in effects) or "no effect"
+        raise ModelError(f"{path}: must define one effect, `class {expected_name}(Effect):`; it defines {names}")
+    effect = effects[0]()
     effect.name = path.stem.replace("_", "-")
-    _require_parts(effect, f"{path}: {wanted}")
+    _require_parts(effect, f"{path}: {expected_name}")
     if not effect.summary or not effect.symptom:
         raise ModelError(
-            f'{path}: the docstring of {wanted} must begin with "{effect.name}: what happens." and have a line '
+            f'{path}: the docstring of {expected_name} must begin with "{effect.name}: what happens." and have a line '
             '"Symptom ..."'
         )
     return effect
 
 
-def _require_parts(effect: Effect, where: str) -> None:
+def _require_parts(effect: Effect, label: str) -> None:
     """Raise ModelError for an effect without a parameter, or without a place where it acts."""
     if not effect.parameters:
-        raise ModelError(f'{where} has no parameter, as in slope = Parameter("{{out}}/K", typical=0.005)')
+        raise ModelError(f'{label} has no parameter, as in slope = Parameter("{{out}}/K", typical=0.005)')
     if not effect.places:
-        raise ModelError(f"{where} acts nowhere; define at least one of the methods {', '.join(HOOKS)}")
+        raise ModelError(f"{label} acts nowhere; define at least one of the methods {', '.join(HOOKS)}")
 
 
 def class_name(path: Path) -> str:
@@ -207,11 +209,11 @@ def fault(path: Path, error: BaseException, name: str = "") -> ModelError:
     frames = traceback.extract_tb(error.__traceback__)
     lines = [frame.lineno for frame in frames if Path(frame.filename).absolute() == path.absolute()]
     line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
-    where = f"{name or path}, line {line}" if line else name or str(path)
+    place = f"{name or path}, line {line}" if line else name or str(path)
     if isinstance(error, ModelError):  # of a class that is no effect
-        return ModelError(f"{where}: {error}")
-    what = error.msg if isinstance(error, SyntaxError) else str(error)
-    return ModelError(f"{where}: {type(error).__name__}: {what}")
+        return ModelError(f"{place}: {error}")
+    message = error.msg if isinstance(error, SyntaxError) else str(error)
+    return ModelError(f"{place}: {type(error).__name__}: {message}")
 
 
 def guarded(hook: Callable[..., Any], path: Path, name: str = "") -> Callable[..., Any]:
@@ -220,23 +222,23 @@ def guarded(hook: Callable[..., Any], path: Path, name: str = "") -> Callable[..
     """
 
     @wraps(hook)
-    def call(self: Effect, given: Any, *more: Any) -> Any:
+    def call(self: Effect, argument: Any, *others: Any) -> Any:
         try:
-            result = hook(self, given, *more)
+            result = hook(self, argument, *others)
         except Exception as error:
             raise fault(path, error, name) from error
-        if isinstance(given, np.ndarray):
-            _check(result, given, f"{name or path}: {hook.__name__}()")
+        if isinstance(argument, np.ndarray):
+            _check(result, argument, f"{name or path}: {hook.__name__}()")
         return result
 
     return call
 
 
-def _check(result: Any, given: np.ndarray, where: str) -> None:
-    if np.shape(result) != given.shape:
-        raise ModelError(f"{where} must give an array of shape {given.shape}, and gave {_described(result)}")
+def _check(result: Any, argument: np.ndarray, label: str) -> None:
+    if np.shape(result) != argument.shape:
+        raise ModelError(f"{label} must give an array of shape {argument.shape}, and gave {_described(result)}")
     if not np.isfinite(result).all():
-        raise ModelError(f"{where} gave numbers that are not finite; check its divisions and roots")
+        raise ModelError(f"{label} gave numbers that are not finite; check its divisions and roots")
 
 
 def _described(result: Any) -> str:

@@ -148,12 +148,15 @@ class Effect:
     memory: int = 0
 
     def __init_subclass__(cls) -> None:
-        own = {member: value for member, value in vars(cls).items() if not member.startswith("_")}
-        for member, value in own.items():
+        members = {member: value for member, value in vars(cls).items() if not member.startswith("_")}
+        for member, value in members.items():
             _check_member(cls, member, value)
         cls.name = re.sub(r"(?<!^)(?=[A-Z])", "-", cls.__name__).lower()
-        cls.parameters = (*cls.parameters, *(replace(v, name=m) for m, v in own.items() if isinstance(v, Parameter)))
-        cls.constants = {**cls.constants, **{m: v.of for m, v in own.items() if isinstance(v, Constant)}}
+        cls.parameters = (
+            *cls.parameters,
+            *(replace(v, name=m) for m, v in members.items() if isinstance(v, Parameter)),
+        )
+        cls.constants = {**cls.constants, **{m: v.of for m, v in members.items() if isinstance(v, Constant)}}
         cls.places = frozenset(hook for hook in HOOKS if getattr(cls, hook) is not getattr(Effect, hook))
         if "Symptom" in (cls.__doc__ or ""):
             for part, text in _sections(cls.__doc__ or "").items():
@@ -255,9 +258,9 @@ def _check_member(cls: type[Effect], member: str, value: object) -> None:
         if isinstance(value, Constant) and not callable(value.of):
             _refuse(cls, f"the constant {member} needs a function of the table, as in Constant(mean_temperature)")
     elif member in METHODS:
-        wanted = inspect.signature(getattr(Effect, member)).parameters
-        if not inspect.isfunction(value) or list(inspect.signature(value).parameters) != list(wanted):
-            _refuse(cls, f"{member} must be a method: def {member}({', '.join(wanted)})")
+        parameters = inspect.signature(getattr(Effect, member)).parameters
+        if not inspect.isfunction(value) or list(inspect.signature(value).parameters) != list(parameters):
+            _refuse(cls, f"{member} must be a method: def {member}({', '.join(parameters)})")
     elif member in TUPLES:
         if not isinstance(value, tuple) or not all(isinstance(word, str) for word in value):
             _refuse(cls, f'{member} must be a tuple of names, as in ("temperature_c",)')
@@ -279,8 +282,8 @@ def _check_whole(cls: type[Effect]) -> None:
         _refuse(cls, "memory and follow belong together: memory says how many arrays follow keeps")
 
 
-def _refuse(cls: type[Effect], what: str) -> NoReturn:
-    raise ModelError(f"{cls.__name__}: {what}")
+def _refuse(cls: type[Effect], message: str) -> NoReturn:
+    raise ModelError(f"{cls.__name__}: {message}")
 
 
 SECTIONS = {"symptom": "Symptom", "excited_by": "Excited by", "confused_with": "Confused with", "source": "Source"}
@@ -288,8 +291,8 @@ SECTIONS = {"symptom": "Symptom", "excited_by": "Excited by", "confused_with": "
 
 def _sections(doc: str) -> dict[str, str]:
     """The parts of an effect's docstring, each on one line but the formula; "" for a part that is not there."""
-    head, _, rest = inspect.cleandoc(doc).partition("\n\n")
-    pieces = re.split(rf"^({'|'.join(SECTIONS.values())})[ ]+", rest, flags=re.MULTILINE)
+    head, _, body = inspect.cleandoc(doc).partition("\n\n")
+    pieces = re.split(rf"^({'|'.join(SECTIONS.values())})[ ]+", body, flags=re.MULTILINE)
     titled = dict(zip(pieces[1::2], pieces[2::2], strict=True))
     parts = {part: " ".join(titled.get(title, "").split()) for part, title in SECTIONS.items()}
     summary = " ".join(head.partition(":")[2].split())

@@ -106,15 +106,15 @@ class Expression:
                 columns.setdefault(node.name, node.at)
         return columns
 
-    def fault(self, at: int, what: str) -> ExpressionError:
+    def fault(self, at: int, message: str) -> ExpressionError:
         """What is wrong at column `at`, shown in the text."""
-        return fault(self.text, at, what)
+        return fault(self.text, at, message)
 
 
-def fault(text: str, at: int, what: str) -> ExpressionError:
+def fault(text: str, at: int, message: str) -> ExpressionError:
     """What is wrong at column `at` of `text`, with a mark below it."""
     at = min(max(at, 0), len(text))
-    return ExpressionError(f"column {at + 1}: {what}\n    {text}\n    {' ' * at}^")
+    return ExpressionError(f"column {at + 1}: {message}\n    {text}\n    {' ' * at}^")
 
 
 def parse(text: str) -> Expression:
@@ -223,91 +223,91 @@ class _Reader:
         self._text = text
         self._bytes = text.encode(errors="replace")
 
-    def node(self, read: ast.expr, depth: int) -> Node:
+    def node(self, syntax: ast.expr, depth: int) -> Node:
         if depth > DEEPEST:
-            raise self._fault(read, f"more than {DEEPEST} operations within one another; write a Python file instead")
-        match read:
+            raise self._fault(syntax, f"more than {DEEPEST} operations within one another; write a Python file instead")
+        match syntax:
             case ast.Constant(value=bool() | str() | bytes() | complex() | None):
                 pass
             case ast.Constant(value=int() | float() as number):
-                return self._number(read, number)
+                return self._number(syntax, number)
             case ast.Name(id=name):
-                return self._name(read, name)
+                return self._name(syntax, name)
             case ast.UnaryOp(op=op, operand=operand) if type(op) in SIGNS:
-                return self._apply(read, SIGNS[type(op)], [operand], depth)
+                return self._apply(syntax, SIGNS[type(op)], [operand], depth)
             case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
-                return self._apply(read, OPERATORS[type(op)], [left, right], depth)
+                return self._apply(syntax, OPERATORS[type(op)], [left, right], depth)
             case ast.Compare():
-                return self._comparison(read, depth)
+                return self._comparison(syntax, depth)
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
-                return self._call(read, name, arguments, depth)
-        raise self._refused(read)
+                return self._call(syntax, name, arguments, depth)
+        raise self._syntax_error(syntax)
 
-    def _number(self, read: ast.expr, number: float) -> Number:
+    def _number(self, syntax: ast.expr, number: float) -> Number:
         try:
             value = float(number)
         except OverflowError:
             value = np.inf
         if not np.isfinite(value):
-            raise self._fault(read, "a number too large to compute with")
+            raise self._fault(syntax, "a number too large to compute with")
         return Number(value)
 
-    def _name(self, read: ast.expr, name: str) -> Node:
+    def _name(self, syntax: ast.expr, name: str) -> Node:
         if name == "pi":
             return Number(np.pi)
         if name in FUNCTIONS:
-            raise self._fault(read, f"{name} is a function: write {name}(...)")
+            raise self._fault(syntax, f"{name} is a function: write {name}(...)")
         if not name.isascii():
-            raise self._fault(read, f'"{name}": names are written in the letters a to z, such as beta')
-        return Name(name, self._at(read))
+            raise self._fault(syntax, f'"{name}": names are written in the letters a to z, such as beta')
+        return Name(name, self._at(syntax))
 
-    def _call(self, read: ast.expr, name: str, arguments: list[ast.expr], depth: int) -> Node:
+    def _call(self, syntax: ast.expr, name: str, arguments: list[ast.expr], depth: int) -> Node:
         if name not in FUNCTIONS:
-            raise self._fault(read, f'there is no function "{name}"{nearest(name, FUNCTIONS)}')
+            raise self._fault(syntax, f'there is no function "{name}"{nearest(name, FUNCTIONS)}')
         operation = FUNCTIONS[name]
         if not operation.least <= len(arguments) <= operation.most:
             expected = f"{operation.least}" if operation.least == operation.most else f"{operation.least} or more"
-            raise self._fault(read, f"{name} takes {expected} between its brackets, not {len(arguments)}")
-        applied = self._apply(read, operation, arguments, depth)
+            raise self._fault(syntax, f"{name} takes {expected} between its brackets, not {len(arguments)}")
+        applied = self._apply(syntax, operation, arguments, depth)
         if name in OF_ANGLES and (degrees := _degrees(applied)):
-            right = f"write {degrees.removesuffix('_deg')}, the same in rad, or {degrees}*pi/180"
-            raise self._fault(read, f"{name} takes rad, and {degrees} is in degrees: {right}")
+            remedy = f"write {degrees.removesuffix('_deg')}, the same in rad, or {degrees}*pi/180"
+            raise self._fault(syntax, f"{name} takes rad, and {degrees} is in degrees: {remedy}")
         return applied
 
-    def _comparison(self, read: ast.Compare, depth: int) -> Node:
+    def _comparison(self, syntax: ast.Compare, depth: int) -> Node:
         """A chain such as 0 < t < 100 is the product of its links."""
-        terms = [read.left, *read.comparators]
+        terms = [syntax.left, *syntax.comparators]
         links = []
-        for op, left, right in zip(read.ops, terms[:-1], terms[1:], strict=True):
+        for op, lhs, rhs in zip(syntax.ops, terms[:-1], terms[1:], strict=True):
             if type(op) not in COMPARISONS:
-                raise self._refused(read)
-            links.append(self._apply(read, COMPARISONS[type(op)], [left, right], depth))
+                raise self._syntax_error(syntax)
+            links.append(self._apply(syntax, COMPARISONS[type(op)], [lhs, rhs], depth))
         product = links[0]
         for link in links[1:]:
-            product = Apply(OPERATORS[ast.Mult], (product, link), self._at(read))
+            product = Apply(OPERATORS[ast.Mult], (product, link), self._at(syntax))
         return product
 
-    def _apply(self, read: ast.expr, operation: Operation, inner: list[ast.expr], depth: int) -> Node:
-        return Apply(operation, tuple(self.node(argument, depth + 1) for argument in inner), self._at(read))
+    def _apply(self, syntax: ast.expr, operation: Operation, inner: list[ast.expr], depth: int) -> Node:
+        return Apply(operation, tuple(self.node(argument, depth + 1) for argument in inner), self._at(syntax))
 
-    def _at(self, read: ast.expr) -> int:
+    def _at(self, syntax: ast.expr) -> int:
         """The column in characters; Python counts bytes."""
-        return len(self._bytes[: read.col_offset].decode(errors="replace"))
+        return len(self._bytes[: syntax.col_offset].decode(errors="replace"))
 
-    def _fault(self, read: ast.expr, what: str) -> ExpressionError:
-        return fault(self._text, self._at(read), what)
+    def _fault(self, syntax: ast.expr, message: str) -> ExpressionError:
+        return fault(self._text, self._at(syntax), message)
 
-    def _refused(self, read: ast.expr) -> ExpressionError:
-        part = ast.get_source_segment(self._text, read) or self._text
+    def _syntax_error(self, syntax: ast.expr) -> ExpressionError:
+        part = ast.get_source_segment(self._text, syntax) or self._text
         hint = next((f": {words}" for sign, words in INSTEAD.items() if sign in part), "")
-        allowed = f"numbers, names, + - * / **, comparisons and {', '.join(FUNCTIONS)} are"
-        return self._fault(read, f"{part[:40]!r} is not allowed here{hint}; {allowed}")
+        vocabulary = f"numbers, names, + - * / **, comparisons and {', '.join(FUNCTIONS)} are"
+        return self._fault(syntax, f"{part[:40]!r} is not allowed here{hint}; {vocabulary}")
 
 
 def _power(base: Array, exponent: Array) -> Array:
     """`base ** exponent`, cut off at HUGE; no number where 0 is divided by, or the root of a negative one is taken."""
-    whole = np.clip(np.power(base, exponent), -HUGE, HUGE)
-    return np.asarray(np.where((base == 0) & (exponent < 0), np.nan, whole))
+    power = np.clip(np.power(base, exponent), -HUGE, HUGE)
+    return np.asarray(np.where((base == 0) & (exponent < 0), np.nan, power))
 
 
 def _exp(x: Array) -> Array:
@@ -327,7 +327,7 @@ def _step(x: Array) -> Array:
     return np.asarray(np.where(x >= 0, 1.0, 0.0 * x))
 
 
-def _where(condition: Array, yes: Array, no: Array) -> Array:
+def _select(condition: Array, yes: Array, no: Array) -> Array:
     return np.where(condition != 0, yes, no)
 
 
@@ -357,7 +357,7 @@ FUNCTIONS: Mapping[str, Operation] = {
         _unary("step", _step),
         Operation("min", _least, 2, MANY),
         Operation("max", _greatest, 2, MANY),
-        Operation("where", _where, 3, 3),
+        Operation("where", _select, 3, 3),
     )
 }
 SIGNS: Mapping[type[ast.unaryop], Operation] = {

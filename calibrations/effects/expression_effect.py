@@ -46,21 +46,21 @@ def effect_for(name: str, text: str, table: Table) -> Effect:
     Raises ExpressionError for what it is not, and for a name that looks like a misspelt column.
     """
     expression = parse(text)
-    known = {*COLUMNS, *FORCES, *(column for column in table.columns if column not in MEASURED)}
+    column_names = {*COLUMNS, *FORCES, *(column for column in table.columns if column not in MEASURED)}
     for word, at in expression.names.items():
-        similar = difflib.get_close_matches(word, known | {*FUNCTIONS}, n=1, cutoff=MISSPELT)
-        if similar and word not in known and len(word) > 3 and not word.startswith(similar[0]):
+        similar = difflib.get_close_matches(word, column_names | {*FUNCTIONS}, n=1, cutoff=MISSPELT)
+        if similar and word not in column_names and len(word) > 3 and not word.startswith(similar[0]):
             raise expression.fault(
                 at, f'"{word}" is no column; did you mean "{similar[0]}"? Name a parameter otherwise'
             )
     effect = own_effect(name, expression.text, tuple(w for w in expression.names if w in table and may_be_column(w)))
     for column in effect.needs:
         if column not in table:
-            word = next((short for short, needed in COLUMNS.items() if needed == column), column)
+            word = next((short for short, full_name in COLUMNS.items() if full_name == column), column)
             at = expression.names.get(word, 0)
             raise expression.fault(at, f"needs the column {column}; {table.source} has: {', '.join(table.columns)}")
-    if why := effect.lacks(table):
-        raise expression.fault(0, f"{why}; {table.source} has: {', '.join(table.output_names)}")
+    if reason := effect.lacks(table):
+        raise expression.fault(0, f"{reason}; {table.source} has: {', '.join(table.output_names)}")
     return effect
 
 
@@ -93,7 +93,7 @@ class _FromExpression(Effect):
         self._expression = expression
         self.name, self.expression = name, expression.text
         self.formula = expression.text if "+=" in expression.text else f"v += {expression.text}"
-        self.needs = _needs(expression, parameters)
+        self.needs = _required_columns(expression, parameters)
         self.kinds = OF_ACCELEROMETERS if target == "v" else ("poses", "motion")
         self.constants = {_scale(p): partial(_size, expression, parameters, p) for p in parameters}
         self.parameters = tuple(
@@ -149,20 +149,22 @@ class _OnOutput(_FromExpression):
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
         columns = variables(self._expression.names, table) | forces(a)
         values = {name: column[:, None] for name, column in columns.items()}
-        target, out, axes = self._expression.target, np.zeros(a.shape), len(table.axes)
+        target, contribution, axes = self._expression.target, np.zeros(a.shape), len(table.axes)
         parameters = {q.name: p[q.name] for q in self.parameters}
         if target == "v":
-            out[:, :axes] = self._value(values, {name: v[:axes] for name, v in parameters.items()}, (len(a), axes))
+            contribution[:, :axes] = self._value(
+                values, {name: v[:axes] for name, v in parameters.items()}, (len(a), axes)
+            )
         else:
-            out[:, [AXES.index(target[1])]] = self._value(values, parameters, (len(a), 1))
-        return out
+            contribution[:, [AXES.index(target[1])]] = self._value(values, parameters, (len(a), 1))
+        return contribution
 
 
 def _on_angle(expression: Expression) -> bool:
     return expression.target.endswith("_deg")
 
 
-def _needs(expression: Expression, parameters: tuple[str, ...]) -> tuple[str, ...]:
+def _required_columns(expression: Expression, parameters: tuple[str, ...]) -> tuple[str, ...]:
     """Columns without which it has no value."""
     words = [word for word in expression.names if word not in {*FORCES, *parameters}]
     target = expression.target

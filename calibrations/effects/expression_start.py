@@ -130,8 +130,8 @@ class _Search:
 
     def column(self, values: Mapping[str, Array]) -> Array:
         """Contribution of the expression to the outputs, axis after axis, shape (axes * n,)."""
-        added = np.broadcast_to(evaluate(self.expression.root, values), (self.table.n,))
-        return (self.weights * added[:, None])[:, self.axes].T.ravel()
+        contribution = np.broadcast_to(evaluate(self.expression.root, values), (self.table.n,))
+        return (self.weights * contribution[:, None])[:, self.axes].T.ravel()
 
     @cached_property
     def weights(self) -> Array:
@@ -167,8 +167,8 @@ def _combinations(grids: list[Array]) -> list[tuple[float, ...]]:
     if np.prod([float(len(grid)) for grid in grids]) <= LARGEST_TRIALS:
         return [tuple(map(float, values)) for values in product(*grids)]
     rng = np.random.default_rng(len(grids))
-    chosen = [rng.choice(grid, LARGEST_TRIALS) for grid in grids]
-    return [tuple(map(float, values)) for values in zip(*chosen, strict=True)]
+    choices = [rng.choice(grid, LARGEST_TRIALS) for grid in grids]
+    return [tuple(map(float, values)) for values in zip(*choices, strict=True)]
 
 
 def _spacing(grid: Array, at: float) -> float:
@@ -216,7 +216,7 @@ def _path(node: Node, name: str) -> list[Apply]:
         return []
     if any(_is(inner_node, name) for inner_node in node.inner) and node.operation.name not in ("neg", "pos"):
         return [node]
-    return next(([node, *below] for inner_node in node.inner if (below := _path(inner_node, name))), [])
+    return next(([node, *tail] for inner_node in node.inner if (tail := _path(inner_node, name))), [])
 
 
 def _is(node: Node, name: str) -> bool:
@@ -230,8 +230,8 @@ def _levels(column: Array) -> Array:
     """Levels between neighbouring values of a column of sorted values."""
     if len(column) == 1:
         return np.unique(np.append(_both_signs(ANY * abs(column[0])), column))
-    between = (column[1:] + column[:-1]) / 2
-    return np.asarray(between[np.unique(np.linspace(0, len(between) - 1, LEVELS).astype(int))])
+    midpoints = (column[1:] + column[:-1]) / 2
+    return np.asarray(midpoints[np.unique(np.linspace(0, len(midpoints) - 1, LEVELS).astype(int))])
 
 
 def _both_signs(positive: Array) -> Array:

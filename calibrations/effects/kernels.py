@@ -57,10 +57,10 @@ def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array, begun: Arra
                 present = on_the_way[i, j, k] if j < on_the_way.shape[1] else a[i, k]
                 _move(forces, previous, present, limits, pressed[i, k])
                 previous = present
-            together = forces[0]
+            total_force = forces[0]
             for e in range(1, len(limits)):
-                together += forces[e]
-            shares[i, k] = together / total
+                total_force += forces[e]
+            shares[i, k] = total_force / total
     return shares
 
 

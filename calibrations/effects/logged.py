@@ -74,16 +74,16 @@ def _without_scatter(table: Table, name: str, power: int) -> tuple[Array, float,
 
     A standard deviation scatters in proportion to itself, so that its logarithm is smoothed.
     """
-    read = table.column(name)
-    if name in table.std_names and np.all(read > 0):
-        exponent, error, change = _smoothed(power * np.log(read))
+    readings = table.column(name)
+    if name in table.std_names and np.all(readings > 0):
+        exponent, error, change = _smoothed(power * np.log(readings))
         values = np.exp(exponent)
         size = float(np.sqrt(np.mean(values**2)))
         return values, error * size, change * size
-    return _smoothed(read**power)
+    return _smoothed(readings**power)
 
 
-def _smoothed(read: Array) -> tuple[Array, float, float]:
+def _smoothed(logged: Array) -> tuple[Array, float, float]:
     """The level of readings (n,), its rms error and that of its change from row to row.
 
     The straight line is taken off first: the cosine transform continues a record as its mirror image, and the line
@@ -91,10 +91,10 @@ def _smoothed(read: Array) -> tuple[Array, float, float]:
     """
     from calibrations.estimators.scatter import without_scatter  # scipy is slow to import, and a list needs none
 
-    rows = np.arange(len(read))
-    line = np.polyval(np.polyfit(rows, read, 1), rows)
-    readings = 1 + int(np.count_nonzero(np.diff(read)))
-    smooth = without_scatter(read - line, readings)
+    rows = np.arange(len(logged))
+    line = np.polyval(np.polyfit(rows, logged, 1), rows)
+    readings = 1 + int(np.count_nonzero(np.diff(logged)))
+    smooth = without_scatter(logged - line, readings)
     return np.asarray(line + smooth.values), smooth.error, smooth.change_error
 
 
@@ -121,9 +121,9 @@ def temperature_rate_c_s(table: Table) -> Array:
 @lru_cache(maxsize=64)
 def leading_temperature(table: Table, lead_s: float) -> Array:
     """The same from the readings without their scatter; as logged where no time changes."""
-    shown = table.column("temperature_c")
+    logged = table.column("temperature_c")
     if "t_s" not in table or not np.ptp(table.time_s) > 0:
-        return shown
+        return logged
     temperature, t = level(table, "temperature_c"), table.time_s
     return temperature + lead_s * _rate(temperature, t) if lead_s >= 0 else _lagging(temperature, t, -lead_s)
 
@@ -140,10 +140,10 @@ def _rate(x: Array, t: Array) -> Array:
 def _lagging(x: Array, t: Array, time_constant_s: float) -> Array:
     """x behind a first-order lag, (n,), settled at the first row; straight between the rows."""
     step = np.diff(t)
-    kept = np.exp(-step / time_constant_s)
-    behind = time_constant_s * np.diff(x) / np.where(step > 0, step, np.inf)
-    out = np.empty_like(x)
-    out[0] = x[0]
-    for i, (share, ramp) in enumerate(zip(kept, behind, strict=True)):
-        out[i + 1] = x[i + 1] - ramp + share * (out[i] - x[i] + ramp)
-    return out
+    memory = np.exp(-step / time_constant_s)
+    ramps = time_constant_s * np.diff(x) / np.where(step > 0, step, np.inf)
+    lagged = np.empty_like(x)
+    lagged[0] = x[0]
+    for i, (share, ramp) in enumerate(zip(memory, ramps, strict=True)):
+        lagged[i + 1] = x[i + 1] - ramp + share * (lagged[i] - x[i] + ramp)
+    return lagged

@@ -22,7 +22,7 @@ def time_constants_s(table: Table) -> Array:
     return np.asarray(np.maximum(starts, SHORTEST_S))
 
 
-def left(table: Table, p: Values) -> Array:
+def remaining_share(table: Table, p: Values) -> Array:
     """Share of the approach that is still to come, shape (n,)."""
     share: Array = np.exp(-(table.time_s - p.begin_s) / p.time_constant)
     return share

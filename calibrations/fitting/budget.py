@@ -86,8 +86,8 @@ class Budget:
     @cached_property
     def coverage(self) -> Array:
         """Coverage factor of each parameter for 95 %, from the whole degrees of freedom (GUM G.4.1)."""
-        whole = np.minimum(np.maximum(np.floor(np.where(np.isnan(self.freedom), 1e9, self.freedom)), 1), 1e9)
-        return np.asarray(stdtrit(whole, (1 + COVERAGE) / 2))
+        whole_freedom = np.minimum(np.maximum(np.floor(np.where(np.isnan(self.freedom), 1e9, self.freedom)), 1), 1e9)
+        return np.asarray(stdtrit(whole_freedom, (1 + COVERAGE) / 2))
 
     @cached_property
     def expanded(self) -> Array:
@@ -100,8 +100,8 @@ def make_budget(fit: Fit, inputs: Iterable[Contribution]) -> Budget:
     cautious = cautiously(fit)
     G = row_gains(cautious)
     of_inputs = [_of_type_b(fit, G, c) for c in inputs]
-    own = _of_type_a(cautious, G, sum(square for _, square in of_inputs))
-    return Budget((*own, *(line for line, _ in of_inputs)))
+    type_a = _of_type_a(cautious, G, sum(square for _, square in of_inputs))
+    return Budget((*type_a, *(line for line, _ in of_inputs)))
 
 
 def row_gains(fit: Fit) -> Array:
@@ -115,13 +115,13 @@ def row_gains(fit: Fit) -> Array:
 def _of_type_a(fit: Fit, G: Array, square: float) -> list[Line]:
     """The fit's own covariance, in its parts; what the inputs leave in the residual, `square`, is no noise."""
     noise, rows = fit.noise, fit.residual.size - len(fit.theta)
-    everything = np.array([np.nan if e.std is None else e.std for e in fit.params.values()]) ** 2
-    by_noise = everything / fit.birge**2
+    variances = np.array([np.nan if e.std is None else e.std for e in fit.params.values()]) ** 2
+    by_noise = variances / fit.birge**2
     white = np.minimum(np.einsum("pcn,cn->p", G**2, noise.white**2), by_noise)
     scatter = np.minimum(np.einsum("pcn,c->p", G**2, noise.scatter**2), by_noise - white)
-    slow, misfit = by_noise - white - scatter, everything - by_noise
-    beyond = float(np.sum(fit.residual**2) - np.sum(noise.white**2))
-    share = min(max(1 - square / beyond, 0.0), 1.0) if square and beyond > 0 else 1.0
+    slow, misfit = by_noise - white - scatter, variances - by_noise
+    nonwhite_square = float(np.sum(fit.residual**2) - np.sum(noise.white**2))
+    share = min(max(1 - square / nonwhite_square, 0.0), 1.0) if square and nonwhite_square > 0 else 1.0
     parts = [
         ("white noise of the dwells", white, float(rows)),
         ("scatter from row to row", share * scatter, float(rows)),
@@ -139,22 +139,22 @@ def _of_type_b(fit: Fit, G: Array, c: Contribution) -> tuple[Line, float]:
     """One input that is not fitted, and the sum of squares that its errors leave in the residual."""
     if c.std is None:
         return Line(c.source, "B", c.unit, None, None, None, c.freedom), 0.0
-    shown, number = _shown(fit, c), c.shared(fit.table)
+    row_errors, number = _errors_of_rows(fit, c), c.shared(fit.table)
     by_error = input_effects(fit, G, c)
     sensitivity = by_error[0] if len(by_error) == 1 else np.sqrt(np.sum(by_error**2, axis=0))
     line = Line(c.source, "B", c.unit, c.std, sensitivity, np.abs(sensitivity) * c.std, c.freedom)
-    return line, c.std**2 * _remaining_square(shown, fit.jacobian, by_error, number)
+    return line, c.std**2 * _remaining_square(row_errors, fit.jacobian, by_error, number)
 
 
 def input_effects(fit: Fit, G: Array, c: Contribution) -> Array:
     """What each error of an input, shared by its rows, does to each parameter, shape (errors, p)."""
     number = c.shared(fit.table)
     by_error = np.zeros((int(number.max()) + 1, len(G)))
-    np.add.at(by_error, number, np.einsum("pcn,cn->np", G, _shown(fit, c)))
+    np.add.at(by_error, number, np.einsum("pcn,cn->np", G, _errors_of_rows(fit, c)))
     return by_error
 
 
-def _shown(fit: Fit, c: Contribution) -> Array:
+def _errors_of_rows(fit: Fit, c: Contribution) -> Array:
     """Which error of the rows looks like one of an input, shape (channels, n).
 
     The residual is measured less predicted: a parameter follows an input against what the residual does.
@@ -162,14 +162,14 @@ def _shown(fit: Fit, c: Contribution) -> Array:
     return -c.derivative(fit.problem, fit.theta)
 
 
-def _remaining_square(shown: Array, jacobian: Array, by_error: Array, number: NDArray[np.intp]) -> float:
+def _remaining_square(row_errors: Array, jacobian: Array, by_error: Array, number: NDArray[np.intp]) -> float:
     """Sum of squares of what errors (channels, n) leave of themselves when the parameters follow them by `by_error`.
 
     One error for each `number`; the jacobian (channels, n, p) takes `by_error` (numbers, p) back to the rows.
     """
     crossed = np.einsum("cnp,np->cn", jacobian, by_error[number])
     normal = np.einsum("cnp,cnq->pq", jacobian, jacobian)
-    return float(np.sum(shown**2) - 2 * np.sum(shown * crossed) + np.sum((by_error @ normal) * by_error))
+    return float(np.sum(row_errors**2) - 2 * np.sum(row_errors * crossed) + np.sum((by_error @ normal) * by_error))
 
 
 def slow_freedom(noise: Noise) -> float:
@@ -194,13 +194,15 @@ def slow_freedom(noise: Noise) -> float:
 # Whoever computes something from several results needs both (GUM 5.2, H.2).
 
 
-def parameter_correlation(fit: Fit, drawn: Budget, inputs: Iterable[Contribution]) -> Array:
-    """Shape (p, p), 1 on the diagonal, for the budget `drawn` of `fit`; NaN where a parameter is not determined."""
+def parameter_correlation(fit: Fit, budget: Budget, inputs: Iterable[Contribution]) -> Array:
+    """Shape (p, p), 1 on the diagonal, for the `budget` of `fit`; NaN where a parameter is not determined."""
     cautious = cautiously(fit)
     G = row_gains(cautious)
     by_noise, _ = covariance(cautious.information, fit.problem.layout.typical)
-    own = np.sqrt(sum((line.std**2 for line in drawn.given if line.kind == "A" and line.std is not None), np.zeros(1)))
-    joint = normalised(by_noise) * np.outer(own, own)
+    type_a_std = np.sqrt(
+        sum((line.std**2 for line in budget.given if line.kind == "A" and line.std is not None), np.zeros(1))
+    )
+    joint = normalised(by_noise) * np.outer(type_a_std, type_a_std)
     for c in inputs:
         if c.std:
             by_error = input_effects(fit, G, c)

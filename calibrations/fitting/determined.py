@@ -47,8 +47,8 @@ def unseen_variance(leverage: Array) -> float:
 
 def undetermined(fit: Fit) -> str | None:
     """Why a small residual is no proof on this data, in words; None where the data determine the model."""
-    if why := magnetometer_coverage_warning(fit.table):
-        return why
+    if reason := magnetometer_coverage_warning(fit.table):
+        return reason
     leverage = leverages(fit)
     variance, lone = unseen_variance(leverage), leverage > 1 - ROUNDING
     if variance <= MOST_UNCERTAIN:
@@ -67,57 +67,57 @@ def _unchecked(fit: Fit, lone: NDArray[np.bool_]) -> str:
     """That some rows, `lone` in shape (channels, n), have parameters to themselves."""
     rows = np.flatnonzero(lone.any(axis=0))
     paths = fit.table.labels.get("path")
-    which = [paths[k] for k in rows] if paths else [f"row {number}" for number in fit.table.numbered(rows)]
+    labels = [paths[k] for k in rows] if paths else [f"row {number}" for number in fit.table.numbered(rows)]
     return (
         f"the fit cannot check all of the {len(fit.theta)} parameters: {lone.sum()} of the {lone.size} measured "
         "values "
-        f"({', '.join(which)}) each determine one parameter alone; repeat these measurements"
+        f"({', '.join(labels)}) each determine one parameter alone; repeat these measurements"
     )
 
 
-def lets_go(before: Fit, after: Fit) -> bool:
-    """Whether a parameter that `before` knew is known no longer: of positions only, whose orientation is not known.
+def lets_go(smaller: Fit, larger: Fit) -> bool:
+    """Whether a parameter that `smaller` knew is known no longer: of positions only, whose orientation is not known.
 
     Effects that bend the output enough make one magnitude of anything: of a sphere without end, and of no other sense.
     """
-    if not after.table.type.magnitude:
+    if not larger.table.type.magnitude:
         return False
-    identified = {key for key, e in before.params.items() if e.identified}
-    return any(key in identified and not e.identified for key, e in after.params.items())
+    identified = {key for key, e in smaller.params.items() if e.identified}
+    return any(key in identified and not e.identified for key, e in larger.params.items())
 
 
 def blind_to(fit: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:
     """The effects, of the model or not, that this table has the columns for and whose parameters it leaves unknown."""
-    return tuple(name for name, effect in effects.items() if _hidden(fit, effect))
+    return tuple(name for name, effect in effects.items() if _cannot_be_shown(fit, effect))
 
 
-def _hidden(fit: Fit, effect: Effect) -> bool:
+def _cannot_be_shown(fit: Fit, effect: Effect) -> bool:
     if effect.incidental:
         return False
     if fit.table.content in effect.kinds and effect.lacks(fit.table) is not None:
         return True
-    return _can_be_asked(fit, effect) and not _shows(fit, effect)
+    return _has_enough_data(fit, effect) and not _is_determined(fit, effect)
 
 
-def _can_be_asked(fit: Fit, effect: Effect) -> bool:
+def _has_enough_data(fit: Fit, effect: Effect) -> bool:
     """Whether there is a column for all that it needs, and a row for each parameter."""
     if effect.excluded(fit.table) is not None:
         return False
     return fit.residual.size > len(Layout.of(fit.model.with_effect(effect), fit.table).slots)
 
 
-def _shows(fit: Fit, effect: Effect) -> bool:
+def _is_determined(fit: Fit, effect: Effect) -> bool:
     """Whether a parameter of the effect is determined, from any of its starts."""
     model = fit.model if fit.model.holds(effect.name) else fit.model.with_effect(effect)
     problem = Problem.of(model, fit.table)
-    mine, typical = problem.layout.of_effect(effect.name), problem.layout.typical
+    own_columns, typical = problem.layout.of_effect(effect.name), problem.layout.typical
     starts = [fit.theta] if model is fit.model else problem.layout.starts()
-    return any(_determined(fit, problem.jacobian(theta), mine, typical) for theta in starts)
+    return any(_determined(fit, problem.jacobian(theta), own_columns, typical) for theta in starts)
 
 
-def _determined(fit: Fit, jacobian: Array, mine: NDArray[np.bool_], typical: Array) -> bool:
-    if not np.any(jacobian[:, :, mine]):
+def _determined(fit: Fit, jacobian: Array, own_columns: NDArray[np.bool_], typical: Array) -> bool:
+    if not np.any(jacobian[:, :, own_columns]):
         return False
     cov, null = covariance(fit.noise.whiten(jacobian), typical)
     std, free = np.sqrt(np.diag(cov)), np.sum(null**2, axis=0)
-    return bool(np.any((free[mine] <= UNDETERMINED) & (std[mine] < typical[mine])))
+    return bool(np.any((free[own_columns] <= UNDETERMINED) & (std[own_columns] < typical[own_columns])))

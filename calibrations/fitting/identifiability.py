@@ -40,9 +40,9 @@ def _directions(jacobian: Array, typical: Array) -> tuple[Array, Array, Array]:
     norm = np.linalg.norm(scaled, axis=0)
     norm = np.where(norm > ROUNDING * norm.max(), norm, 1.0)
     U, s, Vt = np.linalg.svd(scaled / norm, full_matrices=False)
-    good = s > RELATIVE_RANK * s[0]
-    root = (Vt[good].T / s[good]) * (typical / norm)[:, None]
-    return U[:, good], root, Vt[~good] / norm
+    determined = s > RELATIVE_RANK * s[0]
+    root = (Vt[determined].T / s[determined]) * (typical / norm)[:, None]
+    return U[:, determined], root, Vt[~determined] / norm
 
 
 def estimates(model: Model, layout: Layout, theta: Array, jacobian: Array, wider: Array) -> Model:
@@ -53,11 +53,11 @@ def estimates(model: Model, layout: Layout, theta: Array, jacobian: Array, wider
     std, free = wider * np.sqrt(np.diag(cov)), null.T @ null
     by_term: list[list[Estimate]] = [[] for _ in model.terms]
     for k, slot in enumerate(layout.slots):
-        why = _why_not(k, layout, std, free)
+        reason = _why_not(k, layout, std, free)
         unit = slot.parameter.unit.replace("{out}", layout.unit)
         uncertainty = None if free[k, k] > UNDETERMINED else float(std[k])
         by_term[slot.term].append(
-            Estimate(slot.parameter.name, slot.axis, float(theta[k]), uncertainty, unit, why is None, why)
+            Estimate(slot.parameter.name, slot.axis, float(theta[k]), uncertainty, unit, reason is None, reason)
         )
     terms = tuple(replace(term, estimates=tuple(e)) for term, e in zip(model.terms, by_term, strict=True))
     return replace(model, terms=terms, correlations=None)  # those of earlier values

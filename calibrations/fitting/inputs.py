@@ -72,8 +72,8 @@ def column_derivative(name: str, step: float) -> Derivative:
     """With respect to a column of the table, by central differences."""
 
     def derivative(problem: Problem, theta: Array) -> Array:
-        ahead, behind = (_shifted(problem, name, by).residual(theta) for by in (step, -step))
-        return (ahead - behind) / (2 * step)
+        forward, backward = (_shifted(problem, name, by).residual(theta) for by in (step, -step))
+        return (forward - backward) / (2 * step)
 
     return derivative
 
@@ -83,17 +83,17 @@ def step_derivative(effect: Effect, step: float) -> Derivative:
 
     def derivative(problem: Problem, theta: Array) -> Array:
         steps = problem.layout.steps(theta)
-        ahead, behind = (problem.residual_by([*steps, (effect, Values(by=np.asarray(by)))]) for by in (step, -step))
-        return (ahead - behind) / (2 * step)
+        forward, backward = (problem.residual_by([*steps, (effect, Values(by=np.asarray(by)))]) for by in (step, -step))
+        return (forward - backward) / (2 * step)
 
     return derivative
 
 
 def input_contributions(table: Table) -> tuple[Contribution, ...]:
     """Every input that this kind of table has. Raises DataError for a constant that is no number."""
-    own = {"poses": _of_poses, "rates": _of_rates}.get(table.kind, list)
-    contributions = [*_of_any(table), *own()]
-    return tuple(replace(c, std=_given(table, constant)) for constant, c in contributions)
+    of_kind = {"poses": _of_poses, "rates": _of_rates}.get(table.kind, list)
+    contributions = [*_of_any(table), *of_kind()]
+    return tuple(replace(c, std=_stated_std(table, constant)) for constant, c in contributions)
 
 
 def _of_poses() -> list[tuple[str, Contribution]]:
@@ -112,24 +112,27 @@ def _of_poses() -> list[tuple[str, Contribution]]:
         ),
         *(("tilt_std_deg", _common(f"level of the base about {axis}", "deg", _tilt(k))) for k, axis in enumerate("xy")),
         *_of_the_mount(),
-        ("offset_std_v", _common("offset of the converter", "V", step_derivative(_Input("output", _more), 1e-4))),
+        (
+            "offset_std_v",
+            _common("offset of the converter", "V", step_derivative(_Input("output", _add_to_output), 1e-4)),
+        ),
     ]
 
 
 def _of_rates() -> list[tuple[str, Contribution]]:
-    return [("rate_std", _common("speed of the stage", "1", _faster)), *_of_the_mount()]
+    return [("rate_std", _common("speed of the stage", "1", _rate_derivative)), *_of_the_mount()]
 
 
 def _of_the_mount() -> list[tuple[str, Contribution]]:
     return [("mount_std_deg", _common(f"mount about {axis}", "deg", _turn(k))) for k, axis in enumerate("xyz")]
 
 
-def _faster(problem: Problem, theta: Array) -> Array:
+def _rate_derivative(problem: Problem, theta: Array) -> Array:
     """With respect to the share by which the stage turns faster than it says."""
     share = 1e-4
     change = share * problem.table.column("rate_deg_s")
-    ahead, behind = (_shifted(problem, "rate_deg_s", by).residual(theta) for by in (change, -change))
-    return (ahead - behind) / (2 * share)
+    forward, backward = (_shifted(problem, "rate_deg_s", by).residual(theta) for by in (change, -change))
+    return (forward - backward) / (2 * share)
 
 
 def _of_any(table: Table) -> list[tuple[str, Contribution]]:
@@ -142,7 +145,7 @@ def _of_any(table: Table) -> list[tuple[str, Contribution]]:
     return sources
 
 
-def _given(table: Table, constant: str) -> float | None:
+def _stated_std(table: Table, constant: str) -> float | None:
     return table.number(constant, 0.0) if constant in table.constants else None
 
 
@@ -177,7 +180,7 @@ def _times(v: Array, table: Table, p: Values) -> Array:  # noqa: ARG001
     return v * (1 + p.by)
 
 
-def _more(v: Array, table: Table, p: Values) -> Array:  # noqa: ARG001
+def _add_to_output(v: Array, table: Table, p: Values) -> Array:  # noqa: ARG001
     return v + p.by
 
 

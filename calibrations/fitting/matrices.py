@@ -58,11 +58,11 @@ def calibration_matrices(fit: Fit) -> CalibrationMatrices | None:
     if not np.isfinite(M).all() or not np.isfinite(S).all():
         return None
     typical = STEP * fit.problem.layout.typical
-    ahead, behind = ([_stacked(fit, fit.theta + side * step) for step in np.diag(typical)] for side in (1, -1))
-    slopes = (np.array(ahead) - np.array(behind)) / (2 * typical[:, None])
+    forward, backward = ([_stacked(fit, fit.theta + side * step) for step in np.diag(typical)] for side in (1, -1))
+    slopes = (np.array(forward) - np.array(backward)) / (2 * typical[:, None])
     deviations = _parts(_deviation(slopes, _covariance(fit)))
-    beyond = tuple(name for name in fit.model.effects if name not in LINEAR_EFFECTS)
-    return CalibrationMatrices(M, S, b, *deviations, fit.table.input_unit, beyond)
+    nonlinear_effects = tuple(name for name in fit.model.effects if name not in LINEAR_EFFECTS)
+    return CalibrationMatrices(M, S, b, *deviations, fit.table.input_unit, nonlinear_effects)
 
 
 def _stacked(fit: Fit, theta: Array) -> Array:
@@ -91,6 +91,6 @@ def _covariance(fit: Fit) -> Array:
 
 def _deviation(slopes: Array, cov: Array) -> Array:
     """Standard deviations (k,) of what has the derivatives `slopes` (p, k); NaN only where it follows a NaN."""
-    known = np.isfinite(np.diag(cov))
-    variance = np.einsum("pk,pq,qk->k", slopes[known], cov[np.ix_(known, known)], slopes[known])
-    return np.where(slopes[~known].any(axis=0), np.nan, np.sqrt(np.maximum(variance, 0.0)))
+    finite = np.isfinite(np.diag(cov))
+    variance = np.einsum("pk,pq,qk->k", slopes[finite], cov[np.ix_(finite, finite)], slopes[finite])
+    return np.where(slopes[~finite].any(axis=0), np.nan, np.sqrt(np.maximum(variance, 0.0)))

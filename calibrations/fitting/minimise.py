@@ -65,15 +65,15 @@ def _at_once(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
     columns = np.concatenate([problem.residual(start)[:, :, None], problem.jacobian(start)], axis=2)
     rows = problem.layout.prior_rows
     white = np.vstack([noise.whiten(columns), np.column_stack([rows @ start, rows])])
-    J, before = white[:, 1:] * typical, white[:, 0]
-    step = np.linalg.lstsq(J, -before, rcond=None)[0]
+    J, start_residual = white[:, 1:] * typical, white[:, 0]
+    step = np.linalg.lstsq(J, -start_residual, rcond=None)[0]
     theta = start + typical * step
     if np.any(theta < low) or np.any(theta > high):
         return None
-    after = np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
-    if np.linalg.norm(before + J @ step - after) > STRAIGHT * np.linalg.norm(after):
+    end_residual = np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
+    if np.linalg.norm(start_residual + J @ step - end_residual) > STRAIGHT * np.linalg.norm(end_residual):
         return None
-    return theta, float(after @ after) / 2
+    return theta, float(end_residual @ end_residual) / 2
 
 
 def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
@@ -90,9 +90,9 @@ def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, fl
     stairs = False
     for _ in range(NEWTON_STEPS):
         slope = np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), rows])
-        after, least = newton_step(problem.layout, white, theta, residual, slope)
+        candidate, least = newton_step(problem.layout, white, theta, residual, slope)
         gain = float(residual @ residual - least @ least)
-        theta, residual = after, least
+        theta, residual = candidate, least
         if gain < SMALL_GAIN * max(1.0, float(residual @ residual) / len(residual)):
             if stairs or not problem.rounds:
                 break
@@ -113,10 +113,10 @@ def newton_step(
     rotated = qr(np.column_stack([J, residual]), mode="r", overwrite_a=True, check_finite=False)[0]
     R: Array = np.asarray(rotated[: J.shape[1] + 1], dtype=np.float64)
     for damping in DAMPINGS:
-        after = theta + typical * _step(R[:, :-1], R[:, -1], damping, low, high)
-        least = white(after)
+        candidate = theta + typical * _step(R[:, :-1], R[:, -1], damping, low, high)
+        least = white(candidate)
         if float(residual @ residual - least @ least) > 0:
-            return after, least
+            return candidate, least
     return theta, residual
 
 
@@ -145,9 +145,9 @@ def _step(J: Array, residual: Array, damping: float, low: Array, high: Array) ->
         # by orthogonal factors: singular values need not converge on free forms of hundreds of columns
         side = np.append(-side / most, np.zeros(len(damped) - len(side)))
         step[free] = lstsq(damped, side, cond=RELATIVE_RANK, lapack_driver="gelsy", check_finite=False)[0]
-        beyond = free & ((step < low) | (step > high))
-        if not beyond.any():
+        out_of_bounds = free & ((step < low) | (step > high))
+        if not out_of_bounds.any():
             break
         step = np.clip(step, low, high)
-        free &= ~beyond
+        free &= ~out_of_bounds
     return np.asarray(np.clip(step, low, high))

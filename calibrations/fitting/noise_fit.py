@@ -51,32 +51,32 @@ def products(
     grams, logdets = np.zeros((len(slow), k, k)), np.empty(len(slow))
     for g in range(len(slow)):
         m = processes[g]
-        out, logdets[g] = whiten(columns, gap_s, white, slow[g, :m].copy(), tau_s[g, :m].copy())
-        grams[g] = out.T @ out
+        whitened, logdets[g] = whiten(columns, gap_s, white, slow[g, :m].copy(), tau_s[g, :m].copy())
+        grams[g] = whitened.T @ whitened
     return grams, logdets
 
 
 @njit(cache=True, nogil=True)
-def profiled(grams: Array, rest: Array, free: int, least: float) -> tuple[Array, Array, Array, Array]:
-    """Each noise's level, found in rounds beside `rest`, what that leaves of the sums of squares, log-determinants.
+def profiled(grams: Array, other_gram: Array, free: int, least: float) -> tuple[Array, Array, Array, Array]:
+    """Noise levels of one channel by iteration, the sums of squares at these levels, and log-determinants.
 
-    grams   (g, p + 1, p + 1) of one channel, its residual last; rest (p + 1, p + 1) of the other channels
-    free    rows; parameters that this channel bears are taken off
-    least   level
+    grams       (g, p + 1, p + 1) of one channel, its residual last; `other_gram` (p + 1, p + 1) of the other channels
+    free        rows; the parameters that this channel determines are subtracted
+    least       smallest level
 
-    Returns levels, squares left in this channel (before the level) and in the others, log det of the normal matrix.
+    Returns levels, sums of squares of this channel (before its level) and of the others, log det of the normal matrix.
     """
-    n, p = len(grams), len(rest) - 1
+    n, p = len(grams), len(other_gram) - 1
     levels, own_left, other_left, logdets = np.ones(n), np.zeros(n), np.zeros(n), np.zeros(n)
     for g in range(n):
         gram = grams[g].copy()
         for _ in range(LEVEL_ROUNDS):
-            own = gram / levels[g] ** 2
-            normal = own[:p, :p] + rest[:p, :p]
-            sides = np.hstack((own[:p, p:] + rest[:p, p:], own[:p, :p]))
+            scaled = gram / levels[g] ** 2
+            normal = scaled[:p, :p] + other_gram[:p, :p]
+            sides = np.hstack((scaled[:p, p:] + other_gram[:p, p:], scaled[:p, :p]))
             solved, logdets[g] = eliminated(normal, sides)
             theta = np.append(-solved[:, 0], 1.0)
-            own_left[g], other_left[g] = theta @ gram @ theta, theta @ rest @ theta
+            own_left[g], other_left[g] = theta @ gram @ theta, theta @ other_gram @ theta
             variance = max(own_left[g], 0.0) / max(free - np.trace(solved[:, 1:]), 1.0)
             levels[g] = max(np.sqrt(variance), least)
     return levels, own_left, other_left, logdets
@@ -150,9 +150,10 @@ def gains(noise: Noise, residual: Array, jacobian: Array, extras: Sequence[Array
     Smooth columns are set aside: this is what each explains beside them. Gram matrices are made once for all.
     """
     search = NoiseSearch(noise, residual, (jacobian, *extras), smooth, candidate_noises(noise))
-    without = search.best().deviance
+    base_deviance = search.best().deviance
     return [
-        max(0.0, without - search.best(k).deviance) if k in search.beside[1] else 0.0 for k in range(1, len(extras) + 1)
+        max(0.0, base_deviance - search.best(k).deviance) if k in search.beside[1] else 0.0
+        for k in range(1, len(extras) + 1)
     ]
 
 
@@ -217,9 +218,11 @@ class NoiseSearch:
         fast = self.noise.fast[:, :, None]
         Q = [np.linalg.qr(self.smooth / fast[c])[0] for c in range(channels)]
         first = self._freed(self.groups[0], Q, np.zeros((channels * n, 0)))
-        others = [self._freed(group, Q, first) for group in self.groups[1:]]
-        origin = np.repeat(np.arange(len(self.groups)), [first.shape[1], *(other.shape[1] for other in others)])
-        columns = np.hstack([first, *others]).reshape(channels, n, -1)
+        additions = [self._freed(group, Q, first) for group in self.groups[1:]]
+        origin = np.repeat(
+            np.arange(len(self.groups)), [first.shape[1], *(addition.shape[1] for addition in additions)]
+        )
+        columns = np.hstack([first, *additions]).reshape(channels, n, -1)
         return columns * fast, tuple(origin.tolist())
 
     def _freed(self, group: Array, smooth: list[Array], first: Array) -> Array:
@@ -238,8 +241,8 @@ class NoiseSearch:
     @cached_property
     def least(self) -> Array:
         """The least level of each channel's noise, (channels,): what is known to be white, or rounding."""
-        known = rms(self.noise.white)
-        floor = known if self.noise.known else np.maximum(known, rounding_of(self.groups[0]))
+        white_rms = rms(self.noise.white)
+        floor = white_rms if self.noise.known else np.maximum(white_rms, rounding_of(self.groups[0]))
         return np.asarray(np.maximum(floor / rms(self.noise.fast), LEAST_STEP))
 
     @cached_property
@@ -249,10 +252,10 @@ class NoiseSearch:
         smooth = np.broadcast_to(self.smooth, (len(basis), *self.smooth.shape))
         columns = np.concatenate([smooth, basis, self.residual[:, :, None]], axis=2)
         fast, gap_s, k = self.noise.fast, self.noise.gap_s, self.smooth.shape[1]
-        known = self.noise.given or ((),) * len(basis)
+        known_noise = self.noise.given or ((),) * len(basis)
 
         def of(c: int) -> Grams:
-            return _grams(gap_s, fast[c], columns[c], self.grid, k, known[c])
+            return _grams(gap_s, fast[c], columns[c], self.grid, k, known_noise[c])
 
         if len(fast[0]) < LONG:
             return [of(c) for c in range(len(basis))]
@@ -277,20 +280,20 @@ class NoiseSearch:
     def best(self, group: int = 0) -> Best:
         """The noise of greatest likelihood with the first group in the model, and another; channels in turn."""
         channels, n = self.residual.shape
-        chosen = np.flatnonzero([origin in (0, group) for origin in self.beside[1]])
-        rank = len(chosen)
-        grams = [g.of(chosen) for g in self.grams]
+        selected = np.flatnonzero([origin in (0, group) for origin in self.beside[1]])
+        rank = len(selected)
+        grams = [g.of(selected) for g in self.grams]
         free = n - self.smooth.shape[1]
         pick, scale = [0] * channels, np.ones(channels)
         for _ in range(4 if channels > 1 else 1):
-            before = list(pick)
+            previous = list(pick)
             for c in range(channels):
-                others = (grams[d].gram[pick[d]] / scale[d] ** 2 for d in range(channels) if d != c)
-                rest = sum(others, np.zeros((rank + 1, rank + 1)))
-                score, scales = scores(grams[c], rest, free, float(self.least[c]))
+                other_grams = (grams[d].gram[pick[d]] / scale[d] ** 2 for d in range(channels) if d != c)
+                other_gram = sum(other_grams, np.zeros((rank + 1, rank + 1)))
+                score, scales = scores(grams[c], other_gram, free, float(self.least[c]))
                 pick[c] = self._choose(score)
                 scale[c] = scales[pick[c]]
-            if pick == before:
+            if pick == previous:
                 break
         deviance = sum(float(grams[c].logdet[pick[c]] + 2 * n * np.log(scale[c])) for c in range(channels))
         total = sum((grams[c].gram[pick[c]] / scale[c] ** 2 for c in range(channels)), np.zeros((rank + 1, rank + 1)))
@@ -315,10 +318,10 @@ class Grams:
         return replace(self, gram=np.ascontiguousarray(self.gram[:, keep[:, None], keep]))
 
 
-def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[Point], k: int, known: Processes) -> Grams:
+def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[Point], k: int, known_noise: Processes) -> Grams:
     """Gram matrices over the grid; the first `k` columns are set aside (Schur complement)."""
     w = float(rms(fast))
-    by_point = [processes(ratio * w, taus, known) for ratio, taus in grid]
+    by_point = [processes(ratio * w, taus, known_noise) for ratio, taus in grid]
     counts = np.array([len(of) for of in by_point])
     padded = np.array([(*of, *((0.0, 1.0),) * (counts.max() - len(of))) for of in by_point])
     gram, logdet = products(np.ascontiguousarray(columns), gap_s, fast, padded[..., 0], padded[..., 1], counts)
@@ -329,13 +332,13 @@ def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[Point], k: int,
     return Grams(np.ascontiguousarray(reduced), logdet, np.linalg.slogdet(S)[1])
 
 
-def scores(g: Grams, rest: Array, free: int, least: float) -> tuple[Array, Array]:
+def scores(g: Grams, other_gram: Array, free: int, least: float) -> tuple[Array, Array]:
     """-2 log restricted likelihood up to a constant, and the factor on all noise (profiled), along the grid.
 
     `free` rows less smooth columns; the parameters that this channel bears, and not the others, are taken off here.
     """
-    scale, own, other, logdet = profiled(g.gram, rest, free, least)
-    return own / scale**2 + other + g.logdet + g.information + logdet + 2 * free * np.log(scale), scale
+    scale, own_square, other_square, logdet = profiled(g.gram, other_gram, free, least)
+    return own_square / scale**2 + other_square + g.logdet + g.information + logdet + 2 * free * np.log(scale), scale
 
 
 ALLOWED_RATIOS = (0.3, 0.7, 1.4, 2.8)  # slow noise over white and scatter
@@ -354,8 +357,8 @@ def widening(noise: Noise, residual: Array, jacobian: Array, typical: Array) -> 
     flat = (basis / noise.fast[:, :, None]).reshape(residual.size, -1)
     turned = gain(flat.T @ (jacobian / noise.fast[:, :, None]).reshape(residual.size, -1), typical)
     white = noise.whiten(basis)
-    own = _variance((white.T @ white)[None], turned)[0]
-    wider = _mean(search, turned) / np.where(own > 0, own, np.inf)
+    white_variance = _variance((white.T @ white)[None], turned)[0]
+    wider = _mean(search, turned) / np.where(white_variance > 0, white_variance, np.inf)
     return np.sqrt(np.where(wider > 0, wider, 1.0))  # what the data hardly determine has no variance to speak of
 
 
@@ -374,16 +377,16 @@ def _mean(search: NoiseSearch, turned: Array) -> Array:
     """Variance of each parameter in the mean over the grid, channels in turn beside the best of the others."""
     best, grams = search.best(), search.grams
     normal = [g.gram[k, :-1, :-1] / s**2 for g, k, s in zip(grams, best.picks, best.scale, strict=True)]
-    together = _variance(sum(normal[1:], normal[0])[None], turned)[0]
-    mean = together.copy()
+    joint_variance = _variance(sum(normal[1:], normal[0])[None], turned)[0]
+    mean = joint_variance.copy()
     for c, g in enumerate(grams):
-        rest = sum((n for d, n in enumerate(normal) if d != c), np.zeros_like(normal[0]))
-        score, scale = scores(g, np.pad(rest, (0, 1)), search.residual.shape[1], float(search.least[c]))
+        other_normal = sum((n for d, n in enumerate(normal) if d != c), np.zeros_like(normal[0]))
+        score, scale = scores(g, np.pad(other_normal, (0, 1)), search.residual.shape[1], float(search.least[c]))
         weight = np.exp(-(score - score.min()) / 2) * np.append(len(score) - 1, np.ones(len(score) - 1))
         weight /= weight.sum()
-        some = weight > LEAST_WEIGHT
-        variances = _variance(g.gram[some, :-1, :-1] / scale[some, None, None] ** 2 + rest, turned)
-        mean += weight[some] @ variances - weight[some].sum() * together
+        relevant = weight > LEAST_WEIGHT
+        variances = _variance(g.gram[relevant, :-1, :-1] / scale[relevant, None, None] ** 2 + other_normal, turned)
+        mean += weight[relevant] @ variances - weight[relevant].sum() * joint_variance
     return np.asarray(mean)
 
 

@@ -22,7 +22,7 @@ from calibrations.fitting.table_noise import scatter
 from calibrations.geometry.smooth import smooth_columns
 from calibrations.means.noise import Processes, norm_std, white_std
 from calibrations.model import Model
-from calibrations.model.chain import Near, Step, backward, force, forward, sensed
+from calibrations.model.chain import LinearisedChain, Step, backward, force, forward, sensed
 from calibrations.model.parameters import Layout
 from calibrations.motion.spectrum import sample_output
 from calibrations.table import Array, Table
@@ -145,15 +145,15 @@ class Problem:
         """
         low, high = self.layout.bounds
         steps = 1e-3 * self.layout.typical
-        chosen = np.flatnonzero(np.ones(len(theta), dtype=bool) if of is None else of)
-        change, known = self._changes_near(theta, stairs), self._known_columns(theta)
+        indices = np.flatnonzero(np.ones(len(theta), dtype=bool) if of is None else of)
+        change, linear_columns = self._changes_near(theta, stairs), self._known_columns(theta)
         columns = []
-        for k in map(int, chosen):
-            if k in known:
-                columns.append(known[k])
+        for k in map(int, indices):
+            if k in linear_columns:
+                columns.append(linear_columns[k])
                 continue
-            ahead, behind = min(theta[k] + steps[k], high[k]), max(theta[k] - steps[k], low[k])
-            columns.append(change(k, ahead, behind) / (ahead - behind))
+            upper, lower = min(theta[k] + steps[k], high[k]), max(theta[k] - steps[k], low[k])
+            columns.append(change(k, upper, lower) / (upper - lower))
         return np.stack(columns, axis=2) if columns else np.zeros((len(self.channels), self.table.n, 0))
 
     def _known_columns(self, theta: Array) -> dict[int, Array]:
@@ -163,32 +163,35 @@ class Problem:
         if not np.isfinite(layout.prior).any():
             return {}
         steps = layout.steps(theta)
-        columns = self._near([steps[i] for i in even]).columns
-        known: dict[int, Array] = {}
+        columns = self._chain_at([steps[i] for i in even]).columns
+        by_index: dict[int, Array] = {}
         for k, slot in enumerate(layout.slots):
             if slot.term in even and (of := columns.get(even.index(slot.term))) is not None:
-                chosen = [self.table.axes.index(slot.axis)] if slot.axis else slice(None)
-                known[k] = np.zeros_like(of[slot.parameter.name])
-                known[k][:, chosen] = of[slot.parameter.name][:, chosen]
-        if not known:
+                axes = [self.table.axes.index(slot.axis)] if slot.axis else slice(None)
+                by_index[k] = np.zeros_like(of[slot.parameter.name])
+                by_index[k][:, axes] = of[slot.parameter.name][:, axes]
+        if not by_index:
             return {}
-        shown = self.of_output(theta, np.stack(list(known.values()), axis=2))
-        return dict(zip(known, np.moveaxis(shown, 2, 0), strict=True))
+        output_columns = self.of_output(theta, np.stack(list(by_index.values()), axis=2))
+        return dict(zip(by_index, np.moveaxis(output_columns, 2, 0), strict=True))
 
-    def _near(self, steps: Sequence[Step]) -> Near:
+    def _chain_at(self, steps: Sequence[Step]) -> LinearisedChain:
         """The chain with these values."""
-        return Near(self.samples, steps)
+        return LinearisedChain(self.samples, steps)
 
     def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:
         """What the residual changes by, as a function of (entry changed, its value ahead, its value behind)."""
         steps = self.layout.steps(theta)
         even = [i for i, (effect, _) in enumerate(steps) if stairs or not effect.rounds]
-        by_all, beside_stairs = Near(self.samples, steps), Near(self.samples, [steps[i] for i in even])
+        by_all, beside_stairs = (
+            LinearisedChain(self.samples, steps),
+            LinearisedChain(self.samples, [steps[i] for i in even]),
+        )
 
-        def change(k: int, ahead: float, behind: float) -> Array:
+        def change(k: int, upper: float, lower: float) -> Array:
             term = self.layout.slots[k].term
             chain, place = (beside_stairs, even.index(term)) if term in even else (by_all, term)
-            values = (self.layout.values_with(steps[term][1], k, value) for value in (ahead, behind))
+            values = (self.layout.values_with(steps[term][1], k, value) for value in (upper, lower))
             return self._reduced(-chain.change(place, *values))
 
         return change
@@ -263,20 +266,20 @@ class PositionProblem(Problem):
         steps = self.layout.steps(theta)
         return sensed(backward(self.table, steps), self.table, steps)
 
-    def _near(self, steps: Sequence[Step]) -> Near:
+    def _chain_at(self, steps: Sequence[Step]) -> LinearisedChain:
         """From the outputs back to what is sensed."""
-        return Near(self.table, steps, backward(self.table, steps))
+        return LinearisedChain(self.table, steps, backward(self.table, steps))
 
     def of_output(self, theta: Array, changes: Array) -> Array:
         """By how the magnitude follows each output."""
         outputs, change = self.table.outputs, np.zeros((self.table.n, changes.shape[2]))
         for k, axis in enumerate(np.eye(outputs.shape[1])):
-            little = SMALL * float(np.ptp(outputs[:, k]))
+            step = SMALL * float(np.ptp(outputs[:, k]))
             residuals = (
-                self.on(self.table.with_outputs(outputs + s * little * axis)).residual(theta) for s in (1.0, -1.0)
+                self.on(self.table.with_outputs(outputs + s * step * axis)).residual(theta) for s in (1.0, -1.0)
             )
-            ahead, behind = residuals
-            change -= ((ahead - behind)[0] / (2 * little))[:, None] * changes[:, k]
+            plus, minus = residuals
+            change -= ((plus - minus)[0] / (2 * step))[:, None] * changes[:, k]
         return change[None]
 
     @property
@@ -285,9 +288,9 @@ class PositionProblem(Problem):
         return False
 
     def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:  # noqa: ARG002
-        def change(k: int, ahead: float, behind: float) -> Array:
-            more, less = (np.where(np.arange(len(theta)) == k, value, theta) for value in (ahead, behind))
-            return self.residual(more) - self.residual(less)
+        def change(k: int, upper: float, lower: float) -> Array:
+            theta_upper, theta_lower = (np.where(np.arange(len(theta)) == k, value, theta) for value in (upper, lower))
+            return self.residual(theta_upper) - self.residual(theta_lower)
 
         return change
 
@@ -375,8 +378,8 @@ PROBLEMS: Mapping[str, type[Problem]] = MappingProxyType(
 def _check_effects(model: Model, table: Table) -> None:
     """Raises DataError where the rows cannot show an effect of the model."""
     for effect in (term.effect for term in model.terms if table.content in term.effect.kinds):
-        if why := effect.lacks(table):
-            raise DataError(f"{table.source}: {effect.name} is not fitted: {why}")
+        if reason := effect.lacks(table):
+            raise DataError(f"{table.source}: {effect.name} is not fitted: {reason}")
 
 
 def _check_changes(table: Table, but: str) -> None:

@@ -53,13 +53,13 @@ def without_requested(model: Model) -> Model:
     return model
 
 
-def with_sizes(model: Model, before: Fit) -> Model:
-    """The model with sizes for its free forms, from the data of `before`, which is the model without them.
+def with_sizes(model: Model, smaller: Fit) -> Model:
+    """The model with sizes for its free forms, from the data of `smaller`, which is the model without them.
 
     Raises ModelError with the data that would be needed.
     """
     for effect in requested(model):
-        sized = estimated(before, effect)
+        sized = estimated(smaller, effect)
         terms = tuple(replace(term, effect=sized) if term.effect is effect else term for term in model.terms)
         model = replace(model, terms=terms)
     return model
@@ -68,35 +68,35 @@ def with_sizes(model: Model, before: Fit) -> Model:
 def effects_beyond_base(fit: Fit) -> ModelEffects:
     """What the model's effects beyond bias, scale factor and geometry contribute."""
     problem = fit.problem
-    others = [term.name for term in fit.model.terms if term.name not in BASE]
+    names = [term.name for term in fit.model.terms if term.name not in BASE]
     shape = fit.residual.shape
-    if not others:
+    if not names:
         return ModelEffects(np.zeros(shape), np.zeros((*shape, 0)))
     steps = problem.layout.steps(fit.theta)
     base = [step for step in steps if step[0].name in BASE]
     contribution = (forward(fit.table, steps) - forward(fit.table, base)).T
-    mask = np.any([problem.layout.of_effect(name) for name in others], axis=0)
+    mask = np.any([problem.layout.of_effect(name) for name in names], axis=0)
     return ModelEffects(contribution, -fit.jacobian[:, :, mask])
 
 
-def estimated(before: Fit, effect: RequestedForm) -> Effect:
-    """The free form with the sizes that the data of `before` show. Raises ModelError."""
-    table = before.table
-    if (why := effect.excluded(table)) is not None:
-        raise ModelError(f"{effect.name} {why} ({table.source})")
+def estimated(smaller: Fit, effect: RequestedForm) -> Effect:
+    """The free form with the sizes that the data of `smaller` show. Raises ModelError."""
+    table = smaller.table
+    if (reason := effect.excluded(table)) is not None:
+        raise ModelError(f"{effect.name} {reason} ({table.source})")
     if not table.type.stage_angles:
-        return estimated_by_residual(before, effect.place)
+        return estimated_by_residual(smaller, effect.place)
     table = replace(table, left_out=())
-    data, model_effects = PoseData.of(table), effects_beyond_base(before)
+    data, model_effects = PoseData.of(table), effects_beyond_base(smaller)
     first = state_at(data, model_effects, start(data, model_effects), ())
-    every = components(data, first)
-    forms = [c for c in every if c.place == effect.place and c.form is not None and not c.general]
+    all_components = components(data, first)
+    forms = [c for c in all_components if c.place == effect.place and c.form is not None and not c.general]
     forms = [*_completing(effect.place, data, first), *forms]
     if not forms:
         raise ModelError(f"{effect.name} cannot be estimated from {table.source}: its driver does not change there")
-    result = _estimated(before, data, model_effects, [c for c in every if c.noise], forms)
-    whole = Structure(result, (), Geometry(), result.white, FloorSource.SAMPLES)
-    return free_form(tuple(whole._sized(name) for name in result.active))
+    result = _estimated(smaller, data, model_effects, [c for c in all_components if c.noise], forms)
+    structure = Structure(result, (), Geometry(), result.white, FloorSource.SAMPLES)
+    return free_form(tuple(structure._sized(name) for name in result.active))
 
 
 def _completing(place: str, data: PoseData, first: State) -> list[Component]:
@@ -114,14 +114,14 @@ def _completing(place: str, data: PoseData, first: State) -> list[Component]:
 
 
 def _estimated(
-    before: Fit, data: PoseData, model_effects: ModelEffects, noise: list[Component], forms: list[Component]
+    smaller: Fit, data: PoseData, model_effects: ModelEffects, noise: list[Component], forms: list[Component]
 ) -> SearchResult:
     """The forms that act, with their sizes; where the noise is not known, that of the residual."""
-    stated = before.problem.white
-    white = np.tile(before.noise.floor[:, None], (1, data.n)) if stated is None else stated
+    stated_white = smaller.problem.white
+    white = np.tile(smaller.noise.floor[:, None], (1, data.n)) if stated_white is None else stated_white
     for _ in range(ROUNDS):
         result = _sized(data, model_effects, white, noise, forms)
-        if stated is not None:
+        if stated_white is not None:
             break
         scaled = white * result.ratio
         settled = abs(result.ratio - 1) < FLOOR_KNOWN
@@ -135,7 +135,7 @@ def _sized(
     data: PoseData, model_effects: ModelEffects, white: Array, noise: list[Component], forms: list[Component]
 ) -> SearchResult:
     """Selection among the forms and Gauss-Newton steps."""
-    every = [*noise, *forms]
+    all_components = [*noise, *forms]
     values = start(data, model_effects)
     state = state_at(data, model_effects, values, ())
     floor = float(np.sqrt(np.mean(white**2)))
@@ -146,13 +146,13 @@ def _sized(
     by_name = {c.name: c for c in forms}
     pools = [by_name]
     for number in range(ROUNDS):
-        X, blocks, scales = whitened(state, model_effects, values, every, scales, white)
+        X, blocks, scales = whitened(state, model_effects, values, all_components, scales, white)
         g = gram(X, blocks, scales, b)
         if number == 0:
             X, scales = beside_base(X, g, b)
             g = gram(X, blocks, scales, b)
         sizes = estimate(g, variances, most)
-        sizes, _ = select(g, sizes, every, pools, most, ENTER, number > 0)
+        sizes, _ = select(g, sizes, all_components, pools, most, ENTER, number > 0)
         if not any(name in sizes.variances for name in by_name) and len(sizes.variances) == len(noise):
             gained = gains(g, sizes, list(by_name))
             best = max(gained, key=lambda name: gained[name][0])
@@ -160,13 +160,13 @@ def _sized(
             sizes = estimate(g, {**sizes.variances, best: max(gained[best][1], least)}, most)
         variances = dict(sizes.variances)
         values = coefficients(g, sizes)
-        moved = state_at(data, model_effects, values, every)
-        change = float(np.sqrt(np.mean(((moved.predicted - state.predicted) / white) ** 2)))
-        state = moved
+        updated = state_at(data, model_effects, values, all_components)
+        change = float(np.sqrt(np.mean(((updated.predicted - state.predicted) / white) ** 2)))
+        state = updated
         if number > 0 and change < FLOOR_KNOWN:
             break
-    X, blocks, scales = whitened(state, model_effects, values, every, scales, white)
+    X, blocks, scales = whitened(state, model_effects, values, all_components, scales, white)
     g = gram(X, blocks, scales, b)
     sizes = estimate(g, variances, most)
     values = coefficients(g, sizes)
-    return SearchResult(data, model_effects, white, every, g, X, sizes, values, state, (), flicker=False)
+    return SearchResult(data, model_effects, white, all_components, g, X, sizes, values, state, (), flicker=False)

@@ -36,26 +36,28 @@ def widening_of_magnitudes(noise: Noise, residual: Array, jacobian: Array, by_ou
     n, p = jacobian.shape[1:]
     if len(points) == 1 or not p or n <= p + 1:
         return np.ones(p)
-    every = -(-n // MOST_ROWS)
-    rows = slice(None, None, every)
+    stride = -(-n // MOST_ROWS)
+    rows = slice(None, None, stride)
     r, J, D, fast = residual[0, rows], jacobian[0, rows], by_output[0, rows], noise.fast[0, rows]
     least = float(np.min(noise.white[0, rows] / fast)) ** 2 if noise.known else 0.0
     t_s = np.cumsum(noise.gap_s)[rows]
     G = gain(J / fast[:, None], typical) / fast
-    own = np.einsum("pn,n,pn->p", G, fast**2, G)
+    white_variance = np.einsum("pn,n,pn->p", G, fast**2, G)
     output = np.mean(fast**2) / np.mean(np.sum(D**2, axis=1))
-    apart_s, together = np.abs(t_s[:, None] - t_s), D @ D.T
+    apart_s, directions = np.abs(t_s[:, None] - t_s), D @ D.T
     scores, variances = [], []
     for ratio, taus_s in points:
         slow = sum((np.exp(-apart_s / tau_s) for tau_s in taus_s), np.zeros_like(apart_s)) / len(taus_s)
-        K = np.diag(fast**2) + ratio**2 * output * together * slow
+        K = np.diag(fast**2) + ratio**2 * output * directions * slow
         score, level = _score(K, r, J / typical, least)
         scores.append(score)
         variances.append(level * np.einsum("pn,nm,pm->p", G, K, G))
     weight = np.exp(-(np.array(scores) - min(scores)) / 2) * np.append(len(points) - 1, np.ones(len(points) - 1))
     mean = weight @ np.array(variances) / weight.sum()
-    wider = 1 + every * (mean / np.where(own > 0, own, np.inf) - 1)  # thinning leaves slow noise, and adds white
-    return np.sqrt(np.where((own > 0) & (wider > 0), wider, 1.0))
+    wider = 1 + stride * (
+        mean / np.where(white_variance > 0, white_variance, np.inf) - 1
+    )  # thinning leaves slow noise, and adds white
+    return np.sqrt(np.where((white_variance > 0) & (wider > 0), wider, 1.0))
 
 
 def _score(K: Array, r: Array, J: Array, least: float) -> tuple[float, float]:

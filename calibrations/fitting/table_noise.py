@@ -37,8 +37,8 @@ def with_noise(table: Table, model: Model) -> Table:
     The noise of its outputs is then no longer estimated from the residual of a model.
     """
     if not table.type.known_input:
-        known = " and ".join(name for name, kind in KINDS.items() if kind.known_input)
-        raise DataError(f"{table.source}: a noise model is for {known}, but this table is of {table.content}")
+        kinds = " and ".join(name for name, kind in KINDS.items() if kind.known_input)
+        raise DataError(f"{table.source}: a noise model is for {kinds}, but this table is of {table.content}")
     if "t_s" not in table:
         raise DataError(f"{table.source}: slow noise needs the column t_s: when each row was measured")
     if model.unit != table.unit:
@@ -111,8 +111,8 @@ def beyond_ellipsoid(table: Table) -> Array:
     columns = np.column_stack([x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z, x, y, z])
     xx, yy, zz, xy, xz, yz, *linear = np.linalg.lstsq(columns, np.ones(table.n), rcond=None)[0]
     A = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    away = m + np.linalg.solve(A, linear) / 2
-    size = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", away, A, away), 0.0))
+    centred = m + np.linalg.solve(A, linear) / 2
+    size = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", centred, A, centred), 0.0))
     departure = size / size.mean() - 1
     return np.sqrt([departure @ departure / (table.n - 9)])
 

@@ -78,8 +78,8 @@ def added(a: Array, table: Table, steps: Sequence[Step]) -> list[Array]:
         return [effect.transduction(a, table, p) for effect, p in steps]
     parts = {i: effect.transduction(a, table, p) for i, (effect, p) in enumerate(steps) if not effect.scales}
     of_force = (parts[i] for i, (effect, _) in enumerate(steps) if effect.of_force)
-    whole = scaled(a, sum(of_force, np.zeros((1, 3))), steps)
-    return [effect.transduction(whole, table, p) if effect.scales else parts[i] for i, (effect, p) in enumerate(steps)]
+    force = scaled(a, sum(of_force, np.zeros((1, 3))), steps)
+    return [effect.transduction(force, table, p) if effect.scales else parts[i] for i, (effect, p) in enumerate(steps)]
 
 
 def scaled(a: Array, response: Array, steps: Sequence[Step]) -> Array:
@@ -136,7 +136,7 @@ def _slope(output: Callable[[Array], Array], a: Array, h: float = 1e-4) -> Array
 
 
 @dataclass(frozen=True)
-class Near:
+class LinearisedChain:
     """The chain with the values of `steps`.
 
     `measured`: specific force along the reference axes, g, (n, 3), where the outputs and not the stages give it.
@@ -174,8 +174,8 @@ class Near:
         if not self._has_output_stage:
             return np.ones((self.table.n, axes))
         h = 1e-6 * (float(np.ptp(total)) or 1.0)
-        more, less = (converted([total + s * h], self.table.n, self.table, self.steps) for s in (1.0, -1.0))
-        return np.asarray((more - less)[:, :axes] / (2 * h))
+        plus, minus = (converted([total + s * h], self.table.n, self.table, self.steps) for s in (1.0, -1.0))
+        return np.asarray((plus - minus)[:, :axes] / (2 * h))
 
     @cached_property
     def columns(self) -> Mapping[int, Mapping[str, Array]]:
@@ -190,25 +190,25 @@ class Near:
         return any(effect.scales for effect, _ in self.steps)
 
     @cached_property
-    def _whole(self) -> Array:
+    def _total_force(self) -> Array:
         """The force with what nonlinear effects add, g, which a drift of the sensitivity multiplies, shape (n, 3)."""
-        own = [part for part, (effect, _) in zip(self._added, self.steps, strict=True) if effect.of_force]
-        return scaled(self._sensed, sum(own, np.zeros((1, 3))), self.steps)
+        contributions = [part for part, (effect, _) in zip(self._added, self.steps, strict=True) if effect.of_force]
+        return scaled(self._sensed, sum(contributions, np.zeros((1, 3))), self.steps)
 
     @cached_property
     def _drift(self) -> Array:
         """Sensitivity over that of the scale factor, shape (n, 3)."""
-        ones = np.ones_like(self._sensed)
-        drifts = [effect.transduction(ones, self.table, p) for effect, p in self.steps if effect.scales]
-        return scaled(ones, sum(drifts, np.zeros((1, 3))), self.steps)
+        unit_force = np.ones_like(self._sensed)
+        drifts = [effect.transduction(unit_force, self.table, p) for effect, p in self.steps if effect.scales]
+        return scaled(unit_force, sum(drifts, np.zeros((1, 3))), self.steps)
 
     def _force_of(self, effect: Effect) -> Array:
-        return self._whole if effect.scales else self._sensed
+        return self._total_force if effect.scales else self._sensed
 
     def _drift_of(self, effect: Effect) -> Array:
         return self._drift if effect.of_force and self._scales else np.ones((1, 3))
 
-    def _alone(self, effect: Effect, values: Values) -> Array:
+    def _contribution(self, effect: Effect, values: Values) -> Array:
         """What one effect adds, beside the others."""
         part = effect.transduction(self._force_of(effect), self.table, values)
         return np.asarray(part * self._drift_of(effect))
@@ -224,26 +224,26 @@ class Near:
             static = static_force(self.table, steps) if "pose" in effect.places else self._static
             parts = added(sensed(static, self.table, steps), self.table, steps)
         elif not self._has_output_stage:
-            parts = [self._alone(effect, values)]
+            parts = [self._contribution(effect, values)]
         else:
-            parts = [*self._added[:term], self._alone(effect, values), *self._added[term + 1 :]]
+            parts = [*self._added[:term], self._contribution(effect, values), *self._added[term + 1 :]]
         return converted(parts, self.table.n, self.table, steps)[:, : len(self.table.axes)]
 
-    def change(self, term: int, ahead: Values, behind: Values) -> Array:
-        """Output with the values `ahead` of one effect less that with `behind`, to first order, shape (n, axes).
+    def change(self, term: int, upper: Values, lower: Values) -> Array:
+        """Output with the values `upper` of one effect less that with `lower`, to first order, shape (n, axes).
 
         Values before the transduction change the force. The output follows by d output / d force, found once for all.
         """
         effect = self.steps[term][0]
         if len(effect.places) > 1 or "output" in effect.places:
-            return self.output(term, ahead) - self.output(term, behind)
+            return self.output(term, upper) - self.output(term, lower)
         if "transduction" in effect.places:
-            return self._read_out(self._alone(effect, ahead) - self._alone(effect, behind))
-        more, less = self._force_with(term, ahead), self._force_with(term, behind)
-        parts = [np.einsum("nij,nj->ni", self._by_force, more - less)]
-        for other, values in self._remembering:
-            followed = (other.transduction(a, self.table, values) for a in (more, less))
-            parts.append((next(followed) - next(followed)) * self._drift_of(other))
+            return self._read_out(self._contribution(effect, upper) - self._contribution(effect, lower))
+        force_upper, force_lower = self._force_with(term, upper), self._force_with(term, lower)
+        parts = [np.einsum("nij,nj->ni", self._by_force, force_upper - force_lower)]
+        for memory_effect, values in self._remembering:
+            followed = (memory_effect.transduction(a, self.table, values) for a in (force_upper, force_lower))
+            parts.append((next(followed) - next(followed)) * self._drift_of(memory_effect))
         return self._read_out(sum(parts[1:], parts[0]))
 
     def _force_with(self, term: int, values: Values) -> Array:
@@ -253,9 +253,9 @@ class Near:
         if "pose" not in effect.places:
             return sensed(self._static, self.table, steps)
         pose, by_angle, by_up = self._pose, self._by_angle, self._by_up
-        moved = true_pose(self.table, steps)
-        static = self._static + by_up @ (moved.up - pose.up)
-        for change, by in zip((moved.alpha - pose.alpha, moved.beta - pose.beta), by_angle, strict=True):
+        pose_changed = true_pose(self.table, steps)
+        static = self._static + by_up @ (pose_changed.up - pose.up)
+        for change, by in zip((pose_changed.alpha - pose.alpha, pose_changed.beta - pose.beta), by_angle, strict=True):
             static = static + change[:, None] * by
         return sensed(static, self.table, steps)
 
@@ -268,8 +268,8 @@ class Near:
         """d force along the reference axes / d alpha and beta, g/rad, shape (n, 3) each."""
         pose = self._pose
 
-        def slope(more: Pose, less: Pose) -> Array:
-            return (specific_force(more) - specific_force(less)) / (2 * LITTLE)
+        def slope(plus: Pose, minus: Pose) -> Array:
+            return (specific_force(plus) - specific_force(minus)) / (2 * LITTLE)
 
         return (
             slope(replace(pose, alpha=pose.alpha + LITTLE), replace(pose, alpha=pose.alpha - LITTLE)),
@@ -301,6 +301,6 @@ class Near:
         """What a small change of the sum of all parts, (n, 3), changes of the output, shape (n, axes)."""
         axes, n = len(self.table.axes), self.table.n
         if self.table.type.moving or any(effect.rounds for effect, _ in self.steps):
-            more, less = (converted([self._total + s * change / 2], n, self.table, self.steps) for s in (1.0, -1.0))
-            return np.asarray((more - less)[:, :axes])
+            plus, minus = (converted([self._total + s * change / 2], n, self.table, self.steps) for s in (1.0, -1.0))
+            return np.asarray((plus - minus)[:, :axes])
         return np.asarray(self._slope * change[:, :axes])

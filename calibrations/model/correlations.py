@@ -38,10 +38,10 @@ class Correlations:
     @property
     def matrix(self) -> Array:
         """The whole matrix, shape (p, p), with the diagonal 1."""
-        whole = np.eye(len(self.names))
+        full = np.eye(len(self.names))
         for i, row in enumerate(self.lower):
-            whole[i, :i] = whole[:i, i] = row
-        return whole
+            full[i, :i] = full[:i, i] = row
+        return full
 
     def only(self, keys: Container[str]) -> Correlations | None:
         """Those of `keys`; None where there are fewer than two."""
@@ -54,35 +54,38 @@ class Correlations:
     def among(self, keys: Sequence[str]) -> Array:
         """The matrix for `keys`, in their order; 0 where nothing is known."""
         place = {name: i for i, name in enumerate(self.names)}
-        known = [k for k, key in enumerate(keys) if key in place]
-        at = [place[keys[k]] for k in known]
-        found = np.eye(len(keys))
-        found[np.ix_(known, known)] = self.matrix[np.ix_(at, at)]
-        return found
+        present = [k for k, key in enumerate(keys) if key in place]
+        at = [place[keys[k]] for k in present]
+        matrix = np.eye(len(keys))
+        matrix[np.ix_(present, present)] = self.matrix[np.ix_(at, at)]
+        return matrix
 
 
-def check_correlations(given: Correlations, keys: Iterable[str], where: str) -> Correlations:
-    """`given`, if it is a correlation matrix of parameters among `keys`.
+def check_correlations(correlations: Correlations, keys: Iterable[str], source: str) -> Correlations:
+    """`correlations`, if it is a correlation matrix of parameters among `keys`.
 
-    Raises ModelError with `where` and the fault.
+    Raises ModelError with `source` and the fault.
     """
-    known = list(keys)
-    for i, (name, row) in enumerate(zip(given.names, given.lower, strict=False)):
-        if name not in known:
-            raise ModelError(f'{where}: the model has no parameter "{name}" with a value{nearest(name, known)}')
-        if name in given.names[:i]:
-            raise ModelError(f'{where}: "{name}" is given twice')
+    allowed_keys = list(keys)
+    for i, (name, row) in enumerate(zip(correlations.names, correlations.lower, strict=False)):
+        if name not in allowed_keys:
+            raise ModelError(f'{source}: the model has no parameter "{name}" with a value{nearest(name, allowed_keys)}')
+        if name in correlations.names[:i]:
+            raise ModelError(f'{source}: "{name}" is given twice')
         if len(row) != i:
             raise ModelError(
-                f"{where}: {name} has {len(row)} coefficients, and needs {i}: one with each parameter above it"
+                f"{source}: {name} has {len(row)} coefficients, and needs {i}: one with each parameter above it"
             )
         if any(not abs(r) <= 1 for r in row):
-            raise ModelError(f"{where}: {name}: a correlation coefficient is from -1 to 1, not {max(row, key=abs):g}")
-    if len(given.lower) != len(given.names):
-        raise ModelError(f"{where}: {len(given.names)} parameters need {len(given.names)} rows, not {len(given.lower)}")
-    if given.names and np.linalg.eigvalsh(given.matrix)[0] < -ROUNDING:
+            raise ModelError(f"{source}: {name}: a correlation coefficient is from -1 to 1, not {max(row, key=abs):g}")
+    if len(correlations.lower) != len(correlations.names):
         raise ModelError(
-            f"{where}: these coefficients contradict each other: no parameters can have them all; "
+            f"{source}: {len(correlations.names)} parameters need {len(correlations.names)} rows, "
+            f"not {len(correlations.lower)}"
+        )
+    if correlations.names and np.linalg.eigvalsh(correlations.matrix)[0] < -ROUNDING:
+        raise ModelError(
+            f"{source}: these coefficients contradict each other: no parameters can have them all; "
             "fit the model again, or remove the key correlations"
         )
-    return given
+    return correlations

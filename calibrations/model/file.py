@@ -102,26 +102,26 @@ def parse_model(text: str, source: str, effects: Mapping[str, Effect] | None = N
         first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
         key = ".".join(str(part) for part in first["loc"])
         raise ModelError(f"{source}, key {key}: {_fault(first)}") from None
-    known = catalogue() if effects is None else effects
-    terms = tuple(_term(entry, source, known, content.unit) for entry in content.effects)
+    effects_by_name = catalogue() if effects is None else effects
+    terms = tuple(_term(entry, source, effects_by_name, content.unit) for entry in content.effects)
     names = [term.name for term in terms]
     if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ModelError(f'{source}: the effect "{twice}" occurs twice in the model')
+        duplicate = next(name for name in names if names.count(name) > 1)
+        raise ModelError(f'{source}: the effect "{duplicate}" occurs twice in the model')
     correlations = _correlations(content.correlations, Parameters(terms), f"{source}, key correlations")
     return Model(content.name, terms, content.unit, content.provenance, content.covered, correlations)
 
 
-def _correlations(given: _Correlations | None, params: Parameters, where: str) -> Correlations | None:
-    if given is None:
+def _correlations(content: _Correlations | None, params: Parameters, source: str) -> Correlations | None:
+    if content is None:
         return None
     from calibrations.model.correlations import Correlations, check_correlations  # few models have them
 
     try:
-        rows = tuple(tuple(map(float, row.split())) for row in given.lower)
+        rows = tuple(tuple(map(float, row.split())) for row in content.lower)
     except ValueError as error:
-        raise ModelError(f"{where}: a row has numbers with blanks between them: {error}") from None
-    return check_correlations(Correlations(tuple(given.parameters), rows), params, where)
+        raise ModelError(f"{source}: a row has numbers with blanks between them: {error}") from None
+    return check_correlations(Correlations(tuple(content.parameters), rows), params, source)
 
 
 def _fault(error: Any) -> str:
@@ -136,24 +136,28 @@ def _fault(error: Any) -> str:
     return f"no such key{nearest(str(error['loc'][-1]), [field.strip('_') for field in place.model_fields])}"
 
 
-def _term(entry: _Effect, source: str, known: Mapping[str, Effect], unit: str) -> Term:
+def _term(entry: _Effect, source: str, effects_by_name: Mapping[str, Effect], unit: str) -> Term:
     """`unit` is that of the model's outputs, "" where the file gives none."""
-    effect = _effect(entry, source, known)
+    effect = _effect(entry, source, effects_by_name)
     _check_parameters(entry, effect, f"{source}: {entry.effect}")
     units = {p.name: _unit(p, effect, unit, f"{source}: {entry.effect}") for p in entry.parameters}
     for name in entry.constants:
         if name not in effect.constants:
             raise ModelError(f'{source}: {entry.effect} has no constant "{name}"{nearest(name, effect.constants)}')
-    given = tuple(
+    estimates = tuple(
         Estimate(p.name, p.axis or "", p.value, p.std, units[p.name], p.identified, p.why) for p in entry.parameters
     )
-    return Term(effect, entry.tied, given, entry.constants)
+    return Term(effect, entry.tied, estimates, entry.constants)
 
 
-def _effect(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Effect:
+def _effect(entry: _Effect, source: str, effects_by_name: Mapping[str, Effect]) -> Effect:
     if entry.forms is not None or entry.effect.startswith("free:"):
         return _free(entry, source)
-    return _written(entry, source, known) if entry.expression is not None else _known(entry, source, known)
+    return (
+        _expression_effect(entry, source, effects_by_name)
+        if entry.expression is not None
+        else _catalogue_effect(entry, source, effects_by_name)
+    )
 
 
 def _free(entry: _Effect, source: str) -> Effect:
@@ -174,20 +178,20 @@ def _free(entry: _Effect, source: str) -> Effect:
         raise ModelError(f"{source}: {entry.effect}: {error}") from None
 
 
-def _known(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Effect:
+def _catalogue_effect(entry: _Effect, source: str, effects_by_name: Mapping[str, Effect]) -> Effect:
     if entry.columns:
         raise ModelError(f"{source}: {entry.effect} has columns but no expression that uses them")
     try:
-        return find(entry.effect, known)
+        return find(entry.effect, effects_by_name)
     except UnknownName as error:
         raise UnknownName(
             f"{source}: {error}; your own effects are found with --bench (its key folders.effects)"
         ) from None
 
 
-def _written(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Effect:
+def _expression_effect(entry: _Effect, source: str, effects_by_name: Mapping[str, Effect]) -> Effect:
     """The effect of an expression: all of it is in the file, and nothing in the file is run."""
-    if entry.effect in known:
+    if entry.effect in effects_by_name:
         raise ModelError(f"{source}: {entry.effect} is already the name of an effect; give the expression another name")
     try:
         return own_effect(entry.effect, entry.expression or "", tuple(entry.columns))
@@ -195,39 +199,41 @@ def _written(entry: _Effect, source: str, known: Mapping[str, Effect]) -> Effect
         raise type(error)(f"{source}: {entry.effect}: {error}") from None
 
 
-def _check_parameters(entry: _Effect, effect: Effect, where: str) -> None:
+def _check_parameters(entry: _Effect, effect: Effect, label: str) -> None:
     declared = {p.name: p.per_axis and not entry.tied for p in effect.parameters}
     for p in entry.parameters:
         if p.name not in declared:
-            raise ModelError(f'{where} has no parameter "{p.name}"{nearest(p.name, declared)}')
+            raise ModelError(f'{label} has no parameter "{p.name}"{nearest(p.name, declared)}')
         if declared[p.name] and p.axis is None:
-            raise ModelError(f'{where}: "{p.name}" has one value for each axis; it needs `axis: x`, y or z')
+            raise ModelError(f'{label}: "{p.name}" has one value for each axis; it needs `axis: x`, y or z')
         if not declared[p.name] and p.axis is not None:
-            raise ModelError(f'{where}: "{p.name}" is one value for all axes; remove the key axis, which is {p.axis}')
+            raise ModelError(f'{label}: "{p.name}" is one value for all axes; remove the key axis, which is {p.axis}')
         if (entry.effect, p.name, p.value) == ("scale-factor", "scale", 0.0):
-            raise ModelError(f"{where}: the scale is 0, so the sensor would have no response; give another value")
-    given = [(p.name, p.axis) for p in entry.parameters]
-    if twice := next((key for key in given if given.count(key) > 1), None):
-        raise ModelError(f"{where}: {' '.join(filter(None, twice))} is given twice")
+            raise ModelError(f"{label}: the scale is 0, so the sensor would have no response; give another value")
+    keys = [(p.name, p.axis) for p in entry.parameters]
+    if duplicate := next((key for key in keys if keys.count(key) > 1), None):
+        raise ModelError(f"{label}: {' '.join(filter(None, duplicate))} is given twice")
 
 
-def _unit(given: _Parameter, effect: Effect, unit: str, where: str) -> str:
+def _unit(parameter_entry: _Parameter, effect: Effect, unit: str, label: str) -> str:
     """The unit of a parameter: the declared one, for outputs in `unit`. Raises ModelError where the file gives another.
 
     A file that gives a parameter's unit in terms of the output's must give the output's unit too.
     """
-    declared = next(p.unit for p in effect.parameters if p.name == given.name)
-    known, own = bool(unit) or "{out}" not in declared, declared.replace("{out}", unit)
-    if not given.unit:
-        return own if known else ""
-    if known and given.unit == own:
-        return own
-    parameter = " ".join(filter(None, (f'the unit of "{given.name}"', given.axis)))
-    if not known:
-        raise ModelError(f"{where}: {parameter} is {given.unit}; also give the unit of the outputs, such as `unit: V`")
+    declared = next(p.unit for p in effect.parameters if p.name == parameter_entry.name)
+    has_unit, expected = bool(unit) or "{out}" not in declared, declared.replace("{out}", unit)
+    if not parameter_entry.unit:
+        return expected if has_unit else ""
+    if has_unit and parameter_entry.unit == expected:
+        return expected
+    parameter = " ".join(filter(None, (f'the unit of "{parameter_entry.name}"', parameter_entry.axis)))
+    if not has_unit:
+        raise ModelError(
+            f"{label}: {parameter} is {parameter_entry.unit}; also give the unit of the outputs, such as `unit: V`"
+        )
     condition = f" in a model with `unit: {unit}`" if "{out}" in declared else ""
     raise ModelError(
-        f"{where}: {parameter} is {given.unit}, and must be {own}{condition}; "
+        f"{label}: {parameter} is {parameter_entry.unit}, and must be {expected}{condition}; "
         "values are not converted: correct the unit, or convert value and std by hand"
     )
 
@@ -243,9 +249,9 @@ def dump_model(model: Model) -> str:
     }
     if model.covered:
         content["covered"] = {name: list(span) for name, span in model.covered.items()}
-    if model.correlations is not None and (known := model.correlations.only(model.params)) is not None:
-        rows = [" ".join(f"{r:.9g}" for r in row) for row in known.lower]
-        content["correlations"] = {"parameters": list(known.names), "lower": rows}
+    if model.correlations is not None and (correlations := model.correlations.only(model.params)) is not None:
+        rows = [" ".join(f"{r:.9g}" for r in row) for row in correlations.lower]
+        content["correlations"] = {"parameters": list(correlations.names), "lower": rows}
     return yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=100)
 
 

@@ -69,8 +69,8 @@ class Term:
     @property
     def coefficients(self) -> dict[str, int]:
         """Number of coefficients of a free form, by axis; "" where all axes share them."""
-        named = {e.name for e in self.quantities}
-        return dict(Counter(e.axis for e in self.estimates if e.name not in named))
+        names = {e.name for e in self.quantities}
+        return dict(Counter(e.axis for e in self.estimates if e.name not in names))
 
 
 class Parameters(Mapping[str, Estimate]):
@@ -93,10 +93,10 @@ class Parameters(Mapping[str, Estimate]):
 
     def __getitem__(self, key: str) -> Estimate:
         """The estimate of `key`. Raises UnknownParameter, with the keys that begin with it or the nearest one."""
-        whole = self._whole.get(key, key)
-        if whole in self._by_key:
-            return self._by_key[whole]
-        begun = [known for known in self._by_key if known.startswith(f"{key}.")]
+        full_key = self._whole.get(key, key)
+        if full_key in self._by_key:
+            return self._by_key[full_key]
+        begun = [full_name for full_name in self._by_key if full_name.startswith(f"{key}.")]
         if len(begun) == 1:
             return self._by_key[begun[0]]
         hint = f"; it has {', '.join(begun)}" if begun else nearest(key, self._by_key)

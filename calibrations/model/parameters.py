@@ -77,8 +77,8 @@ class Layout:
 
     def starts(self) -> list[Array]:
         """Vectors to start from: the model's values, and every combination of declared starts where it has none."""
-        known = self._known()
-        choices = [(known[k],) if k in known else self._declared(s) for k, s in enumerate(self.slots)]
+        values = self._known_values()
+        choices = [(values[k],) if k in values else self._declared(s) for k, s in enumerate(self.slots)]
         return self._shared_choices(choices)
 
     def _declared(self, slot: Slot) -> tuple[float, ...]:
@@ -102,7 +102,7 @@ class Layout:
             vectors.append(np.clip(vector, *self.bounds))
         return vectors
 
-    def _known(self) -> dict[int, float]:
+    def _known_values(self) -> dict[int, float]:
         values = {(i, e.name, e.axis): e.value for i, term in enumerate(self.model.terms) for e in term.estimates}
         keys = [(s.term, s.parameter.name, s.axis) for s in self.slots]
         return {k: values[key] for k, key in enumerate(keys) if key in values}
@@ -110,7 +110,7 @@ class Layout:
     def known(self) -> Array | None:
         """The model's own values, or None where one is missing."""
         assumed = {k: slot.parameter.assumed for k, slot in enumerate(self.slots)}
-        values = {k: value for k, value in assumed.items() if value is not None} | self._known()
+        values = {k: value for k, value in assumed.items() if value is not None} | self._known_values()
         return np.array([values[k] for k in range(len(self.slots))]) if len(values) == len(self.slots) else None
 
     def steps(self, theta: Array) -> list[Step]:
@@ -120,27 +120,27 @@ class Layout:
     def values(self, i: int, theta: Array) -> Values:
         """The named values of one of the model's terms."""
         term = self.model.terms[i]
-        named = Values.of(term.constants)
-        named |= {p.name: np.zeros(3 if p.per_axis else ()) for p in term.effect.parameters}
+        values = Values.of(term.constants)
+        values |= {p.name: np.zeros(3 if p.per_axis else ()) for p in term.effect.parameters}
         for k in self._entries[i]:
-            self._enter(named, k, theta[k])
-        return named
+            self._enter(values, k, theta[k])
+        return values
 
     def values_with(self, values: Values, k: int, value: float) -> Values:
         """The named values of a term with another one for its entry `k`."""
         name = self.slots[k].parameter.name
-        named = Values({**values, name: values[name].copy()})
-        self._enter(named, k, value)
-        return named
+        changed = Values({**values, name: values[name].copy()})
+        self._enter(changed, k, value)
+        return changed
 
-    def _enter(self, named: Values, k: int, value: float) -> None:
+    def _enter(self, values: Values, k: int, value: float) -> None:
         parameter, axis = self.slots[k].parameter, self.slots[k].axis
         if not parameter.per_axis:
-            named[parameter.name] = np.asarray(value)
+            values[parameter.name] = np.asarray(value)
         elif axis:
-            named[parameter.name][AXES.index(axis)] = value
+            values[parameter.name][AXES.index(axis)] = value
         else:
-            named[parameter.name] = np.full(3, value)
+            values[parameter.name] = np.full(3, value)
 
     @cached_property
     def _entries(self) -> list[list[int]]:

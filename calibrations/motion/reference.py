@@ -89,8 +89,8 @@ def find_sines(t_s: Array, x: Array) -> tuple[Sine, ...]:
     residual = x
     while len(sines) < MOST_SINES:
         frequency, prominence = strongest_line(t_s, residual)
-        again = any(abs(s.frequency_hz - frequency) < 1 / np.ptp(t_s) for s in sines)
-        if again or prominence < PROMINENT * np.log(len(x)):
+        duplicate = any(abs(s.frequency_hz - frequency) < 1 / np.ptp(t_s) for s in sines)
+        if duplicate or prominence < PROMINENT * np.log(len(x)):
             break
         sines.append(fit_four_parameter(t_s, residual, frequency))
         sines = _refit_sines(t_s, x, sines)
@@ -105,11 +105,11 @@ def strongest_line(t_s: Array, x: Array) -> tuple[float, float]:
     f, power = periodogram(x, (len(t_s) - 1) / float(np.ptp(t_s)))
     first = min(FEWEST_MOTION_PERIODS, len(f) - 2)
     k = first + int(np.argmax(power[first:-1]))
-    around = np.median(power[max(first, k - NEIGHBOURS) : k + NEIGHBOURS]) or np.finfo(float).tiny
+    background = np.median(power[max(first, k - NEIGHBOURS) : k + NEIGHBOURS]) or np.finfo(float).tiny
     low, peak, high = np.log(np.maximum(power[k - 1 : k + 2], np.finfo(float).tiny))
     curvature = low - 2 * peak + high
     shift = (low - high) / (2 * curvature) if curvature < 0 else 0.0
-    return float(f[k] + shift * f[1]), float(power[k] / around)
+    return float(f[k] + shift * f[1]), float(power[k] / background)
 
 
 def _refit_sines(t_s: Array, x: Array, sines: list[Sine]) -> list[Sine]:
@@ -124,16 +124,16 @@ def _refit_sines(t_s: Array, x: Array, sines: list[Sine]) -> list[Sine]:
 def _as_sine(a: float, b: float, offset: float, turn: float, cov: Array, middle: float, density: float) -> Sine:
     """From x = offset + a cos(turn (t - middle)) + b sin(turn (t - middle)) to amplitude and phase at t = 0."""
     amplitude = float(np.hypot(a, b))
-    along, across = np.array([a, b]) / amplitude, np.array([b, -a]) / amplitude**2
-    late = np.array([*across, 0.0, -middle])
+    by_amplitude, by_phase = np.array([a, b]) / amplitude, np.array([b, -a]) / amplitude**2
+    phase_row = np.array([*by_phase, 0.0, -middle])
     return Sine(
         frequency_hz=turn / (2 * np.pi),
         amplitude=amplitude,
         phase_rad=float((np.arctan2(-b, a) - turn * middle + np.pi) % (2 * np.pi) - np.pi),
         offset=float(offset),
         frequency_std_hz=float(np.sqrt(cov[3, 3])) / (2 * np.pi),
-        amplitude_std=float(np.sqrt(along @ cov[:2, :2] @ along)),
-        phase_std_rad=float(np.sqrt(late @ cov @ late)),
+        amplitude_std=float(np.sqrt(by_amplitude @ cov[:2, :2] @ by_amplitude)),
+        phase_std_rad=float(np.sqrt(phase_row @ cov @ phase_row)),
         offset_std=float(np.sqrt(cov[2, 2])),
         density=density,
     )
@@ -296,8 +296,8 @@ def reference_acceleration(t_s: Array, displacement_m: Array, rate_hz: float) ->
         else 0.0
     )
     lines = sorted((line for line in sines if line.frequency_hz <= most), key=line_prominence, reverse=True)
-    moving = sum((-((2 * np.pi * s.frequency_hz) ** 2) * s.at(t_s) for s in lines), np.zeros(len(t_s)))
-    return Reference(moving + second_derivative(smoothed.values, rate_hz, STENCIL), tuple(lines), smoothed, rate_hz)
+    sine_part = sum((-((2 * np.pi * s.frequency_hz) ** 2) * s.at(t_s) for s in lines), np.zeros(len(t_s)))
+    return Reference(sine_part + second_derivative(smoothed.values, rate_hz, STENCIL), tuple(lines), smoothed, rate_hz)
 
 
 def line_prominence(line: Sine) -> float:
@@ -343,11 +343,11 @@ def filter_bias(name: str, response: Response, at_hz: float, rate_hz: float, edg
     """The bias of a filter given by its response relative to the true one."""
     response_at_line = complex(response(np.array([at_hz]))[0])
     f = np.linspace(at_hz / 100, rate_hz / 2, 20001)
-    right = np.abs(np.abs(response(f)) - 1) < 0.01
+    unbiased = np.abs(np.abs(response(f)) - 1) < 0.01
     k = int(np.argmin(np.abs(f - at_hz)))
-    wrong = np.flatnonzero(~right)
-    below, above = wrong[wrong < k], wrong[wrong > k]
-    band = (float(f[below[-1]]) if len(below) else 0.0, float(f[above[0]]) if len(above) else rate_hz / 2)
+    biased = np.flatnonzero(~unbiased)
+    lower, upper = biased[biased < k], biased[biased > k]
+    band = (float(f[lower[-1]]) if len(lower) else 0.0, float(f[upper[0]]) if len(upper) else rate_hz / 2)
     return Bias(name, at_hz, abs(response_at_line) - 1, float(np.angle(response_at_line)), band, edge_s)
 
 

@@ -55,10 +55,10 @@ def find_records(table: Table) -> tuple[Record, ...]:
     if table.n < 2 or not t[-1] > t[0]:
         raise TooFewRows(f"{table.source}: {table.n} samples all have the same time; this not a record of a motion")
     step = float(np.median(np.diff(t))) or float(t[-1] - t[0]) / (table.n - 1)
-    cut = np.diff(t) > LONGEST_STEP * step
+    gaps = np.diff(t) > LONGEST_STEP * step
     for name in SAME_RATE:
-        cut |= np.diff(table.optional(name, 0.0)) != 0
-    edges = np.concatenate([[0], np.flatnonzero(cut) + 1, [table.n]])
+        gaps |= np.diff(table.optional(name, 0.0)) != 0
+    edges = np.concatenate([[0], np.flatnonzero(gaps) + 1, [table.n]])
     long = [(int(a), int(b)) for a, b in pairwise(edges) if (b - a) * step >= SHORTEST_MOTION_S - step / 2]
     if not long:
         raise TooFewRows(
@@ -71,12 +71,12 @@ def find_records(table: Table) -> tuple[Record, ...]:
 def _checked(table: Table, t: Array, first: int, end: int) -> Record:
     part = t[first:end]
     rate_hz = (len(part) - 1) / float(part[-1] - part[0])
-    late = np.abs(part - part[0] - np.arange(len(part)) / rate_hz)
-    if late.max() > MOST_UNEVEN / rate_hz:
-        row = first + int(np.argmax(late)) + 1
+    lateness = np.abs(part - part[0] - np.arange(len(part)) / rate_hz)
+    if lateness.max() > MOST_UNEVEN / rate_hz:
+        row = first + int(np.argmax(lateness)) + 1
         raise DataError(
-            f'{table.source}: row {row}, column "t_s" is {late.max() * rate_hz:.2g} of a step off; a motion is sampled '
-            "evenly, at the converter's own pace"
+            f'{table.source}: row {row}, column "t_s" is {lateness.max() * rate_hz:.2g} of a step off; '
+            "a motion is sampled evenly, at the converter's own pace"
         )
     return Record(first, end, rate_hz)
 
@@ -99,15 +99,15 @@ def apply_response(x: Array, rate_hz: float, response: Response) -> Array:
     n, mean = len(x), x.mean(axis=0).reshape(-1)
     flat = x.reshape(n, -1) - mean
     margin = min(n - 1, int(np.ceil(MARGIN_S * rate_hz)))
-    more = scipy.fft.next_fast_len(n + 2 * margin, real=True) - n - 2 * margin
+    padding = scipy.fft.next_fast_len(n + 2 * margin, real=True) - n - 2 * margin
     fade = ((1 + np.cos(np.pi * np.arange(1, margin + 1) / (margin + 1))) / 2)[:, None]
-    before = (2 * flat[0] - flat[1 : margin + 1]) * fade
-    behind = (2 * flat[-1] - flat[-2 : -margin - 2 : -1]) * fade
-    whole = np.concatenate([before[::-1], flat, behind, np.zeros((more, flat.shape[1]))])
-    f = scipy.fft.rfftfreq(len(whole), 1 / rate_hz)
+    head = (2 * flat[0] - flat[1 : margin + 1]) * fade
+    tail = (2 * flat[-1] - flat[-2 : -margin - 2 : -1]) * fade
+    extended = np.concatenate([head[::-1], flat, tail, np.zeros((padding, flat.shape[1]))])
+    f = scipy.fft.rfftfreq(len(extended), 1 / rate_hz)
     H = response(np.maximum(f, f[1] / 2))[:, None]  # the mean, which a response may treat apart, is not in here
-    out = scipy.fft.irfft(scipy.fft.rfft(whole, axis=0) * H, len(whole), axis=0)[margin : margin + n]
-    return np.asarray((out + mean * response(np.zeros(1)).real).reshape(x.shape))
+    filtered = scipy.fft.irfft(scipy.fft.rfft(extended, axis=0) * H, len(extended), axis=0)[margin : margin + n]
+    return np.asarray((filtered + mean * response(np.zeros(1)).real).reshape(x.shape))
 
 
 def first_order(corner_hz: float) -> Response:
@@ -167,11 +167,11 @@ def filter_output(v: Array, table: Table, response: Callable[[int], Response]) -
 
     Axes that were not measured are left as they are: nothing reads them.
     """
-    out = np.array(v)
+    filtered = np.array(v)
     for record in find_records(table):
         for k in range(min(v.shape[1], len(table.axes))):
-            out[record.rows, k] = apply_response(v[record.rows, k], record.rate_hz, response(k))
-    return out
+            filtered[record.rows, k] = apply_response(v[record.rows, k], record.rate_hz, response(k))
+    return filtered
 
 
 def sample_output(v: Array, table: Table) -> Array:

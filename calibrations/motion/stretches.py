@@ -57,11 +57,11 @@ def residual_lines(
 
 def _frequencies(references: Sequence[Reference], length_s: float) -> list[float]:
     lines = [line for reference in references for line in reference.lines]
-    chosen: list[float] = []
+    frequencies: list[float] = []
     for line in sorted(lines, key=line_prominence, reverse=True):
-        if all(abs(line.frequency_hz - f) * length_s > 0.9 for f in (0.0, *chosen)):
-            chosen.append(line.frequency_hz)
-    return chosen
+        if all(abs(line.frequency_hz - f) * length_s > 0.9 for f in (0.0, *frequencies)):
+            frequencies.append(line.frequency_hz)
+    return frequencies
 
 
 def _broadband(samples: Table, residual: Array, has_lines: bool) -> Line:
@@ -180,7 +180,7 @@ def _visible_lines(
 
 def _rows(table: Table, samples: Table, lines: Sequence[Line], cuts: list[tuple[int, int]], slope: float) -> Stretches:
     means = {name: np.array([values[a:b].mean() for a, b in cuts]) for name, values in samples.columns.items()}
-    parts = ["mean", *(f"{how} {line.name}" for line in lines for how in ("in phase", "in quadrature"))]
+    parts = ["mean", *(f"{phase} {line.name}" for line in lines for phase in ("in phase", "in quadrature"))]
     return Stretches(
         kind="motion",
         columns=MappingProxyType({name: values for name, values in means.items() if name in table}),
@@ -260,8 +260,8 @@ def _weights(lines: Sequence[Line], cuts: list[tuple[int, int]], n: int) -> csr_
         columns.append(np.arange(a, b))
     data = [value[:, k] for k in range(templates.shape[1]) for value in values]
     starts = np.concatenate([[0], np.cumsum([len(products) for products in data])])
-    where = np.concatenate(columns * templates.shape[1])
-    return csr_array((np.concatenate(data), where, starts), shape=(len(data), n))
+    columns_of_data = np.concatenate(columns * templates.shape[1])
+    return csr_array((np.concatenate(data), columns_of_data, starts), shape=(len(data), n))
 
 
 def _white(samples: Table, lines: Sequence[Line], cuts: list[tuple[int, int]]) -> Array:

@@ -36,5 +36,5 @@ class SinusoidalNoise(Effect):
     frequency_4 = _frequency(4)
 
     def lines(self, p: Values) -> tuple[tuple[float, float], ...]:
-        named = [(f"frequency_{k}", f"amplitude_{k}") for k in range(1, MOST + 1)]
-        return tuple((float(p[f]), float(p[a])) for f, a in named if a in p and p[a] > 0)
+        members = [(f"frequency_{k}", f"amplitude_{k}") for k in range(1, MOST + 1)]
+        return tuple((float(p[f]), float(p[a])) for f, a in members if a in p and p[a] > 0)

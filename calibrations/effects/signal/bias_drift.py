@@ -47,8 +47,8 @@ class BiasDrift(Effect):
     wanders = Constant(lambda table: float(_wanders(table)))
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
-        since = table.time_s - p.middle_s
-        drift = np.outer(since / HOUR_S, p.slope)
+        elapsed_s = table.time_s - p.middle_s
+        drift = np.outer(elapsed_s / HOUR_S, p.slope)
         if p.wanders:
             drift += _waves_of(table, float(p.middle_s), float(p.span_s)) @ np.array([p[f"wave_{k}"] for k in WAVES])
         return drift
@@ -72,13 +72,13 @@ def _wanders(table: Table) -> bool:
         return False
     u = (table.time_s - table.time_s.min()) / (np.ptp(table.time_s) or 1.0) - 0.5
     line = np.column_stack([smooth, np.ones(table.n), u])
-    squares = [_left(line, table.outputs), _left(np.hstack([line, _waves(u)]), table.outputs)]
+    squares = [_residual_square(line, table.outputs), _residual_square(np.hstack([line, _waves(u)]), table.outputs)]
     rounding = table.n * (ROUNDING * np.abs(table.outputs).max(axis=0)) ** 2  # outputs without noise leave no more
     gain = table.n * np.sum(np.log(np.maximum(squares[0], rounding) / np.maximum(squares[1], rounding)))
     return bool(gain > len(table.axes) * len(WAVES) * np.log(table.n))
 
 
-def _left(columns: Array, outputs: Array) -> Array:
+def _residual_square(columns: Array, outputs: Array) -> Array:
     """Sum of squares of each output beside `columns`."""
-    rest = outputs - columns @ np.linalg.lstsq(columns, outputs, rcond=1e-9)[0]
-    return np.asarray(np.sum(rest**2, axis=0))
+    residual = outputs - columns @ np.linalg.lstsq(columns, outputs, rcond=1e-9)[0]
+    return np.asarray(np.sum(residual**2, axis=0))

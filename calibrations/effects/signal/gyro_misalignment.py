@@ -10,15 +10,15 @@ from calibrations.table import AXES, Array, Table
 PAIRS = tuple(permutations(AXES, 2))
 
 
-def _lean(own: str, other: str) -> Parameter:
+def _lean(axis: str, towards: str) -> Parameter:
     return Parameter(
         "deg",
         typical=2.0,
         per_axis=False,
         low=-45.0,
         high=45.0,
-        where=f"turned_{other}",
-        doc=f"lean of the sensing axis {own} towards {other}",
+        where=f"turned_{towards}",
+        doc=f"lean of the sensing axis {axis} towards {towards}",
     )
 
 
@@ -51,7 +51,7 @@ class GyroMisalignment(Effect):
 
     def force(self, a: Array, table: Table, p: Values) -> Array:
         axes: Array = np.zeros((3, 3))
-        for own, other in PAIRS:
-            axes[AXES.index(own), AXES.index(other)] = np.sin(np.radians(p[own + other]))
+        for axis, towards in PAIRS:
+            axes[AXES.index(axis), AXES.index(towards)] = np.sin(np.radians(p[axis + towards]))
         np.fill_diagonal(axes, np.sqrt(np.maximum(0.0, 1 - np.sum(axes**2, axis=1))))
         return a @ axes.T

@@ -8,8 +8,8 @@ from calibrations.table import AXES, Array, Table
 
 
 def _mean_of_turned(table: Table) -> float:
-    found = rate_scales(table)
-    return float(np.mean(np.abs(found[found != 0])))
+    scales = rate_scales(table)
+    return float(np.mean(np.abs(scales[scales != 0])))
 
 
 class GyroScaleFactor(Effect):

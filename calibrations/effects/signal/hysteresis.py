@@ -56,11 +56,11 @@ class Hysteresis(Effect):
     def follow(self, a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[Array, list[Array]]:
         """`before` and after: the specific force at which each element would be at rest, g."""
         limits, pressed = _limits(p), _pressed(a, p)
-        held = [
-            np.minimum(limit * pressed, np.maximum(-limit * pressed, a - rest))
-            for limit, rest in zip(limits, before, strict=True)
+        forces = [
+            np.minimum(limit * pressed, np.maximum(-limit * pressed, a - rest_point))
+            for limit, rest_point in zip(limits, before, strict=True)
         ]
-        return sum(held[1:], held[0]) * (p.height / np.sum(limits)), [a - each for each in held]
+        return sum(forces[1:], forces[0]) * (p.height / np.sum(limits)), [a - force for force in forces]
 
 
 def _limits(p: Values) -> Array:

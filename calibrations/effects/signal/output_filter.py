@@ -23,7 +23,7 @@ class OutputFilter(Effect):
 
     def output(self, v: Array, table: Table, p: Values) -> Array:
         nominal = corner_hz(table)
-        moved = [nominal + max(float(d), -0.9 * nominal) for d in p.off_nominal]
+        corners_hz = [nominal + max(float(d), -0.9 * nominal) for d in p.off_nominal]
         return filter_output(
-            v, table, lambda k: lambda f: np.asarray(first_order(moved[k])(f) / first_order(nominal)(f))
+            v, table, lambda k: lambda f: np.asarray(first_order(corners_hz[k])(f) / first_order(nominal)(f))
         )

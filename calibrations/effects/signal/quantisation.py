@@ -64,12 +64,14 @@ class Quantisation(Effect):
     def output(self, v: Array, table: Table, p: Values) -> Array:
         codes = (v - p.offset) / p.step
         nearest = np.round(codes)
-        beyond = codes - nearest
+        remainder = codes - nearest
         noise = max(float(p.noise / p.step), LEAST_NOISE)
         mean = nearest
         for j in range(CODES):
             mean = (
-                mean + scipy.special.ndtr((beyond - 0.5 - j) / noise) - scipy.special.ndtr((-beyond - 0.5 - j) / noise)
+                mean
+                + scipy.special.ndtr((remainder - 0.5 - j) / noise)
+                - scipy.special.ndtr((-remainder - 0.5 - j) / noise)
             )
         return np.asarray(p.offset + p.step * mean)
 
@@ -82,21 +84,21 @@ def _frequencies(table: Table) -> Array:
     return np.arange(3 / span, most, 1 / (FINEST * span))
 
 
-def _start(table: Table, which: int) -> Array:
-    return np.full(len(table.axes), _saw(table)[which])
+def _start(table: Table, k: int) -> Array:
+    return np.full(len(table.axes), _sawtooth(table)[k])
 
 
 @lru_cache(maxsize=8)
-def _saw(table: Table) -> tuple[float, float, float]:
+def _sawtooth(table: Table) -> tuple[float, float, float]:
     """(step, offset, noise) of the saw that what is not smooth in the angles follows best."""
     smooth = smooth_columns(table)
     v = table.outputs
     even = smooth @ (smooth.T @ v) if smooth.size else v
-    rest = (v - even).ravel()
+    uneven = (v - even).ravel()
     frequencies = _frequencies(table)
     if not len(frequencies):
         return 1e-3, 0.0, 0.0
-    turned = _transform(rest, even.ravel(), frequencies)
+    turned = _transform(uneven, even.ravel(), frequencies)
     best = int(np.argmax(np.abs(turned)))
     f = float(frequencies[best])
     # - q / pi sin(2 pi f (V - o)): its transform is + i times a phase of -2 pi f o

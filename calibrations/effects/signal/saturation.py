@@ -26,8 +26,8 @@ class Saturation(Effect):
     loss = Parameter("1", typical=1.0, per_axis=False, starts=(1.0,), low=0.0, high=1.0, doc="of what is beyond")
 
     def output(self, v: Array, table: Table, p: Values) -> Array:
-        left: Array = v - p.loss * (np.maximum(v - p.high, 0.0) + np.minimum(v - p.low, 0.0))
-        return left
+        limited: Array = v - p.loss * (np.maximum(v - p.high, 0.0) + np.minimum(v - p.low, 0.0))
+        return limited
 
 
 def _levels(table: Table, side: int) -> Array:

@@ -24,5 +24,5 @@ class SupplySensitivity(Effect):
 
     def output(self, v: Array, table: Table, p: Values) -> Array:
         supply_v = level(table, "supply_v") if p.level else table.column("supply_v")
-        more = supply_v / p.reference_v - 1
-        return v * (1 + more[:, None] * p.share)
+        excess = supply_v / p.reference_v - 1
+        return v * (1 + excess[:, None] * p.share)

@@ -44,7 +44,7 @@ class TemperatureHysteresis(Effect):
 
     def follow(self, a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[Array, list[Array]]:
         """`before` and after: the temperature behind the play, less T0, K; so it begins at T0."""
-        (held,) = before
+        (memory,) = before
         from_t0 = (table.column("temperature_c") - p.reference_c)[:, None]
-        lagging = np.minimum(np.maximum(held, from_t0 - p.play), from_t0 + p.play)
+        lagging = np.minimum(np.maximum(memory, from_t0 - p.play), from_t0 + p.play)
         return lagging * p.slope, [lagging]

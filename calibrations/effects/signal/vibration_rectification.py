@@ -42,8 +42,8 @@ class VibrationRectification(Effect):
         columns = table.std_names
         if any(name not in table for name in columns):
             return f"needs the columns {', '.join(columns)}"
-        same = all(np.ptp(table.column(name)) == 0 for name in columns)
-        return "needs standard deviations that differ" if same else None
+        constant = all(np.ptp(table.column(name)) == 0 for name in columns)
+        return "needs standard deviations that differ" if constant else None
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
         if table.kind == "poses":
@@ -53,11 +53,11 @@ class VibrationRectification(Effect):
 
 def _mean_squares_g2(table: Table, output_per_g: float, smooth: bool) -> Array:
     """Mean square of the samples of each axis about their mean, less the least of all rows, g^2, shape (n, 3)."""
-    out = np.zeros((table.n, 3))
+    mean_squares = np.zeros((table.n, 3))
     for k, name in enumerate(table.std_names):
         squares = (level(table, name, 2) if smooth else table.column(name) ** 2) / output_per_g**2
-        out[:, k] = squares - squares.min()
-    return out
+        mean_squares[:, k] = squares - squares.min()
+    return mean_squares
 
 
 def mean_square_g2(table: Table) -> Array:

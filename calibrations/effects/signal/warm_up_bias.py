@@ -1,7 +1,7 @@
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.effects.warm_up import TIME_CONSTANT, begin_s, left
+from calibrations.effects.warm_up import TIME_CONSTANT, begin_s, remaining_share
 from calibrations.table import Array, Table
 
 
@@ -25,4 +25,4 @@ class WarmUpBias(Effect):
     begin_s = Constant(begin_s)
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
-        return np.outer(left(table, p), p.amplitude)
+        return np.outer(remaining_share(table, p), p.amplitude)

@@ -1,5 +1,5 @@
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.effects.warm_up import TIME_CONSTANT, begin_s, left
+from calibrations.effects.warm_up import TIME_CONSTANT, begin_s, remaining_share
 from calibrations.table import Array, Table
 
 
@@ -25,4 +25,4 @@ class WarmUpScale(Effect):
     begin_s = Constant(begin_s)
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
-        return left(table, p)[:, None] * a * p.amplitude
+        return remaining_share(table, p)[:, None] * a * p.amplitude

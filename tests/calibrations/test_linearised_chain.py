@@ -8,7 +8,7 @@ import pytest
 from calibrations.effects import Values
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.problem import Problem
-from calibrations.model.chain import Near, forward
+from calibrations.model.chain import LinearisedChain, forward
 from calibrations.model.file import read_model
 from tests.calibrations import synthetic
 
@@ -26,7 +26,10 @@ def test_one_effect_changes_as_in_the_whole_chain(name: str) -> None:
         model = model.with_effect(catalogue()[each])
     problem = Problem.of(model, TABLE)
     layout, theta = problem.layout, problem.layout.starts()[0] + problem.layout.typical / 10
-    near, changed = Near(problem.table, layout.steps(theta)), theta + 0.3 * layout.typical * layout.of_effect(name)
+    near, changed = (
+        LinearisedChain(problem.table, layout.steps(theta)),
+        theta + 0.3 * layout.typical * layout.of_effect(name),
+    )
     term = layout.model.effects.index(name)
     found = near.output(term, layout.values(term, changed))
     np.testing.assert_array_equal(found, forward(problem.table, layout.steps(changed)))
@@ -36,7 +39,7 @@ def test_one_effect_changes_as_in_the_whole_chain(name: str) -> None:
 def test_what_only_adds_has_derivatives_to_the_last_digits() -> None:
     problem = Problem.of(read_model("linear").with_effect(catalogue()["hysteresis"]), TABLE)
     layout, theta = problem.layout, problem.layout.starts()[0]
-    near, term = Near(problem.table, layout.steps(theta)), layout.model.effects.index("hysteresis")
+    near, term = LinearisedChain(problem.table, layout.steps(theta)), layout.model.effects.index("hysteresis")
     values = layout.values(term, theta)
     more, less, whole = (
         near.output(term, Values({**values, "height": values["height"] * factor}))
