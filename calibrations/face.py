@@ -103,9 +103,9 @@ def add(model: GivenModel, effect: GivenEffect) -> Model:
 
     `effect` is the name of one of the catalogue, the file of one of your own, or a class that derives from `Effect`.
     """
-    from calibrations.effects.catalogue import resolve_effect
+    from calibrations.effects.catalogue import load_effect
 
-    before, added = _model(model), resolve_effect(effect)
+    before, added = _model(model), load_effect(effect)
     if before.holds(added.name):
         raise ModelError(f"{before.name}: {added.name} is already in the model; it has {', '.join(before.effects)}")
     return before.with_effect(added)

@@ -45,44 +45,44 @@ class RowCandidate(Candidate):
     basis: Array
 
 
-def candidates(before: Fit, effects: Mapping[str, Effect]) -> list[RowCandidate]:
+def candidates(base: Fit, effects: Mapping[str, Effect]) -> list[RowCandidate]:
     """All candidates, best first: by likelihood, minus log(rows) for each parameter (Schwarz). Those that do not lower
     the error on unseen poses are last."""
-    screen = Screen(before)
-    linearised = [(effect, *_columns(screen, effect)) for effect in testable_effects(before, effects)]
+    screen = Screen(base)
+    linearised = [(effect, *_columns(screen, effect)) for effect in testable_effects(base, effects)]
     linearised = [item for item in linearised if item[3].shape[1]]
     search = Search(screen, [basis for *_, basis in linearised])
     extras = [columns for *_, columns, _ in linearised]
-    joint_gains = _gains(before, extras)
-    smooth_gains = _gains(before, extras, before.problem.smooth) if before.problem.smooth.size else joint_gains
+    joint_gains = _gains(base, extras)
+    smooth_gains = _gains(base, extras, base.problem.smooth) if base.problem.smooth.size else joint_gains
     ranked = [
         _candidate(screen, *item, gain, smooth_gain, search.trials)
         for item, gain, smooth_gain in zip(linearised, joint_gains, smooth_gains, strict=True)
     ]
-    unseen = before.held_out_excess
-    ranked = _with_probabilities(ranked, before.residual.size, unseen)
+    unseen = base.held_out_excess
+    ranked = _with_probabilities(ranked, base.residual.size, unseen)
     ranked.sort(
-        key=lambda c: (c.held_out_after < unseen, round(schwarz(c, before.residual.size), DECIMALS)), reverse=True
+        key=lambda c: (c.held_out_after < unseen, round(schwarz(c, base.residual.size), DECIMALS)), reverse=True
     )
     rivals = [_same_signal(c, ranked, screen) for c in ranked]
     return [
-        replace(c, indistinguishable_from=(*names, *_unlogged(c.effect, before, effects)))
+        replace(c, indistinguishable_from=(*names, *_unlogged(c.effect, base, effects)))
         for c, names in zip(ranked, rivals, strict=True)
     ]
 
 
-def best_pair(before: Fit, ranked: list[RowCandidate]) -> tuple[RowCandidate, RowCandidate] | None:
+def best_pair(base: Fit, ranked: list[RowCandidate]) -> tuple[RowCandidate, RowCandidate] | None:
     """The two candidates with the largest joint gain, the stronger first; None if no pair is significant.
 
     A model may miss two effects of which neither is visible while the other one is missing.
     """
-    pairs = [(a, b) for a, b in combinations(ranked, 2) if _fits(before, a.effect, b.effect)]
-    joint = _gains(before, [np.concatenate([a.columns, b.columns], axis=2) for a, b in pairs], before.problem.smooth)
+    pairs = [(a, b) for a, b in combinations(ranked, 2) if _fits(base, a.effect, b.effect)]
+    joint = _gains(base, [np.concatenate([a.columns, b.columns], axis=2) for a, b in pairs], base.problem.smooth)
     best, lowest_p = None, 1.0
     for (a, b), gain in zip(pairs, joint, strict=True):
         rank = a.rank + b.rank
-        free = before.residual.size - before.jacobian.shape[2] - rank - before.problem.smooth.size
-        p = _tail(gain, before.residual.size, rank, max(free, 1)) * len(pairs)
+        free = base.residual.size - base.jacobian.shape[2] - rank - base.problem.smooth.size
+        p = _tail(gain, base.residual.size, rank, max(free, 1)) * len(pairs)
         if p < lowest_p:
             best, lowest_p = (a, b), p
     return best if lowest_p < SIGNIFICANT else None
@@ -105,94 +105,94 @@ def schwarz(c: RowCandidate, rows: int) -> float:
 
 def with_planned(ranked: Sequence[RowCandidate], step: Step[Fit]) -> list[RowCandidate]:
     """The candidates, first the effect of a planned step with the errors of its full fit. It may be a free form."""
-    before, after = step.before, step.after
+    base, extended = step.before, step.after
     planned = next((c for c in ranked if c.name == step.name), None)
     if planned is None:
-        planned = _free_candidate(next(t.effect for t in after.model.terms if t.name == step.name), before, after)
-    full = replace(planned, excess_after=after.pooled_excess, held_out_after=after.held_out_excess)
+        planned = _free_candidate(next(t.effect for t in extended.model.terms if t.name == step.name), base, extended)
+    fitted_candidate = replace(planned, excess_after=extended.pooled_excess, held_out_after=extended.held_out_excess)
     remaining = [c for c in ranked if c.name != step.name]
-    return _with_probabilities([full, *remaining], before.residual.size, before.held_out_excess)
+    return _with_probabilities([fitted_candidate, *remaining], base.residual.size, base.held_out_excess)
 
 
-def _free_candidate(effect: Effect, before: Fit, after: Fit) -> RowCandidate:
+def _free_candidate(effect: Effect, base: Fit, extended: Fit) -> RowCandidate:
     """A free form as a candidate, from its fit; its rank is that of all columns that it may use."""
-    screen = Screen(before)
+    screen = Screen(base)
     start, columns, basis = _columns(screen, effect)
-    gain, rank = twice_log_likelihood(after) - twice_log_likelihood(before), basis.shape[1]
-    free = min(before.residual.size - before.jacobian.shape[2] - rank, before.noise.freedom)
+    gain, rank = twice_log_likelihood(extended) - twice_log_likelihood(base), basis.shape[1]
+    free = min(base.residual.size - base.jacobian.shape[2] - rank, base.noise.freedom)
     return RowCandidate(
-        effect=effect, rank=rank, gain=gain, p_value=_tail(gain, before.residual.size, rank, max(free, 1)),
-        probability=0.0, excess_after=after.pooled_excess, held_out_after=after.held_out_excess,
+        effect=effect, rank=rank, gain=gain, p_value=_tail(gain, base.residual.size, rank, max(free, 1)),
+        probability=0.0, excess_after=extended.pooled_excess, held_out_after=extended.held_out_excess,
         start=start, columns=columns, basis=basis,
     )  # fmt: skip
 
 
-def added(before: Fit, c: RowCandidate) -> Fit:
+def refit_with(base: Fit, c: RowCandidate) -> Fit:
     """The model with the candidate added, all parameters fitted jointly."""
-    return refit(before, before.model.with_effect(c.effect), c.start)
+    return refit(base, base.model.with_effect(c.effect), c.start)
 
 
-def testable_effects(before: Fit, effects: Mapping[str, Effect]) -> list[Effect]:
+def testable_effects(base: Fit, effects: Mapping[str, Effect]) -> list[Effect]:
     """The effects that the model can miss and that the data can show, with enough rows for their parameters."""
-    return [effect for effect in effects.values() if _applies(effect, before) and _fits(before, effect)]
+    return [effect for effect in effects.values() if _applies(effect, base) and _fits(base, effect)]
 
 
-def _applies(effect: Effect, before: Fit) -> bool:
+def _applies(effect: Effect, base: Fit) -> bool:
     """Whether the model can miss the effect, and the data can show it.
 
     If the directions do not cover the sphere, iron cannot be tested, and looks like any other change from one direction
     to the next: then only effects of iron are candidates. A drift needs an offset in the model: without one, a fit uses
     a nearly constant drift as the offset.
     """
-    model = before.model
-    known = set(effect.after) <= set(model.effects) and not model.holds(effect.name)
-    known = known and (not DRIFTING & set(effect.needs) or bool(OFFSETS & set(model.effects)))
-    iron_is_seen = effect.first_kind.field or magnetometer_coverage_warning(before.table) is None
-    return known and iron_is_seen and effect.excluded(before.table) is None
+    model = base.model
+    addable = set(effect.after) <= set(model.effects) and not model.holds(effect.name)
+    addable = addable and (not DRIFTING & set(effect.needs) or bool(OFFSETS & set(model.effects)))
+    iron_is_seen = effect.first_kind.field or magnetometer_coverage_warning(base.table) is None
+    return addable and iron_is_seen and effect.excluded(base.table) is None
 
 
-def _fits(before: Fit, *added: Effect) -> bool:
+def _fits(base: Fit, *additions: Effect) -> bool:
     """Whether the table has more rows than the model with these effects has parameters."""
-    model = before.model
-    for effect in added:
+    model = base.model
+    for effect in additions:
         model = model.with_effect(effect)
-    return before.residual.size > len(Layout.of(model.for_table(before.table), before.table).slots)
+    return base.residual.size > len(Layout.of(model.for_table(base.table), base.table).slots)
 
 
 def _columns(screen: Screen, effect: Effect) -> tuple[Array, Array, Array]:
     """The best start, derivatives of the residual with respect to the effect's parameters there, and their basis."""
-    before = screen.fit
-    model = before.model.with_effect(effect)
-    problem = Problem.of(model, before.table)
+    base = screen.fit
+    model = base.model.with_effect(effect)
+    problem = Problem.of(model, base.table)
     mask = problem.layout.of_effect(effect.name)
-    best = (np.zeros(0), np.zeros((*before.residual.shape, 0)), np.zeros((before.residual.size, 0)))
-    for theta in _starts(before, problem, effect):
+    best = (np.zeros(0), np.zeros((*base.residual.shape, 0)), np.zeros((base.residual.size, 0)))
+    for theta in _starts(base, problem, effect):
         columns = problem.jacobian(theta, mask)
-        if effect.searched(before.table) > 1:
-            columns = np.concatenate([_contribution(before, problem, theta, mask), columns], axis=2)
+        if effect.searched(base.table) > 1:
+            columns = np.concatenate([_contribution(base, problem, theta, mask), columns], axis=2)
         basis = screen.basis(columns)
         if not best[2].shape[1] or screen.statistic(basis) > screen.statistic(best[2]):
             best = (theta, columns, basis)
     return best
 
 
-def _starts(before: Fit, problem: Problem, effect: Effect) -> list[Array]:
+def _starts(base: Fit, problem: Problem, effect: Effect) -> list[Array]:
     """Values for the effect's derivatives: near zero, or its fit if its values were searched for in the data."""
-    if effect.searched(before.table) > 1:
-        return [refit(before, problem.layout.model).theta]
+    if effect.searched(base.table) > 1:
+        return [refit(base, problem.layout.model).theta]
     return problem.layout.starts()
 
 
-def _contribution(before: Fit, problem: Problem, theta: Array, mask: NDArray[np.bool_]) -> Array:
+def _contribution(base: Fit, problem: Problem, theta: Array, mask: NDArray[np.bool_]) -> Array:
     """Change of the residual by the effect, shape (channels, n, 1)."""
-    return (before.problem.residual(theta[~mask]) - problem.residual(theta))[:, :, None]
+    return (base.problem.residual(theta[~mask]) - problem.residual(theta))[:, :, None]
 
 
-def _gains(before: Fit, extras: list[Array], smooth: Array | None = None) -> list[float]:
+def _gains(base: Fit, extras: list[Array], smooth: Array | None = None) -> list[float]:
     """Twice the gain in log-likelihood by each block of columns, with the noise refitted and `smooth` eliminated."""
     scaled = [e / np.maximum(np.sqrt(np.sum(e**2, axis=(0, 1))), np.finfo(float).tiny) for e in extras]
-    nothing = np.zeros((before.table.n, 0))
-    return gains(before.noise, before.residual, before.jacobian, scaled, nothing if smooth is None else smooth)
+    no_columns = np.zeros((base.table.n, 0))
+    return gains(base.noise, base.residual, base.jacobian, scaled, no_columns if smooth is None else smooth)
 
 
 def _candidate(
@@ -209,23 +209,21 @@ def _candidate(
 
     A signal that repeats with the angles counts as slow noise in neither test: one eliminates it, one keeps the noise.
     """
-    before, rank = screen.fit, basis.shape[1]
-    smooth = before.problem.smooth.shape[1]
+    base, rank = screen.fit, basis.shape[1]
+    smooth = base.problem.smooth.shape[1]
     score = screen.statistic(basis)
-    free = min(
-        before.residual.size - before.jacobian.shape[2] - rank - smooth * len(before.channels), before.noise.freedom
-    )
+    free = min(base.residual.size - base.jacobian.shape[2] - rank - smooth * len(base.channels), base.noise.freedom)
     p_score = float(fdtrc(rank, free, score / rank)) if smooth else 1.0
-    p_refitted = _tail(smooth_gain, before.residual.size, rank, free)
-    tests, searched = 2 if smooth else 1, effect.searched(before.table)
-    after = before.residual - np.concatenate([before.jacobian, columns], axis=2) @ _change(before, columns)
+    p_refitted = _tail(smooth_gain, base.residual.size, rank, free)
+    tests, searched = 2 if smooth else 1, effect.searched(base.table)
+    remainder = base.residual - np.concatenate([base.jacobian, columns], axis=2) @ _change(base, columns)
     return RowCandidate(
         effect=effect,
         rank=rank,
         gain=twice_gain - 2 * float(np.log(searched)),
         p_value=float(of_search(min(p_score, p_refitted), tests * trials * searched)),
-        excess_after=float(np.sqrt(np.mean((rms(after) / before.noise.floor) ** 2))),
-        held_out_after=before.held_out_with(columns),
+        excess_after=float(np.sqrt(np.mean((rms(remainder) / base.noise.floor) ** 2))),
+        held_out_after=base.held_out_with(columns),
         probability=0.0,
         start=start,
         columns=columns,
@@ -233,12 +231,12 @@ def _candidate(
     )
 
 
-def _change(before: Fit, columns: Array) -> Array:
+def _change(base: Fit, columns: Array) -> Array:
     """Least-squares change of all parameters, the candidate's at the end, to first order."""
-    white = np.hstack([before.whitened[:, 1:], before.noise.whiten(columns)])
+    white = np.hstack([base.whitened[:, 1:], base.noise.whiten(columns)])
     size = np.linalg.norm(white, axis=0)
     size = np.where(size > 0, size, 1.0)
-    return np.asarray(np.linalg.lstsq(white / size, before.whitened[:, 0], rcond=1e-9)[0] / size)
+    return np.asarray(np.linalg.lstsq(white / size, base.whitened[:, 0], rcond=1e-9)[0] / size)
 
 
 def _with_probabilities(ranked: list[RowCandidate], rows: int, unseen: float) -> list[RowCandidate]:
@@ -254,14 +252,14 @@ def _with_probabilities(ranked: list[RowCandidate], rows: int, unseen: float) ->
     return [replace(c, probability=float(w / weight.sum())) for c, w in zip(ranked, weight[:-1], strict=True)]
 
 
-def _unlogged(effect: Effect, before: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:
+def _unlogged(effect: Effect, base: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:
     """Effects of temperature that the table cannot separate from an effect of time, because it has no temperature."""
-    if "t_s" not in effect.needs or not before.table.type.stage_angles:
+    if "t_s" not in effect.needs or not base.table.type.stage_angles:
         return ()
     return tuple(
         name
         for name, rival in effects.items()
-        if name in effect.confused_with and "temperature_c" in rival.needs and "temperature_c" not in before.table
+        if name in effect.confused_with and "temperature_c" in rival.needs and "temperature_c" not in base.table
     )
 
 
@@ -273,47 +271,47 @@ def _same_signal(c: RowCandidate, ranked: list[RowCandidate], screen: Screen) ->
         return ()
     names = []
     for rival in ranked:
-        lost = strength - float(np.sum((rival.basis.T @ signal) ** 2))
-        if rival is not c and lost < INSEPARABLE and rival.rank <= c.rank + 1:
+        unexplained = strength - float(np.sum((rival.basis.T @ signal) ** 2))
+        if rival is not c and unexplained < INSEPARABLE and rival.rank <= c.rank + 1:
             names.append(rival.name)
     return tuple(names)
 
 
-def with_rivals(best: RowCandidate, ranked: Sequence[RowCandidate], before: Fit) -> RowCandidate:
-    """`best`, one of the candidates `ranked` on top of `before`, with all its rivals."""
+def with_rivals(best: RowCandidate, ranked: Sequence[RowCandidate], base: Fit) -> RowCandidate:
+    """`best`, one of the candidates `ranked` on top of `base`, with all its rivals."""
     if best.p_value >= SIGNIFICANT:
         return best
     by_name = {c.name: c for c in ranked}
     inseparable = [
         name
         for name in best.indistinguishable_from
-        if name not in by_name or _has_undetermined_part(by_name[name], best, before)
+        if name not in by_name or _has_undetermined_part(by_name[name], best, base)
     ]
     similar = [c for c in ranked if c.name not in (best.name, *best.indistinguishable_from) and _is_similar(c, best)]
-    likelihood = twice_log_likelihood(added(before, best)) if similar else 0.0
-    further = [c.name for c in similar if _is_rival(added(before, c), before, likelihood)]
+    likelihood = twice_log_likelihood(refit_with(base, best)) if similar else 0.0
+    further = [c.name for c in similar if _is_rival(refit_with(base, c), base, likelihood)]
     return replace(best, indistinguishable_from=(*inseparable, *further))
 
 
-def _has_undetermined_part(c: RowCandidate, best: RowCandidate, before: Fit) -> bool:
+def _has_undetermined_part(c: RowCandidate, best: RowCandidate, base: Fit) -> bool:
     """Whether the data leave a part of a rival that contains `best` undetermined, so that it is a rival still.
 
     A play of width 0 is no rival; without a reversal, a play may have any width.
     """
     if best.name not in c.effect.contains:
         return True
-    return not all(e.identified for e in added(before, c).model.estimates(c.name))
+    return not all(e.identified for e in refit_with(base, c).model.estimates(c.name))
 
 
 def _is_similar(c: RowCandidate, best: RowCandidate) -> bool:
     """Whether `c` explains nearly as much with at most one parameter more, and neither effect contains the other."""
-    within = best.name in c.effect.contains or c.name in best.effect.contains
-    return not within and c.rank <= best.rank + 1 and c.gain > SAME_SHAPE * best.gain
+    nested = best.name in c.effect.contains or c.name in best.effect.contains
+    return not nested and c.rank <= best.rank + 1 and c.gain > SAME_SHAPE * best.gain
 
 
-def _is_rival(after: Fit, before: Fit, likeliest: float) -> bool:
-    """Whether the fit `after` is as good as that of the effect with twice the log-likelihood `likeliest`."""
-    if likeliest - twice_log_likelihood(after) < INSEPARABLE:
+def _is_rival(extended: Fit, base: Fit, likeliest: float) -> bool:
+    """Whether the fit `extended` is as good as that of the effect with twice the log-likelihood `likeliest`."""
+    if likeliest - twice_log_likelihood(extended) < INSEPARABLE:
         return True
-    as_good = after.pooled_excess <= MATERIAL and after.share_left(before) <= MOST_BY_FORM
-    return as_good and not after.table.type.moving
+    as_good = extended.pooled_excess <= MATERIAL and extended.share_left(base) <= MOST_BY_FORM
+    return as_good and not extended.table.type.moving

@@ -91,15 +91,15 @@ def place_curves(findings: Findings[Fit]) -> dict[str, PlaceCurve]:
 def place_curve(end: Fit, place: str) -> PlaceCurve | None:
     """The curve of a place in a fitted model; None without an effect there, or without a single driver."""
     names = [term.name for term in end.model.terms if place_of_effect(term.name) == place]
-    known = DRIVERS.get(place) or _logged(place, end.table)
-    if not names or known is None:
+    place_driver = DRIVERS.get(place) or _logged(place, end.table)
+    if not names or place_driver is None:
         return None
-    driver, driver_unit, factor = known
+    driver, driver_unit, factor = place_driver
     groups = _groups(end, place, driver, factor)
     base = None if factor == "angle" else [_base(driver, factor, x, weight) for _, x, weight in groups.values()]
     value, std = _contribution(end, names, base)
-    named = [name for name in names if not name.startswith(PREFIX)]
-    explained = _contribution(end, named, base)[0] if named else np.zeros(value.shape)
+    effect_names = [name for name in names if not name.startswith(PREFIX)]
+    explained = _contribution(end, effect_names, base)[0] if effect_names else np.zeros(value.shape)
     at, values, bands, parts = {}, {}, {}, {}
     for axis, (rows, x, weight) in groups.items():
         averaged = _averaged(x, weight, value[rows].ravel(), std[rows].ravel(), explained[rows].ravel())
@@ -162,11 +162,11 @@ def _by_angle(end: Fit, place: str) -> Array:
     name = f"{place.removeprefix('stage-angle-')}_deg"
     steps = end.problem.layout.steps(end.theta)
 
-    def moved(by: float) -> Array:
+    def shifted(by: float) -> Array:
         columns = {**end.table.columns, name: end.table.column(name) + by}
         return forward(_with(end.table, columns), steps)
 
-    return np.asarray((moved(STEP_RAD) - moved(-STEP_RAD)).T / (2 * STEP_RAD))
+    return np.asarray((shifted(STEP_RAD) - shifted(-STEP_RAD)).T / (2 * STEP_RAD))
 
 
 def _with(table: Table, columns: Mapping[str, Array]) -> Table:
@@ -207,10 +207,10 @@ def _symmetry(driver: str, x: Array, value: Array) -> str:
     v = np.interp(middle + u, x, value)
     v = v - v.mean()
     even = float(np.sum(((v + v[::-1]) / 2) ** 2) / np.sum(v**2)) if np.any(v) else 0.0
-    about = f"about {middle:.3g}"
+    centre = f"about {middle:.3g}"
     if even > NEARLY_ALL:
-        return f"even {about}"
-    return f"odd {about}" if even < 1 - NEARLY_ALL else f"neither even nor odd {about}"
+        return f"even {centre}"
+    return f"odd {centre}" if even < 1 - NEARLY_ALL else f"neither even nor odd {centre}"
 
 
 def _wave(x: Array, k: float) -> Array:
@@ -295,6 +295,6 @@ def _residual_squares(columns: Array, value: Array, weight: Array) -> float:
 
 
 def _share(columns: Array, value: Array) -> float:
-    ones = np.ones(len(value))
-    total = _residual_squares(ones[:, None], value, ones)
-    return 1 - _residual_squares(np.column_stack([ones, columns]), value, ones) / total if total > 0 else 0.0
+    constant = np.ones(len(value))
+    total = _residual_squares(constant[:, None], value, constant)
+    return 1 - _residual_squares(np.column_stack([constant, columns]), value, constant) / total if total > 0 else 0.0

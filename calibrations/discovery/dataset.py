@@ -98,7 +98,7 @@ class Dataset(ABC, Generic[F]):
         """One chosen effect added to a model, both fitted."""
 
     @abstractmethod
-    def step(self, effect: Effect, before: F) -> Step[F]:
+    def step(self, effect: Effect, base: F) -> Step[F]:
         """One chosen effect added to a fit."""
 
     @abstractmethod
@@ -106,7 +106,7 @@ class Dataset(ABC, Generic[F]):
         """All effects that a fitted model misses; shares are relative to the error of `origin`."""
 
     @abstractmethod
-    def candidates(self, before: F, plan: Findings[F], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:
+    def candidates(self, base: F, plan: Findings[F], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:
         """Every effect alone on top of a fit that belongs to a search, the next one of `plan` first."""
 
     def beginning(self, model: Model) -> tuple[Dataset[F], F]:

@@ -124,8 +124,8 @@ def _beyond_squares(r: Array, table: Table) -> Array:
     parts = [np.ones(len(v)), v, v[:, rows] * v[:, columns]]
     for name in ("temperature_c", "supply_v", "t_s"):
         if name in table and np.ptp(table.column(name)) > 0:
-            along = (table.column(name) - table.column(name).mean()) / table.column(name).std()
-            parts += [along, along[:, None] * v]
+            standardised = (table.column(name) - table.column(name).mean()) / table.column(name).std()
+            parts += [standardised, standardised[:, None] * v]
     basis = np.linalg.svd(np.column_stack(parts), full_matrices=False)[0]
     return np.asarray((r - basis @ (basis.T @ r)) * np.sqrt(len(r) / max(len(r) - basis.shape[1], 1)))
 
@@ -178,20 +178,20 @@ def _misfit(fit: Fit) -> Iterator[str]:
 def _response(fit: Fit) -> Iterator[str]:
     """Scale factors that no sensor has."""
     table, kind = fit.table, fit.table.type
-    known = [
+    scale_factors = [
         e for name in SCALES for e in fit.model.estimates(name)
         if e.axis and e.std is not None and (e.identified or e.std > 0) and e.name in ("scale_factor", "scale", name)
     ]  # fmt: skip
-    if not known:
+    if not scale_factors:
         return
-    for e in known:
+    for e in scale_factors:
         if e.std is not None and abs(e.value) < ROWS_APART * e.std:
             yield (
                 f"the scale factor of {e.axis} is 0 within its uncertainty: this output does not follow "
                 f"{_input(kind)}; check its column, its cable and the reference"
             )
             return
-    sizes = {e.axis: abs(e.value) for e in known}
+    sizes = {e.axis: abs(e.value) for e in scale_factors}
     low, high = min(sizes, key=lambda a: sizes[a]), max(sizes, key=lambda a: sizes[a])
     if sizes[high] > UNLIKE_AXES * sizes[low] > 0:
         yield (
@@ -200,7 +200,7 @@ def _response(fit: Fit) -> Iterator[str]:
         )
         return
     value = float(np.median(list(sizes.values())))
-    if kind.moving and all(e.value < 0 for e in known):
+    if kind.moving and all(e.value < 0 for e in scale_factors):
         yield (
             "the scale factor is negative: displacement_m or the outputs have the wrong sign, or the sensor is turned; "
             "check the direction in which displacement_m counts"

@@ -69,11 +69,11 @@ def _times(table: Table) -> Iterator[str]:
 
 
 def _sample_rate(table: Table, t_s: Array) -> Iterator[str]:
-    stated, step_s = table.number("sample_rate_hz", 0.0), float(np.median(np.diff(t_s)))
-    if stated > 0 and step_s > 0 and abs(1 / step_s / stated - 1) > RATE_AGREES:
+    stated_hz, step_s = table.number("sample_rate_hz", 0.0), float(np.median(np.diff(t_s)))
+    if stated_hz > 0 and step_s > 0 and abs(1 / step_s / stated_hz - 1) > RATE_AGREES:
         yield (
-            f"t_s gives {1 / step_s:.4g} samples a second, and the constant sample_rate_hz is {stated:g}; correct the "
-            "unit of t_s (s), or the constant"
+            f"t_s gives {1 / step_s:.4g} samples a second, and the constant sample_rate_hz is {stated_hz:g}; "
+            "correct the unit of t_s (s), or the constant"
         )
 
 
@@ -97,14 +97,14 @@ def _equal_values(table: Table) -> Iterator[str]:
             continue
         other_values = values[values != value]
         repetition = f"{name} is exactly {value:g} in {count} of {table.n} rows, and the others all differ"
-        away = max(value - other_values.max(), other_values.min() - value)
-        if name in table.output_names and 0 < away < END_OF_RANGE * np.ptp(other_values):
+        distance = max(value - other_values.max(), other_values.min() - value)
+        if name in table.output_names and 0 < distance < END_OF_RANGE * np.ptp(other_values):
             end = "highest" if value > other_values.max() else "lowest"
             yield (
                 f"{repetition}: at its {end} value the output or the converter is saturated; take a wider range, or "
                 "leave these rows out"
             )
-        elif away < 0 or abs(value - np.median(other_values)) > FAR_FROM_OTHERS * robust_std(
+        elif distance < 0 or abs(value - np.median(other_values)) > FAR_FROM_OTHERS * robust_std(
             other_values - np.median(other_values)
         ):
             yield f"{repetition}: it may stand for a missing reading, or a stuck one; leave these rows out"

@@ -127,14 +127,14 @@ def one_sided(pattern: Pattern, table: Table) -> list[Pattern]:
 
 
 def _in_time(table: Table) -> Iterator[Pattern]:
-    t, named = table.time_s, "t_s" in table
+    t, has_time = table.time_s, "t_s" in table
     u: Array = (t - t.mean()) / (float(np.ptp(t)) or 1.0)
-    trend, expression = ("trend with time", "a*t + b*t**2") if named else ("trend from row to row", "")
+    trend, expression = ("trend with time", "a*t + b*t**2") if has_time else ("trend from row to row", "")
     yield Pattern(trend, np.column_stack([u, u**2]), expression, slow=True)
     inner = np.unique(np.linspace(2, table.n - 3, min(STEPS, max(table.n - 4, 1))).astype(int))
-    for k, rows in zip(inner, _between(inner, table.n), strict=True):
+    for k, rows in zip(inner, _neighbour_ranges(inner, table.n), strict=True):
         yield replace(_step(table, k), finer=partial(_steps, table, rows))
-    if named:
+    if has_time:
         starts = np.quantile(t, np.linspace(0, 1, RAMPS + 2))
         for low, start, high in zip(starts[:-2], starts[1:-1], starts[2:], strict=True):
             yield replace(_ramp(t, start), finer=partial(_ramps, t, low, high))
@@ -162,11 +162,11 @@ def _ramps(t: Array, low: float, high: float) -> list[Pattern]:
 
 def _ramp(t: Array, start: float) -> Pattern:
     """0 up to `start`, then a linear rise."""
-    since: Array = np.maximum(0.0, t - start) / (float(np.ptp(t)) or 1.0)
-    return Pattern(f"ramp from t = {start:.0f} s on", since[:, None], f"a*max(0, t - {start:.6g})", slow=True)
+    rise: Array = np.maximum(0.0, t - start) / (float(np.ptp(t)) or 1.0)
+    return Pattern(f"ramp from t = {start:.0f} s on", rise[:, None], f"a*max(0, t - {start:.6g})", slow=True)
 
 
-def _between(places: Array, n: int) -> list[Array]:
+def _neighbour_ranges(places: Array, n: int) -> list[Array]:
     """For each of the places among n rows, the rows up to its neighbours."""
     edges = np.concatenate([[1], places, [n - 1]])
     rows = [np.arange(a, b + 1) for a, b in zip(edges[:-2], edges[2:], strict=True)]
@@ -180,9 +180,9 @@ def _steps(table: Table, rows: Array) -> list[Pattern]:
 def _step(table: Table, k: int) -> Pattern:
     """0 before row k, 1 from it on."""
     at = (table.time_s[k - 1] + table.time_s[k]) / 2
-    named = "t_s" in table
-    text = f"step at t = {at:.0f} s" if named else f"step at row {at:.0f}"
-    expression = f"a*step(t - {at:.7g})" if named else ""
+    has_time = "t_s" in table
+    text = f"step at t = {at:.0f} s" if has_time else f"step at row {at:.0f}"
+    expression = f"a*step(t - {at:.7g})" if has_time else ""
     return Pattern(text, np.where(np.arange(table.n) >= k, 1.0, 0.0)[:, None], expression, slow=True)
 
 
@@ -200,7 +200,7 @@ def _in_columns(table: Table) -> Iterator[Pattern]:
         yield Pattern(f"follows {words}", np.column_stack([u, u**2]) if curved else u[:, None], expression)
         if len(levels) >= FEWEST_LEVELS:
             places = np.unique(np.linspace(2, len(levels) - 3, LEVELS).astype(int))
-            for k, rows in zip(places, _between(places, len(levels)), strict=True):
+            for k, rows in zip(places, _neighbour_ranges(places, len(levels)), strict=True):
                 levelled = partial(_level, values, levels, (words, unit, short))
                 yield replace(levelled(k), finer=partial(_levels, levelled, rows))
 
@@ -263,19 +263,19 @@ def _in_stage(table: Table, channels: int) -> Iterator[Pattern]:
     They repeat with the stage's own angle or, if the table rocks while the other stage turns, with beta.
     """
     pose = nominal_pose(table)
-    for angle, along, numbers in (
+    for angle, driver, numbers in (
         ("beta", "beta", HARMONICS),
         ("alpha", "alpha", OF_ALPHA),
         ("alpha", "beta", ROCKING),
     ):
         turned = replace(pose, **{angle: getattr(pose, angle) + 1e-6})
         force_change = ((specific_force(turned) - specific_force(pose)) / 1e-6).T[:channels, :, None]
-        degrees = table.column(f"{along}_deg")
-        angle_words = f"the stage angle {angle}" if angle == along else f"{along} in the stage angle {angle}"
+        degrees = table.column(f"{driver}_deg")
+        angle_words = f"the stage angle {angle}" if angle == driver else f"{driver} in the stage angle {angle}"
         for k in numbers:
             if len(np.unique(degrees)) > 2 * k:
                 text, waves = f"{_ordinal(k)} harmonic of {angle_words}", _waves(k * np.radians(degrees))
-                yield Pattern(text, force_change * waves[None], f"{angle}_deg += {_harmonic(k, along)}")
+                yield Pattern(text, force_change * waves[None], f"{angle}_deg += {_harmonic(k, driver)}")
 
 
 def _waves(turned: Array) -> Array:

@@ -98,12 +98,12 @@ def _failing_stretches(fit: Fit) -> list[_Stretch]:
     if not stretches:
         return []
     limit = SIGNIFICANT / len(stretches)
-    bad = [k for k, p in enumerate(stretches) if chances[k] < limit and p.excess > MATERIAL]
+    failing = [k for k, p in enumerate(stretches) if chances[k] < limit and p.excess > MATERIAL]
     overall = {channel: (fit.excess[c], floor[c]) for c, channel in enumerate(fit.channels)}
-    bad = [k for k in bad if _stands_out(stretches[k], *overall[stretches[k].channel])] or bad[:1]
-    bad.sort(key=lambda k: stretches[k].excess, reverse=True)
-    first = {(stretches[k].coordinate, stretches[k].channel): k for k in reversed(bad)}
-    return [stretches[k] for k in bad if first[stretches[k].coordinate, stretches[k].channel] == k]
+    failing = [k for k in failing if _stands_out(stretches[k], *overall[stretches[k].channel])] or failing[:1]
+    failing.sort(key=lambda k: stretches[k].excess, reverse=True)
+    first = {(stretches[k].coordinate, stretches[k].channel): k for k in reversed(failing)}
+    return [stretches[k] for k in failing if first[stretches[k].coordinate, stretches[k].channel] == k]
 
 
 def _stretch_words(table: Table, coordinate: str, low: float, high: float) -> str:
@@ -112,12 +112,12 @@ def _stretch_words(table: Table, coordinate: str, low: float, high: float) -> st
         return f"side {SIDES[round(low)]}"
     if coordinate == "direction":
         return {1: "turning clockwise", -1: "turning anticlockwise", 0: "direction unknown"}[round(low)]
-    unit, since = WORDS[coordinate][1], ""
+    unit, origin_words = WORDS[coordinate][1], ""
     if coordinate == "time":
         size, unit = in_time(float(np.ptp(table.time_s)))
-        zero_s, since = time_origin(table)
+        zero_s, origin_words = time_origin(table)
         low, high = (low - zero_s) / size, (high - zero_s) / size
-    return f"{coordinate} {f'{low:g}' if low == high else interval(low, high)} {unit}{since}"
+    return f"{coordinate} {f'{low:g}' if low == high else interval(low, high)} {unit}{origin_words}"
 
 
 def _by_noise(fit: Fit) -> Array:
@@ -142,8 +142,8 @@ def _sides(fit: Fit) -> Iterator[tuple[str, float, float, NDArray[np.intp]]]:
     if not fit.table.type.magnitude:
         return
     a = backward(fit.table, fit.problem.layout.steps(fit.theta))
-    along = np.argmax(np.abs(a), axis=1)
-    side = 2 * along + (a[np.arange(len(a)), along] < 0)
+    axis = np.argmax(np.abs(a), axis=1)
+    side = 2 * axis + (a[np.arange(len(a)), axis] < 0)
     for k in range(len(SIDES)):
         if len(rows := np.flatnonzero(side == k)):
             yield "side", float(k), float(k), rows

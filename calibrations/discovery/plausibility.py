@@ -61,16 +61,16 @@ def findings(table: Table) -> tuple[Finding, ...]:
     if not table.type.stage_angles:
         return ()
     force = specific_force(nominal_pose(table))
-    stated, variation = response(table.outputs, force), table.outputs.std(axis=0)
-    dead = tuple(_dead(table, stated))
+    stated_response, variation = response(table.outputs, force), table.outputs.std(axis=0)
+    dead_outputs = tuple(_unresponsive_outputs(table, stated_response))
     least = V_PER_G[0] * force.std(axis=0).max() if table.unit == "V" else 0.0
-    if dead and variation.min() < max(least, FAR_LESS_VARIATION * variation.max()):
-        return dead  # no other reading of the angles makes a response of it
-    geometry = geometry_finding(table, stated)
+    if dead_outputs and variation.min() < max(least, FAR_LESS_VARIATION * variation.max()):
+        return dead_outputs  # no other reading of the angles makes a response of it
+    geometry = geometry_finding(table, stated_response)
     if geometry is not None and geometry.verdict is not None:
         return (geometry,)
-    if dead:
-        return dead
+    if dead_outputs:
+        return dead_outputs
     groups = _two_groups(table)
     return tuple(finding for finding in (groups, geometry) if finding is not None)
 
@@ -102,7 +102,7 @@ def _implausible_zero(fit: Fit) -> Finding | None:
     return None
 
 
-def _dead(table: Table, stated: Response) -> Iterator[Finding]:
+def _unresponsive_outputs(table: Table, stated_response: Response) -> Iterator[Finding]:
     """Outputs that do not respond to gravity, or in some rows only."""
     a = specific_force(nominal_pose(table))
     white = white_std(table)
@@ -110,21 +110,21 @@ def _dead(table: Table, stated: Response) -> Iterator[Finding]:
         if np.std(a[:, k]) < EXCITED_G:
             continue
         floor = None if white is None else float(rms(white[:, k]))
-        why = _stuck(table.outputs[:, k], a, name) or _silent(table.outputs[:, k], stated, k, name, floor)
-        if why is not None:
-            yield Finding(Verdict.NO_RESPONSE, f"{why}; {CHECK_WIRING} {AXES[k]}")
+        reason = _stuck(table.outputs[:, k], a, name) or _silent(table.outputs[:, k], stated_response, k, name, floor)
+        if reason is not None:
+            yield Finding(Verdict.NO_RESPONSE, f"{reason}; {CHECK_WIRING} {AXES[k]}")
 
 
-def _silent(output: Array, stated: Response, k: int, name: str, floor: float | None) -> str | None:
+def _silent(output: Array, stated_response: Response, k: int, name: str, floor: float | None) -> str | None:
     """The reason against an output that does not respond in any row; None if it responds."""
     swing = float(np.ptp(output))
     if swing <= 1e-9 * float(np.abs(output).max()):
         return f"{name} is constant ({output[0]:.6g} V) while gravity along {AXES[k]} changes"
-    share, n = float(stated.share[k]), len(output)
+    share, n = float(stated_response.share[k]), len(output)
     if share >= FOLLOWS_GRAVITY:
         return None
     spread = float(np.std(output))
-    noise = floor is not None and floor > 0 and float(rms(stated.residual[k])) < MOST_SLOW_NOISE * floor
+    noise = floor is not None and floor > 0 and float(rms(stated_response.residual[k])) < MOST_SLOW_NOISE * floor
     if noise and fdtrc(3, n - 4, max(share, 0.0) / 3 / ((1 - share) / (n - 4))) < WEAK_RESPONSE:
         return None
     if noise:
@@ -137,14 +137,14 @@ def _of_rates(table: Table) -> Iterator[Finding]:
     if not (all(f"a{axis}" in table for axis in AXES) or all(f"axis_{axis}" in table for axis in AXES)):
         return
     rate = table.column("rate_deg_s")[:, None] * turn_axes(table)
-    about = rate / max(float(np.abs(rate).max()), np.finfo(float).tiny)
-    stated = response(table.outputs, about)
-    turned = [k for k in range(len(table.axes)) if about[:, k].std() > EXCITED_G]
+    relative_rate = rate / max(float(np.abs(rate).max()), np.finfo(float).tiny)
+    stated_response = response(table.outputs, relative_rate)
+    turned = [k for k in range(len(table.axes)) if relative_rate[:, k].std() > EXCITED_G]
     remedy = "check the columns, the sign of rate_deg_s, and the sensor's mount and cable"
     for k in turned:
-        name, share, slope = table.output_names[k], float(stated.share[k]), stated.slope[k]
-        if (why := _stuck(table.outputs[:, k], about, name, table.unit, "the rate")) is not None:
-            yield Finding(Verdict.NO_RESPONSE, f"{why}; {CHECK_WIRING} {AXES[k]}")
+        name, share, slope = table.output_names[k], float(stated_response.share[k]), stated_response.slope[k]
+        if (reason := _stuck(table.outputs[:, k], relative_rate, name, table.unit, "the rate")) is not None:
+            yield Finding(Verdict.NO_RESPONSE, f"{reason}; {CHECK_WIRING} {AXES[k]}")
         elif share < FOLLOWS_GRAVITY:
             yield Finding(
                 Verdict.NO_RESPONSE,
@@ -153,9 +153,9 @@ def _of_rates(table: Table) -> Iterator[Finding]:
         elif abs(slope[k]) < np.cos(np.radians(TURNED_DEG)) * np.linalg.norm(slope):
             axis = AXES[int(np.argmax(np.abs(slope)))]
             yield Finding(Verdict.UNEXPLAINED, f"{name} follows the rate about {axis}, not about {AXES[k]}; {remedy}")
-    if (groups := _two_groups(table, about)) is not None:
+    if (groups := _two_groups(table, relative_rate)) is not None:
         yield groups
-    if reversed_ := [table.output_names[k] for k in turned if stated.slope[k, k] < 0]:
+    if reversed_ := [table.output_names[k] for k in turned if stated_response.slope[k, k] < 0]:
         yield Finding(
             None,
             f"{' and '.join(reversed_)} fall{'s' if len(reversed_) == 1 else ''} where the rate rises, as of a table "
@@ -192,18 +192,22 @@ def _stuck(output: Array, a: Array, name: str, unit: str = "V", input_name: str 
     return f"{name} is stuck at {value:.5g} {unit} in {rows.sum()} of {n} rows while {input_name} changes"
 
 
-def _two_groups(table: Table, about: Array | None = None) -> Finding | None:
+def _two_groups(table: Table, known_input: Array | None = None) -> Finding | None:
     """Rows of two sensors in one table: two linear responses, nothing between them, without a pattern.
 
-    `about` is the known input, shape (n, 3); None for the specific force at the poses.
+    `known_input` is the known input, shape (n, 3); None for the specific force at the poses.
     """
-    if about is None:
+    if known_input is None:
         table = table.in_order()
-        about = specific_force(nominal_pose(table))
-    columns = np.column_stack([np.ones(table.n), about])
-    labels, within, distance = _clusters(columns, table.outputs)
+        known_input = specific_force(nominal_pose(table))
+    columns = np.column_stack([np.ones(table.n), known_input])
+    labels, within_share, distance = _clusters(columns, table.outputs)
     share = float(labels.mean())
-    if within > LEFT_WITHIN_GROUPS or not SMALLER_GROUP <= share <= 1 - SMALLER_GROUP or _patterned(table, labels):
+    if (
+        within_share > LEFT_WITHIN_GROUPS
+        or not SMALLER_GROUP <= share <= 1 - SMALLER_GROUP
+        or _patterned(table, labels)
+    ):
         return None
     white = white_std(table)
     axis = int(np.argmax(distance))
@@ -234,11 +238,11 @@ def _clusters(columns: Array, outputs: Array) -> tuple[NDArray[np.bool_], float,
     if not np.all(size > 0):
         return np.zeros(len(outputs), dtype=bool), 1.0, size
     main = np.linalg.svd(residual / size, full_matrices=False)[0][:, 0]
-    along = np.sum(residual / size**2 * (outputs - outputs.mean(axis=0)), axis=1)
-    labels, within, distance = min(
-        (_refined_clusters(start > 0, columns, outputs / size) for start in (main, along)), key=_within_share
+    along_output = np.sum(residual / size**2 * (outputs - outputs.mean(axis=0)), axis=1)
+    labels, within_share, distance = min(
+        (_refined_clusters(start > 0, columns, outputs / size) for start in (main, along_output)), key=_within_share
     )
-    return labels, within, distance * size
+    return labels, within_share, distance * size
 
 
 def _refined_clusters(
@@ -252,12 +256,12 @@ def _refined_clusters(
                 return labels, 1.0, np.zeros(scaled.shape[1])
             fitted[group] = columns @ np.linalg.lstsq(columns[rows], scaled[rows], rcond=EXCITED_G)[0]
             errors[group] = np.sum((scaled - fitted[group]) ** 2, axis=1)
-        after = errors[1] < errors[0]
-        if np.array_equal(after, labels):
+        updated = errors[1] < errors[0]
+        if np.array_equal(updated, labels):
             break
-        labels = after
-    within = float(np.mean(np.min(errors, axis=0))) / scaled.shape[1]
-    return labels, within, rms((fitted[1] - fitted[0]).T)
+        labels = updated
+    within_share = float(np.mean(np.min(errors, axis=0))) / scaled.shape[1]
+    return labels, within_share, rms((fitted[1] - fitted[0]).T)
 
 
 def _within_share(clusters: tuple[NDArray[np.bool_], float, Array]) -> float:

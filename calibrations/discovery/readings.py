@@ -54,8 +54,8 @@ class Response:
 
 def response(outputs: Array, a: Array) -> Response:
     """The response of outputs (n, axes) to a specific force `a` (n, 3) in g, in the directions that it excites."""
-    about = a - a.mean(axis=0)
-    U, size, Vt = np.linalg.svd(about, full_matrices=False)
+    deviation = a - a.mean(axis=0)
+    U, size, Vt = np.linalg.svd(deviation, full_matrices=False)
     excited = size > EXCITED_G * np.sqrt(len(a))
     centred = outputs - outputs.mean(axis=0)
     part = U[:, excited].T @ centred
@@ -66,15 +66,15 @@ def response(outputs: Array, a: Array) -> Response:
     return Response(slope.T, np.where(total > 0, share, 0.0), residual.T)
 
 
-def geometry_finding(table: Table, stated: Response) -> Finding | None:
+def geometry_finding(table: Table, stated_response: Response) -> Finding | None:
     """The geometry that explains the outputs better than the stated one; None if there is none."""
-    if (reading := _other_columns(table, 1 - stated.share)) is not None:
+    if (reading := _other_columns(table, 1 - stated_response.share)) is not None:
         return Finding(Verdict.UNEXPLAINED, f"the outputs do not follow the poses as stated; they do if {reading}")
-    explained = bool(np.all(stated.share >= EXPLAINED_BY_GEOMETRY))
-    assignment = _assignment(table, stated, specific_force(nominal_pose(table))) if explained else None
+    explained = bool(np.all(stated_response.share >= EXPLAINED_BY_GEOMETRY))
+    assignment = _assignment(table, stated_response, specific_force(nominal_pose(table))) if explained else None
     if explained and (assignment is None or assignment.verdict is None):
         return assignment
-    angle_readings = " or if ".join(_other_angles(table, stated, explained))
+    angle_readings = " or if ".join(_other_angles(table, stated_response, explained))
     if not angle_readings:
         return assignment
     if assignment is not None:
@@ -95,7 +95,7 @@ def _other_columns(table: Table, residual_shares: Array) -> str | None:
     if stated_share < max(floor, UNTOUCHED_BY_READINGS) or table.n < 2 * FEWEST_RESPONSE_ROWS:
         return None
     limit = min(FAR_BETTER_GEOMETRY * stated_share, 1 - EXPLAINED_BY_GEOMETRY)
-    return _scaled(table, limit) or _shifted(table, limit) or _changed(table, limit)
+    return _scaled(table, limit) or _shifted(table, limit) or _response_change(table, limit)
 
 
 def _unexplained_share(outputs: Array, force: Array) -> Array:
@@ -119,13 +119,13 @@ class _Angle(NamedTuple):
 def _scaled(table: Table, limit: float) -> str | None:
     """A stage angle with a wrong factor, or with a zero that is wrong by tens of degrees."""
     angles = []
-    some = _some_rows(table)
+    sample = _some_rows(table)
     for column in COLUMNS:
         if np.ptp(table.column(column)) == 0:
             continue
         shifted = _refined(_Angle(column, 1.0, 0.0), table, free_scale=False)
-        starts = [_best_zero(column, scale, some) for scale in SCALES]
-        start = starts[int(np.argmin([_worst_share(angle, some) for angle in starts]))]
+        starts = [_best_zero(column, scale, sample) for scale in SCALES]
+        start = starts[int(np.argmin([_worst_share(angle, sample) for angle in starts]))]
         scaled = _refined(start, table, free_scale=True)
         angles += [(_worst_share(shifted, table), shifted), (_worst_share(scaled, table), scaled)]
     angles = [(share, angle) for share, angle in angles if share <= limit]
@@ -151,8 +151,8 @@ def _some_rows(table: Table) -> Table:
     """Rows drawn at random, since a fixed step could fall on the same angles each time; all rows of a short table."""
     if table.n <= ENOUGH_ROWS:
         return table
-    drawn = np.random.default_rng(0).choice(table.n, ENOUGH_ROWS, replace=False)
-    return table.rows(np.sort(drawn))
+    row_numbers = np.random.default_rng(0).choice(table.n, ENOUGH_ROWS, replace=False)
+    return table.rows(np.sort(row_numbers))
 
 
 def _by_sensor(table: Table) -> float:
@@ -188,15 +188,15 @@ def _refined(angle: _Angle, table: Table, *, free_scale: bool) -> _Angle:
     size = table.outputs.std(axis=0)
     reach = float(np.max(np.abs(table.column(angle.column))))
 
-    def moved(step: Array) -> _Angle:
+    def shifted(step: Array) -> _Angle:
         """A step of 1 moves the farthest angle by 1 deg."""
         scale = angle.scale + (step[1] / reach if free_scale else 0.0)
         return _Angle(angle.column, float(scale), float(angle.zero_deg + step[0]))
 
     def error(step: Array) -> Array:
-        return np.ravel(response(table.outputs, moved(step).force(table)).residual.T / size)
+        return np.ravel(response(table.outputs, shifted(step).force(table)).residual.T / size)
 
-    return moved(scipy.optimize.least_squares(error, np.zeros(2 if free_scale else 1), x_scale=10.0, max_nfev=30).x)
+    return shifted(scipy.optimize.least_squares(error, np.zeros(2 if free_scale else 1), x_scale=10.0, max_nfev=30).x)
 
 
 def _shifted(table: Table, limit: float) -> str | None:
@@ -205,9 +205,9 @@ def _shifted(table: Table, limit: float) -> str | None:
     names = table.output_names
     for shift in SHIFTS:
         overlap = slice(max(-shift, 0), table.n - max(shift, 0))
-        moved = np.roll(table.outputs, -shift, axis=0)
+        shifted_outputs = np.roll(table.outputs, -shift, axis=0)
         displacement = f"{abs(shift)} row{'s' if abs(shift) > 1 else ''} too {'late' if shift > 0 else 'early'}"
-        shifted_shares = _unexplained_share(moved[overlap], force[overlap])
+        shifted_shares = _unexplained_share(shifted_outputs[overlap], force[overlap])
         if np.max(shifted_shares) <= limit:
             return f"the outputs stand {displacement} in the file; shift their columns, or those of the angles"
         stated_shares = _unexplained_share(table.outputs[overlap], force[overlap])
@@ -217,7 +217,7 @@ def _shifted(table: Table, limit: float) -> str | None:
     return None
 
 
-def _changed(table: Table, limit: float) -> str | None:
+def _response_change(table: Table, limit: float) -> str | None:
     """A row at which the linear response of the outputs changes."""
     columns = np.column_stack([np.ones(table.n), specific_force(nominal_pose(table))])
     outputs = (table.outputs - table.outputs.mean(axis=0)) / table.outputs.std(axis=0)
@@ -260,13 +260,13 @@ def _two_responses(columns: Array, outputs: Array, k: int) -> tuple[float, float
     return float(np.max(squares)) / len(columns), change
 
 
-def _other_angles(table: Table, stated: Response, explained: bool) -> list[str]:
+def _other_angles(table: Table, stated_response: Response, explained: bool) -> list[str]:
     """Readings of the angle columns by which each output follows its own axis, unlike by the stated ones."""
     texts = []
     for text, pose in _angle_readings(nominal_pose(table)).items():
         a = specific_force(pose)
         candidate = response(table.outputs, a)
-        far_better = np.max(1 - candidate.share) <= FAR_BETTER_GEOMETRY * np.max(1 - stated.share)
+        far_better = np.max(1 - candidate.share) <= FAR_BETTER_GEOMETRY * np.max(1 - stated_response.share)
         if (
             np.all(candidate.share >= EXPLAINED_BY_GEOMETRY)
             and (explained or far_better)
@@ -295,24 +295,26 @@ def _angle_readings(pose: Pose) -> Mapping[str, Pose]:
     )
 
 
-def _assignment(table: Table, stated: Response, a: Array) -> Finding | None:
+def _assignment(table: Table, stated_response: Response, a: Array) -> Finding | None:
     """Outputs that do not follow their own axes, or follow them backwards; None if there are none."""
-    about = a - a.mean(axis=0)
-    eigen = np.linalg.eigh(about.T @ about / table.n)
+    centred = a - a.mean(axis=0)
+    eigen = np.linalg.eigh(centred.T @ centred / table.n)
     excited_directions = eigen[1][:, eigen[0] > EXCITED_G**2]
     projector = excited_directions @ excited_directions.T
-    excited_axes = projector[: len(stated.slope)]  # excited part of each axis
-    size = np.linalg.norm(stated.slope, axis=1)
+    excited_axes = projector[: len(stated_response.slope)]  # excited part of each axis
+    size = np.linalg.norm(stated_response.slope, axis=1)
     if not size.max() > 0:
         return None
     reach = np.linalg.norm(excited_axes, axis=1)
-    responding = [k for k in range(len(size)) if stated.share[k] >= FOLLOWS_GRAVITY and size[k] > 0]
-    cosine = {k: float(stated.slope[k] @ excited_axes[k] / size[k] / reach[k]) for k in responding if reach[k] > 0.5}
+    responding = [k for k in range(len(size)) if stated_response.share[k] >= FOLLOWS_GRAVITY and size[k] > 0]
+    cosine = {
+        k: float(stated_response.slope[k] @ excited_axes[k] / size[k] / reach[k]) for k in responding if reach[k] > 0.5
+    }
     limit = np.cos(np.radians(TURNED_DEG))
     astray = [k for k, c in cosine.items() if abs(c) < limit]
     astray += [k for k in responding if k not in cosine and size[k] > 0.5 * size.max()]
     if astray:
-        return Finding(Verdict.UNEXPLAINED, _astray(table, stated, astray))
+        return Finding(Verdict.UNEXPLAINED, _astray(table, stated_response, astray))
     reversed_ = [k for k, c in cosine.items() if c < 0]
     if not reversed_:
         return None
@@ -331,19 +333,21 @@ def _assignment(table: Table, stated: Response, a: Array) -> Finding | None:
     )
 
 
-def _astray(table: Table, stated: Response, rows: list[int]) -> str:
+def _astray(table: Table, stated_response: Response, rows: list[int]) -> str:
     """The axis that each output follows, and a hint on the wiring to check."""
     follow = []
     for k in rows:
-        slope = stated.slope[k]
+        slope = stated_response.slope[k]
         axis = int(np.argmax(np.abs(slope)))
         if abs(slope[axis]) > np.cos(np.radians(TURNED_DEG)) * np.linalg.norm(slope):
             follow.append(f"{table.output_names[k]} follows gravity along {'-' if slope[axis] < 0 else ''}{AXES[axis]}")
         else:
             angle = float(np.degrees(np.arctan2(slope[1 - k], slope[k]))) if k < 2 else 0.0
             follow.append(f"{table.output_names[k]} follows gravity {abs(angle):.0f} deg away from {AXES[k]}")
-    swapped = len(rows) == 2 and rows == [0, 1] and np.argmax(np.abs(stated.slope[:2]), axis=1).tolist() == [1, 0]
-    exchanged = swapped and stated.slope[0, 1] * stated.slope[1, 0] > 0
+    swapped = (
+        len(rows) == 2 and rows == [0, 1] and np.argmax(np.abs(stated_response.slope[:2]), axis=1).tolist() == [1, 0]
+    )
+    exchanged = swapped and stated_response.slope[0, 1] * stated_response.slope[1, 0] > 0
     remedy = (
         f"the channels are exchanged: exchange the columns {' and '.join(table.output_names[:2])}, or the channels in "
         "the bench file"

@@ -116,8 +116,8 @@ class Diagnosis(_Answer[F]):
     @classmethod
     def of(cls, findings: Findings[F]) -> Diagnosis[F]:
         """The findings as an answer on the given model."""
-        doubtful = findings.given.verdict is not Verdict.EFFECT_MISSING
-        return cls(findings, findings.experiment(findings.names) if doubtful else None)
+        needs_experiment = findings.given.verdict is not Verdict.EFFECT_MISSING
+        return cls(findings, findings.experiment(findings.names) if needs_experiment else None)
 
     def report(self) -> str:
         """The verdict on the given model, its candidates, and the best of them."""

@@ -86,12 +86,12 @@ class RowSearch:
         self, effect: Effect, start: Fit, outliers: tuple[int, ...], effects: Mapping[str, Effect]
     ) -> Findings[Fit]:
         """One chosen effect, with the effects that the data cannot separate from it."""
-        before = start.in_floor(start.noise.floor)
-        step = self.data.step(effect, before)
+        base = start.in_floor(start.noise.floor)
+        step = self.data.step(effect, base)
         if (reason := rejection(step.after)) is not None:
             return replace(self.rejected(step.before, reason), steps=(step,))
-        ranked = candidates(before, effects)
-        candidate = next((with_rivals(c, ranked, before) for c in ranked if c.name == effect.name), None)
+        ranked = candidates(base, effects)
+        candidate = next((with_rivals(c, ranked, base) for c in ranked if c.name == effect.name), None)
         rivals = candidate.indistinguishable_from if candidate is not None else ()
         return self._findings(
             step.before, step.after, outliers, _material_structure(step.after),
@@ -111,9 +111,9 @@ class RowSearch:
     def _search_model(
         self, start: Fit, outliers: tuple[int, ...], origin: Fit, effects: Mapping[str, Effect]
     ) -> Findings[Fit]:
-        moving = self.table.type.moving
-        path = find_path(start, outliers, effects, max_steps=1 if self._shows_places or moving else MOST_EFFECTS)
-        if moving and competing_pattern(path.start, path.end) is None:
+        is_motion = self.table.type.moving
+        path = find_path(start, outliers, effects, max_steps=1 if self._shows_places or is_motion else MOST_EFFECTS)
+        if is_motion and competing_pattern(path.start, path.end) is None:
             path = continue_path(path, effects)
         if not self._shows_places or _explained(path):
             return self._path_findings(path, effects, origin)
@@ -176,7 +176,7 @@ class RowSearch:
         remainder = pattern or _material_structure(end)
         if remainder is None and any(place.unknown for place in structural.structure.places):
             remainder = structure_of(structural.causes_alone)
-        known = {c.name for c in structural.candidates}
+        candidate_names = {c.name for c in structural.candidates}
         findings = self._findings(
             start, end, outliers, remainder,
             origin=origin,
@@ -188,9 +188,9 @@ class RowSearch:
             spoilt=pattern is not None,
             separations=self._separations(
                 {
-                    name: tuple(rival for rival in rivals if rival in known)
+                    name: tuple(rival for rival in rivals if rival in candidate_names)
                     for name, rivals in structural.alternatives.items()
-                    if known & set(rivals)
+                    if candidate_names & set(rivals)
                 }
             ),
             remarks=structural.remarks,
@@ -272,9 +272,9 @@ def _ordered_steps(start: Fit, final: FinalModel, effects: Mapping[str, Effect])
     present = start
     for name in order:
         last = len(steps) == len(order) - 1
-        after = final.end if last else refit(present, present.model.with_effect(effects[name]))
-        steps.append(Step(name, present, after))
-        present = after
+        extended = final.end if last else refit(present, present.model.with_effect(effects[name]))
+        steps.append(Step(name, present, extended))
+        present = extended
     return tuple(steps)
 
 

@@ -103,13 +103,13 @@ class Rows(Dataset[Fit]):
             return self
         from calibrations.free_forms.effect import place_to_leave_out  # few searches leave out a place
 
-        chosen = tuple(dict.fromkeys(place_to_leave_out(place) for place in places))
-        for place in chosen:
+        place_names = tuple(dict.fromkeys(place_to_leave_out(place) for place in places))
+        for place in place_names:
             column = place.removeprefix("column:")
             if column not in (place, "std", *self.table.columns):
                 hint = nearest(column, self.table.columns)
                 raise ModelError(f"{place} cannot be left out: {self.source} has no column {column}{hint}")
-        return Rows(replace(self.table, left_out=chosen))
+        return Rows(replace(self.table, left_out=place_names))
 
     @property
     def at_rest(self) -> bool:
@@ -157,9 +157,9 @@ class Rows(Dataset[Fit]):
 
         return until(findings, enough)
 
-    def candidates(self, before: Fit, plan: Findings[Fit], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:
+    def candidates(self, base: Fit, plan: Findings[Fit], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:
         """One round of the search, the next effect of the plan first."""
-        ranked = candidates(before, effects)
+        ranked = candidates(base, effects)
         return tuple(with_planned(ranked, plan.steps[0]) if plan.steps else ranked)
 
     def beginning(self, model: Model) -> tuple[Rows, Fit]:
@@ -181,15 +181,15 @@ class Rows(Dataset[Fit]):
 
     def untestable(self, fit: Fit, effects: Mapping[str, Effect]) -> str | None:
         """The effects that these data cannot show together with the model."""
-        hidden = blind_to(fit, effects)
-        if not hidden:
+        names = blind_to(fit, effects)
+        if not names:
             return None
         if self.at_rest:
             return None  # the verdict and the cautions say it for all effects of the force
         angles = fit.table.column("alpha_deg") if fit.table.type.stage_angles else np.arange(2.0)
         hint = f" The data has only one inclination, alpha = {angles[0]:g} deg; measure at other inclinations."
         return (
-            f"With the model {fit.model.name}, these effects cannot be tested on this data: {', '.join(hidden)}."
+            f"With the model {fit.model.name}, these effects cannot be tested on this data: {', '.join(names)}."
             f"{'' if np.ptp(angles) else hint}"
         )
 
@@ -217,22 +217,22 @@ class Rows(Dataset[Fit]):
         """Correlations of the identified parameters, by the noise; without the coefficients of a large free form."""
         from calibrations.model.correlations import MOST, Correlations  # only what writes a model needs them
 
-        known = {key: e for key, e in fit.params.items() if e.identified and e.std}
-        if len(known) > MOST:
+        identified = {key: e for key, e in fit.params.items() if e.identified and e.std}
+        if len(identified) > MOST:
             quantities = [e for term in fit.model.terms for e in term.quantities]
-            known = {key: e for key, e in known.items() if any(e is quantity for quantity in quantities)}
-        if not 1 < len(known) <= MOST:
+            identified = {key: e for key, e in identified.items() if any(e is quantity for quantity in quantities)}
+        if not 1 < len(identified) <= MOST:
             return None
-        places = [k for k, key in enumerate(fit.params) if key in known]
-        return Correlations.of(list(known), fit.correlation[np.ix_(places, places)])
+        places = [k for k, key in enumerate(fit.params) if key in identified]
+        return Correlations.of(list(identified), fit.correlation[np.ix_(places, places)])
 
-    def step(self, effect: Effect, before: Fit) -> Step[Fit]:
+    def step(self, effect: Effect, base: Fit) -> Step[Fit]:
         """The effect added, with both errors in one floor. Raises ModelError if it adds nothing."""
-        after = refit(before, before.model.with_effect(effect))
+        extended = refit(base, base.model.with_effect(effect))
         if effect.expression:
-            _require_new(after, effect.name, before.model.name)
-        floor = after.noise.scatter
-        return Step(effect.name, before.in_floor(floor), after.in_floor(floor))
+            _require_new(extended, effect.name, base.model.name)
+        floor = extended.noise.scatter
+        return Step(effect.name, base.in_floor(floor), extended.in_floor(floor))
 
     def in_one_floor(self, start: Fit, steps: tuple[Step[Fit], ...]) -> tuple[Fit, tuple[Step[Fit], ...]]:
         """All errors in multiples of the last residual, if that is the only measure of noise."""
@@ -243,11 +243,11 @@ class Rows(Dataset[Fit]):
 
     def require_allowed(self, effect: Effect) -> None:
         """Raises ModelError where the table lacks a column, or the effect is defined for another kind."""
-        if (why := effect.excluded(self.table)) is not None:
+        if (reason := effect.excluded(self.table)) is not None:
             t = self.table
             if effect.name.startswith(PREFIX) and t.content in effect.kinds:
-                raise ModelError(f"{effect.name} {why} ({t.source})")
-            raise ModelError(f"{effect.name} {why}; {t.source} is a table of {t.kind}: {', '.join(t.columns)}")
+                raise ModelError(f"{effect.name} {reason} ({t.source})")
+            raise ModelError(f"{effect.name} {reason}; {t.source} is a table of {t.kind}: {', '.join(t.columns)}")
 
     def errors_document(self, fit: Fit) -> dict[str, Any]:
         """rmse, noise floor, slow noise and excess by axis."""
@@ -279,8 +279,8 @@ def _require_new(fit: Fit, name: str, model: str) -> None:
     estimates = fit.model.estimates(name)
     if all(e.std is None for e in estimates):
         e = estimates[0]
-        where = f" of {e.axis}" if e.axis else ""
-        raise ModelError(f"{name} changes nothing that {model} cannot already describe: {e.name}{where}: {e.why}")
+        axis_words = f" of {e.axis}" if e.axis else ""
+        raise ModelError(f"{name} changes nothing that {model} cannot already describe: {e.name}{axis_words}: {e.why}")
 
 
 def _by_axis(fit: Fit, values: Array) -> dict[str, float]:

@@ -27,7 +27,7 @@ from calibrations.criteria import (
     NEARLY_AS_GOOD,
     SIGNIFICANT,
 )
-from calibrations.discovery.candidates import RowCandidate, added, best_pair, candidates, with_rivals
+from calibrations.discovery.candidates import RowCandidate, best_pair, candidates, refit_with, with_rivals
 from calibrations.discovery.significance import chance, likelihood
 from calibrations.effects import Effect
 from calibrations.fitting.determined import lets_go
@@ -111,8 +111,8 @@ def extend_path(path: Path, effects: Mapping[str, Effect], max_steps: int = MOST
 
 def continue_path(path: Path, effects: Mapping[str, Effect]) -> Path:
     """Continue the forward search of a path that ended after its first step."""
-    done = not path.steps or path.end.share_left(path.start) <= 0
-    return path if done else in_final_floor(further := extend_path(path, effects), further.end)
+    complete = not path.steps or path.end.share_left(path.start) <= 0
+    return path if complete else in_final_floor(further := extend_path(path, effects), further.end)
 
 
 def in_final_floor(path: Path, end: Fit) -> Path:
@@ -127,7 +127,9 @@ def in_final_floor(path: Path, end: Fit) -> Path:
 
     def rescaled_step(s: ForwardStep) -> ForwardStep:
         rescaled_candidates = tuple(map(rescaled, s.candidates))
-        selected = next(c for c, before in zip(rescaled_candidates, s.candidates, strict=True) if before is s.selected)
+        selected = next(
+            c for c, candidate in zip(rescaled_candidates, s.candidates, strict=True) if candidate is s.selected
+        )
         return ForwardStep(s.before.in_floor(floor), s.after.in_floor(floor), rescaled_candidates, selected)
 
     return Path(
@@ -162,15 +164,20 @@ def _next(present: Fit, ranked: list[RowCandidate]) -> ForwardStep | None:
 
 def _explained_share(present: Fit, excess_after: float) -> float:
     """Part of the excess variance over the noise floor that an effect explains; 1 if there is hardly any excess."""
-    before = present.pooled_excess**2
-    return (before - excess_after**2) / (before - 1) if before > MATERIAL**2 else 1.0
+    square_before = present.pooled_excess**2
+    return (square_before - excess_after**2) / (square_before - 1) if square_before > MATERIAL**2 else 1.0
 
 
 def _forward_step(present: Fit, ranked: list[RowCandidate], c: RowCandidate) -> ForwardStep:
     """The step that adds `c`, with the errors of the full fit."""
-    after = added(present, c)
-    full = replace(c, excess_after=after.pooled_excess, held_out_after=after.held_out_excess)
-    return ForwardStep(present, after, tuple(full if candidate is c else candidate for candidate in ranked), full)
+    extended = refit_with(present, c)
+    fitted_candidate = replace(c, excess_after=extended.pooled_excess, held_out_after=extended.held_out_excess)
+    return ForwardStep(
+        present,
+        extended,
+        tuple(fitted_candidate if candidate is c else candidate for candidate in ranked),
+        fitted_candidate,
+    )
 
 
 @dataclass(frozen=True)
@@ -189,7 +196,7 @@ class FinalModel:
             name: c for name, ranked in self.candidates_by_effect.items() for c in ranked if c.name == name
         }
         return {
-            name: with_rivals(c, self.candidates_by_effect[name], _without(self.end, name))
+            name: with_rivals(c, self.candidates_by_effect[name], _refit_without(self.end, name))
             for name, c in added_effects.items()
         }
 
@@ -206,11 +213,11 @@ def final_model(path: Path, effects: Mapping[str, Effect]) -> FinalModel:
         candidates_by_effect = _candidates_by_effect(
             path, end, tuple(name for name in names if name not in freed), effects
         )
-        after = _first_exchange(end, names, candidates_by_effect, freed)
-        if after is None:
+        exchange = _first_exchange(end, names, candidates_by_effect, freed)
+        if exchange is None:
             break
-        further = extend_path(Path(after[0], (), ()), effects)
-        end, names = further.end, (*after[1], *(step.selected.name for step in further.steps))
+        further = extend_path(Path(exchange[0], (), ()), effects)
+        end, names = further.end, (*exchange[1], *(step.selected.name for step in further.steps))
     return FinalModel(end, names, candidates_by_effect)
 
 
@@ -220,7 +227,7 @@ def _drop_needless(present: Fit, names: tuple[str, ...], freed: set[str]) -> tup
         cost_of = cost if len(names) <= MOST_EXCHANGED else first_order_cost
         costs = {name: cost_of(present, name) for name in removable}
         name = min(costs, key=lambda n: costs[n][0] / max(costs[n][1], 1))
-        reduced = _without(present, name)
+        reduced = _refit_without(present, name)
         if chance(*costs[name]) < SIGNIFICANT and reduced.held_out_excess > present.held_out_excess:
             break
         names = tuple(n for n in names if n != name)
@@ -234,7 +241,7 @@ def _candidates_by_effect(
     """By effect, all candidates on the model without that effect."""
     if len(path.steps) == 1 and names == (path.steps[0].selected.name,):
         return {names[0]: path.steps[0].candidates}
-    return {name: tuple(candidates(_without(end, name), effects)) for name in names}
+    return {name: tuple(candidates(_refit_without(end, name), effects)) for name in names}
 
 
 def _first_exchange(
@@ -247,12 +254,12 @@ def _first_exchange(
     present = likelihood(end)
     for name, ranked in candidates_by_effect.items():
         for c in _promising(ranked):
-            after = added(_without(end, name), c)
+            exchanged = refit_with(_refit_without(end, name), c)
             exchanged_names = tuple(c.name if n == name else n for n in names)
-            if present - CLEARLY_BETTER < likelihood(after) <= present + CLEARLY_BETTER and c.name != name:
-                after, exchanged_names = _drop_needless(after, exchanged_names, freed)
-            if likelihood(after) > present + CLEARLY_BETTER and not lets_go(end, after):
-                return after, exchanged_names
+            if present - CLEARLY_BETTER < likelihood(exchanged) <= present + CLEARLY_BETTER and c.name != name:
+                exchanged, exchanged_names = _drop_needless(exchanged, exchanged_names, freed)
+            if likelihood(exchanged) > present + CLEARLY_BETTER and not lets_go(end, exchanged):
+                return exchanged, exchanged_names
     return None
 
 
@@ -262,13 +269,13 @@ def _promising(ranked: tuple[RowCandidate, ...]) -> list[RowCandidate]:
 
 
 @lru_cache(maxsize=16)
-def _without(end: Fit, name: str) -> Fit:
+def _refit_without(end: Fit, name: str) -> Fit:
     return refit(end, end.model.without(name))
 
 
 def cost(end: Fit, name: str) -> tuple[float, int]:
     """Growth of the whitened sum of squares without the effect, and the number of its parameters."""
-    residual_without = end.noise.whiten(_without(end, name).residual[:, :, None])[:, 0]
+    residual_without = end.noise.whiten(_refit_without(end, name).residual[:, :, None])[:, 0]
     present = end.whitened[:, 0]
     return float(residual_without @ residual_without - present @ present), int(end.problem.layout.of_effect(name).sum())
 

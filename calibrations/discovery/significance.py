@@ -119,8 +119,8 @@ def reductions(model: Array, residual: Array, candidates: Sequence[Array]) -> Ar
     """
     Q = _basis(model)
     remainder = _freed(residual, Q)
-    known = np.column_stack([Q, remainder]).T
-    products = [(_gram(columns), known @ columns) for columns in candidates]
+    basis = np.column_stack([Q, remainder]).T
+    products = [(_gram(columns), basis @ columns) for columns in candidates]
     sums, least_eigenvalues = _by_gram(products)
     nearly_spanned = list(map(int, np.flatnonzero(least_eigenvalues < NEARLY)))
     sizes = [np.sqrt(np.diagonal(products[k][0])) for k in nearly_spanned]
@@ -150,13 +150,13 @@ def _by_gram(products: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
     Products of each candidate: with itself (k, k), and with the model's basis and, last, the residual (p + 1, k).
     """
     count, wide = len(products), max((len(gram) for gram, _ in products), default=0)
-    known = len(products[0][1]) if count else 1
-    grams, along = np.tile(np.eye(wide), (count, 1, 1)), np.zeros((count, known, wide))
+    rows = len(products[0][1]) if count else 1
+    grams, projected = np.tile(np.eye(wide), (count, 1, 1)), np.zeros((count, rows, wide))
     for k, (gram, projections) in enumerate(products):
-        grams[k, : len(gram), : len(gram)], along[k, :, : len(gram)] = gram, projections
+        grams[k, : len(gram), : len(gram)], projected[k, :, : len(gram)] = gram, projections
     scale = 1 / np.sqrt(np.maximum(np.diagonal(grams, axis1=1, axis2=2), np.finfo(float).tiny))[:, None]
-    along *= scale
-    model, residual_products = along[:, :-1], along[:, -1:]
+    projected *= scale
+    model, residual_products = projected[:, :-1], projected[:, -1:]
     values, vectors = np.linalg.eigh(grams * scale * scale.swapaxes(1, 2) - model.swapaxes(1, 2) @ model)
     squares = (residual_products @ vectors)[:, 0] ** 2 / np.maximum(values, NEARLY)
     return squares.sum(axis=1), np.min(values, axis=1, initial=1.0)

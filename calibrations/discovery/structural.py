@@ -105,19 +105,19 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
         ):
             best = from_stairs
     places, causes, forms, end = best.structure, best.causes, best.forms, best.end
-    needed = [name for name in basic if chance(*first_order_cost(end, name, shared=True)) < SIGNIFICANT]
-    chosen = [*largest_first(at_values_of(end, causes), end, places), *at_values_of(end, forms)]
-    if needed != basic:
-        base = _freed(start, needed, effects)
-        end = fit_together(base, chosen)
-    accepted, fits = fit_gradually(base, chosen, end)
+    needed_effects = [name for name in basic if chance(*first_order_cost(end, name, shared=True)) < SIGNIFICANT]
+    selected = [*largest_first(at_values_of(end, causes), end, places), *at_values_of(end, forms)]
+    if needed_effects != basic:
+        base = _freed(start, needed_effects, effects)
+        end = fit_together(base, selected)
+    accepted_additions, fits = fit_gradually(base, selected, end)
     if fits[-1].pooled_excess < NO_WORSE * end.pooled_excess:
-        chosen, end = accepted, fits[-1]
-        forms = [a for a in chosen if a.effect.name.startswith(PREFIX)]
+        selected, end = accepted_additions, fits[-1]
+        forms = [a for a in selected if a.effect.name.startswith(PREFIX)]
     else:
-        fits = [base, *fitted(base, end, chosen)]
-    steps = _steps(start, needed, base, effects)
-    steps += [Step(a.effect.name, *pair) for a, pair in zip(chosen, pairwise(fits), strict=True)]
+        fits = [base, *fitted(base, end, selected)]
+    steps = _steps(start, needed_effects, base, effects)
+    steps += [Step(a.effect.name, *pair) for a, pair in zip(selected, pairwise(fits), strict=True)]
     ranked = _first(start, steps, candidates(start, effects))
     return StructuralSearch(start, tuple(steps), places, ranked, causes_alone(end, forms), remarks)
 
@@ -134,14 +134,14 @@ class _StructureFit:
 
 def _fit_structure(base: Fit, places: Structure, effects: Mapping[str, Effect]) -> _StructureFit:
     """Fit of the causes and free forms of a structure; if its residual is more than noise, with the forms renewed."""
-    added = additions(places, base.model, effects)
-    causes = fit_separately(base, places, added)
+    all_additions = additions(places, base.model, effects)
+    causes = fit_separately(base, places, all_additions)
     forms = free_additions(places, base.model)
     end = fit_together(base, [*causes, *forms])
     if any(
-        a.effect.rounds for a in added
+        a.effect.rounds for a in all_additions
     ):  # the converter rounds the whole output, and not the remainder of other places
-        as_searched = [a if a.effect.rounds else alone for a, alone in zip(added, causes, strict=True)]
+        as_searched = [a if a.effect.rounds else separate for a, separate in zip(all_additions, causes, strict=True)]
         alternative = fit_together(base, [*as_searched, *forms])
         if alternative.pooled_excess < end.pooled_excess:
             causes, end = as_searched, alternative
@@ -150,8 +150,10 @@ def _fit_structure(base: Fit, places: Structure, effects: Mapping[str, Effect]) 
         if alternative.pooled_excess < NO_WORSE * end.pooled_excess:  # as well without
             causes, end = smooth, alternative
     if end.pooled_excess > base.pooled_excess:  # the joint fit diverged
-        accepted, fits = fit_gradually(base, [*causes, *forms])
-        causes, forms = ([a for a in accepted if a.effect.name.startswith(PREFIX) is free] for free in (False, True))
+        accepted_additions, fits = fit_gradually(base, [*causes, *forms])
+        causes, forms = (
+            [a for a in accepted_additions if a.effect.name.startswith(PREFIX) is free] for free in (False, True)
+        )
         end = fits[-1]
     reached = places.follows_noise and float(rms(end.residual.ravel())) <= AS_SEARCHED * places.result.error
     if end.held_out_excess > MATERIAL and not end.problem.rounds and not reached:
@@ -190,11 +192,11 @@ def _fit_before_stairs(base: Fit, effects: Mapping[str, Effect]) -> tuple[_Struc
     rounding = Addition(
         effects[STAIRS], {}, tuple(Estimate(name, "", value, None, "") for name, value in values.items())
     )
-    end, without = (fit_together(base, [*causes, *stage, *forms]) for stage in ([rounding], []))
-    if without.pooled_excess < NO_WORSE * end.pooled_excess:
+    end, unconverted = (fit_together(base, [*causes, *stage, *forms]) for stage in ([rounding], []))
+    if unconverted.pooled_excess < NO_WORSE * end.pooled_excess:
         return None, 1.0  # as well without: a regular sweep gathers outputs by itself
-    named = _StructureFit(with_stairs(places, base.residual, stairs, white), [*causes, rounding], forms, end)
-    return named, end.share_left(without)
+    structure_fit = _StructureFit(with_stairs(places, base.residual, stairs, white), [*causes, rounding], forms, end)
+    return structure_fit, end.share_left(unconverted)
 
 
 def _freed(start: Fit, names: list[str], effects: Mapping[str, Effect]) -> Fit:
@@ -219,8 +221,8 @@ def _first(start: Fit, steps: list[Step[Fit]], ranked: list[RowCandidate]) -> tu
     if not steps:
         return tuple(ranked)
     first_effect, *other_candidates = with_planned(ranked, steps[0])
-    alone = sum(not step.name.startswith(PREFIX) for step in steps) == 1
-    if alone and not first_effect.name.startswith(PREFIX):
+    single = sum(not step.name.startswith(PREFIX) for step in steps) == 1
+    if single and not first_effect.name.startswith(PREFIX):
         first_effect = with_rivals(first_effect, ranked, start)
     return first_effect, *other_candidates
 

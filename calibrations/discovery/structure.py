@@ -59,8 +59,8 @@ def _remaining_share(pattern: Pattern, screen: Screen) -> float:
     J = J / np.where(size > 0, size, 1.0)
     r = fit.residual.ravel()
     remainder = (r - J @ np.linalg.lstsq(J, r, rcond=1e-9)[0]).reshape(fit.residual.shape)
-    after = float(np.mean((rms(remainder) / fit.noise.floor) ** 2))
-    return max(after - 1, 0.0) / max(fit.pooled_excess**2 - 1, 1e-9)
+    remaining_square = float(np.mean((rms(remainder) / fit.noise.floor) ** 2))
+    return max(remaining_square - 1, 0.0) / max(fit.pooled_excess**2 - 1, 1e-9)
 
 
 def without_slow(fit: Fit) -> Fit:
@@ -156,14 +156,14 @@ def poorly_predicted(fit: Fit) -> Pattern | None:
     return Pattern(text, np.zeros((0, 0, 0)))
 
 
-def competing_pattern(start: Fit, end: Fit, named: Fit | None = None) -> Pattern | None:
+def competing_pattern(start: Fit, end: Fit, named_fit: Fit | None = None) -> Pattern | None:
     """The pattern that explains the residual of `start` better than the effects added up to `end`; None if none does.
 
     The likelihood under the noise without its slow part compares the two, because slow noise would absorb either. A
     parameter costs log(rows), and so does the choice among the patterns. The rows of a motion repeat each other, so
     that a step at its beginning is an effect that is always there. There, only an offset at one attitude competes, and
-    only if its residual is noise: with few attitudes it absorbs a part of most effects. `named`: the fit without free
-    forms, which follow any pattern and do not show its cause.
+    only if its residual is noise: with few attitudes it absorbs a part of most effects. `named_fit`: the fit without
+    free forms, which follow any pattern and do not show its cause.
     """
     if end is start:
         return None
@@ -178,7 +178,7 @@ def competing_pattern(start: Fit, end: Fit, named: Fit | None = None) -> Pattern
     if (
         pattern is None
         or not best > _likelihood_with_effects(end, white_start) + PATTERN_BETTER
-        or _contains(pattern, start, named or end, screen)
+        or _contains(pattern, start, named_fit or end, screen)
     ):
         return None
     return sharpened(pattern, screen)
@@ -194,8 +194,8 @@ def _leaves_noise(pattern: Pattern, screen: Screen) -> bool:
 def _contains(pattern: Pattern, start: Fit, end: Fit, screen: Screen) -> bool:
     """Whether the signal of the effects is part of the pattern, which then describes their form and no other cause."""
     explained = screen.freed(start.residual - end.residual)
-    inside = screen.basis(pattern.columns).T @ explained
-    return float(inside @ inside) > PATTERN_CONTAINED * float(explained @ explained)
+    explained_by_pattern = screen.basis(pattern.columns).T @ explained
+    return float(explained_by_pattern @ explained_by_pattern) > PATTERN_CONTAINED * float(explained @ explained)
 
 
 def _likelihood_with_effects(end: Fit, white_start: Fit) -> float:

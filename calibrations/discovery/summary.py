@@ -67,12 +67,12 @@ def summary_lines(discovery: Discovery[Fit]) -> list[Line]:
         return []  # an output that does not respond has no scale
     findings, end = discovery.findings, discovery.end
     floor, unit = pooled_milli(end)[1], milli_unit(end)
-    added = {step.name for step in discovery.steps}
+    added_effects = {step.name for step in discovery.steps}
     alternatives = discovery.alternatives
     lines, listed = [], set[str]()
     for place in findings.places:
-        effects = tuple(c for c in place.causes if c in added)
-        if not effects and f"{PREFIX}{place.name}" not in added:
+        effects = tuple(c for c in place.causes if c in added_effects)
+        if not effects and f"{PREFIX}{place.name}" not in added_effects:
             continue  # an effect with another name explains it, or the search stopped before
         rivals = dict.fromkeys([*place.inseparable_from, *(r for e in effects for r in alternatives.get(e, ()))])
         certainty = 1 - place.p_value
@@ -88,7 +88,7 @@ def summary_lines(discovery: Discovery[Fit]) -> list[Line]:
         lines.append((at, effects, float(np.sqrt(np.mean(change**2))), 1 - p, tuple(alternatives.get(step.name, ()))))
     total = sum(size**2 for _, _, size, _, _ in lines) or 1.0
     summary = [
-        Line(at, e, size, unit, size**2 / total, certainty, rivals, bool(e) and f"{PREFIX}{at}" in added)
+        Line(at, e, size, unit, size**2 / total, certainty, rivals, bool(e) and f"{PREFIX}{at}" in added_effects)
         for at, e, size, certainty, rivals in lines
     ]
     return sorted(summary, key=lambda line: -line.size)

@@ -60,14 +60,14 @@ def find(name: str, effects: Mapping[str, Effect]) -> Effect:
 
 
 def with_own(user_effects: Iterable[Effect | type[Effect] | str | Path]) -> Mapping[str, Effect]:
-    """The catalogue, and effects of a user's own beside it. Raises ModelError as `resolve_effect` does."""
+    """The catalogue, and effects of a user's own beside it. Raises ModelError as `load_effect` does."""
     if isinstance(user_effects, (str, Path, Effect, type)):
         user_effects = (user_effects,)
-    by_name = {effect.name: effect for effect in map(resolve_effect, user_effects)}
+    by_name = {effect.name: effect for effect in map(load_effect, user_effects)}
     return {**catalogue(), **by_name}
 
 
-def resolve_effect(source: Effect | type[Effect] | str | Path) -> Effect:
+def load_effect(source: Effect | type[Effect] | str | Path) -> Effect:
     """An effect by its name in the catalogue, its file (.py), or as a class, such as one of a notebook's cell.
 
     Raises UnknownName with the nearest, ModelError for what is no whole effect, and for the name of a shipped one.

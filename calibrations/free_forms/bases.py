@@ -77,8 +77,8 @@ def _turned(low: float, high: float, intervals: int, order: int) -> tuple[Array,
     derivative = scipy.interpolate.BSpline(knots, np.eye(splines), DEGREE).derivative(order)(at) * step**order
     penalty = derivative.T @ (np.tile(weights / 2, intervals)[:, None] * derivative)
     values, vectors = np.linalg.eigh(penalty)
-    kept = values > NULL * values[-1]
-    return np.asarray(knots), np.asarray(vectors[:, kept] / np.sqrt(values[kept]), dtype=np.float64)
+    penalised = values > NULL * values[-1]
+    return np.asarray(knots), np.asarray(vectors[:, penalised] / np.sqrt(values[penalised]), dtype=np.float64)
 
 
 def spline(x: Array, most: int = 14, order: int = 2, margin: float = 0.03) -> Spline:
@@ -231,7 +231,7 @@ class Preisach:
     def _over_play(self) -> Spline:
         return Spline(self.low, self.high, self.intervals, order=1)
 
-    def over(self, plays: Array) -> Array:
+    def columns_of(self, plays: Array) -> Array:
         """Columns from what follows behind each play (n, widths), shape (n, count)."""
         return np.column_stack([self._over_play(follower) for follower in plays.T])
 

@@ -50,7 +50,7 @@ class ModelEffects:
     columns: Array
 
     @staticmethod
-    def nothing(data: PoseData) -> ModelEffects:
+    def without_effects(data: PoseData) -> ModelEffects:
         """No effect."""
         shape = data.channels, data.n
         return ModelEffects(np.zeros(shape), np.zeros((*shape, 0)))
@@ -112,28 +112,32 @@ def state_at(
     by_beta = rows @ (at(alpha, beta + SMALL, tilt) - at(alpha, beta - SMALL, tilt)).T / (2 * SMALL)
     by_tilt = rows @ (at(alpha, beta, tilt + SMALL) - at(alpha, beta, tilt - SMALL)).T / (2 * SMALL)
     force = a if data.at_rest else a @ _sensing(rows).T
-    ones = np.ones_like(linear)
-    bare = State(data, force, a, by_alpha, by_beta, by_tilt, linear, linear, ones)
+    unit_gain = np.ones_like(linear)
+    undrifted = State(data, force, a, by_alpha, by_beta, by_tilt, linear, linear, unit_gain)
     response, of_force = linear.copy(), np.zeros_like(linear)
     for comp in active:
         if comp.stage == "response" and not comp.scales:
-            part = comp.jacobian(bare) @ values.of[comp.name]
+            part = comp.jacobian(undrifted) @ values.of[comp.name]
             response += part
             of_force += part if comp.of_force else 0.0
     if drifts := [comp for comp in active if comp.stage == "response" and comp.scales]:
         # a drift of the sensitivity multiplies all that the sensor makes of the force
         total_force = force.copy()
         total_force[:, :c] += (of_force / np.linalg.norm(rows, axis=1)[:, None]).T
-        drifting = replace(bare, force=total_force)
+        drifting = replace(undrifted, force=total_force)
         response += sum(comp.jacobian(drifting) @ values.of[comp.name] for comp in drifts)
 
     def output(response: Array) -> Array:
-        before = State(data, force, a, by_alpha, by_beta, by_tilt, response, response, ones)
-        added = (comp.jacobian(before) @ values.of[comp.name] for comp in active if comp.stage == "output")
-        return sum(added, response)
+        unconverted = State(data, force, a, by_alpha, by_beta, by_tilt, response, response, unit_gain)
+        contributions = (comp.jacobian(unconverted) @ values.of[comp.name] for comp in active if comp.stage == "output")
+        return sum(contributions, response)
 
-    little = SMALL * float(np.ptp(response))
-    gain = (output(response + little) - output(response - little)) / (2 * little) if little > 0 else ones
+    small_step = SMALL * float(np.ptp(response))
+    gain = (
+        (output(response + small_step) - output(response - small_step)) / (2 * small_step)
+        if small_step > 0
+        else unit_gain
+    )
     return State(data, force, a, by_alpha, by_beta, by_tilt, response, output(response), gain)
 
 
@@ -141,18 +145,18 @@ def base_jacobian(state: State, model_effects: ModelEffects) -> Array:
     """d output / d base coefficients, (channels, n, p)."""
     data = state.data
     c, n = data.channels, data.n
-    out = np.zeros((c, n, base_size(data, model_effects)))
+    jacobian = np.zeros((c, n, base_size(data, model_effects)))
     for k in range(c):
-        out[k, :, k] = 1.0
+        jacobian[k, :, k] = 1.0
         if not data.at_rest:
-            out[k, :, c + 3 * k : c + 3 * k + 3] = state.reference
-    out[:, :, 4 * c] = state.by_alpha
-    out[:, :, 4 * c + 1] = state.by_tilt
+            jacobian[k, :, c + 3 * k : c + 3 * k + 3] = state.reference
+    jacobian[:, :, 4 * c] = state.by_alpha
+    jacobian[:, :, 4 * c + 1] = state.by_tilt
     if data.remounted:
-        out[:, :, 4 * c + 2] = state.by_beta
-    out *= state.gain[:, :, None]
-    out[:, :, own_base_size(data) :] = model_effects.columns
-    return out
+        jacobian[:, :, 4 * c + 2] = state.by_beta
+    jacobian *= state.gain[:, :, None]
+    jacobian[:, :, own_base_size(data) :] = model_effects.columns
+    return jacobian
 
 
 def _sensing(rows: Array) -> Array:

@@ -90,24 +90,24 @@ def per_axis(basis: Basis) -> Columns:
 
     def columns(state: State) -> Array:
         blocks = [basis(state, k) for k in range(state.data.channels)]
-        out = np.zeros((len(blocks), state.data.n, sum(b.shape[1] for b in blocks)))
+        matrices = np.zeros((len(blocks), state.data.n, sum(b.shape[1] for b in blocks)))
         at = 0
         for k, block in enumerate(blocks):
-            out[k, :, at : at + block.shape[1]] = block
+            matrices[k, :, at : at + block.shape[1]] = block
             at += block.shape[1]
-        return out
+        return matrices
 
     return columns
 
 
-def free(form: Form, data_state: State, cause: str = "", price: float = 0.0, **more: object) -> Component:
+def free(form: Form, data_state: State, cause: str = "", price: float = 0.0, **options: object) -> Component:
     """The component of a free form."""
     table = data_state.data.table
     name = f"{form.place}/{form.name}"
     if form.driver in ANGLES:
-        nothing = np.zeros((table.n, 3))
-        angle = form.columns(table, nothing, nothing[:, 0], 0)
-        return Component(name, form.place, form.driver, cause, price=price, angle=angle, form=form, **more)  # type: ignore[arg-type]
+        no_force = np.zeros((table.n, 3))
+        angle = form.columns(table, no_force, no_force[:, 0], 0)
+        return Component(name, form.place, form.driver, cause, price=price, angle=angle, form=form, **options)  # type: ignore[arg-type]
 
     def basis(state: State, k: int) -> Array:
         return form.columns(table, state.force, state.response[k], k)
@@ -117,4 +117,4 @@ def free(form: Form, data_state: State, cause: str = "", price: float = 0.0, **m
     else:
         columns = per_axis(basis)
     stage = "output" if form.driver == "output" else "response"
-    return Component(name, form.place, stage, cause, price=price, columns=columns, form=form, **more)  # type: ignore[arg-type]
+    return Component(name, form.place, stage, cause, price=price, columns=columns, form=form, **options)  # type: ignore[arg-type]

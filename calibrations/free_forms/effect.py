@@ -49,9 +49,9 @@ def check_forms(forms: tuple[Form, ...], place: str) -> tuple[Form, ...]:
         if not form.sizes or min(form.sizes) < 0 or max(form.sizes) == 0:
             raise ModelError(f"{subject} has no size; the size is the standard deviation of its coefficients")
         counts = {"bases": len(form.bases), "kept": len(form.kept) or 1}
-        if wrong := next((key for key, n in counts.items() if n not in (1, len(form.sizes))), None):
+        if member := next((key for key, n in counts.items() if n not in (1, len(form.sizes))), None):
             raise ModelError(
-                f"{subject}: {wrong} has {counts[wrong]} entries for {len(form.sizes)} axes; give 1, or 1 an axis"
+                f"{subject}: {member} has {counts[member]} entries for {len(form.sizes)} axes; give 1, or 1 an axis"
             )
         if any(
             not (size > 0) <= form.count(k) <= form.basis(k).count * (size > 0) for k, size in enumerate(form.sizes)
@@ -136,15 +136,15 @@ class FreeForm(Effect):
 
     def _summed(self, table: Table, force: Array, response: Array, k: int, coefficients: Array) -> Array:
         """The sum of all columns for axis k with these coefficients, shape (n,)."""
-        out, at = np.zeros(len(force)), 0
+        total, at = np.zeros(len(force)), 0
         for i, form in enumerate(self.forms):
             form_coefficients = coefficients[at : at + form.count(k)]
             at += len(form_coefficients)
             if form.of_table:
-                out += self._columns_of(i, table, force, k) @ form_coefficients
+                total += self._columns_of(i, table, force, k) @ form_coefficients
             else:
-                out += form.summed(table, force, response, k, form_coefficients)
-        return out
+                total += form.summed(table, force, response, k, form_coefficients)
+        return total
 
     def _kept_columns(self, table: Table, force: Array) -> list[Array]:
         """Columns of each axis. Those of the last force are kept: a jacobian asks for them once a parameter."""
@@ -160,15 +160,15 @@ class _OnResponse(FreeForm):
     """Adds to the output of each axis, (n, 3)."""
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
-        out, nothing = np.zeros(a.shape), np.zeros(len(a))
-        known = self._has_columns(table, a)
+        contribution, no_response = np.zeros(a.shape), np.zeros(len(a))
+        has_columns = self._has_columns(table, a)
         for k in range(len(table.axes)):
             coefficients = self._coefficients(p, k)
-            if known:
-                out[:, k] = self._kept_columns(table, a)[k] @ coefficients
+            if has_columns:
+                contribution[:, k] = self._kept_columns(table, a)[k] @ coefficients
             else:
-                out[:, k] = self._summed(table, a, nothing, k, coefficients)
-        return out
+                contribution[:, k] = self._summed(table, a, no_response, k, coefficients)
+        return contribution
 
     def columns(self, a: Array, table: Table) -> dict[str, Array]:
         by_name = {p.name: np.zeros(a.shape) for p in self.parameters}
@@ -183,10 +183,10 @@ class _AtOutput(FreeForm):
     """Adds to the output, over the output."""
 
     def output(self, v: Array, table: Table, p: Values) -> Array:
-        out = v.copy()
+        output = v.copy()
         for k in range(len(table.axes)):
-            out[:, k] += self._summed(table, v, v[:, k], k, self._coefficients(p, k))
-        return out
+            output[:, k] += self._summed(table, v, v[:, k], k, self._coefficients(p, k))
+        return output
 
 
 class _OnAngle(FreeForm):

@@ -31,7 +31,7 @@ from pydantic import Field
 from calibrations.effects.kernels import play, slip_elements
 from calibrations.effects.logged import leading_temperature, level
 from calibrations.free_forms.bases import Basis, Play, Preisach, Products, Spline
-from calibrations.free_forms.poses import side, way
+from calibrations.free_forms.poses import side, turning_forces
 from calibrations.geometry.orientation import nominal_pose, other_in_plane, out_of_plane, specific_force
 from calibrations.table import Array, Table
 
@@ -77,9 +77,9 @@ class Form:
 
     def needs(self) -> tuple[str, ...]:
         """Columns without which the form cannot be computed."""
-        named = self.driver.removeprefix("column:")
+        column = self.driver.removeprefix("column:")
         by_driver = {"temperature": ("temperature_c",), "time": ("t_s",)}
-        required = by_driver.get(self.driver, (named,) if named != self.driver else ())
+        required = by_driver.get(self.driver, (column,) if column != self.driver else ())
         return (*required, *(("direction",) if self.factor == "side" and self.approach_deg else ()))
 
     @property
@@ -104,26 +104,26 @@ class Form:
         """
         basis, count = self.basis(k), self.count(k)
         if isinstance(basis, Products):
-            out = basis(force)
+            columns = basis(force)
         elif isinstance(basis, Preisach):
-            out = np.asarray(_hysteretic(table, basis, self.approach_deg)[k])
+            columns = np.asarray(_hysteretic(table, basis, self.approach_deg)[k])
         elif isinstance(basis, Play):
             lagging = _lagging(table, basis, self.lead_s) if self.driver == "temperature" else None
             pressed = self.factor == "pressed"
-            out = np.asarray(_slipping(table, basis, self.approach_deg, pressed)[k]) if lagging is None else lagging
+            columns = np.asarray(_slipping(table, basis, self.approach_deg, pressed)[k]) if lagging is None else lagging
         elif self.driver in MODELLED:
-            out = basis(self.drive(table, force, response, k))[:, :count]
+            columns = basis(self.drive(table, force, response, k))[:, :count]
         else:
-            out = _of_table(self, table, k)[:, :count]
+            columns = _of_table(self, table, k)[:, :count]
         multiplied = self.factor not in ("", "pressed")
-        return np.asarray(out * self._factor(table, force, k)[:, None]) if multiplied else out
+        return np.asarray(columns * self._factor(table, force, k)[:, None]) if multiplied else columns
 
     def summed(self, table: Table, force: Array, response: Array, k: int, coefficients: Array) -> Array:
         """The sum of the columns of axis k with these coefficients, shape (n,)."""
         basis = self.basis(k)
         if isinstance(basis, Spline) and self.driver in MODELLED:
-            out = basis.summed(self.drive(table, force, response, k), coefficients)
-            return out * self._factor(table, force, k) if self.factor else out
+            total = basis.summed(self.drive(table, force, response, k), coefficients)
+            return total * self._factor(table, force, k) if self.factor else total
         return np.asarray(self.columns(table, force, response, k) @ coefficients)
 
     def drive(self, table: Table, force: Array, response: Array, k: int) -> Array:
@@ -156,10 +156,10 @@ class Form:
 @lru_cache(maxsize=32)
 def _of_table(form: Form, table: Table, k: int) -> Array:
     """Columns of axis k where a column of the table drives them, which no parameter of a model changes."""
-    nothing = np.zeros((table.n, 3))
+    no_force = np.zeros((table.n, 3))
     basis = form.basis(k)
     assert not isinstance(basis, (Play, Preisach, Products))  # noqa: S101 forces drive these
-    return basis(form.drive(table, nothing, nothing[:, 0], k))
+    return basis(form.drive(table, no_force, no_force[:, 0], k))
 
 
 @lru_cache(maxsize=32)
@@ -174,9 +174,9 @@ def _hysteretic(table: Table, basis: Preisach, approach_deg: float) -> Array:
     """Columns of a Preisach hysteresis of the force along each axis, shape (3, n, count)."""
     driver = specific_force(nominal_pose(table))
     widths = np.array(basis.widths)
-    forces = slip_elements(driver, way(table, approach_deg), np.ones_like(driver), widths, np.zeros(3))
+    forces = slip_elements(driver, turning_forces(table, approach_deg), np.ones_like(driver), widths, np.zeros(3))
     plays = np.moveaxis(driver[:, None, :] - forces, 2, 0)
-    return np.ascontiguousarray([basis.over(followers) for followers in plays])
+    return np.ascontiguousarray([basis.columns_of(followers) for followers in plays])
 
 
 @lru_cache(maxsize=32)
@@ -184,7 +184,7 @@ def _slipping(table: Table, basis: Play, approach_deg: float, pressed: bool) -> 
     """Forces of the slip elements over their widths, and what is left of their first state, shape (3, n, columns)."""
     widths = np.array(basis.widths)
     driver = specific_force(nominal_pose(table))
-    path, even = way(table, approach_deg), np.ones_like(driver)
+    path, even = turning_forces(table, approach_deg), np.ones_like(driver)
     by_load = even + np.abs(other_in_plane(driver)) if pressed else even
     forces = slip_elements(driver, path, by_load, widths, np.zeros(3))
     columns = np.moveaxis(forces, 2, 0) / widths

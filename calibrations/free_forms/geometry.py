@@ -79,29 +79,33 @@ def geometry(result: SearchResult, curves: Mapping[str, Array], effects: Geometr
     floor, mean_gain = float(np.sqrt(np.mean(result.white**2))), float(np.mean(np.abs(gain)))
     if not mean_gain > 0:
         return Geometry()
-    pick, over = _angles(result, gain)
+    pick, hidden_by = _angles(result, gain)
     b = own_base_size(data)
     sizes = {place: float(np.sqrt(np.mean(curve**2))) for place, curve in curves.items()}
     lines_of = {place: _linear_part(result, place, curve) for place, curve in curves.items()}
     shift, covariance = _base_with_forms(result, sizes)
     C = pick @ covariance[:b, :b] @ pick.T
     C += np.diag(np.full(len(pick), (IMMATERIAL * floor / mean_gain) ** 2))
-    line_angles = [2 * max((lines_of.get(place, 0.0) for place in places), default=0.0) / mean_gain for places in over]
+    line_angles = [
+        2 * max((lines_of.get(place, 0.0) for place in places), default=0.0) / mean_gain for places in hidden_by
+    ]
     outputs = partial(_linear_outputs, result, effects)
-    linear = state_at(data, ModelEffects.nothing(data), Coefficients(result.values.base[:b], {}), ()).predicted
+    linear = state_at(data, ModelEffects.without_effects(data), Coefficients(result.values.base[:b], {}), ()).predicted
     to_angles = pick @ (result.gram.base_inverse @ result.columns[:, : len(covariance)].T)[:b]
 
     def remaining_angles(values: Mapping[str, Array]) -> Array:
         return np.asarray(to_angles @ ((linear - outputs(values)) / result.white).ravel() + pick @ shift[:b])
 
-    values, alternatives, _ = _chosen(remaining_angles, C + np.diag(np.square(line_angles)), effects, effects.given)
+    values, alternatives, _ = _cheapest_effects(
+        remaining_angles, C + np.diag(np.square(line_angles)), effects, effects.given
+    )
     sizes_of = {
-        name: float(np.sqrt(np.mean((outputs(values) - outputs(_without(values, name))) ** 2))) / floor
+        name: float(np.sqrt(np.mean((outputs(values) - outputs(_values_without(values, name))) ** 2))) / floor
         for name in values
     }
-    refinements, _, residual_angles = _chosen(remaining_angles, C, effects, effects.given | values.keys())
+    refinements, _, residual_angles = _cheapest_effects(remaining_angles, C, effects, effects.given | values.keys())
     lines: dict[str, float] = {}
-    for places, angle, uncertainty in zip(over, residual_angles, np.sqrt(np.diag(C)), strict=True):
+    for places, angle, uncertainty in zip(hidden_by, residual_angles, np.sqrt(np.diag(C)), strict=True):
         if places and abs(angle) > max(LEAST_LINE * floor / mean_gain, SEEN * uncertainty):
             lines[places[0]] = max(lines.get(places[0], 0.0), float(abs(angle)) * mean_gain)
     return Geometry(tuple(values), sizes_of, tuple(refinements), alternatives, lines)
@@ -115,7 +119,7 @@ def _linear_outputs(result: SearchResult, effects: GeometryEffects, values: Mapp
     return np.asarray(base[:c, None] + scale[:, None] * effects.forces(values)[:, :c].T)
 
 
-def _without(values: Mapping[str, Array], name: str) -> dict[str, Array]:
+def _values_without(values: Mapping[str, Array], name: str) -> dict[str, Array]:
     return {key: value for key, value in values.items() if key != name}
 
 
@@ -163,23 +167,23 @@ def _angles(result: SearchResult, gain: Array) -> tuple[Array, list[tuple[str, .
     """The matrix that picks the angles q of the base coefficients, rad, and the places that hide each."""
     data, c = result.data, result.data.channels
     rows: list[Array] = []
-    over: list[tuple[str, ...]] = []
+    hidden_by: list[tuple[str, ...]] = []
     for k in range(c):
         for j in range(3):
             if j != k:
                 row = np.zeros(own_base_size(data))
                 row[c + 3 * k + j] = 1 / gain[k]
                 rows.append(row)
-                over.append(OVER_CROSS if j == CROSS[k] else OVER_Z)
+                hidden_by.append(OVER_CROSS if j == CROSS[k] else OVER_Z)
     for i in range(4 * c, own_base_size(data)):
         row = np.zeros(own_base_size(data))
         row[i] = 1.0
         rows.append(row)
-        over.append(())
-    return np.array(rows), over
+        hidden_by.append(())
+    return np.array(rows), hidden_by
 
 
-def _chosen(
+def _cheapest_effects(
     remaining_angles: Callable[[Mapping[str, Array]], Array], C: Array, effects: GeometryEffects, free: AbstractSet[str]
 ) -> tuple[dict[str, Array], dict[str, tuple[str, ...]], Array]:
     """(values of the cheapest effects that explain the angles of covariance C, their rivals, remaining angles).
@@ -202,12 +206,12 @@ def _chosen(
             price = CAUSE_PRICE * count + PARAMETER_PRICE * rank
             scored.append((float(residual_angles @ residual_angles) + price, names, residual_angles, values))
     scored.sort(key=lambda s: s[0])
-    best, chosen, residual_angles, values = scored[0]
-    close = [names for score, names, *_ in scored[1:] if score < best + CLOSE and len(names) <= len(chosen)]
-    rivals = {name for names in close for name in names} - set(chosen)
+    best, effect_names, residual_angles, values = scored[0]
+    close = [names for score, names, *_ in scored[1:] if score < best + CLOSE and len(names) <= len(effect_names)]
+    rivals = {name for names in close for name in names} - set(effect_names)
     return (
-        {name: values[name] for name in chosen},
-        {name: tuple(sorted(rivals)) for name in chosen if rivals},
+        {name: values[name] for name in effect_names},
+        {name: tuple(sorted(rivals)) for name in effect_names if rivals},
         root @ residual_angles,
     )
 
@@ -227,7 +231,7 @@ def _fitted(
         differences = [
             (remaining_angles(by_effect(p - e)), remaining_angles(by_effect(p + e))) for e in SMALL_DEG * np.eye(len(p))
         ]
-        A = np.column_stack([(before - after) / (2 * SMALL_DEG) for before, after in differences])
+        A = np.column_stack([(upper - lower) / (2 * SMALL_DEG) for upper, lower in differences])
         step, _, rank_shown, _ = np.linalg.lstsq(A, residual_angles, rcond=1e-6)
         p, rank = p + step, float(rank_shown)
         residual_angles = remaining_angles(by_effect(p))

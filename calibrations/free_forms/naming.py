@@ -10,7 +10,7 @@ from scipy.stats import chi2, kurtosis
 
 from calibrations.free_forms.chain import base_size
 from calibrations.free_forms.components import Component
-from calibrations.free_forms.reml import Sizes, gains, without
+from calibrations.free_forms.reml import Sizes, fit_without, gains
 from calibrations.free_forms.search import SearchResult, climb
 from calibrations.table import Array
 
@@ -83,9 +83,9 @@ def places(result: SearchResult) -> list[ActingPlace]:
     }
     sizes = {place: float(np.sqrt(np.mean(curve**2))) for place, curve in curves.items()}
     largest = max(sizes.values(), default=0.0)
-    out = []
+    acting_places = []
     for place, names in by_place.items():
-        causes, share = _named(result, place, names, curves[place], Q, b)
+        causes, share = _name_effects(result, place, names, curves[place], Q, b)
         walks = all("/walk-" in name for name in names)  # they follow anything, the errors of readings too
         curved = walks or not any(result.component(name).cause for name in names)  # no form of the catalogue acts
         followed = _followed(result, curves, place, Q, 0.0 if walks else share) if curved else None
@@ -104,8 +104,8 @@ def places(result: SearchResult) -> list[ActingPlace]:
         curve = curves[place].reshape(result.white.shape) * result.white
         constants = followed[0].constants if followed else ()
         acting = tuple(names), causes, share, material, gain, alternatives, curve, constants
-        out.append(ActingPlace(place, sizes[place], own_size, largest, *acting))
-    return _with_substitutes(result, sorted(out, key=lambda p: -p.size))
+        acting_places.append(ActingPlace(place, sizes[place], own_size, largest, *acting))
+    return _with_substitutes(result, sorted(acting_places, key=lambda p: -p.size))
 
 
 def _own_size(result: SearchResult, gain: float) -> float:
@@ -120,29 +120,29 @@ def _excess(result: SearchResult) -> float:
 
 def _with_substitutes(result: SearchResult, acting: Sequence[ActingPlace]) -> list[ActingPlace]:
     """The places. If two explain most of each other, the larger one counts, and the smaller one is its alternative."""
-    out = list(acting)
-    for i, place in enumerate(out):
+    places_kept = list(acting)
+    for i, place in enumerate(places_kept):
         if (place.material and place.own >= LEAST_SIZE) or place.size < max(LEAST_SIZE, LEAST_SHARE * place.largest):
             continue
-        for substitute in (o for o in out[i + 1 :] if not o.material):
-            gain = _lost(result, (*place.components, *substitute.components))
+        for substitute in (o for o in places_kept[i + 1 :] if not o.material):
+            gain = _cost_without(result, (*place.components, *substitute.components))
             if _own_size(result, gain) >= LEAST_SIZE:
                 names = substitute.causes or (substitute.name,)
                 alternatives = tuple(sorted({*place.inseparable_from, *names} - set(place.causes)))
-                out[i] = replace(place, material=True, gain=gain, inseparable_from=alternatives)
+                places_kept[i] = replace(place, material=True, gain=gain, inseparable_from=alternatives)
                 break
-    return out
+    return places_kept
 
 
-def _lost(result: SearchResult, names: Sequence[str]) -> float:
+def _cost_without(result: SearchResult, names: Sequence[str]) -> float:
     """What the fit loses without some components, of twice the log-likelihood."""
-    return _without(result, names).deviance - result.sizes.deviance
+    return _sizes_without(result, names).deviance - result.sizes.deviance
 
 
-def _without(result: SearchResult, names: Sequence[str]) -> Sizes:
+def _sizes_without(result: SearchResult, names: Sequence[str]) -> Sizes:
     sizes = result.sizes
     for name in names:
-        sizes = without(result.gram, sizes, name)
+        sizes = fit_without(result.gram, sizes, name)
     return sizes
 
 
@@ -162,7 +162,7 @@ def _freed(Q: Array, x: Array) -> Array:
     return np.asarray(x - Q @ (Q.T @ x))
 
 
-def _named(
+def _name_effects(
     result: SearchResult, place: str, names: Sequence[str], curve: Array, Q: Array, b: int
 ) -> tuple[tuple[str, ...], float]:
     """The fewest catalogue effects that take up the curve, and their share of its variance."""
@@ -180,17 +180,17 @@ def _named(
     if all(result.component(name).form is None for name in names):
         needed_causes, share = _necessary({cause: columns[cause][0] for cause in acting}, curve, total)
         return _one_name(result, names, needed_causes, curve, Q), share
-    chosen: dict[str, Array] = {}
+    columns_by_cause: dict[str, Array] = {}
     share = 0.0
     walks = {result.component(name).cause for name in names if "/walk-" in name}
     first = [cause for cause in acting if cause and cause not in walks] if walks else []  # a walk follows anything
     while True:
-        full = len(set(chosen) - acting.keys()) >= MOST_FORMS
+        at_limit = len(set(columns_by_cause) - acting.keys()) >= MOST_FORMS
         trials: dict[str, tuple[float, Array]] = {}
         for cause in first or columns:
-            if cause in chosen or (full and cause not in acting):
+            if cause in columns_by_cause or (at_limit and cause not in acting):
                 continue
-            chosen_columns = list(chosen.values())
+            chosen_columns = list(columns_by_cause.values())
             options = columns[cause]
             if cause not in acting:
                 options = [*options, *_at_best_shapes(result, forms[cause], curve, chosen_columns, Q)]
@@ -199,25 +199,25 @@ def _named(
             )
             trials[cause] = 1 - squares / total, X
         best = max(trials, key=lambda c: trials[c][0], default="")
-        if not best or trials[best][0] - share < (NEXT_FORM if chosen else 0.2):
+        if not best or trials[best][0] - share < (NEXT_FORM if columns_by_cause else 0.2):
             if not first:
                 break
             first = []
             continue
-        share, chosen[best] = trials[best]
-    causes = _one_name(result, names, tuple(chosen), curve, Q)
+        share, columns_by_cause[best] = trials[best]
+    causes = _one_name(result, names, tuple(columns_by_cause), curve, Q)
     return (causes, share) if share >= NAMED else ((), share)
 
 
 def _one_name(
-    result: SearchResult, names: Sequence[str], chosen: Sequence[str], curve: Array, Q: Array
+    result: SearchResult, names: Sequence[str], cause_names: Sequence[str], curve: Array, Q: Array
 ) -> tuple[str, ...]:
     """The causes with one name for an effect and the wider one that contains it.
 
     It is the wider one where the other, at its best shape, leaves a part of the curve that can be seen, and the wider
     one beside the other without a shape leaves clearly less: both with their shapes follow many lags.
     """
-    causes = dict.fromkeys(chosen)
+    causes = dict.fromkeys(cause_names)
 
     def residual_rms(comps: Sequence[Component], companions: Sequence[Array]) -> float:
         squares = min((_residual_at_best(result, c, curve, Q, companions)[0] for c in comps), default=np.inf)
@@ -226,8 +226,8 @@ def _one_name(
     for outer in (comp for comp in map(result.component, names) if comp.contains):
         at_place = [c for c in result.components if c.place == outer.place and not c.form]
         inner, wider = ([c for c in at_place if c.cause == cause] for cause in (outer.contains, outer.cause))
-        plain = [c.reshaped((0.0,) * len(c.shape)) if c.reshaped else c for c in inner[:1]]
-        clear = CLEARLY_LESS * residual_rms(wider, [_columns_of(result, c, Q) for c in plain])
+        unshaped = [c.reshaped((0.0,) * len(c.shape)) if c.reshaped else c for c in inner[:1]]
+        clear = CLEARLY_LESS * residual_rms(wider, [_columns_of(result, c, Q) for c in unshaped])
         name = outer.cause if residual_rms(inner, []) > max(UNSEEN, clear) else outer.contains
         causes = dict.fromkeys(name if cause in (outer.cause, outer.contains) else cause for cause in causes)
     return tuple(causes)
@@ -287,19 +287,19 @@ def _necessary(columns: Mapping[str, Array], curve: Array, total: float) -> tupl
     """Of the catalogue forms that act without a free form beside them, those that the curve needs, and their share."""
     share = 1 - _residual_squares(list(columns.values()), curve) / total
 
-    def lost(cause: str) -> float:
+    def cost_without(cause: str) -> float:
         remaining = [X for name, X in columns.items() if name != cause]
         return share - (1 - _residual_squares(remaining, curve) / total if remaining else 0.0)
 
-    needs = {cause: lost(cause) for cause in columns}
-    least = min(LEAST_NEEDED, max(needs.values()))
-    return tuple(c for c in sorted(needs, key=lambda c: -needs[c]) if needs[c] >= least), share
+    costs = {cause: cost_without(cause) for cause in columns}
+    least = min(LEAST_NEEDED, max(costs.values()))
+    return tuple(c for c in sorted(costs, key=lambda c: -costs[c]) if costs[c] >= least), share
 
 
 def _follows_many(comp: Component) -> bool:
     """Whether a cause's columns are of many widths, so that they take up a part of most curves."""
-    many = ("clips", "play", "preisach")
-    return comp.cause == "quantisation" or (comp.form is not None and comp.form.basis(0).kind in many)
+    flexible_kinds = ("clips", "play", "preisach")
+    return comp.cause == "quantisation" or (comp.form is not None and comp.form.basis(0).kind in flexible_kinds)
 
 
 def _jumps(result: SearchResult, name: str) -> bool:
@@ -338,16 +338,16 @@ def _rivals(result: SearchResult, names: Sequence[str], larger: set[str]) -> tup
     Of one component those that gain nearly as much. At a `larger` place that acts, also a form that gains most of it:
     the form of a mechanism is never quite that of the catalogue.
     """
-    reduced = _without(result, names)
-    lost = reduced.deviance - result.sizes.deviance
+    reduced = _sizes_without(result, names)
+    cost = reduced.deviance - result.sizes.deviance
     acting = [result.component(name) for name in names]
     inactive = [c for c in result.components if c.name not in result.sizes.variances and c.place != acting[0].place]
     gained = gains(result.gram, reduced, [c.name for c in inactive])
-    limit = lost - acting[0].price - CLOSE if len(names) == 1 else np.inf
-    most = MOSTLY * lost
+    limit = cost - acting[0].price - CLOSE if len(names) == 1 else np.inf
+    most = MOSTLY * cost
     close = {
         c.cause or c.place
         for c in inactive
         if gained[c.name][0] - c.price > (min(limit, most) if c.place in larger and not c.general else limit)
     }
-    return lost, tuple(sorted(close - {component.cause for component in acting}))
+    return cost, tuple(sorted(close - {component.cause for component in acting}))

@@ -96,7 +96,7 @@ def _stages(data: PoseData, first: State) -> list[Component]:
     return components
 
 
-def _over(forces: Array, count: int, intervals: int) -> tuple[Any, ...]:
+def _splines_over(forces: Array, count: int, intervals: int) -> tuple[Any, ...]:
     """A spline over each axis's own range of forces (n, 3)."""
     return tuple(spline(forces[:, k], intervals) for k in range(count))
 
@@ -112,13 +112,13 @@ def _own_response(data: PoseData, first: State) -> list[Component]:
         form("cubic-nonlinearity", lambda s, k: s.force[:, k, None] ** 3),
         form("odd-quadratic-nonlinearity", lambda s, k: (s.force[:, k] * np.abs(s.force[:, k]))[:, None]),
         form("scale-factor-asymmetry", lambda s, k: np.abs(s.force[:, k, None])),
-        free(Form(place, "curve", "own", _over(first.force, data.channels, 22)), first),
+        free(Form(place, "curve", "own", _splines_over(first.force, data.channels, 22)), first),
     ]
     price = 2 * np.log(len(DEAD_G))
 
     def dead_zone(name: str) -> Make:
         return lambda shape: Component(
-            name, place, "response", "dead-zone", f"{place}/dead-zone", price, per_axis(_dead(shape)),
+            name, place, "response", "dead-zone", f"{place}/dead-zone", price, per_axis(_dead_zone(shape)),
             shape=shape, step=tuple(0.3 * w for w in shape), reshaped=dead_zone(name),
             starts=lambda _: tuple(("width", axis, abs(w)) for axis, w in zip(data.axes, shape, strict=True)),
         )  # fmt: skip
@@ -128,7 +128,7 @@ def _own_response(data: PoseData, first: State) -> list[Component]:
     return components + _saturations(data, first)
 
 
-def _dead(widths: tuple[float, ...]) -> Basis:
+def _dead_zone(widths: tuple[float, ...]) -> Basis:
     """Specific force clipped at a width of each channel's own, g."""
     return lambda s, k: np.clip(s.force[:, k, None], -abs(widths[k]), abs(widths[k]))
 
@@ -181,16 +181,16 @@ def _saturated(levels: tuple[float, ...], side: int) -> Columns:
     """
 
     def columns(s: State) -> Array:
-        out = np.zeros((s.data.channels, s.data.n, 1))
+        matrices = np.zeros((s.data.channels, s.data.n, 1))
         for k in range(s.data.channels):
             a = s.force[:, k]
             gain = float(np.polyfit(a, s.response[k], 1)[0]) if np.ptp(a) > 0 else 1.0
             if side == 0:
-                lost = np.maximum(a - levels[2 * k], 0.0) + np.minimum(a - levels[2 * k + 1], 0.0)
+                clipped = np.maximum(a - levels[2 * k], 0.0) + np.minimum(a - levels[2 * k + 1], 0.0)
             else:
-                lost = np.maximum(a - levels[k], 0.0) if side > 0 else np.minimum(a - levels[k], 0.0)
-            out[k, :, 0] = gain * lost
-        return out
+                clipped = np.maximum(a - levels[k], 0.0) if side > 0 else np.minimum(a - levels[k], 0.0)
+            matrices[k, :, 0] = gain * clipped
+        return matrices
 
     return columns
 
@@ -200,18 +200,18 @@ def _other_axes(data: PoseData, first: State) -> list[Component]:
     cross, z = first.force[:, list(CROSS)], out_of_plane(first.force)
     inclinations = len(np.unique(np.round(first.force[:, 2], 3)))
 
-    def named(place: str, cause: str, basis: Basis, price: float = 0.0) -> Component:
+    def component(place: str, cause: str, basis: Basis, price: float = 0.0) -> Component:
         return Component(f"{place}/{cause}", place, "response", cause, price=price, columns=per_axis(basis))
 
     def curve(
         place: str, driver: str, forces: Array, intervals: int, factor: Factor = "", price: float = 0.0
     ) -> Component:
-        return free(Form(place, "curve", driver, _over(forces, c, intervals), factor), first, price=price)
+        return free(Form(place, "curve", driver, _splines_over(forces, c, intervals), factor), first, price=price)
 
     components = [
-        named("cross-response", "cross-axis-bias", lambda s, k: s.force[:, CROSS[k], None] ** 2),
+        component("cross-response", "cross-axis-bias", lambda s, k: s.force[:, CROSS[k], None] ** 2),
         curve("cross-response", "cross", cross, 14),
-        named(
+        component(
             "scale-over-cross", "cross-axis-scale",
             lambda s, k: (s.force[:, k] * s.force[:, CROSS[k]])[:, None], PRODUCT,
         ),
@@ -227,7 +227,10 @@ def _other_axes(data: PoseData, first: State) -> list[Component]:
         perpendicular = out_of_plane(s.force)[:, k]
         return np.column_stack([s.force[:, k] * perpendicular, s.force[:, k] * perpendicular**2])
 
-    components += [named("z-response", "z-axis-bias", square), named("scale-over-z", "z-axis-scale", product, PRODUCT)]
+    components += [
+        component("z-response", "z-axis-bias", square),
+        component("scale-over-z", "z-axis-scale", product, PRODUCT),
+    ]
     if inclinations >= FEWEST_INCLINATIONS:
         components += [
             curve("z-response", "out-of-plane", z, 10),
@@ -240,19 +243,19 @@ def _history(data: PoseData, first: State) -> list[Component]:
     """Slip elements with free weights, slip elements pressed by the other axis, and branches."""
     if not data.sides:
         return []
-    stated = "approach_deg" in data.table.constants
-    start_shape = (AS_STATED if stated else LOGGED_DEG,)
+    has_approach = "approach_deg" in data.table.constants
+    start_shape = (AS_STATED if has_approach else LOGGED_DEG,)
     components = [
-        _slipping(first, "slip", "", stated)(start_shape),
-        _slipping(first, "pressed-slip", "pressed", stated)(start_shape),
+        _slipping(first, "slip", "", has_approach)(start_shape),
+        _slipping(first, "pressed-slip", "pressed", has_approach)(start_shape),
     ]
-    components.append(_loops(first, stated)(start_shape))
+    components.append(_loops(first, has_approach)(start_shape))
     cross, own_force = first.force[:, list(CROSS)], first.force
     for approach, turn in data.sides.items():
         if np.ptp(turn) == 0:
             continue
         for name, driver, forces in (("branch-over-cross", "cross", cross), ("branch-over-own", "own", own_force)):
-            splines = _over(forces, data.channels, 10)
+            splines = _splines_over(forces, data.channels, 10)
             form = Form("history", f"{name}-{SIDES[approach]}", driver, splines, "side", approach_deg=approach)
             components.append(free(form, first, "hysteresis", PRODUCT))
         friction = Form("history", f"friction-{SIDES[approach]}", "cross", (Ramp(),), "side", approach_deg=approach)
@@ -260,25 +263,25 @@ def _history(data: PoseData, first: State) -> list[Component]:
     return components
 
 
-def _slipping(first: State, name: str, factor: Factor, stated: bool) -> Make:
+def _slipping(first: State, name: str, factor: Factor, has_approach: bool) -> Make:
     """Slip elements; the shape is the angle in degrees before a pose at which its approach starts."""
 
     def at(shape: tuple[float, ...]) -> Component:
         widths = Play(WIDTHS_G, memory=not factor and first.data.timed)
-        approach = AS_STATED if stated else abs(shape[0])
+        approach = AS_STATED if has_approach else abs(shape[0])
         form = Form("history", name, "way", (widths,), factor, approach_deg=approach)
         return free(form, first, "hysteresis", PRODUCT if factor else 0.0, shape=shape, step=(2.0,),
-                    reshaped=None if stated else _slipping(first, name, factor, stated),
+                    reshaped=None if has_approach else _slipping(first, name, factor, has_approach),
                     constants=(("approach_deg", approach),))  # fmt: skip
 
     return at
 
 
-def _loops(first: State, stated: bool) -> Make:
+def _loops(first: State, has_approach: bool) -> Make:
     """Hysteresis with loops that depend on the force; the shape is the start of the approach, degrees before a pose."""
 
     def at(shape: tuple[float, ...]) -> Component:
-        approach = AS_STATED if stated else abs(shape[0])
+        approach = AS_STATED if has_approach else abs(shape[0])
         reach = 1.05 * float(np.abs(first.force).max())
         basis = Preisach(LOOPS_G, -reach, reach, LOOP_INTERVALS)
         form = Form("history", "loops", "way", (basis,), approach_deg=approach)

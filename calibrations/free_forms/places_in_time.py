@@ -27,18 +27,18 @@ BRANCHES = (0.02, 0.035, 0.06, 0.1, 0.17, 0.28, 0.45)  # the same: plays that to
 FEWEST_TIMED, FEWEST_NOISE = 12, 20  # rows that can show a function of time, and slow noise
 
 
-def slow_noise(data: PoseData, whole: bool = False) -> list[Component]:
-    """Flicker noise of each channel: never a cause, always in the model; `whole`: of all frequencies."""
+def slow_noise(data: PoseData, all_frequencies: bool = False) -> list[Component]:
+    """Flicker noise of each channel: never a cause, always in the model; `all_frequencies`: of all frequencies."""
     if not data.timed or data.n < FEWEST_NOISE:
         return []
-    count = min(WALK_WAVES, data.n // 2) if whole else min(WAVES, data.n // 6)
-    basis = Waves(0.0, 1.0, count, 1.0)(data.since)
-    out = []
+    count = min(WALK_WAVES, data.n // 2) if all_frequencies else min(WAVES, data.n // 6)
+    basis = Waves(0.0, 1.0, count, 1.0)(data.elapsed_share)
+    components = []
     for k in range(data.channels):
         columns = np.zeros((data.channels, *basis.shape))
         columns[k] = basis
-        out.append(Component(f"noise/{data.axes[k]}", "noise", "response", columns=_fixed(columns), noise=True))
-    return out
+        components.append(Component(f"noise/{data.axes[k]}", "noise", "response", columns=_fixed(columns), noise=True))
+    return components
 
 
 def _fixed(columns: Array) -> Columns:
@@ -61,15 +61,15 @@ def over_temperature(data: PoseData, first: State) -> list[Component]:
     leads = LEADS_S if data.timed else (0.0,)
     if data.timed and data.at_rest:
         leads = (*leads, *LONG_LEADS_S)
-    chosen = 2 * np.log(len(leads))
+    lead_price = 2 * np.log(len(leads))
     factors: tuple[tuple[str, Factor, float], ...] = (
         ("temperature-bias", "", 0.0),
         ("temperature-scale", "force", PRODUCT),
     )
     for place, factor, price in factors:
         for lead in leads:
-            more = price + chosen if lead else price
-            components.append(_warmer(data, first, f"{place}/{place}@{lead:g}", place, factor, more)((lead,)))
+            form_price = price + lead_price if lead else price
+            components.append(_warmer(data, first, f"{place}/{place}@{lead:g}", place, factor, form_price)((lead,)))
         components.append(_curve_over_temperature(data, first, place, factor, price)((0.0,)))
     if data.timed:
         temperature = leading_temperature(data.table, 0.0)
@@ -78,9 +78,9 @@ def over_temperature(data: PoseData, first: State) -> list[Component]:
             components.append(_lagging_by_play(name, temperature)((part * float(np.ptp(temperature)),)))
         widths = tuple(part * float(np.ptp(temperature)) for part in BRANCHES)
         form = Form("temperature-bias", "branches", "temperature", (Play(widths),))
-        more = {"general": True, "contains": "temperature-bias", "starts": _middle_play(widths)}
+        form_price = {"general": True, "contains": "temperature-bias", "starts": _middle_play(widths)}
         components.append(
-            free(form, first, "temperature-hysteresis", GENERAL, **more)
+            free(form, first, "temperature-hysteresis", GENERAL, **form_price)
         )  # after transients: it settles as they do
     return components
 
@@ -146,7 +146,7 @@ def _curve_over_temperature(data: PoseData, first: State, place: str, factor: Fa
 def over_time(data: PoseData, first: State) -> list[Component]:
     if not data.timed or data.n < FEWEST_TIMED:
         return []
-    t, u = data.table.time_s, data.since
+    t, u = data.table.time_s, data.elapsed_share
     begin, span = float(t.min()), float(np.ptp(t)) or 1.0
     components: list[Component] = []
     places: tuple[tuple[str, Factor, str, str, float], ...] = (

@@ -57,7 +57,7 @@ class Reading:
         """Constants of a catalogue effect that this reading drives."""
         return (("level", float(self.is_level)),)
 
-    def named(self, name: str) -> str:
+    def component_name(self, name: str) -> str:
         """The name of a component that this reading drives."""
         return f"{name}-of-level" if self.is_level else name
 
@@ -71,8 +71,8 @@ def _readings(table: Table, names: Sequence[str], power: int = 1) -> list[Readin
         return [Reading(logged)]
     error = max(reading_error(table, name, power) for name in names)
     raw = Reading(logged, error=float(np.hypot(scatter, error)))
-    known = all(level_is_known(table, name, power) for name in names)
-    return [raw, Reading(levels, True, error)] if known else [raw]
+    level_known = all(level_is_known(table, name, power) for name in names)
+    return [raw, Reading(levels, True, error)] if level_known else [raw]
 
 
 def over_columns(data: PoseData, first: State) -> list[Component]:
@@ -95,10 +95,10 @@ def _supplied(supply: Reading) -> Component:
     """The output in proportion to the supply."""
     place, cause = "column:supply_v", "supply-sensitivity"
     (volts,) = supply.values
-    more = (volts / volts.mean() - 1)[:, None]
-    columns = per_axis(lambda state, k: state.response[k, :, None] * more)
+    excess = (volts / volts.mean() - 1)[:, None]
+    columns = per_axis(lambda state, k: state.response[k, :, None] * excess)
     return Component(
-        supply.named(f"{place}/{cause}"), place, "output", cause, f"{place}/{cause}", supply.price, columns,
+        supply.component_name(f"{place}/{cause}"), place, "output", cause, f"{place}/{cause}", supply.price, columns,
         constants=supply.constants, error=supply.error,
     )  # fmt: skip
 
@@ -108,11 +108,11 @@ def _vibrating(squares: Reading, first: State) -> list[Component]:
     place, cause = "column:std", "vibration-rectification"
     columns = per_axis(lambda _, k: (squares.values[k] - squares.values[k].mean())[:, None])
     curves = tuple(spline(q, 6) for q in squares.values)
-    curve = Form(place, squares.named("curve"), "variance", curves, level=squares.is_level)
+    curve = Form(place, squares.component_name("curve"), "variance", curves, level=squares.is_level)
     return [
         Component(
-            squares.named(f"{place}/{cause}"), place, "response", cause, f"{place}/{cause}", squares.price, columns,
-            constants=squares.constants, error=squares.error,
+            squares.component_name(f"{place}/{cause}"), place, "response", cause, f"{place}/{cause}", squares.price,
+            columns, constants=squares.constants, error=squares.error,
         ),
         free(curve, first, price=squares.price, family=f"{place}/curve", error=squares.error),
     ]  # fmt: skip
@@ -126,7 +126,7 @@ def _over_column(place: str, reading: Reading, first: State) -> list[Component]:
     components = []
     for prefix, factor, price in factors:
         for kind, bases in (("line", line), ("curve", curve)):
-            form = Form(place, reading.named(f"{prefix}{kind}"), place, bases, factor, level=reading.is_level)
+            form = Form(place, reading.component_name(f"{prefix}{kind}"), place, bases, factor, level=reading.is_level)
             family = f"{place}/{prefix}{kind}"
             components.append(free(form, first, price=price + reading.price, family=family, error=reading.error))
     return components

@@ -41,8 +41,8 @@ class PoseData:
     def of(table: Table) -> PoseData:
         """The data of a table in order of time."""
         spreads = table.std_names
-        known = {f"{name}_of_mean" for name in spreads}
-        other = set(table.columns) - USED - set(table.output_names) - set(spreads) - known
+        mean_names = {f"{name}_of_mean" for name in spreads}
+        others_logged = set(table.columns) - USED - set(table.output_names) - set(spreads) - mean_names
         return PoseData(
             table=table,
             alpha=np.radians(table.column("alpha_deg")),
@@ -52,7 +52,7 @@ class PoseData:
             outputs=table.outputs.T.copy(),
             sides=_sides(table),
             spread=np.stack([table.column(name) for name in spreads]) if all(s in table for s in spreads) else None,
-            logged={name: table.column(name) for name in sorted(other) if np.ptp(table.column(name)) > 0},
+            logged={name: table.column(name) for name in sorted(others_logged) if np.ptp(table.column(name)) > 0},
         )
 
     @property
@@ -81,7 +81,7 @@ class PoseData:
         return "t_s" in self.table and float(np.ptp(self.table.time_s)) > 0
 
     @property
-    def since(self) -> Array:
+    def elapsed_share(self) -> Array:
         """Time from 0 to 1 along the record, shape (n,)."""
         t = self.table.time_s
         return np.asarray((t - t.min()) / (float(np.ptp(t)) or 1.0))
@@ -98,14 +98,14 @@ def _sides(table: Table) -> dict[float, Array]:
         return {}
     if "approach_deg" in table.constants:
         return {AS_STATED: last_turn(table)}
-    moved = last_turn(approached(table, 0.0))
+    approach_side = last_turn(approached(table, 0.0))
     if "direction" not in table or not table.column("direction").any():
-        return {0.0: moved}
-    logged = np.where(table.column("direction") != 0, table.column("direction"), moved)
-    return {LOGGED_DEG: logged} if np.array_equal(logged, moved) else {0.0: moved, LOGGED_DEG: logged}
+        return {0.0: approach_side}
+    logged = np.where(table.column("direction") != 0, table.column("direction"), approach_side)
+    return {LOGGED_DEG: logged} if np.array_equal(logged, approach_side) else {0.0: approach_side, LOGGED_DEG: logged}
 
 
-def way(table: Table, by_deg: float) -> Array:
+def turning_forces(table: Table, by_deg: float) -> Array:
     """Specific force where it turns round before each pose, g, shape (n, points, 3)."""
     return turning_points(approached(table, by_deg))
 

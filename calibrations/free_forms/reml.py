@@ -233,7 +233,7 @@ def estimate(
     products = _Products.of(g, list(present))
     fit = products.solved(present)
     for _ in range(rounds):
-        changed, at, moved = {}, 0, 0.0
+        updated, at, largest_change = {}, 0, 0.0
         shrunk = fit.shrunk
         for (name, v), m in zip(present.items(), products.widths, strict=True):
             part = slice(at, at + m)
@@ -241,17 +241,17 @@ def estimate(
             free = m - float(np.sum(shrunk[part]))
             size = float(fit.coefficients[part] @ fit.coefficients[part])
             factor = np.clip(size / max(v * free, 1e-300), 0.05, 20.0) ** 1.4
-            changed[name] = float(np.clip(v * factor, 1e-16, most.get(name, 1e8)))
-            moved = max(moved, abs(np.log(changed[name] / v)) * min(1.0, free / 0.01))
-        after = products.solved(changed)
-        if after.deviance > fit.deviance + 1e-6:  # too far: halfway back
-            changed = {k: float(np.sqrt(v * present[k])) for k, v in changed.items()}
-            after = products.solved(changed)
-        gained = fit.deviance - after.deviance
+            updated[name] = float(np.clip(v * factor, 1e-16, most.get(name, 1e8)))
+            largest_change = max(largest_change, abs(np.log(updated[name] / v)) * min(1.0, free / 0.01))
+        next_fit = products.solved(updated)
+        if next_fit.deviance > fit.deviance + 1e-6:  # too far: halfway back
+            updated = {k: float(np.sqrt(v * present[k])) for k, v in updated.items()}
+            next_fit = products.solved(updated)
+        gained = fit.deviance - next_fit.deviance
         if gained < -0.5:
             break
-        present, fit = changed, after
-        if moved < SETTLED or abs(gained) < 0.01 or fit.deviance - REACH * gained > target:
+        present, fit = updated, next_fit
+        if largest_change < SETTLED or abs(gained) < 0.01 or fit.deviance - REACH * gained > target:
             break
     return fit.sizes
 
@@ -340,7 +340,7 @@ def loss(g: Gram, fit: Sizes, name: str) -> float:
     return quadratic + logdet - len(u) * float(np.log(fit.variances[name]))
 
 
-def without(g: Gram, fit: Sizes, name: str) -> Sizes:
+def fit_without(g: Gram, fit: Sizes, name: str) -> Sizes:
     """The fit without one active component, the other variances held."""
     part = _part(g, fit, name)
     remaining = np.r_[0 : part.start, part.stop : len(fit.coefficients)]

@@ -79,7 +79,7 @@ class RequestedForm(FreeForm):
         return shortage(self.place, table)
 
 
-def named(name: str, effects: Mapping[str, Effect]) -> Effect:
+def resolve_effect(name: str, effects: Mapping[str, Effect]) -> Effect:
     """The effect of the catalogue, or the free form `free:PLACE`, of that name.
 
     Raises UnknownName or ModelError with the nearest name.
@@ -94,21 +94,21 @@ def shortage(place: str, table: Table) -> str | None:
         return f"needs {fewest} {rows} or more, and the data has {table.n}; measure more {rows}"
     if place.startswith(COLUMN):
         return _short_column(place.removeprefix(COLUMN), table)
-    needs = DRIVERS[place].needs
+    required = DRIVERS[place].needs
     if not table.type.stage_angles:
         if place in OF_STAGES:
             return f"needs a sweep of poses: stages move the sensor little, or not at all, in {table.type.name}"
-        needs = needs if needs in ("temperature", "time", "axes") else ""
-    match needs:
+        required = required if required in ("temperature", "time", "axes") else ""
+    match required:
         case "":
             return None
         case "beta":
-            return _few("angles beta", table, "beta_deg", FEWEST_VALUES, "use steps of 30 deg or less")
+            return _shortage_of_values("angles beta", table, "beta_deg", FEWEST_VALUES, "use steps of 30 deg or less")
         case "inclinations":
-            return _few("inclinations alpha", table, "alpha_deg", FEWEST_INCLINATIONS,
+            return _shortage_of_values("inclinations alpha", table, "alpha_deg", FEWEST_INCLINATIONS,
                         "measure at other inclinations as well, such as 30, 60, 90 and 150 deg")  # fmt: skip
         case "temperature":
-            return _few("temperatures", table, "temperature_c", FEWEST_TEMPERATURES,
+            return _shortage_of_values("temperatures", table, "temperature_c", FEWEST_TEMPERATURES,
                         "measure while the temperature changes")  # fmt: skip
         case "time":
             return None if "t_s" in table else "needs the column t_s, the time of each pose"
@@ -120,7 +120,7 @@ def shortage(place: str, table: Table) -> str | None:
     )  # fmt: skip
 
 
-def _few(subject: str, table: Table, column: str, fewest: int, advice: str) -> str | None:
+def _shortage_of_values(subject: str, table: Table, column: str, fewest: int, advice: str) -> str | None:
     if column not in table:
         return f"needs the column {column}"
     values = table.column(column)
@@ -128,8 +128,8 @@ def _few(subject: str, table: Table, column: str, fewest: int, advice: str) -> s
     distinct = len(np.unique(np.round((np.mod(values, 360) if column == "beta_deg" else values) / span, 4)))
     if distinct >= fewest:
         return None
-    has = f"one only, {values[0]:g}" if distinct == 1 else f"{distinct}"
-    return f"needs {fewest} different {subject} or more, and the data has {has}; {advice}"
+    count_words = f"one only, {values[0]:g}" if distinct == 1 else f"{distinct}"
+    return f"needs {fewest} different {subject} or more, and the data has {count_words}; {advice}"
 
 
 def _short_sides(table: Table) -> str | None:
@@ -167,6 +167,6 @@ def _formula(place: str) -> str:
         return f"{angle} <- {angle} + f({angle})"
     x = {"own-response": "a_i", "cross-response": "a_j", "z-response": "a_z", "output": "V", "force": "a"}
     factor = "a_i " if place.startswith("scale-over") or place.endswith("-scale") else ""
-    over = {"scale-over-cross": "a_j", "scale-over-z": "a_z", "history": "a, on the way to the pose"}
+    arguments = {"scale-over-cross": "a_j", "scale-over-z": "a_z", "history": "a, on the way to the pose"}
     end = {"temperature-bias": "T", "temperature-scale": "T", "time-bias": "t", "time-scale": "t"}
-    return f"V += {factor}f_i({(x | over | end).get(place, place.removeprefix(COLUMN))})"
+    return f"V += {factor}f_i({(x | arguments | end).get(place, place.removeprefix(COLUMN))})"

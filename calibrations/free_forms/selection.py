@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 import numpy as np
 
 from calibrations.free_forms.components import Component
-from calibrations.free_forms.reml import Gram, Sizes, estimate, gains, loss, without
+from calibrations.free_forms.reml import Gram, Sizes, estimate, fit_without, gains, loss
 
 ENTER = 16.0  # gain in -2 log restricted likelihood for one component more: 1 % of clean sensors (`chance`)
 LEAVE = 12.0
@@ -83,11 +83,11 @@ def select(
                 continue
         if not last:
             break
-        after = _exchanged(g, sizes, by_name, most, steps)
-        if set(after.variances) == set(sizes.variances) or frozenset(after.variances) in visited:
+        exchanged = _exchanged(g, sizes, by_name, most, steps)
+        if set(exchanged.variances) == set(sizes.variances) or frozenset(exchanged.variances) in visited:
             break
-        visited.add(frozenset(after.variances))
-        sizes = _pruned(g, after, by_name, most, steps)
+        visited.add(frozenset(exchanged.variances))
+        sizes = _pruned(g, exchanged, by_name, most, steps)
     return estimate(g, sizes.variances, most), steps
 
 
@@ -107,11 +107,11 @@ def _next(
     g: Gram, sizes: Sizes, pools: Pools, stale: Sequence[dict[str, float]], threshold: float
 ) -> tuple[str, float, float] | None:
     """The first component, by pool, whose gain is above the threshold; None if there is none."""
-    for pool, known in zip(pools, stale, strict=True):
-        best = _best(g, sizes, pool, known)
-        if known and (best is None or best[1] <= threshold):
-            known.clear()
-            best = _best(g, sizes, pool, known)
+    for pool, known_gains in zip(pools, stale, strict=True):
+        best = _best(g, sizes, pool, known_gains)
+        if known_gains and (best is None or best[1] <= threshold):
+            known_gains.clear()
+            best = _best(g, sizes, pool, known_gains)
         if best is not None and best[1] > threshold:
             return best
     return None
@@ -127,17 +127,17 @@ def _best(
     """
     families = {by_name[name].family for name in sizes.variances if name in by_name} - {""}
     names = [n for n, c in by_name.items() if n not in sizes.variances and c.family not in families and n in g.blocks]
-    known = {} if stale is None else stale
-    names.sort(key=lambda n: -known.get(n, np.inf))
+    known_gains = {} if stale is None else stale
+    names.sort(key=lambda n: -known_gains.get(n, np.inf))
     acting = acting_places(sizes.variances, by_name)
     best: tuple[str, float, float] | None = None
-    for part in [names[k : k + 6] for k in range(0, len(names), 6)] if known else [names]:
-        if not part or (best is not None and best[1] > known.get(part[0], np.inf)):
+    for part in [names[k : k + 6] for k in range(0, len(names), 6)] if known_gains else [names]:
+        if not part or (best is not None and best[1] > known_gains.get(part[0], np.inf)):
             break
         for n, (gained, variance) in gains(g, sizes, part).items():
-            known[n] = gained - price(by_name[n], acting)
-            if best is None or known[n] > best[1]:
-                best = n, known[n], variance
+            known_gains[n] = gained - price(by_name[n], acting)
+            if best is None or known_gains[n] > best[1]:
+                best = n, known_gains[n], variance
     return best
 
 
@@ -154,11 +154,11 @@ def _pruned(
         if costs[name] > LEAVE:
             return sizes
         remaining = {k: v for k, v in sizes.variances.items() if k != name}
-        after = estimate(g, remaining, most, 12)
-        if after.deviance - sizes.deviance - prices_by_name[name] > LEAVE:
+        reduced = estimate(g, remaining, most, 12)
+        if reduced.deviance - sizes.deviance - prices_by_name[name] > LEAVE:
             return sizes
         steps.append(f"-{name}")
-        sizes = after
+        sizes = reduced
 
 
 def _exchanged(
@@ -168,7 +168,7 @@ def _exchanged(
     for name in [n for n in sizes.variances if not by_name[n].noise]:
         if name not in sizes.variances:
             continue
-        reduced = without(g, sizes, name)
+        reduced = fit_without(g, sizes, name)
         acting = acting_places(reduced.variances, by_name)
         component_price = price(by_name[name], acting)
         replacement = estimate(g, reduced.variances, most, 12, sizes.deviance + component_price + LEAVE)

@@ -153,15 +153,15 @@ def before_stairs(table: Table, white: Array, stairs: Stairs) -> Table:
     )
 
 
-def fitted_stairs(table: Table, before: Array, white: Array, stairs: Stairs) -> Stairs:
-    """Stairs near those given, fitted to the outputs; `before`: the same before the rounding, (channels, n)."""
-    outputs, middle = table.outputs.T, float(np.mean(before))
+def fitted_stairs(table: Table, unrounded: Array, white: Array, stairs: Stairs) -> Stairs:
+    """Stairs near those given, fitted to the outputs; `unrounded`: the same before the rounding, (channels, n)."""
+    outputs, middle = table.outputs.T, float(np.mean(unrounded))
     begins = float(np.round((middle - stairs.offset) / stairs.step))
     code = stairs.offset + begins * stairs.step  # the code in the middle: there step and offset are independent
 
     def residual(u: Array) -> Array:
         step, offset = stairs.step * (1 + u[1] * stairs.step / np.ptp(outputs)), code + u[0] * stairs.step
-        return ((outputs - _mean_code(before, step, offset, stairs.noise)) / white).ravel()
+        return ((outputs - _mean_code(unrounded, step, offset, stairs.noise)) / white).ravel()
 
     grid = np.linspace(-0.1, 0.1, 21)
     start = min(((a, b) for a in grid for b in grid), key=lambda u: float(np.sum(np.abs(residual(np.array(u))))))
@@ -212,7 +212,7 @@ def find_saw(
         return None
     fine = frequencies[best] + np.linspace(-1, 1, 41) / (SAW_POINTS * span)
     power = np.abs(np.exp(-2j * np.pi * np.outer(fine, at)) @ values) ** 2
-    return saw(float(fine[int(np.argmax(power))]), 3, price, 0.05 / span)
+    return sawtooth(float(fine[int(np.argmax(power))]), 3, price, 0.05 / span)
 
 
 def _fundamental(frequencies: NDArray[np.floating], noise: float) -> Array:
@@ -231,7 +231,7 @@ def _spectrum(at: Array, values: Array, step: float, count: int) -> Array:
     return np.asarray(np.abs(np.fft.rfft(grid)[:count]) ** 2)
 
 
-def saw(frequency: float, harmonics: int, price: float, step: float) -> Component:
+def sawtooth(frequency: float, harmonics: int, price: float, step: float) -> Component:
     """Quantisation: harmonics of a saw over the output, codes per unit of output; `step` of the frequency to try."""
     name = f"output/quantisation@{frequency:.6g}"
 

@@ -64,25 +64,25 @@ class Structure:
         and a geometry only where it is larger than a linear part of what is unknown.
         """
         largest = max((place.size for place in self.unknown), default=0.0)
-        named: list[str] = []
+        cause_names: list[str] = []
         for place in self.places:
             if place.material and (place.size >= largest or (place.share >= SEEN_FORM and not self._follows(place))):
-                named += [c for c in place.causes if not self._same_as_one_of(c, named)]
+                cause_names += [c for c in place.causes if not self._same_as_one_of(c, cause_names)]
         visible = [c for c in self.geometry.causes if self.geometry.sizes[c] >= LINEAR_PART * largest]
-        return tuple(dict.fromkeys([*named, *visible]))
+        return tuple(dict.fromkeys([*cause_names, *visible]))
 
     def _follows(self, place: ActingPlace) -> bool:
         """Whether a place acts by components that follow many things: branches, slip elements, a random walk."""
         return place.name == "history" or any("/walk-" in name for name in place.components)
 
-    def _same_as_one_of(self, cause: str, named: list[str]) -> bool:
+    def _same_as_one_of(self, cause: str, cause_names: list[str]) -> bool:
         """Whether the data cannot separate a cause from one of those that are named, or from its place."""
         alternatives = set(self.alternatives.get(cause, ()))
         places_of_named = {
-            place.name for place in self.places if set(named) & set(place.causes) and cause not in place.causes
+            place.name for place in self.places if set(cause_names) & set(place.causes) and cause not in place.causes
         }
-        return bool(alternatives & (places_of_named | set(named))) or any(
-            cause in self.alternatives.get(named_cause, ()) for named_cause in named
+        return bool(alternatives & (places_of_named | set(cause_names))) or any(
+            cause in self.alternatives.get(named_cause, ()) for named_cause in cause_names
         )
 
     @property
@@ -112,7 +112,7 @@ class Structure:
         """Causes that decay within the first poses, as the memory of what came before them does."""
         if not self.result.data.timed:
             return ()
-        first_poses = self.result.data.since < FIRST_POSES
+        first_poses = self.result.data.elapsed_share < FIRST_POSES
         causes: list[str] = []
         for place in self.places:
             curve = max(place.curve, key=np.ptp)
@@ -182,11 +182,13 @@ class Structure:
         channels = 1 if form.shared else self.result.data.channels
         b = self.result.columns.shape[1] - 1 - len(self.result.gram.with_data)
         columns = self.result.columns[:, b + block.start : b + block.stop]
-        added = self.result.sizes.of(self.result.gram, name) ** 2 * np.sum(columns**2, axis=0) / self.result.data.n
-        return with_size(form, float(np.sqrt(variance) / scale), added, channels)
+        mean_squares = (
+            self.result.sizes.of(self.result.gram, name) ** 2 * np.sum(columns**2, axis=0) / self.result.data.n
+        )
+        return with_size(form, float(np.sqrt(variance) / scale), mean_squares, channels)
 
 
-def with_size(form: Form, size: float, added: Array, channels: int) -> Form:
+def with_size(form: Form, size: float, mean_squares: Array, channels: int) -> Form:
     """A form with its size, and with those columns of each axis that add something.
 
     added     mean square of what each column adds, in noise floors, the axes one after another
@@ -196,7 +198,7 @@ def with_size(form: Form, size: float, added: Array, channels: int) -> Form:
     sizes, counts = [], []
     for k in range(channels):
         count = form.count(k)
-        tail_squares = np.cumsum(added[at : at + count][::-1])[::-1]  # from each column on
+        tail_squares = np.cumsum(mean_squares[at : at + count][::-1])[::-1]  # from each column on
         is_indivisible = form.basis(k).kind in ("clips", "play", "preisach", "products", "ramp")
         sizes.append(size if count else 0.0)
         counts.append(count if is_indivisible else max(min(count, 1), int(np.sum(tail_squares > KEPT**2))))

@@ -66,10 +66,10 @@ def sensed(a: Array, table: Table, steps: Sequence[Step]) -> Array:
 
 def respond(a: Array, table: Table, steps: Sequence[Step]) -> Array:
     """Output of all three axes to the specific force `a` along the sensing axes, shape (n, 3)."""
-    return converted(added(a, table, steps), len(a), table, steps)
+    return converted(effect_contributions(a, table, steps), len(a), table, steps)
 
 
-def added(a: Array, table: Table, steps: Sequence[Step]) -> list[Array]:
+def effect_contributions(a: Array, table: Table, steps: Sequence[Step]) -> list[Array]:
     """What each effect adds to the output of all three axes, shape (n, 3) each; zeros, (1, 3), where nothing.
 
     A drift of the sensitivity multiplies all that the sensor makes of the force, also what its nonlinearity adds.
@@ -156,7 +156,7 @@ class LinearisedChain:
 
     @cached_property
     def _added(self) -> list[Array]:
-        return added(self._sensed, self.table, self.steps)
+        return effect_contributions(self._sensed, self.table, self.steps)
 
     @cached_property
     def _total(self) -> Array:
@@ -222,7 +222,7 @@ class LinearisedChain:
         steps = [*self.steps[:term], (effect, values), *self.steps[term + 1 :]]
         if effect.places & {"pose", "force"}:
             static = static_force(self.table, steps) if "pose" in effect.places else self._static
-            parts = added(sensed(static, self.table, steps), self.table, steps)
+            parts = effect_contributions(sensed(static, self.table, steps), self.table, steps)
         elif not self._has_output_stage:
             parts = [self._contribution(effect, values)]
         else:
@@ -293,7 +293,7 @@ class LinearisedChain:
         h = LITTLE * (float(np.max(np.abs(a))) or 1.0)
 
         def total(a: Array) -> Array:
-            return np.asarray(sum(added(a, self.table, steps), np.zeros_like(a)))
+            return np.asarray(sum(effect_contributions(a, self.table, steps), np.zeros_like(a)))
 
         return np.stack([(total(a + h * e) - total(a - h * e)) / (2 * h) for e in np.eye(3)], axis=2)
 

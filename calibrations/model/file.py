@@ -163,11 +163,11 @@ def _effect(entry: _Effect, source: str, effects_by_name: Mapping[str, Effect]) 
 def _free(entry: _Effect, source: str) -> Effect:
     """The free forms of a place: all of them is in the file, or the first fit finds their sizes."""
     from calibrations.free_forms.effect import read_forms  # few models have one
-    from calibrations.free_forms.requested import named
+    from calibrations.free_forms.requested import resolve_effect
 
     try:
         if entry.forms is None:
-            return named(entry.effect, {})
+            return resolve_effect(entry.effect, {})
         return read_forms(entry.effect, entry.forms or [])
     except ValidationError as error:
         first = error.errors()[0]

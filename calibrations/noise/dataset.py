@@ -111,10 +111,10 @@ class StillRecord(Dataset[NoiseFit]):
         return self._searched(fit(start.model, start.still), effects, origin)
 
     def candidates(
-        self, before: NoiseFit, plan: Findings[NoiseFit], effects: Mapping[str, Effect]
+        self, base: NoiseFit, plan: Findings[NoiseFit], effects: Mapping[str, Effect]
     ) -> tuple[Candidate, ...]:
         """Every process alone, the next one of the plan first."""
-        processes = candidates(search(before.still, before.model, effects), before, plan.alternatives)
+        processes = candidates(search(base.still, base.model, effects), base, plan.alternatives)
         planned = tuple(c for c in plan.candidates if not c.effect.is_noise and c.name in plan.names)
         return (*planned, *sorted(processes, key=lambda c: c.name not in plan.names[:1]))
 
@@ -173,18 +173,18 @@ class StillRecord(Dataset[NoiseFit]):
 
     def addition(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> NoiseFindings:
         """One process, with what the record cannot separate from it, and what is missing beside it."""
-        before = self.fit(model)
-        step = self.step(effect, before)
-        first = search(before.still, before.model, effects)
+        base = self.fit(model)
+        step = self.step(effect, base)
+        first = search(base.still, base.model, effects)
         more = search(step.after.still, step.after.model, {**effects, effect.name: effect})
         doubts = alternatives(first, (effect.name,)) if effect.name in first.gains else {}
         structure = structure_of(more)
         missing = f"{' and '.join(more.gains)} would explain more" if more.gains else None
         return NoiseFindings(
             data=self,
-            start=before,
-            origin=before,
-            baseline=before,
+            start=base,
+            origin=base,
+            baseline=base,
             steps=(step,),
             causes=(effect.name,),
             alternatives=doubts,
@@ -195,11 +195,11 @@ class StillRecord(Dataset[NoiseFit]):
             search=more,
         )
 
-    def step(self, effect: Effect, before: NoiseFit) -> Step[NoiseFit]:
+    def step(self, effect: Effect, base: NoiseFit) -> Step[NoiseFit]:
         """The effect added."""
-        larger = before.model.with_effect(effect)
-        after = fit(larger, before.still) if effect.is_noise else self.fit(larger)
-        return Step(effect.name, before, after, after.log_likelihood - before.log_likelihood)
+        larger = base.model.with_effect(effect)
+        after = fit(larger, base.still) if effect.is_noise else self.fit(larger)
+        return Step(effect.name, base, after, after.log_likelihood - base.log_likelihood)
 
     def require_allowed(self, effect: Effect) -> None:
         """Raises ModelError for an effect that is neither noise nor one of a logged temperature."""

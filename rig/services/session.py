@@ -18,7 +18,7 @@ from calibrations.discovery.results import Comparison, Diagnosis
 from calibrations.effects import Effect
 from calibrations.errors import CalibrationError, ModelError
 from calibrations.free_forms.place_names import PREFIX
-from calibrations.free_forms.requested import named as free_form_at
+from calibrations.free_forms.requested import resolve_effect as free_form_at
 from calibrations.model import Model
 from rig.errors import RecordError
 from rig.services.content import Content, content_of

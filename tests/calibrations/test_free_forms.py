@@ -83,7 +83,7 @@ def test_relays_at_any_place_are_a_sum_of_functions_of_plays() -> None:
         output[i] = np.mean(closed)
     widths = tuple(np.linspace(0.05, 0.6, 6))
     plays = np.column_stack([kernels.play(path, width) for width in widths])
-    columns = np.column_stack([np.ones(len(path)), Preisach(widths, -1.05, 1.05, 8).over(plays)])
+    columns = np.column_stack([np.ones(len(path)), Preisach(widths, -1.05, 1.05, 8).columns_of(plays)])
     slips = np.column_stack([np.ones(len(path)), path, path[:, None] - plays])
 
     def left(X: Array) -> float:

@@ -9,7 +9,7 @@ from calibrations.discovery.curves import place_curve, place_curves
 from calibrations.discovery.rows import Rows
 from calibrations.discovery.summary import step_shares, summary_lines, sure
 from calibrations.effects.catalogue import catalogue
-from calibrations.free_forms.requested import named
+from calibrations.free_forms.requested import resolve_effect
 from calibrations.loop import discover
 from calibrations.model.file import read_model
 from calibrations.presentation.answers import discovery_text
@@ -95,7 +95,7 @@ def test_an_effect_with_one_parameter_is_certain_where_the_data_show_it() -> Non
 
 
 def test_without_variance_beyond_the_noise_a_step_has_no_share() -> None:
-    found = Rows(table()).add(named("free:own-response", {}), read_model("linear"), catalogue())
+    found = Rows(table()).add(resolve_effect("free:own-response", {}), read_model("linear"), catalogue())
     assert step_shares(found) == [None]
     assert found.to_dict()["steps"][0]["share"] is None
 

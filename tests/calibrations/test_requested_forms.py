@@ -15,7 +15,7 @@ from calibrations.free_forms.chain import ModelEffects, start, state_at
 from calibrations.free_forms.place_names import EFFECTS_AT, GEOMETRY_PLACE, PLACES, place_of_effect
 from calibrations.free_forms.places import components
 from calibrations.free_forms.poses import PoseData
-from calibrations.free_forms.requested import DRIVERS, RequestedForm, named
+from calibrations.free_forms.requested import DRIVERS, RequestedForm, resolve_effect
 from calibrations.loop import dataset, discover
 from calibrations.model.file import dump_model, parse_model, read_model
 from calibrations.table import Array, Table
@@ -38,7 +38,7 @@ def table(added: Array | float = 0.0, **columns: Array) -> Table:
 
 
 def with_form(place: str, data: Table) -> Fit:
-    return Rows(data).add(named(f"free:{place}", {}), read_model("linear"), catalogue()).end
+    return Rows(data).add(resolve_effect(f"free:{place}", {}), read_model("linear"), catalogue()).end
 
 
 def changing(place: str) -> dict[str, Array]:
@@ -78,7 +78,7 @@ def test_a_model_file_may_name_a_form_without_sizes() -> None:
 
 
 def test_a_search_begins_with_a_requested_form() -> None:
-    model = read_model("linear").with_effect(named("free:own-response", {}))
+    model = read_model("linear").with_effect(resolve_effect("free:own-response", {}))
     assert discover(table(CURVES["own-response"]), model).steps == ()
 
 
@@ -109,11 +109,11 @@ BAD = {
 def test_a_form_that_the_data_cannot_show_is_refused_with_the_data_it_needs(name: str) -> None:
     data, message = BAD[name]
     with pytest.raises(CalibrationError, match=message):
-        dataset(data).add(named(name, {}), read_model("linear"), catalogue())
+        dataset(data).add(resolve_effect(name, {}), read_model("linear"), catalogue())
 
 
 def test_a_model_with_a_form_that_the_data_cannot_show_is_refused() -> None:
-    model = read_model("linear").with_effect(named("free:own-response", {}))
+    model = read_model("linear").with_effect(resolve_effect("free:own-response", {}))
     with pytest.raises(ModelError, match="needs 24 poses"):
         fit(model, table().rows(few))
 
@@ -128,7 +128,7 @@ def test_every_place_has_a_driver_and_an_entry_of_effects() -> None:
 
 def test_effects_of_the_search_are_listed_at_their_places() -> None:
     data = PoseData.of(table(temperature_c=WARMING, supply_v=5 + 0.01 * WARMING, vx_std_v=WARMING, vy_std_v=WARMING))
-    nothing = ModelEffects.nothing(data)
+    nothing = ModelEffects.without_effects(data)
     for c in components(data, state_at(data, nothing, start(data, nothing), ())):
         assert not c.cause or place_of_effect(c.cause) == c.place
 

@@ -10,7 +10,7 @@ from calibrations.discovery.rows import Rows
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import CalibrationError
 from calibrations.fitting.fit import Fit, evaluate, fit
-from calibrations.free_forms.requested import named
+from calibrations.free_forms.requested import resolve_effect
 from calibrations.loop import dataset
 from calibrations.model.file import dump_model, parse_model, read_model
 from calibrations.table import Array, Table
@@ -48,7 +48,7 @@ def positions(added: Array | float = 0.0, rows: int = N) -> Table:
 
 
 def with_form(place: str, data: Table) -> Step[Fit]:
-    return Rows(data).add(named(f"free:{place}", {}), read_model("linear"), catalogue()).steps[0]
+    return Rows(data).add(resolve_effect(f"free:{place}", {}), read_model("linear"), catalogue()).steps[0]
 
 
 @pytest.mark.parametrize("place", CURVES)
@@ -108,4 +108,4 @@ BAD = {
 def test_a_form_that_positions_cannot_show_is_refused_with_the_data_it_needs(name: str) -> None:
     data, message = BAD[name]
     with pytest.raises(CalibrationError, match=message):
-        dataset(data).add(named(name, {}), read_model("linear"), catalogue())
+        dataset(data).add(resolve_effect(name, {}), read_model("linear"), catalogue())

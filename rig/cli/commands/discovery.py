@@ -161,10 +161,10 @@ def _find_effect(effect: str, name: str | None, question: Loaded) -> Effect:
     from calibrations.effects.catalogue import read_effect
     from calibrations.errors import ModelError
     from calibrations.free_forms.place_names import PREFIX
-    from calibrations.free_forms.requested import named
+    from calibrations.free_forms.requested import resolve_effect
 
     if effect.startswith(PREFIX):
-        return named(effect, question.effects)
+        return resolve_effect(effect, question.effects)
     if name is not None:
         if name in question.effects:
             raise ModelError(f"{name} is already in the catalogue (`rig effects {name}`); give yours another name")
@@ -173,7 +173,7 @@ def _find_effect(effect: str, name: str | None, question: Loaded) -> Effect:
         return read_effect(Path(effect))
     if effect not in question.effects and not NAME.fullmatch(effect):
         raise ModelError(f'there is no effect "{effect}"; if this is an expression, give it a name: --name my-effect')
-    return named(effect, question.effects)
+    return resolve_effect(effect, question.effects)
 
 
 @click.command("discover")

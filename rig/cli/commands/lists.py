@@ -67,9 +67,9 @@ def effects_command(effect: str | None, bench_file: Path | None, as_json: bool) 
 
     listed = list(known.values())
     if effect:
-        from calibrations.free_forms.requested import named  # slow to import; the list needs no free form
+        from calibrations.free_forms.requested import resolve_effect  # slow to import; the list needs no free form
 
-        listed = [named(effect, known)]
+        listed = [resolve_effect(effect, known)]
     if as_json:
         emit({"schema": "rig.effects/1", "effects": [document(e) for e in listed]})
     elif effect:
