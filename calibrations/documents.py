@@ -26,15 +26,15 @@ if TYPE_CHECKING:
 Document = dict[str, Any]
 
 
-def fit_document(data: Dataset[F], found: F, path: str | None) -> Document:
+def fit_document(data: Dataset[F], fitted: F, path: str | None) -> Document:
     """`rig.fit/1`."""
     return {
         "schema": "rig.fit/1",
         "data": data.source,
-        "parameters": parameters_document(found.model),
+        "parameters": parameters_document(fitted.model),
         "n": data.n,
-        **data.errors_document(found),
-        **_rejected(data.rejection(found)),
+        **data.errors_document(fitted),
+        **_rejected(data.rejection(fitted)),
         "model": path,
     }
 
@@ -145,7 +145,7 @@ def _in_doubt(result: Diagnosis[F] | Discovery[F]) -> Document:
     return {
         "alternatives": {name: list(names) for name, names in result.alternatives.items()},
         "reason": result.reason,
-        "disturbances": [dict(each) for each in result.findings.disturbances],
+        "disturbances": [dict(disturbance) for disturbance in result.findings.disturbances],
         "places": places_document(result),
         "residual_structure": result.residual_structure,
         "left_out": list(result.findings.data.left_out),
@@ -188,7 +188,7 @@ def _curve_fields(curve: PlaceCurve | None, explained: bool) -> Document:
     at = curve.at[curve.largest]  # one grid for all axes
 
     def on_grid(values: Mapping[str, Array]) -> Document:
-        return {axis: np.interp(at, curve.at[axis], each).tolist() for axis, each in values.items()}
+        return {axis: np.interp(at, curve.at[axis], samples).tolist() for axis, samples in values.items()}
 
     document = {
         "driver": curve.driver,
@@ -232,10 +232,10 @@ def _candidate(c: Candidate, result: Diagnosis[F]) -> Document:
 
 def why(c: Candidate, result: Diagnosis[F]) -> str:
     """The candidate in words: what it is, its symptom, and what adding it does to the held-out error."""
-    data, before = result.findings.data, result.held_out_before
-    fall = f"changes the error on {data.unseen} from {before:.3g} to {c.held_out_after:.3g} times {data.floor}"
-    if c.held_out_after >= before:
-        fall = f"does not lower the error on {data.unseen} ({before:.3g} times {data.floor})"
+    data, error_before = result.findings.data, result.held_out_before
+    fall = f"changes the error on {data.unseen} from {error_before:.3g} to {c.held_out_after:.3g} times {data.floor}"
+    if c.held_out_after >= error_before:
+        fall = f"does not lower the error on {data.unseen} ({error_before:.3g} times {data.floor})"
     return f"{c.effect.summary} Symptom: {c.effect.symptom} Adding it {fall}."
 
 
@@ -253,9 +253,9 @@ def experiment_document(e: Experiment | None) -> Document | None:
     }
 
 
-def _expected(found: Expected | None) -> Document | None:
+def _expected(expected: Expected | None) -> Document | None:
     """Distances in standard deviations; null where they are not computed."""
-    if found is None:
+    if expected is None:
         return None
-    alone = {"deviations": float(np.sqrt(found.alone)), "probability": found.probability_alone}
-    return {"deviations": found.deviations, "probability": found.probability, "alone": alone}
+    alone_document = {"deviations": float(np.sqrt(expected.alone)), "probability": expected.probability_alone}
+    return {"deviations": expected.deviations, "probability": expected.probability, "alone": alone_document}

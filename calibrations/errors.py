@@ -64,10 +64,10 @@ class UnknownParameter(UnknownName, KeyError):
     __str__ = Exception.__str__  # KeyError puts the message into quotes
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def nearest(name: str, known_names: Iterable[str]) -> str:
     """A hint `; did you mean "..."?` with the nearest known name, or the known names if none is near."""
-    known = sorted(known)
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    known_names = sorted(known_names)
+    close = difflib.get_close_matches(name, known_names, n=1, cutoff=0.5)
     if close:
         return f'; did you mean "{close[0]}"?'
-    return f"; known: {', '.join(known)}" if known else ""
+    return f"; known: {', '.join(known_names)}" if known_names else ""

@@ -105,10 +105,10 @@ def add(model: GivenModel, effect: GivenEffect) -> Model:
     """
     from calibrations.effects.catalogue import load_effect
 
-    before, added = _model(model), load_effect(effect)
-    if before.holds(added.name):
-        raise ModelError(f"{before.name}: {added.name} is already in the model; it has {', '.join(before.effects)}")
-    return before.with_effect(added)
+    base, new_effect = _model(model), load_effect(effect)
+    if base.holds(new_effect.name):
+        raise ModelError(f"{base.name}: {new_effect.name} is already in the model; it has {', '.join(base.effects)}")
+    return base.with_effect(new_effect)
 
 
 def noise(data: Table | Array, rate_hz: float | None = None) -> NoiseAnalysis:
@@ -120,8 +120,8 @@ def noise(data: Table | Array, rate_hz: float | None = None) -> NoiseAnalysis:
     from calibrations.noise.analysis import analyse
     from calibrations.noise.record import reduce_record
 
-    given = data if isinstance(data, Table) else Table.from_columns("still", {"v": data}, None, "the given samples")
-    return analyse(reduce_record(_channels(given, rate_hz), given.source, given.constants, every_deviation=True))
+    table = data if isinstance(data, Table) else Table.from_columns("still", {"v": data}, None, "the given samples")
+    return analyse(reduce_record(_channels(table, rate_hz), table.source, table.constants, every_deviation=True))
 
 
 def compensate(model: GivenModel, outputs: Table | Columns | Array, **columns: float | Array) -> Any:
@@ -140,27 +140,27 @@ def compensate(model: GivenModel, outputs: Table | Columns | Array, **columns: f
     return compensated(_model(model), outputs, columns)
 
 
-def _data(given: Any) -> Table:
+def _data(data: Any) -> Table:
     """The table itself. Raises DataError for anything else: it would end in an error of the analysis."""
-    if isinstance(given, Table):
-        return given
-    hint = "cal.read(path)" if isinstance(given, (str, Path)) else 'cal.table(data, kind="positions")'
-    raise DataError(f"a table is needed, and a {type(given).__name__} was given; make one with {hint}")
+    if isinstance(data, Table):
+        return data
+    hint = "cal.read(path)" if isinstance(data, (str, Path)) else 'cal.table(data, kind="positions")'
+    raise DataError(f"a table is needed, and a {type(data).__name__} was given; make one with {hint}")
 
 
-def _model(given: GivenModel) -> Model:
+def _model(source: GivenModel) -> Model:
     """The model that is given by its name or file, or that a fit or a discovery has. Raises ModelError, UnknownName."""
     from calibrations.model import Model
     from calibrations.model.file import read_model
 
-    if isinstance(given, (str, Path)):
-        return read_model(given)
-    model = given if isinstance(given, Model) else getattr(given, "model", None)
+    if isinstance(source, (str, Path)):
+        return read_model(source)
+    model = source if isinstance(source, Model) else getattr(source, "model", None)
     if isinstance(model, Model):
         return model
-    hint = "; its fit is in its member `fit`" if isinstance(getattr(given, "fit", None), Result) else ""
+    hint = "; its fit is in its member `fit`" if isinstance(getattr(source, "fit", None), Result) else ""
     raise ModelError(
-        f"a model is needed, and a {type(given).__name__} was given; give the name of a model, its file, a model, a "
+        f"a model is needed, and a {type(source).__name__} was given; give the name of a model, its file, a model, a "
         f"fit or a discovery{hint}"
     )
 

@@ -75,9 +75,9 @@ class Source:
 
         Raises DataError where they cannot be read, also during the iteration.
         """
-        opened = self.marked if marked and self.marked is not None else self.opened
+        opener = self.marked if marked and self.marked is not None else self.opened
         try:
-            with opened() as file:
+            with opener() as file:
                 yield iter(file)
         except UnicodeError:
             raise DataError(f"{self.name}: contains bytes that are not text; save the file as CSV in UTF-8") from None
@@ -102,8 +102,8 @@ def open_text_file(path: Path, garbled: bool = False) -> Source:
         with _bytes(path) as file:
             head = file.read(HEAD_BYTES)
     except (OSError, EOFError, zlib.error) as error:
-        what = "cannot be read as text" if path.suffix == ".gz" else "cannot be read"
-        raise DataError(f"{path}: {what}: {_reason(error)}") from None
+        fault = "cannot be read as text" if path.suffix == ".gz" else "cannot be read"
+        raise DataError(f"{path}: {fault}: {_reason(error)}") from None
     encoding = _encoding(head, path, MOST_GARBLED if garbled else 0.0)
     return Source(
         str(path),
@@ -135,8 +135,8 @@ class _Unpacked(gzip.GzipFile):
         """Read for the text decoder. Raises DataError beyond LARGEST_BYTES, and in a line beyond LONGEST_LINE_BYTES."""
         data = super().read1(size)
         self._taken += len(data)
-        _, end, rest = data.rpartition(b"\n")
-        self._of_line = len(rest) if end else self._of_line + len(data)
+        _, end, last_line = data.rpartition(b"\n")
+        self._of_line = len(last_line) if end else self._of_line + len(data)
         if self._of_line > LONGEST_LINE_BYTES:
             most = LONGEST_LINE_BYTES >> 20
             raise DataError(f"{self.name}: a line has more than {most} MiB; is it really a CSV file?")
@@ -163,9 +163,9 @@ def _encoding(head: bytes, path: Path, most_garbled: float) -> str:
     controls = [k for k, byte in enumerate(head) if byte in CONTROLS]
     if controls and (len(controls) > most_garbled * len(head) or controls[0] < len(head.splitlines()[0])):
         binary = controls[0]
-        for first, what, remedy in KNOWN_BINARY:
+        for first, content, remedy in KNOWN_BINARY:
             if head.startswith(first):
-                raise DataError(f"{path}: is {what}, not text; {remedy}, and import the CSV file")
+                raise DataError(f"{path}: is {content}, not text; {remedy}, and import the CSV file")
         raise DataError(
             f"{path}: is not text (byte {binary} is {head[binary]:#04x}); is it really a CSV file? "
             "From a spreadsheet, save the sheet as CSV"
@@ -217,19 +217,19 @@ def _document(text: str) -> Any:
     return document
 
 
-def read_mapping(path: Path, what: str, error: Callable[[str], Exception], example: str) -> dict[str, Any]:
-    """The mapping in the YAML file `path`; `what` names the file's kind and `example` says how to get or write one.
+def read_mapping(path: Path, file_kind: str, error: Callable[[str], Exception], example: str) -> dict[str, Any]:
+    """The mapping in the YAML file `path`; `file_kind` names its kind and `example` says how to get or write one.
 
     Raises `error` with the path, the kind and the reason.
     """
     try:
         document = load_yaml(path.read_text(encoding="utf-8"))
     except OSError as fault:
-        raise error(f"{path}: cannot read the {what}: {fault.strerror}; give another file") from None
+        raise error(f"{path}: cannot read the {file_kind}: {fault.strerror}; give another file") from None
     except ValueError as fault:
-        raise error(f"{path}: the {what} is not YAML: {fault}") from None
+        raise error(f"{path}: the {file_kind} is not YAML: {fault}") from None
     if not isinstance(document, dict):
-        raise error(f"{path}: the {what} is not a mapping; {example}")
+        raise error(f"{path}: the {file_kind} is not a mapping; {example}")
     return document
 
 

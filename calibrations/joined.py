@@ -14,7 +14,7 @@ ZERO_WHERE_MISSING = ("mount_deg", "flip", "direction")  # a table says nothing 
 MEASURED = "noise_inflation_"  # constants that each table measured for itself
 
 
-def joined(tables: Sequence[Table]) -> Table:
+def join_tables(tables: Sequence[Table]) -> Table:
     """One table with the rows of all, in the order given, and the columns that all have.
 
     Time goes on: a table whose clock began anew begins where the one before it ended. Constants are those on which all
@@ -23,11 +23,11 @@ def joined(tables: Sequence[Table]) -> Table:
     first = tables[0]
     if len(tables) == 1:
         return first
-    for other in tables[1:]:
-        if (other.kind, other.axes, other.unit) != (first.kind, first.axes, first.unit):
+    for further in tables[1:]:
+        if (further.kind, further.axes, further.unit) != (first.kind, first.axes, first.unit):
             raise DataError(
-                f"{other.source}: is a table of {other.kind} along {', '.join(other.axes)}, {first.source} one of "
-                f"{first.kind} along {', '.join(first.axes)}; only tables of the same kind and axes can be "
+                f"{further.source}: is a table of {further.kind} along {', '.join(further.axes)}, {first.source} one "
+                f"of {first.kind} along {', '.join(first.axes)}; only tables of the same kind and axes can be "
                 "analysed together"
             )
     columns = {name: np.concatenate([_column(t, name) for t in tables]) for name in _common(tables)}
@@ -67,11 +67,11 @@ def _times(tables: Sequence[Table]) -> list[Array]:
 
 
 def _constants(tables: Sequence[Table]) -> dict[str, Constant]:
-    kept: dict[str, Constant] = {}
+    constants: dict[str, Constant] = {}
     for name, value in tables[0].constants.items():
         values = [t.constants.get(name) for t in tables]
         if name.startswith(MEASURED) and None not in values:
-            kept[name] = float(np.mean([t.number(name, 1.0) for t in tables]))
-        elif all(other == value for other in values):
-            kept[name] = value
-    return kept
+            constants[name] = float(np.mean([t.number(name, 1.0) for t in tables]))
+        elif all(constant == value for constant in values):
+            constants[name] = value
+    return constants

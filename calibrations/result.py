@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from calibrations.presentation.chart import Picture
 
 
-class Shown(ABC):
+class ReportedResult(ABC):
     """A value that a terminal and a notebook show as its report. A dataclass that is one needs `repr=False`."""
 
     @abstractmethod
@@ -29,7 +29,7 @@ class Shown(ABC):
         return f"<pre>{escape(self.report())}</pre>"
 
 
-class Result(Shown):
+class Result(ReportedResult):
     """A result of an analysis."""
 
     @abstractmethod

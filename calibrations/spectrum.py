@@ -65,11 +65,11 @@ def flicker(f: Array, by: Sampling, corner_hz: float = np.inf) -> Array:
     for fold in range(-folds, folds + 1 - (by.size % 2 == 0 and folds < FOLDS)):
         at_hz = f + fold / by.interval_s
         sine = np.abs(np.sin(np.pi * at_hz * step))
-        total += _kept(f, sine, by) * step / (2 * sine) / (1 + (at_hz / corner_hz) ** 2)
+        total += _power_gain(f, sine, by) * step / (2 * sine) / (1 + (at_hz / corner_hz) ** 2)
     return total
 
 
-def _kept(f: Array, sine: Array, by: Sampling) -> Array:
+def _power_gain(f: Array, sine: Array, by: Sampling) -> Array:
     """Power that a mean keeps of a frequency; `sine` is that of half its phase from sample to sample."""
     return np.asarray((np.sin(np.pi * f * by.interval_s) / (by.size * sine)) ** 2)
 
@@ -150,10 +150,10 @@ class Bands:
         if process == "white-noise" and np.isfinite(self.corner_hz):
             filter_s = 1 / (2 * np.pi * self.corner_hz)
             return gauss_markov(f, self.sampling, filter_s) / (2 * filter_s)
-        kept = 1 / (1 + (f / self.corner_hz) ** 2)
+        passed = 1 / (1 + (f / self.corner_hz) ** 2)
         if process not in LINEAR:
-            return np.asarray(kept * gauss_markov(f, self.sampling, time_constant_s))
-        return np.asarray(kept * LINEAR[process](f, self.sampling))
+            return np.asarray(passed * gauss_markov(f, self.sampling, time_constant_s))
+        return np.asarray(passed * LINEAR[process](f, self.sampling))
 
     def _of_the_ends(self) -> Array:
         """What the first and the last error of quantisation add to every cosine coefficient."""
@@ -178,8 +178,8 @@ def slow_bands(means: Array, sampling: Sampling, corner_hz: float = np.inf) -> B
     n = len(means)
     highest = min(n, 2 + int(corner_hz * n * sampling.interval_s) if np.isfinite(corner_hz) else n)
     power = scipy.fft.dct(means, type=2, norm="ortho")[1:highest] ** 2 * sampling.interval_s
-    empty = _slow_grid(n, highest, sampling, corner_hz)
-    return replace(empty, density=np.add.reduceat(power, _edges(highest - 1)[:-1]) / empty.freedom)
+    grid = _slow_grid(n, highest, sampling, corner_hz)
+    return replace(grid, density=np.add.reduceat(power, _edges(highest - 1)[:-1]) / grid.freedom)
 
 
 @lru_cache(maxsize=8)
@@ -196,13 +196,13 @@ def fast_bands(frequency_hz: Array, density: Array, freedom: float, rate_hz: flo
 
     Under a Hann window neighbours have a correlation of 4/9, and their neighbours 1/36.
     """
-    chosen = frequency_hz <= corner_hz / 2
-    edges = _edges(int(chosen.sum()))
+    in_band = frequency_hz <= corner_hz / 2
+    edges = _edges(int(in_band.sum()))
     count = np.diff(edges).astype(float)
     alike = 1 + 2 * (np.maximum(count - 1, 0) * 4 / 9 + np.maximum(count - 2, 0) / 36) / np.maximum(count, 1)
 
     def mean(values: Array) -> Array:
-        return np.add.reduceat(values[chosen], edges[:-1]) / count if len(count) else np.empty(0)
+        return np.add.reduceat(values[in_band], edges[:-1]) / count if len(count) else np.empty(0)
 
     none = np.zeros(len(count))
     return Bands(mean(frequency_hz), mean(density), freedom * count / alike, Sampling(rate_hz), none, corner_hz)
@@ -283,9 +283,9 @@ class Welch:
         self._part += 1
         if self._part < MOST_PARTS:
             return
-        for each in (self._power, self._stretches):
-            each[: MOST_PARTS // 2] = each[0::2] + each[1::2]
-            each[MOST_PARTS // 2 :] = 0
+        for sums in (self._power, self._stretches):
+            sums[: MOST_PARTS // 2] = sums[0::2] + sums[1::2]
+            sums[MOST_PARTS // 2 :] = 0
         self._part, self._full = MOST_PARTS // 2, 2 * self._full
 
 

@@ -111,18 +111,20 @@ class Table:
 
     @property
     def _title(self) -> str:
-        known = f"; {', '.join(f'{name}: {value}' for name, value in self.constants.items())}" if self.constants else ""
-        return f"{self.n} rows of {self.kind}{f', {self.source}' if self.source else ''}{known}"
+        constants_text = (
+            f"; {', '.join(f'{name}: {value}' for name, value in self.constants.items())}" if self.constants else ""
+        )
+        return f"{self.n} rows of {self.kind}{f', {self.source}' if self.source else ''}{constants_text}"
 
     def _shown(self) -> tuple[list[str], list[list[str]]]:
         """Head and rows of a view: all rows, or the first and last of many."""
-        many = self.n > FIRST + LAST
-        rows = [*range(FIRST), *range(self.n - LAST, self.n)] if many else list(range(self.n))
+        is_long = self.n > FIRST + LAST
+        rows = [*range(FIRST), *range(self.n - LAST, self.n)] if is_long else list(range(self.n))
         cells = [
             [str(k), *(f"{v[k]:.6g}" for v in self.columns.values()), *(t[k] for t in self.labels.values())]
             for k in rows
         ]
-        if many:
+        if is_long:
             cells.insert(FIRST, ["..."] * len(cells[0]))
         return ["", *self.columns, *self.labels], cells
 
@@ -226,12 +228,12 @@ class Table:
             h.update(np.ascontiguousarray(self.columns[name]).tobytes())
         return h.hexdigest()
 
-    def rows(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Table:
+    def rows(self, selection: NDArray[np.bool_] | NDArray[np.intp]) -> Table:
         """The same table with some of its rows."""
-        where: NDArray[np.intp] = np.arange(self.n)[chosen]
-        labels = {name: tuple(values[i] for i in where) for name, values in self.labels.items()}
-        columns = {name: values[where] for name, values in self.columns.items()}
-        return replace(self, columns=MappingProxyType(columns), labels=labels, numbers=self.numbered(where))
+        row_indices: NDArray[np.intp] = np.arange(self.n)[selection]
+        labels = {name: tuple(values[i] for i in row_indices) for name, values in self.labels.items()}
+        columns = {name: values[row_indices] for name, values in self.columns.items()}
+        return replace(self, columns=MappingProxyType(columns), labels=labels, numbers=self.numbered(row_indices))
 
     def with_outputs(self, outputs: Array) -> Table:
         """The same table with other outputs, shape (n, axes)."""
@@ -289,12 +291,12 @@ def _check(table: Table) -> None:
 def _check_sizes(table: Table) -> None:
     """Numbers that are none, or so large that nothing can be computed from them."""
     for name, values in table.columns.items():
-        bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
-        if len(bad):
-            fault = "not a finite number" if not np.isfinite(values[bad[0]]) else "more than anything measured"
+        wrong_rows = np.flatnonzero(~(np.abs(values) <= LARGEST))
+        if len(wrong_rows):
+            fault = "not a finite number" if not np.isfinite(values[wrong_rows[0]]) else "more than anything measured"
             raise DataError(
-                f'{table.source}: row {bad[0] + 1}, column "{name}" is {values[bad[0]]:g}, {fault}'
-                f"{f' (and {len(bad) - 1} more)' if len(bad) > 1 else ''}; remove the row or the column"
+                f'{table.source}: row {wrong_rows[0] + 1}, column "{name}" is {values[wrong_rows[0]]:g}, {fault}'
+                f"{f' (and {len(wrong_rows) - 1} more)' if len(wrong_rows) > 1 else ''}; remove the row or the column"
             )
 
 
@@ -302,17 +304,17 @@ def _check_numbers(table: Table) -> None:
     """Counts, standard deviations, directions and constants that cannot be."""
     for name, values in table.columns.items():
         if name == "n":
-            bad, must = values < 1, "at least 1: it counts averaged samples"
+            is_wrong, must = values < 1, "at least 1: it counts averaged samples"
         elif name == "direction":
-            bad, must = ~np.isin(values, (-1, 0, 1)), "1 (beta growing), -1 (falling) or 0 (unknown)"
+            is_wrong, must = ~np.isin(values, (-1, 0, 1)), "1 (beta growing), -1 (falling) or 0 (unknown)"
         elif "_std" in name:
-            bad, must = values < 0, "0 or more"
+            is_wrong, must = values < 0, "0 or more"
         elif name == "supply_v":
-            bad, must = values <= 0, "above 0: without supply there is no output"
+            is_wrong, must = values <= 0, "above 0: without supply there is no output"
         else:
             continue
-        if bad.any():
-            row = int(np.argmax(bad))
+        if is_wrong.any():
+            row = int(np.argmax(is_wrong))
             raise DataError(f'{table.source}: row {row + 1}, column "{name}" is {values[row]:g}; it must be {must}')
     for name in ("filter_corner_hz", "sample_rate_hz"):
         if not table.number(name, 1.0) > 0:
@@ -355,15 +357,15 @@ def _check_columns(table: Table) -> None:
     required = min(sets, key=lambda names: sum(name not in table.columns for name in names))
     missing = [name for name in required if name not in table.columns]
     present = [*table.columns, *table.labels]
-    unused = [name for name in present if name not in required]
+    unused_columns = [name for name in present if name not in required]
     raise MissingColumn(
         f'{table.source}: a table of {table.kind} needs the column "{missing[0]}"'
-        f"{_nearest_given(missing[0], unused)}; it has: {', '.join(present)}"
+        f"{_nearest_given(missing[0], unused_columns)}; it has: {', '.join(present)}"
     )
 
 
-def _nearest_given(missing: str, others: list[str]) -> str:
-    hint = nearest(missing, others) if others else ""
+def _nearest_given(missing: str, other_names: list[str]) -> str:
+    hint = nearest(missing, other_names) if other_names else ""
     return hint if hint.startswith("; did you mean") else ""
 
 
@@ -371,18 +373,18 @@ def guess_kind(names: Iterable[str]) -> str:
     """The kind of table that has these columns. Raises MissingColumn when none has."""
     names = list(names)
     for kind in ("motion", "poses", "rates", "positions"):
-        if any(all(name in names for name in wanted) for wanted in FILE_KINDS[kind].columns):
+        if any(all(name in names for name in columns) for columns in FILE_KINDS[kind].columns):
             return kind
-    required = {name for kind in FILE_KINDS.values() for wanted in kind.columns for name in wanted}
+    required = {name for kind in FILE_KINDS.values() for columns in kind.columns for name in columns}
     for name in names:
         close = difflib.get_close_matches(name, required, n=1, cutoff=0.65)
         if name not in required and name not in OPTIONAL and close:
             raise MissingColumn(f'the column name is unknown: "{name}"; did you mean "{close[0]}"?')
-    each = [(kind.name, wanted) for kind in FILE_KINDS.values() for wanted in kind.columns]
-    kind, wanted = max(each, key=lambda e: sum(name in names for name in e[1]))
-    missing = [name for name in wanted if name not in names]
-    if len(missing) < len(wanted):
-        expected = f"{kind} need {', '.join(wanted)}; there are: {', '.join(names)}"
+    column_sets = [(kind.name, columns) for kind in FILE_KINDS.values() for columns in kind.columns]
+    kind, columns = max(column_sets, key=lambda e: sum(name in names for name in e[1]))
+    missing = [name for name in columns if name not in names]
+    if len(missing) < len(columns):
+        expected = f"{kind} need {', '.join(columns)}; there are: {', '.join(names)}"
         raise MissingColumn(f'the column "{missing[0]}" is missing: {expected}')
     raise MissingColumn(
         f"columns {', '.join(names)} do not fit any kind of table; "

@@ -29,7 +29,7 @@ LARGE_STD = 100.0  # from here on the digits in brackets would be before the dec
 
 def concise(value: float, std: float | None, of: str = "") -> str:
     """`2.500123(45) V` in ASCII: the digits in brackets are the standard uncertainty of the last digits."""
-    if not _known(std):
+    if not _is_known(std):
         return f"{value:.6g} {of}".rstrip()
     decimals = max(0, 1 - exponent(float(f"{std:.1e}")))  # of the rounded one: 0.0998 is 0.10
     if decimals > MOST_DECIMALS or std >= LARGE_STD:
@@ -39,7 +39,7 @@ def concise(value: float, std: float | None, of: str = "") -> str:
 
 def estimate_text(value: float, std: float | None) -> str:
     """`2.50013(24)`, or `−1.23(11) × 10⁻⁸`: the concise form with typographic signs; six digits without `std`."""
-    if not _known(std):
+    if not _is_known(std):
         return minus(f"{value:.6g}")
     power = _power(value, std)
     if power == 0 and std < LARGE_STD:
@@ -70,7 +70,7 @@ def in_prefix(value: float, std: float | None, of: str) -> tuple[float, str]:
 
 def time_text(value: float, std: float | None) -> str:
     """A time since a beginning: `2.86(42)`, or `at most 7.7` where its expanded uncertainty (k = 2) is larger."""
-    if _known(std) and value < 2 * std:
+    if _is_known(std) and value < 2 * std:
         return f"at most {rounded(value + 2 * std, 2)}"
     return estimate_text(value, std)
 
@@ -99,7 +99,7 @@ def _to_digits(value: float, uncertainty: float, power: int) -> str:
     return minus(f"{round(value, decimals) / 10.0**power:.{max(decimals + power, 0)}f}")
 
 
-def _known(std: float | None) -> TypeGuard[float]:
+def _is_known(std: float | None) -> TypeGuard[float]:
     return std is not None and math.isfinite(std) and std > 0
 
 
@@ -227,7 +227,7 @@ def labelled(name: str, of: str) -> str:
 # Words
 
 
-def joined(names: Iterable[str], word: str = "and") -> str:
+def join_words(names: Iterable[str], word: str = "and") -> str:
     """`a`, `a and b`, `a, b and c`."""
     names = list(names)
     return f" {word} ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

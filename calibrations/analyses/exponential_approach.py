@@ -62,8 +62,8 @@ def remaining_drift(p: Array, t_s: Array) -> Array:
 def model_derivatives(p: Array, t_s: Array) -> Array:
     """Derivatives of the model by its parameters, shape (n, p)."""
     k = (len(p) - 1) // 2
-    over = t_s[:, None] / np.exp(p[1 + k :])
-    return np.column_stack([np.ones(len(t_s)), np.exp(-over), p[1 : 1 + k] * np.exp(-over) * over])
+    time_ratio = t_s[:, None] / np.exp(p[1 + k :])
+    return np.column_stack([np.ones(len(t_s)), np.exp(-time_ratio), p[1 : 1 + k] * np.exp(-time_ratio) * time_ratio])
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,11 @@ class Series:
         p = self._descended(p, min(self.points, key=lambda point: self._scored(p, point)[1]))
         restricted = np.array([self._scored(p, point)[1] for point in self.points])
         weight = np.exp((restricted.min() - restricted) / 2) * np.array(list(self.points.values()))
-        chosen = np.flatnonzero(weight > LEAST_LIKELIHOOD * weight.sum())
-        likely, weight = [list(self.points)[i] for i in chosen], weight[chosen] / weight[chosen].sum()
+        likely_points = np.flatnonzero(weight > LEAST_LIKELIHOOD * weight.sum())
+        likely, weight = (
+            [list(self.points)[i] for i in likely_points],
+            weight[likely_points] / weight[likely_points].sum(),
+        )
         fits = np.array([self._descended(p, point) for point in likely])
         _, _, covariances, noise = zip(*map(self._scored, fits, likely), strict=True)
         mean = weight @ fits
@@ -134,33 +137,33 @@ class Series:
         """Time constants and noise of greatest likelihood on the grid."""
         taus, points = np.exp(self._ln_taus), list(self.points)
         sets = [s for s in combinations(range(TAUS), k) if k < 2 or taus[s[1]] >= LEAST_TAU_RATIO * taus[s[0]]]
-        chosen = np.array([[0, *(1 + i for i in s)] for s in sets])
+        column_sets = np.array([[0, *(1 + i for i in s)] for s in sets])
         columns = np.column_stack([np.ones(len(self.t_s)), np.exp(-self.t_s[:, None] / taus), self.values])
-        scores = np.array([self._deviances(columns, point, chosen) for point in points])
+        scores = np.array([self._deviances(columns, point, column_sets) for point in points])
         best, at = np.unravel_index(int(np.argmin(scores)), scores.shape)
         return tuple(float(taus[i]) for i in sets[at]), points[best]
 
-    def _deviances(self, columns: Array, point: Point, chosen: NDArray[np.intp]) -> Array:
+    def _deviances(self, columns: Array, point: Point, column_sets: NDArray[np.intp]) -> Array:
         """-2 log likelihood of each choice of columns, shape (choices,); the last column is the values."""
-        out, logdet = self._whitened(columns, point)
-        gram, n = out.T @ out, len(out)
-        normal, right = gram[chosen[:, :, None], chosen[:, None, :]], gram[chosen, -1]
-        ridge = 1e-10 * gram[0, 0] * np.eye(chosen.shape[1])
-        solved = np.linalg.solve(normal + ridge, right[:, :, None])[:, :, 0]
-        square = np.maximum(gram[-1, -1] - np.sum(right * solved, axis=1), 0.0)
+        whitened, logdet = self._whitened(columns, point)
+        gram, n = whitened.T @ whitened, len(whitened)
+        normal, products = gram[column_sets[:, :, None], column_sets[:, None, :]], gram[column_sets, -1]
+        ridge = 1e-10 * gram[0, 0] * np.eye(column_sets.shape[1])
+        solved = np.linalg.solve(normal + ridge, products[:, :, None])[:, :, 0]
+        square = np.maximum(gram[-1, -1] - np.sum(products * solved, axis=1), 0.0)
         factor = self._factor(square, n)
         return np.asarray(square / factor + n * np.log(factor) + logdet)
 
     def _start(self, taus_s: tuple[float, ...], point: Point) -> Array:
         columns = [np.ones(len(self.t_s)), *(np.exp(-self.t_s / tau) for tau in taus_s), self.values]
-        out, _ = self._whitened(np.column_stack(columns), point)
-        return np.concatenate([np.linalg.lstsq(out[:, :-1], out[:, -1], rcond=None)[0], np.log(taus_s)])
+        whitened, _ = self._whitened(np.column_stack(columns), point)
+        return np.concatenate([np.linalg.lstsq(whitened[:, :-1], whitened[:, -1], rcond=None)[0], np.log(taus_s)])
 
     def _linearised(self, p: Array, point: Point) -> tuple[Array, Array, float]:
         """Whitened derivatives (n, p) and residual (n,) at `p`, and log det of the noise."""
         columns = np.column_stack([model_derivatives(p, self.t_s), self.values - p[0] - remaining_drift(p, self.t_s)])
-        out, logdet = self._whitened(columns, point)
-        return out[:, :-1], out[:, -1], logdet
+        whitened, logdet = self._whitened(columns, point)
+        return whitened[:, :-1], whitened[:, -1], logdet
 
     def _descended(self, p: Array, point: Point) -> Array:
         """The best parameters under the noise of `point` from a start nearby (Levenberg and Marquardt)."""
@@ -170,11 +173,11 @@ class Series:
             normal = J.T @ J
             step = np.linalg.lstsq(normal + damping * np.diag(np.diag(normal)), J.T @ r, rcond=None)[0]
             step[1 + k :] = self._within(p[1 + k :] + np.clip(step[1 + k :], -LONGEST_STEP, LONGEST_STEP)) - p[1 + k :]
-            tried = self._linearised(p + step, point)
-            gain = float(r @ r - tried[1] @ tried[1])
+            trial = self._linearised(p + step, point)
+            gain = float(r @ r - trial[1] @ trial[1])
             damping = damping / 10 if gain >= 0 else damping * 10
             if gain >= 0:
-                p, (J, r, _) = p + step, tried
+                p, (J, r, _) = p + step, trial
             if 0 <= gain < CONVERGED:
                 break
         return p

@@ -99,8 +99,8 @@ class QuantityFilter:
 
     def after(self, t_s: float, value: float, std: float, *, offset: bool = False) -> QuantityFilter:
         """Add a value."""
-        done = self.bank.after(t_s, (value - self.first) / self.unit, (std or self.unit) / self.unit, offset=offset)
-        return replace(self, bank=done)
+        bank = self.bank.after(t_s, (value - self.first) / self.unit, (std or self.unit) / self.unit, offset=offset)
+        return replace(self, bank=bank)
 
     def forecast(self) -> Forecast:
         """The present forecast."""
@@ -150,26 +150,28 @@ class SoakForecast:
         return {name: quantity_filter.forecast() for name, quantity_filter in self.followed.items()}
 
     def _held(self, part: Table, axis: str) -> dict[str, QuantityFilter]:
-        before = self.followed.get(name := f"bias-{axis}")
-        if before is None:
+        previous = self.followed.get(name := f"bias-{axis}")
+        if previous is None:
             return {}
         n, white = part.column("n"), white_std(part)
         t_s, value = float(np.average(part.time_s, weights=n)), float(np.average(part.output(axis), weights=n))
         std = 0.0 if white is None else float(1 / np.sqrt(np.sum(white[:, part.axes.index(axis)] ** -2)))
-        return {name: before.after(t_s, value, std, offset=True)}
+        return {name: previous.after(t_s, value, std, offset=True)}
 
     def _turned(self, part: Table, axis: str) -> dict[str, QuantityFilter]:
         if np.diff(part.time_s, prepend=part.time_s[0]).max() > LONGEST_MOVE_S:
             return {}
         try:
-            (done,) = estimate_tumbles(part, axis)
+            (tumble,) = estimate_tumbles(part, axis)
         except DataError:
             return {}
-        scale = done.scale_v_per_g
-        values = {"bias": (done.bias_v, done.bias_std_v), "scale": (scale, abs(scale) * done.scale_std)}
+        scale = tumble.scale_v_per_g
+        values = {"bias": (tumble.bias_v, tumble.bias_std_v), "scale": (scale, abs(scale) * tumble.scale_std)}
         return {
-            name: before.after(done.t_s, *value) if before else QuantityFilter.of(done.t_s, *value, scale)
-            for name, value, before in ((f"{q}-{axis}", v, self.followed.get(f"{q}-{axis}")) for q, v in values.items())
+            name: previous.after(tumble.t_s, *value) if previous else QuantityFilter.of(tumble.t_s, *value, scale)
+            for name, value, previous in (
+                (f"{q}-{axis}", v, self.followed.get(f"{q}-{axis}")) for q, v in values.items()
+            )
         }
 
 
@@ -187,12 +189,12 @@ class ForecastHistory:
     @property
     def known_s(self) -> float | None:
         """The time since power-on from which the final value is known to the end; None if it is not."""
-        since = None
+        known_from_s = None
         for forecast in reversed(self.forecasts):
             if not forecast.known:
                 break
-            since = forecast.t_s
-        return since
+            known_from_s = forecast.t_s
+        return known_from_s
 
 
 def steady_time(histories: Mapping[str, ForecastHistory], axis: str = "") -> Bounds | None:
@@ -201,20 +203,22 @@ def steady_time(histories: Mapping[str, ForecastHistory], axis: str = "") -> Bou
     last = [course.last for name, course in histories.items() if name.endswith(axis)]
     if not last or any(forecast.surprised for forecast in last):
         return None
-    within = [[s if s - forecast.t_s < LATEST_STEADY_S else np.inf for s in forecast.steady_s] for forecast in last]
-    return Bounds(*np.max(within, axis=0).tolist())
+    steady_times = [
+        [s if s - forecast.t_s < LATEST_STEADY_S else np.inf for s in forecast.steady_s] for forecast in last
+    ]
+    return Bounds(*np.max(steady_times, axis=0).tolist())
 
 
 def forecast_history(table: Table, oven_c: float = 0.0) -> dict[str, ForecastHistory]:
     """Every quantity of a soak's table by name, as known after LOOKS parts of it, closer together at the beginning."""
     parts = list(soak_parts(table))
-    looks = set(np.rint(np.geomspace(1, len(parts), FORECASTS)).astype(int).tolist()) if parts else set()
+    look_numbers = set(np.rint(np.geomspace(1, len(parts), FORECASTS)).astype(int).tolist()) if parts else set()
     histories: dict[str, list[Forecast]] = {}
     for number, state in enumerate(filter_soak(table, oven_c), 1):
-        for name, forecast in state.forecasts().items() if number in looks else ():
-            before = histories.setdefault(name, [])
-            if not before or before[-1].t_s < forecast.t_s:
-                before.append(forecast)
+        for name, forecast in state.forecasts().items() if number in look_numbers else ():
+            earlier = histories.setdefault(name, [])
+            if not earlier or earlier[-1].t_s < forecast.t_s:
+                earlier.append(forecast)
     return {name: ForecastHistory(tuple(forecasts)) for name, forecasts in histories.items()}
 
 
@@ -241,14 +245,16 @@ def soak_parts(table: Table) -> Iterator[Table]:
 
 def _time_to_tolerance_s(remaining: Array, taus_s: Array, tolerance: float) -> Array:
     """For each draw, how long the remaining drift is beyond the tolerance; `remaining` and `taus_s` (n, 2)."""
-    ahead = np.abs(np.sum(remaining[:, None, :] * np.exp(-HORIZON_S[None, :, None] / taus_s[:, None, :]), axis=2))
-    over = np.log(np.maximum(ahead, SMALLEST) / tolerance)
-    last = len(HORIZON_S) - 1 - np.argmax(over[:, ::-1] > 0, axis=1)  # the last time at which it is beyond
-    last, draw = np.minimum(last, len(HORIZON_S) - 2), np.arange(len(over))
-    before, after = over[draw, last], over[draw, last + 1]
-    share = np.clip(before / np.maximum(before - after, SMALLEST), 0.0, 1.0)
+    future_drift = np.abs(
+        np.sum(remaining[:, None, :] * np.exp(-HORIZON_S[None, :, None] / taus_s[:, None, :]), axis=2)
+    )
+    log_excess = np.log(np.maximum(future_drift, SMALLEST) / tolerance)
+    last = len(HORIZON_S) - 1 - np.argmax(log_excess[:, ::-1] > 0, axis=1)  # the last time at which it is beyond
+    last, draw = np.minimum(last, len(HORIZON_S) - 2), np.arange(len(log_excess))
+    excess_before, excess_after = log_excess[draw, last], log_excess[draw, last + 1]
+    share = np.clip(excess_before / np.maximum(excess_before - excess_after, SMALLEST), 0.0, 1.0)
     crossed = HORIZON_S[last] + share * (HORIZON_S[last + 1] - HORIZON_S[last])
-    return np.where((over > 0).any(axis=1), crossed, 0.0)
+    return np.where((log_excess > 0).any(axis=1), crossed, 0.0)
 
 
 def _bounds(draws: Array) -> Bounds:

@@ -129,10 +129,10 @@ def field_elements(sensed: Array, sensor_from_base: Array, turns: Sequence[str])
     step = 1e-4 * value["F"]
     stds = {}
     for name in value:
-        ahead, behind = (
+        forward, backward = (
             np.array([_of_field(means.mean(axis=0) + side * step * e)[name] for e in np.eye(3)]) for side in (1, -1)
         )
-        slope = (ahead - behind) / (2 * step)
+        slope = (forward - backward) / (2 * step)
         stds[name] = float(np.sqrt(slope @ covariance @ slope))
     return Elements(value, stds)
 
@@ -149,8 +149,8 @@ def level_elements_by_extremes(outputs: Array, sensor_from_base: Array, turn_std
     level = np.column_stack([level @ round_z.correction, np.zeros(len(level))])
     in_base = np.einsum("nij,ni->nj", sensor_from_base, level)
     elements = _of_field(in_base.mean(axis=0))
-    along = np.radians([elements["D"], elements["D"] + 90])
-    std = [float((in_base[:, :2] @ [np.cos(a), -np.sin(a)]).std(ddof=1) / np.sqrt(len(level))) for a in along]
+    azimuths = np.radians([elements["D"], elements["D"] + 90])
+    std = [float((in_base[:, :2] @ [np.cos(a), -np.sin(a)]).std(ddof=1) / np.sqrt(len(level))) for a in azimuths]
     h_std = float(np.hypot(std[0], HIDDEN_IRON * round_z.flattening * elements["H"]))
     d_std = None if turn_std_deg is None else float(np.hypot(np.degrees(std[1] / elements["H"]), turn_std_deg))
     return Elements({k: elements[k] for k in "HD"}, {"H": h_std, "D": d_std})
@@ -167,11 +167,13 @@ def iron_by_extremes(outputs: Array, edges: Sequence[str], turns: Sequence[str],
     names = list(dict.fromkeys(turns))
     middles, unseen = np.full((2, len(names), 3), np.nan)
     for k, name in enumerate(names):
-        rows, mine = turn == name, edge[turn == name][0]
-        level = [axis for axis, letter in enumerate("xyz") if letter != mine]
+        rows, own_edge = turn == name, edge[turn == name][0]
+        level = [axis for axis, letter in enumerate("xyz") if letter != own_edge]
         middles[k, level] = estimate_hard_iron(outputs[rows][:, level])
         unseen[k, level] = (
-            0.0 if len(set(turn[edge == mine])) > 1 else _hidden_iron_std(outputs[rows], "xyz".index(mine), round_z)
+            0.0
+            if len(set(turn[edge == own_edge])) > 1
+            else _hidden_iron_std(outputs[rows], "xyz".index(own_edge), round_z)
         )
     count = np.sum(np.isfinite(middles), axis=0)
     measured, least = count > 0, np.maximum(count, 1)
@@ -196,8 +198,8 @@ def _remaining_per_mille(outputs: Array, middle: Array, round_z: Ellipse, about_
     """Of the whole sphere where hard iron is known of every axis; else of the turn about z."""
     if not np.isfinite(middle).all():
         return horizontal_per_mille((about_z - estimate_hard_iron(about_z)) @ round_z.correction)
-    away = outputs - middle
-    size = np.linalg.norm(np.column_stack([away[:, :2] @ round_z.correction, away[:, 2:]]), axis=1)
+    centred = outputs - middle
+    size = np.linalg.norm(np.column_stack([centred[:, :2] @ round_z.correction, centred[:, 2:]]), axis=1)
     return float(1e3 * size.std() / size.mean())
 
 

@@ -46,12 +46,12 @@ def search_angles_y(alpha_deg: float, beta_deg: float) -> tuple[float, float]:
 
 def theta_x(alpha_x_deg: float, beta_x_deg: float) -> Array:
     """Direction of the x sensing axis in the reference frame, a unit vector, shape (3,). Ang (18)."""
-    return np.asarray(_about("y", alpha_x_deg) @ _about("z", beta_x_deg) @ [1.0, 0.0, 0.0])
+    return np.asarray(_rotation_about("y", alpha_x_deg) @ _rotation_about("z", beta_x_deg) @ [1.0, 0.0, 0.0])
 
 
 def theta_y(alpha_y_deg: float, beta_y_deg: float) -> Array:
     """Direction of the y sensing axis in the reference frame, a unit vector, shape (3,). Ang (19)."""
-    return np.asarray(_about("x", alpha_y_deg) @ _about("z", beta_y_deg) @ [0.0, 1.0, 0.0])
+    return np.asarray(_rotation_about("x", alpha_y_deg) @ _rotation_about("z", beta_y_deg) @ [0.0, 1.0, 0.0])
 
 
 def along_reference(a: Array, x: Array, y: Array) -> Array:
@@ -65,7 +65,7 @@ def along_reference(a: Array, x: Array, y: Array) -> Array:
     return np.column_stack([along_x, along_y])
 
 
-def _about(axis: str, angle_deg: float) -> Array:
+def _rotation_about(axis: str, angle_deg: float) -> Array:
     """Rotation matrix about an axis of the reference frame, shape (3, 3)."""
     return rotation(np.radians(angle_deg) * np.eye(3)[AXES.index(axis)])
 
@@ -200,9 +200,9 @@ def _is_white(brackets: list[_Bracket]) -> bool:
 
 def _direction(bracket: _Bracket, noise: Noise) -> Direction:
     factors, covariance, _ = bracket.solved(noise)
-    back, size = _about("z", bracket.centre_deg), float(np.linalg.norm(factors[:3]))
-    theta = back @ factors[:3] / size
-    slope = (np.eye(3) - np.outer(theta, theta)) @ back / size
+    rotation, size = _rotation_about("z", bracket.centre_deg), float(np.linalg.norm(factors[:3]))
+    theta = rotation @ factors[:3] / size
+    slope = (np.eye(3) - np.outer(theta, theta)) @ rotation / size
     return Direction(bracket.axis, theta, slope @ covariance[:3, :3] @ slope.T, bracket.rounds)
 
 

@@ -99,8 +99,8 @@ def inverse_response(table: Table, model: Model, axis: int, band: Response) -> R
     """
     name = table.axes[axis]
     corner = corner_hz(table) + model.value(f"output-filter.{name}")
-    late = model.value(f"sampling-delay.{name}") - skew_s(table, axis)
-    low_pass, undelayed = first_order(corner), delay(-late)
+    delay_s = model.value(f"sampling-delay.{name}") - skew_s(table, axis)
+    low_pass, undelayed = first_order(corner), delay(-delay_s)
     return lambda f: np.asarray(band(f) * undelayed(f) / low_pass(f))
 
 
@@ -218,14 +218,14 @@ def _noise_limit(
 ) -> Quantity:
     """Rms that the sensor's noise alone leaves in the band, mm/s^2."""
     source = part if still is None else still
-    where = record if still is None else max(find_records(still), key=lambda r: r.end - r.first)
-    x = source.column(part.output_name("x"))[where.rows]
+    source_record = record if still is None else max(find_records(still), key=lambda r: r.end - r.first)
+    x = source.column(part.output_name("x"))[source_record.rows]
     if still is None:
         x = x - _motion_part(x, record, reference)
-    f, density = periodogram(x, where.rate_hz)
-    above = f > 1.5 * record.rate_hz / part.n  # slower than the record is its mean
+    f, density = periodogram(x, source_record.rate_hz)
+    in_band = f > 1.5 * record.rate_hz / part.n  # slower than the record is its mean
     size = np.abs(inverse_response(part, model, 0, band)(f)) * 1e3 * part.gravity_m_s2 / _per_g(model)
-    power = density[above] * size[above] ** 2 * f[1]
+    power = density[in_band] * size[in_band] ** 2 * f[1]
     limit = max(float(np.sqrt(power.sum())), np.finfo(float).tiny)  # a converter may see no noise at all
     # a line of a spectrum is known to its own size; Hann's window makes neighbours alike: 1.5 lines in one
     return Quantity(limit, float(np.sqrt(1.5 * np.sum(power**2))) / (2 * limit), "mm/s^2")
@@ -282,10 +282,10 @@ def fit_physical(sweep: Table) -> Model:
 
 def _in_plane(sweep: Table) -> Table:
     """The sweep with the axes that a table of motion has: those in the plane of the table of beta."""
-    kept = {*KINDS["motion"].outputs, *KINDS["motion"].digital}
-    others = {name for name in sweep.output_names if name not in kept}
-    others |= {std_column(name) for name in others}
-    return replace(sweep, columns={name: values for name, values in sweep.columns.items() if name not in others})
+    kept_names = {*KINDS["motion"].outputs, *KINDS["motion"].digital}
+    dropped = {name for name in sweep.output_names if name not in kept_names}
+    dropped |= {std_column(name) for name in dropped}
+    return replace(sweep, columns={name: values for name, values in sweep.columns.items() if name not in dropped})
 
 
 def _mean(sweep: Table, axis: str, beta_deg: float) -> float:

@@ -37,8 +37,8 @@ def _autocorrelation(centred: Array) -> Array:
     n = len(centred)
     covariance = autocovariance(centred, max(2, int(LONGEST_LAG * n)))
     rho = covariance[1:] / covariance[0]
-    below = np.flatnonzero(rho < 2 / np.sqrt(n))
-    return np.asarray(rho[: below[0]] if len(below) else rho)
+    insignificant = np.flatnonzero(rho < 2 / np.sqrt(n))
+    return np.asarray(rho[: insignificant[0]] if len(insignificant) else rho)
 
 
 def hidden_inclination_deg(peak_to_peak_v: float, scale_v_per_g: float) -> float:

@@ -106,8 +106,8 @@ class SteadyState:
         if not self.terms:
             return 0.0, float(np.sqrt(2) * self.noise)
         first, last = model_derivatives(self.parameters, np.array(self.span_s) - self.span_s[0])
-        before, after = self.at(np.array(self.span_s))
-        return float(after - before), float(np.sqrt((last - first) @ self.covariance @ (last - first)))
+        start_value, end_value = self.at(np.array(self.span_s))
+        return float(end_value - start_value), float(np.sqrt((last - first) @ self.covariance @ (last - first)))
 
     @property
     def from_start(self) -> bool:
@@ -158,12 +158,12 @@ class SteadyState:
             return start
         lengths = np.exp(p[1 + k :]) * (np.log(k * np.abs(p[1 : 1 + k])) - ln_tolerance)
         t_s = np.linspace(start, max(end, start + float(lengths.max())), TIME_POINTS)
-        over = np.log(np.abs(remaining_drift(p, t_s - start)) + 1e-300) - ln_tolerance
-        above = np.flatnonzero(over > 0)
-        if not len(above):
+        log_excess = np.log(np.abs(remaining_drift(p, t_s - start)) + 1e-300) - ln_tolerance
+        beyond_times = np.flatnonzero(log_excess > 0)
+        if not len(beyond_times):
             return start
-        i = min(int(above[-1]), TIME_POINTS - 2)
-        return float(t_s[i] + (t_s[i + 1] - t_s[i]) * over[i] / (over[i] - over[i + 1]))
+        i = min(int(beyond_times[-1]), TIME_POINTS - 2)
+        return float(t_s[i] + (t_s[i + 1] - t_s[i]) * log_excess[i] / (log_excess[i] - log_excess[i + 1]))
 
 
 def fit_steady_state(t_s: Array, values: Array, stds: Array) -> SteadyState:
@@ -179,8 +179,8 @@ def fit_steady_state(t_s: Array, values: Array, stds: Array) -> SteadyState:
     series = Series(t_s - t_s[0], (values - middle) / unit, stds / unit)
     most = min(MOST_EXPONENTIALS, (len(t_s) - 1 - SPARE_VALUES) // 2)
     candidates = [series.likeliest(k) for k in range(most + 1)]
-    chosen, _ = min(candidates, key=lambda candidate: candidate[1] + EXPONENTIAL_GAIN * (len(candidate[0]) // 2))
-    best = series.averaged(chosen)
+    start_values, _ = min(candidates, key=lambda candidate: candidate[1] + EXPONENTIAL_GAIN * (len(candidate[0]) // 2))
+    best = series.averaged(start_values)
     k = (len(best.parameters) - 1) // 2
     size = np.array([unit] * (1 + k) + [1.0] * k)
     parameters = best.parameters * size
@@ -312,15 +312,15 @@ def analyse_soak(table: Table, oven_c: float = 0.0) -> Soak:
     broken = {gap.path for gap in gaps}
     usable = np.array([path.startswith(REVERSAL) and path not in broken for path in table.labels["path"]])
     if oven_c and "temperature_c" in table:
-        away = np.flatnonzero(np.abs(table.column("temperature_c") - oven_c) > REACHED_K)
-        usable[: away[-1] + 1 if len(away) else 0] = False
+        off_target = np.flatnonzero(np.abs(table.column("temperature_c") - oven_c) > REACHED_K)
+        usable[: off_target[-1] + 1 if len(off_target) else 0] = False
     if not usable.any():
         raise TooFewRows(f"{table.source}: has no reversal yet; resume the run")
     reversals = table.rows(_complete(table, usable))
     courses: dict[str, Course] = {}
     for axis in (axis for axis in table.axes if axis in AXES):
-        done = estimate_tumbles(reversals, axis)
-        courses |= {f"{quantity}-{axis}": _course(quantity, axis, done) for quantity in ("bias", "scale")}
+        tumbles = estimate_tumbles(reversals, axis)
+        courses |= {f"{quantity}-{axis}": _course(quantity, axis, tumbles) for quantity in ("bias", "scale")}
     return Soak(table, gaps, courses)
 
 
@@ -342,13 +342,13 @@ def _complete(table: Table, usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.isin(paths, names[counts == counts.max()]) & usable
 
 
-def _course(quantity: str, axis: str, done: list[Tumble]) -> Course:
-    t_s = np.array([tumble.t_s for tumble in done])
+def _course(quantity: str, axis: str, tumbles: list[Tumble]) -> Course:
+    t_s = np.array([tumble.t_s for tumble in tumbles])
     if quantity == "bias":
-        values, stds = np.array([(tumble.bias_v, tumble.bias_std_v) for tumble in done]).T
+        values, stds = np.array([(tumble.bias_v, tumble.bias_std_v) for tumble in tumbles]).T
     else:
-        values = np.array([tumble.scale_v_per_g for tumble in done])
-        stds = values * np.array([tumble.scale_std for tumble in done])
+        values = np.array([tumble.scale_v_per_g for tumble in tumbles])
+        stds = values * np.array([tumble.scale_std for tumble in tumbles])
     state = fit_steady_state(t_s, values, stds) if len(t_s) >= FEWEST_APPROACH_VALUES else None
     return Course(quantity, axis, t_s, values, stds, state)
 
@@ -356,9 +356,9 @@ def _course(quantity: str, axis: str, done: list[Tumble]) -> Course:
 def _gaps(table: Table) -> tuple[RecordGap, ...]:
     paths, length = table.labels["path"], _lengths_s(table)
     ends, starts = (table.time_s + length / 2)[:-1], (table.time_s - length / 2)[1:]
-    within = np.array([a == b and a.startswith(HOLD) for a, b in pairwise(paths)], dtype=bool)
-    allowed = np.where(within, LONGEST_HOLD_GAP / _rate_hz(table), LONGEST_MOVE_S)
-    gaps = np.flatnonzero(starts - ends > allowed)
+    same_hold = np.array([a == b and a.startswith(HOLD) for a, b in pairwise(paths)], dtype=bool)
+    longest_s = np.where(same_hold, LONGEST_HOLD_GAP / _rate_hz(table), LONGEST_MOVE_S)
+    gaps = np.flatnonzero(starts - ends > longest_s)
     return tuple(
         RecordGap(float(ends[i]), float(starts[i] - ends[i]), paths[i] if paths[i] == paths[i + 1] else "")
         for i in gaps

@@ -64,10 +64,10 @@ def repeatability(values: Sequence[float], stds: Sequence[float]) -> tuple[float
         raise DataError("repeatability needs at least two repetitions; resume the run")
     variance = float(np.var(values, ddof=1))
     noise = float(np.mean(np.square(stds)))
-    between = max(0.0, variance - noise)
+    between_variance = max(0.0, variance - noise)
     spread = max(variance, noise) * np.sqrt(2 / (n - 1))
-    std = float(np.sqrt(between + spread) - np.sqrt(between))
-    return float(np.sqrt(between)), std if std > 0 else None
+    std = float(np.sqrt(between_variance + spread) - np.sqrt(between_variance))
+    return float(np.sqrt(between_variance)), std if std > 0 else None
 
 
 # A quantity over a sensor's calibrations: its drift, its scatter between calibrations, and the next due date.
@@ -113,17 +113,17 @@ class Stability:
 
     def predict(self, t_days: Array) -> tuple[Array, Array]:
         """Value and standard uncertainty at other times, shape as `t_days`."""
-        since = np.asarray(t_days, dtype=np.float64) - self.middle_days
+        elapsed_days = np.asarray(t_days, dtype=np.float64) - self.middle_days
         C = self.covariance
-        variance = C[0, 0] + 2 * since * C[0, 1] + since**2 * C[1, 1] + self.scatter**2
-        return np.asarray(self.centre + self.slope * since), np.asarray(np.sqrt(variance))
+        variance = C[0, 0] + 2 * elapsed_days * C[0, 1] + elapsed_days**2 * C[1, 1] + self.scatter**2
+        return np.asarray(self.centre + self.slope * elapsed_days), np.asarray(np.sqrt(variance))
 
     def due_days(self, low: float, high: float) -> float | None:
         """The first day since the last calibration with the interval beyond the limits; None within ten years."""
         days = self.t_days[-1] + np.arange(HORIZON_DAYS + 1.0)
         value, std = self.predict(days)
-        beyond = (value - self.coverage * std < low) | (value + self.coverage * std > high)
-        return float(days[np.argmax(beyond)]) if beyond.any() else None
+        outside = (value - self.coverage * std < low) | (value + self.coverage * std > high)
+        return float(days[np.argmax(outside)]) if outside.any() else None
 
 
 def fit_stability(t_days: Sequence[float], values: Sequence[float], stds: Sequence[float]) -> Stability:

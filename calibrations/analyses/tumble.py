@@ -56,8 +56,8 @@ def estimate_tumbles(table: Table, axis: str) -> list[Tumble]:
         raise DataError(f"{table.source}: no tumble is complete yet; resume the run")
     missing = {name: _missing(table, rows) for name, rows in begun.items()}
     if all(missing.values()):
-        name, where = next(iter(missing.items()))
-        raise DataError(f"{table.source}: no tumble is complete: {name!r} lacks {where}; measure it again")
+        name, missing_words = next(iter(missing.items()))
+        raise DataError(f"{table.source}: no tumble is complete: {name!r} lacks {missing_words}; measure it again")
     return [_tumble(table, axis, name, rows) for name, rows in begun.items() if not missing[name]]
 
 

@@ -98,8 +98,8 @@ def evaluate_interval(
     values: dict[Node, tuple[Interval, Interval]] = {}
     for node in sort_nodes(roots):
         if node.operation == "given":
-            own = np.array([float(name == node.name) for name in by]).reshape(-1, *(1 for _ in n))
-            values[node] = ranges[node.name], point_interval(np.broadcast_to(own, (len(by), *n)).copy())
+            unit_slope = np.array([float(name == node.name) for name in by]).reshape(-1, *(1 for _ in n))
+            values[node] = ranges[node.name], point_interval(np.broadcast_to(unit_slope, (len(by), *n)).copy())
         elif node.constant:
             values[node] = point_interval(np.full(n, node.value)), point_interval(np.zeros((len(by), *n)))
         elif node.table is not None:
@@ -141,16 +141,16 @@ def _applied(name: str, *inner: Pair) -> Pair:
         case "abs":
             return _extreme("max", (x, dx), (-x, -dx))
         case "where":
-            return _chosen((x, dx), *more)
+            return _choose((x, dx), *more)
         case "exp":
             value = x.monotone("exp")
             return value, value * dx
         case "log":
-            real = Interval(np.where(x.low > 0, x.low, np.nan), x.high)
-            return _known(real.monotone("log")), dx / x
+            domain = Interval(np.where(x.low > 0, x.low, np.nan), x.high)
+            return _bounded(domain.monotone("log")), dx / x
         case "sqrt":
-            real = Interval(np.where(x.low >= 0, x.low, np.nan), x.high)
-            value = _known(real.monotone("sqrt"))
+            domain = Interval(np.where(x.low >= 0, x.low, np.nan), x.high)
+            value = _bounded(domain.monotone("sqrt"))
             return value, dx / (value + value)
         case "sin":
             return _wave(x), _wave(x, np.pi / 2) * dx
@@ -178,7 +178,7 @@ def _hull(x: Interval, y: Interval) -> Interval:
     return Interval(np.minimum(x.low, y.low), np.maximum(x.high, y.high))
 
 
-def _picked(first: Flags, second: Flags, x: Interval, y: Interval) -> Interval:
+def _pick(first: Flags, second: Flags, x: Interval, y: Interval) -> Interval:
     """x where the first flag is sure, y where the second is, else their hull."""
     hull = _hull(x, y)
     low = np.where(first, x.low, np.where(second, y.low, hull.low))
@@ -190,20 +190,20 @@ def _extreme(name: str, first: Pair, second: Pair) -> Pair:
     if name == "min":
         return (
             Interval(np.minimum(x.low, y.low), np.minimum(x.high, y.high)),
-            _picked(x.high < y.low, y.high < x.low, dx, dy),
+            _pick(x.high < y.low, y.high < x.low, dx, dy),
         )
     return (
         Interval(np.maximum(x.low, y.low), np.maximum(x.high, y.high)),
-        _picked(x.low > y.high, y.low > x.high, dx, dy),
+        _pick(x.low > y.high, y.low > x.high, dx, dy),
     )
 
 
-def _chosen(condition: Pair, yes: Pair, no: Pair) -> Pair:
+def _choose(condition: Pair, yes: Pair, no: Pair) -> Pair:
     """A choice: slope of either branch; a jump where the condition follows the variables."""
     c, dc = condition
     surely, surely_not = (c.low > 0) | (c.high < 0), c.zero
-    value = _picked(surely, surely_not, yes[0], no[0])
-    slopes = _picked(surely, surely_not, yes[1], no[1])
+    value = _pick(surely, surely_not, yes[0], no[0])
+    slopes = _pick(surely, surely_not, yes[1], no[1])
     jumps = ~(surely | surely_not) & ~dc.zero.all(axis=0)
     return value, Interval(np.where(jumps, -np.inf, slopes.low), np.where(jumps, np.inf, slopes.high))
 
@@ -226,9 +226,9 @@ def _stepped(name: str, inner: tuple[Pair, ...]) -> Pair:
     return Interval(low, high), Interval(np.where(jumps, -np.inf, flat), np.where(jumps, np.inf, flat))
 
 
-def _wave(x: Interval, ahead: float = 0.0) -> Interval:
+def _wave(x: Interval, phase: float = 0.0) -> Interval:
     """The sine of x + ahead."""
-    low, high = x.low + ahead, x.high + ahead
+    low, high = x.low + phase, x.high + phase
     ends = np.array([np.sin(low), np.sin(high)])
     turns = {
         k: np.floor((high - k * np.pi / 2) / (2 * np.pi)) >= np.ceil((low - k * np.pi / 2) / (2 * np.pi))
@@ -238,7 +238,7 @@ def _wave(x: Interval, ahead: float = 0.0) -> Interval:
     return Interval(np.where(turns[-1], -1.0, wide.low - 1e-15), np.where(turns[1], 1.0, wide.high + 1e-15))
 
 
-def _known(x: Interval) -> Interval:
+def _bounded(x: Interval) -> Interval:
     """Unbounded where there is no number."""
     none = np.isnan(x.low) | np.isnan(x.high)
     return Interval(np.where(none, -np.inf, x.low), np.where(none, np.inf, x.high))
@@ -332,10 +332,10 @@ def _boxes(sought: Mapping[str, tuple[float, float]], inputs: Mapping[str, tuple
     parts = [BOXES_PER_AXIS] * len(sought) + [BOXES_PER_INPUT] * len(inputs)
     while math.prod(parts) > MOST_BOXES:
         parts = [max(1, n // 2) for n in parts]
-    everything = {**sought, **inputs}
-    cuts = [np.linspace(low, high, n + 1) for (low, high), n in zip(everything.values(), parts, strict=True)]
-    lows = np.meshgrid(*(cut[:-1] for cut in cuts), indexing="ij")
-    highs = np.meshgrid(*(cut[1:] for cut in cuts), indexing="ij")
-    boxes = {name: Interval(low.ravel(), high.ravel()) for name, low, high in zip(everything, lows, highs, strict=True)}
+    ranges = {**sought, **inputs}
+    cuts = [np.linspace(low, high, n + 1) for (low, high), n in zip(ranges.values(), parts, strict=True)]
+    lows = np.meshgrid(*(edges[:-1] for edges in cuts), indexing="ij")
+    highs = np.meshgrid(*(edges[1:] for edges in cuts), indexing="ij")
+    boxes = {name: Interval(low.ravel(), high.ravel()) for name, low, high in zip(ranges, lows, highs, strict=True)}
     n = math.prod(parts)
     return boxes | {name: Interval(np.full(n, -math.inf), np.full(n, math.inf)) for name in endless}

@@ -52,33 +52,33 @@ class Uncertainty:
 
 
 def result_uncertainty(
-    model: Model, forward: Forward, table: Table, a: Array, beside: Mapping[str, Span], reach: float
+    model: Model, forward: Forward, table: Table, a: Array, spans: Mapping[str, Span], reach: float
 ) -> Uncertainty | None:
     """By the standard uncertainties of the parameters and their correlations; None where there are none.
 
-    Over the specific force `a` (n, 3) of the rows of `table`, and that as far as `reach` goes on an axis; `beside` has
+    Over the specific force `a` (n, 3) of the rows of `table`, and that as far as `reach` goes on an axis; `spans` has
     the stated range of each input besides the outputs. Source  GUM 5.2.2.
     """
     if not any(e.std and e.identified for e in model.params.values()):
         return None
-    inputs = {name: span for name, span in beside.items() if name not in FORCES}
-    within = {name: _found_in(name, span, model) for name, span in inputs.items()}
+    inputs = {name: span for name, span in spans.items() if name not in FORCES}
+    covered = {name: _found_in(name, span, model) for name, span in inputs.items()}
     far = reach * a / np.abs(a).max(axis=1, keepdims=True)
-    stds = np.concatenate([_stds(model, forward, table, a, at) for at in _corners(within)])
+    stds = np.concatenate([_stds(model, forward, table, a, at) for at in _corners(covered)])
     at, largest = _largest(lambda place: _stds(model, forward, table, far, place), inputs)
     rms = float(np.sqrt(np.mean(stds**2, axis=0)).max())
-    return Uncertainty(within, rms, float(stds.max()), max(largest, float(stds.max())), at)
+    return Uncertainty(covered, rms, float(stds.max()), max(largest, float(stds.max())), at)
 
 
-def _found_in(name: str, stated: Span, model: Model) -> Span:
+def _found_in(name: str, stated_span: Span, model: Model) -> Span:
     """The range of an input during the measurement of the parameters, limited to the stated range.
 
     The range that the data covered, by the model file, or its reference; the whole range if neither is known.
     """
     at = {key: value for term in model.terms for key, value in term.constants.items()}
     reference = at.get(REFERENCES.get(name, ""))
-    low, high = model.covered.get(name, stated if reference is None else (reference, reference))
-    return float(np.clip(low, *stated)), float(np.clip(high, *stated))
+    low, high = model.covered.get(name, stated_span if reference is None else (reference, reference))
+    return float(np.clip(low, *stated_span)), float(np.clip(high, *stated_span))
 
 
 def _corners(spans: Mapping[str, Span]) -> list[Inputs]:
@@ -118,13 +118,15 @@ def _stds(model: Model, forward: Forward, table: Table, a: Array, at: Inputs) ->
     h = 1e-5
     J = np.stack([(output(model, a + h * e) - output(model, a - h * e)) / (2 * h) for e in np.eye(3)[k]], axis=2)
     inverse, estimates = np.linalg.inv(J), {key: e for key, e in model.params.items() if e.std and e.identified}
-    sides = [(output(up, a), output(down, a)) for up, down in _moved(model)]
-    moved = np.stack([np.einsum("nij,nj->ni", inverse, up - down) for up, down in sides]) / (2 * PARAMETER_STEP)
-    mixed = moved if model.correlations is None else np.tensordot(model.correlations.among(list(estimates)), moved, 1)
-    return np.asarray(np.sqrt(np.maximum(np.sum(moved * mixed, axis=0), 0.0)))
+    sides = [(output(up, a), output(down, a)) for up, down in _perturbed_models(model)]
+    changes = np.stack([np.einsum("nij,nj->ni", inverse, up - down) for up, down in sides]) / (2 * PARAMETER_STEP)
+    mixed = (
+        changes if model.correlations is None else np.tensordot(model.correlations.among(list(estimates)), changes, 1)
+    )
+    return np.asarray(np.sqrt(np.maximum(np.sum(changes * mixed, axis=0), 0.0)))
 
 
-def _moved(model: Model) -> Sequence[tuple[Model, Model]]:
+def _perturbed_models(model: Model) -> Sequence[tuple[Model, Model]]:
     """The model with each known parameter moved a little, up and down; in the order of `params`."""
     return [
         (_with(model, i, j, PARAMETER_STEP * e.std), _with(model, i, j, -PARAMETER_STEP * e.std))
@@ -136,8 +138,8 @@ def _moved(model: Model) -> Sequence[tuple[Model, Model]]:
 
 def _with(model: Model, i: int, j: int, by: float) -> Model:
     term: Term = model.terms[i]
-    moved: Estimate = replace(term.estimates[j], value=term.estimates[j].value + by)
-    estimates = (*term.estimates[:j], moved, *term.estimates[j + 1 :])
+    estimate: Estimate = replace(term.estimates[j], value=term.estimates[j].value + by)
+    estimates = (*term.estimates[:j], estimate, *term.estimates[j + 1 :])
     return replace(model, terms=(*model.terms[:i], replace(term, estimates=estimates), *model.terms[i + 1 :]))
 
 
@@ -155,28 +157,28 @@ def memory_at(table: Table, a: Array, forward: Forward) -> dict[str, Array]:
     if not forward.memory:
         return {}
     steps = [step for step in steps_of(forward.model) if step[0].name in forward.remembering]
-    stored = np.array(list(_along(table, a, steps)))  # (n, slots, 3)
+    stored = np.array(list(_memories_by_row(table, a, steps)))  # (n, slots, 3)
     columns = {f"m{slot}{axis}": stored[:, slot, k] for slot in range(stored.shape[1]) for k, axis in enumerate(AXES)}
     return {name: columns[name] for name in forward.memory}
 
 
-def _along(table: Table, a: Array, steps: Sequence[Step]) -> Iterator[list[Array]]:
+def _memories_by_row(table: Table, a: Array, steps: Sequence[Step]) -> Iterator[list[Array]]:
     """What is remembered before each row, (3,) for every slot."""
     stored = [[np.zeros((1, 3))] * effect.memory for effect, _ in steps]
     paths = turning_points(table) if "alpha_deg" in table else np.empty((table.n, 0, 3))
     for i in range(table.n):
         row = table.rows(np.array([i]))
         for force in paths[i]:
-            stored = _after(steps, force, row, stored)
+            stored = _next_memories(steps, force, row, stored)
         yield [slot[0] for slots in stored for slot in slots]
-        stored = _after(steps, a[i], row, stored)
+        stored = _next_memories(steps, a[i], row, stored)
 
 
-def _after(steps: Sequence[Step], force: Array, row: Table, before: list[list[Array]]) -> list[list[Array]]:
+def _next_memories(steps: Sequence[Step], force: Array, row: Table, memories: list[list[Array]]) -> list[list[Array]]:
     """What each effect remembers after one sample more, of the specific `force`, (3,)."""
     return [
         list(effect.follow(force[None], row, p, slots)[1])
-        for (effect, p), slots in zip(steps, before, strict=True)
+        for (effect, p), slots in zip(steps, memories, strict=True)
         if effect.memory
     ]
 
@@ -216,10 +218,10 @@ def compensation_costs(
     trial = _Trial(forward, program, table, a, memory_at(table, sensed(a, table, followed), forward))
     names = {effect.name for effect, _ in followed}
     reduced = replace(model, terms=tuple(term for term in model.terms if term.name in names))
-    hidden = unit == "g" and len(forward.axes) == 2 and "az" in program.inputs
+    needs_gravity = unit == "g" and len(forward.axes) == 2 and "az" in program.inputs
     return Cost(
         {name: _of_left_out(name, model, followed, trial) for name in forward.left_out},
-        _of_gravity(followed, trial) if hidden else None,
+        _of_gravity(followed, trial) if needs_gravity else None,
         result_uncertainty(
             reduced, forward, table, a, {name: spans[name] for name in program.inputs if name in spans}, reach
         ),

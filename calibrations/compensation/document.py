@@ -59,9 +59,9 @@ class Origin:
 def header_lines(compensation: Compensation, origin: Origin) -> list[str]:
     """The head of a source file, wrapped; an empty line separates its sections."""
     sections = [
-        _what(compensation, origin),
+        _program_lines(compensation, origin),
         _inputs(compensation),
-        _how(compensation),
+        _method_lines(compensation),
         _effects(compensation),
         _uncertainty(compensation),
         _parameters(compensation),
@@ -106,7 +106,7 @@ def _wrapped(text: str) -> list[str]:
     ) or [""]
 
 
-def _what(compensation: Compensation, origin: Origin) -> Iterator[str]:
+def _program_lines(compensation: Compensation, origin: Origin) -> Iterator[str]:
     model = compensation.model
     yield f"{origin.name}: from outputs to {_sensed(compensation)} along the reference axes, by the model {model.name}."
     yield f"  in {UNIT_TEXT[compensation.unit]}"
@@ -146,7 +146,7 @@ def _of_axis(name: str, compensation: Compensation) -> str:
     )
 
 
-def _how(compensation: Compensation) -> Iterator[str]:
+def _method_lines(compensation: Compensation) -> Iterator[str]:
     bound, unit = compensation.bound, compensation.unit
     remaining = f"q^{bound.steps} x {compensation.range.reach:g} {unit} = {round_up(bound.within)} {unit}"
     yield (
@@ -205,12 +205,12 @@ def coverage_text(compensation: Compensation) -> str:
             "the model is extrapolated."
         )
     covered = ", ".join(f"{name} {_span(name, spans[name], compensation)}" for name in spans)
-    beyond = [
+    extrapolated = [
         name for name, (low, high) in compensation.beside.items()
         if name not in FORCES and (name not in spans or low < spans[name][0] or high > spans[name][1])
     ]  # fmt: skip
     text = f"Covered by the data of the calibration: {covered}; beyond, the model is extrapolated"
-    return f"{text}. The stated range goes beyond in {', '.join(beyond)}." if beyond else f"{text}."
+    return f"{text}. The stated range goes beyond in {', '.join(extrapolated)}." if extrapolated else f"{text}."
 
 
 def uncertainty_text(compensation: Compensation) -> str:
@@ -218,7 +218,7 @@ def uncertainty_text(compensation: Compensation) -> str:
     uncertainty = compensation.costs.parameters
     if uncertainty is None:
         return "Uncertainty: the model file has none."
-    where = ", ".join(f"{name} {_span(name, span, compensation)}" for name, span in uncertainty.within.items())
+    conditions = ", ".join(f"{name} {_span(name, span, compensation)}" for name, span in uncertainty.within.items())
     at = ", ".join(f"{name} {value:.6g}" for name, value in uncertainty.at.items())
     rms, most, largest = (
         error_text(value, compensation.unit) for value in (uncertainty.rms, uncertainty.most, uncertainty.largest)
@@ -230,8 +230,8 @@ def uncertainty_text(compensation: Compensation) -> str:
     )
     return (
         f"Standard uncertainty of the result from the parameters, {correlation}: {rms} rms, {most} at most over the "
-        f"sphere of directions{f' with {where}' if where else ''}; {largest} at most over the whole stated range"
-        f"{f', at {at}' if at else ''}. Noise and errors of the model are not included."
+        f"sphere of directions{f' with {conditions}' if conditions else ''}; {largest} at most over the whole stated "
+        f"range{f', at {at}' if at else ''}. Noise and errors of the model are not included."
     )
 
 
@@ -346,7 +346,7 @@ def files(compensation: Compensation, origin: Origin, checks: ReferenceVectors) 
 
 def summary(compensation: Compensation, origin: Origin) -> dict[str, Any]:
     """The document without the program."""
-    program, bound, beside, correlations = (
+    program, bound, input_spans, correlations = (
         compensation.program,
         compensation.bound,
         compensation.beside,
@@ -366,7 +366,7 @@ def summary(compensation: Compensation, origin: Origin) -> dict[str, Any]:
             {
                 "name": name,
                 "unit": unit_of_input(name, compensation),
-                "range": list(beside[name]) if name in beside else None,
+                "range": list(input_spans[name]) if name in input_spans else None,
             }
             for name in program.inputs
         ],

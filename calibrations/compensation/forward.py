@@ -94,11 +94,11 @@ def measured_axes(model: Model) -> tuple[str, ...]:
 
     Raises ModelError for a model without values.
     """
-    named = {e.axis for e in model.params.values()}
-    if empty := [term.name for term in model.terms if not term.estimates]:
-        reason = f"{empty[0]} has no value" if named else "has no values"
+    axes_named = {e.axis for e in model.params.values()}
+    if without_values := [term.name for term in model.terms if not term.estimates]:
+        reason = f"{without_values[0]} has no value" if axes_named else "has no values"
         raise ModelError(f"{model.name}: {reason} yet; `rig fit DATA --model {model.name} --out FILE` gives it some")
-    axes = tuple(axis for axis in AXES if axis in named)
+    axes = tuple(axis for axis in AXES if axis in axes_named)
     return axes or AXES
 
 
@@ -127,13 +127,13 @@ def known_at_run_time(effect: Effect) -> str:
 def trace_model(model: Model, without: Collection[str] = ()) -> Forward:
     """The graphs of a fitted model; the effects in `without` are left out."""
     axes, steps = measured_axes(model), steps_of(model)
-    own = {name for effect, _ in steps for name in effect.needs if name not in NUMBERS and can_be_written(name)}
-    table = RunTime(axes, {name: name for name in (*KNOWN, *sorted(own))})
+    own_columns = {name for effect, _ in steps for name in effect.needs if name not in NUMBERS and can_be_written(name)}
+    table = RunTime(axes, {name: name for name in (*KNOWN, *sorted(own_columns))})
     fates = [_fate(step, table, without) for step in steps]
     inverted = [step for step, fate in zip(steps, fates, strict=True) if fate.how == INVERTED]
-    traced, after = _outputs(inverted, table)
+    traced, memories = _outputs(inverted, table)
     outputs = tuple(traced.nodes[0, : len(axes)])
-    return Forward(model, axes, outputs, tuple(fates), _used(outputs, after))
+    return Forward(model, axes, outputs, tuple(fates), _used(outputs, memories))
 
 
 def _values(term: Term) -> Values:
@@ -167,12 +167,12 @@ def _fate(step: Step, table: RunTime, without: Collection[str]) -> Fate:
     return Fate(effect.name, INVERTED)
 
 
-def _used(outputs: Sequence[Node], after: Mapping[str, Node]) -> dict[str, Node]:
+def _used(outputs: Sequence[Node], memories: Mapping[str, Node]) -> dict[str, Node]:
     """The stored values that the outputs use, directly or through other stored values."""
     stored: dict[str, Node] = {}
-    while new := {name for name in variable_names([*outputs, *stored.values()]) if name in after} - stored.keys():
-        stored |= {name: after[name] for name in sorted(new)}
-    return {name: stored[name] for name in after if name in stored}
+    while new := {name for name in variable_names([*outputs, *stored.values()]) if name in memories} - stored.keys():
+        stored |= {name: memories[name] for name in sorted(new)}
+    return {name: stored[name] for name in memories if name in stored}
 
 
 def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str, Node]]:
@@ -191,9 +191,9 @@ def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str,
         before_v = v
         if effect.memory:
             slots = [[f"m{len(memory) // 3 + k}{axis}" for axis in AXES] for k in range(effect.memory)]
-            before: Any = [Traced([[variable(name) for name in row]]) for row in slots]
-            part, after = effect.follow(a, table, p, before)
-            for row, stored in zip(slots, after, strict=True):
+            slots_before: Any = [Traced([[variable(name) for name in row]]) for row in slots]
+            part, slots_after = effect.follow(a, table, p, slots_before)
+            for row, stored in zip(slots, slots_after, strict=True):
                 memory |= dict(zip(row, as_traced(stored).nodes[0], strict=True))
             v = v + part
         elif "transduction" in effect.places and not effect.scales:

@@ -149,7 +149,7 @@ def apply_operation(operation: str, *inner: Node) -> Node:
     if all(node.constant for node in inner):
         with np.errstate(all="ignore"):
             return number(float(OPERATIONS[operation].apply(*(node.value for node in inner))))
-    return _shortened(operation, inner) or _made(operation, inner)
+    return _shortened(operation, inner) or _make_node(operation, inner)
 
 
 @lru_cache(MANY)
@@ -172,7 +172,7 @@ def sort_nodes(roots: Iterable[Node]) -> list[Node]:
     """Every node below the roots once, after its operands."""
     nodes: dict[Node, None] = {}
     for root in roots:
-        for node in _below(root, nodes):
+        for node in _descend(root, nodes):
             nodes.setdefault(node)
     return list(nodes)
 
@@ -196,15 +196,15 @@ def evaluate_nodes(roots: Iterable[Node], values: Mapping[str, Array]) -> list[A
     return [results[root] for root in roots]
 
 
-def _below(node: Node, visited: Mapping[Node, None]) -> Iterator[Node]:
+def _descend(node: Node, visited: Mapping[Node, None]) -> Iterator[Node]:
     if node not in visited:
         for inner in node.inner:
-            yield from _below(inner, visited)
+            yield from _descend(inner, visited)
         yield node
 
 
 @lru_cache(MANY)
-def _made(operation: str, inner: tuple[Node, ...]) -> Node:
+def _make_node(operation: str, inner: tuple[Node, ...]) -> Node:
     return Node(operation, inner)
 
 

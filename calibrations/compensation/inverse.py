@@ -175,14 +175,18 @@ class Residual:
     def lines(self) -> list[str]:
         """For people."""
         return [
-            f"{axis}: rms error {rounded(before)} mm/s² by the linear model, {rounded(after)} mm/s² compensated, "
-            f"{100 * (1 - after / before):.1f} % less, on {self.table.n} poses of {self.table.source}"
-            for axis, (before, after) in self.rmse.items()
+            f"{axis}: rms error {rounded(rms_linear)} mm/s² by the linear model, {rounded(rms_compensated)} mm/s² "
+            f"compensated, {100 * (1 - rms_compensated / rms_linear):.1f} % less, "
+            f"on {self.table.n} poses of {self.table.source}"
+            for axis, (rms_linear, rms_compensated) in self.rmse.items()
         ]
 
     def document(self) -> dict[str, Any]:
         """As JSON."""
-        rmse = {axis: {"linear": before, "compensated": after} for axis, (before, after) in self.rmse.items()}
+        rmse = {
+            axis: {"linear": rms_linear, "compensated": rms_compensated}
+            for axis, (rms_linear, rms_compensated) in self.rmse.items()
+        }
         return {"data": self.table.source, "n": self.table.n, "unit": "mm/s^2", "rmse": rmse}
 
 

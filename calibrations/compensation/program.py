@@ -48,25 +48,25 @@ class Program:
     @property
     def operations(self) -> Mapping[str, int]:
         """Number of operations of each kind per sample."""
-        once, again = (
+        single, per_step = (
             Counter(OPERATIONS[line.operation].counts_as for line in lines)
             for lines in (self.before + self.after, self.loop)
         )
-        return {kind: once[kind] + self.steps * again[kind] for kind in sorted({*once, *again})}
+        return {kind: single[kind] + self.steps * per_step[kind] for kind in sorted({*single, *per_step})}
 
     def run(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
         """The sought and the stored values, for inputs of one shape; stored inputs are 0 by default."""
         values: dict[str, Any] = {name: np.asarray(inputs[name], float) for name in self.inputs}
         values |= self.tables
         values |= {name: np.asarray(inputs.get(name, 0.0), float) for name in self.remembered}
-        _do(self.before, values)
+        _execute(self.before, values)
         values |= {name: np.zeros(np.shape(values[self.inputs[0]])) for name in self.sought}
         for _ in range(self.steps):
-            _do(self.loop, values)
+            _execute(self.loop, values)
             values |= dict(zip(self.sought, [_value(name, values) for name in self.next], strict=True))
-        _do(self.after, values)
-        after = {name: _value(word, values) for name, word in self.remembered.items()}
-        return {name: values[name] for name in self.sought} | after
+        _execute(self.after, values)
+        memories = {name: _value(word, values) for name, word in self.remembered.items()}
+        return {name: values[name] for name in self.sought} | memories
 
 
 def write_program(forward: Forward, bound: Bound) -> Program:
@@ -74,26 +74,26 @@ def write_program(forward: Forward, bound: Bound) -> Program:
     outputs = tuple(f"v{axis}" for axis in forward.axes)
     nexts, later = _next(forward, bound, outputs), list(forward.memory.values())
     nodes = sort_nodes([*nexts, *later])
-    moving = _following(nodes, set(forward.sought))
-    own = {*forward.sought, *outputs, *forward.memory}
-    used = [node.name for node in nodes if node.operation == "given" and node.name not in own]
-    named = _Names()
-    in_loop = [node for node in sort_nodes(nexts) if node in moving]
-    before = [named.line(node) for node in nodes if node not in moving and node.inner]
-    loop = [named.line(node) for node in in_loop if node.inner]
-    next_ = tuple(named.word(node) for node in nexts)
-    named.forget(in_loop)  # they follow what is sought, which is found only now
-    after = [named.line(node) for node in sort_nodes(later) if node in moving and node.inner]
+    iterated = _following(nodes, set(forward.sought))
+    own_names = {*forward.sought, *outputs, *forward.memory}
+    used = [node.name for node in nodes if node.operation == "given" and node.name not in own_names]
+    names = _Names()
+    in_loop = [node for node in sort_nodes(nexts) if node in iterated]
+    lines_before = [names.line(node) for node in nodes if node not in iterated and node.inner]
+    loop = [names.line(node) for node in in_loop if node.inner]
+    next_ = tuple(names.word(node) for node in nexts)
+    names.forget(in_loop)  # they follow what is sought, which is found only now
+    lines_after = [names.line(node) for node in sort_nodes(later) if node in iterated and node.inner]
     return Program(
         inputs=(*outputs, *used),
         sought=forward.sought,
-        before=tuple(before),
+        before=tuple(lines_before),
         loop=tuple(loop),
         next=next_,
         steps=bound.steps,
-        after=tuple(after),
-        remembered={name: named.word(node) for name, node in forward.memory.items()},
-        tables={name: table for table, name in named.tables.items()},
+        after=tuple(lines_after),
+        remembered={name: names.word(node) for name, node in forward.memory.items()},
+        tables={name: table for table, name in names.tables.items()},
     )
 
 
@@ -128,10 +128,10 @@ def _next(forward: Forward, bound: Bound, outputs: tuple[str, ...]) -> list[Node
     errors = [variable(name) - G for name, G in zip(outputs, forward.outputs, strict=True)]
     nexts = []
     for name, row in zip(forward.sought, bound.C, strict=True):
-        moved = variable(name)
+        next_node = variable(name)
         for share, error in zip(row, errors, strict=True):
-            moved += number(float(share)) * error
-        nexts.append(moved)
+            next_node += number(float(share)) * error
+        nexts.append(next_node)
     return nexts
 
 
@@ -144,7 +144,7 @@ def _following(nodes: list[Node], sought: set[str]) -> set[Node]:
     return dependent
 
 
-def _do(lines: tuple[Line, ...], values: dict[str, Any]) -> None:
+def _execute(lines: tuple[Line, ...], values: dict[str, Any]) -> None:
     for line in lines:
         values[line.name] = OPERATIONS[line.operation].apply(*(_value(name, values) for name in line.inner))
 

@@ -25,13 +25,15 @@ def compensate(model: Model, samples: Any, columns: Mapping[str, Any]) -> Any:
     compensation = invert_model(model)
     if compensation.program.remembered:
         raise DataError(f"{model.name}: has hysteresis, so its inverse needs earlier samples; use `rig compensate`")
-    named = _named(samples)
+    columns_by_name = _columns_by_name(samples)
     inputs = dict(columns)
-    if named is None:
+    if columns_by_name is None:
         outputs = _array(samples, compensation.forward.axes)
     else:
-        outputs = _columns(named, compensation)
-        inputs = {name: named[name] for name in compensation.program.inputs if name in named} | inputs
+        outputs = _columns(columns_by_name, compensation)
+        inputs = {
+            name: columns_by_name[name] for name in compensation.program.inputs if name in columns_by_name
+        } | inputs
     result = compensation.program.run(_inputs(compensation, outputs, inputs))
     forces = np.column_stack([result[name] for name in compensation.program.sought])
     if not hasattr(samples, "iloc"):
@@ -40,7 +42,7 @@ def compensate(model: Model, samples: Any, columns: Mapping[str, Any]) -> Any:
     return data_frame(forces, index=samples.index, columns=names)
 
 
-def _named(samples: Any) -> Mapping[str, Any] | None:
+def _columns_by_name(samples: Any) -> Mapping[str, Any] | None:
     """The columns of samples by name; None for an array."""
     if isinstance(samples, Table):
         return samples.columns
@@ -56,27 +58,27 @@ def _array(samples: Any, axes: tuple[str, ...]) -> Array:
         outputs = outputs[:, None] if len(axes) == 1 else outputs[None, :]
     if outputs.ndim == 2 and outputs.shape[1] == len(axes):
         return outputs
-    needed = f"the model has the axes {', '.join(axes)}, so (n, {len(axes)}) is needed"
+    requirement = f"the model has the axes {', '.join(axes)}, so (n, {len(axes)}) is needed"
     hint = "give a column for each of these axes"
     if outputs.ndim == 2 and outputs.shape[0] == len(axes):
         hint = "exchange rows and columns, as in outputs.T"
     elif outputs.ndim == 2 and outputs.shape[1] == len(AXES):
         hint = f"select their columns, as in outputs[:, {[AXES.index(axis) for axis in axes]}]"
-    raise DataError(f"the outputs have shape {np.shape(samples)}; {needed}: {hint}")
+    raise DataError(f"the outputs have shape {np.shape(samples)}; {requirement}: {hint}")
 
 
-def _columns(named: Mapping[str, Any], compensation: Compensation) -> Array:
+def _columns(columns_by_name: Mapping[str, Any], compensation: Compensation) -> Array:
     """Outputs (n, axes) from columns with the names of data files. Raises MissingColumn."""
     kinds = [kind for kind in KINDS.values() if kind.input_unit == compensation.unit]
     sets = list(dict.fromkeys(_outputs(kind.outputs, compensation.forward.axes) for kind in kinds))
     sets = [names for names in sets if len(names) == len(compensation.forward.axes)]
     for names in sets:
-        if all(name in named for name in names):
-            return np.column_stack([_numbers(named[name], f'the column "{name}"') for name in names])
-    close = max(sets, key=lambda names: sum(name in named for name in names))
-    missing = next(name for name in close if name not in named)
+        if all(name in columns_by_name for name in names):
+            return np.column_stack([_numbers(columns_by_name[name], f'the column "{name}"') for name in names])
+    close = max(sets, key=lambda names: sum(name in columns_by_name for name in names))
+    missing = next(name for name in close if name not in columns_by_name)
     raise MissingColumn(
-        f'the column "{missing}" is missing{nearest(missing, map(str, named))}. The model has the axes '
+        f'the column "{missing}" is missing{nearest(missing, map(str, columns_by_name))}. The model has the axes '
         f"{', '.join(compensation.forward.axes)}; name the columns of its outputs {' or '.join(map(', '.join, sets))}"
     )
 

@@ -59,17 +59,17 @@ class CubicTable:
         ends = self(low), self(high)
         value = [np.minimum(*ends), np.maximum(*ends)]
         slope = [np.full(np.shape(low), np.inf), np.full(np.shape(low), -np.inf)]
-        beyond = (low <= edges[0]) | (high >= edges[-1])  # constant there
-        slope = [np.where(beyond, 0.0, end) for end in slope]
+        outside = (low <= edges[0]) | (high >= edges[-1])  # constant there
+        slope = [np.where(outside, 0.0, end) for end in slope]
         reach = self.step * 1e-9  # a knot belongs to both pieces
         for k in range(len(values)):
-            inside = (low <= edges[k + 1] + reach) & (high >= edges[k] - reach)
-            value[0] = np.where(inside, np.minimum(value[0], values[k].min()), value[0])
-            value[1] = np.where(inside, np.maximum(value[1], values[k].max()), value[1])
-            slope[0] = np.where(inside, np.minimum(slope[0], slopes[k].min()), slope[0])
-            slope[1] = np.where(inside, np.maximum(slope[1], slopes[k].max()), slope[1])
-        little = ROUNDING * float(np.abs(self._array).max())
-        return value[0] - little, value[1] + little, slope[0] - little / self.step, slope[1] + little / self.step
+            overlaps = (low <= edges[k + 1] + reach) & (high >= edges[k] - reach)
+            value[0] = np.where(overlaps, np.minimum(value[0], values[k].min()), value[0])
+            value[1] = np.where(overlaps, np.maximum(value[1], values[k].max()), value[1])
+            slope[0] = np.where(overlaps, np.minimum(slope[0], slopes[k].min()), slope[0])
+            slope[1] = np.where(overlaps, np.maximum(slope[1], slopes[k].max()), slope[1])
+        margin = ROUNDING * float(np.abs(self._array).max())
+        return value[0] - margin, value[1] + margin, slope[0] - margin / self.step, slope[1] + margin / self.step
 
     @cached_property
     def _parts(self) -> tuple[Array, Array, Array]:
@@ -102,11 +102,11 @@ def trace_free_form(effect: FreeForm, a: Traced, v: Traced, table: RunTime, p: V
 
     Raises NotTraced for a form that no product can follow.
     """
-    out = as_nodes(np.zeros((1, 3)))
+    contribution = as_nodes(np.zeros((1, 3)))
     for k in range(len(table.axes)):
         for form in effect.forms:
-            out[0, k] += _part(form, coefficients_of(form, p, k), a.nodes[0], v.nodes[0, k], table, k)
-    return as_traced(Traced(out))
+            contribution[0, k] += _part(form, coefficients_of(form, p, k), a.nodes[0], v.nodes[0, k], table, k)
+    return as_traced(Traced(contribution))
 
 
 def _part(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, k: int) -> Node:

@@ -65,7 +65,7 @@ class Traced(NDArrayOperatorsMixin):
         raise NotTraced("its function branches on a value known at run time only; use np.where")
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
-        if method != "__call__" or any(isinstance(out, np.ndarray) for out in options.get("out") or ()):
+        if method != "__call__" or any(isinstance(target, np.ndarray) for target in options.get("out") or ()):
             raise NotTraced(f"its function uses np.{ufunc.__name__}.{method} or changes an array in place")
         match ufunc.__name__:
             case "matmul":
@@ -146,10 +146,10 @@ def as_nodes(value: Any) -> np.ndarray:
 def _elementwise(make: Callable[..., Node], *inputs: Any) -> Traced:
     """`make` elementwise, with numpy's broadcasting."""
     arrays = np.broadcast_arrays(*(as_nodes(value) for value in inputs))
-    out = np.empty(arrays[0].shape, dtype=object)
-    for place in np.ndindex(out.shape):
-        out[place] = make(*(array[place] for array in arrays))
-    return Traced(out)
+    result = np.empty(arrays[0].shape, dtype=object)
+    for place in np.ndindex(result.shape):
+        result[place] = make(*(array[place] for array in arrays))
+    return Traced(result)
 
 
 def _power(base: Any, exponent: Any) -> Traced:
@@ -165,7 +165,7 @@ def as_traced(value: Any) -> Traced:
     return Traced(as_nodes(value))
 
 
-def _where(condition: Any, yes: Any, no: Any) -> Traced:
+def _select(condition: Any, yes: Any, no: Any) -> Traced:
     return _elementwise(lambda *x: apply_operation("where", *x), condition, yes, no)
 
 
@@ -174,7 +174,7 @@ def _clip(a: Any, low: Any, high: Any) -> Traced:
 
 
 FUNCTIONS: Mapping[Callable[..., Any], Callable[..., Any]] = {
-    np.where: _where,
+    np.where: _select,
     np.clip: _clip,
     np.outer: lambda a, b: Traced(np.outer(as_nodes(a), as_nodes(b))),
     np.broadcast_to: lambda a, shape: Traced(np.broadcast_to(as_nodes(a), shape)),
@@ -204,12 +204,12 @@ def trace_expression(effect: Effect, a: Traced, table: RunTime, p: Values) -> Tr
     expression = parse(effect.expression)
     columns = {word: table.column(COLUMNS.get(word, word))[0] for word in expression.names if word not in {*FORCES, *p}}
     forces = {name: a[0, k] for k, name in enumerate(FORCES)}
-    own = range(len(table.axes)) if expression.target == "v" else (AXES.index(expression.target[1]),)
-    out = as_nodes(np.zeros((1, 3)))
-    for k in own:
+    target_axes = range(len(table.axes)) if expression.target == "v" else (AXES.index(expression.target[1]),)
+    contribution = as_nodes(np.zeros((1, 3)))
+    for k in target_axes:
         parameters = {q.name: p[q.name][k] if q.per_axis else p[q.name] for q in effect.parameters}
-        out[0, k] = as_nodes(_walked(expression.root, {**columns, **forces, **parameters}))[()]
-    return as_traced(Traced(out))
+        contribution[0, k] = as_nodes(_walked(expression.root, {**columns, **forces, **parameters}))[()]
+    return as_traced(Traced(contribution))
 
 
 def _walked(node: ExpressionNode, values: Mapping[str, Any]) -> Any:

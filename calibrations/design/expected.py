@@ -24,7 +24,7 @@ from calibrations.fitting.fit import Fit
 from calibrations.fitting.minimise import newton_step
 from calibrations.fitting.problem import Problem
 from calibrations.geometry.orientation import nominal_pose, specific_force
-from calibrations.joined import joined
+from calibrations.joined import join_tables
 from calibrations.means.noise import white_only
 from calibrations.model import Model
 from calibrations.model.chain import forward
@@ -58,7 +58,7 @@ class Expected:
     @property
     def probability_alone(self) -> float:
         """Of finding the missing effect by its own data alone."""
-        return min(pairs_separated(self.alone), _beyond(self.visible, NAMED_GAIN))
+        return min(pairs_separated(self.alone), _exceedance(self.visible, NAMED_GAIN))
 
 
 def expected_gain(best: Fit, rival: Fit, table: Table) -> Expected:
@@ -73,10 +73,10 @@ def expected_gain(best: Fit, rival: Fit, table: Table) -> Expected:
 
 def pairs_separated(noncentrality: float) -> float:
     """Probability that the likelihood ratio exceeds the odds that separate two explanations."""
-    return _beyond(noncentrality, INSEPARABLE)
+    return _exceedance(noncentrality, INSEPARABLE)
 
 
-def _beyond(noncentrality: float, threshold: float) -> float:
+def _exceedance(noncentrality: float, threshold: float) -> float:
     """Probability that a statistic of mean lambda and standard deviation 2 sqrt(lambda) is beyond a threshold."""
     if noncentrality <= 0 or noncentrality == np.inf:
         return float(noncentrality > 0)
@@ -99,7 +99,7 @@ def _distance(right: Fit, wrong: Fit, table: Table) -> Callable[[bool], float]:
 
     Predictions come from both fits' own history.
     """
-    all_data = joined([right.table, table])
+    all_data = join_tables([right.table, table])
     is_present = np.arange(all_data.n) < right.table.n
     truth = right.problem.on(all_data).residual(right.theta)
     mistaken = wrong.problem.on(all_data)
@@ -107,23 +107,23 @@ def _distance(right: Fit, wrong: Fit, table: Table) -> Callable[[bool], float]:
 
     errors, slopes = mistaken.residual(wrong.theta) - truth, mistaken.jacobian(wrong.theta)
 
-    def least(together: bool) -> float:
+    def least(with_present: bool) -> float:
         def white(columns: Array) -> Array:
             """(channels, n, k) -> (rows, k)."""
             new = noise.whiten(columns[:, ~is_present])
-            return np.concatenate([right.noise.whiten(columns[:, is_present]), new]) if together else new
+            return np.concatenate([right.noise.whiten(columns[:, is_present]), new]) if with_present else new
 
         def distance(theta: Array) -> Array:
             return white((mistaken.residual(theta) - truth)[:, :, None])[:, 0]
 
-        theta, left, slope = wrong.theta, white(errors[:, :, None])[:, 0], white(slopes)
+        theta, residual, slope = wrong.theta, white(errors[:, :, None])[:, 0], white(slopes)
         for _ in range(ROUNDS):
-            before = float(left @ left)
-            theta, left = newton_step(mistaken.layout, distance, theta, left, slope)
-            if before - float(left @ left) < CLOSE_GAIN * max(float(left @ left), 1.0):
+            square_before = float(residual @ residual)
+            theta, residual = newton_step(mistaken.layout, distance, theta, residual, slope)
+            if square_before - float(residual @ residual) < CLOSE_GAIN * max(float(residual @ residual), 1.0):
                 break
             slope = white(mistaken.jacobian(theta))
-        return float(left @ left)
+        return float(residual @ residual)
 
     return least
 
@@ -152,8 +152,8 @@ def assume_sensor(
     problem = Problem.of(model, table)
     theta = _values(problem.layout)
     noise = white_only(problem.white, problem.gap_s, len(problem.channels))
-    nothing = np.zeros((len(problem.channels), table.n))
-    return Fit(problem.layout.model, problem, theta, noise, nothing, problem.jacobian(theta))
+    zero_residual = np.zeros((len(problem.channels), table.n))
+    return Fit(problem.layout.model, problem, theta, noise, zero_residual, problem.jacobian(theta))
 
 
 def _sensed(
@@ -205,7 +205,9 @@ def predict_data(like: Fit, columns: Mapping[str, Array]) -> Table:
     names = data.output_names
     planned = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items() if name != "dwell_s"}
     rows = len(planned["alpha_deg"])
-    constant = {name: np.full(rows, np.mean(data.column(name))) for name in _needed(like) if name not in planned}
+    constant = {
+        name: np.full(rows, np.mean(data.column(name))) for name in _unplanned_columns(like) if name not in planned
+    }
     values = constant | _noise(like, columns, rows) | planned | {name: np.zeros(rows) for name in names}
     table = Table.from_columns("poses", values, data.constants, f"a plan like {data.source}")
     _check_planned(like, table)
@@ -213,15 +215,15 @@ def predict_data(like: Fit, columns: Mapping[str, Array]) -> Table:
     return replace(table, columns={**table.columns, **dict(zip(names, outputs.T, strict=True))})
 
 
-def _needed(like: Fit) -> set[str]:
+def _unplanned_columns(like: Fit) -> set[str]:
     """Columns of the data that the model's effects read, and that a plan need not know."""
     return {name for term in like.model.terms for name in term.effect.needs} - set(PLANNED)
 
 
 def _check_planned(like: Fit, table: Table) -> None:
     for term in like.model.terms:
-        if why := term.effect.excluded(table):
-            raise MissingColumn(f"{table.source}: {term.name} {why}; plan it")
+        if reason := term.effect.excluded(table):
+            raise MissingColumn(f"{table.source}: {term.name} {reason}; plan it")
 
 
 def _noise(like: Fit, columns: Mapping[str, Array], rows: int) -> dict[str, Array]:

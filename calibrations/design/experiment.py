@@ -44,8 +44,8 @@ class Experiment:
     expected: Expected | None = None
 
 
-def _of(procedure: str, why: str, **settings: object) -> Experiment:
-    return Experiment(procedure, settings, (), why)
+def _of(procedure: str, reason: str, **settings: object) -> Experiment:
+    return Experiment(procedure, settings, (), reason)
 
 
 FINE = "full turns both ways at finely spaced inclinations, out of order, excite each of them differently"
@@ -87,8 +87,8 @@ LOGGED: tuple[str, dict[str, object], str] = ("sweep", {"step_deg": 30.0, "incli
 def separating_experiment(name: str, rivals: Sequence[str], table: Table) -> Experiment:
     """An experiment for an effect and the rivals that this data cannot separate from it."""
     unlogged = TEMPERATURE_EFFECTS & {name, *rivals} and "temperature_c" not in table
-    procedure, settings, why = LOGGED if unlogged else experiment_by_physics({name, *rivals})
-    return Experiment(procedure, settings, tuple((name, rival) for rival in rivals), why)
+    procedure, settings, reason = LOGGED if unlogged else experiment_by_physics({name, *rivals})
+    return Experiment(procedure, settings, tuple((name, rival) for rival in rivals), reason)
 
 
 def experiment_by_physics(names: Set[str]) -> tuple[str, dict[str, object], str]:

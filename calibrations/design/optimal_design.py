@@ -43,10 +43,10 @@ def covariance_of(rows: Array) -> Array:
     size = np.linalg.norm(rows, axis=0)
     scale = np.where(size > 0, size, 1.0)
     _, s, Vt = np.linalg.svd(np.vstack([rows / scale, np.zeros((p, p))]), full_matrices=False)
-    good = s > RELATIVE_RANK * s[0]
-    root = Vt[good].T / s[good] / scale[:, None]
+    determined = s > RELATIVE_RANK * s[0]
+    root = Vt[determined].T / s[determined] / scale[:, None]
     covariance = root @ root.T
-    free = np.sum(Vt[~good] ** 2, axis=0) > UNDETERMINED
+    free = np.sum(Vt[~determined] ** 2, axis=0) > UNDETERMINED
     covariance[free, free] = np.inf
     return np.asarray(covariance)
 
@@ -104,7 +104,7 @@ class DOptimal:
     """The volume of the parameters' joint uncertainty."""
 
     def gain(self, covariance: Array, rows: Array) -> Array:
-        return np.asarray(np.linalg.slogdet(_seen(rows @ covariance, rows))[1])
+        return np.asarray(np.linalg.slogdet(_prediction_matrices(rows @ covariance, rows))[1])
 
     def loss(self, covariance: Array) -> float:
         return float(np.linalg.slogdet(covariance)[1])
@@ -123,8 +123,8 @@ class IOptimal:
 
     def gain(self, covariance: Array, rows: Array) -> Array:
         JC = rows @ covariance
-        lost = JC @ self.weight @ JC.transpose(0, 2, 1)
-        return np.asarray(np.trace(np.linalg.solve(_seen(JC, rows), lost), axis1=1, axis2=2))
+        weighted = JC @ self.weight @ JC.transpose(0, 2, 1)
+        return np.asarray(np.trace(np.linalg.solve(_prediction_matrices(JC, rows), weighted), axis1=1, axis2=2))
 
     def loss(self, covariance: Array) -> float:
         return float(np.sum(covariance * self.weight))
@@ -143,7 +143,7 @@ def exchange_design(rows: Array, poses: int, criterion: Criterion) -> Chosen:
     """
     rng = np.random.default_rng(0)
     designs = [_improved(rows, rng.integers(0, len(rows), poses), criterion, rng) for _ in range(STARTS)]
-    return min(designs, key=lambda chosen: criterion.loss(_covariance(rows[chosen])))
+    return min(designs, key=lambda design: criterion.loss(_covariance(rows[design])))
 
 
 def information_gain(measured: Array, candidates: Array, criterion: Criterion) -> Array:
@@ -154,18 +154,18 @@ def information_gain(measured: Array, candidates: Array, criterion: Criterion) -
     return criterion.gain(_covariance(measured), candidates)
 
 
-def choose_repeats(rows: Array, chosen: Chosen, more: int, criterion: Criterion) -> Chosen:
-    """Which of `chosen` to measure once more, each at most once: those that help most, one after another; (more,)."""
-    remaining, repeats = [int(k) for k in np.unique(chosen)], list[int]()
-    for _ in range(min(more, len(remaining))):
-        covariance = _covariance(rows[np.concatenate([chosen, np.array(repeats, dtype=np.intp)])])
+def choose_repeats(rows: Array, design: Chosen, count: int, criterion: Criterion) -> Chosen:
+    """Which of `design` to measure once more, each at most once: those that help most, one after another; (more,)."""
+    remaining, repeats = [int(k) for k in np.unique(design)], list[int]()
+    for _ in range(min(count, len(remaining))):
+        covariance = _covariance(rows[np.concatenate([design, np.array(repeats, dtype=np.intp)])])
         repeats.append(remaining.pop(int(np.argmax(criterion.gain(covariance, rows[remaining])))))
     return np.array(repeats, dtype=np.intp)
 
 
-def farthest_poses(places: Array, chosen: Chosen, count: int) -> Chosen:
-    """The `places` (candidates, k) that are farthest from all `chosen` and from each other, one by one; (count,)."""
-    nearest = np.min(np.linalg.norm(places[:, None] - places[None, np.unique(chosen)], axis=2), axis=1)
+def farthest_poses(places: Array, design: Chosen, count: int) -> Chosen:
+    """The `places` (candidates, k) that are farthest from all `design` and from each other, one by one; (count,)."""
+    nearest = np.min(np.linalg.norm(places[:, None] - places[None, np.unique(design)], axis=2), axis=1)
     farthest: list[int] = []
     for _ in range(count):
         farthest.append(int(np.argmax(nearest)))
@@ -173,20 +173,20 @@ def farthest_poses(places: Array, chosen: Chosen, count: int) -> Chosen:
     return np.array(farthest, dtype=np.intp)
 
 
-def _improved(rows: Array, chosen: Chosen, criterion: Criterion, rng: np.random.Generator) -> Chosen:
+def _improved(rows: Array, design: Chosen, criterion: Criterion, rng: np.random.Generator) -> Chosen:
     """Exchange pose by pose until a whole pass changes nothing. Among equals the first of a random order is taken."""
     shuffled = rng.permutation(len(rows))
     for _ in range(MOST_PASSES):
-        before = chosen.copy()
-        for k in range(len(chosen)):
-            covariance = _covariance(rows[np.delete(chosen, k)])
+        previous = design.copy()
+        for k in range(len(design)):
+            covariance = _covariance(rows[np.delete(design, k)])
             gains = criterion.gain(covariance, rows)
             best = shuffled[np.argmax(gains[shuffled])]
-            if gains[best] > gains[chosen[k]] * (1 + LEAST_GAIN):
-                chosen[k] = best
-        if np.array_equal(before, chosen):
+            if gains[best] > gains[design[k]] * (1 + LEAST_GAIN):
+                design[k] = best
+        if np.array_equal(previous, design):
             break
-    return chosen
+    return design
 
 
 def _covariance(rows: Array) -> Array:
@@ -195,6 +195,6 @@ def _covariance(rows: Array) -> Array:
     return np.asarray(np.linalg.inv(flat.T @ flat + RIDGE * np.eye(flat.shape[1])))
 
 
-def _seen(JC: Array, rows: Array) -> Array:
+def _prediction_matrices(JC: Array, rows: Array) -> Array:
     """I + J C J' of each candidate, shape (candidates, axes, axes)."""
     return np.asarray(np.eye(rows.shape[1]) + JC @ rows.transpose(0, 2, 1))

@@ -46,15 +46,15 @@ class Next:
     turn: str
 
 
-def directions_up(outputs: Array, named: Array) -> Array:
+def directions_up(outputs: Array, named_directions: Array) -> Array:
     """Directions upward of the positions with the mean `outputs` (n, 3), as unit vectors (n, 3).
 
-    The first positions do not determine the zero of the sensor: for them these are the `named` directions (n, 3).
+    The first positions do not determine the zero of the sensor: for them these are `named_directions` (n, 3).
     """
     if len(outputs) < KNOWN_AFTER:
-        return named
-    away = outputs - sphere_centre(outputs)
-    return np.asarray(away / np.linalg.norm(away, axis=1, keepdims=True))
+        return named_directions
+    centred = outputs - sphere_centre(outputs)
+    return np.asarray(centred / np.linalg.norm(centred, axis=1, keepdims=True))
 
 
 def next_orientation(measured: Array, last: Array | None = None, sides: int = FIRST_SIDES) -> Next:

@@ -56,19 +56,19 @@ class Tour:
         Relative: 0 if no order of time is in the poses' order.
         """
         axes, p = self.rows.shape[1:]
-        lost = (self._trend.T @ self._rooted[order]).reshape(len(DEGREES) * axes, p)
-        remaining = np.eye(len(lost)) - lost @ lost.T
+        drift_part = (self._trend.T @ self._rooted[order]).reshape(len(DEGREES) * axes, p)
+        remaining = np.eye(len(drift_part)) - drift_part @ drift_part.T
         if np.linalg.eigvalsh(remaining)[0] < RELATIVE_RANK:
             return float("inf")
-        spread = lost @ self._root.T
+        spread = drift_part @ self._root.T
         return float(np.max(np.sum(spread * np.linalg.solve(remaining, spread), axis=0) / self._variance))
 
     @cached_property
     def _root(self) -> Array:
         """R (p, p) with R R' the covariance without a drift, in units in which each parameter's rows have length 1."""
         _, s, Vt = np.linalg.svd(self._flat, full_matrices=False)
-        good = s > RELATIVE_RANK * s[0]
-        return np.asarray(Vt.T * np.where(good, 1 / np.where(good, s, 1.0), 0.0))
+        determined = s > RELATIVE_RANK * s[0]
+        return np.asarray(Vt.T * np.where(determined, 1 / np.where(determined, s, 1.0), 0.0))
 
     @cached_property
     def _flat(self) -> Array:
@@ -99,9 +99,9 @@ def order_tour(tour: Tour) -> Order:
     present = best = _nearest_neighbours(tour)
     cost = least = tour.cost_s(present)
     for warmth_s in np.geomspace(WARM_S, COLD_S, PROPOSALS * len(present)):
-        tried, most = _changed(present, rng), cost + warmth_s * rng.exponential()
-        if tour.travel_s(tried) < most and (tried_cost := tour.cost_s(tried)) < most:
-            present, cost = tried, tried_cost
+        trial_order, most = _neighbour_order(present, rng), cost + warmth_s * rng.exponential()
+        if tour.travel_s(trial_order) < most and (tried_cost := tour.cost_s(trial_order)) < most:
+            present, cost = trial_order, tried_cost
             if cost < least:
                 best, least = present, cost
     return best
@@ -116,7 +116,7 @@ def _nearest_neighbours(tour: Tour) -> Order:
     return np.array(order, dtype=np.intp)
 
 
-def _changed(order: Order, rng: np.random.Generator) -> Order:
+def _neighbour_order(order: Order, rng: np.random.Generator) -> Order:
     """A stretch turned round, or taken out and put in elsewhere."""
     i, j = np.sort(rng.integers(0, len(order) + 1, 2))
     if rng.random() < 0.5:

@@ -15,7 +15,7 @@ from calibrations.fitting.sensed import in_milli
 from calibrations.free_forms.place_names import PREFIX
 from calibrations.geometry.orientation import one_orientation
 from calibrations.table import Array
-from calibrations.text import joined, prefixed, rounded, unit
+from calibrations.text import join_words, prefixed, rounded, unit
 
 FLOORS = ("floor", "floors", "x")
 OUTPUT, SENSED = "output", "sensed"
@@ -98,7 +98,7 @@ def until(findings: Findings[Fit], enough: Enough) -> Findings[Fit]:
     names = {step.name for step in kept_steps}
     remark = f"The error on {findings.data.unseen} is {enough.error(fits[k])}, as small as asked ({enough.text})."
     if omitted_steps:
-        remark += f" Left out: {joined([step.name for step in omitted_steps])}."
+        remark += f" Left out: {join_words([step.name for step in omitted_steps])}."
     return replace(
         findings,
         steps=kept_steps,

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from enum import Enum, StrEnum
 
 from calibrations.criteria import MATERIAL, MOST_BY_FORM, MOST_UNEXPLAINED, SIGNIFICANT
-from calibrations.text import joined
+from calibrations.text import join_words
 
 MOST_NAMED = 4  # missing effects in a short sentence
 
@@ -187,13 +187,13 @@ def headline(j: Judgement) -> str:
     if j.verdict is Verdict.NO_RESPONSE:
         return f"No response: {j.left}."
     if j.verdict is Verdict.UNEXPLAINED and j.unknown and not j.spoilt:
-        return f"An effect that is not in the catalogue acts at {joined(j.unknown)}."
+        return f"An effect that is not in the catalogue acts at {join_words(j.unknown)}."
     if j.verdict is Verdict.UNEXPLAINED:
         return f"No effect of the catalogue explains the residual: {j.left}."
     if j.missing:
-        return f"The model {j.model} misses {joined(j.missing)}."
+        return f"The model {j.model} misses {join_words(j.missing)}."
     if j.added:
-        return f"The model {j.model} misses {joined(j.added)}."
+        return f"The model {j.model} misses {join_words(j.added)}."
     if j.enough:
         return f"The model {j.model} needs no further effect."
     if j.undetermined is not None:
@@ -212,9 +212,9 @@ def _details(j: Judgement) -> Iterator[str]:
         return
     if j.verdict is Verdict.UNEXPLAINED:
         if j.missing:
-            yield f"The model {j.model} also misses {joined(j.missing)}."
+            yield f"The model {j.model} also misses {join_words(j.missing)}."
         elif j.added:
-            yield f"The model {j.model} also misses {joined(j.added)}."
+            yield f"The model {j.model} also misses {join_words(j.added)}."
         if j.unknown and not j.spoilt:
             yield _remaining_error(j)
     elif not (j.missing or j.enough) and j.closest is None and j.undetermined is None:
@@ -222,10 +222,10 @@ def _details(j: Judgement) -> Iterator[str]:
     elif j.left is not None and not j.spoilt:
         yield f"Remaining with them: {j.left}."
     if j.refinements:
-        yield f"To describe the exact form of these effects, the model also has {joined(j.refinements)}."
+        yield f"To describe the exact form of these effects, the model also has {join_words(j.refinements)}."
     for name in (*j.missing, *j.added):
         if rivals := j.alternatives.get(name):
-            yield f"This data cannot separate {name} from {joined(rivals, 'or')}."
+            yield f"This data cannot separate {name} from {join_words(rivals, 'or')}."
     if j.provisional and j.missing:
         yield "Provisional: the names may change when further effects are added."
 
@@ -237,12 +237,12 @@ def _incomplete(j: Judgement) -> bool:
 
 def _remaining_error(j: Judgement) -> str:
     completeness = (
-        f"With {joined(j.added)}, no effect is missing. " if j.added and j.verdict is Verdict.ADEQUATE else ""
+        f"With {join_words(j.added)}, no effect is missing. " if j.added and j.verdict is Verdict.ADEQUATE else ""
     )
     error = f"{completeness}Remaining error: {j.error:.3g} times {j.floor}"
     if j.left is None:
         noise = " The part above it is slow noise or scatter between rows: it has no pattern."
         noise_text = noise if j.error > MATERIAL else ""
         return f"{error}. No search for further effects was made." if _incomplete(j) else f"{error}.{noise_text}"
-    causes = f" The cause may be the exact form of {joined(j.added, 'or')}, or one more effect." if j.added else ""
+    causes = f" The cause may be the exact form of {join_words(j.added, 'or')}, or one more effect." if j.added else ""
     return f"{error}: {j.left}.{causes}"

@@ -102,19 +102,19 @@ class Bank:
     def at(self, t_s: float) -> Bank:
         """The bank at a later time, with nothing measured since."""
         gap_s, mean = t_s - self.t_s, self.belief.mean.copy()
-        over = gap_s * np.exp(-mean[:, LN_TAU:SLOW])
-        decay, slow = np.exp(-over), np.exp(-gap_s / SLOW_S)
+        time_ratio = gap_s * np.exp(-mean[:, LN_TAU:SLOW])
+        decay, slow = np.exp(-time_ratio), np.exp(-gap_s / SLOW_S)
         step = np.tile(np.eye(SIZE), (len(mean), 1, 1))
         noise = np.zeros_like(step)
         for k in range(2):
             step[:, REST + k, REST + k] = decay[:, k]
-            step[:, REST + k, LN_TAU + k] = mean[:, REST + k] * decay[:, k] * over[:, k]
+            step[:, REST + k, LN_TAU + k] = mean[:, REST + k] * decay[:, k] * time_ratio[:, k]
         for k in range(len(SLOW_S)):
             step[:, SLOW + k, SLOW + k] = slow[k]
             noise[:, SLOW + k, SLOW + k] = self.slow[:, k] ** 2 * (1 - slow[k] ** 2)
         noise[:, WALK, WALK] = self.walk**2 * gap_s / HOUR_S
-        step[:, ROOM:, ROOM:], lost = _swung(gap_s)
-        noise[:, range(ROOM, SIZE), range(ROOM, SIZE)] = self.room[:, None] ** 2 * lost
+        step[:, ROOM:, ROOM:], room_variance = _swung(gap_s)
+        noise[:, range(ROOM, SIZE), range(ROOM, SIZE)] = self.room[:, None] ** 2 * room_variance
         mean[:, REST:LN_TAU] *= decay
         mean[:, SLOW:WALK] *= slow
         mean[:, ROOM:] = mean[:, ROOM:] @ step[0, ROOM:, ROOM:].T
@@ -125,27 +125,27 @@ class Bank:
         matrix = np.zeros((1, SIZE))
         matrix[0, [LEVEL, REST, REST + 1, *range(SLOW, ROOM + 1)]] = 1.0
         matrix[0, OFFSET] = float(offset)
-        ahead = self.at(t_s)
+        predicted = self.at(t_s)
         noise = (std**2 + self.scatter**2)[:, None, None]
-        done = correct(ahead.belief, np.array([value]), matrix, noise)
-        weighed = replace(ahead, belief=done.belief, log_weight=self.log_weight + done.log_likelihood)
-        return weighed._pruned(self.nis + float(weighed.weight @ done.nis))
+        corrected = correct(predicted.belief, np.array([value]), matrix, noise)
+        weighed = replace(predicted, belief=corrected.belief, log_weight=self.log_weight + corrected.log_likelihood)
+        return weighed._pruned(self.nis + float(weighed.weight @ corrected.nis))
 
     def drawn(self, n: int, seed: int = 0) -> Array:
         """States that may be the true one, up to SLOW: shape (n, SLOW). The same bank gives the same."""
         random = np.random.default_rng(seed)
-        chosen = np.sort(random.choice(len(self.weight), n, p=self.weight))
-        members, member = np.unique(chosen, return_inverse=True)
+        draws = np.sort(random.choice(len(self.weight), n, p=self.weight))
+        members, member = np.unique(draws, return_inverse=True)
         sizes, ways = np.linalg.eigh(self.belief.covariance[members, :SLOW, :SLOW])
         roots = ways * np.sqrt(np.maximum(sizes, 0.0))[:, None, :]
-        away = roots[member] @ random.standard_normal((n, SLOW, 1))
-        return np.asarray(self.belief.mean[chosen, :SLOW] + away[:, :, 0])
+        deviations = roots[member] @ random.standard_normal((n, SLOW, 1))
+        return np.asarray(self.belief.mean[draws, :SLOW] + deviations[:, :, 0])
 
     def _pruned(self, nis: float) -> Bank:
         likely = self.weight > LEAST_WEIGHT
         belief = Belief(self.belief.mean[likely], self.belief.covariance[likely])
-        mine = {name: getattr(self, name)[likely] for name in ("slow", "scatter", "walk", "room", "log_weight")}
-        return replace(self, belief=belief, nis=nis, count=self.count + 1, **mine)
+        members = {name: getattr(self, name)[likely] for name in ("slow", "scatter", "walk", "room", "log_weight")}
+        return replace(self, belief=belief, nis=nis, count=self.count + 1, **members)
 
 
 def make_bank(t_s: float, value: float, most: float) -> Bank:

@@ -73,8 +73,8 @@ def between_variance(matrix: Array, measured: Array, variances: Array, freedom: 
     Source  Mandel and Paule, Anal. Chem. 42 (1970).
     """
 
-    def excess(between: float) -> float:
-        return shortest_solution(matrix, measured, variances + between).square - freedom
+    def excess(extra_variance: float) -> float:
+        return shortest_solution(matrix, measured, variances + extra_variance).square - freedom
 
     if excess(0.0) <= 0:
         return 0.0
@@ -120,10 +120,10 @@ class Recursive:
         size[size == 0] = 1.0
         left_vectors, lengths, turned = np.linalg.svd(self.triangle[:, :n] / size, full_matrices=False)
         determined = lengths > SMALLEST_DIAGONAL * lengths[0]
-        back = (turned[determined].T / lengths[determined]) / size[:, None]
-        values, covariance = back @ left_vectors[:, determined].T @ self.triangle[:, n], back @ back.T
-        hidden = np.any(np.abs(turned[~determined]) > UNDETERMINED_SHARE, axis=0)
-        values[hidden], covariance[hidden], covariance[:, hidden] = np.nan, np.nan, np.nan
+        inverse = (turned[determined].T / lengths[determined]) / size[:, None]
+        values, covariance = inverse @ left_vectors[:, determined].T @ self.triangle[:, n], inverse @ inverse.T
+        undetermined = np.any(np.abs(turned[~determined]) > UNDETERMINED_SHARE, axis=0)
+        values[undetermined], covariance[undetermined], covariance[:, undetermined] = np.nan, np.nan, np.nan
         residual = self.triangle[:, n] - left_vectors[:, determined] @ (
             left_vectors[:, determined].T @ self.triangle[:, n]
         )

@@ -35,17 +35,17 @@ class Level(NamedTuple):
     change_error: float
 
 
-def without_scatter(read: Array, readings: int) -> Level:
+def without_scatter(means: Array, readings: int) -> Level:
     """The level beneath the scatter of a column's means (m,), of which each of so many `readings` holds until the next.
 
     Frequencies above those of the readings say nothing of their scatter, and are left
     out.
     """
-    m = len(read)
+    m = len(means)
     k = np.arange(1, min(m, readings))
     if len(k) < FEWEST_ORDINATES:
-        return Level(read, 0.0, 0.0, 0.0)
-    coefficients = dct(read, type=2, norm="ortho")[k]
+        return Level(means, 0.0, 0.0, 0.0)
+    coefficients = dct(means, type=2, norm="ortho")[k]
     repeats, turn = max(1.0, m / readings), np.pi * k / (2 * m)
     power = (coefficients * repeats * np.sin(turn) / np.sin(repeats * turn)) ** 2  # as if none had been held
     share, doubt = _level_share(power, 2 * np.sin(turn), coefficients**2)
@@ -92,8 +92,10 @@ class _Spectrum:
     def of(cls, power: Array, level: Array) -> _Spectrum:
         """By the power that was seen (k,). Where nothing scatters the likelihood is flat, and so is the share."""
         optimum = minimize_scalar(_deviance_of_ratio, bounds=LOG_RATIOS, args=(power, level), method="bounded")
-        beside = sum(_deviance_of_ratio(optimum.x + step, power, level) for step in (-CURVATURE_STEP, CURVATURE_STEP))
-        curvature = (beside - 2 * optimum.fun) / CURVATURE_STEP**2
+        neighbours = sum(
+            _deviance_of_ratio(optimum.x + step, power, level) for step in (-CURVATURE_STEP, CURVATURE_STEP)
+        )
+        curvature = (neighbours - 2 * optimum.fun) / CURVATURE_STEP**2
         return cls(level, float(optimum.x), float(np.sqrt(2 / max(curvature, FLAT))), float(optimum.fun))
 
     def share(self, stds: float) -> Array:

@@ -60,7 +60,7 @@ def px4(sensors: Sequence[Simulated], slot: Slot) -> Exported:
     for values, _ in sensor_parts:
         for name, value in values.items():
             kind = INTEGER if isinstance(value, int) else FLOAT
-            lines.append(f"1\t1\t{name}\t{_written(value)}\t{kind}")
+            lines.append(f"1\t1\t{name}\t{_value_text(value)}\t{kind}")
     parts = [part for _, part in sensor_parts]
     return Exported.of_parts("\n".join(lines) + "\n", parts, _identity_notes(slot, "PX4"))
 
@@ -68,7 +68,7 @@ def px4(sensors: Sequence[Simulated], slot: Slot) -> Exported:
 def ardupilot(sensors: Sequence[Simulated], slot: Slot) -> Exported:
     """A file of parameters for Mission Planner, QGroundControl and MAVProxy: NAME,VALUE."""
     sensor_parts = [_ardupilot_sensor(_fitted(sensor, "ArduPilot", ARDUPILOT_T0), slot) for sensor in sensors]
-    lines = [f"{name},{_written(value)}" for values, _ in sensor_parts for name, value in values.items()]
+    lines = [f"{name},{_value_text(value)}" for values, _ in sensor_parts for name, value in values.items()]
     parts = [part for _, part in sensor_parts]
     return Exported.of_parts("\n".join(lines) + "\n", parts, _identity_notes(slot, "ArduPilot"))
 
@@ -113,14 +113,14 @@ def _px4_thermal(form: LinearForm, simulated: Simulated, letter: str, slot: Slot
 def _px4_ignored(outputs: Outputs, form: LinearForm) -> Iterator[Loss]:
     """Corrections that PX4 reads and does not apply, because they are small."""
     offset, scales = form.offsets[0], np.diag(form.matrix)
-    unit, why = outputs.simulated.unit, f"PX4 does not apply changes up to {PX4_IGNORES:g}"
+    unit, reason = outputs.simulated.unit, f"PX4 does not apply changes up to {PX4_IGNORES:g}"
     if 0 < np.linalg.norm(offset) <= PX4_IGNORES:
         size = np.abs(form.matrix @ offset) / outputs.per
-        yield Loss("offset", f"{why} {outputs.unit}", float(size.max()), float(size.max()), unit)
+        yield Loss("offset", f"{reason} {outputs.unit}", float(size.max()), float(size.max()), unit)
     if unit != "deg/s" and 0 < np.linalg.norm(scales - 1) <= PX4_IGNORES:
         size = np.abs((scales - 1) * outputs.a / outputs.per)
         rms = float(np.sqrt(np.mean(size**2, axis=0)).max())
-        yield Loss("scale", f"{why}", rms, float(size.max()), unit)
+        yield Loss("scale", f"{reason}", rms, float(size.max()), unit)
 
 
 def _ardupilot_sensor(fitted: tuple[Outputs, LinearForm], slot: Slot) -> tuple[Mapping[str, Value], Exported]:
@@ -184,9 +184,9 @@ def _check_range(program: str, outputs: Outputs, quantity: str, values: Array, s
 def _identity_notes(slot: Slot, program: str) -> tuple[str, ...]:
     if slot.device_id is not None:
         return ()
-    where = f"load the file only into the vehicle where this sensor is number {slot.number + 1}"
-    return (f"No device ID: {where}, or give --device-id, as {program} reports it.",)
+    advice = f"load the file only into the vehicle where this sensor is number {slot.number + 1}"
+    return (f"No device ID: {advice}, or give --device-id, as {program} reports it.",)
 
 
-def _written(value: Value) -> str:
+def _value_text(value: Value) -> str:
     return str(value) if isinstance(value, int) else f"{float(np.float32(value)):.9g}"

@@ -92,9 +92,9 @@ def outputs_in(simulated: Simulated, unit: str, program: str) -> Outputs:
 def unit_factor(unit: str, target: str, gravity_m_s2: float) -> float | None:
     """Units of `target` in one `unit`; None where they are not of one kind."""
     kinds = {"m/s^2": ("m/s2", "g", "mg"), "rad/s": ("rad/s", "deg/s"), "gauss": ("gauss", "mgauss", "uT")}
-    plain = {"gauss": "gauss", "G": "gauss", "mgauss": "mgauss", "mG": "mgauss"}.get(unit) or parse_unit(unit)
+    unit_name = {"gauss": "gauss", "G": "gauss", "mgauss": "mgauss", "mG": "mgauss"}.get(unit) or parse_unit(unit)
     factors = {**IN_SI, "g": gravity_m_s2, "mg": 1e-3 * gravity_m_s2}
-    return factors[plain] if plain in kinds[target] else None
+    return factors[unit_name] if unit_name in kinds[target] else None
 
 
 def fit_form(outputs: Outputs, kind: str, degree: int = 0, t0: float | None = None) -> LinearForm:
@@ -135,8 +135,8 @@ def losses(form: LinearForm, outputs: Outputs) -> Iterator[Loss]:
         gain = outputs.a if name in GAINS else 0.0
         remaining = (outputs.factor * part - gain) @ form.matrix.T
         for i in range(3):
-            own = {OFFSETS: [], DIAGONAL: [outputs.a[:, i]]}.get(form.kind, [*outputs.a.T])
-            basis = np.column_stack([*own, powers])
+            form_columns = {OFFSETS: [], DIAGONAL: [outputs.a[:, i]]}.get(form.kind, [*outputs.a.T])
+            basis = np.column_stack([*form_columns, powers])
             remaining[:, i] -= basis @ _solved(basis, remaining[:, i])
         rms, most = _size(remaining / outputs.per)
         if most > NEGLIGIBLE * np.abs(simulated.a).max():
@@ -151,12 +151,12 @@ def exported(
     text: str = "",
     notes: tuple[str, ...] = (),
     ignored: Sequence[Loss] = (),
-    held: Collection[str] = (),
+    held_effects: Collection[str] = (),
 ) -> Exported:
-    """The part of a file on one sensor: errors and losses of its form. `held`: effects that the file has beside it."""
+    """The part of a file on one sensor: errors and losses of its form. `held_effects`: those in its other parts."""
     unit = outputs.simulated.unit
-    lost = (loss for loss in losses(form, outputs) if loss.effect not in held)
-    return Exported(text, (*lost, *ignored), notes, ((SENSOR[unit], *error_of(form, outputs), unit),))
+    form_losses = (loss for loss in losses(form, outputs) if loss.effect not in held_effects)
+    return Exported(text, (*form_losses, *ignored), notes, ((SENSOR[unit], *error_of(form, outputs), unit),))
 
 
 def _size(error: Array) -> tuple[float, float]:

@@ -36,15 +36,15 @@ class Stream:
 
 def kalibr(models: Sequence[Model], stream: Stream, comment: str) -> Exported:
     """The file imu.yaml of Kalibr."""
-    numbers, losses, notes = _all(models, stream, "kalibr")
+    numbers, losses, notes = _densities(models, stream, "kalibr")
     lines = [f"# {comment}", *_lines(numbers), f"rostopic: {stream.topic}", f"update_rate: {stream.rate_hz:.6g}"]
     return Exported("\n".join(lines) + "\n", losses, notes)
 
 
 def openvins(models: Sequence[Model], stream: Stream, comment: str) -> Exported:
     """The file kalibr_imu_chain.yaml of OpenVINS, with ideal intrinsics: calibrate the measurements before."""
-    numbers, losses, notes = _all(models, stream, "openvins")
-    ones = ["    - [1.0, 0.0, 0.0]", "    - [0.0, 1.0, 0.0]", "    - [0.0, 0.0, 1.0]"]
+    numbers, losses, notes = _densities(models, stream, "openvins")
+    unit_rows = ["    - [1.0, 0.0, 0.0]", "    - [0.0, 1.0, 0.0]", "    - [0.0, 0.0, 1.0]"]
     zeros = ["    - [0.0, 0.0, 0.0]"] * 3
     lines = ["%YAML:1.0", f"# {comment}", "", "imu0:"]
     lines += ["  T_i_b:", *(f"    - [{', '.join('1.0' if i == k else '0.0' for k in range(4))}]" for i in range(4))]
@@ -52,7 +52,7 @@ def openvins(models: Sequence[Model], stream: Stream, comment: str) -> Exported:
     lines += [f"  rostopic: {stream.topic}", "  time_offset: 0.0", f"  update_rate: {stream.rate_hz:.1f}"]
     lines += ['  model: "kalibr"']
     for name in ("Tw", "R_IMUtoGYRO", "Ta", "R_IMUtoACC"):
-        lines += [f"  {name}:", *ones]
+        lines += [f"  {name}:", *unit_rows]
     lines += ["  Tg:", *zeros]
     ideal = "The file has ideal axes and scale factors: give OpenVINS measurements that are already compensated."
     return Exported("\n".join(lines) + "\n", losses, (*notes, ideal))
@@ -63,7 +63,7 @@ def _lines(numbers: Mapping[str, float]) -> Iterator[str]:
         yield f"{name}: {value:.6e}"  # with a point: YAML readers take 4e-6 for a text
 
 
-def _all(
+def _densities(
     models: Sequence[Model], stream: Stream, program: str
 ) -> tuple[dict[str, float], tuple[Loss, ...], tuple[str, ...]]:
     """The four densities by name, what is lost, and remarks. Raises ModelError where a sensor is missing."""
@@ -84,8 +84,8 @@ def _all(
         model = by_sensor[sensor]
         factor = _factor(model, sensor)
         white, walk = (factor * _largest(model, name) for name in (WHITE, WALK))
-        if stated := stream.walks.get(sensor):
-            walk = stated
+        if stated_walk := stream.walks.get(sensor):
+            walk = stated_walk
         if not walk:
             raise ModelError(
                 f"{model.name}: has no {WALK}, and {program} refuses 0; record longer and fit a model with {WALK}, "
@@ -94,7 +94,7 @@ def _all(
         if not white:
             raise ModelError(f"{model.name}: has no {WHITE}, and {program} refuses 0; fit it with {WHITE}")
         numbers |= {f"{sensor}_noise_density": white, f"{sensor}_random_walk": walk}
-        losses += _lost(model, sensor, factor)
+        losses += _other_processes(model, sensor, factor)
         notes += _axes(model, sensor)
     return numbers, tuple(losses), tuple(notes)
 
@@ -125,7 +125,7 @@ def _largest(model: Model, effect: str) -> float:
     return max((e.value for e in model.estimates(effect) if e.identified), default=0.0)
 
 
-def _lost(model: Model, sensor: str, factor: float) -> Iterator[Loss]:
+def _other_processes(model: Model, sensor: str, factor: float) -> Iterator[Loss]:
     """Every other process, as its largest Allan deviation in g or deg/s."""
     _, unit, per = SENSORS[sensor]
     for term in model.terms:

@@ -58,7 +58,7 @@ def imucal(sensors: Sequence[Simulated], comment: str) -> Exported:
         document |= {f"K_{letter}": np.diag(gains).tolist(), f"R_{letter}": (forward / gains[:, None]).tolist()}
         document[f"b_{letter}"] = form.offsets[0].tolist()
     document["K_ga"] = _of_acceleration(rate).tolist()
-    parts = [exported(acceleration, forms[0]), exported(rate, forms[1], held=(G_SENSITIVITY,))]
+    parts = [exported(acceleration, forms[0]), exported(rate, forms[1], held_effects=(G_SENSITIVITY,))]
     return Exported.of_parts(json.dumps(document, indent=1) + "\n", parts)
 
 
@@ -67,8 +67,8 @@ def _of_acceleration(rate: Outputs) -> Array:
     simulated = rate.simulated
     sensitivity = np.zeros((3, 3))
     for i, axis in enumerate(AXES):
-        for k, along in enumerate(AXES):
-            sensitivity[i, k] = simulated.model.value(f"{G_SENSITIVITY}.{along}.{axis}")
+        for k, input_axis in enumerate(AXES):
+            sensitivity[i, k] = simulated.model.value(f"{G_SENSITIVITY}.{input_axis}.{axis}")
     return sensitivity * rate.factor / simulated.gravity_m_s2
 
 

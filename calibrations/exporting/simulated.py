@@ -105,20 +105,22 @@ def simulate(
     reach = reach or REACH[compensation.unit]
     inputs = [name for name in variable_names(forward.outputs) if name not in FORCES]
     ranges = {name: _span(model, name, spans or {}) for name in inputs}
-    a, beside = _grid(reach, ranges)
-    at = {**dict(zip(FORCES, a.T, strict=True)), **beside}
+    a, other_inputs = _grid(reach, ranges)
+    at = {**dict(zip(FORCES, a.T, strict=True)), **other_inputs}
     outputs = _outputs(model, remembering, at, len(a))
     inverted = [f.effect for f in forward.fates if f.how == INVERTED]
     parts = {name: outputs - _outputs(model, (*remembering, name), at, len(a)) for name in inverted}
-    lost = []
+    loss_list = []
     for fate in compensation.forward.fates:
         if fate.how == LEFT_OUT:
             size = compensation.costs.left_out.get(fate.effect)
-            why = HISTORY if fate.effect in remembering else fate.why
-            lost.append(
-                Loss(fate.effect, why, size.rms if size else None, size.most if size else None, compensation.unit)
+            reason = HISTORY if fate.effect in remembering else fate.why
+            loss_list.append(
+                Loss(fate.effect, reason, size.rms if size else None, size.most if size else None, compensation.unit)
             )
-    return Simulated(model, compensation.unit, a, outputs, ranges, beside.get("temperature_c"), parts, tuple(lost))
+    return Simulated(
+        model, compensation.unit, a, outputs, ranges, other_inputs.get("temperature_c"), parts, tuple(loss_list)
+    )
 
 
 def _span(model: Model, name: str, spans: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
@@ -144,8 +146,8 @@ def _grid(reach: float, ranges: Mapping[str, tuple[float, float]]) -> tuple[Arra
     levels = [_levels(name, span) for name, span in ranges.items()]
     corners = np.array(list(product(*levels)), dtype=float)  # one row without columns if there is no other input
     a = np.tile(sphere, (len(corners), 1))
-    beside = np.repeat(corners, len(sphere), axis=0)
-    return a, dict(zip(ranges, beside.T, strict=True))
+    other_values = np.repeat(corners, len(sphere), axis=0)
+    return a, dict(zip(ranges, other_values.T, strict=True))
 
 
 def _levels(name: str, span: tuple[float, float]) -> Sequence[float]:
@@ -153,6 +155,6 @@ def _levels(name: str, span: tuple[float, float]) -> Sequence[float]:
     return [span[0]] if span[0] == span[1] else np.linspace(*span, count).tolist()
 
 
-def _outputs(model: Model, without: Sequence[str], at: Mapping[str, Array], n: int) -> Array:
-    forward = trace_model(model, without)
+def _outputs(model: Model, left_out: Sequence[str], at: Mapping[str, Array], n: int) -> Array:
+    forward = trace_model(model, left_out)
     return np.column_stack([np.broadcast_to(v, n) for v in evaluate_nodes(forward.outputs, at)])

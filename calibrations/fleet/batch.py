@@ -59,11 +59,11 @@ def find_batch_effects(looks: Sequence[Screening], of_stage: Container[str] = ()
     """
     if len(looks) < FEWEST_SENSORS:
         return []
-    tried: dict[tuple[str, int, int], list[tuple[Score, int]]] = defaultdict(list)
+    scores_by_effect: dict[tuple[str, int, int], list[tuple[Score, int]]] = defaultdict(list)
     for look in looks:
         for score in look.scores:
-            tried[score.effect, score.start, len(score.score)].append((score, look.rows))
-    tests = [of for of in tried.values() if len(of) >= max(FEWEST_SENSORS, len(looks) / 2)]
+            scores_by_effect[score.effect, score.start, len(score.score)].append((score, look.rows))
+    tests = [of for of in scores_by_effect.values() if len(of) >= max(FEWEST_SENSORS, len(looks) / 2)]
     judged = [_judged(of, 2 * len(tests), of[0][0].effect not in of_stage) for of in tests]
     judged = sorted((effect for effect in judged if effect.p_value < SIGNIFICANT), key=lambda e: e.gain, reverse=True)
     best: dict[str, BatchEffect] = {}
@@ -83,7 +83,7 @@ def _judged(of: list[tuple[Score, int]], tests: int, may_differ: bool) -> BatchE
     price = float(np.median(ranks)) * float(np.median(np.log([rows for _, rows in of])))
     options = [(True, *_common(scores, int(np.median(ranks))))]
     if may_differ:
-        options.append((False, _own(statistics, ranks), len(of) * (float(np.median(statistics)) - price)))
+        options.append((False, _sensor_chance(statistics, ranks), len(of) * (float(np.median(statistics)) - price)))
     significant = [option for option in options if option[1] * tests < SIGNIFICANT]
     common, p_value, gain = max(significant or options, key=lambda option: option[2])
     return BatchEffect(
@@ -105,8 +105,8 @@ def _common(scores: list[Score], rank: int) -> tuple[float, float]:
     rank = min(rank, int(is_determined.sum()))
     if not rank or n <= rank + 1:
         return 1.0, 0.0
-    along = (vectors.T @ total)[is_determined][-rank:]
-    share = float(np.sum(along**2 / values[is_determined][-rank:])) / n  # the common share of their information
+    components = (vectors.T @ total)[is_determined][-rank:]
+    share = float(np.sum(components**2 / values[is_determined][-rank:])) / n  # the common share of their information
     f = share / max(1 - share, 1e-12) * (n - rank) / rank
     information = sum((w * s.information for w, s in zip(weights, scores, strict=True)), np.zeros((u.shape[1],) * 2))
     gain = float(total @ np.linalg.pinv(information, rcond=1e-9, hermitian=True) @ total)
@@ -120,7 +120,7 @@ def _bounded(scores: list[Score]) -> tuple[Array, Array]:
     return np.array([s.score for s in scores]) * weights[:, None], weights
 
 
-def _own(statistics: Array, ranks: Array) -> float:
+def _sensor_chance(statistics: Array, ranks: Array) -> float:
     """Chance that noise makes as many sensors gain from the effect; 1 where they are fewer than MOST."""
     n, gaining = len(statistics), int(np.sum(statistics > LEAST_SHARED_GAIN * ranks))
     if gaining < LEAST_GAINING_SHARE * n:

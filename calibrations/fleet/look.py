@@ -80,22 +80,22 @@ class SharedDesigns:
         table = fit.table
         design = _key(table, ())
         can: Key = (*table.columns, *design)
-        effects = _once(self._asked, can, lambda: _asked(fit, self.effects))
+        effects = _cached(self._asked, can, lambda: _screened_effects(fit, self.effects))
         groups = [group for effect in effects for group in self._effect(fit, effect)]
-        shapes: tuple[Group, ...] = _once(self._groups, design, lambda: tuple(_patterns(fit)))
+        shapes: tuple[Group, ...] = _cached(self._groups, design, lambda: tuple(_patterns(fit)))
         groups += shapes
         search: Key = (*(effect.name for effect in effects), *design)
-        return SearchGroups(tuple(groups), _once(self._trials, search, lambda: _trials(fit, groups)))
+        return SearchGroups(tuple(groups), _cached(self._trials, search, lambda: _trials(fit, groups)))
 
     def _effect(self, fit: Fit, effect: Effect) -> tuple[Group, ...]:
         if "output" in effect.places:
             return tuple(_derivatives(fit, effect))
         constants = np.array([float(constant(fit.table)) for constant in effect.constants.values()])
         key = (effect.name, constants.tobytes(), *_key(fit.table, effect.needs))
-        return _once(self._groups, key, lambda: tuple(_derivatives(fit, effect)))
+        return _cached(self._groups, key, lambda: tuple(_derivatives(fit, effect)))
 
 
-def _once(cache: dict[Key, V], key: Key, make: Callable[[], V]) -> V:
+def _cached(cache: dict[Key, V], key: Key, make: Callable[[], V]) -> V:
     """What was made for a key, or is now; where there are MOST of them all are forgotten, so that memory stays flat."""
     value = cache.get(key)
     if value is None:
@@ -106,14 +106,14 @@ def _once(cache: dict[Key, V], key: Key, make: Callable[[], V]) -> V:
     return value
 
 
-def _asked(fit: Fit, effects: Mapping[str, Effect]) -> tuple[Effect, ...]:
+def _screened_effects(fit: Fit, effects: Mapping[str, Effect]) -> tuple[Effect, ...]:
     return tuple(effect for effect in testable_effects(fit, effects) if effect.searched(fit.table) <= 1)
 
 
-def _key(table: Table, needs: tuple[str, ...]) -> Key:
+def _key(table: Table, required: tuple[str, ...]) -> Key:
     """What columns at rows in order of time are a function of."""
     design = ANGLES if table.type.stage_angles else table.columns
-    names = [name for name in dict.fromkeys((*design, *needs)) if name in table]
+    names = [name for name in dict.fromkeys((*design, *required)) if name in table]
     return tuple(part for name in names for part in (name, table.column(name).tobytes()))
 
 
@@ -126,10 +126,10 @@ def _ranges(table: Table, channels: int) -> Array:
 def _derivatives(fit: Fit, effect: Effect) -> Iterator[Group]:
     """Of the residual with respect to the effect's parameters, from each of its starts."""
     problem = Problem.of(fit.model.with_effect(effect), fit.table)
-    mine = problem.layout.of_effect(effect.name)
+    own_columns = problem.layout.of_effect(effect.name)
     scaled = bool(effect.places & {"pose", "force"})
     for start, theta in enumerate(problem.layout.starts()):
-        columns = problem.jacobian(theta, mine)
+        columns = problem.jacobian(theta, own_columns)
         if np.any(columns):
             yield Group(effect.name, start, columns / _ranges(fit.table, len(columns)) if scaled else columns, scaled)
 
@@ -138,8 +138,8 @@ def _patterns(fit: Fit) -> Iterator[Group]:
     """Of poses those that angles and the order of rows can show: they are the same for all sensors of a design."""
     table = fit.table
     if table.type.stage_angles:
-        chosen = [name for name in (*ANGLES, *table.output_names) if name in table]
-        table = Table.from_columns(table.kind, {name: table.column(name) for name in chosen})
+        names = [name for name in (*ANGLES, *table.output_names) if name in table]
+        table = Table.from_columns(table.kind, {name: table.column(name) for name in names})
     return (Group("", k, pattern.columns) for k, pattern in enumerate(patterns(table, fit.channels)))
 
 
@@ -218,7 +218,7 @@ def screen_sensor(table: Table, model: Model, shared: SharedDesigns) -> Screenin
     groups = shared.of(fit)
     columns = [group.of(fit.table) for group in groups.all]
     screen = Screen(fit)
-    scores, chance, gram, along = _weighed(screen, groups, columns)
+    scores, chance, gram, scores_of_columns = _weighed(screen, groups, columns)
     return Screening(
         unit=table.unit,
         names=tuple((fit.model.terms[s.term].name, s.parameter.name, s.axis, _unit(fit, s.parameter.unit))
@@ -232,7 +232,7 @@ def screen_sensor(table: Table, model: Model, shared: SharedDesigns) -> Screenin
         chance=chance,
         outliers=outliers,
         scores=scores,
-        stage=_stage(groups, shared.effects, gram, along),
+        stage=_stage(groups, shared.effects, gram, scores_of_columns),
     )  # fmt: skip
 
 
@@ -244,9 +244,9 @@ def information(fit: Fit) -> Array:
     """Inverse covariance (p, p) of the parameters, with the standard uncertainties that the fit states."""
     cautious = cautiously(fit)
     white = cautious.information
-    own = np.sqrt(np.diag(covariance(white, fit.problem.layout.typical)[0]))
-    stated = np.array([e.std or 0.0 for e in fit.params.values()])
-    wider = np.where((own > 0) & (stated > 0), stated / np.where(own > 0, own, 1.0), 1.0)
+    white_std = np.sqrt(np.diag(covariance(white, fit.problem.layout.typical)[0]))
+    stated_std = np.array([e.std or 0.0 for e in fit.params.values()])
+    wider = np.where((white_std > 0) & (stated_std > 0), stated_std / np.where(white_std > 0, white_std, 1.0), 1.0)
     return np.asarray((white.T @ white) / np.outer(wider, wider))
 
 
@@ -259,19 +259,19 @@ def _weighed(
     size = np.linalg.norm(white, axis=0)
     free = white - screen.explained @ (screen.explained.T @ white)
     free[:, np.linalg.norm(free, axis=0) <= NOT_SHOWN * size] = 0.0
-    gram, along = free.T @ free, free.T @ screen.residual
+    gram, projections = free.T @ free, free.T @ screen.residual
     edges = np.cumsum([0, *(column.shape[2] for column in columns)])
     blocks = [slice(a, b) for a, b in pairwise(edges)]
-    statistics, ranks = statistics_of([gram[b, b] for b in blocks], [along[b] for b in blocks])
+    statistics, ranks = statistics_of([gram[b, b] for b in blocks], [projections[b] for b in blocks])
     free_rows = min(screen.free, fit.noise.freedom)
     single = np.where(ranks > 0, fdtrc(np.maximum(ranks, 1), free_rows, statistics / np.maximum(ranks, 1)), 1.0)
     single = np.minimum(single, _beside_slow_noise(fit, groups, columns, ranks))
     scores = tuple(
-        Score(g.effect, g.start, along[b], gram[b, b], float(s), int(r), float(p))
+        Score(g.effect, g.start, projections[b], gram[b, b], float(s), int(r), float(p))
         for g, b, s, r, p in zip(groups.all, blocks, statistics, ranks, single, strict=True)
         if g.effect and r
     )
-    return scores, float(of_search(float(single.min()), groups.trials)), gram, along
+    return scores, float(of_search(float(single.min()), groups.trials)), gram, projections
 
 
 def statistics_of(grams: list[Array], scores: list[Array]) -> tuple[Array, Array]:
@@ -283,10 +283,10 @@ def statistics_of(grams: list[Array], scores: list[Array]) -> tuple[Array, Array
     size = np.sqrt(np.diagonal(padded, axis1=1, axis2=2))
     scale = np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
     values, vectors = np.linalg.eigh(padded * scale[:, :, None] * scale[:, None, :])
-    along = np.einsum("gkj,gk->gj", vectors, sides * scale)
+    components = np.einsum("gkj,gk->gj", vectors, sides * scale)
     is_determined = values > LEAST_RANK
     return np.sum(
-        np.where(is_determined, along**2 / np.where(is_determined, values, 1.0), 0.0), axis=1
+        np.where(is_determined, components**2 / np.where(is_determined, values, 1.0), 0.0), axis=1
     ), is_determined.sum(axis=1)
 
 
@@ -300,15 +300,15 @@ def _beside_slow_noise(fit: Fit, groups: SearchGroups, columns: list[Array], ran
     effects = [k for k, group in enumerate(groups.all) if group.effect and ranks[k]]
     if not effects or not np.any(fit.noise.slow):
         return p_values
-    tried = [
+    tested = [
         k for k, p in zip(effects, _without_slow(fit, [columns[k] for k in effects]), strict=True) if p < POSSIBLY_SLOW
     ]
-    scaled = [columns[k] / np.maximum(np.sqrt(np.sum(columns[k] ** 2, axis=(0, 1))), 1e-300) for k in tried]
+    scaled = [columns[k] / np.maximum(np.sqrt(np.sum(columns[k] ** 2, axis=(0, 1))), 1e-300) for k in tested]
     smooth = fit.problem.smooth
-    worth = np.array(gains(fit.noise, fit.residual, fit.jacobian, scaled, smooth)) if tried else np.zeros(0)
-    rows, rank = fit.residual.size, ranks[tried]
+    worth = np.array(gains(fit.noise, fit.residual, fit.jacobian, scaled, smooth)) if tested else np.zeros(0)
+    rows, rank = fit.residual.size, ranks[tested]
     free = np.maximum(rows - fit.jacobian.shape[2] - rank - smooth.shape[1] * len(fit.channels), 1)
-    p_values[tried] = fdtrc(rank, free, np.expm1(np.minimum(worth / rows, 500.0)) * free / rank)
+    p_values[tested] = fdtrc(rank, free, np.expm1(np.minimum(worth / rows, 500.0)) * free / rank)
     return p_values
 
 
@@ -321,7 +321,7 @@ def _without_slow(fit: Fit, columns: list[Array]) -> Array:
     return np.asarray(chdtrc(ranks, falls / level))
 
 
-def _stage(groups: SearchGroups, effects: Mapping[str, Effect], gram: Array, along: Array) -> StageScore:
+def _stage(groups: SearchGroups, effects: Mapping[str, Effect], gram: Array, projections: Array) -> StageScore:
     """The effects on the pose that are not in the model, from their first start."""
     names: list[tuple[str, str, str]] = []
     places: list[int] = []
@@ -331,7 +331,7 @@ def _stage(groups: SearchGroups, effects: Mapping[str, Effect], gram: Array, alo
             names += [(group.effect, p.name, p.unit) for p in effects[group.effect].parameters]
             places += range(at, at + group.columns.shape[2])
         at += group.columns.shape[2]
-    return StageScore(tuple(names), along[places], gram[np.ix_(places, places)])
+    return StageScore(tuple(names), projections[places], gram[np.ix_(places, places)])
 
 
 def _of_stage(group: Group, effects: Mapping[str, Effect]) -> bool:

@@ -35,10 +35,10 @@ def correct_stage_errors(table: Table, errors: StageErrors, effects: Mapping[str
         effect = effects[name]
         parameters = Values.of({p.name: values.get(p.name, 0.0) for p in effect.parameters})
         pose = effect.pose(pose, table, parameters)
-    down = specific_force(replace(pose, mount=np.zeros(table.n), flip=np.zeros(table.n)))
+    gravity = specific_force(replace(pose, mount=np.zeros(table.n), flip=np.zeros(table.n)))
     columns = dict(table.columns)
-    columns["alpha_deg"] = np.degrees(np.arctan2(np.hypot(down[:, 0], down[:, 1]), down[:, 2]))
-    columns["beta_deg"] = np.degrees(np.arctan2(down[:, 1], down[:, 0]))
+    columns["alpha_deg"] = np.degrees(np.arctan2(np.hypot(gravity[:, 0], gravity[:, 1]), gravity[:, 2]))
+    columns["beta_deg"] = np.degrees(np.arctan2(gravity[:, 1], gravity[:, 0]))
     return replace(table, columns=MappingProxyType(columns))
 
 
@@ -124,8 +124,8 @@ def unconnected_rigs(fleet: Sequence[Measured]) -> list[tuple[str, ...]]:
     groups: list[set[str]] = []
     for batch in dict.fromkeys(measured.batch for measured in fleet):
         rigs = {measured.rig for measured in fleet if measured.batch == batch}
-        joined = [group for group in groups if group & rigs]
-        groups = [group for group in groups if not group & rigs] + [rigs.union(*joined)]
+        connected = [group for group in groups if group & rigs]
+        groups = [group for group in groups if not group & rigs] + [rigs.union(*connected)]
     return [tuple(sorted(group)) for group in groups]
 
 
@@ -137,34 +137,34 @@ def _effect(
     fleet: Sequence[Measured], names: Sequence[tuple[str, str, str]], effect: str, corrections: Mapping[str, Array]
 ) -> _Found:
     """The errors of one effect, of every rig, after the corrections made already."""
-    mine = [k for k, name in enumerate(names) if name[0] == effect]
+    own_rows = [k for k, name in enumerate(names) if name[0] == effect]
     sensors, values, variances, scores, informations = [], [], [], [], []
     for measured in fleet:
         A = measured.stage.information
-        own = A[mine][:, mine]
-        size = np.diag(own)
-        if not np.all(size > 0) or np.linalg.cond(own / np.sqrt(np.outer(size, size))) > 1 / DETERMINED:
+        own_information = A[own_rows][:, own_rows]
+        size = np.diag(own_information)
+        if not np.all(size > 0) or np.linalg.cond(own_information / np.sqrt(np.outer(size, size))) > 1 / DETERMINED:
             continue
-        score = measured.stage.score[mine] + A[mine] @ corrections[measured.rig]
-        inverse = np.linalg.inv(own)
+        score = measured.stage.score[own_rows] + A[own_rows] @ corrections[measured.rig]
+        inverse = np.linalg.inv(own_information)
         sensors.append(measured)
         values.append(-inverse @ score)  # the residual falls as the prediction grows
         scores.append(score)
         variances.append(np.diag(inverse))
-        informations.append(own)
+        informations.append(own_information)
     if not sensors:
         return _Found()
     y, v = np.array(values), np.array(variances)
-    errors_of_parameters = [_parameter(sensors, y[:, j], v[:, j], names[k]) for j, k in enumerate(mine)]
-    least = min(len(mine) * min((e.p_value for of in errors_of_parameters for e in of), default=1.0), 1.0)
+    errors_of_parameters = [_parameter(sensors, y[:, j], v[:, j], names[k]) for j, k in enumerate(own_rows)]
+    least = min(len(own_rows) * min((e.p_value for of in errors_of_parameters for e in of), default=1.0), 1.0)
     errors = tuple(replace(error, p_value=least) for of in errors_of_parameters for error in of)
-    off = {rig: np.zeros(len(mine)) for rig in corrections}
+    off = {rig: np.zeros(len(own_rows)) for rig in corrections}
     for error in errors:
         if error.beyond:
-            off[error.rig][[names[k][1] for k in mine].index(error.parameter)] = error.value
+            off[error.rig][[names[k][1] for k in own_rows].index(error.parameter)] = error.value
     falls = (
-        -2 * score @ off[measured.rig] - off[measured.rig] @ own @ off[measured.rig]
-        for measured, score, own in zip(sensors, scores, informations, strict=True)
+        -2 * score @ off[measured.rig] - off[measured.rig] @ own_information @ off[measured.rig]
+        for measured, score, own_information in zip(sensors, scores, informations, strict=True)
     )
     return _Found(errors, float(sum(falls)))
 
@@ -172,33 +172,33 @@ def _effect(
 def _parameter(sensors: Sequence[Measured], y: Array, v: Array, name: tuple[str, str, str]) -> list[RigError]:
     """One parameter of every rig; nothing where the rigs cannot be compared."""
     alike = ~_far(sensors, y, v)
-    sensors = [measured for measured, good in zip(sensors, alike, strict=True) if good]
+    sensors = [measured for measured, is_alike in zip(sensors, alike, strict=True) if is_alike]
     y, v = y[alike], v[alike]
     batches, rigs = sorted({measured.batch for measured in sensors}), sorted({measured.rig for measured in sensors})
     of_batch = np.array([[measured.batch == batch for batch in batches] for measured in sensors], dtype=float)
     design = np.hstack(
         [of_batch, np.array([[measured.rig == rig for rig in rigs] for measured in sensors], dtype=float)]
     )
-    more = int(np.linalg.matrix_rank(design)) - len(batches)
-    free = len(y) - len(batches) - more
-    if more <= 0 or free < FEWEST_SENSORS_PER_RIG:
+    rig_rank = int(np.linalg.matrix_rank(design)) - len(batches)
+    free = len(y) - len(batches) - rig_rank
+    if rig_rank <= 0 or free < FEWEST_SENSORS_PER_RIG:
         return []
     total = v + between_variance(design, y, v, free)
     solution = shortest_solution(design, y, total)
     theta, scale = solution.values, max(1.0, solution.square / free)
-    f = (shortest_solution(of_batch, y, total).square - solution.square) / more / scale
-    p_value = float(fdtrc(more, free, max(f, 0.0)))
+    f = (shortest_solution(of_batch, y, total).square - solution.square) / rig_rank / scale
+    p_value = float(fdtrc(rig_rank, free, max(f, 0.0)))
     errors = []
     for group in unconnected_rigs(sensors):
         places = [len(batches) + rigs.index(rig) for rig in group]
         middle = _middle(theta[places])
         for k, rig in enumerate(group if len(group) > 1 else ()):
-            along = np.zeros(len(theta))
-            along[places] = np.eye(len(group))[k] - middle
-            value, std = float(along @ theta), float(np.sqrt(scale * along @ solution.covariance @ along))
-            beyond = std > 0 and 2 * float(stdtr(free, -abs(value) / std)) * len(rigs) < SIGNIFICANT
+            contrast = np.zeros(len(theta))
+            contrast[places] = np.eye(len(group))[k] - middle
+            value, std = float(contrast @ theta), float(np.sqrt(scale * contrast @ solution.covariance @ contrast))
+            significant = std > 0 and 2 * float(stdtr(free, -abs(value) / std)) * len(rigs) < SIGNIFICANT
             count = sum(measured.rig == rig for measured in sensors)
-            errors.append(RigError(rig, name[0], name[1], name[2], value, std, p_value, count, beyond))
+            errors.append(RigError(rig, name[0], name[1], name[2], value, std, p_value, count, significant))
     return errors
 
 
@@ -217,7 +217,7 @@ def _far(sensors: Sequence[Measured], y: Array, v: Array) -> NDArray[np.bool_]:
     places: dict[tuple[str, str], list[int]] = {}
     for k, sensor in enumerate(sensors):
         places.setdefault((sensor.batch, sensor.rig), []).append(k)
-    for chosen in map(np.array, places.values()):
-        off = np.abs(y[chosen] - np.median(y[chosen]))
-        far[chosen] = off > FAR_SENSOR * np.sqrt(robust_std(off) ** 2 + v[chosen])
+    for members in map(np.array, places.values()):
+        off = np.abs(y[members] - np.median(y[members]))
+        far[members] = off > FAR_SENSOR * np.sqrt(robust_std(off) ** 2 + v[members])
     return far

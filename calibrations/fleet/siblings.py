@@ -115,8 +115,8 @@ class Siblings:
         low, high = np.min(mean - 12 * std, axis=0), np.max(mean + 12 * std, axis=0)
         for _ in range(HALVINGS):
             middle = (low + high) / 2
-            below = self.weight @ ndtr((middle - mean) / std) < share
-            low, high = np.where(below, middle, low), np.where(below, high, middle)
+            too_low = self.weight @ ndtr((middle - mean) / std) < share
+            low, high = np.where(too_low, middle, low), np.where(too_low, high, middle)
         return np.asarray((low + high) / 2)
 
 
@@ -136,20 +136,20 @@ def _suspects(y: Array, v: Array) -> NDArray[np.bool_]:
     """Values far from the median; none where fewer than FEWEST would be left."""
     middle = float(np.median(y))
     spread = float(robust_std(y - middle))
-    out = np.abs(y - middle) > MOST_USUAL * np.sqrt(spread**2 + v)
-    return out if int(np.sum(~out)) >= FEWEST_SIBLINGS else np.zeros(len(y), dtype=bool)
+    suspects = np.abs(y - middle) > MOST_USUAL * np.sqrt(spread**2 + v)
+    return suspects if int(np.sum(~suspects)) >= FEWEST_SIBLINGS else np.zeros(len(y), dtype=bool)
 
 
 def _posterior(y: Array, v: Array, unlike: NDArray[np.bool_]) -> Siblings:
-    own, noise = y[~unlike], v[~unlike]
-    if len(own) < FEWEST_SIBLINGS:
+    usual, noise = y[~unlike], v[~unlike]
+    if len(usual) < FEWEST_SIBLINGS:
         return Siblings(y, v, unlike, np.zeros(1), np.ones(1))
     at = (np.arange(GRID) + 0.5) / GRID
-    scale = float(np.std(own)) + np.sqrt(float(np.median(noise))) / 4
+    scale = float(np.std(usual)) + np.sqrt(float(np.median(noise))) / 4
     tau = scale * at / (1 - at)
-    mu, variance = _means(own, noise, tau)
+    mu, variance = _means(usual, noise, tau)
     total = noise + tau[:, None] ** 2
-    log = -0.5 * np.sum(np.log(total) + (own - mu[:, None]) ** 2 / total, axis=1) + 0.5 * np.log(variance)
+    log = -0.5 * np.sum(np.log(total) + (usual - mu[:, None]) ** 2 / total, axis=1) + 0.5 * np.log(variance)
     log -= 2 * np.log1p(-at)  # the grid's spacing, which makes the density flat in tau
     weight = np.exp(log - log.max())
     return Siblings(y, v, unlike, tau, weight / weight.sum())
@@ -207,19 +207,19 @@ def pool_siblings(theta: Array, information: Array, typical: Array) -> Pooled:
     prior, mean = np.full(theta.shape, WIDE**-2.0), np.zeros(theta.shape)
     siblings: list[Siblings] = []
     for _ in range(SWEEPS):
-        before = prior.copy()
+        previous = prior.copy()
         siblings = []
         for k in range(theta.shape[1]):
-            siblings.append(fit_siblings(*_alone(scaled, weighted, prior, mean, k)))
+            siblings.append(fit_siblings(*_by_own_data(scaled, weighted, prior, mean, k)))
             mean[:, k], prior[:, k] = _foretold(siblings[-1])
-        if np.all(np.abs(prior / before - 1) < SETTLED):
+        if np.all(np.abs(prior / previous - 1) < SETTLED):
             break
-    own = np.linalg.inv(scaled)
-    std = np.sqrt(np.diagonal(own, axis1=1, axis2=2))
+    own_covariance = np.linalg.inv(scaled)
+    std = np.sqrt(np.diagonal(own_covariance, axis1=1, axis2=2))
     return Pooled(tuple(siblings), typical, np.where(std < WIDE, std, np.inf) * typical)
 
 
-def _alone(scaled: Array, weighted: Array, prior: Array, mean: Array, k: int) -> tuple[Array, Array]:
+def _by_own_data(scaled: Array, weighted: Array, prior: Array, mean: Array, k: int) -> tuple[Array, Array]:
     """Parameter k and its variance for each sensor, (n,), by its own data and the prior of its other parameters."""
     prior_of_others = prior.copy()
     prior_of_others[:, k] = 0.0

@@ -47,19 +47,19 @@ class ErrorTable:
         if not np.isfinite(values).all() or (values[:, 2] < 0).any():
             raise DataError("the error table has a value that is not finite, or a standard uncertainty below 0")
         angles, errors, _ = self._nodes
-        back = np.flatnonzero(np.diff(angles + errors) <= 0)
-        if back.size:
-            at = angles[back[0]] % TURN_DEG
+        reversals = np.flatnonzero(np.diff(angles + errors) <= 0)
+        if reversals.size:
+            at = angles[reversals[0]] % TURN_DEG
             raise DataError(f"with this error table the stage turns backwards after {at:g} deg; are its errors in deg?")
 
     @cached_property
     def _nodes(self) -> tuple[Array, Array, Array]:
         """Angles, errors and uncertainties in order, over three turns: the middle one is from 0 to 360 deg."""
         angle, error, std = np.array(self.points, dtype=np.float64).T
-        once, place = np.unique(np.round(angle % TURN_DEG, 9) % TURN_DEG, return_inverse=True)
+        distinct, place = np.unique(np.round(angle % TURN_DEG, 9) % TURN_DEG, return_inverse=True)
         mean = np.bincount(place, error) / np.bincount(place)
-        largest = np.array([std[place == k].max() for k in range(len(once))])
-        turns = np.concatenate([once - TURN_DEG, once, once + TURN_DEG])
+        largest = np.array([std[place == k].max() for k in range(len(distinct))])
+        turns = np.concatenate([distinct - TURN_DEG, distinct, distinct + TURN_DEG])
         return turns, np.tile(mean, 3), np.tile(largest, 3)
 
     def true_deg(self, set_deg: ArrayLike) -> tuple[Array, Array]:
@@ -73,21 +73,21 @@ class ErrorTable:
         true = scipy.interpolate.PchipInterpolator(angles, angles + errors)(at)
         return angles_set + true - at, np.interp(at, angles, stds)
 
-    def _joined(self, at: Array, named: Array) -> Array:
+    def _joined(self, at: Array, stated_angles: Array) -> Array:
         """`at`, moved to the nearest point at the edge of a gap. Raises DataError inside a gap."""
         angles = self._nodes[0]
         k = np.searchsorted(angles, at, side="right") - 1
-        below, above = angles[k], angles[k + 1]
-        nearest = np.where(at - below <= above - at, below, above)
-        inside = above - below <= LONGEST_GAP_DEG
-        lost = np.flatnonzero(~inside & (np.abs(at - nearest) > POINT_REACH_DEG))
-        if lost.size:
-            first = lost[0]
+        lower, upper = angles[k], angles[k + 1]
+        nearest = np.where(at - lower <= upper - at, lower, upper)
+        is_covered = upper - lower <= LONGEST_GAP_DEG
+        uncovered = np.flatnonzero(~is_covered & (np.abs(at - nearest) > POINT_REACH_DEG))
+        if uncovered.size:
+            first = uncovered[0]
             raise DataError(
-                f"at {named[first]:g} deg the stage's error table has no point between {below[first]:g} and "
-                f"{above[first]:g} deg; measure there, or choose angles within the table"
+                f"at {stated_angles[first]:g} deg the stage's error table has no point between {lower[first]:g} and "
+                f"{upper[first]:g} deg; measure there, or choose angles within the table"
             )
-        return np.where(inside, at, nearest)
+        return np.where(is_covered, at, nearest)
 
 
 def read_error_table(path: Path) -> tuple[Point, ...]:

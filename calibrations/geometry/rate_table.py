@@ -49,8 +49,8 @@ def turn_axes(table: Table) -> Array:
 def rate_slopes(table: Table) -> Array:
     """Output of each axis per deg/s of the table's rate, shape (3,). Raises DataError where the rate never changes."""
     rate = _changing(table)
-    away = rate - rate.mean()
-    return np.asarray(away @ table.outputs / (away @ away))
+    deviations = rate - rate.mean()
+    return np.asarray(deviations @ table.outputs / (deviations @ deviations))
 
 
 def rate_scales(table: Table) -> Array:
@@ -59,10 +59,10 @@ def rate_scales(table: Table) -> Array:
     Raises DataError where the rate never changes.
     """
     rate = _changing(table)[:, None] * turn_axes(table)
-    away = rate - rate.mean(axis=0)
-    squares = np.sum(away**2, axis=0)
+    deviations = rate - rate.mean(axis=0)
+    squares = np.sum(deviations**2, axis=0)
     turned = squares > LEAST_OTHER_AXIS * squares.max()
-    return np.where(turned, np.sum(away * table.outputs, axis=0) / np.where(turned, squares, 1.0), 0.0)
+    return np.where(turned, np.sum(deviations * table.outputs, axis=0) / np.where(turned, squares, 1.0), 0.0)
 
 
 def is_turned(table: Table, axis: int) -> float:

@@ -38,15 +38,15 @@ def magnetometer_coverage_warning(table: Table) -> str | None:
     if not table.type.field:
         return None
     for degree, effects in ((HARD_IRON, "hard-iron and soft-iron"), (SOFT_IRON, "soft-iron")):
-        if why := coverage_fault(table, degree):
-            return f"{effects} cannot be tested: {why}; the values assume a sensor without this effect"
+        if fault := coverage_fault(table, degree):
+            return f"{effects} cannot be tested: {fault}; the values assume a sensor without this effect"
     return None
 
 
 def directions(table: Table) -> Array:
     """Unit vectors (n, 3) from the centre of the sphere fitted to the outputs."""
-    away = table.outputs - sphere_centre(table.outputs)
-    return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), np.finfo(float).tiny))
+    centred = table.outputs - sphere_centre(table.outputs)
+    return np.asarray(centred / np.maximum(np.linalg.norm(centred, axis=1, keepdims=True), np.finfo(float).tiny))
 
 
 def sphere_centre(means: Array) -> Array:

@@ -31,12 +31,12 @@ def turning_points(table: Table) -> Array:
     Rows in order of time. Other points on the way are included; they have no effect.
     """
     alpha, beta = np.radians(table.column("alpha_deg")), np.radians(table.column("beta_deg"))
-    away = beta - np.radians(_approach_deg(table)) * table.optional("direction", 0.0)
+    beta_start = beta - np.radians(_approach_deg(table)) * table.optional("direction", 0.0)
     if "t_s" not in table:  # the order is not known: each pose is reached from its approach alone
-        last = _on_the_way(table, alpha, away, np.zeros(table.n), beta - away)
-        return np.concatenate([_at(table, alpha, away)[:, None], last[:, :-1]], axis=1)
+        last = _on_the_way(table, alpha, beta_start, np.zeros(table.n), beta - beta_start)
+        return np.concatenate([_at(table, alpha, beta_start)[:, None], last[:, :-1]], axis=1)
     before_alpha, before_beta = np.append(0.0, alpha[:-1]), np.append(0.0, beta[:-1])
-    by_way = np.where(_needs_approach(table, beta - before_beta), away, before_beta)
+    by_way = np.where(_needs_approach(table, beta - before_beta), beta_start, before_beta)
     moves = (
         _on_the_way(table, before_alpha, before_beta, alpha - before_alpha, np.zeros(table.n)),
         _on_the_way(table, alpha, before_beta, np.zeros(table.n), by_way - before_beta),
@@ -51,13 +51,13 @@ def last_turn(table: Table) -> Array:
 
     A pose reached without a move of beta keeps the sense of the pose before. Rows in order of time.
     """
-    moved = np.sign(np.diff(table.column("beta_deg"), prepend=np.nan))
-    moved[0] = 0.0  # before the first move the side is not known
+    sense = np.sign(np.diff(table.column("beta_deg"), prepend=np.nan))
+    sense[0] = 0.0  # before the first move the side is not known
     if _approach_deg(table) > 0:
         direction = table.optional("direction", 0.0)
-        moved = np.where(direction != 0, direction, moved)
-    last = np.maximum.accumulate(np.where(moved != 0, np.arange(table.n), 0))
-    return np.asarray(moved[last])
+        sense = np.where(direction != 0, direction, sense)
+    last = np.maximum.accumulate(np.where(sense != 0, np.arange(table.n), 0))
+    return np.asarray(sense[last])
 
 
 def _approach_deg(table: Table) -> float:

@@ -52,9 +52,11 @@ class Group:
         ]
 
     def _topic(self, name: str, rows: int, names: list[str]) -> Topic:
-        alone = len(names) == 1 and len(self.arrays) == 1
+        is_only_array = len(names) == 1 and len(self.arrays) == 1
         header = [
-            column for array in names for column in _columns(array, self.arrays[array][0], self.arrays[array][1], alone)
+            column
+            for array in names
+            for column in _columns(array, self.arrays[array][0], self.arrays[array][1], is_only_array)
         ]
 
         def cells() -> Cells:
@@ -62,7 +64,7 @@ class Group:
             for array in names:
                 shape, unit, read = self.arrays[array]
                 values = _upright(np.asarray(read(), dtype=np.float64), rows)
-                columns |= dict(zip(_columns(array, shape, unit, alone), values.T.copy(), strict=True))
+                columns |= dict(zip(_columns(array, shape, unit, is_only_array), values.T.copy(), strict=True))
             return columns
 
         return Topic(name, tuple(header), rows, cells, constants=self.constants)
@@ -89,13 +91,13 @@ def _upright(values: Array, rows: int) -> Array:
     return values.T if _lies(values.shape) else values
 
 
-def _columns(name: str, shape: tuple[int, ...], unit: str, alone: bool) -> list[str]:
+def _columns(name: str, shape: tuple[int, ...], unit: str, is_only_array: bool) -> list[str]:
     """The names of an array's columns. A lone array of several columns is a table without a header."""
     width = int(np.prod(shape)) // _rows(shape)
     bracket = f" ({unit})" if unit else ""
     if width == 1:
         return [name + bracket]
-    if alone and width != len(AXES):
+    if is_only_array and width != len(AXES):
         return [str(k + 1) for k in range(width)]
     ends = AXES if width == len(AXES) else [str(k + 1) for k in range(width)]
     return [f"{name}_{end}{bracket}" for end in ends]
@@ -195,29 +197,29 @@ def _hdf5_groups(h5py: Any, path: Path, node: Any, name: str, depth: int) -> Ite
 def _add_dataset(path: Path, group: Group, key: str, data: Any) -> None:
     if data.shape is None or data.attrs.get("MATLAB_class") in (b"char", b"cell", b"function_handle"):
         return
-    matlab, where = "MATLAB_class" in data.attrs, data.name
+    matlab, dataset_path = "MATLAB_class" in data.attrs, data.name
     if data.dtype.names:
         for name in data.dtype.names:
             kind, inner = data.dtype[name].base.kind, data.dtype[name].shape
             if kind in "iufb":
                 require_size(path, data.size * 8)
-                group.arrays[name] = ((*data.shape, *inner), "", _later(path, where, False, name))
+                group.arrays[name] = ((*data.shape, *inner), "", _later(path, dataset_path, False, name))
     elif data.dtype.kind in "iufb" and data.size > 1:
         require_size(path, data.size * 8)
         unit = next((parse_unit(str(_constant(data.attrs[k]))) for k in ("units", "unit") if k in data.attrs), "")
         shape = tuple(reversed(data.shape)) if matlab else data.shape
-        group.arrays[key] = (shape, unit, _later(path, where, matlab))
+        group.arrays[key] = (shape, unit, _later(path, dataset_path, matlab))
     elif data.size == 1:
         constant = _constant(data[()])
         group.constants |= {} if constant is None else {key: constant}
 
 
-def _later(path: Path, where: str, transposed: bool, column: str | None = None) -> Callable[[], Any]:
+def _later(path: Path, dataset_path: str, transposed: bool, column: str | None = None) -> Callable[[], Any]:
     def read() -> Any:
         import h5py
 
         with h5py.File(path, "r") as file:
-            values = file[where][()]
+            values = file[dataset_path][()]
         values = values if column is None else values[column]
         return values.T if transposed else values
 
@@ -230,8 +232,8 @@ def matlab_topics(path: Path) -> list[Topic]:
 
     require_size(path, _matlab_bytes(path))
     variables = loadmat(path, squeeze_me=False, struct_as_record=True)
-    plain = {name: value for name, value in variables.items() if not name.startswith("__")}
-    return [topic for group in _matlab_groups(plain, "", 0) for topic in group.topics()]
+    public_variables = {name: value for name, value in variables.items() if not name.startswith("__")}
+    return [topic for group in _matlab_groups(public_variables, "", 0) for topic in group.topics()]
 
 
 def _matlab_groups(variables: Mapping[str, Any], name: str, depth: int) -> Iterator[Group]:
@@ -345,10 +347,10 @@ def _first_row(sheet: Any) -> tuple[str, ...]:
 
 
 def _worksheet(openpyxl: Any, path: Path, name: str) -> str:
-    out, cells = io.StringIO(), 0
+    text, cells = io.StringIO(), 0
     book = openpyxl.load_workbook(path, read_only=True, data_only=True)
     try:
-        writer = csv.writer(out, lineterminator="\n")
+        writer = csv.writer(text, lineterminator="\n")
         for row in book[name].iter_rows(values_only=True):
             cells += len(row)
             if cells > MOST_CELLS:
@@ -356,4 +358,4 @@ def _worksheet(openpyxl: Any, path: Path, name: str) -> str:
             writer.writerow(["" if v is None else repr(v) if isinstance(v, float) else str(v) for v in row])
     finally:
         book.close()
-    return out.getvalue()
+    return text.getvalue()

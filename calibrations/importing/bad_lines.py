@@ -40,17 +40,17 @@ class BadLines:
         if len(self.shown) < SHOWN:
             self.shown.append(f"line {line} ({reason})")
 
-    def end(self, tell: Callable[[str], None]) -> None:
-        """Report the skipped lines to `tell` at the end of the file. Raises DataError if too many were skipped."""
+    def end(self, report: Callable[[str], None]) -> None:
+        """Report the skipped lines to `report` at the end of the file. Raises DataError if too many were skipped."""
         if not self.bad:
             return
         total = self.good + self.bad
-        many = f"{self.bad} of {total} lines" if self.bad > 1 else f"1 of {total} lines"
+        count_words = f"{self.bad} of {total} lines" if self.bad > 1 else f"1 of {total} lines"
         if self.bad > self.share * total:
             option = "" if self.share == MOST_ASKED else "; --bad-lines skip skips them"
             raise DataError(
-                f"{self.first} ({many} are damaged, and at most {100 * self.share:g} % are skipped{option})"
+                f"{self.first} ({count_words} are damaged, and at most {100 * self.share:g} % are skipped{option})"
             )
-        more = f" and {self.bad - len(self.shown)} more" if self.bad > len(self.shown) else ""
+        rest_words = f" and {self.bad - len(self.shown)} more" if self.bad > len(self.shown) else ""
         verb = "are damaged and were" if self.bad > 1 else "is damaged and was"
-        tell(f"{self.name}: {many} {verb} skipped: {', '.join(self.shown)}{more}.")
+        report(f"{self.name}: {count_words} {verb} skipped: {', '.join(self.shown)}{rest_words}.")

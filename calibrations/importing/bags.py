@@ -37,12 +37,12 @@ def bag_topics(path: Path) -> list[Topic]:
         require_size(path, path.stat().st_size)
         _require_suffix(path)
     try:
-        with _opened(anyreader, path) as reader:
+        with _open(anyreader, path) as reader:
             names = list(dict.fromkeys(connection.topic for connection in reader.connections))
             by_name = {name: [c for c in reader.connections if c.topic == name] for name in names}
             return [_topic(anyreader, path, name, of) for name, of in by_name.items()]
     except anyreader.AnyReaderError as error:
-        raise _refused(path, error) from None
+        raise _bag_error(path, error) from None
 
 
 def _require_suffix(path: Path) -> None:
@@ -54,13 +54,13 @@ def _require_suffix(path: Path) -> None:
         raise DataError(f"{path}: is a ROS bag; rename it so that its name ends with {endings[0]}")
 
 
-def _opened(anyreader: Any, path: Path) -> Any:
+def _open(anyreader: Any, path: Path) -> Any:
     from rosbags.typesys import Stores, get_typestore
 
     return anyreader.AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
 
 
-def _refused(path: Path, error: Exception) -> DataError:
+def _bag_error(path: Path, error: Exception) -> DataError:
     reason = " ".join(str(error).split())[:200]
     if "mismatch" in reason or "definition" in reason:
         remedy = "its message definitions do not fit its messages; record the bag again with the sensor's own messages"
@@ -92,7 +92,7 @@ def _cells(anyreader: Any, path: Path, name: str, kind: str) -> Cells:
     stamps, values = array("q"), [array("d") for _ in VECTORS[kind]]
     absent, frames = set[int](), set[str]()
     try:
-        with _opened(anyreader, path) as reader:
+        with _open(anyreader, path) as reader:
             connections = [c for c in reader.connections if c.topic == name]
             for connection, received_ns, raw in reader.messages(connections=connections):
                 message = reader.deserialize(raw, connection.msgtype)
@@ -105,7 +105,7 @@ def _cells(anyreader: Any, path: Path, name: str, kind: str) -> Cells:
                     if getattr(message, covariance)[0] == -1:
                         absent.add(k)
     except (anyreader.AnyReaderError, KeyError, AttributeError) as error:
-        raise _refused(path, error) from None
+        raise _bag_error(path, error) from None
     if len(frames) > 1:
         raise DataError(
             f"{path}, topic {name}: has messages of {len(frames)} sensors (frame_id {', '.join(sorted(frames))}); "

@@ -59,30 +59,30 @@ def _topics(path: Path) -> list[Topic] | None:
     """The topics of a binary file, None for another file. Raises DataError."""
     try:
         if path.is_dir():
-            return _read(BAG, path) if (path / "metadata.yaml").is_file() else None
+            return _read_topics(BAG, path) if (path / "metadata.yaml").is_file() else None
         with path.open("rb") as file:
             head = file.read(MATLAB_HEADER_BYTES)
     except OSError:
         return None  # the text reader gives the reason
-    read = next((reader for mark, reader in READERS.items() if head.startswith(mark)), None)
+    reader_name = next((reader for mark, reader in READERS.items() if head.startswith(mark)), None)
     if reason := next((reason for mark, reason in CANNOT.items() if head.startswith(mark)), None):
         raise DataError(f"{path}: {reason}")
     if len(head) == MATLAB_HEADER_BYTES and head[126:] in (b"IM", b"MI") and head.startswith(b"MATLAB 5"):
-        read = ("arrays", "matlab_topics")
+        reader_name = ("arrays", "matlab_topics")
     elif head.startswith(b"MATLAB 7.3"):
-        read = READERS[HDF5_MARK]
+        reader_name = READERS[HDF5_MARK]
     elif head.startswith(b"PK\x03\x04"):
-        read = ("arrays", _zip_reader(path))
-    if read is None:
+        reader_name = ("arrays", _zip_reader(path))
+    if reader_name is None:
         return None
-    return _read(read, path)
+    return _read_topics(reader_name, path)
 
 
-def _read(reader: tuple[str, str], path: Path) -> list[Topic]:
+def _read_topics(reader: tuple[str, str], path: Path) -> list[Topic]:
     module, name = reader
-    read: Callable[[Path], list[Topic]] = getattr(import_module(f"calibrations.importing.{module}"), name)
+    read_topics: Callable[[Path], list[Topic]] = getattr(import_module(f"calibrations.importing.{module}"), name)
     with _unreadable_as_data_error(path):
-        return read(path)
+        return read_topics(path)
 
 
 @contextmanager

@@ -69,7 +69,7 @@ def _ulog_topic(data: Any, is_one_of_several: bool, remarks: tuple[str, ...]) ->
         )
 
     def cells() -> Cells:
-        return {ours: _numbers(data.data[theirs]) for theirs, ours in renamed.items()}
+        return {column: _numbers(data.data[field]) for field, column in renamed.items()}
 
     notes = remarks if data.name in RAW or not fields else (*remarks, f"{name}: {CORRECTED}")
     constants: dict[str, Constant] = {"device_id": float(ids[0])} if fields and ids[0] else {}
@@ -85,8 +85,8 @@ def _ulog_remarks(path: Path, log: Any) -> list[str]:
     remarks = []
     if log.file_corruption:
         remarks.append(f"{path}: some records are damaged and were skipped; check the times for gaps, or copy it again")
-    elif (cut := _cut_at(path)) is not None:
-        remarks.append(f"{path}: ends inside a record, at byte {cut}; the complete records before it are used")
+    elif (cut_at := _cut_at(path)) is not None:
+        remarks.append(f"{path}: ends inside a record, at byte {cut_at}; the complete records before it are used")
     if log.dropouts:
         lost_s = sum(dropout.duration for dropout in log.dropouts) / 1000
         remarks.append(f"{path}: the logger lost {lost_s:.3g} s of data in {len(log.dropouts)} dropouts")
@@ -140,20 +140,20 @@ def _require_lengths(path: Path) -> None:
     """Raises DataError for records of less than 3 bytes: pymavlink would read the same bytes for ever."""
     with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
         match = TOO_SHORT.search(content)
-        found = None if match is None else (match.start(), match[0][4])
-    if found is not None:
+        format_place = None if match is None else (match.start(), match[0][4])
+    if format_place is not None:
         raise DataError(
-            f"{path}: is damaged: the format at byte {found[0]} has records of {found[1]} bytes, which cannot be; copy "
-            "it again from the vehicle"
+            f"{path}: is damaged: the format at byte {format_place[0]} has records of {format_place[1]} bytes, "
+            "which cannot be; copy it again from the vehicle"
         )
 
 
 def _dataflash_topics(path: Path, log: Any) -> list[Topic]:
     names = [name for name, number in log.name_to_id.items() if log.counts[number]]
-    read = [name for name in names if DATAFLASH_MESSAGES.match(name)]
+    message_names = [name for name in names if DATAFLASH_MESSAGES.match(name)]
     columns: dict[str, dict[str, array[float]]] = {}
     corrections: dict[str, float] = {}
-    while (message := log.recv_match(type=[*read, "PARM"])) is not None:
+    while (message := log.recv_match(type=[*message_names, "PARM"])) is not None:
         fields = message.to_dict()
         kind = fields.pop("mavpackettype")
         if kind == "PARM":
@@ -161,16 +161,18 @@ def _dataflash_topics(path: Path, log: Any) -> list[Topic]:
                 corrections[str(fields["Name"])] = float(fields["Value"])
             continue
         name = f"{kind}[{fields['I']}]" if "I" in fields else kind
-        into = columns.setdefault(name, {})
+        topic_columns = columns.setdefault(name, {})
         clock = fields.get("SampleUS") or fields.get("TimeUS") or 1000 * fields.get("TimeMS", 0)
-        into.setdefault("t_s (us)", array("d")).append(clock)
-        for theirs, ours in DATAFLASH_FIELDS.items():
-            if theirs in fields:
-                into.setdefault(ours, array("d")).append(fields[theirs])
+        topic_columns.setdefault("t_s (us)", array("d")).append(clock)
+        for field, column in DATAFLASH_FIELDS.items():
+            if field in fields:
+                topic_columns.setdefault(column, array("d")).append(fields[field])
     remarks = _dataflash_remarks(path, log)
     topics = [_dataflash_topic(name, cells, corrections, remarks) for name, cells in columns.items()]
     refusal = "has no accelerometer, gyroscope or magnetometer; choose ACC, GYR, IMU or MAG"
-    unread = [name for name in names if name not in read and name not in ("FMT", "FMTU", "UNIT", "MULT", "PARM")]
+    unread = [
+        name for name in names if name not in message_names and name not in ("FMT", "FMTU", "UNIT", "MULT", "PARM")
+    ]
     return topics + [Topic(n, (), log.counts[log.name_to_id[n]], refusal=refusal, sensor="") for n in unread]
 
 
@@ -178,15 +180,15 @@ def _dataflash_remarks(path: Path, log: Any) -> list[str]:
     """The bytes between records that belong to none, and a cut last record; pymavlink skips both without a word."""
     kinds = [k for k, offsets in enumerate(log.offsets) if len(offsets) and k in log.formats]
     first = np.concatenate([np.asarray(log.offsets[k], dtype=np.int64) for k in kinds])
-    after = first + np.repeat([log.formats[k].len for k in kinds], [len(log.offsets[k]) for k in kinds])
+    ends = first + np.repeat([log.formats[k].len for k in kinds], [len(log.offsets[k]) for k in kinds])
     order = np.argsort(first)
-    first, after = first[order], after[order]
-    holes = np.flatnonzero(first[1:] > after[:-1])
+    first, ends = first[order], ends[order]
+    holes = np.flatnonzero(first[1:] > ends[:-1])
     remarks = []
     if len(holes):
-        lost, place = int((first[1:] - after[:-1])[holes].sum()), int(after[holes[0]])
-        remarks.append(f"{path}: {lost} bytes are no record and were skipped, the first at {place}; copy it again")
-    if after[-1] > path.stat().st_size:
+        skipped, place = int((first[1:] - ends[:-1])[holes].sum()), int(ends[holes[0]])
+        remarks.append(f"{path}: {skipped} bytes are no record and were skipped, the first at {place}; copy it again")
+    if ends[-1] > path.stat().st_size:
         remarks.append(f"{path}: ends inside a record, at byte {first[-1]}; the complete records before it are used")
     return remarks
 
@@ -194,7 +196,7 @@ def _dataflash_remarks(path: Path, log: Any) -> list[str]:
 def _dataflash_topic(
     name: str, columns: Mapping[str, array[float]], corrections: Mapping[str, float], remarks: list[str]
 ) -> Topic:
-    cells = {ours: np.frombuffer(values, dtype=np.float64) for ours, values in columns.items()}
+    cells = {column: np.frombuffer(values, dtype=np.float64) for column, values in columns.items()}
     if "temperature_c" in cells and not np.any(cells["temperature_c"]):
         del cells["temperature_c"]  # not measured
     sensor = next((s for s in "amg" if any(k.startswith(f"{s}x ") for k in cells)), "")

@@ -72,14 +72,14 @@ def import_sheet(
     laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping] = (), constants: Mapping[str, Constant] | None = None
 ) -> ImportedTable:
     """The table in a sheet. Raises DataError; the message of MissingColumn ends with a likely import command."""
-    chosen = complete_mapping(laid, mapped)
+    mapping = complete_mapping(laid, mapped)
     try:
-        return _import_with(laid, kind, chosen, constants or {})
+        return _import_with(laid, kind, mapping, constants or {})
     except MissingColumn as error:
         from calibrations.importing.proposal import suggest_import  # a table with its columns needs no proposal
 
         tail = suggest_import(
-            laid, kind, chosen, constants or {}, lambda *meant: _import_with(laid, *_completed(laid, *meant)).table
+            laid, kind, mapping, constants or {}, lambda *meant: _import_with(laid, *_completed(laid, *meant)).table
         )
         raise MissingColumn(f"{error}{tail}") from None
 
@@ -92,59 +92,59 @@ def _completed(
 
 
 def _import_with(
-    laid: Sheet, kind: str | None, chosen: Sequence[ColumnMapping], constants: Mapping[str, Constant]
+    laid: Sheet, kind: str | None, mapping: Sequence[ColumnMapping], constants: Mapping[str, Constant]
 ) -> ImportedTable:
     """The table by a complete mapping. Raises DataError, MissingColumn without advice."""
-    unmapped = _unmapped_columns(laid, chosen, bool(chosen))
+    unmapped = _unmapped_columns(laid, mapping, bool(mapping))
     try:
-        kind = kind or guess_kind([*(m.name for m in chosen), *unmapped])
+        kind = kind or guess_kind([*(m.name for m in mapping), *unmapped])
     except MissingColumn as error:
         reason = error if look_like_names(laid.header) else "a header line with column names is missing"
         raise MissingColumn(f"{laid.place}: {reason}") from None
     merged = {**laid.constants, **constants}
-    merged |= _output_unit(chosen, kind, merged.get("triad") == "m", laid.name)
-    mapped_names = {m.theirs for m in chosen}
-    path = next((m.theirs for m in chosen if m.name == PATH), PATH)
+    merged |= _output_unit(mapping, kind, merged.get("triad") == "m", laid.name)
+    mapped_names = {m.theirs for m in mapping}
+    path = next((m.theirs for m in mapping if m.name == PATH), PATH)
     first = zip(laid.header, laid.sample[0], strict=True)
     words = [name for name, cell in first if name not in mapped_names and _is_text(name, cell)]
-    needed = {*mapped_names - {path}, *NUMBERS}
+    required = {*mapped_names - {path}, *NUMBERS}
     notes: list[str] = []
     words = list(dict.fromkeys([*words, path])) if path in laid.header else words
-    numbers, texts = read_cells(laid, words, needed, notes.append)
-    columns = {m.name: _converted(numbers[m.theirs], m) for m in chosen if m.name != PATH}
+    numbers, texts = read_cells(laid, words, required, notes.append)
+    columns = {m.name: _converted(numbers[m.theirs], m) for m in mapping if m.name != PATH}
     columns |= {name: numbers[name] for name in unmapped if name in numbers}
     labels = {k: texts[k] for k in unmapped if k in texts} | ({PATH: texts[path]} if path in texts else {})
     if is_session(kind, columns, labels.get(PATH)):
         columns[RATE] = sample_rates(columns, labels[PATH], merged, laid.name)
     table = Table.from_columns(kind, columns, merged, laid.name, labels)
-    _check_units(table, laid, chosen)
+    _check_units(table, laid, mapping)
     check_at_rest(table)
     check_turning(table)
-    return ImportedTable(table, laid, tuple(chosen), tuple(notes))
+    return ImportedTable(table, laid, tuple(mapping), tuple(notes))
 
 
 def complete_mapping(laid: Sheet, mapped: Sequence[ColumnMapping]) -> list[ColumnMapping]:
     """`mapped` with names and units from the header, and the columns that have our names. Raises DataError."""
-    chosen: list[ColumnMapping] = []
+    mappings: list[ColumnMapping] = []
     for m in mapped:
-        if m.name in [mapping.name for mapping in chosen]:
+        if m.name in [mapping.name for mapping in mappings]:
             raise DataError(f'{laid.name}: the column "{m.name}" is mapped twice; give it once')
-        chosen.append(_locate(laid, m))
-    mapped_names = {m.theirs for m in chosen}
-    for header, bare, unit in zip(laid.header, laid.bare, laid.units, strict=True):
-        if bare in NUMBERS - {m.name for m in chosen} and header not in mapped_names:
-            chosen.append(check_unit(ColumnMapping(bare, header, unit), laid.name))
-    return [m for m in chosen if m.unit or m.name != m.theirs]
+        mappings.append(_locate(laid, m))
+    mapped_names = {m.theirs for m in mappings}
+    for header, name, unit in zip(laid.header, laid.bare, laid.units, strict=True):
+        if name in NUMBERS - {m.name for m in mappings} and header not in mapped_names:
+            mappings.append(check_unit(ColumnMapping(name, header, unit), laid.name))
+    return [m for m in mappings if m.unit or m.name != m.theirs]
 
 
 def needs_mapping(laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping]) -> bool:
     """Whether a table of `kind`, or of any kind, still lacks columns. Raises as `complete_mapping`."""
-    chosen = complete_mapping(laid, mapped)
-    names = {m.name for m in chosen} | set(_unmapped_columns(laid, chosen, bool(mapped)))
+    mapping = complete_mapping(laid, mapped)
+    names = {m.name for m in mapping} | set(_unmapped_columns(laid, mapping, bool(mapped)))
     if kind == "rates" and PATH in names:
         from calibrations.importing.proposal import missing_columns  # as above
 
-        return bool(missing_columns(kind, laid, chosen))
+        return bool(missing_columns(kind, laid, mapping))
     kinds = [FILE_KINDS[kind]] if kind else FILE_KINDS.values()
     sets = [columns for kind_of_table in kinds for columns in kind_of_table.columns if kind or len(columns) > 1]
     return not any(names.issuperset(columns) for columns in sets)
@@ -156,25 +156,25 @@ def _locate(laid: Sheet, m: ColumnMapping) -> ColumnMapping:
         if m.theirs in names:
             place = names.index(m.theirs)
             return check_unit(replace(m, theirs=laid.header[place], unit=m.unit or laid.units[place]), laid.name)
-    bare, _, unit = m.theirs.rpartition(":")
-    if not m.unit and bare in laid.header:
-        raise DataError(f'{laid.name}: unknown unit "{unit}" of the column "{bare}"{nearest(unit, UNITS)}')
+    column, _, unit = m.theirs.rpartition(":")
+    if not m.unit and column in laid.header:
+        raise DataError(f'{laid.name}: unknown unit "{unit}" of the column "{column}"{nearest(unit, UNITS)}')
     raise MissingColumn(f'{laid.name}: there is no column "{m.theirs}"{nearest(m.theirs, laid.header)}')
 
 
 def check_unit(m: ColumnMapping, source: str) -> ColumnMapping:
     """The mapping itself. Raises DataError for a unit that cannot be converted to the target's."""
-    own = column_unit(m.name)
-    if m.unit and own and UNITS[m.unit][0] != own:
+    target_unit = column_unit(m.name)
+    if m.unit and target_unit and UNITS[m.unit][0] != target_unit:
         raise DataError(
-            f'{source}: the column "{m.name}" is in {own}; "{m.theirs}" in {m.unit} cannot be converted to it'
+            f'{source}: the column "{m.name}" is in {target_unit}; "{m.theirs}" in {m.unit} cannot be converted to it'
         )
     return m
 
 
-def _unmapped_columns(laid: Sheet, chosen: Sequence[ColumnMapping], is_mapped: bool) -> list[str]:
+def _unmapped_columns(laid: Sheet, mapping: Sequence[ColumnMapping], is_mapped: bool) -> list[str]:
     """The columns that keep their own names; none of a file without a header if some are mapped."""
-    used = {name for m in chosen for name in (m.name, m.theirs)}
+    used = {name for m in mapping for name in (m.name, m.theirs)}
     return [name for name in laid.header if name not in used] if laid.named or not is_mapped else []
 
 
@@ -189,11 +189,11 @@ def _converted(values: Array, m: ColumnMapping) -> Array:
     return values if (factor, offset) == (1.0, 0.0) else values * factor + offset
 
 
-def _check_units(table: Table, laid: Sheet, chosen: Sequence[ColumnMapping]) -> None:
+def _check_units(table: Table, laid: Sheet, mapping: Sequence[ColumnMapping]) -> None:
     """Raises DataError for numbers that are unlikely in their unit, with the import command for a better one."""
-    stated = {m.name for m in chosen if m.unit}
-    doubts = find_unit_doubts(table, stated)
-    is_timed = is_raw_log(table) and "t_s" in table and "t_s" not in stated
+    with_unit = {m.name for m in mapping if m.unit}
+    doubts = find_unit_doubts(table, with_unit)
+    is_timed = is_raw_log(table) and "t_s" in table and "t_s" not in with_unit
     if is_timed and (doubt := find_log_time_doubt(table.column("t_s"))) is not None:
         doubts["t_s"] = doubt
     if not doubts:
@@ -201,15 +201,15 @@ def _check_units(table: Table, laid: Sheet, chosen: Sequence[ColumnMapping]) -> 
     from calibrations.importing.proposal import import_command  # as above
 
     name, (reason, unit) = next(iter(doubts.items()))
-    by_name = {name: ColumnMapping(name, name) for name in doubts} | {m.name: m for m in chosen}
-    better = [replace(m, unit=doubts[m.name][1] if m.name in doubts else m.unit) for m in by_name.values()]
-    own = next(replace(m, unit=column_unit(name)) for m in better if m.name == name)
+    by_name = {name: ColumnMapping(name, name) for name in doubts} | {m.name: m for m in mapping}
+    corrected = [replace(m, unit=doubts[m.name][1] if m.name in doubts else m.unit) for m in by_name.values()]
+    as_stated = next(replace(m, unit=column_unit(name)) for m in corrected if m.name == name)
     if not unit:
-        raise DataError(f'{laid.name}: the column "{name}" {reason}; state its unit, as in --column {own.text}')
+        raise DataError(f'{laid.name}: the column "{name}" {reason}; state its unit, as in --column {as_stated.text}')
     raise DataError(
         f'{laid.name}: the column "{name}" {reason}\nIf its unit is {unit}, import it with:\n\n'
-        f"    {import_command(laid, table.kind, better)}\n\n"
-        f"If its unit is {own.unit} after all, state it: --column {own.text}"
+        f"    {import_command(laid, table.kind, corrected)}\n\n"
+        f"If its unit is {as_stated.unit} after all, state it: --column {as_stated.text}"
     )
 
 
@@ -220,8 +220,8 @@ def _output_unit(mapped: Sequence[ColumnMapping], kind: str, field: bool, source
     """
     accelerometer = any(m.name == "ax" for m in mapped)
     for axes in (RATES,) if kind == "rates" else TRIADS[1:] if field else TRIADS[:1] if accelerometer else TRIADS:
-        stated = {m.name: UNITS[m.unit][0] for m in mapped if m.unit}
-        units = {axis: stated.get(axis, "") for axis in axes}
+        stated_units = {m.name: UNITS[m.unit][0] for m in mapped if m.unit}
+        units = {axis: stated_units.get(axis, "") for axis in axes}
         if len(set(units.values())) > 1:
             units_of_axes = ", ".join(f"{axis} in {unit or 'no unit'}" for axis, unit in units.items())
             raise DataError(f"{source}: the three axes must have the same unit: {units_of_axes}")
@@ -249,9 +249,9 @@ def drop_duplicate_rows(table: Table) -> tuple[Table, str | None]:
     if not len(copies):
         return table, None
     pairs = [f"{row + 1} (as {first[group.ravel()[row]] + 1})" for row in copies[:MOST_ROWS_LISTED]]
-    more = f" and {len(copies) - MOST_ROWS_LISTED} more" if len(copies) > MOST_ROWS_LISTED else ""
+    rest_words = f" and {len(copies) - MOST_ROWS_LISTED} more" if len(copies) > MOST_ROWS_LISTED else ""
     verb = "copies an earlier row" if len(copies) == 1 else "copy earlier rows"
-    rows_said = f"row{'s' if len(copies) > 1 else ''} {', '.join(pairs)}{more}"
+    rows_said = f"row{'s' if len(copies) > 1 else ''} {', '.join(pairs)}{rest_words}"
     return table.rows(np.sort(first)), (
         f"{table.source}: {rows_said} {verb} (same time, same values); each is used once."
     )

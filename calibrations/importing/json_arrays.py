@@ -34,7 +34,7 @@ def json_as_lines(source: Source) -> Source:
         if source.name.endswith(".json"):
             raise DataError(f"{source.name}: is not valid JSON; {JSON_FORM}") from None
         return source
-    return text_source(_written(document, source.name), source.name)
+    return text_source(_csv_text(document, source.name), source.name)
 
 
 def _bounded(lines: Iterator[str], name: str) -> Iterator[str]:
@@ -46,7 +46,7 @@ def _bounded(lines: Iterator[str], name: str) -> Iterator[str]:
         yield line
 
 
-def _written(document: Any, name: str) -> str:
+def _csv_text(document: Any, name: str) -> str:
     if isinstance(document, list) and document and all(isinstance(row, dict) for row in document):
         document = {key: [row.get(key) for row in document] for key in document[0]}
     arrays = {k: v for k, v in document.items() if isinstance(v, list) and v} if isinstance(document, dict) else {}
@@ -56,14 +56,14 @@ def _written(document: Any, name: str) -> str:
     if len(set(lengths.values())) > 1:
         raise DataError(f"{name}: arrays of different length: {lengths}")
     columns = dict(chain.from_iterable(_columns(key, values, name) for key, values in arrays.items()))
-    out = io.StringIO()
-    out.writelines(
+    text = io.StringIO()
+    text.writelines(
         f"# {key}: {value}\n" for key, value in document.items() if isinstance(value, (str, int, float)) and value != ""
     )
-    writer = csv.writer(out, lineterminator="\n")
+    writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     writer.writerows(zip(*columns.values(), strict=True))
-    return out.getvalue()
+    return text.getvalue()
 
 
 def _columns(key: str, values: list[Any], name: str) -> Iterator[tuple[str, list[Any]]]:
@@ -72,10 +72,10 @@ def _columns(key: str, values: list[Any], name: str) -> Iterator[tuple[str, list
         yield key, values
         return
     width = len(values[0])
-    bad = next((k for k, row in enumerate(values) if not isinstance(row, list) or len(row) != width), None)
-    if bad is not None:
+    wrong_row = next((k for k, row in enumerate(values) if not isinstance(row, list) or len(row) != width), None)
+    if wrong_row is not None:
         raise DataError(
-            f'{name}: row {bad + 1} of "{key}" does not have {width} numbers like the first row; {JSON_FORM}'
+            f'{name}: row {wrong_row + 1} of "{key}" does not have {width} numbers like the first row; {JSON_FORM}'
         )
     names = AXES if width == len(AXES) else [str(k + 1) for k in range(width)]
     for place, end in enumerate(names):

@@ -40,19 +40,19 @@ ROUND_DEG_S = 0.05
 Doubt = tuple[str, str]  # the reason, and the unit that would fit, "" for none
 
 
-def find_unit_doubts(table: Table, stated: Collection[str]) -> dict[str, Doubt]:
-    """The columns with an unlikely unit. `stated`: columns whose unit the file or a person gives."""
-    doubts = {name: _doubt(name, values, name in stated) for name, values in table.columns.items()}
+def find_unit_doubts(table: Table, stated_columns: Collection[str]) -> dict[str, Doubt]:
+    """The columns with an unlikely unit. `stated_columns`: columns whose unit the file or a person gives."""
+    doubts = {name: _doubt(name, values, name in stated_columns) for name, values in table.columns.items()}
     return {name: doubt for name, doubt in doubts.items() if doubt is not None}
 
 
 def looks_like_radians(values: Array) -> bool:
     """Whether angles lie within one turn in rad and off the grid of whole arc minutes on which degrees are set."""
-    some: Array = np.unique(np.round(np.abs(values), 6))
-    some = some[some > ROUNDING_DEG]
-    if not len(some) or some[-1] > 2 * np.pi * 1.001 or _on_grid(some, ARC_MINUTE_DEG, ROUNDING_DEG):
+    distinct: Array = np.unique(np.round(np.abs(values), 6))
+    distinct = distinct[distinct > ROUNDING_DEG]
+    if not len(distinct) or distinct[-1] > 2 * np.pi * 1.001 or _on_grid(distinct, ARC_MINUTE_DEG, ROUNDING_DEG):
         return False
-    return len(some) >= FEWEST_ANGLES or _on_grid(some, np.pi / 36, ROUNDING_DEG)
+    return len(distinct) >= FEWEST_ANGLES or _on_grid(distinct, np.pi / 36, ROUNDING_DEG)
 
 
 def _on_grid(values: Array, step: float, rounding: float) -> bool:
@@ -83,17 +83,17 @@ def covers_all_directions(outputs: Array) -> bool:
     sphere's
     centre, and directions spread over the sphere.
     """
-    away = outputs - sphere_centre(outputs)
-    size = np.linalg.norm(away, axis=1)
+    centred = outputs - sphere_centre(outputs)
+    size = np.linalg.norm(centred, axis=1)
     low, middle, high = np.quantile(size, [0.25, 0.5, 0.75])
     if not middle > 0 or (high - low) / middle > MOST_MAGNITUDE_SPREAD:
         return False
-    directions = away / np.maximum(size, np.finfo(float).tiny)[:, None]
+    directions = centred / np.maximum(size, np.finfo(float).tiny)[:, None]
     return bool(np.linalg.eigvalsh(directions.T @ directions / len(outputs))[0] > LEAST_DIRECTION_SHARE)
 
 
-def _doubt(name: str, values: Array, stated: bool) -> Doubt | None:
-    return _impossible(name, values) or (None if stated else _unlikely(name, values))
+def _doubt(name: str, values: Array, has_unit: bool) -> Doubt | None:
+    return _impossible(name, values) or (None if has_unit else _unlikely(name, values))
 
 
 def _impossible(name: str, values: Array) -> Doubt | None:
@@ -105,8 +105,8 @@ def _impossible(name: str, values: Array) -> Doubt | None:
 
 
 def _unlikely(name: str, values: Array) -> Doubt | None:
-    ask = UNIT_CHECKS.get(column_unit(name)) if name in NUMBERS else None
-    return ask(values) if ask else None
+    check = UNIT_CHECKS.get(column_unit(name)) if name in NUMBERS else None
+    return check(values) if check else None
 
 
 def _angle(values: Array) -> Doubt | None:
@@ -117,11 +117,15 @@ def _angle(values: Array) -> Doubt | None:
 
 def _rate(values: Array) -> Doubt | None:
     """Rates that are whole multiples of 5 deg/s if they are in rad/s, and no round numbers as they are."""
-    some: Array = np.unique(np.round(np.abs(values), 6))
-    some = some[some > ROUNDING_DEG]
-    if len(some) < FEWEST_RATES or some[-1] > FASTEST_RAD_S or not _on_grid(some, np.pi / 36, RATE_ROUNDING):
+    distinct: Array = np.unique(np.round(np.abs(values), 6))
+    distinct = distinct[distinct > ROUNDING_DEG]
+    if (
+        len(distinct) < FEWEST_RATES
+        or distinct[-1] > FASTEST_RAD_S
+        or not _on_grid(distinct, np.pi / 36, RATE_ROUNDING)
+    ):
         return None
-    if _on_grid(some, ROUND_DEG_S, ROUNDING_DEG / 2):
+    if _on_grid(distinct, ROUND_DEG_S, ROUNDING_DEG / 2):
         return None
     return (
         f"runs from {values.min():.4g} to {values.max():.4g}, in whole multiples of 5 deg/s if it is in rad/s",
@@ -226,10 +230,10 @@ def check_turning(table: Table) -> None:
     if table.content != "rates" or table.unit != "deg/s":
         return
     try:
-        along = table.column("rate_deg_s")[:, None] * turn_axes(table)
+        axis_rates = table.column("rate_deg_s")[:, None] * turn_axes(table)
     except DataError:  # the axes are not known
         return
-    slopes, *_ = np.linalg.lstsq(np.column_stack([np.ones(table.n), along]), table.outputs, rcond=None)
+    slopes, *_ = np.linalg.lstsq(np.column_stack([np.ones(table.n), axis_rates]), table.outputs, rcond=None)
     per_rate = float(np.linalg.norm(slopes[1:], axis=0).max())
     degrees = UNITS["rad/s"][1]
     hints = {

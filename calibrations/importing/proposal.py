@@ -102,9 +102,13 @@ def propose_mapping(laid: Sheet, kind: str | None = None, mapped: Sequence[Colum
     unmapped = [name for name in laid.header if name not in {m.theirs for m in mapped} | NUMBERS]
     values = {name: numbers for name in unmapped if len(numbers := sample_values(laid, name))}
     guesses = guess_by_names(laid, values, kind) if laid.named else guess_by_values(values, kind)
-    for name, ours in guesses:
-        if ours not in {m.name for m in mapping} and ours not in laid.header and (ours != "n" or _counts(values[name])):
-            mapping.append(ColumnMapping(ours, name, _unit(laid, name, ours, values[name])))
+    for name, target in guesses:
+        if (
+            target not in {m.name for m in mapping}
+            and target not in laid.header
+            and (target != "n" or _counts(values[name]))
+        ):
+            mapping.append(ColumnMapping(target, name, _unit(laid, name, target, values[name])))
     if kind == "rates":
         return _with_sections(mapping, laid)
     return _with_gravity(mapping, values) if kind == "positions" else _with_scatter(_with_time(mapping, laid))
@@ -120,13 +124,13 @@ def likely_kind(laid: Sheet, mapped: Iterable[ColumnMapping] = ()) -> str:
     """`rates` with a gyroscope's outputs and a rate or named sections; `poses` with a stage angle; `motion` with a
     displacement; `positions` with three outputs; else `poses`.
     """
-    names = {*(m.name for m in mapped), *laid.bare, *(_by_name(bare, "poses") for bare in laid.bare)}
-    turned = {*names, *(_by_name(bare, "rates") for bare in laid.bare)}
+    names = {*(m.name for m in mapped), *laid.bare, *(_by_name(unitless, "poses") for unitless in laid.bare)}
+    turned = {*names, *(_by_name(unitless, "rates") for unitless in laid.bare)}
     if {"rate_deg_s", "gx"} <= turned or (_section(laid) and {"gx", "gy", "gz"} <= turned):
         return "rates"
     if {"alpha_deg", "beta_deg"} & names:
         return "poses"
-    if "displacement_m" in {*names, *(_by_name(bare, "motion") for bare in laid.bare)}:
+    if "displacement_m" in {*names, *(_by_name(unitless, "motion") for unitless in laid.bare)}:
         return "motion"
     if laid.named:
         return (
@@ -162,21 +166,21 @@ def import_command(
     return shlex.join(words)
 
 
-def _shortest(laid: Sheet, theirs: str) -> str:
+def _shortest(laid: Sheet, column: str) -> str:
     """The file's column name without its unit, where that is unique."""
-    bare = split_unit(theirs)[0]
-    return bare if laid.bare.count(bare) == 1 else theirs
+    unitless = split_unit(column)[0]
+    return unitless if laid.bare.count(unitless) == 1 else column
 
 
 def guess_by_names(laid: Sheet, values: Mapping[str, Array], kind: str) -> list[tuple[str, str]]:
     """(their name, our name) for the columns with a meaningful name."""
-    bare = dict(zip(laid.header, laid.bare, strict=True))
+    unitless = dict(zip(laid.header, laid.bare, strict=True))
     units = dict(zip(laid.header, laid.units, strict=True))
-    guesses = [(name, _by_name(bare[name], kind) or _by_unit(bare[name], units[name])) for name in values]
-    named = {ours for _, ours in guesses}
-    nameless = iter(name for name in KINDS[kind].outputs if name not in named)
-    plain = {name: next(nameless, "") for name, ours in guesses if not ours and _is_output(bare[name])}
-    return [(name, ours or plain.get(name, "")) for name, ours in guesses if ours or plain.get(name)]
+    guesses = [(name, _by_name(unitless[name], kind) or _by_unit(unitless[name], units[name])) for name in values]
+    targets = {target for _, target in guesses}
+    nameless = iter(name for name in KINDS[kind].outputs if name not in targets)
+    outputs = {name: next(nameless, "") for name, target in guesses if not target and _is_output(unitless[name])}
+    return [(name, target or outputs.get(name, "")) for name, target in guesses if target or outputs.get(name)]
 
 
 def guess_by_values(values: Mapping[str, Array], kind: str) -> list[tuple[str, str]]:
@@ -206,43 +210,43 @@ def sample_values(laid: Sheet, name: str) -> Array:
 
 def sensed_by(header: Iterable[str], topic: str) -> str:
     """The sensor whose three axes, or whose poses, a topic and its columns name: a, m or g; "" for none."""
-    bare = {split_unit(name)[0] for name in header}
-    if {"vx_v", "alpha_deg"} & bare:
+    unitless = {split_unit(name)[0] for name in header}
+    if {"vx_v", "alpha_deg"} & unitless:
         return "a"
-    for names in (bare & NUMBERS, {_by_name(f"{topic}_{name}", "positions") for name in bare}):
+    for names in (unitless & NUMBERS, {_by_name(f"{topic}_{name}", "positions") for name in unitless}):
         for sensor in "amg":
             if names.issuperset(sensor + axis for axis in AXES):
                 return sensor
     return ""
 
 
-def _by_name(bare: str, kind: str) -> str:
+def _by_name(unitless: str, kind: str) -> str:
     """Our name for theirs, "" for a name without a known meaning."""
-    if (match := INDEXED.match(bare)) and int(match["index"]) < len(AXES):
-        bare = f"{match['name']}_{AXES[int(match['index'])]}"  # accSmooth[0] of Betaflight
-    words = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", bare)
+    if (match := INDEXED.match(unitless)) and int(match["index"]) < len(AXES):
+        unitless = f"{match['name']}_{AXES[int(match['index'])]}"  # accSmooth[0] of Betaflight
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", unitless)
     axis = next((m["axis"] for m in re.finditer(AXIS, re.sub(r"[^a-z]", " ", words.lower()))), "")
     lower = words.lower()
-    if bare in ("T", "Temp"):
+    if unitless in ("T", "Temp"):
         return "temperature_c"
     if axis and kind in STD_COLUMNS and re.search(SCATTER, lower):
         return STD_COLUMNS[kind].format(axis=axis)
-    ours = next((ours for pattern, ours in NAME_PATTERNS[kind] if re.search(pattern, lower)), None)
-    if ours is not None:
-        return "" if "{axis}" in ours and not axis else ours.format(axis=axis)
+    target = next((target for pattern, target in NAME_PATTERNS[kind] if re.search(pattern, lower)), None)
+    if target is not None:
+        return "" if "{axis}" in target and not axis else target.format(axis=axis)
     last = re.search(r"(?:^|[_\W]|^v|^u|^a|acc|out)(?P<axis>[xyz])\d*$", lower)
     axis = axis or (last["axis"] if last else "")
     return dict(zip(AXES, KINDS[kind].outputs, strict=False)).get(axis, "")
 
 
-def _by_unit(bare: str, unit: str) -> str:
+def _by_unit(unitless: str, unit: str) -> str:
     """Our name by the unit alone: a temperature or a time."""
-    own = UNITS[unit][0] if unit else ""
-    return {"degC": "temperature_c", "s": "t_s"}.get(own, "") if bare else ""
+    target_unit = UNITS[unit][0] if unit else ""
+    return {"degC": "temperature_c", "s": "t_s"}.get(target_unit, "") if unitless else ""
 
 
-def _is_output(bare: str) -> bool:
-    return re.search(r"v?out|volt|signal|sensor|^v$|^u$|^ch|channel|ain|adc|acc", bare.lower()) is not None
+def _is_output(unitless: str) -> bool:
+    return re.search(r"v?out|volt|signal|sensor|^v$|^u$|^ch|channel|ain|adc|acc", unitless.lower()) is not None
 
 
 def _is_angle(values: Array) -> bool:
@@ -251,12 +255,12 @@ def _is_angle(values: Array) -> bool:
     return bool(len(values) and on_grid and 2 * np.pi < np.max(np.abs(values)) <= 360)
 
 
-def _unit(laid: Sheet, name: str, ours: str, values: Array) -> str:
+def _unit(laid: Sheet, name: str, target: str, values: Array) -> str:
     """The unit that the file states, if it fits; else the one that fits the values."""
-    stated, own = laid.units[laid.header.index(name)], column_unit(ours)
-    if stated:
-        return stated if not own or UNITS[stated][0] == own else ""
-    return likely_unit(ours, values)
+    stated_unit, target_unit = laid.units[laid.header.index(name)], column_unit(target)
+    if stated_unit:
+        return stated_unit if not target_unit or UNITS[stated_unit][0] == target_unit else ""
+    return likely_unit(target, values)
 
 
 def _counts(values: Array) -> bool:
@@ -280,9 +284,9 @@ def _with_sections(mapping: list[ColumnMapping], laid: Sheet) -> list[ColumnMapp
 
 def time_doubt(laid: Sheet, mapped: Iterable[ColumnMapping]) -> Doubt | None:
     """The doubt about the unit of the time, as the first rows show it; None where a unit is stated."""
-    theirs = {m.name: m.theirs for m in mapped}
+    columns = {m.name: m.theirs for m in mapped}
     clock = next((m for m in mapped if m.name == "t_s" and not m.unit), None)
-    angles = [sample_values(laid, theirs[name]) for name in ("alpha_deg", "beta_deg") if name in theirs]
+    angles = [sample_values(laid, columns[name]) for name in ("alpha_deg", "beta_deg") if name in columns]
     if clock is None or not angles or not all(map(len, angles)):
         return None
     time_s = sample_values(laid, clock.theirs)
@@ -306,7 +310,7 @@ def _with_gravity(mapping: list[ColumnMapping], values: Mapping[str, Array]) -> 
     for names, unit_of_all in ((KINDS["positions"].outputs, gravity_unit), (KINDS["fields"].outputs, field_unit)):
         axes = {m.name: m.theirs for m in mapping if m.name in names and not m.unit and m.theirs in values}
         if len(axes) == len(AXES):
-            unit = unit_of_all(np.column_stack([values[theirs] for theirs in axes.values()]))
+            unit = unit_of_all(np.column_stack([values[column] for column in axes.values()]))
             mapping = [replace(m, unit=unit) if m.name in axes else m for m in mapping]
     return mapping
 
@@ -355,17 +359,17 @@ def _attempt(
     while True:
         try:
             table = average_raw_log(take(kind, columns, merged))
-            why = _objection(table, laid)
+            objection = _objection(table, laid)
         except MissingConstant as error:
             if error.name in merged:
-                why = str(error)
+                objection = str(error)
             else:
                 merged[error.name] = error.likely or EXAMPLES[error.name][0]
                 unknown += [] if error.likely else [error.name]
                 continue
         except DataError as error:
-            why = str(error)
-        return Attempt(kind, columns, merged, (), tuple(unknown), why)
+            objection = str(error)
+        return Attempt(kind, columns, merged, (), tuple(unknown), objection)
 
 
 def _objection(table: Table, laid: Sheet) -> str:
@@ -377,24 +381,26 @@ def _objection(table: Table, laid: Sheet) -> str:
     return ""
 
 
-def _suggestion(laid: Sheet, tried: Attempt) -> str:
-    free = [name for name in laid.header if name not in {m.theirs for m in tried.columns}]
-    cannot = len(tried.lacking) == len(required_columns(tried.kind, ())) or len(tried.lacking) > len(free)
-    if not tried.columns or (not laid.named and (tried.lacking or tried.refused)) or (laid.named and cannot):
-        theirs = "such as vx_v=Vout:mV" if laid.named else "by its number, such as vx_v=2:mV"
-        return f"; name a column with --column, {theirs}"
-    columns = [*tried.columns, *(ColumnMapping(name, PLACEHOLDER) for name in tried.lacking)]
-    stated = {k: PLACEHOLDER if k in tried.unknown else v for k, v in tried.constants.items()}
-    words = [f"{key}={value:.15g}" if isinstance(value, float) else f"{key}={value}" for key, value in stated.items()]
-    line = f"\n\n    {import_command(laid, tried.kind, columns, words)}\n"
-    if tried.refused:
-        return f"\nThe most likely import fails: {tried.refused}{line}"
-    fill = f" (put {'; '.join(_placeholders(tried, free))})" if tried.lacking or tried.unknown else ""
+def _suggestion(laid: Sheet, attempt: Attempt) -> str:
+    free = [name for name in laid.header if name not in {m.theirs for m in attempt.columns}]
+    cannot = len(attempt.lacking) == len(required_columns(attempt.kind, ())) or len(attempt.lacking) > len(free)
+    if not attempt.columns or (not laid.named and (attempt.lacking or attempt.refused)) or (laid.named and cannot):
+        example = "such as vx_v=Vout:mV" if laid.named else "by its number, such as vx_v=2:mV"
+        return f"; name a column with --column, {example}"
+    columns = [*attempt.columns, *(ColumnMapping(name, PLACEHOLDER) for name in attempt.lacking)]
+    constants = {k: PLACEHOLDER if k in attempt.unknown else v for k, v in attempt.constants.items()}
+    words = [
+        f"{key}={value:.15g}" if isinstance(value, float) else f"{key}={value}" for key, value in constants.items()
+    ]
+    line = f"\n\n    {import_command(laid, attempt.kind, columns, words)}\n"
+    if attempt.refused:
+        return f"\nThe most likely import fails: {attempt.refused}{line}"
+    fill = f" (put {'; '.join(_placeholders(attempt, free))})" if attempt.lacking or attempt.unknown else ""
     return f"\nThe names and values suggest this import{fill}:{line}"
 
 
-def _placeholders(tried: Attempt, free: Sequence[str]) -> list[str]:
+def _placeholders(attempt: Attempt, free: Sequence[str]) -> list[str]:
     """What a person has to fill in."""
-    if tried.lacking:
+    if attempt.lacking:
         return [f"your column's name for {PLACEHOLDER}: {', '.join(free)}"]
-    return [f"{EXAMPLES[name][1]} for {PLACEHOLDER} in {name}" for name in tried.unknown]
+    return [f"{EXAMPLES[name][1]} for {PLACEHOLDER} in {name}" for name in attempt.unknown]

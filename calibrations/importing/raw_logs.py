@@ -52,8 +52,8 @@ def average_still_positions(log: Table, rate_hz: float) -> Table:
     bounds = still_intervals(samples, rate_hz)
     if len(bounds) < 2:
         count = "one still interval" if bounds else "no still intervals"
-        needed = "keep the sensor still for 1 s or more in each of many positions; for a log at rest use `rig noise`"
-        raise DataError(f"{log.source}: found {count}; {needed}")
+        remedy = "keep the sensor still for 1 s or more in each of many positions; for a log at rest use `rig noise`"
+        raise DataError(f"{log.source}: found {count}; {remedy}")
     if _is_alike(samples, bounds):
         raise DataError(
             f"{log.source}: {', '.join(log.output_names)} are the same in all {len(bounds)} still intervals within "
@@ -125,8 +125,8 @@ def _effective_std(x: Array) -> float:
     """
     n = len(x)
     acov = autocovariance(x, n // 2)
-    below = np.flatnonzero(acov <= 0)
-    end = int(below[0]) if len(below) else len(acov)
+    negative_lags = np.flatnonzero(acov <= 0)
+    end = int(negative_lags[0]) if len(negative_lags) else len(acov)
     return float(np.sqrt(max(acov[0] + 2 * acov[1:end].sum(), 0.0) * n / (n - 1)))
 
 
@@ -236,33 +236,33 @@ def _windows(log: Table, width: int) -> list[tuple[int, int]]:
     still = np.ones(starts, dtype=bool)
     for name in ("alpha_deg", "beta_deg"):
         still &= _span(log.columns[name], width) <= JITTER_DEG
-    changes = np.cumsum(_changed(log))
+    changes = np.cumsum(_find_changes(log))
     still &= changes[width - 1 :] == changes[:starts]
     return [(begin, end + width - 1) for begin, end in _runs(still)]
 
 
 def _span(values: Array, width: int) -> Array:
     """Maximum less minimum of any `width` successive values, shape (n - width + 1,)."""
-    high, low, done = values, values, 1
-    while done < width:  # the extremes over twice as many are those of two halves
-        more = min(done, width - done)
-        high, low = np.maximum(high[:-more], high[more:]), np.minimum(low[:-more], low[more:])
-        done += more
+    high, low, covered = values, values, 1
+    while covered < width:  # the extremes over twice as many are those of two halves
+        step = min(covered, width - covered)
+        high, low = np.maximum(high[:-step], high[step:]), np.minimum(low[:-step], low[step:])
+        covered += step
     return np.asarray(high - low)
 
 
-def _changed(log: Table) -> NDArray[np.bool_]:
+def _find_changes(log: Table) -> NDArray[np.bool_]:
     """Rows with another mounting or label than the row before, or after a gap in time."""
-    changed = np.zeros(log.n, dtype=bool)
+    is_change = np.zeros(log.n, dtype=bool)
     if "t_s" in log:
         gaps = np.abs(np.diff(log.columns["t_s"]))
-        changed[1:] = gaps > max(SHORTEST_PAUSE_S, LONGEST_PAUSE * float(np.median(gaps)))
+        is_change[1:] = gaps > max(SHORTEST_PAUSE_S, LONGEST_PAUSE * float(np.median(gaps)))
     for name in MOUNTING:
         if name in log:
-            changed[1:] |= np.diff(log.columns[name]) != 0
+            is_change[1:] |= np.diff(log.columns[name]) != 0
     for words in log.labels.values():
-        changed[1:] |= np.array([a != b for a, b in pairwise(words)])
-    return changed
+        is_change[1:] |= np.array([a != b for a, b in pairwise(words)])
+    return is_change
 
 
 def _is_moving(log: Table, stretches: list[tuple[int, int]]) -> bool:
@@ -278,9 +278,9 @@ def _settled(log: Table, stretches: list[tuple[int, int]]) -> list[tuple[int, in
     befores = [0, *(b for _, b in stretches)]
     afters = [*(a for a, _ in stretches[1:]), log.n]
     trimmed = []
-    for (a, b), before, after in zip(stretches, befores, afters, strict=False):
+    for (a, b), end_before, start_after in zip(stretches, befores, afters, strict=False):
         trim = min(rows, (b - a) // 8)
-        trimmed.append((a + trim * (a > before), b - trim * (b < after)))
+        trimmed.append((a + trim * (a > end_before), b - trim * (b < start_after)))
     return trimmed
 
 
@@ -344,10 +344,10 @@ def _rate_hz(log: Table) -> float:
     if rate_hz > 0:
         return rate_hz
     name, likely = _likely_rate(log.constants)
-    needed = f"the column t_s, or a line such as `# sample_rate_hz: {likely or 100:g}` above its header"
+    requirement = f"the column t_s, or a line such as `# sample_rate_hz: {likely or 100:g}` above its header"
     hint = f'; the constant "{name}" is likely the sample rate' if likely else ""
     option = f"in `rig import`, --constant sample_rate_hz={likely or 100:g}"
-    raise MissingConstant(f"{log.source}: a raw log needs {needed} ({option}){hint}", "sample_rate_hz", likely)
+    raise MissingConstant(f"{log.source}: a raw log needs {requirement} ({option}){hint}", "sample_rate_hz", likely)
 
 
 def _likely_rate(constants: Mapping[str, Constant]) -> tuple[str, float | None]:

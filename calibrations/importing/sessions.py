@@ -37,16 +37,16 @@ def sample_rates(
     bounds, outputs = _bounds(sections), np.column_stack([columns[name] for name in OUTPUTS])
     quiet = min(bounds, key=lambda bound: float(outputs[bound[0] : bound[1]].std(axis=0).sum()))
     means = np.array([outputs[a:b].mean(axis=0) for a, b in bounds])
-    away = np.linalg.norm(means - means[bounds.index(quiet)], axis=1)
+    distances = np.linalg.norm(means - means[bounds.index(quiet)], axis=1)
     a, b = quiet
-    if away.max() <= LEAST_TURN_NOISE * float(np.linalg.norm(outputs[a:b].std(axis=0))):
+    if distances.max() <= LEAST_TURN_NOISE * float(np.linalg.norm(outputs[a:b].std(axis=0))):
         raise DataError(
             f"{source}: no section is a turn: the means of gx, gy, gz are the same in all sections; "
             "turn the sensor in some of them"
         )
     rates = np.zeros(len(outputs))
-    for (a, b), size in zip(bounds, away, strict=True):
-        if size > LEAST_TURN_SHARE * away.max():
+    for (a, b), size in zip(bounds, distances, strict=True):
+        if size > LEAST_TURN_SHARE * distances.max():
             rates[a:b] = _turn_deg(constants, source) / _length_s(columns, constants, (a, b), source)
     return rates
 

@@ -89,8 +89,8 @@ class Sheet:
         """The header's names without units."""
         return tuple(split_unit(name)[0] for name in self.header)
 
-    def rows(self, bad: BadLines) -> Iterator[Row]:
-        """Iterate over the rows of data without those of another width, which `bad` counts or refuses."""
+    def rows(self, bad_lines: BadLines) -> Iterator[Row]:
+        """Iterate over the rows of data without those of another width, which `bad_lines` counts or refuses."""
         with self.source.lines(marked=self.skipped > 0) as lines:
             for number, cells in split_rows(islice(lines, self.first - 1, None), self.separator, self.name, self.first):
                 if len(cells) == self.width:
@@ -98,7 +98,7 @@ class Sheet:
                     continue
                 spans = 1 + sum(cell.count("\n") for cell in cells)  # an open quote swallows lines
                 reason = f"{len(cells)} values for {len(self.header)} columns"
-                bad.add(number, reason, _another_width(self.name, number, cells, self.header), spans)
+                bad_lines.add(number, reason, _another_width(self.name, number, cells, self.header), spans)
 
 
 def read_sheet(source: Source) -> Sheet:
@@ -111,32 +111,43 @@ def read_sheet(source: Source) -> Sheet:
         raise DataError(f"{source.name}: {EMPTY}")
     width = _width(rows)
     rows = _without_titles(rows, width, constants)
-    (line, header), named = rows[0], not all(map(is_number, rows[0][1]))
-    if named and len(header) != width and len(rows) > 1:
+    (line, header), has_names = rows[0], not all(map(is_number, rows[0][1]))
+    if has_names and len(header) != width and len(rows) > 1:
         raise DataError(_another_width(source.name, *rows[1], header))
     columns = width - _empty_behind([cells for _, cells in rows if len(cells) == width])
-    header = _checked(header[:columns], f"{source.name}, line {line}") if named else list(map(str, range(1, width + 1)))
-    below, units = _units(header, rows[1 if named else 0 :], named)
-    if not below:
+    header = (
+        _checked(header[:columns], f"{source.name}, line {line}") if has_names else list(map(str, range(1, width + 1)))
+    )
+    data_rows, units = _units(header, rows[1 if has_names else 0 :], has_names)
+    if not data_rows:
         raise DataError(f"{source.name}: there are no rows below the header; export the measurements again")
-    sample = _whole([tuple(cells[:columns]) for _, cells in below if len(cells) == width])
+    sample = _undamaged([tuple(cells[:columns]) for _, cells in data_rows if len(cells) == width])
     if not sample:
-        raise DataError(_another_width(source.name, *below[0], header))
+        raise DataError(_another_width(source.name, *data_rows[0], header))
     if not any(is_number(cell) for cells in sample for cell in cells):
         raise DataError(
             f"{source.name}: has no numbers in its first {len(sample)} rows; a table of measurements has a header "
             "line with column names, and rows of numbers below it"
         )
     return Sheet(
-        source, separator, tuple(header[:columns]), tuple(units), named, width, line, below[0][0], sample, constants
+        source,
+        separator,
+        tuple(header[:columns]),
+        tuple(units),
+        has_names,
+        width,
+        line,
+        data_rows[0][0],
+        sample,
+        constants,
     )
 
 
-def _whole(rows: list[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
+def _undamaged(rows: list[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
     """The rows without damaged ones: those with a word where nearly all others have a number."""
-    wrong = [tuple(not is_number(cell) for cell in row) for row in rows]
-    numeric = [sum(column) <= MOST_WORDS * len(rows) for column in zip(*wrong, strict=True)]
-    fits = [row for row, words in zip(rows, wrong, strict=True) if not any(map(and_, words, numeric))]
+    is_word = [tuple(not is_number(cell) for cell in row) for row in rows]
+    numeric = [sum(column) <= MOST_WORDS * len(rows) for column in zip(*is_word, strict=True)]
+    fits = [row for row, words in zip(rows, is_word, strict=True) if not any(map(and_, words, numeric))]
     return tuple(fits or rows)
 
 
@@ -191,10 +202,10 @@ def _head(source: Source) -> tuple[dict[str, Constant], int, list[str]]:
     constants: dict[str, Constant] = {}
     with source.lines(marked=True) as lines:
         for start, line in enumerate(lines):
-            plain = line.strip(BLANK)
-            if plain and not plain.startswith("#"):
+            stripped = line.strip(BLANK)
+            if stripped and not stripped.startswith("#"):
                 return constants, start, [line, *islice(lines, HEAD_LINES)]
-            key, colon, value = plain.lstrip("#").rstrip(";,\t ").partition(":")
+            key, colon, value = stripped.lstrip("#").rstrip(";,\t ").partition(":")
             if colon and key.strip():
                 constants[key.strip()] = number_or_text(value.strip())
     raise DataError(f"{source.name}: {EMPTY}")
@@ -236,20 +247,20 @@ def _empty_behind(rows: Sequence[list[str]]) -> int:
     return min(ends, default=0)
 
 
-def _checked(header: list[str], where: str) -> list[str]:
+def _checked(header: list[str], place: str) -> list[str]:
     if "" in header:
-        raise DataError(f"{where}: a column has no name" + _names(header, ": {}") + "; name every column")
-    if twice := next((name for name, count in Counter(header).items() if count > 1), None):
-        raise DataError(f'{where}: the column "{twice}" occurs twice; rename one')
+        raise DataError(f"{place}: a column has no name" + _names(header, ": {}") + "; name every column")
+    if duplicate := next((name for name, count in Counter(header).items() if count > 1), None):
+        raise DataError(f'{place}: the column "{duplicate}" occurs twice; rename one')
     return header
 
 
-def _units(header: Sequence[str], rows: list[Row], named: bool) -> tuple[list[Row], list[str]]:
+def _units(header: Sequence[str], rows: list[Row], has_names: bool) -> tuple[list[Row], list[str]]:
     """The rows of data, and a unit for each column: from the header, or from a row of units below it."""
     units = [split_unit(name)[1] for name in header]
-    if named and rows and len(rows[0][1]) >= len(header) and _is_units(rows[0][1]):
-        below = map(parse_unit, rows[0][1])
-        return rows[1:], [unit or unit_below for unit, unit_below in zip(units, below, strict=False)]
+    if has_names and rows and len(rows[0][1]) >= len(header) and _is_units(rows[0][1]):
+        row_units = map(parse_unit, rows[0][1])
+        return rows[1:], [unit or unit_below for unit, unit_below in zip(units, row_units, strict=False)]
     return rows, units
 
 
@@ -277,36 +288,36 @@ def look_like_names(header: Iterable[str]) -> bool:
 
 
 def read_cells(
-    sheet: Sheet, texts: Collection[str], needed: Collection[str] = (), tell: Callable[[str], None] = lambda _: None
+    sheet: Sheet, texts: Collection[str], required: Collection[str] = (), report: Callable[[str], None] = lambda _: None
 ) -> tuple[Mapping[str, Array], Mapping[str, tuple[str, ...]]]:
     """Every column by its name in the header: columns of numbers, and the columns in `texts`.
 
-    `tell` receives a remark on damaged lines that were skipped, if the sheet allows it. Of columns in memory, those
-    outside `needed` that are not all finite are left out: a log has many that are unused.
+    `report` receives a remark on damaged lines that were skipped, if the sheet allows it. Of columns in memory, those
+    outside `required` that are not all finite are left out: a log has many that are unused.
     Raises DataError with file, line and column.
     """
     if sheet.cells is not None:
-        return _in_memory(sheet, sheet.cells, texts, needed)
+        return _in_memory(sheet, sheet.cells, texts, required)
     if not texts and (numbers := _at_once(sheet)) is not None:
         return dict(zip(sheet.header, numbers.T, strict=True)), {}
-    bad = BadLines(sheet.name, sheet.skipped)
-    columns = _one_by_one(sheet, texts, bad)
-    bad.end(tell)
+    bad_lines = BadLines(sheet.name, sheet.skipped)
+    columns = _one_by_one(sheet, texts, bad_lines)
+    bad_lines.end(report)
     return columns
 
 
 def _in_memory(
-    sheet: Sheet, cells: Mapping[str, Array | tuple[str, ...]], texts: Collection[str], needed: Collection[str]
+    sheet: Sheet, cells: Mapping[str, Array | tuple[str, ...]], texts: Collection[str], required: Collection[str]
 ) -> tuple[Mapping[str, Array], Mapping[str, tuple[str, ...]]]:
     numbers, words = {}, {}
     for name, values in cells.items():
         if isinstance(values, tuple) or name in texts:
-            if name in needed and name not in texts:
+            if name in required and name not in texts:
                 raise DataError(f'{sheet.place}: the column "{name}" has no numbers; choose another column')
             words[name] = values if isinstance(values, tuple) else tuple(f"{v:g}" for v in values)
         elif np.isfinite(values).all():
             numbers[name] = values
-        elif name in needed:
+        elif name in required:
             row = int(np.flatnonzero(~np.isfinite(values))[0])
             raise DataError(
                 f'{sheet.place}, row {row + 1}, column "{name}": {values[row]} is not a finite number; '
@@ -339,19 +350,19 @@ def _at_once(sheet: Sheet) -> Array | None:
 
 
 def _one_by_one(
-    sheet: Sheet, texts: Collection[str], bad: BadLines
+    sheet: Sheet, texts: Collection[str], bad_lines: BadLines
 ) -> tuple[Mapping[str, Array], Mapping[str, tuple[str, ...]]]:
     numbers = {name: array("d") for name in sheet.header if name not in texts}
     words: dict[str, list[str]] = {name: [] for name in sheet.header if name in texts}
     numeric = [(k, numbers[name]) for k, name in enumerate(sheet.header) if name in numbers]
-    for row in sheet.rows(bad):
+    for row in sheet.rows(bad_lines):
         try:
             values = [_number(sheet, row, k) for k, _ in numeric]
         except DataError as error:
-            again = tuple(row[1][: len(sheet.header)]) == sheet.header
-            bad.add(row[0], "the header again" if again else _wrong(sheet, row), str(error))
+            is_header = tuple(row[1][: len(sheet.header)]) == sheet.header
+            bad_lines.add(row[0], "the header again" if is_header else _damage_words(sheet, row), str(error))
             continue
-        bad.good += 1
+        bad_lines.good += 1
         for (_, column), value in zip(numeric, values, strict=True):
             column.append(value)
         for k, name in enumerate(sheet.header):
@@ -363,7 +374,7 @@ def _one_by_one(
     )
 
 
-def _wrong(sheet: Sheet, row: Row) -> str:
+def _damage_words(sheet: Sheet, row: Row) -> str:
     """The first cell of a damaged row that is not a number, in words."""
     k = next((k for k in range(len(sheet.header)) if not is_number(row[1][k])), 0)
     return f"{sheet.header[k]} is {row[1][k][:LONGEST_SHOWN]!r}"
@@ -380,5 +391,5 @@ def _number(sheet: Sheet, row: Row, k: int) -> float:
         if isfinite(value):
             return value
         reason = f'"{cells[k]}" is not a finite number'
-    where = f'{sheet.name}, line {line}, column "{sheet.header[k]}"'
-    raise DataError(f"{where}: {reason}; correct the cell or remove the row")
+    place = f'{sheet.name}, line {line}, column "{sheet.header[k]}"'
+    raise DataError(f"{place}: {reason}; correct the cell or remove the row")

@@ -76,7 +76,7 @@ def topic_sheet(path: Path, topics: Sequence[Topic], name: str | None) -> Sheet:
     """
     if not topics:
         raise DataError(f"{path}: has no table of two or more rows of numbers; export the measurements again")
-    topic = _chosen(path, topics, name)
+    topic = _choose_topic(path, topics, name)
     if topic.refusal:
         raise DataError(f"{path}, topic {topic.name}: {topic.refusal}")
     unread = [t for t in topics if t is not topic]
@@ -86,13 +86,13 @@ def topic_sheet(path: Path, topics: Sequence[Topic], name: str | None) -> Sheet:
             f"{path}: reading {topic.name}; choose another with --topic: {_listed(t.name for t in unread)}",
             *notes,
         )
-    chosen = topic.name if unread else ""
+    topic_name = topic.name if unread else ""
     if topic.text is not None:
-        sheet = read_sheet(text_source(topic.text(), str(path))).of_topic(chosen, notes)
+        sheet = read_sheet(text_source(topic.text(), str(path))).of_topic(topic_name, notes)
         return replace(sheet, topics=tuple(t.name for t in topics))
     if topic.cells is None or topic.rows < 1:
         raise DataError(f"{path}, topic {topic.name}: has no rows; record the measurements again")
-    sheet = column_sheet(str(path), topic.cells(), topic.constants, chosen, notes)
+    sheet = column_sheet(str(path), topic.cells(), topic.constants, topic_name, notes)
     return replace(sheet, topics=tuple(t.name for t in topics))
 
 
@@ -108,10 +108,10 @@ def column_sheet(
         raise DataError(f"{place}: has no numbers; choose a file or a topic with columns of measurements")
     sample = tuple(zip(*(_head(v) for v in columns.values()), strict=False))
     header = tuple(columns)
-    named = not all(column.isdigit() for column in header)
+    has_names = not all(column.isdigit() for column in header)
     units = tuple(split_unit(column)[1] for column in header)
     return Sheet(
-        Source(name, _no_text), None, header, units, named, len(header), 1, 1, sample, dict(constants), columns,
+        Source(name, _no_text), None, header, units, has_names, len(header), 1, 1, sample, dict(constants), columns,
         topic, notes,
     )  # fmt: skip
 
@@ -143,7 +143,7 @@ def require_size(path: Path, unpacked: int) -> None:
         )
 
 
-def _chosen(path: Path, topics: Sequence[Topic], name: str | None) -> Topic:
+def _choose_topic(path: Path, topics: Sequence[Topic], name: str | None) -> Topic:
     names = [t.name for t in topics]
     if name is not None:
         if name not in names:
@@ -157,27 +157,27 @@ def _chosen(path: Path, topics: Sequence[Topic], name: str | None) -> Topic:
     if len(best) == 1:
         return best[0]
     lines = "".join(f"\n    {t.described}" for t in topics[:MOST_LISTED])
-    more = f"\n    and {len(topics) - MOST_LISTED} more" if len(topics) > MOST_LISTED else ""
+    rest_words = f"\n    and {len(topics) - MOST_LISTED} more" if len(topics) > MOST_LISTED else ""
     command = shlex.join(["rig", "import", str(path), "--topic", proposed or names[0]])
     raise SeveralTopics(
-        f"{path}: has {len(topics)} topics; choose one with --topic:{lines}{more}\nSuch as\n\n    {command}\n",
+        f"{path}: has {len(topics)} topics; choose one with --topic:{lines}{rest_words}\nSuch as\n\n    {command}\n",
         {t.name: t.described for t in topics},
         proposed,
     )
 
 
 def _listed(names: Any) -> str:
-    every = list(names)
-    more = f" and {len(every) - MOST_LISTED} more" if len(every) > MOST_LISTED else ""
-    return ", ".join(every[:MOST_LISTED]) + more
+    all_names = list(names)
+    rest_words = f" and {len(all_names) - MOST_LISTED} more" if len(all_names) > MOST_LISTED else ""
+    return ", ".join(all_names[:MOST_LISTED]) + rest_words
 
 
 def _head(values: Array | tuple[str, ...]) -> list[str]:
     """The first cells as text; of numbers, the first finite ones, repeated where they are few."""
     if isinstance(values, tuple):
         return list(values[:HEAD_LINES])
-    early = values[: 4 * HEAD_LINES]
-    finite = early[np.isfinite(early)]
+    first_values = values[: 4 * HEAD_LINES]
+    finite = first_values[np.isfinite(first_values)]
     if not len(finite):
         finite = values[np.isfinite(values)]
     return [repr(float(v)) for v in np.resize(finite, min(HEAD_LINES, len(values)))]

@@ -37,12 +37,14 @@ _IN_NAME = re.compile(r"^(?P<name>.*?)\s*(?:\((?P<round>[^()]*)\)|\[(?P<square>[
 
 def parse_unit(text: str) -> str:
     """The unit that `text` spells (`°C`, `m/s²`, `volts`, `mV`) in this program's spelling; "" for no known unit."""
-    plain = text.strip().strip("()[]").strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")
-    if plain in UNITS:
-        return plain
-    lower = plain.lower()
-    once = {unit.lower(): unit for unit in UNITS if unit.lower() != "k"}  # a k alone is kilo more often than kelvin
-    return SPELLINGS.get(lower) or once.get(lower, "")
+    stripped = text.strip().strip("()[]").strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")
+    if stripped in UNITS:
+        return stripped
+    lower = stripped.lower()
+    by_lower_case = {
+        unit.lower(): unit for unit in UNITS if unit.lower() != "k"
+    }  # a k alone is kilo more often than kelvin
+    return SPELLINGS.get(lower) or by_lower_case.get(lower, "")
 
 
 def split_unit(header: str) -> tuple[str, str]:
@@ -77,9 +79,14 @@ class ColumnMapping:
     def parse(text: str) -> ColumnMapping:
         """Parse `vx_v=Vout:mV` or `vx_v=Vout`. Raises DataError."""
         name, equals, source = text.partition("=")
-        bare, _, last = source.rpartition(":")
-        unit = parse_unit(last) if bare else ""
-        theirs = bare if unit else source
-        if not equals or not name.strip() or not theirs.strip() or (not bare and ":" in source and parse_unit(last)):
+        before_colon, _, last = source.rpartition(":")
+        unit = parse_unit(last) if before_colon else ""
+        column = before_colon if unit else source
+        if (
+            not equals
+            or not name.strip()
+            or not column.strip()
+            or (not before_colon and ":" in source and parse_unit(last))
+        ):
             raise DataError(f'"{text}": write a column as NAME=THEIRS or NAME=THEIRS:UNIT, such as vx_v=Vout:mV')
-        return ColumnMapping(name.strip(), theirs.strip(), unit)
+        return ColumnMapping(name.strip(), column.strip(), unit)

@@ -107,8 +107,8 @@ class Noise:
 
     def is_like(self, noise: Noise) -> bool:
         """Whether both weigh the rows alike, scatter within 1 % of the noise."""
-        same = np.array_equal(self.ratio, noise.ratio) and self.taus_s == noise.taus_s
-        return same and bool(np.all(np.abs(rms(self.fast) / rms(noise.fast) - 1) < 1e-2))
+        same_shape = np.array_equal(self.ratio, noise.ratio) and self.taus_s == noise.taus_s
+        return same_shape and bool(np.all(np.abs(rms(self.fast) / rms(noise.fast) - 1) < 1e-2))
 
     def prolonged(self) -> Noise:
         """Flicker noise goes on at times longer than a record: with time constants up to BEYOND times its length.
@@ -119,8 +119,8 @@ class Noise:
         for c, taus in enumerate(self.taus_s):
             if len(taus) > 1:
                 step = taus[1] / taus[0]
-                more = int(np.log(BEYOND * float(np.sum(self.gap_s)) / taus[-1]) / np.log(step))
-                taus_s[c] = (*taus, *(taus[-1] * step**k for k in range(1, more + 1)))
+                count = int(np.log(BEYOND * float(np.sum(self.gap_s)) / taus[-1]) / np.log(step))
+                taus_s[c] = (*taus, *(taus[-1] * step**k for k in range(1, count + 1)))
                 ratio[c] *= np.sqrt(len(taus_s[c]) / len(taus))
         return replace(self, ratio=ratio, taus_s=tuple(taus_s))
 
@@ -147,22 +147,24 @@ class Noise:
     @cached_property
     def logdet(self) -> float:
         """log det Sigma over all channels."""
-        empty = np.zeros((self.white.shape[1], 0))
-        return sum(self._whiten_channel(c, empty)[1] for c in range(len(self.white)))
+        no_columns = np.zeros((self.white.shape[1], 0))
+        return sum(self._whiten_channel(c, no_columns)[1] for c in range(len(self.white)))
 
 
 def correlated(
-    columns: Array, gap_s: Array, fast: Array, slow: float, taus_s: tuple[float, ...], known: Processes = ()
+    columns: Array, gap_s: Array, fast: Array, slow: float, taus_s: tuple[float, ...], known_noise: Processes = ()
 ) -> tuple[Array, float]:
     """Columns (n, k) of one channel made white, and log det Sigma."""
-    out, logdet = whiten(np.ascontiguousarray(columns), gap_s, fast, *_arrays(processes(slow, taus_s, known)))
-    return out, float(logdet)
+    whitened, logdet = whiten(
+        np.ascontiguousarray(columns), gap_s, fast, *_arrays(processes(slow, taus_s, known_noise))
+    )
+    return whitened, float(logdet)
 
 
-def processes(slow: float, taus_s: tuple[float, ...], known: Processes = ()) -> Processes:
+def processes(slow: float, taus_s: tuple[float, ...], known_noise: Processes = ()) -> Processes:
     """Those that make up slow noise of a standard deviation, evenly shared, and those that are given."""
     std = slow / len(taus_s) ** 0.5
-    return (*((std, tau_s) for tau_s in taus_s if slow or not known), *known)
+    return (*((std, tau_s) for tau_s in taus_s if slow or not known_noise), *known_noise)
 
 
 def _arrays(processes: Processes) -> tuple[Array, Array]:
@@ -184,12 +186,14 @@ def rms(x: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(x * x, axis=-1)))
 
 
-def white_only(white: Array | None, gap_s: Array, channels: int, known: tuple[Processes, ...] = ()) -> Noise:
+def white_only(white: Array | None, gap_s: Array, channels: int, known_noise: tuple[Processes, ...] = ()) -> Noise:
     """The noise before anything is fitted."""
-    ones = np.ones(channels)
+    unit_scale = np.ones(channels)
     if white is None:
-        return Noise(np.zeros((channels, len(gap_s))), gap_s, ones, 0 * ones, ((1.0,),) * channels, known)
-    return Noise(white, gap_s, 0 * ones, 0 * ones, ((1.0,),) * channels, known)
+        return Noise(
+            np.zeros((channels, len(gap_s))), gap_s, unit_scale, 0 * unit_scale, ((1.0,),) * channels, known_noise
+        )
+    return Noise(white, gap_s, 0 * unit_scale, 0 * unit_scale, ((1.0,),) * channels, known_noise)
 
 
 WINDOW = 6.0  # lags summed, at least, and in correlation times: exp(-6) of an exponential's sum is left out
@@ -209,7 +213,7 @@ def white_std(table: Table) -> Array | None:
     scattered = std > 0
     if not scattered.any(axis=0).all():
         return None
-    usual = np.array([np.median(x[some]) for x, some in zip(std.T, scattered.T, strict=True)])
+    usual = np.array([np.median(x[is_scattered]) for x, is_scattered in zip(std.T, scattered.T, strict=True)])
     std = np.where(std > NO_SCATTER * usual, std, usual)
     factors = np.array([inflation(table, axis) for axis in table.axes])
     mean: Array = std * np.sqrt(factors / table.column("n")[:, None])
@@ -227,9 +231,9 @@ def norm_std(table: Table, std: Array) -> Array:
     if "norm_std" in table:
         return (table.column("norm_std") * np.sqrt(inflation(table) / table.column("n")))[:, None]
     centre = (table.outputs.max(axis=0) + table.outputs.min(axis=0)) / 2
-    along = table.outputs - centre
-    along = along / np.linalg.norm(along, axis=1, keepdims=True)
-    return np.asarray(np.sqrt(np.sum((along * std) ** 2, axis=1, keepdims=True)))
+    unit_vectors = table.outputs - centre
+    unit_vectors = unit_vectors / np.linalg.norm(unit_vectors, axis=1, keepdims=True)
+    return np.asarray(np.sqrt(np.sum((unit_vectors * std) ** 2, axis=1, keepdims=True)))
 
 
 def inflation(table: Table, axis: str = "") -> float:
@@ -279,10 +283,10 @@ def _summed(covariance: Array, n: int) -> tuple[float, int]:
     if not covariance[0] > 0:
         return float("nan"), 0
     sums = 2 * np.cumsum(covariance) - covariance[0]
-    beyond = np.flatnonzero(np.arange(len(sums)) >= WINDOW * np.maximum(1.0, sums / covariance[0] / 2))
-    if not len(beyond):
+    past_window = np.flatnonzero(np.arange(len(sums)) >= WINDOW * np.maximum(1.0, sums / covariance[0] / 2))
+    if not len(past_window):
         return float("nan"), 0
-    last = int(beyond[0])
+    last = int(past_window[0])
     true = sums[last] / (1 - (2 * last + 1) / n)  # each lag has lost true / n by the block's mean
     return float(true / (covariance[0] + true / n)), last
 

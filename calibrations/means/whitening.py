@@ -21,7 +21,7 @@ def whiten(columns: Array, gap_s: Array, white: Array, slow: Array, tau_s: Array
     """
     n, k = columns.shape
     m = len(slow)
-    out = np.empty_like(columns)
+    whitened = np.empty_like(columns)
     state = np.zeros((m, k))
     P = np.diag(slow * slow)
     gain, phi = np.zeros(m), np.zeros(m)
@@ -44,22 +44,22 @@ def whiten(columns: Array, gap_s: Array, white: Array, slow: Array, tau_s: Array
                 gain[p] += P[p, q]
             total += gain[p]
         scale = 1.0 / np.sqrt(total)
-        ahead = out[i]  # row by row, so that a step goes over all columns at once
-        ahead[:] = columns[i]
+        row = whitened[i]  # row by row, so that a step goes over all columns at once
+        row[:] = columns[i]
         for p in range(m):
             for j in range(k):
-                ahead[j] -= state[p, j]
+                row[j] -= state[p, j]
         for p in range(m):
             share = gain[p] / total
             for j in range(k):
-                state[p, j] += share * ahead[j]
+                state[p, j] += share * row[j]
         for j in range(k):
-            ahead[j] *= scale
+            row[j] *= scale
         for p in range(m):
             for q in range(m):
                 P[p, q] -= gain[p] * gain[q] / total
         logdet += np.log(total)
-    return out, logdet
+    return whitened, logdet
 
 
 @njit(cache=True, nogil=True)
@@ -87,13 +87,13 @@ def whiten_transposed(columns: Array, gap_s: Array, white: Array, slow: Array, t
             gains[i, p] = gain[p] / total
             for q in range(m):
                 P[p, q] -= gain[p] * gain[q] / total
-    out = np.empty_like(columns)
+    transposed = np.empty_like(columns)
     later = np.zeros((m, k))  # what the rows after this one add to the state
     for i in range(n - 1, -1, -1):
         for j in range(k):
-            out[i, j] = columns[i, j] * scales[i]
+            transposed[i, j] = columns[i, j] * scales[i]
             for p in range(m):
-                out[i, j] += gains[i, p] * later[p, j]
+                transposed[i, j] += gains[i, p] * later[p, j]
             for p in range(m):
-                later[p, j] = phis[i, p] * (later[p, j] - out[i, j])
-    return out
+                later[p, j] = phis[i, p] * (later[p, j] - transposed[i, j])
+    return transposed

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from calibrations.effects import Effect
 from calibrations.errors import UnknownParameter, nearest
 from calibrations.frames import data_frame, html_table
-from calibrations.result import Shown
+from calibrations.result import ReportedResult
 from calibrations.table import Table
 from calibrations.text import columns, concise_in_prefix, minus, rounded, unit, value_text
 
@@ -154,7 +154,7 @@ def _key(*parts: str) -> str:
 
 
 @dataclass(frozen=True, repr=False)
-class Model(Shown):
+class Model(ReportedResult):
     """An ordered list of effects. `unit` is that of the output, "" before the first fit.
 
     `covered`: lowest and highest value of each influence in the data that the values come from, as far as it is known.

@@ -27,7 +27,7 @@ from calibrations.noise.fit import upper_bound
 from calibrations.noise.likelihood import ChannelFit
 from calibrations.noise.lines import Line
 from calibrations.noise.record import Channel, Still
-from calibrations.noise.samples import CONSTANT, WILD, Hidden, hidden_in
+from calibrations.noise.samples import CONSTANT, WILD, HiddenNoise, hidden_in
 from calibrations.noise.search import Search, search
 from calibrations.result import Result
 from calibrations.table import Array
@@ -127,10 +127,10 @@ class ChannelNoise:
         return low, high
 
     def _coefficient(self, effect: Effect) -> Coefficient:
-        hidden = hidden_in(self.channel.oddities)
+        hidden_noise = hidden_in(self.channel.oddities)
         unit = effect.parameters[0].unit.replace("{out}", self.unit)
-        if hidden is not None and hidden.hides(effect.name):
-            return _below_step(hidden, effect.name, unit)
+        if hidden_noise is not None and hidden_noise.hides(effect.name):
+            return _below_step(hidden_noise, effect.name, unit)
         if "lines" in effect.places:
             return self._sinusoid(unit)
         rivals = self.search.rivals.get(effect.name, ())
@@ -212,11 +212,11 @@ class NoiseAnalysis(Result):
 
     def spoils(self, disturbance: Disturbance) -> tuple[str, ...]:
         """The coefficients that a disturbance changes, or would change had it not been removed."""
-        after = self.channels[disturbance.axis].coefficients
-        identified = tuple(name for name, coefficient in after.items() if coefficient.identified)
+        cleaned = self.channels[disturbance.axis].coefficients
+        identified = tuple(name for name, coefficient in cleaned.items() if coefficient.identified)
         if disturbance.pattern is not None and self.uncleaned is not None:
-            before = self.uncleaned[disturbance.axis].coefficients
-            return tuple(name for name in after if _differ(before[name], after[name]))
+            uncleaned = self.uncleaned[disturbance.axis].coefficients
+            return tuple(name for name in cleaned if _differ(uncleaned[name], cleaned[name]))
         if disturbance.kind in (*MISFITS, CONSTANT):
             return identified
         return tuple(name for name in identified if name in SPOILT.get(disturbance.kind, ()))
@@ -233,16 +233,16 @@ def _channels(record: Still, search: Search) -> dict[str, ChannelNoise]:
     }
 
 
-def _below_step(hidden: Hidden, name: str, unit: str) -> Coefficient:
+def _below_step(hidden_noise: HiddenNoise, name: str, unit: str) -> Coefficient:
     """What is known of a process where the noise is below one step of the converter."""
-    upper = hidden.white_below if name == "white-noise" else np.inf
+    upper = hidden_noise.white_below if name == "white-noise" else np.inf
     return Coefficient(0.0, upper / INTERVAL_STDS, unit, upper)
 
 
-def _differ(before: Coefficient, after: Coefficient) -> bool:
-    if before.identified != after.identified:
+def _differ(uncleaned: Coefficient, cleaned: Coefficient) -> bool:
+    if uncleaned.identified != cleaned.identified:
         return True
-    return before.identified and abs(after.value - before.value) > SPOILT_BY * before.std
+    return uncleaned.identified and abs(cleaned.value - uncleaned.value) > SPOILT_BY * uncleaned.std
 
 
 # The JSON document of a noise analysis.

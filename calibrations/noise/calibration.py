@@ -73,8 +73,8 @@ class Calibration:
     @property
     def separations(self) -> Mapping[str, Experiment]:
         """By cause in doubt, the experiment that separates it from what it may be."""
-        doubtful = next((pattern for pattern in self.patterns if pattern.rivals), None)
-        experiment = experiment_for_pattern(doubtful, self.start.still.length_s) if doubtful else None
+        pattern_in_doubt = next((pattern for pattern in self.patterns if pattern.rivals), None)
+        experiment = experiment_for_pattern(pattern_in_doubt, self.start.still.length_s) if pattern_in_doubt else None
         return {self.signal.causes[0]: experiment} if experiment and self.alternatives else {}
 
 
@@ -94,8 +94,8 @@ def calibrated(search_before: Search, start: NoiseFit, effects: Mapping[str, Eff
     if not signal.names:
         return None
     model = with_terms(start.model, signal.steps[-1])
-    after = search(fit(model, start.still).still, model, effects)
-    return Calibration(start, signal, warm, after, {name: effect.contains for name, effect in effects.items()})
+    search_after = search(fit(model, start.still).still, model, effects)
+    return Calibration(start, signal, warm, search_after, {name: effect.contains for name, effect in effects.items()})
 
 
 def _without_costly_curves(
@@ -121,7 +121,7 @@ def _worth(signal: SignalSearch, model: Model, still: Still) -> float:
 
 def with_terms(model: Model, terms: tuple[Term, ...]) -> Model:
     """The model with these terms as they are, in place of its own of the same names, or behind them."""
-    named = {term.name: term for term in terms}
+    by_name = {term.name: term for term in terms}
     new = [term for term in terms if term.name not in model.effects]
-    replaced = tuple(named.get(term.name, term) for term in model.terms)
+    replaced = tuple(by_name.get(term.name, term) for term in model.terms)
     return replace(model, name="+".join([model.name, *(term.name for term in new)]), terms=(*replaced, *new))

@@ -173,10 +173,13 @@ class Stretch:
     def text(self) -> str:
         """In words."""
         low, high = self.tau_s
-        many = f"{self.ratio:.3g} x" if self.ratio > 1 else f"only {self.ratio:.2g} x"
-        where = f"{self.low_hz:.3g} to {self.high_hz:.3g} Hz" if self.high_hz > self.low_hz else f"{self.low_hz:.4g} Hz"
+        ratio_text = f"{self.ratio:.3g} x" if self.ratio > 1 else f"only {self.ratio:.2g} x"
+        band_text = (
+            f"{self.low_hz:.3g} to {self.high_hz:.3g} Hz" if self.high_hz > self.low_hz else f"{self.low_hz:.4g} Hz"
+        )
         return (
-            f"{self.axis} has {many} the power of the model at {where} (averaging times of {low:.2g} to {high:.2g} s)"
+            f"{self.axis} has {ratio_text} the power of the model at {band_text} "
+            f"(averaging times of {low:.2g} to {high:.2g} s)"
         )
 
 
@@ -198,18 +201,18 @@ def stretches(fit: ChannelFit, most: int = 3) -> list[Stretch]:
     candidates.sort(
         key=lambda stretch: (stretch[0], -abs(np.log(stretch[3])) * (sums[0][stretch[2]] - sums[0][stretch[1]]))
     )
-    chosen: list[tuple[float, int, int, float]] = []
+    selected: list[tuple[float, int, int, float]] = []
     for stretch in candidates:
-        if len(chosen) == most:
+        if len(selected) == most:
             break
-        if all(stretch[2] <= wider[1] or stretch[1] >= wider[2] for wider in chosen):
-            chosen.append(stretch)
+        if all(stretch[2] <= wider[1] or stretch[1] >= wider[2] for wider in selected):
+            selected.append(stretch)
     return [
         Stretch(
             fit.channel.axis, float(f[a]), float(f[b - 1]), ratio,
             float((ratio - 1) * np.sqrt((sums[0][b] - sums[0][a]) / 2)), min(1.0, p * len(candidates)),
         )
-        for p, a, b, ratio in chosen
+        for p, a, b, ratio in selected
     ]  # fmt: skip
 
 
@@ -331,12 +334,12 @@ def noise_levels(fit: ChannelFit) -> Levels | None:
     length = len(means) // PARTS
     f = np.arange(1, length) / (2 * max(length, 1) * step_s)
     highest_hz = min(channel.highest_hz, 0.5 / step_s)
-    chosen = (f > TREND_SHARE * highest_hz) & (f < highest_hz)
-    if np.count_nonzero(chosen) < FEWEST_LEVEL_ORDINATES:
+    in_band = (f > TREND_SHARE * highest_hz) & (f < highest_hz)
+    if np.count_nonzero(in_band) < FEWEST_LEVEL_ORDINATES:
         return None
     parts = means[: PARTS * length].reshape(PARTS, length)
-    power = dct(parts, type=2, norm="ortho", axis=1)[:, 1:][:, chosen] ** 2 * step_s
-    levels = (power / fit.level(f[chosen])).mean(axis=1)
+    power = dct(parts, type=2, norm="ortho", axis=1)[:, 1:][:, in_band] ** 2 * step_s
+    levels = (power / fit.level(f[in_band])).mean(axis=1)
     ratio = levels / levels.mean()
-    gain = float(np.count_nonzero(chosen) * np.sum(ratio - 1 - np.log(ratio)))
+    gain = float(np.count_nonzero(in_band) * np.sum(ratio - 1 - np.log(ratio)))
     return Levels(channel.axis, np.sqrt(ratio), length * step_s, float(chdtrc(PARTS - 1, gain)))

@@ -176,10 +176,10 @@ class StillRecord(Dataset[NoiseFit]):
         base = self.fit(model)
         step = self.step(effect, base)
         first = search(base.still, base.model, effects)
-        more = search(step.after.still, step.after.model, {**effects, effect.name: effect})
+        next_search = search(step.after.still, step.after.model, {**effects, effect.name: effect})
         doubts = alternatives(first, (effect.name,)) if effect.name in first.gains else {}
-        structure = structure_of(more)
-        missing = f"{' and '.join(more.gains)} would explain more" if more.gains else None
+        structure = structure_of(next_search)
+        missing = f"{' and '.join(next_search.gains)} would explain more" if next_search.gains else None
         return NoiseFindings(
             data=self,
             start=base,
@@ -192,14 +192,14 @@ class StillRecord(Dataset[NoiseFit]):
             spoilt=bool(structure or missing),
             reason=reason_of(first, doubts, structure) or missing,
             further=next_of(first, doubts, structure),
-            search=more,
+            search=next_search,
         )
 
     def step(self, effect: Effect, base: NoiseFit) -> Step[NoiseFit]:
         """The effect added."""
         larger = base.model.with_effect(effect)
-        after = fit(larger, base.still) if effect.is_noise else self.fit(larger)
-        return Step(effect.name, base, after, after.log_likelihood - base.log_likelihood)
+        extended = fit(larger, base.still) if effect.is_noise else self.fit(larger)
+        return Step(effect.name, base, extended, extended.log_likelihood - base.log_likelihood)
 
     def require_allowed(self, effect: Effect) -> None:
         """Raises ModelError for an effect that is neither noise nor one of a logged temperature."""
@@ -268,6 +268,6 @@ def _steps(start: NoiseFit, search: Search, names: tuple[str, ...]) -> Iterator[
     present = start
     for k, name in enumerate(names):
         last = k == len(search.gains) - 1
-        after = search.end if last else fit(present.model.with_effect(search.effects[name]), search.still)
-        yield Step(name, present, after, search.gains[name] / 2)
-        present = after
+        extended = search.end if last else fit(present.model.with_effect(search.effects[name]), search.still)
+        yield Step(name, present, extended, search.gains[name] / 2)
+        present = extended

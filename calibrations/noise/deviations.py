@@ -132,8 +132,8 @@ def _point(tree: Tree, kind: str, octave: int) -> tuple[float, float, int] | Non
     """(deviation, degrees of freedom, noise type) at 2^octave samples; None where the record is too short."""
     level, factor = max(0, octave - FACTORS + 1), min(octave, FACTORS - 1)
     order, divisor = OCTAVE_KINDS[kind]
-    where = (level, factor if level == 0 else 0, order)
-    number, total = int(tree.windows[where]), float(tree.squares[where])
+    index = (level, factor if level == 0 else 0, order)
+    number, total = int(tree.windows[index]), float(tree.squares[index])
     if not number:
         return None
     m, bins = 2.0**octave, 2**factor

@@ -156,9 +156,9 @@ def experiment_for_pattern(pattern: Pattern, length_s: float) -> Experiment | No
     if cause is None:
         return None
     rivals = [name for name in causes_of_rivals if name is not None] or [TAKEN_FOR]
-    procedure, settings, why = experiment_by_physics({cause, *rivals} - {TAKEN_FOR})
-    why = OVEN_SHOWS if pattern.kind == FOLLOWS and rivals == [TAKEN_FOR] else why
-    return Experiment(procedure, settings, tuple((cause, rival) for rival in rivals), why)
+    procedure, settings, reason = experiment_by_physics({cause, *rivals} - {TAKEN_FOR})
+    reason = OVEN_SHOWS if pattern.kind == FOLLOWS and rivals == [TAKEN_FOR] else reason
+    return Experiment(procedure, settings, tuple((cause, rival) for rival in rivals), reason)
 
 
 def experiment_for_filter(name: str, corner_hz: float) -> Experiment | None:
@@ -172,25 +172,25 @@ def _round_up_to_tens(seconds: float) -> float:
     return float(10 * np.ceil(seconds / 10))
 
 
-def separating_record(search: Search, named: tuple[str, ...]) -> Experiment | None:
+def separating_record(search: Search, names: tuple[str, ...]) -> Experiment | None:
     """The shortest record that separates the first effect in doubt from its rivals with certainty.
 
     None of them certain, the longest that is proposed.
     """
-    name, rivals = next(((name, search.rivals[name]) for name in named if search.rivals.get(name)), ("", ()))
+    name, rivals = next(((name, search.rivals[name]) for name in names if search.rivals.get(name)), ("", ()))
     if not rivals:
         return None
     pairs = tuple((name, rival) for rival in rivals)
     lengths = [k * search.still.length_s for k in LONGER if k * search.still.length_s <= LONGEST_RECORD_S]
     lengths = lengths or [2 * search.still.length_s]
     foreseen = [(length_s, _information(search, name, rivals, length_s)) for length_s in lengths]
-    chosen = next((option for option in foreseen if pairs_separated(option[1]) >= CERTAIN_PROBABILITY), foreseen[-1])
+    choice = next((option for option in foreseen if pairs_separated(option[1]) >= CERTAIN_PROBABILITY), foreseen[-1])
     return Experiment(
         PROCEDURE,
-        {"duration_s": _round_up_to_tens(chosen[0])},
+        {"duration_s": _round_up_to_tens(choice[0])},
         pairs,
         LONGER_SEPARATES,
-        expected=Expected(chosen[1], chosen[1]),
+        expected=Expected(choice[1], choice[1]),
     )
 
 
@@ -202,19 +202,19 @@ def _information(search: Search, name: str, rivals: tuple[str, ...], length_s: f
     for rival in rivals:
         sides = (search.mixture, effects[name]), (search.mixtures.of([*remaining, effects[rival]]), effects[rival])
         deviances += [
-            sum(_deviance_of_wrong(*pair, length_s) for pair in zip(right.channels, wrong.channels, strict=True))
-            for (right, own), (wrong, rival_effect) in (sides, sides[::-1])
-            if own.name not in rival_effect.contains  # a process that contains it can take its form
+            sum(_deviance_of_wrong(*pair, length_s) for pair in zip(true_fit.channels, rival_fit.channels, strict=True))
+            for (true_fit, true_effect), (rival_fit, rival_effect) in (sides, sides[::-1])
+            if true_effect.name not in rival_effect.contains  # a process that contains it can take its form
         ]
     return min(deviances)
 
 
-def _deviance_of_wrong(right: ChannelFit, wrong: ChannelFit, length_s: float) -> float:
+def _deviance_of_wrong(true_fit: ChannelFit, rival_fit: ChannelFit, length_s: float) -> float:
     """Deviance of the wrong effects on what the right ones expect of a record of this length."""
-    channel = longer_channel(right.channel, length_s)
-    truth = replace(right, channel=channel, parts=(_slow(channel),), lines=(), fits={})
+    channel = longer_channel(true_fit.channel, length_s)
+    truth = replace(true_fit, channel=channel, parts=(_slow(channel),), lines=(), fits={})
     bands = replace(truth.parts[0], density=truth.expected)
-    return fit_effects(replace(truth, parts=(bands,), fits={}), wrong.effects).deviance
+    return fit_effects(replace(truth, parts=(bands,), fits={}), rival_fit.effects).deviance
 
 
 def longer_channel(channel: Channel, length_s: float) -> Channel:
@@ -257,8 +257,8 @@ def _channel_corner_hz(fit: ChannelFit) -> float | None:
         return None
     white = sum(value**2 for value in fit.values.get(WHITE, {}).values())
     corner = 1 / (2 * np.pi * time_s)
-    alone = white < LEAST_WHITE * 2 * sigma**2 * time_s
-    return float(corner) if alone or corner > SLOWEST_FILTER_HZ else None
+    fits_alone = white < LEAST_WHITE * 2 * sigma**2 * time_s
+    return float(corner) if fits_alone or corner > SLOWEST_FILTER_HZ else None
 
 
 def structure_of(search: Search) -> str | None:
@@ -266,11 +266,11 @@ def structure_of(search: Search) -> str | None:
     return "; ".join(disturbance.text for disturbance in disturbances(search) if disturbance.matters) or None
 
 
-def alternatives(search: Search, named: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
+def alternatives(search: Search, names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
     """By named effect, those that the record cannot separate from it; a low-pass is named by its effect."""
-    behind = {name: (OUTPUT_FILTER,) for name in named if possible_corner_hz(search, name) is not None}
-    doubtful = {name: (*search.rivals.get(name, ()), *behind.get(name, ())) for name in named}
-    return {name: rivals for name, rivals in doubtful.items() if rivals}
+    filtered = {name: (OUTPUT_FILTER,) for name in names if possible_corner_hz(search, name) is not None}
+    rivals_by_name = {name: (*search.rivals.get(name, ()), *filtered.get(name, ())) for name in names}
+    return {name: rivals for name, rivals in rivals_by_name.items() if rivals}
 
 
 def reason_of(search: Search, doubts: Mapping[str, tuple[str, ...]], structure: str | None) -> str | None:
@@ -329,12 +329,12 @@ def _jump(means: Array) -> tuple[float, float] | None:
     n = len(means)
     if n < FEWEST_MEANS or not np.ptp(means):
         return None
-    about = means - means.mean()
+    deviations = means - means.mean()
     count = np.arange(1, n)
-    sums = np.cumsum(about)[:-1]
+    sums = np.cumsum(deviations)[:-1]
     gained = sums**2 * n / (count * (n - count))  # of the sum of squares, by two levels
     k = int(np.argmax(gained))
-    if gained[k] < ALL_OF_JUMP * float(about @ about) or min(k + 1, n - k - 1) < FEWEST_BESIDE_JUMP:
+    if gained[k] < ALL_OF_JUMP * float(deviations @ deviations) or min(k + 1, n - k - 1) < FEWEST_BESIDE_JUMP:
         return None
     return (k + 1) / n, float(-sums[k] / (n - k - 1) - sums[k] / (k + 1))
 

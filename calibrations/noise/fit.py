@@ -52,13 +52,13 @@ def estimates(fit: ChannelFit, effect: Effect, unit: str, deviations: Deviations
     """Of one effect's parameters, in the order in which they are declared."""
     lines = "lines" in effect.places
     values = _line_estimates(fit, unit) if lines else _spectrum_estimates(fit, effect, unit, deviations)
-    hidden = hidden_in(fit.channel.oddities)
-    if hidden is None or not hidden.hides(effect.name):
+    hidden_noise = hidden_in(fit.channel.oddities)
+    if hidden_noise is None or not hidden_noise.hides(effect.name):
         yield from values
         return
-    why = f"the noise is below the converter's step of {hidden.step:.4g} {unit}"
+    reason = f"the noise is below the converter's step of {hidden_noise.step:.4g} {unit}"
     for estimate in values:
-        yield replace(estimate, std=None, identified=False, why=why)
+        yield replace(estimate, std=None, identified=False, why=reason)
 
 
 def _spectrum_estimates(fit: ChannelFit, effect: Effect, unit: str, deviations: Deviations) -> Iterator[Estimate]:
@@ -78,8 +78,8 @@ def _unidentified(fit: ChannelFit, effect: Effect, unit: str) -> Iterator[Estima
     strength, values, axis = effect.parameters[0], fit.values[effect.name], fit.channel.axis
     value, bound, _ = upper_bound(fit, effect, [e for e in fit.effects if e is not effect])
     strength_unit = strength.unit.replace("{out}", unit)
-    why = f"the process may be absent: {strength.name} is below {bound:.2g} {strength_unit} (95 %)"
-    yield Estimate(strength.name, axis, value, (bound - value) / INTERVAL_STDS, strength_unit, False, why)
+    reason = f"the process may be absent: {strength.name} is below {bound:.2g} {strength_unit} (95 %)"
+    yield Estimate(strength.name, axis, value, (bound - value) / INTERVAL_STDS, strength_unit, False, reason)
     for p in effect.parameters[1:]:
         yield Estimate(p.name, axis, values[p.name], None, p.unit, False, "the process may be absent")
 
@@ -163,8 +163,8 @@ def _line_estimates(fit: ChannelFit, unit: str) -> Iterator[Estimate]:
         yield Estimate(f"amplitude_{k}", axis, float(line.amplitude), float(line.std), unit)
         yield Estimate(f"frequency_{k}", axis, float(line.frequency_hz), float(line.std_hz), "Hz")
     if not fit.lines:
-        why = f"no line exceeds the noise; its amplitude is below {fit.line_bound:.2g} {unit}"
-        yield Estimate("amplitude_1", axis, 0.0, float(fit.line_bound / INTERVAL_STDS), unit, False, why)
+        reason = f"no line exceeds the noise; its amplitude is below {fit.line_bound:.2g} {unit}"
+        yield Estimate("amplitude_1", axis, 0.0, float(fit.line_bound / INTERVAL_STDS), unit, False, reason)
 
 
 ROUNDS = 2  # over the shapes, where a model has several

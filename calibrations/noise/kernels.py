@@ -61,9 +61,9 @@ def absorb(tree: Tree, samples: Array, offset: float, third: bool) -> None:
     """Take in more samples, less `offset`, the same each time; `third`: with differences of the third order."""
     place = 0
     while place < len(samples):
-        have = tree.filled[0]
-        count = min(TAIL + STEP - have, len(samples) - place)
-        tree.sums[0, have : have + count] = samples[place : place + count] - offset
+        filled = tree.filled[0]
+        count = min(TAIL + STEP - filled, len(samples) - place)
+        tree.sums[0, filled : filled + count] = samples[place : place + count] - offset
         _noted(tree, 0, count)
         place += count
         level = 0
@@ -82,10 +82,10 @@ def finish(tree: Tree, third: bool) -> None:
 @njit(cache=True, nogil=True)
 def _noted(tree: Tree, level: int, count: int) -> None:
     """Count bins that were put into a buffer, and keep the very first."""
-    have = tree.filled[level]
-    before = tree.seen[level]
-    lacks = max(0, min(count, 2 * OVERLAP - before))
-    tree.heads[level, before : before + lacks] = tree.sums[level, have : have + lacks]
+    filled = tree.filled[level]
+    count_before = tree.seen[level]
+    lacks = max(0, min(count, 2 * OVERLAP - count_before))
+    tree.heads[level, count_before : count_before + lacks] = tree.sums[level, filled : filled + lacks]
     tree.filled[level] += count
     tree.seen[level] += count
 
@@ -100,12 +100,12 @@ def _hand_up(tree: Tree, level: int, third: bool) -> None:
     _measure_second(tree, level)
     if third:
         _measure_third(tree, level)
-    first, above = tree.paired[level], tree.filled[level + 1]
+    first, filled_above = tree.paired[level], tree.filled[level + 1]
     pairs = (n - first) // 2
     b0, b1 = b[first : first + 2 * pairs : 2], b[first + 1 : first + 2 * pairs : 2]
     p0, p1 = p[first : first + 2 * pairs : 2], p[first + 1 : first + 2 * pairs : 2]
-    tree.sums[level + 1, above : above + pairs] = b0 + b1
-    tree.phases[level + 1, above : above + pairs] = p0 + p1 + size * b0
+    tree.sums[level + 1, filled_above : filled_above + pairs] = b0 + b1
+    tree.phases[level + 1, filled_above : filled_above + pairs] = p0 + p1 + size * b0
     _noted(tree, level + 1, pairs)
     tail = min(TAIL, n)
     b[:tail] = b[n - tail : n].copy()
@@ -158,11 +158,11 @@ def integrals(b: Array, p: Array, size: float) -> tuple[Array, Array]:
     """Running sums of bins less their mean, and of the phase over all samples, each shape (n + 1,) from 0."""
     n = len(b)
     mean = b.mean()
-    inside = mean * (size - 1.0) / 2.0  # what the mean adds to the phase within a bin
+    mean_phase = mean * (size - 1.0) / 2.0  # what the mean adds to the phase within a bin
     phase, summed = np.zeros(n + 1), np.zeros(n + 1)
     x = c = 0.0
     for i in range(n):
-        c += p[i] - inside + size * x
+        c += p[i] - mean_phase + size * x
         x += b[i] - mean
         phase[i + 1] = x
         summed[i + 1] = c
@@ -201,14 +201,14 @@ def _add_moments(z: Array, old: int, to: Array) -> None:
         a += new[i]
         b += new[i] * new[i]
     start = max(old, 1)
-    current, before = z[start:], z[start - 1 : -1]
+    current, preceding = z[start:], z[start - 1 : -1]
     for i in range(len(current)):
-        c += current[i] * before[i]
-        d += (current[i] - before[i]) ** 2
+        c += current[i] * preceding[i]
+        d += (current[i] - preceding[i]) ** 2
     start = max(old, 2)
-    current, before, earlier = z[start:], z[start - 1 : -1], z[start - 2 : -2]
+    current, preceding, earlier = z[start:], z[start - 1 : -1], z[start - 2 : -2]
     for i in range(len(current)):
-        e += (current[i] - before[i]) * (before[i] - earlier[i])
+        e += (current[i] - preceding[i]) * (preceding[i] - earlier[i])
     to += np.array((a, b, c, d, e))
 
 

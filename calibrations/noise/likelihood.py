@@ -63,14 +63,14 @@ def maximise_from(
             trial = theta + length * step
             S = base + G @ trial
             if S.min() > 0.0:
-                better = log_likelihood(S, measured, freedom)
-                if better >= value:
+                next_value = log_likelihood(S, measured, freedom)
+                if next_value >= value:
                     break
             length /= 2
         if length <= 1e-4:
             break
-        gained = better - value
-        theta, value = trial, better
+        gained = next_value - value
+        theta, value = trial, next_value
         if gained < converged:
             break
     return theta, value

@@ -97,33 +97,33 @@ def _median_around(density: Array) -> Array:
     Where a spectrum only falls, or only rises, that is the ordinate's own level: behind a filter, or beside flicker,
     a window that reached further to one side would take the slope for a line. Too near an end nothing can be said.
     """
-    around = np.full(len(density), np.inf)
+    medians = np.full(len(density), np.inf)
     most = AROUND // 2
     if len(density) >= AROUND:
-        around[most:-most] = median_filter(density, AROUND)[most:-most]
+        medians[most:-most] = median_filter(density, AROUND)[most:-most]
     for k in range(LOBE + 1, min(most, len(density) // 2)):
-        around[k] = np.median(density[: 2 * k + 1])
-        around[-1 - k] = np.median(density[-1 - 2 * k :])
-    return around
+        medians[k] = np.median(density[: 2 * k + 1])
+        medians[-1 - k] = np.median(density[-1 - 2 * k :])
+    return medians
 
 
 def fast_lines(f: Array, density: Array, freedom: float, above_hz: float, length_s: float) -> tuple[Array, list[Line]]:
     """(densities (f,) with the lines taken off, the lines above a frequency, strongest first)."""
-    around = _median_around(density)
+    background = _median_around(density)
     lines, remaining = [], density.copy()
     for _ in range(MOST_FAST_LINES):
-        height = np.where(f > above_hz, remaining / around, 0.0)
+        height = np.where(f > above_hz, remaining / background, 0.0)
         best = int(np.argmax(height))
         if not len(f) * chdtrc(freedom, freedom * height[best]) < FALSE_LINE:
             break
         lobe = slice(max(0, best - LOBE), best + LOBE + 1)
-        excess = np.maximum(remaining[lobe] - around[lobe], 0.0)
+        excess = np.maximum(remaining[lobe] - background[lobe], 0.0)
         amplitude = float(np.sqrt(4 * (f[1] - f[0]) * excess.sum()))
-        std = float(np.sqrt(2 * WINDOW_LOSS * around[best] / length_s))
+        std = float(np.sqrt(2 * WINDOW_LOSS * background[best] / length_s))
         lines.append(
             Line(float(np.sum(f[lobe] * excess) / excess.sum()), amplitude, std, CENTROID * float(f[1] - f[0]))
         )
-        remaining[lobe] = around[lobe]
+        remaining[lobe] = background[lobe]
     return remaining, sorted(lines, key=lambda line: -line.amplitude)
 
 
@@ -137,10 +137,10 @@ def bands(channel: Channel, lines: Iterable[Line] = ()) -> tuple[Bands, ...]:
     lines = tuple(lines)
     slow = slow_bands(means_without(channel, lines), channel.sampling, channel.corner_hz)
     f, density = fast_without(channel, lines)
-    chosen = f > 0.5 / channel.sampling.interval_s
-    if not chosen.any():
+    in_band = f > 0.5 / channel.sampling.interval_s
+    if not in_band.any():
         return (slow,)
-    f, density = f[chosen], density[chosen]
+    f, density = f[in_band], density[in_band]
     fast = fast_bands(f, density, channel.segments.freedom, channel.rate_hz, channel.corner_hz)
     return (slow, fast) if len(fast.density) else (slow,)
 
@@ -172,16 +172,16 @@ def fast_without(channel: Channel, lines: Iterable[Line]) -> tuple[Array, Array]
     """(frequencies, densities) of the ordinates that the means' bands do not reach, less the lines."""
     f, density = channel.segments.frequency_hz, channel.segments.density
     above_hz = min(0.5 / channel.sampling.interval_s, channel.corner_hz / 2)
-    chosen = f > (above_hz if int(channel.segments.stretches.sum()) >= FEWEST_FAST_STRETCHES else np.inf)
-    f, density = f[chosen], density[chosen].copy()
+    in_band = f > (above_hz if int(channel.segments.stretches.sum()) >= FEWEST_FAST_STRETCHES else np.inf)
+    f, density = f[in_band], density[in_band].copy()
     for line in lines:
         chosen_lobe = np.flatnonzero(np.abs(f - line.frequency_hz) < REACH * channel.rate_hz / LENGTH)
         if len(chosen_lobe):
-            around = density[max(0, chosen_lobe[0] - AROUND) : chosen_lobe[-1] + AROUND]
+            neighbourhood = density[max(0, chosen_lobe[0] - AROUND) : chosen_lobe[-1] + AROUND]
             remaining = density[chosen_lobe] - line.amplitude**2 * _window_density(
                 f[chosen_lobe] - line.frequency_hz, channel.rate_hz
             )
-            density[chosen_lobe] = np.maximum(remaining, LEAST_DENSITY * np.median(around))
+            density[chosen_lobe] = np.maximum(remaining, LEAST_DENSITY * np.median(neighbourhood))
     return f, density
 
 
@@ -198,8 +198,8 @@ def strongest_line(channel: Channel, known_lines: Lines, level: Callable[[Array]
     """
     means, sampling = means_without(channel, known_lines), channel.sampling
     power = windowed_density(means, sampling)
-    around = _level_around(power, len(means) * sampling.interval_s)
-    slow = without_line(means, power, sampling, lambda f: np.maximum(level(f), around(f)), channel.corner_hz / 2)
+    background = _level_around(power, len(means) * sampling.interval_s)
+    slow = without_line(means, power, sampling, lambda f: np.maximum(level(f), background(f)), channel.corner_hz / 2)
     f, density = fast_without(channel, known_lines)
     fast = fast_lines(f, density, channel.segments.freedom, 0.0, channel.length_s)[1] if len(f) else []
     if isinstance(slow, float):

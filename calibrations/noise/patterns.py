@@ -99,14 +99,15 @@ class Pattern:
         return replace(channel, means=channel.means - self.size * self.form) if channel.axis == self.axis else channel
 
 
-def pattern_of(fit: ChannelFit, removed: Iterable[Pattern] = ()) -> Pattern | None:
-    """The pattern with the greatest gain in one channel; None where chance explains it. `removed`: those before it."""
+def pattern_of(fit: ChannelFit, removed_patterns: Iterable[Pattern] = ()) -> Pattern | None:
+    """The pattern with the greatest gain in one channel; None where chance explains it."""
     if hidden_in(fit.channel.oddities) is not None:
         return None  # rounding makes steps and slopes
     spectrum, unit = _Ordinates.of(fit), fit.channel.unit
     candidates = [
         _step(fit.channel, spectrum, unit), *_courses(fit.channel, spectrum, unit),
-        *_followed(fit.channel, spectrum, unit, removed), *_further(fit.channel, spectrum, unit, removed),
+        *_followed(fit.channel, spectrum, unit, removed_patterns),
+        *_further(fit.channel, spectrum, unit, removed_patterns),
     ]  # fmt: skip
     kinds = {(pattern.kind, pattern.cause) for pattern in candidates}
     best, *weaker = sorted((_best(candidates, *kind) for kind in kinds), key=lambda pattern: -pattern.worth)
@@ -156,10 +157,10 @@ def _step(channel: Channel, by: _Ordinates, unit: str) -> Pattern:
     """The step with the greatest gain, over all places."""
     n, k = by.n, len(by.seen)
     per_step = _per_step(n, k)
-    along, power = np.zeros(n - 1), np.zeros(n + 1)
-    along[: min(k, n - 1)] = (by.seen * per_step / by.variance)[: n - 1]
+    gain_terms, power = np.zeros(n - 1), np.zeros(n + 1)
+    gain_terms[: min(k, n - 1)] = (by.seen * per_step / by.variance)[: n - 1]
     power[1 : k + 1] = per_step**2 / by.variance
-    top = dst(along, type=1) / 2
+    top = dst(gain_terms, type=1) / 2
     turned = dct(power, type=1) + power[0]
     turned[::2] += power[-1]
     turned[1::2] -= power[-1]
@@ -227,17 +228,17 @@ def _course_coefficients(n: int, k: int) -> Array:
     return np.asarray(coefficients / np.sqrt(2 * n))
 
 
-def _followed(channel: Channel, by: _Ordinates, unit: str, removed: Iterable[Pattern]) -> Iterator[Pattern]:
+def _followed(channel: Channel, by: _Ordinates, unit: str, removed_patterns: Iterable[Pattern]) -> Iterator[Pattern]:
     """Outputs that follow a column, as read or without its scatter, at once or with a lag; each column once."""
     price = PATTERN_AMPLITUDE + 2 * float(np.log(len(LAGS) * max(1, len(channel.logged))))
-    removed_causes = {pattern.cause for pattern in removed if pattern.axis == channel.axis}
+    removed_causes = {pattern.cause for pattern in removed_patterns if pattern.axis == channel.axis}
     for name, column in channel.logged.items():
         if name in removed_causes:
             continue
         for values, doubt in ((column.read, 0.0), (column.level, column.doubt)):
             share = _best_lag(values, by)
-            behind = f", with a lag of {share * channel.length_s:.2g} s" if share else ""
-            text = f"{channel.axis} follows {name} by {{}} {unit}/{PER.get(name, name)}{behind}"
+            lag_words = f", with a lag of {share * channel.length_s:.2g} s" if share else ""
+            text = f"{channel.axis} follows {name} by {{}} {unit}/{PER.get(name, name)}{lag_words}"
             make = partial(_lagged, values, share)
             lag_s = share * channel.length_s
             yield Pattern(FOLLOWS, channel.axis, text, make, *by.matched(make()), price, name, doubt, lag_s=lag_s)
@@ -263,11 +264,11 @@ def _best_lag(values: Array, by: _Ordinates) -> float:
     return float(optimum.x if optimum.fun < losses[best] else LAGS[best])
 
 
-def _further(channel: Channel, by: _Ordinates, unit: str, removed: Iterable[Pattern]) -> Iterator[Pattern]:
+def _further(channel: Channel, by: _Ordinates, unit: str, removed_patterns: Iterable[Pattern]) -> Iterator[Pattern]:
     """Curvature and branches of an output that follows a column, with the lag that was found: its square and cube, and
     a hysteresis, which depends on the direction in which the column changes."""
     price = PATTERN_AMPLITUDE + 2 * float(np.log(len(POWERS) + len(PLAYS)))
-    for line in removed:
+    for line in removed_patterns:
         if line.kind != FOLLOWS or line.further or line.axis != channel.axis:
             continue
         per, span = PER.get(line.cause, line.cause), float(np.ptp(line.form))

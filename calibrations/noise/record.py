@@ -40,8 +40,8 @@ class Logged:
 
     def part(self, span: slice) -> Logged:
         """Some of the record, which is a record of its own."""
-        read, level = (values[span] - values[span].mean() for values in (self.read, self.level))
-        return Logged(read, level, self.doubt, self.mean + float(self.read[span].mean()))
+        readings, level = (values[span] - values[span].mean() for values in (self.read, self.level))
+        return Logged(readings, level, self.doubt, self.mean + float(self.read[span].mean()))
 
 
 def logged_column(blocks: Sequence[Array], n: int) -> Logged | None:
@@ -51,12 +51,12 @@ def logged_column(blocks: Sequence[Array], n: int) -> Logged | None:
         means.add(block)
         readings += int(np.count_nonzero(np.diff(block, prepend=last)))
         last = block[-1] if len(block) else last
-    read = means.values()
-    if sum(map(len, blocks)) != n or np.ptp(read) == 0:
+    means_read = means.values()
+    if sum(map(len, blocks)) != n or np.ptp(means_read) == 0:
         return None
     mean = sum(float(np.sum(block)) for block in blocks) / n
-    level = without_scatter(read, readings)
-    return Logged(read, level.values, level.doubt, mean)
+    level = without_scatter(means_read, readings)
+    return Logged(means_read, level.values, level.doubt, mean)
 
 
 # A still record of any length, reduced in one pass to all that its noise is told from.
@@ -96,9 +96,11 @@ class Reduction:
     def oddities(self) -> tuple[Oddity, ...]:
         """Samples that are not noise, and noise below the converter's step."""
         curve = self.octaves.curve()
-        hidden = self._steps.hidden(curve, self.rate_hz, self.corner_hz)
-        between = float(curve.deviation[0] ** 2)
-        return oddities(self._outliers.found(), self._stuck.found(), hidden, self.n, self.rate_hz, between)
+        hidden_noise = self._steps.hidden(curve, self.rate_hz, self.corner_hz)
+        neighbour_variance = float(curve.deviation[0] ** 2)
+        return oddities(
+            self._outliers.found(), self._stuck.found(), hidden_noise, self.n, self.rate_hz, neighbour_variance
+        )
 
 
 def require_length(n: int, rate_hz: float, corner_hz: float, source: str) -> None:
@@ -114,7 +116,7 @@ def require_length(n: int, rate_hz: float, corner_hz: float, source: str) -> Non
         )
 
 
-def require_numbers(samples: Array, before: int, source: str) -> Array:
+def require_numbers(samples: Array, count_before: int, source: str) -> Array:
     """As float64. Raises DataError where one is no number."""
     try:
         samples = samples.astype(np.float64, casting="same_kind" if samples.dtype.kind == "f" else "safe")
@@ -124,7 +126,7 @@ def require_numbers(samples: Array, before: int, source: str) -> Array:
     if not finite.all():
         row = int(np.argmin(finite))
         raise DataError(
-            f"{source}: sample {before + row + 1} is {samples[row]:g}, not a number; "
+            f"{source}: sample {count_before + row + 1} is {samples[row]:g}, not a number; "
             "cut the record there and analyse a part without gaps"
         )
     return samples
@@ -224,7 +226,7 @@ class Still:
     def hidden(self) -> bool:
         """Whether the noise of every channel is below its converter's step."""
         hidden_of_channels = [hidden_in(channel.oddities) for channel in self.channels]
-        return all(hidden is not None and hidden.all for hidden in hidden_of_channels)
+        return all(channel_noise is not None and channel_noise.all for channel_noise in hidden_of_channels)
 
     @property
     def axes(self) -> tuple[str, ...]:

@@ -49,7 +49,7 @@ FASTEST = ("white-noise", "quantisation-noise")  # what is hidden at least
 
 
 @dataclass(frozen=True)
-class Hidden:
+class HiddenNoise:
     """Noise below a converter's `step`, over so many `levels`; white noise is below the coefficient `white_below`.
 
     `all`: whether what is slow is hidden too.
@@ -88,26 +88,26 @@ class Steps:
         """The next samples, shape (n,)."""
         if not len(samples):
             return
-        between = np.abs(np.diff(samples, prepend=self._last))
-        self._step = float(np.min(between, where=between > 0, initial=self._step))
+        differences = np.abs(np.diff(samples, prepend=self._last))
+        self._step = float(np.min(differences, where=differences > 0, initial=self._step))
         self._low, self._high = min(self._low, float(samples.min())), max(self._high, float(samples.max()))
         self._last = float(samples[-1])
 
-    def hidden(self, curve: Curve, rate_hz: float, corner_hz: float) -> Hidden | None:
+    def hidden(self, curve: Curve, rate_hz: float, corner_hz: float) -> HiddenNoise | None:
         """By the Allan deviations of the samples, behind a first-order low-pass; None where noise is not hidden."""
         limit = LEAST * self._step**2
         if not np.isfinite(self._step) or _reaching(curve, rate_hz, corner_hz) >= limit:
             return None
-        below = LEAST_DITHER * self._step / float(np.sqrt(min(rate_hz, np.pi * corner_hz)))
+        white_bound = LEAST_DITHER * self._step / float(np.sqrt(min(rate_hz, np.pi * corner_hz)))
         levels = round((self._high - self._low) / self._step) + 1
-        return Hidden(self._step, levels, below, bool(np.max(curve.deviation**2) < limit))
+        return HiddenNoise(self._step, levels, white_bound, bool(np.max(curve.deviation**2) < limit))
 
 
 def hidden_step(values: Array) -> float | None:
     """The step that hides the fast noise of values (n,); None where none does."""
-    between = np.abs(np.diff(values))
-    step = float(np.min(between, where=between > 0, initial=np.inf))
-    return step if np.isfinite(step) and np.mean(between**2) / 2 < LEAST * step**2 else None
+    differences = np.abs(np.diff(values))
+    step = float(np.min(differences, where=differences > 0, initial=np.inf))
+    return step if np.isfinite(step) and np.mean(differences**2) / 2 < LEAST * step**2 else None
 
 
 def _reaching(curve: Curve, rate_hz: float, corner_hz: float) -> float:
@@ -174,10 +174,10 @@ class Outliers:
     def _judge(self, part: Array) -> None:
         """All but the outer samples of a part."""
         middle = part[SIDE:-SIDE]
-        to_left, right = middle - _median(part, 0), middle - _median(part, SIDE + 1)
+        to_left, to_right = middle - _median(part, 0), middle - _median(part, SIDE + 1)
         if len(middle) >= FEWEST_FOR_SCALE or not self._scale:
             self._scale = float(np.quantile(np.abs(to_left), DECILE)) / NORMAL
-        off = np.where(np.sign(to_left) == np.sign(right), np.minimum(np.abs(to_left), np.abs(right)), 0.0)
+        off = np.where(np.sign(to_left) == np.sign(to_right), np.minimum(np.abs(to_left), np.abs(to_right)), 0.0)
         wild = np.flatnonzero(off > WILD_SAMPLE * self._scale)
         if len(wild) and self._scale > 0:
             self._note(self._before + SIDE + wild, off[wild])
@@ -186,11 +186,15 @@ class Outliers:
         self._judged += len(middle)
 
     def _note(self, at: NDArray[np.intp], off: Array) -> None:
-        was, worst = self._wild, int(np.argmax(off))
+        previous, worst = self._wild, int(np.argmax(off))
         deviations = float(off[worst]) / self._scale
-        wildest = (int(at[worst]), deviations) if deviations > was.deviations else (was.wildest, was.deviations)
-        first = was.first if was.count else int(at[0])
-        self._wild = Wild(was.count + len(at), first, *wildest, was.power + float(np.sum(off**2)))
+        wildest = (
+            (int(at[worst]), deviations)
+            if deviations > previous.deviations
+            else (previous.wildest, previous.deviations)
+        )
+        first = previous.first if previous.count else int(at[0])
+        self._wild = Wild(previous.count + len(at), first, *wildest, previous.power + float(np.sum(off**2)))
 
 
 def _median(part: Array, start: int) -> Array:
@@ -239,9 +243,9 @@ class Stuck:
         by_chance = (self._n - longest.length) / count * (1 + np.log(count))
         return longest if longest.length > max(SHORTEST_STUCK, STUCK_BEYOND_CHANCE * by_chance) else None
 
-    def _end(self, more: int) -> None:
-        """The present run ends after `more` samples."""
-        self._keep(Run(self._present.start, self._n + more - self._present.start))
+    def _end(self, count: int) -> None:
+        """The present run ends after `count` samples."""
+        self._keep(Run(self._present.start, self._n + count - self._present.start))
 
     def _keep(self, run: Run) -> None:
         if run.length > self._longest.length:
@@ -264,10 +268,10 @@ class Ends:
             self._alike = 1 / len(np.unique(samples))
         self._n += len(samples)
         for name, value in (("highest", float(samples.max())), ("lowest", float(samples.min()))):
-            before, count = self._ends.get(name, (value, 0))
-            beyond = value > before if name == "highest" else value < before
-            if beyond or value == before:
-                count = int(np.count_nonzero(samples == value)) + (0 if beyond else count)
+            extreme, count = self._ends.get(name, (value, 0))
+            exceeds = value > extreme if name == "highest" else value < extreme
+            if exceeds or value == extreme:
+                count = int(np.count_nonzero(samples == value)) + (0 if exceeds else count)
                 self._ends[name] = value, count
 
     def check(self, source: str) -> None:
@@ -295,35 +299,35 @@ class Oddity:
     kind: str
     text: str
     matters: bool
-    hidden: Hidden | None = None
+    hidden: HiddenNoise | None = None
 
 
-def hidden_in(oddities_of_channel: Iterable[Oddity]) -> Hidden | None:
+def hidden_in(oddities_of_channel: Iterable[Oddity]) -> HiddenNoise | None:
     """The noise below a converter's step; None where none is."""
     return next((oddity.hidden for oddity in oddities_of_channel if oddity.hidden is not None), None)
 
 
 def oddities(
-    wild: Wild, stuck: Run | None, hidden: Hidden | None, n: int, rate_hz: float, variance: float
+    wild: Wild, stuck: Run | None, hidden_noise: HiddenNoise | None, n: int, rate_hz: float, variance: float
 ) -> tuple[Oddity, ...]:
     """Of a record of n samples, whose neighbours have the Allan variance `variance`."""
     result = []
     if wild.count:
         result.append(_wild(wild, n, rate_hz, variance))
-    if stuck is not None and hidden is None:  # below a step, samples are the same for long
+    if stuck is not None and hidden_noise is None:  # below a step, samples are the same for long
         start_s, length_s = stuck.start / rate_hz, stuck.length / rate_hz
         text = f"{stuck.length} samples from t = {start_s:.6g} s on are equal, for {length_s:.4g} s"
         result.append(Oddity(CONSTANT, text, stuck.length / n > _uncertain(n)))
-    if hidden is not None:
-        result.append(Oddity(COARSE, hidden.text, True, hidden))
+    if hidden_noise is not None:
+        result.append(Oddity(COARSE, hidden_noise.text, True, hidden_noise))
     return tuple(result)
 
 
 def _wild(wild: Wild, n: int, rate_hz: float, variance: float) -> Oddity:
     share = min(1.0, wild.power / (n * variance))
-    many = "one sample is" if wild.count == 1 else f"{wild.count} samples are"
+    count_words = "one sample is" if wild.count == 1 else f"{wild.count} samples are"
     text = (
-        f"{many} far from the neighbours: by up to {wild.deviations:.3g} standard deviations at "
+        f"{count_words} far from the neighbours: by up to {wild.deviations:.3g} standard deviations at "
         f"t = {wild.wildest / rate_hz:.6g} s (sample {wild.wildest + 1}): {100 * share:.2g} % of the noise's power"
     )
     return Oddity(WILD, text, share > _uncertain(n))

@@ -242,43 +242,43 @@ def _search_once(still: Still, model: Model, noises: Mapping[str, Effect], model
     )
 
 
-def candidates(search: Search, before: NoiseFit, doubts: Mapping[str, tuple[str, ...]]) -> tuple[Candidate, ...]:
+def candidates(search: Search, base: NoiseFit, doubts: Mapping[str, tuple[str, ...]]) -> tuple[Candidate, ...]:
     """Every effect that the model does not hold, each alone on top of it; those that are missed come first."""
-    missing = [effect for name, effect in search.effects.items() if name not in before.model.effects]
-    after = {effect.name: fit(before.model.with_effect(effect), search.still) for effect in missing}
-    gains = {name: 2 * (extended.log_likelihood - before.log_likelihood) for name, extended in after.items()}
+    missing = [effect for name, effect in search.effects.items() if name not in base.model.effects]
+    extended_fits = {effect.name: fit(base.model.with_effect(effect), search.still) for effect in missing}
+    gains = {name: 2 * (extended.log_likelihood - base.log_likelihood) for name, extended in extended_fits.items()}
     if search.liner is not None:
         gains[search.liner.name] = max(gains[search.liner.name], search.gains[search.liner.name])
-    bands = sum(len(extended.seen) for extended in before.channels)
-    scores = np.array([_schwarz(effect, gains[effect.name], before, bands) for effect in missing])
+    bands = sum(len(extended.seen) for extended in base.channels)
+    scores = np.array([_schwarz(effect, gains[effect.name], base, bands) for effect in missing])
     odds = np.exp(np.minimum(np.append(scores, 0.0) - max([*scores, 0.0]), 0.0) / 2)
     probability = odds / odds.sum()
     result = [
         Candidate(
             effect=effect,
             gain=gains[effect.name],
-            p_value=_p_value(effect, gains[effect.name], before, len(missing)),
+            p_value=_p_value(effect, gains[effect.name], base, len(missing)),
             probability=float(probability[k]),
-            excess_after=after[effect.name].pooled_excess,
-            held_out_after=after[effect.name].held_out_excess,
+            excess_after=extended_fits[effect.name].pooled_excess,
+            held_out_after=extended_fits[effect.name].held_out_excess,
             indistinguishable_from=doubts.get(effect.name, ()),
         )
         for k, effect in enumerate(missing)
     ]
     order = {name: k for k, name in enumerate(search.gains)}
-    result.sort(key=lambda c: (order.get(c.name, len(order)), -_schwarz(c.effect, c.gain, before, bands)))
+    result.sort(key=lambda c: (order.get(c.name, len(order)), -_schwarz(c.effect, c.gain, base, bands)))
     return tuple(result)
 
 
-def _schwarz(effect: Effect, gain: float, before: NoiseFit, bands: int) -> float:
+def _schwarz(effect: Effect, gain: float, base: NoiseFit, bands: int) -> float:
     """Gain minus the price of the parameters, log(bands) each; of lines, the parameters of one line."""
     count = 2 if "lines" in effect.places else len(effect.parameters)
-    return gain - len(before.channels) * count * float(np.log(bands))
+    return gain - len(base.channels) * count * float(np.log(bands))
 
 
-def _p_value(effect: Effect, gain: float, before: NoiseFit, trials: int) -> float:
+def _p_value(effect: Effect, gain: float, base: NoiseFit, trials: int) -> float:
     """Chance of such a gain anywhere in the search for a complete model."""
     if "lines" in effect.places:
-        ordinates = sum(channel.channel.n / 2 for channel in before.channels)
+        ordinates = sum(channel.channel.n / 2 for channel in base.channels)
         return float(min(1.0, trials * ordinates * np.exp(-gain / 2)))
-    return min(1.0, trials * chance(gain, [tube(channel, effect) for channel in before.channels]))
+    return min(1.0, trials * chance(gain, [tube(channel, effect) for channel in base.channels]))

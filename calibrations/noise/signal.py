@@ -44,30 +44,30 @@ def without_signal(still: Still, terms: tuple[Term, ...]) -> Still:
     if terms == still.signal:
         return still
     channels = tuple(
-        replace(c, means=c.means + _added(still.signal, c, still.source) - _added(terms, c, still.source))
+        replace(c, means=c.means + _contribution(still.signal, c, still.source) - _contribution(terms, c, still.source))
         for c in still.channels
     )
     return replace(with_cleaned_curves(replace(still, channels=channels), set(still.axes)), signal=terms)
 
 
-def _added(terms: tuple[Term, ...], channel: Channel, source: str) -> Array:
+def _contribution(terms: tuple[Term, ...], channel: Channel, source: str) -> Array:
     """What terms add to the means of a channel, less its mean, shape (m,). Raises DataError."""
     if not terms:
         return np.zeros(len(channel.means))
     names = AXES[: AXES.index(channel.axis) + 1]
     table = _table(channel, {name: np.zeros(len(channel.means)) for name in names}, source)
-    nothing = np.zeros((table.n, 3))
-    parts = (term.effect.transduction(nothing, table, _values(term)) for term in terms)
-    added = sum(parts, nothing)[:, AXES.index(channel.axis)]
-    return np.asarray(added - added.mean())
+    no_force = np.zeros((table.n, 3))
+    parts = (term.effect.transduction(no_force, table, _values(term)) for term in terms)
+    contribution = sum(parts, no_force)[:, AXES.index(channel.axis)]
+    return np.asarray(contribution - contribution.mean())
 
 
 def _values(term: Term) -> Values:
     """The values of a term by name; 0 for an axis without one."""
-    named = {p.name: np.zeros(3 if p.per_axis else ()) for p in term.effect.parameters}
+    values = {p.name: np.zeros(3 if p.per_axis else ()) for p in term.effect.parameters}
     for e in term.estimates:
-        named[e.name] = np.where(np.array(AXES) == e.axis, e.value, named[e.name]) if e.axis else np.asarray(e.value)
-    return Values.of({**term.constants, **named})
+        values[e.name] = np.where(np.array(AXES) == e.axis, e.value, values[e.name]) if e.axis else np.asarray(e.value)
+    return Values.of({**term.constants, **values})
 
 
 def _table(channel: Channel, outputs: Mapping[str, Array], source: str) -> Table:
@@ -132,10 +132,10 @@ class SignalSearch:
         fit = fit_rows(_biased(last, effects), self.table)
         terms = _terms(fit, {term.name for term in last}, still)
         steps = []
-        for before in self.steps:
-            names = {PLACE if term.name == name else term.name for term in before}
-            changed = tuple(term for term in terms if term.name in names)
-            steps.append(changed if PLACE in names or before is self.steps[-1] else before)
+        for step_terms in self.steps:
+            names = {PLACE if term.name == name else term.name for term in step_terms}
+            changed_terms = tuple(term for term in terms if term.name in names)
+            steps.append(changed_terms if PLACE in names or step_terms is self.steps[-1] else step_terms)
         return replace(self, steps=tuple(steps))
 
     def without(self, name: str, effects: Mapping[str, Effect], still: Still) -> SignalSearch:
@@ -207,22 +207,23 @@ def _terms(fit: Fit, names: set[str], still: Still) -> tuple[Term, ...]:
 
     The scatter of the thermometer is taken off as far as it is known: its doubt adds to that of a slope.
     """
-    chosen = tuple(term for term in fit.model.terms if term.name in names)
+    selected = tuple(term for term in fit.model.terms if term.name in names)
     doubts = {channel.axis: channel.logged[TEMPERATURE].doubt for channel in still.channels}
 
-    def stated(e: Estimate) -> Estimate:
+    def with_record_unit(e: Estimate) -> Estimate:
         unit = e.unit.replace(fit.table.unit, still.unit)
         doubt = doubts.get(e.axis, 0.0) * e.value if e.name == "slope" else 0.0
         return replace(e, unit=unit, std=None if e.std is None else float(np.hypot(e.std, doubt)))
 
     return tuple(
-        replace(term, estimates=tuple(map(stated, term.estimates))) for term in _relabelled(chosen, AXES, still.axes)
+        replace(term, estimates=tuple(map(with_record_unit, term.estimates)))
+        for term in _relabelled(selected, AXES, still.axes)
     )
 
 
-def _relabelled(terms: tuple[Term, ...], before: Sequence[str], after: Sequence[str]) -> tuple[Term, ...]:
+def _relabelled(terms: tuple[Term, ...], old_axes: Sequence[str], new_axes: Sequence[str]) -> tuple[Term, ...]:
     """Terms with other names of their axes."""
-    names = dict(zip(before, after, strict=False))
+    names = dict(zip(old_axes, new_axes, strict=False))
 
     def renamed(e: Estimate) -> Estimate:
         return replace(e, axis=names.get(e.axis, e.axis))

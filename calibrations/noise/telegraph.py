@@ -141,20 +141,22 @@ def likeliest_path(values: Array, low: float, high: float, spread: float, goes: 
     goes    share of the values at which the path jumps
     """
     n = len(values)
-    path, before = np.zeros(n, dtype=np.int64), np.empty(n, dtype=np.int8)
+    path, origins = np.zeros(n, dtype=np.int64), np.empty(n, dtype=np.int8)
     for _ in range(ROUNDS):
-        changed = viterbi(values, (low + high) / 2, (high - low) / spread**2, np.log(goes / (1 - goes)), before, path)
-        times, upper, total, above = 0, 0, 0.0, 0.0
+        path_changes = viterbi(
+            values, (low + high) / 2, (high - low) / spread**2, np.log(goes / (1 - goes)), origins, path
+        )
+        times, upper, total, upper_total = 0, 0, 0.0, 0.0
         for i in range(n):
             times += i > 0 and path[i] != path[i - 1]
             upper += path[i]
             total += values[i]
-            above += path[i] * values[i]
+            upper_total += path[i] * values[i]
         if times < FEWEST_JUMPS:
             return path[:0]
-        if not changed:
+        if not path_changes:
             break
-        low, high, goes = (total - above) / (n - upper), above / upper, times / n
+        low, high, goes = (total - upper_total) / (n - upper), upper_total / upper, times / n
         square = 0.0
         for i in range(n):
             square += (values[i] - low - path[i] * (high - low)) ** 2
@@ -163,7 +165,7 @@ def likeliest_path(values: Array, low: float, high: float, spread: float, goes: 
 
 
 @njit(cache=True, nogil=True)
-def viterbi(values: Array, middle: float, slope: float, goes: float, before: NDArray[np.int8], path: Path) -> bool:
+def viterbi(values: Array, middle: float, slope: float, goes: float, origins: NDArray[np.int8], path: Path) -> bool:
     """Write the likeliest path of 0 and 1 to `path` (n,), and return whether it changes.
 
     slope   a value's distance from the middle, times this, is the logarithm of how much more likely the upper level is
@@ -173,13 +175,13 @@ def viterbi(values: Array, middle: float, slope: float, goes: float, before: NDA
     Only the difference of the log-likelihoods of both levels counts: beyond -goes either way, both come from one level.
     """
     n = len(values)
-    ahead = (values[0] - middle) * slope
+    log_odds = (values[0] - middle) * slope
     for i in range(1, n):
-        before[i] = (ahead > -goes) - (ahead < goes)
-        ahead = min(max(ahead, goes), -goes) + (values[i] - middle) * slope
-    level, changed = 1 if ahead > 0 else 0, False
+        origins[i] = (log_odds > -goes) - (log_odds < goes)
+        log_odds = min(max(log_odds, goes), -goes) + (values[i] - middle) * slope
+    level, path_changes = 1 if log_odds > 0 else 0, False
     for i in range(n - 1, -1, -1):
-        changed |= path[i] != level
+        path_changes |= path[i] != level
         path[i] = level
-        level = (before[i] + 1) // 2 if before[i] != 0 else level
-    return changed
+        level = (origins[i] + 1) // 2 if origins[i] != 0 else level
+    return path_changes

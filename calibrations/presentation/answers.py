@@ -83,8 +83,8 @@ def unknown_text(result: Discovery[Any]) -> str:
         lines.append(f"{text}.")
         if place["expression"]:
             name = f"{place['place'].replace(':', '-').replace('_', '-')}-form"
-            one = place["expression"].startswith(("vx +=", "vy +=", "vz +=")) and len(curve["value"]) > 1
-            remark = " (one output; the others need the same with their own axes)" if one else ""
+            one_output = place["expression"].startswith(("vx +=", "vy +=", "vz +=")) and len(curve["value"]) > 1
+            remark = " (one output; the others need the same with their own axes)" if one_output else ""
             lines.append(f"    It looks like: {place['expression']}{remark}")
             lines.append(
                 f'    To add that in its stead: rig add "{place["expression"]}" --name {name} --model MODEL '

@@ -74,7 +74,7 @@ def budget_section(fit: Fit) -> Section | None:
         "expanded uncertainty", "unit", "largest source",
     )  # fmt: skip
     rows, lines = [], dict[str, list[tuple[str, ...]]]()
-    for k, effect, e in _known(fit):
+    for k, effect, e in _identified_estimates(fit):
         label, combined, expanded = f"{e.name} {e.axis}".strip(), float(budget.combined[k]), float(budget.expanded[k])
         factor, of = in_prefix(expanded, None, e.unit)
         largest = max(sources(budget, k), key=lambda source: source.contribution)
@@ -111,7 +111,7 @@ def budget_document(fit: Fit) -> Mapping[str, Any] | None:
                 "expanded": float(budget.expanded[k]),
                 "contributions": {source.name: source.contribution for source in sources(budget, k)},
             }
-            for k, effect, e in _known(fit)
+            for k, effect, e in _identified_estimates(fit)
         ],
         "not_given": list(budget.not_given),
     }
@@ -123,7 +123,7 @@ def _budget(fit: Fit) -> Budget | None:
     return make_budget(fit, input_contributions(fit.table))
 
 
-def _known(fit: Fit) -> Iterator[tuple[int, str, Estimate]]:
+def _identified_estimates(fit: Fit) -> Iterator[tuple[int, str, Estimate]]:
     """Number, effect and estimate of each identified quantity; coefficients of free forms have no budget."""
     estimates = ((term, e) for term in fit.model.terms for e in term.estimates)
     for k, (term, e) in enumerate(estimates):

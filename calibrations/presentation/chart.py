@@ -210,7 +210,7 @@ class Picture:
     chart: Chart = field(repr=False)
 
 
-def one(panel: Panel, height: float = 3.8) -> Chart:
+def single_chart(panel: Panel, height: float = 3.8) -> Chart:
     """A chart of one panel."""
     return Chart(((panel,),), height)
 
@@ -220,7 +220,7 @@ def stacked(panels: Sequence[Panel], height: float, share_x: bool = True, bar: S
     return Chart(tuple((panel,) for panel in panels), height, share_x=share_x, bar=bar)
 
 
-def beside(panels: Sequence[Panel], height: float, share_y: bool = False, bar: Scale | None = None) -> Chart:
+def side_by_side(panels: Sequence[Panel], height: float, share_y: bool = False, bar: Scale | None = None) -> Chart:
     """Panels next to each other."""
     return Chart((tuple(panels),), height, share_y=share_y, bar=bar)
 

@@ -36,17 +36,17 @@ Applications"; *Book* is a chapter 17, "MEMS Inertial Sensors and Magnetic Senso
 
 def page(effect: Effect) -> str:
     """The page of one effect."""
-    about = [
+    sections = [
         ("Symptom", effect.symptom),
         ("Excited by", effect.excited_by),
         ("Confused with", effect.confused_with or "nothing in the catalogue"),
         ("Acts on", ACTS_ON[effect.acts_on] + "."),
-        ("Needs", _needs(effect)),
+        ("Needs", _required_data(effect)),
         ("At run time", f"{known_at_run_time(effect)}."),
         ("Source", effect.source),
     ]
     rows = "\n".join(_row(parameter) for parameter in effect.parameters)
-    lines = "\n".join(f"- **{title}**: {text}" for title, text in about)
+    lines = "\n".join(f"- **{title}**: {text}" for title, text in sections)
     return (
         f"# {effect.name}\n\n{effect.summary[:1].upper()}{effect.summary[1:]}\n\n"
         f"![{_alternative(effect)}](pictures/{effect.name}.svg)\n\n{_caption(effect)}\n\n"
@@ -103,9 +103,9 @@ def _caption(effect: Effect) -> str:
         return _caption_of_noise(effect)
     incomplete = {"bias": "a model without a bias", "scale-factor": "a model without a scale factor"}
     kind = effect.first_kind
-    plain, turned = kind.perfect_sensor, kind.field or kind.turning
+    perfect_model, turned = kind.perfect_sensor, kind.field or kind.turning
     values = [_value(p, effect) for p in effect.parameters if turned or not p.where]
-    model, names = incomplete.get(effect.name, plain), ", ".join(values)
+    model, names = incomplete.get(effect.name, perfect_model), ", ".join(values)
     return f"Residual of {model} for a sensor{kind.nominal} with {names}, without noise."
 
 
@@ -134,7 +134,7 @@ def _gallery(e: Effect) -> str:
     return f"| [{e.name}]({e.name}.md) | {e.acts_on} | {e.summary.rstrip('.')} | [{image}]({e.name}.md) |"
 
 
-def _needs(effect: Effect) -> str:
+def _required_data(effect: Effect) -> str:
     columns = " and ".join(f"the column `{name}`" for name in effect.needs)
     return f"data of {' or '.join(effect.kinds)}" + (f", with {columns}." if columns else ".")
 

@@ -69,12 +69,12 @@ def figure(chart: c.Chart, keep: str, drag: Literal["select", "zoom", False] = "
 
 def _titles(panel: c.Panel) -> Iterator[dict[str, Any]]:
     """Title and remark of a panel, above its left and right end."""
-    above = {"y": 1, "yref": "y domain", "yanchor": "bottom", "xref": "x domain", "showarrow": False,
+    title_style = {"y": 1, "yref": "y domain", "yanchor": "bottom", "xref": "x domain", "showarrow": False,
              "yshift": 2 + LEGEND_PX * bool(panel.legend)}  # fmt: skip
     if panel.title:
-        yield above | {"text": f"<b>{panel.title}</b>", "x": 0, "xanchor": "left"}
+        yield title_style | {"text": f"<b>{panel.title}</b>", "x": 0, "xanchor": "left"}
     if panel.remark:
-        yield above | {"text": panel.remark, "x": 1, "xanchor": "right"}
+        yield title_style | {"text": panel.remark, "x": 1, "xanchor": "right"}
 
 
 def _share_axes(chart: c.Chart, layout: dict[str, Any]) -> None:
@@ -196,8 +196,8 @@ def _series(series: c.Series, panel: c.Panel) -> Parts:  # noqa: ARG001 the argu
 def _points(s: c.Points, panel: c.Panel) -> Parts:
     trace = _trace(s, panel, "markers") | {"marker": _marker(s)}
     if s.low is not None and s.high is not None:
-        above, below = np.asarray(s.high) - s.y, np.asarray(s.y) - s.low
-        ends = {"symmetric": False, "array": _list(above), "arrayminus": _list(below)}
+        upper, lower = np.asarray(s.high) - s.y, np.asarray(s.y) - s.low
+        ends = {"symmetric": False, "array": _list(upper), "arrayminus": _list(lower)}
         trace["error_y"] = ends | {"type": "data", "width": 0, "thickness": 1, "color": _bar_colour(s)}
     if s.reach is not None:
         trace["error_x"] = {"type": "data", "array": _list(s.reach), "width": 4, "thickness": 1.6,
@@ -318,8 +318,8 @@ def _trace(s: c.Points | c.Line, panel: c.Panel, mode: str) -> Trace:
             "showlegend": bool(s.label)}  # fmt: skip
 
 
-def _across(along: c.Along) -> dict[str, Any]:
-    return {f"{along}ref": f"{along} domain", f"{along}0": 0, f"{along}1": 1}
+def _across(direction: c.Along) -> dict[str, Any]:
+    return {f"{direction}ref": f"{direction} domain", f"{direction}0": 0, f"{direction}1": 1}
 
 
 def _list(values: Any, axis: c.Axis | None = None) -> list[Any]:

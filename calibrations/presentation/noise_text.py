@@ -64,9 +64,9 @@ def _disturbances(analysis: NoiseAnalysis) -> Iterable[str]:
     yield "Disturbances that are not noise:"
     for disturbance in removable:
         effect = " and ".join(analysis.spoils(disturbance))
-        removed = ", removed before the fit" if disturbance.pattern is not None else ""
+        removed_words = ", removed before the fit" if disturbance.pattern is not None else ""
         spoils = f"; it spoils {effect}" if effect else ""
-        yield f"  {disturbance.text}{removed}{spoils}{'' if disturbance.matters else '; too small to matter'}"
+        yield f"  {disturbance.text}{removed_words}{spoils}{'' if disturbance.matters else '; too small to matter'}"
     yield ""
     if analysis.uncleaned is None:
         return

@@ -55,12 +55,12 @@ class Correlated:
     coefficient: float
 
 
-def parameter_rows(model: Model, before: Model | None = None) -> list[ParameterRow]:
-    """A row for each parameter of `model`, with its change since the model `before`, where there is one."""
-    earlier = {_key(term, e): e for term, e in _estimates(before)} if before is not None else {}
+def parameter_rows(model: Model, earlier_model: Model | None = None) -> list[ParameterRow]:
+    """A row for each parameter of `model`, with its change since the model `earlier_model`, where there is one."""
+    earlier = {_key(term, e): e for term, e in _estimates(earlier_model)} if earlier_model is not None else {}
     rows = []
     for term, e in _estimates(model):
-        change = "" if before is None else _change(e, earlier.get(_key(term, e)))
+        change = "" if earlier_model is None else _change(e, earlier.get(_key(term, e)))
         doc = next((p.doc for p in term.effect.parameters if p.name == e.name), "")
         rows.append(_row(term.name, e, change, doc))
     for term in model.terms:
@@ -109,14 +109,14 @@ def _scale(e: Estimate) -> tuple[float, str]:
     return prefixed(unit(e.unit), max(abs(e.value), e.std or 0.0) * WHOLE)
 
 
-def _change(e: Estimate, before: Estimate | None) -> str:
-    if before is None:
+def _change(e: Estimate, earlier: Estimate | None) -> str:
+    if earlier is None:
         return NEW
-    if before.identified != e.identified:
+    if earlier.identified != e.identified:
         return "now identified" if e.identified else "was identified"
     if not e.identified:
         return SAME
-    by, std = e.value - before.value, before.std or e.std or 0.0
+    by, std = e.value - earlier.value, earlier.std or e.std or 0.0
     if abs(by) <= LEAST_CHANGE * std:
         return SAME
     factor, of = prefixed(unit(e.unit), abs(by))

@@ -66,8 +66,8 @@ def columns(fit: Fit) -> list[Column]:
 
 def _sensed(fit: Fit, letter: str) -> list[Column]:
     """What is sensed along each axis, named by a letter and the axis."""
-    along, n = fit.table.type.sensed_along, len(fit.channels)
-    return [_column(letter + k, along.format(k), a, n) for k, a in zip(AXES, specific_force(fit).T, strict=True)]
+    axis_label, n = fit.table.type.sensed_along, len(fit.channels)
+    return [_column(letter + k, axis_label.format(k), a, n) for k, a in zip(AXES, specific_force(fit).T, strict=True)]
 
 
 def telling_columns(fit: Fit, effect: Effect) -> list[Column]:
@@ -111,8 +111,8 @@ def _time(table: Table, n: int) -> Column:
     if "t_s" not in table:
         return _column("row", "row (number)", np.arange(1.0, table.n + 1), n)
     size, unit = in_time(float(np.ptp(table.time_s)))
-    zero_s, since = time_origin(table)
-    return _column("time", f"time{since} ({unit})", (table.time_s - zero_s) / size, n)
+    zero_s, origin_words = time_origin(table)
+    return _column("time", f"time{origin_words} ({unit})", (table.time_s - zero_s) / size, n)
 
 
 def _column(name: str, label: str, values: Array, n: int) -> Column:
@@ -127,11 +127,11 @@ def choices(fit: Fit) -> dict[str, Column]:
         by_name |= {column.name: column for column in _sensed(fit, "a")}
     elif not table.type.moving:
         by_name["axis"] = nearest_axis(fit)
-    chosen = {"beta_deg" if name == "beta" else name for name in by_name}
-    chosen |= {"t_s", "temperature_c"} & set(table.columns)
+    driver_columns = {"beta_deg" if name == "beta" else name for name in by_name}
+    driver_columns |= {"t_s", "temperature_c"} & set(table.columns)
     for name, values in table.columns.items():
-        if name not in chosen:
-            by_name[name] = Column(name, (named(name),) * n, np.tile(values, (n, 1)))
+        if name not in driver_columns:
+            by_name[name] = Column(name, (column_label(name),) * n, np.tile(values, (n, 1)))
     return by_name
 
 
@@ -158,7 +158,7 @@ def repeats(table: Table) -> bool:
     return len(angles) >= MANY_VISITS * len(np.unique(angles, axis=0))
 
 
-def named(column: str) -> str:
+def column_label(column: str) -> str:
     """The label of a table's column, with its unit."""
     if column in NAMES:
         return NAMES[column]
@@ -172,7 +172,7 @@ TURNING = {1: ", clockwise", -1: ", anticlockwise"}
 
 
 @dataclass(frozen=True)
-class Shown:
+class ChannelResidual:
     """Channel `c` of a fit, residuals in thousandths of what is sensed if `in_g`, else of the output."""
 
     fit: Fit
@@ -273,8 +273,8 @@ def _place(table: Table, row: int) -> Iterator[str]:
         yield f"row {number}: {at['rate_deg_s']:g} deg/s"
     else:
         yield f"row {number}"
-    zero_s, since = time_origin(table) if "t_s" in at else (0.0, "")
-    details = [f"t = {at['t_s'] - zero_s:.0f} s{since}"] if "t_s" in at else []
+    zero_s, origin_words = time_origin(table) if "t_s" in at else (0.0, "")
+    details = [f"t = {at['t_s'] - zero_s:.0f} s{origin_words}"] if "t_s" in at else []
     details += [f"{at['temperature_c']:.2f} °C"] if "temperature_c" in at else []
     if details:
         yield ", ".join(details)

@@ -172,14 +172,14 @@ def _panel(ax: Axes, panel: c.Panel, last: bool, first: bool) -> None:
         _second(ax, panel.second)
 
 
-def _axis(ax: Axes, axis: c.Axis, along: c.Along, labelled: bool) -> None:
-    side = ax.xaxis if along == "x" else ax.yaxis
+def _axis(ax: Axes, axis: c.Axis, direction: c.Along, labelled: bool) -> None:
+    side = ax.xaxis if direction == "x" else ax.yaxis
     if axis.log:
-        (ax.set_xscale if along == "x" else ax.set_yscale)("log")
+        (ax.set_xscale if direction == "x" else ax.set_yscale)("log")
     if axis.names:
         side.set_ticks(range(len(axis.names)), axis.names)
-        ax.grid(visible=False, axis=along)
-        if along == "x" and len(axis.names) > MOST_LEVEL:
+        ax.grid(visible=False, axis=direction)
+        if direction == "x" and len(axis.names) > MOST_LEVEL:
             ax.tick_params(axis="x", rotation=30)
     elif axis.ticks == "quarters":
         side.set_major_locator(MultipleLocator(90))
@@ -187,17 +187,17 @@ def _axis(ax: Axes, axis: c.Axis, along: c.Along, labelled: bool) -> None:
         side.set_major_locator(MaxNLocator(integer=True))
     elif axis.ticks == "dates":
         ax.xaxis_date()
-    elif along == "x" and not axis.log and _long_marks(*ax.get_xlim()):
+    elif direction == "x" and not axis.log and _long_marks(*ax.get_xlim()):
         side.set_major_locator(MaxNLocator(FEW_MARKS))
     limits: Any = (axis.low, axis.high)
     if limits != (None, None):
-        (ax.set_xlim if along == "x" else ax.set_ylim)(*limits)
+        (ax.set_xlim if direction == "x" else ax.set_ylim)(*limits)
     if axis.reverse:
-        (ax.invert_xaxis if along == "x" else ax.invert_yaxis)()
+        (ax.invert_xaxis if direction == "x" else ax.invert_yaxis)()
     if axis.log:
-        _mark_powers(ax, along)
+        _mark_powers(ax, direction)
     if labelled and axis.label:
-        (ax.set_xlabel if along == "x" else ax.set_ylabel)(axis.label)
+        (ax.set_xlabel if direction == "x" else ax.set_ylabel)(axis.label)
 
 
 def _long_marks(low: float, high: float) -> bool:
@@ -205,12 +205,12 @@ def _long_marks(low: float, high: float) -> bool:
     return high > low and max(abs(low), abs(high)) > LONG_MARK * (high - low)
 
 
-def _mark_powers(ax: Axes, along: c.Along) -> None:
+def _mark_powers(ax: Axes, direction: c.Along) -> None:
     """Marks of a logarithmic axis in plain text: powers of ten, and 2 and 5 where there are few of these."""
-    side, (low, high) = (ax.xaxis, ax.get_xlim()) if along == "x" else (ax.yaxis, ax.get_ylim())
+    side, (low, high) = (ax.xaxis, ax.get_xlim()) if direction == "x" else (ax.yaxis, ax.get_ylim())
     side.set_major_formatter(FuncFormatter(lambda value, _: tick_text(value)))
-    few = abs(np.log10(high / low)) < c.FEW_DECADES
-    side.set_minor_formatter(FuncFormatter(_of_two_and_five) if few else NullFormatter())
+    few_decades = abs(np.log10(high / low)) < c.FEW_DECADES
+    side.set_minor_formatter(FuncFormatter(_of_two_and_five) if few_decades else NullFormatter())
 
 
 def _of_two_and_five(value: float, _: int | None = None) -> str:
@@ -224,9 +224,9 @@ def _second(ax: Axes, second: c.Second) -> None:
     def back(value: c.Array) -> c.Array:
         return value * second.scale + second.zero
 
-    right = ax.secondary_yaxis("right", functions=(converted, back))  # type: ignore[arg-type] # stubs want any array-like
-    right.set_ylabel(second.label)
-    right.spines["right"].set_visible(True)
+    second_axis = ax.secondary_yaxis("right", functions=(converted, back))  # type: ignore[arg-type] # stubs want any array-like
+    second_axis.set_ylabel(second.label)
+    second_axis.spines["right"].set_visible(True)
 
 
 def _map(scale: c.Scale) -> tuple[Colormap, Normalize]:
@@ -262,10 +262,10 @@ def _points(s: c.Points, ax: Axes) -> None:
     for symbol in dict.fromkeys(symbols.tolist()):
         rows = np.flatnonzero(symbols == symbol)
         shape, hollow = symbol.removesuffix("-open"), symbol.endswith("-open")
-        mine = [edges[k] for k in rows]
-        colours: dict[str, Any] = {"facecolors": "none" if hollow else mine}
+        point_colours = [edges[k] for k in rows]
+        colours: dict[str, Any] = {"facecolors": "none" if hollow else point_colours}
         if shape != "cross":  # a cross has no edge, and matplotlib warns of one
-            colours["edgecolors"] = mine
+            colours["edgecolors"] = point_colours
         ax.scatter(x[rows], y[rows], s=(PX * s.size) ** 2, marker=SYMBOLS[shape], **colours,
                    linewidths=LINE, zorder=2, label=label or None)  # fmt: skip
         label = ""
@@ -307,8 +307,8 @@ def _bars(s: c.Bars, ax: Axes) -> None:
     places = np.arange(len(s.ends))
     ax.barh(places, np.asarray(s.ends) - s.base, 0.6, s.base, color=list(s.colours), zorder=1, label=s.label or None)
     for k, (end, text, inside) in enumerate(zip(s.ends, s.texts, s.inside, strict=True)):
-        place, right = (s.base, 6) if inside else (end, 12)
-        ax.annotate(text, (place, k), (right, 0), textcoords="offset points", va="center", zorder=3,
+        place, offset_px = (s.base, 6) if inside else (end, 12)
+        ax.annotate(text, (place, k), (offset_px, 0), textcoords="offset points", va="center", zorder=3,
                     color="white" if inside else c.INK)  # fmt: skip
 
 
@@ -325,9 +325,9 @@ def _cells(s: c.Cells, ax: Axes) -> None:
 @_series.register
 def _note(s: c.Note, ax: Axes) -> None:
     places: Any = tuple("axes fraction" if along in s.shares else "data" for along in "xy")
-    right = {"left": 4, "center": 0, "right": -4}[s.horizontal]
+    offset_px = {"left": 4, "center": 0, "right": -4}[s.horizontal]
     up = {"bottom": 3, "middle": 0, "top": -3}[s.vertical]
-    ax.annotate(s.text, (s.x, s.y), (right, up), xycoords=places, textcoords="offset points", ha=s.horizontal,
+    ax.annotate(s.text, (s.x, s.y), (offset_px, up), xycoords=places, textcoords="offset points", ha=s.horizontal,
                 va="center" if s.vertical == "middle" else s.vertical, color=s.colour, fontsize=8.5,
                 rotation=90 if s.upright else 0, zorder=5)  # fmt: skip
 

@@ -29,7 +29,7 @@ from calibrations.model import Model
 from calibrations.model.file import parse_model
 from calibrations.table import Table
 from calibrations.tables import FITTED, MEANS
-from calibrations.text import joined
+from calibrations.text import join_words
 from rig.errors import RigError
 from rig.services.load import LONGEST_BEGINNING, channels_alone, check_unit
 from rig.services.request import effects_of as checked
@@ -160,7 +160,7 @@ def _checked(table: Table, model: Model) -> Table:
 def _instead(source: str, kind: str) -> str:
     command = "discover" if kind in FITTED else "noise"
     return (
-        f"{source}: is a table of {kind}, and a fleet can have {joined(list(MEANS))}; leave it out, and analyse "
+        f"{source}: is a table of {kind}, and a fleet can have {join_words(list(MEANS))}; leave it out, and analyse "
         f"it alone: rig {command} {source}"
     )
 

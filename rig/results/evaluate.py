@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from calibrations.errors import CalibrationError
-from calibrations.text import joined
+from calibrations.text import join_words
 from rig.bench import Bench
 from rig.errors import RecordError
 from rig.record import Record, Run
@@ -43,7 +43,7 @@ def _missing(results: Mapping[str, Result | Missing]) -> str | None:
     for name, result in results.items():
         if isinstance(result, Missing):
             by_reason.setdefault(result.why, []).append(name)
-    return "; ".join(f"no {joined(names, 'or')}: {why}" for why, names in by_reason.items()) or None
+    return "; ".join(f"no {join_words(names, 'or')}: {why}" for why, names in by_reason.items()) or None
 
 
 def evaluated(record: Record, run: Run) -> dict[str, Result | Missing]:

@@ -23,11 +23,11 @@ from calibrations.presentation.chart import (
     Rule,
     Symbol,
     floor_band,
-    one,
+    single_chart,
 )
 from calibrations.presentation.charts.history import Life
 from calibrations.presentation.charts.noise import TIME, Scaled, measured_points
-from calibrations.presentation.residual import Column, Shown
+from calibrations.presentation.residual import ChannelResidual, Column
 from calibrations.table import in_time
 from calibrations.text import estimate_in_prefix, estimate_text, labelled, minus, prefixed, unit
 from procedures.session import Dwell
@@ -161,7 +161,7 @@ def course_chart(course: Course, name: str, time: RunTime = RunTime(), units: Ma
     clock = [time.clock(at_s) for at_s in run_s]
     line = Line(at, np.array(mean), colour=colour, hover=hover, markers=len(at) < FEW, texts=clock)
     of = "°C" if name == "temperature" else units.get(name.removeprefix("rms "), "V")
-    return one(Panel((*band, line), Axis(f"time{time.since} ({unit_s})"), Axis(f"{name} ({of})")))
+    return single_chart(Panel((*band, line), Axis(f"time{time.since} ({unit_s})"), Axis(f"{name} ({of})")))
 
 
 # A sensor's life
@@ -234,9 +234,9 @@ def _differences(pairs: Sequence[Pair]) -> Panel:
     return Panel((Rule(0.0, "x", width=1.2), dots), Axis(labelled("difference", spelt)), y)
 
 
-def residuals(first: Shown, second: Shown, x: Column, other_x: Column) -> Chart:
+def residuals(first: ChannelResidual, second: ChannelResidual, x: Column, other_x: Column) -> Chart:
     """Residuals of both, each fitted by itself, on shared axes; the grey band is the larger noise floor."""
-    looks: tuple[tuple[Shown, Column, str, Symbol, str], ...] = (
+    looks: tuple[tuple[ChannelResidual, Column, str, Symbol, str], ...] = (
         (first, x, MEASURED, "circle", "first"),
         (second, other_x, CANDIDATE, "diamond-open", "second"),
     )
@@ -246,10 +246,10 @@ def residuals(first: Shown, second: Shown, x: Column, other_x: Column) -> Chart:
         for shown, column, colour, symbol, name in looks
     ]  # fmt: skip
     axis = Axis(x.labels[first.c], ticks="quarters" if x.name == "beta" else "")
-    return one(Panel((*floor_band(max(first.floor, second.floor)), *dots), axis, Axis(first.label)))
+    return single_chart(Panel((*floor_band(max(first.floor, second.floor)), *dots), axis, Axis(first.label)))
 
 
-def difference(first: Shown, again: Again) -> Chart:
+def difference(first: ChannelResidual, again: Again) -> Chart:
     """The second measurement less the first, at every pose that both have; the band is its noise floor."""
     c, values = first.c, first.factor * again.difference[first.c]
     hover = [f"{minus(f'{value:.4g}')} {first.unit}<br>{first.place(int(row))}"
@@ -257,7 +257,7 @@ def difference(first: Shown, again: Again) -> Chart:
     dots = Points(first.fit.table.column("beta_deg")[again.first], values, hover=hover)
     y = Axis(f"second − first, {first.fit.channels[c]} ({first.unit})")
     series = (*floor_band(first.factor * float(again.floor[c])), dots)
-    return one(Panel(series, Axis("β (deg)", ticks="quarters"), y))
+    return single_chart(Panel(series, Axis("β (deg)", ticks="quarters"), y))
 
 
 def deviations(curves: Sequence[DeviationComparison], into: Sequence[Scaled]) -> Chart:
@@ -273,4 +273,4 @@ def deviations(curves: Sequence[DeviationComparison], into: Sequence[Scaled]) ->
         dots = measured_points(curve.tau_s, values, low, high, by.unit, name)
         series += [model, replace(dots, colour=colour, symbol=symbol, size=8)]
     y = Axis(f"Allan deviation ({into[0].unit})", log=True)
-    return one(Panel(tuple(series), Axis(TIME, log=True), y, legend="upper right"))
+    return single_chart(Panel(tuple(series), Axis(TIME, log=True), y, legend="upper right"))

@@ -22,7 +22,7 @@ from calibrations.importing.proposal import (
 )
 from calibrations.importing.sheet import Sheet
 from calibrations.importing.units import UNITS, ColumnMapping, column_unit
-from calibrations.presentation.chart import CANDIDATE, MEASURED, QUIET, Axis, Chart, Panel, Points, one
+from calibrations.presentation.chart import CANDIDATE, MEASURED, QUIET, Axis, Chart, Panel, Points, single_chart
 from calibrations.table import AXES, NUMBERS, Constant, Table, guess_kind
 from rig.record import Record
 from rig.services.tables import averaged
@@ -123,7 +123,7 @@ def data_chart(table: Table) -> Chart:
     ]
     label = f"{name.rpartition('_')[0]} ({column_unit(name)})" if name else "row"
     unit = column_unit(outputs[0]) or table.unit
-    return one(Panel(tuple(dots), Axis(label), Axis(f"outputs ({unit})"), legend="outside"))
+    return single_chart(Panel(tuple(dots), Axis(label), Axis(f"outputs ({unit})"), legend="outside"))
 
 
 def _own(sheet: Sheet) -> list[ColumnMapping]:

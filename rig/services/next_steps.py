@@ -14,7 +14,7 @@ from calibrations.text import (
     concise_in_prefix,
     estimate_in_prefix,
     in_prefix,
-    joined,
+    join_words,
     rounded,
     time_text,
     unit,
@@ -65,7 +65,7 @@ def _failed(run: Run) -> Iterator[str]:
         remedy = next(text for pattern, text in REMEDIES.items() if re.match(pattern, name.rpartition("/")[2]))
         by_remedy.setdefault(remedy, []).append(name)
     for remedy, names in by_remedy.items():
-        yield f"Fail: {joined(names)}: {remedy.format(run=run.run)}"
+        yield f"Fail: {join_words(names)}: {remedy.format(run=run.run)}"
 
 
 def _marginal(run: Run) -> Iterator[str]:
@@ -75,7 +75,7 @@ def _marginal(run: Run) -> Iterator[str]:
         longer = f" (--{setting.replace('_', '-')} {LONGER * run.settings[setting]:g})" if setting else ""
         verb = "reach" if len(names) > 1 else "reaches"
         yield (
-            f"Marginal: {joined(names)} {verb} across the limit with its uncertainty; {LONGER} times the duration"
+            f"Marginal: {join_words(names)} {verb} across the limit with its uncertainty; {LONGER} times the duration"
             f"{longer} halves the uncertainty"
         )
 

@@ -95,7 +95,7 @@ def names_of(data: str) -> list[str]:
 
 
 def load_all(names: Sequence[str], tell: Callable[[str], None] = lambda _: None) -> Table:
-    """The tables that `names` name, joined. Raises what `load` and `joined` raise."""
+    """The tables that `names` name, joined. Raises what `load` and `join_tables` raise."""
     tables = [load(name, tell=tell) for name in names]
     sources = [table.source for table in tables]
     if twice := next((name for name, source in zip(names, sources, strict=True) if sources.count(source) > 1), None):
@@ -109,14 +109,14 @@ def joined_runs(
     tables: Sequence[Table], begun: Sequence[datetime | None], tell: Callable[[str], None] = lambda _: None
 ) -> Table:
     """The tables of runs joined; times count from the beginning of the first, where all say when they were `begun`."""
-    from calibrations.joined import clock_began_anew, joined  # a single table needs it not
+    from calibrations.joined import clock_began_anew, join_tables  # a single table needs it not
 
     known = [at for at in begun if at is not None]
     if len(known) == len(tables):
         tables = [_later(t, (at - known[0]).total_seconds()) for t, at in zip(tables, known, strict=True)]
     if clock_began_anew(tables):
         tell("The time starts again in each of these; the analysis assumes that one followed directly after the other.")
-    return joined(tables)
+    return join_tables(tables)
 
 
 def _begun(name: str) -> datetime | None:

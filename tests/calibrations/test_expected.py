@@ -11,7 +11,7 @@ from calibrations.criteria import CERTAIN_PROBABILITY
 from calibrations.design.expected import Expected, expected_gain, pairs_separated, predict_data, vary_one_way
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit, fit, refit
-from calibrations.joined import joined
+from calibrations.joined import join_tables
 from calibrations.model import Model
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
@@ -76,7 +76,7 @@ def test_it_is_the_gain_in_likelihood_that_the_experiment_then_brings() -> None:
         tables = measured(0.02, seed, (0, 1))
         best, rival = rivals(tables[0])
         foretold = expected_gain(best, rival, planned(best, 1.0)).together
-        wrong, right = rivals(joined(tables))
+        wrong, right = rivals(join_tables(tables))
         gain = np.sum((wrong.residual**2 - right.residual**2) / right.noise.white**2)
         ratios.append(gain / foretold)
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.15)

@@ -15,7 +15,7 @@ from calibrations.noise.analysis import analyse, noise_document
 from calibrations.noise.fit import fit_channel
 from calibrations.noise.patterns import pattern_of
 from calibrations.noise.record import Reduction, Samples, reduce_record
-from calibrations.noise.samples import COARSE, Hidden, hidden_in, hidden_step
+from calibrations.noise.samples import COARSE, HiddenNoise, hidden_in, hidden_step
 from calibrations.noise.telegraph import telegraph_of
 from calibrations.table import Array
 from tests.calibrations.hidden_noise import RECORDS, telegraph
@@ -26,7 +26,7 @@ MEANS = (0.0, 0.25, 0.5)  # of a step
 Random = np.random.Generator
 
 
-def hidden(x: Array, rate_hz: float = RATE_HZ, corner_hz: float = np.inf, blocks: int = 1) -> Hidden | None:
+def hidden(x: Array, rate_hz: float = RATE_HZ, corner_hz: float = np.inf, blocks: int = 1) -> HiddenNoise | None:
     seen = Reduction(rate_hz, corner_hz)
     assert sum(len(part) for part in seen.read(np.array_split(x, blocks), "made")) == len(x)
     return hidden_in(seen.oddities())
@@ -68,7 +68,7 @@ def test_no_process_of_the_catalogue_is_hidden(name: str) -> None:
 
 
 def test_noise_behind_a_low_pass_is_judged_by_what_reaches_the_converter() -> None:
-    def behind(steps: float, corner_hz: float) -> Hidden | None:
+    def behind(steps: float, corner_hz: float) -> HiddenNoise | None:
         random, kept = np.random.default_rng(1), np.exp(-2 * np.pi * 15 / 1000)
         from scipy.signal import lfilter
 

@@ -20,9 +20,17 @@ from calibrations.loop import compare, discover
 from calibrations.model import Model
 from calibrations.model.file import read_model
 from calibrations.noise.comparison import DeviationComparison
-from calibrations.presentation.chart import Bars, Chart, Line, Panel, Points, Second, one
+from calibrations.presentation.chart import Bars, Chart, Line, Panel, Points, Second, single_chart
 from calibrations.presentation.charts import fit as charts
-from calibrations.presentation.charts.discovery import MOST_CURVES, album, brief, effect_chart, levels, tried, waterfall
+from calibrations.presentation.charts.discovery import (
+    MOST_CURVES,
+    album,
+    brief,
+    effect_chart,
+    levels,
+    tested_steps,
+    waterfall,
+)
 from calibrations.presentation.charts.noise import ratio
 from calibrations.presentation.interactive import figure
 from calibrations.presentation.residual import choices, first_choices, telling_columns
@@ -282,7 +290,7 @@ def test_the_name_of_a_model_with_many_effects_leaves_room_for_bars() -> None:
 def test_the_ratio_of_deviations_has_marks_on_both_sides_of_1() -> None:
     times, ones = np.array([1.0, 10.0, 100.0]), np.ones(3)
     curve = DeviationComparison(times, 1.1 * ones, 0.9 * ones, 1.4 * ones, ones, 10 * ones, ones)
-    marks = figure(one(ratio(curve)), "ratio")["layout"]["yaxis"]["tickvals"]
+    marks = figure(single_chart(ratio(curve)), "ratio")["layout"]["yaxis"]["tickvals"]
     assert min(marks) < 1 < max(marks)
 
 
@@ -305,7 +313,7 @@ def test_only_the_greatest_falls_are_drawn() -> None:
     (step,) = warm().steps
     idle = [Step(f"e{k}", step.after, step.after) for k in range(MOST_CURVES)]
     findings = replace(warm().findings, steps=(*idle[:2], step, *idle[2:]))
-    shown = tried(Discovery.of(findings))
+    shown = tested_steps(Discovery.of(findings))
     assert step in shown
 
 

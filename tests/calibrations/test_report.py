@@ -29,7 +29,7 @@ from calibrations.text import (
     estimate_text,
     expanded_text,
     interval,
-    joined,
+    join_words,
     minus,
     probability,
     rounded,
@@ -292,7 +292,7 @@ def test_what_is_not_explained_is_said_so() -> None:
 
 
 def test_names_are_joined() -> None:
-    assert joined(["a", "b", "c"]) == "a, b and c"
+    assert join_words(["a", "b", "c"]) == "a, b and c"
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.design.experiment import Experiment
-from calibrations.joined import joined
+from calibrations.joined import join_tables
 from calibrations.table import Table
 from drivers.world.config import WorldConfig
 from drivers.world.world import World
@@ -41,7 +41,7 @@ class QuickRig:
         name = f"run {len(self.tables) + 1}"
         columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
         self.tables.append(Table.from_columns("poses", columns, CONSTANTS, name))
-        return name, joined(self.tables)
+        return name, join_tables(self.tables)
 
     def _held(self, poses: list[Pose], path: str, settings: dict[str, Any]) -> dict[str, Any]:
         """Dwell means of poses of one path, after the soak that begins a step of temperature."""

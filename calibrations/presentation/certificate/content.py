@@ -48,12 +48,12 @@ class Decision:
 def decide(value: float, std: float, expanded: float, limit: Limit) -> Decision:
     """The statement for a limit of the magnitude, or for a (lowest, highest) value."""
     low, high = limit if isinstance(limit, tuple) else (-limit, limit)
-    inside = min(value - low, high - value)
-    if inside >= 0:
-        statement = "pass" if inside >= expanded else "conditionalPass"
+    margin = min(value - low, high - value)
+    if margin >= 0:
+        statement = "pass" if margin >= expanded else "conditionalPass"
     else:
-        statement = "fail" if inside <= -expanded else "conditionalFail"
-    probability = float(ndtr((high - value) / std) - ndtr((low - value) / std)) if std > 0 else float(inside >= 0)
+        statement = "fail" if margin <= -expanded else "conditionalFail"
+    probability = float(ndtr((high - value) / std) - ndtr((low - value) / std)) if std > 0 else float(margin >= 0)
     return Decision(low, high, statement, probability)
 
 

@@ -93,11 +93,11 @@ def _estimate(fit: Fit, G: Array, disturbed: Array) -> Array:
 def _noise(noise: Noise, trials: int, rng: np.random.Generator) -> Array:
     """Noise of the means, shape (trials, channels, n)."""
     channels, n = noise.white.shape
-    out = noise.fast * rng.standard_normal((trials, channels, n))
+    samples = noise.fast * rng.standard_normal((trials, channels, n))
     for c, (taus_s, slow) in enumerate(zip(noise.taus_s, noise.slow, strict=True)):
         for tau_s in taus_s if slow > 0 else ():
-            out[:, c] += slow / np.sqrt(len(taus_s)) * _wandering(np.exp(-noise.gap_s / tau_s), trials, rng)
-    return out
+            samples[:, c] += slow / np.sqrt(len(taus_s)) * _wandering(np.exp(-noise.gap_s / tau_s), trials, rng)
+    return samples
 
 
 def _wandering(phi: Array, trials: int, rng: np.random.Generator) -> Array:
@@ -113,8 +113,8 @@ MISFIT = 1.05  # Birge ratio from which on it is reported
 CERTAIN_K = 2.0  # coverage factor, where the degrees of freedom ask for no more
 
 
-def figures(fit: Fit, before: Model | None, limits: Mapping[str, Limit], trials: int = TRIALS) -> Figures:
-    """All figures of a fit to poses, positions, rates or fields; `before` is the model in use until now, with values.
+def figures(fit: Fit, earlier_model: Model | None, limits: Mapping[str, Limit], trials: int = TRIALS) -> Figures:
+    """All figures of a fit to poses, positions, rates or fields; `earlier_model`: in use until now, with values.
 
     Raises ModelError for another kind of table, and where nothing is determined; UnusableData.
     """
@@ -125,7 +125,7 @@ def figures(fit: Fit, before: Model | None, limits: Mapping[str, Limit], trials:
     budget = make_budget(fit, inputs)
     trial = simulate(fit, inputs, trials)
     weights = _weights(fit)
-    earlier = _values(before) if before is not None else {}
+    earlier = _values(earlier_model) if earlier_model is not None else {}
     certified = [k for k, (_, e) in enumerate(_estimates(fit.model)) if e.identified and e.std]
     outcomes = tuple(
         _outcome(k, t, e, budget, trial[:, k], weights[k], fit, earlier, limits)
@@ -138,7 +138,7 @@ def figures(fit: Fit, before: Model | None, limits: Mapping[str, Limit], trials:
     return Figures(
         fit.model.name,
         outcomes,
-        tuple(_errors(fit, before)),
+        tuple(_errors(fit, earlier_model)),
         budget.not_given,
         trials,
         tuple(_remarks(fit)),
@@ -177,7 +177,7 @@ def _outcome(
     std, coverage = float(budget.combined[k]), max(CERTAIN_K, float(budget.coverage[k]))
     low, high = (float(end) for end in interval(trial))
     judgement = verdict(e.value, coverage * std, std, low, high)
-    why = _why_further(k, coverage, std, float(trial.std()), budget) if judgement == CONSERVATIVE else ""
+    reason = _why_further(k, coverage, std, float(trial.std()), budget) if judgement == CONSERVATIVE else ""
     if judgement == WIDENED:
         coverage = max(coverage, (e.value - low) / std, (high - e.value) / std)
     limit = limits.get(parameter_name := name(of.effect, e.name, e.axis))
@@ -195,7 +195,7 @@ def _outcome(
         coverage=coverage,
         freedom=float(budget.freedom[k]),
         sources=sources(budget, k),
-        simulated=Simulated(float(trial.std()), low, high, judgement, why),
+        simulated=Simulated(float(trial.std()), low, high, judgement, reason),
         found=earlier.get((of.name, e.name, e.axis)),
         decision=None if limit is None else decide(e.value, std, coverage * std, limit),
         weights=tuple((int(numbers[i]), float(weights[i])) for i in order),
@@ -219,9 +219,9 @@ def _weights(fit: Fit) -> Array:
     return np.asarray(squares / np.where(total > 0, total, 1.0))
 
 
-def _errors(fit: Fit, before: Model | None) -> Iterator[Error]:
+def _errors(fit: Fit, earlier_model: Model | None) -> Iterator[Error]:
     """In thousandths of what is sensed, by channel; as found where the earlier model has every value that is needed."""
-    earlier = None if before is None else evaluate(before, fit.table)
+    earlier = None if earlier_model is None else evaluate(earlier_model, fit.table)
     for c, channel in enumerate(fit.channels):
         as_found = None if earlier is None else _size(earlier, c, fit)
         yield Error(channel, milli_unit(fit), as_found, _size(fit, c, fit))
@@ -234,9 +234,9 @@ def _size(of: Fit, c: int, unit_of: Fit) -> tuple[float, float]:
 
 
 def _remarks(fit: Fit) -> Iterator[str]:
-    for why in (doubt(fit.table), *fit_doubts(fit)):
-        if why is not None:
-            yield f"Check: {why}."
+    for reason in (doubt(fit.table), *fit_doubts(fit)):
+        if reason is not None:
+            yield f"Check: {reason}."
     if fit.birge > MISFIT:
         yield (
             f"The residual is larger than the noise (Birge ratio {fit.birge:.2f}). The uncertainties are multiplied "

@@ -60,7 +60,7 @@ def sections(c: Certificate) -> list[Section]:
         _procedure(c),
         _environment(c),
         _results(c),
-        _found(c),
+        _as_found_section(c),
         _uncertainty(c),
         _traceability(c),
     ]
@@ -68,8 +68,8 @@ def sections(c: Certificate) -> list[Section]:
 
 def verdict(c: Certificate) -> str:
     """The worst statement of conformity; nothing where no result has a limit."""
-    stated = {o.decision.statement for o in c.figures.outcomes if o.decision is not None}
-    return next((text for key, text in reversed(STATEMENTS.items()) if key in stated), "")
+    statements = {o.decision.statement for o in c.figures.outcomes if o.decision is not None}
+    return next((text for key, text in reversed(STATEMENTS.items()) if key in statements), "")
 
 
 def _identification(c: Certificate) -> Section:
@@ -142,7 +142,7 @@ def _results(c: Certificate) -> Section:
     return Section("Results", (*words, results_table(c)))
 
 
-def _found(c: Certificate) -> Section:
+def _as_found_section(c: Certificate) -> Section:
     """As found, where an earlier calibration is known; the error of indication in any case."""
     outcomes = [o for o in c.figures.outcomes if o.found is not None]
     changes = tuple(
@@ -157,8 +157,8 @@ def _found(c: Certificate) -> Section:
     head = ("axis", "rms as found", "greatest as found", "rms as left", "greatest as left", "unit")
     tables = [Table("Error of indication over the poses of this calibration", head, errors, (1, 2, 3, 4))]
     if changes:
-        changed = ("quantity", "as found", "as left", "change", "unit", "change / U")
-        tables.insert(0, Table("Change since the previous calibration", changed, changes, (1, 2, 3, 5)))
+        change_head = ("quantity", "as found", "as left", "change", "unit", "change / U")
+        tables.insert(0, Table("Change since the previous calibration", change_head, changes, (1, 2, 3, 5)))
     words = f"As found: by {c.before}." if c.before else "No values as found: no earlier calibration was given."
     return Section("As found and as left", (words, *tables))
 

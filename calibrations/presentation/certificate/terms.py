@@ -51,7 +51,7 @@ OF_GRAVITY = ("g", "mg")
 def in_si(unit: str, gravity_m_s2: float) -> tuple[float, str]:
     """The factor by which a value in `unit` is multiplied, and its D-SI unit. Raises DataError for an unknown one."""
     factor, powers = _in_si(unit, gravity_m_s2)
-    return factor, _named(powers)
+    return factor, _unit_text(powers)
 
 
 def product_in_si(first: str, second: str) -> str:
@@ -59,10 +59,10 @@ def product_in_si(first: str, second: str) -> str:
     powers = Counter(_in_si(first, 1.0)[1])
     for name, power in _in_si(second, 1.0)[1].items():
         powers[name] += power
-    return _named(powers)
+    return _unit_text(powers)
 
 
-def _named(powers: Mapping[str, int]) -> str:
+def _unit_text(powers: Mapping[str, int]) -> str:
     return "".join(f"\\{n}" + (f"\\tothe{{{p}}}" if p != 1 else "") for n, p in powers.items() if p) or "\\one"
 
 

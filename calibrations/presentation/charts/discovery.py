@@ -25,7 +25,7 @@ from calibrations.presentation.chart import (
     Picture,
     Points,
     Span,
-    one,
+    single_chart,
 )
 from calibrations.presentation.charts.fit import (
     change_of,
@@ -38,7 +38,7 @@ from calibrations.presentation.charts.fit import (
 )
 from calibrations.presentation.charts.motion import evaluation
 from calibrations.presentation.charts.places import Falling, place_pictures
-from calibrations.presentation.residual import Shown, choices, first_choices
+from calibrations.presentation.residual import ChannelResidual, choices, first_choices
 from calibrations.text import rounded
 
 BELOW = 0.5  # times the floor: where the logarithmic axis begins
@@ -78,8 +78,10 @@ def levels(steps: Falling) -> list[Level]:
     start = Level(
         brief(steps.start.model.name), steps.start.pooled_excess, steps.start.held_out_excess, error_text(steps.start)
     )
-    after = [Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, error_text(s.after)) for s in steps.steps]
-    return [start, *after]
+    later_levels = [
+        Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, error_text(s.after)) for s in steps.steps
+    ]
+    return [start, *later_levels]
 
 
 def brief(model: str) -> str:
@@ -102,16 +104,16 @@ def waterfall(steps: Sequence[Level], words: Measure = Measure()) -> Chart:
     reach = 2.2 * max(*excess, *unseen, 3.0)
     colours = [MODEL, *(GOOD if value < NEAR else MEASURED for value in excess[1:])]
     texts = [f"{rounded(level.seen)} × ({level.rms})" for level in steps]
-    inside = [log10(max(value, BELOW) / BELOW) > LONG * log10(reach / BELOW) for value in excess]
+    text_inside = [log10(max(value, BELOW) / BELOW) > LONG * log10(reach / BELOW) for value in excess]
     hover = [f"{rounded(value)} × {words.over} on {words.unseen}" for value in unseen]
     series = (
         Span(BELOW, 1.0, "x"),
-        Bars(BELOW, excess, colours, texts, inside),
+        Bars(BELOW, excess, colours, texts, text_inside),
         Points(unseen, np.arange(len(steps), dtype=float), colour=UNSEEN, symbol="diamond", size=10, hover=hover),
     )
     x = Axis(words.axis, log=True, low=BELOW, high=reach)
     y = Axis(low=-0.5, high=max(len(steps), FEWEST) - 0.5, names=tuple(level.name for level in steps), reverse=True)
-    return one(Panel(series, x, y), 0.6 + ROW * max(len(steps), FEWEST))
+    return single_chart(Panel(series, x, y), 0.6 + ROW * max(len(steps), FEWEST))
 
 
 def effect_chart(step: Step[Fit]) -> Chart:
@@ -121,10 +123,10 @@ def effect_chart(step: Step[Fit]) -> Chart:
     rows = []
     for k, c in enumerate(drawn_channels(step.before, change_of(step))):
         titles = (f"before; line: {step.name}", "after") if k == 0 else ("", "")
-        before, after = (Shown(fit, c, False) for fit in (step.before, step.after))
+        channel_before, channel_after = (ChannelResidual(fit, c, False) for fit in (step.before, step.after))
         rows.append((
-            residual(before, x, colour, step, title=titles[0]),
-            residual(after, x, colour, second=True, title=titles[1]),
+            residual(channel_before, x, colour, step, title=titles[0]),
+            residual(channel_after, x, colour, second=True, title=titles[1]),
         ))  # fmt: skip
     bar = None if step.before.table.type.moving else scale_of(colour, 0)
     return Chart(tuple(rows), row_height(step.before), share_y=True, bar=bar)
@@ -148,7 +150,7 @@ def steps_album(discovery: Discovery[Fit]) -> list[Picture]:
     )
     return [
         Picture("waterfall", "Error by model", fall, waterfall(levels(discovery))),
-        *(_curve(step, discovery) for step in tried(discovery)),
+        *(_curve(step, discovery) for step in tested_steps(discovery)),
         *place_pictures(discovery),
     ]
 
@@ -163,7 +165,7 @@ def _evaluated(motion: MotionResult) -> Picture:
     return Picture("evaluation", "Both models and the displacement sensor", caption, evaluation(motion))
 
 
-def tried(discovery: Discovery[Fit]) -> tuple[Step[Fit], ...]:
+def tested_steps(discovery: Discovery[Fit]) -> tuple[Step[Fit], ...]:
     """The effects that reduced the error most, in the order added; where none was kept, the best that was tried."""
     if not discovery.steps:
         return discovery.findings.tried[:1]

@@ -1,7 +1,7 @@
 """Charts of a fit: measurement and model, the residual against a column, and the residual pattern.
 
-A panel shows one channel (`Shown`). A filled marker is a clockwise approach, an open one an anticlockwise approach;
-colours are the values of a second column.
+A panel shows one channel (`ChannelResidual`). A filled marker is a clockwise approach, an open one an anticlockwise
+approach; colours are the values of a second column.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from calibrations.presentation.chart import (
     Scale,
     Second,
     Symbol,
-    beside,
     floor_band,
+    side_by_side,
     stacked,
 )
 from calibrations.presentation.charts import motion
 from calibrations.presentation.residual import (
+    ChannelResidual,
     Column,
-    Shown,
     choices,
     columns,
     first_choices,
@@ -64,28 +64,28 @@ ACROSS_PX, DOWN_PX, LEAST_PX, MOST_PX = 900.0, 330.0, 3.0, 10.0  # of a map of p
 def fit_album(fit: Fit) -> list[Picture]:
     """The model and its data, the residual, and the residual pattern."""
     model, kind = fit.model.name, fit.table.type
-    shown, mapped = (text.format(model) for text in (kind.measurement_caption, kind.failure_caption))
+    measurement_words, failure_words = (text.format(model) for text in (kind.measurement_caption, kind.failure_caption))
     difference = f"Measured less the model {model}. The grey band is the noise floor, one standard deviation each way."
     if len(fit.channels) > len(drawn_channels(fit, fit.residual)):
         difference += f" Only the {MOST_ROWS} outputs with the largest residual are drawn."
     return [
-        Picture("measurement", "Measurement and model", shown, measurement_chart(fit)),
+        Picture("measurement", "Measurement and model", measurement_words, measurement_chart(fit)),
         Picture("residual", "Residual", difference, residual_chart(fit)),
-        Picture("failure", "Residual pattern", mapped, failure_chart(fit)),
+        Picture("failure", "Residual pattern", failure_words, failure_chart(fit)),
     ]
 
 
 def measurement_chart(fit: Fit) -> Chart:
     """A panel for each output, or one for the magnitude of positions."""
     if fit.table.type.moving:
-        return stacked([motion.measurement(Shown(fit, c, False)) for c in motion.firsts(fit)], 2.6)
+        return stacked([motion.measurement(ChannelResidual(fit, c, False)) for c in motion.firsts(fit)], 2.6)
     columns_of_fit, n = choices(fit), 1 if fit.table.type.magnitude else len(fit.channels)
     x, colour = (columns_of_fit[name] for name in first_choices(list(columns_of_fit), fit.table))
     if fit.table.type.magnitude:
         x = columns(fit)[3]
-    panels = [measurement(Shown(fit, c, False), x, colour) for c in range(n)]
+    panels = [measurement(ChannelResidual(fit, c, False), x, colour) for c in range(n)]
     bar = scale_of(colour, 0)
-    return beside(panels, 4.2, bar=bar) if n < 3 else stacked(panels, ROW, bar=bar)
+    return side_by_side(panels, 4.2, bar=bar) if n < 3 else stacked(panels, ROW, bar=bar)
 
 
 def residual_chart(fit: Fit) -> Chart:
@@ -94,7 +94,7 @@ def residual_chart(fit: Fit) -> Chart:
     colour = columns_of_fit[first_choices(list(columns_of_fit), fit.table)[1]]
     across = columns(fit)
     rows = tuple(
-        tuple(residual(Shown(fit, c, False), x, colour, second=x is across[-1]) for x in across)
+        tuple(residual(ChannelResidual(fit, c, False), x, colour, second=x is across[-1]) for x in across)
         for c in drawn_channels(fit, fit.residual)
     )
     alike = bool(np.ptp(colour.values) == 0)  # a motion has one inclination
@@ -105,8 +105,8 @@ def residual_chart(fit: Fit) -> Chart:
 def failure_chart(fit: Fit) -> Chart:
     """A map for each channel; for a motion the residual over one period."""
     if fit.table.type.moving:
-        return stacked([motion.failure(Shown(fit, c, False)) for c in motion.firsts(fit)], 2.6)
-    panels = [failure(Shown(fit, c, False)) for c in range(len(fit.channels))]
+        return stacked([motion.failure(ChannelResidual(fit, c, False)) for c in motion.firsts(fit)], 2.6)
+    panels = [failure(ChannelResidual(fit, c, False)) for c in range(len(fit.channels))]
     reach = max(PALE, float(np.abs(fit.residual / fit.noise.floor[:, None]).max()))
     return stacked(panels, 4.2 if len(panels) == 1 else ROW, bar=_signed(reach))
 
@@ -125,15 +125,15 @@ def row_height(fit: Fit) -> float:
     return SMALL_ROW if fit.table.type.moving else ROW
 
 
-def measurement(shown: Shown, x: Column, colour: Column) -> Panel:
+def measurement(channel: ChannelResidual, x: Column, colour: Column) -> Panel:
     """Dots are measured, the line is the model (crosses where rows share no curve); output over `x`."""
-    c, rows, fit = shown.c, shown.rows, shown.fit
-    measured, model, label = _outputs(shown)
-    hover = [f"{value:.6g}<br>{text}" for value, text in zip(measured[rows], shown.hover, strict=True)]
-    dots = _dots(shown, x.values[c, rows], measured[rows], colour, hover)
+    c, rows, fit = channel.c, channel.rows, channel.fit
+    measured, model, label = _outputs(channel)
+    hover = [f"{value:.6g}<br>{text}" for value, text in zip(measured[rows], channel.hover, strict=True)]
+    dots = _dots(channel, x.values[c, rows], measured[rows], colour, hover)
     curve_hover = "model: %{y:.6g}"
     if x.name == "beta":
-        lines = (Line(*_stretches(shown, x.values[c], model), width=1.2, hover=curve_hover),)
+        lines = (Line(*_stretches(channel, x.values[c], model), width=1.2, hover=curve_hover),)
         series = (*lines, dots)
     elif fit.table.type.magnitude:
         std = fit.noise.fast[0, rows]
@@ -144,38 +144,44 @@ def measurement(shown: Shown, x: Column, colour: Column) -> Panel:
         series = (dots, crosses)  # type: ignore[assignment]
     title = "" if fit.table.type.magnitude else f"axis {fit.channels[c]}"
     second = None
-    if not shown.in_g and fit.table.type.stage_angles:
+    if not channel.in_g and fit.table.type.stage_angles:
         second = Second(float(scales(fit)[c]), zero(fit, c), f"{fit.table.input_unit}, by bias and scale factor")
     return Panel(series, _axis(x, c), Axis(label), title, second=second)
 
 
 def residual(
-    shown: Shown, x: Column, colour: Column, step: Step[Fit] | None = None, *, second: bool = False, title: str = ""
+    channel: ChannelResidual,
+    x: Column,
+    colour: Column,
+    step: Step[Fit] | None = None,
+    *,
+    second: bool = False,
+    title: str = "",
 ) -> Panel:
     """The residual over `x` and the noise floor; the part that the effect of `step` explains as a line.
 
     The line is full for clockwise and broken for anticlockwise approaches. `second`: an axis in mg on the right.
     """
-    c, rows = shown.c, shown.rows
-    dots = _dots(shown, x.values[c, rows], shown.residual, colour, shown.hover)
-    lines = tuple(_explained(step, x, shown)) if step else ()
-    right = None
-    if second and not shown.fit.table.type.magnitude and not shown.in_g:
-        right = Second(shown.scale, 0.0, MILLI[shown.fit.table.input_unit])
-    label = shown.label
-    if shown.fit.table.type.moving:
+    c, rows = channel.c, channel.rows
+    dots = _dots(channel, x.values[c, rows], channel.residual, colour, channel.hover)
+    lines = tuple(_explained(step, x, channel)) if step else ()
+    second_axis = None
+    if second and not channel.fit.table.type.magnitude and not channel.in_g:
+        second_axis = Second(channel.scale, 0.0, MILLI[channel.fit.table.input_unit])
+    label = channel.label
+    if channel.fit.table.type.moving:
         label = label.replace(" in ", "\nin ", 1).replace(" with", "\nwith", 1)
-    return Panel((*floor_band(shown.floor), dots, *lines), _axis(x, c), Axis(label), title, second=right)
+    return Panel((*floor_band(channel.floor), dots, *lines), _axis(x, c), Axis(label), title, second=second_axis)
 
 
-def failure(shown: Shown) -> Panel:
+def failure(channel: ChannelResidual) -> Panel:
     """Each row at its place, coloured by its residual over the noise floor."""
-    fit, c, rows = shown.fit, shown.c, shown.rows
-    x, y, axes = _map(shown)
-    over = shown.residual / shown.floor
-    dots = Points(x[rows], y[rows], symbol=[PLACES[int(s)] for s in shown.side], size=_marker_px(shown), values=over,
-                  scale=_signed(max(PALE, float(np.abs(over).max(initial=0.0)))), hover=shown.hover,
-                  keys=range(len(rows)))  # fmt: skip
+    fit, c, rows = channel.fit, channel.c, channel.rows
+    x, y, axes = _map(channel)
+    relative = channel.residual / channel.floor
+    dots = Points(x[rows], y[rows], symbol=[PLACES[int(s)] for s in channel.side], size=_marker_px(channel),
+                  values=relative, scale=_signed(max(PALE, float(np.abs(relative).max(initial=0.0)))),
+                  hover=channel.hover, keys=range(len(rows)))  # fmt: skip
     circles: tuple[Line, ...] = ()
     if fit.table.type.magnitude:
         turn = np.linspace(0, 2 * np.pi, 121)
@@ -184,13 +190,13 @@ def failure(shown: Shown) -> Panel:
     return Panel((*circles, dots), *axes, title, equal=fit.table.type.magnitude)
 
 
-def _marker_px(shown: Shown) -> float:
+def _marker_px(channel: ChannelResidual) -> float:
     """Markers of neighbouring poses, and of both directions of turning, must not overlap."""
-    table = shown.fit.table
+    table = channel.fit.table
     if not table.type.stage_angles:
         return MOST_PX
-    across, down = (len(np.unique(table.column(name))) for name in ("beta_deg", "alpha_deg"))
-    return min(max(min(ACROSS_PX / across, DOWN_PX / (2 * down)), LEAST_PX), MOST_PX)
+    across, rows_down = (len(np.unique(table.column(name))) for name in ("beta_deg", "alpha_deg"))
+    return min(max(min(ACROSS_PX / across, DOWN_PX / (2 * rows_down)), LEAST_PX), MOST_PX)
 
 
 def scale_of(colour: Column, c: int) -> Scale:
@@ -205,60 +211,60 @@ def _signed(reach: float) -> Scale:
     return Scale("residual / noise floor", -reach, reach, signed=True)
 
 
-def _dots(shown: Shown, x: Array, y: Array, colour: Column, hover: Sequence[str]) -> Points:
-    return Points(x, y, symbol=[SIDES[int(s)] for s in shown.side], values=colour.values[shown.c, shown.rows],
-                  scale=scale_of(colour, shown.c), hover=hover, keys=range(len(shown.rows)))  # fmt: skip
+def _dots(channel: ChannelResidual, x: Array, y: Array, colour: Column, hover: Sequence[str]) -> Points:
+    return Points(x, y, symbol=[SIDES[int(s)] for s in channel.side], values=colour.values[channel.c, channel.rows],
+                  scale=scale_of(colour, channel.c), hover=hover, keys=range(len(channel.rows)))  # fmt: skip
 
 
 def _axis(x: Column, c: int) -> Axis:
     return Axis(x.labels[c], ticks="quarters" if x.name == "beta" else "", names=x.names)
 
 
-def _outputs(shown: Shown) -> tuple[Array, Array, str]:
+def _outputs(channel: ChannelResidual) -> tuple[Array, Array, str]:
     """Measured values, the model's values, and their label, for every row."""
-    fit, c = shown.fit, shown.c
+    fit, c = channel.fit, channel.c
     if fit.table.type.magnitude:
         magnitude_label = f"|{fit.table.type.symbol}| by the model ({fit.table.type.sensed_in})"
         return 1.0 + fit.residual[0], np.ones(fit.table.n), magnitude_label
     measured = fit.table.outputs[:, c]
     model = measured - fit.residual[c]
-    if not shown.in_g:
+    if not channel.in_g:
         return measured, model, f"output of {fit.channels[c]} ({fit.table.unit})"
     offset, unit = zero(fit, c), fit.table.input_unit
     label = f"{fit.channels[c]} by bias and scale factor ({unit})"
-    return (measured - offset) / shown.scale, (model - offset) / shown.scale, label
+    return (measured - offset) / channel.scale, (model - offset) / channel.scale, label
 
 
-def _stretches(shown: Shown, x: Array, model: Array) -> tuple[Array, Array]:
+def _stretches(channel: ChannelResidual, x: Array, model: Array) -> tuple[Array, Array]:
     """The model over x, one stretch for each inclination and direction of turning, with gaps between."""
-    table, at, values = shown.fit.table, [], []
-    groups = np.stack([table.optional("alpha_deg", 0.0), table.optional("direction", 0.0)])[:, shown.rows]
+    table, at, values = channel.fit.table, [], []
+    groups = np.stack([table.optional("alpha_deg", 0.0), table.optional("direction", 0.0)])[:, channel.rows]
     _, group = np.unique(groups, axis=1, return_inverse=True)
     for k in range(int(group.max(initial=-1)) + 1):
-        rows = shown.rows[group.ravel() == k]
+        rows = channel.rows[group.ravel() == k]
         order = rows[np.argsort(x[rows], kind="stable")]
         at += [*x[order], np.nan]
         values += [*model[order], np.nan]
     return np.array(at), np.array(values)
 
 
-def _explained(step: Step[Fit], x: Column, shown: Shown) -> Iterator[Line | Points]:
+def _explained(step: Step[Fit], x: Column, channel: ChannelResidual) -> Iterator[Line | Points]:
     """A line where the change is a function of `x`, else a cross for each row."""
-    if not is_function(step, x, shown.c):
-        change, rows = change_of(step)[shown.c], shown.rows
-        hover = [f"explained by {step.name}<br>{shown.place(int(row))}" for row in rows]
-        yield Points(x.values[shown.c, rows], shown.factor * change[rows], colour=CANDIDATE, symbol="cross", size=5,
+    if not is_function(step, x, channel.c):
+        change, rows = change_of(step)[channel.c], channel.rows
+        hover = [f"explained by {step.name}<br>{channel.place(int(row))}" for row in rows]
+        yield Points(x.values[channel.c, rows], channel.factor * change[rows], colour=CANDIDATE, symbol="cross", size=5,
                      hover=hover)  # fmt: skip
         return
-    for side, at, values in curves(step, x, shown.c):
+    for side, at, values in curves(step, x, channel.c):
         turning = {1: " clockwise", -1: " anticlockwise"}.get(int(side), "")
-        yield Line(at, shown.factor * values, colour=CANDIDATE, width=3, dash="solid" if side >= 0 else "dash",
+        yield Line(at, channel.factor * values, colour=CANDIDATE, width=3, dash="solid" if side >= 0 else "dash",
                    halo=True, hover=f"explained by {step.name}{turning}")  # fmt: skip
 
 
-def _map(shown: Shown) -> tuple[Array, Array, tuple[Axis, Axis]]:
+def _map(channel: ChannelResidual) -> tuple[Array, Array, tuple[Axis, Axis]]:
     """The place of each row, and the axes."""
-    fit = shown.fit
+    fit = channel.fit
     if fit.table.type.stage_angles:
         alpha, side = fit.table.column("alpha_deg"), np.sign(fit.table.optional("direction", 0.0))
         label = Axis("β (deg); ▲ turning clockwise, ▼ anticlockwise", ticks="quarters")
@@ -270,12 +276,12 @@ def _map(shown: Shown) -> tuple[Array, Array, tuple[Axis, Axis]]:
     if fit.table.type.magnitude:
         a = specific_force(fit)
         flat = a[:, :2] / np.sqrt(np.linalg.norm(a, axis=1, keepdims=True) + np.abs(a[:, 2:]))
-        right = np.where(a[:, 2] < 0, HALF_SPHERES, 0.0)
+        offset = np.where(a[:, 2] < 0, HALF_SPHERES, 0.0)
         unit = fit.table.type.sensed_in
-        return flat[:, 0] + right, flat[:, 1], (Axis(f"{TOWARDS} ({unit})"), Axis(f"towards y ({unit})"))
+        return flat[:, 0] + offset, flat[:, 1], (Axis(f"{TOWARDS} ({unit})"), Axis(f"towards y ({unit})"))
     first = columns(fit)[0]
-    over = fit.residual[shown.c] / fit.noise.floor[shown.c]
-    return first.values[shown.c], over, (Axis(first.labels[shown.c]), Axis("residual / noise floor"))
+    relative = fit.residual[channel.c] / fit.noise.floor[channel.c]
+    return first.values[channel.c], relative, (Axis(first.labels[channel.c]), Axis("residual / noise floor"))
 
 
 # The column that an effect's curve is drawn over: the change of the residual is nearest to a function of it

@@ -21,7 +21,7 @@ from calibrations.presentation.chart import (
     Panel,
     Points,
     Rule,
-    one,
+    single_chart,
     stacked,
 )
 from calibrations.table import Array
@@ -40,7 +40,7 @@ def shares(population: Population) -> Chart:
     texts = [[percent(float(value)) if value else "" for value in row] for row in share]
     x = Axis(names=tuple(batch.batch or "no batch" for batch in population.batches))
     y = Axis(low=-0.5, high=len(effects) - 0.5, names=tuple(effects), reverse=True)
-    return one(Panel((Cells(share, texts),), x, y), ROW * len(effects) + 0.4)
+    return single_chart(Panel((Cells(share, texts),), x, y), ROW * len(effects) + 0.4)
 
 
 def rigs(errors: Sequence[RigError]) -> Chart:
@@ -49,10 +49,10 @@ def rigs(errors: Sequence[RigError]) -> Chart:
     of = list(dict.fromkeys(e.rig for e in errors))
     panels = []
     for effect, parameter, unit in names:
-        mine = [e for e in errors if (e.effect, e.parameter, e.unit) == (effect, parameter, unit)]
-        place, value = np.array([float(of.index(e.rig)) for e in mine]), np.array([e.value for e in mine])
-        colours = [VERMILION if e.beyond else BLUE for e in mine]
-        dots = Points(value, place, colour=colours, reach=np.array([2 * e.std for e in mine]))
+        rig_errors = [e for e in errors if (e.effect, e.parameter, e.unit) == (effect, parameter, unit)]
+        place, value = np.array([float(of.index(e.rig)) for e in rig_errors]), np.array([e.value for e in rig_errors])
+        colours = [VERMILION if e.beyond else BLUE for e in rig_errors]
+        dots = Points(value, place, colour=colours, reach=np.array([2 * e.std for e in rig_errors]))
         y = Axis(low=-0.5, high=len(of) - 0.5, names=tuple(of), reverse=True)
         panels.append(Panel((Rule(0.0, "x", width=0.7), dots), Axis(), y, f"{effect}, {parameter} in {unit}"))
     return stacked(panels, max(0.16 * len(of), 0.9) + 0.4, share_x=False)

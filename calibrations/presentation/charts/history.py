@@ -126,21 +126,21 @@ def control_panels(
     Open dots are the baseline, which sets the limits (the band); diamonds are beyond the limits.
     """
     reach, limit = np.full(len(chart.values), chart.reach), np.full(len(chart.ranges), chart.range_limit)
-    slow, since, change = chart.ewma_reach, chart.judged, f"{name} − centre"
+    slow, judged_from, change = chart.ewma_reach, chart.judged, f"{name} − centre"
     centre = f"centre {chart.centre:.6g} {unit(of)}".rstrip()
     parts = {
-        INDIVIDUALS: (1, chart.values - chart.centre, -reach, reach, chart.jumps, since, change, centre),
-        EWMA: (1, chart.ewma - chart.centre, -slow, slow, chart.drifts, since, change, chart.verdict),
-        RANGES: (2, chart.ranges, 0 * limit, limit, (), since - 1, "range", ""),
+        INDIVIDUALS: (1, chart.values - chart.centre, -reach, reach, chart.jumps, judged_from, change, centre),
+        EWMA: (1, chart.ewma - chart.centre, -slow, slow, chart.drifts, judged_from, change, chart.verdict),
+        RANGES: (2, chart.ranges, 0 * limit, limit, (), judged_from - 1, "range", ""),
     }
     x = Axis("calibration", low=0.5, high=len(chart.values) + 0.5, ticks="integers")
     panels = {}
-    for title, (first, values, low, high, beyond, judged, label, remark) in parts.items():
+    for title, (first, values, low, high, signals, judged, label, remark) in parts.items():
         factor, spelt = prefixed(unit(of), float(np.abs([values, high]).max()))
         numbers = np.arange(first, first + len(values), dtype=float)
-        mine = None if keys is None else keys[first - 1 :]
+        point_keys = None if keys is None else keys[first - 1 :]
         texts = [f"{text}: {rounded(v)} {spelt}" for text, v in zip(hover[first - 1 :], factor * values, strict=False)]
-        dots = _control_points(numbers, factor * values, beyond, judged, texts, mine)
+        dots = _control_points(numbers, factor * values, signals, judged, texts, point_keys)
         band = Band(numbers, factor * low, factor * high, steps=True)
         series = (band, Rule(0.0, width=0.7), Line(numbers, factor * values, colour=MEASURED, width=1), dots)
         panels[title] = Panel(series, x, Axis(labelled(label, spelt)), title, remark)
@@ -148,15 +148,15 @@ def control_panels(
 
 
 def _control_points(
-    x: Array, y: Array, beyond: Collection[int], judged: int, hover: Sequence[str], keys: Sequence[str] | None
+    x: Array, y: Array, signals: Collection[int], judged: int, hover: Sequence[str], keys: Sequence[str] | None
 ) -> Points:
     """Signals differ by form and colour."""
     symbols: list[Symbol] = []
     for k in range(len(x)):
         baseline = k < judged
-        if k in beyond:
+        if k in signals:
             symbols.append("diamond-open" if baseline else "diamond")
         else:
             symbols.append("circle-open" if baseline else "circle")
-    colours = [CANDIDATE if k in beyond else MEASURED for k in range(len(x))]
+    colours = [CANDIDATE if k in signals else MEASURED for k in range(len(x))]
     return Points(x, y, colour=colours, symbol=symbols, size=8, hover=hover, keys=keys)

@@ -25,7 +25,7 @@ from calibrations.presentation.chart import (
     Rule,
     floor_band,
 )
-from calibrations.presentation.residual import Shown
+from calibrations.presentation.residual import ChannelResidual
 from calibrations.table import Array
 from calibrations.text import estimate_text as written
 from calibrations.text import rounded
@@ -43,17 +43,17 @@ def evaluation(result: MotionResult) -> Chart:
     curves = [values[visible] for values in (result.linear, result.physical, result.reference)]
     low, high = float(np.min(curves)), float(np.max(curves))
     axis = Axis("acceleration (mm/s²)", low=low - ROOM * (high - low), high=high + LEGEND_ROOM * (high - low))
-    above, below = [], []
+    upper_row, lower_row = [], []
     for k, (name, values, error) in enumerate(_models(result)):
         colour = (VERMILION, BLUE)[k]
         sensor = Line(t, values[visible], f"sensor, {name} model", colour, 1.8)
         reference = Line(t, result.reference[visible], "displacement sensor", INK, 1.8, "dot")
         title = f"{'ab'[k]}  {name} model: rmse {written(error.value, error.std)} mm/s²"
-        above.append(Panel((sensor, reference), Axis(), axis, title, legend="upper right"))
+        upper_row.append(Panel((sensor, reference), Axis(), axis, title, legend="upper right"))
         error_line = Line(t, (values - result.reference)[visible], colour=colour)
         series = (*floor_band(result.noise_limit.value), error_line)
-        below.append(Panel(series, Axis("time (s)"), Axis("sensor − reference (mm/s²)")))
-    return Chart((tuple(above), tuple(below)), 2.8, share_x=True, share_y=True)
+        lower_row.append(Panel(series, Axis("time (s)"), Axis("sensor − reference (mm/s²)")))
+    return Chart((tuple(upper_row), tuple(lower_row)), 2.8, share_x=True, share_y=True)
 
 
 def _models(result: MotionResult) -> tuple[tuple[str, Array, Quantity], ...]:
@@ -63,26 +63,26 @@ def _models(result: MotionResult) -> tuple[tuple[str, Array, Quantity], ...]:
     )
 
 
-def measurement(shown: Shown) -> Panel:
+def measurement(channel: ChannelResidual) -> Panel:
     """Output less its mean over a few periods; dots are measured, the line is the model."""
-    axis = _axis(shown)
-    wave = waveform(shown.fit, axis)
-    texts = [f"{y:.5g} at {x:.3f} s" for x, y in zip(wave.at, shown.factor * wave.measured, strict=True)]
-    line = Line(wave.at, shown.factor * wave.model, "model", hover="model: %{y:.5g}")
-    dots = Points(wave.at, shown.factor * wave.measured, "measured", size=5, hover=texts)
+    axis = _axis(channel)
+    wave = waveform(channel.fit, axis)
+    texts = [f"{y:.5g} at {x:.3f} s" for x, y in zip(wave.at, channel.factor * wave.measured, strict=True)]
+    line = Line(wave.at, channel.factor * wave.model, "model", hover="model: %{y:.5g}")
+    dots = Points(wave.at, channel.factor * wave.measured, "measured", size=5, hover=texts)
     time = Axis("time since the first sample (s)")
-    return Panel((line, dots), time, Axis(f"{axis} − mean ({shown.unit})"), f"axis {axis}")
+    return Panel((line, dots), time, Axis(f"{axis} − mean ({channel.unit})"), f"axis {axis}")
 
 
-def failure(shown: Shown) -> Panel:
+def failure(channel: ChannelResidual) -> Panel:
     """Mean residual over one period of the strongest line; the band is the noise of a mean."""
-    axis = _axis(shown)
-    period = over_a_period(shown.fit, axis)
+    axis = _axis(channel)
+    period = over_a_period(channel.fit, axis)
     hover = "%{y:.3g} at %{x:.0f} deg"
-    line = Line(period.phase_deg, shown.factor * period.residual, colour=CANDIDATE, hover=hover, markers=True)
+    line = Line(period.phase_deg, channel.factor * period.residual, colour=CANDIDATE, hover=hover, markers=True)
     x = Axis(f"phase of the motion {period.line} (deg)", ticks="quarters")
-    series = (*floor_band(shown.factor * period.floor), line)
-    return Panel(series, x, Axis(f"mean residual of {axis} ({shown.unit})"), f"axis {axis}")
+    series = (*floor_band(channel.factor * period.floor), line)
+    return Panel(series, x, Axis(f"mean residual of {axis} ({channel.unit})"), f"axis {axis}")
 
 
 def firsts(fit: Fit) -> list[int]:
@@ -91,9 +91,9 @@ def firsts(fit: Fit) -> list[int]:
     return [axes.index(axis) for axis in dict.fromkeys(axes)]
 
 
-def _axis(shown: Shown) -> str:
+def _axis(channel: ChannelResidual) -> str:
     """The axis of the channel: `x` of `x in phase at 10 Hz`."""
-    return shown.fit.channels[shown.c].partition(" ")[0]
+    return channel.fit.channels[channel.c].partition(" ")[0]
 
 
 @dataclass(frozen=True)

@@ -38,8 +38,8 @@ from calibrations.presentation.chart import (
     Points,
     Rule,
     Series,
-    beside,
-    one,
+    side_by_side,
+    single_chart,
 )
 from calibrations.presentation.charts.discovery import Level, Measure, waterfall
 from calibrations.spectrum import GAUSS_MARKOV
@@ -74,7 +74,7 @@ class Scaled:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class ModelCurve:
     """One model's curve: its fit, label and look."""
 
     fit: ChannelFit
@@ -104,17 +104,19 @@ def units(still: Still) -> dict[bool, str]:
 # One channel with noise models
 
 
-def allan(curve: Curve | DeviationComparison, into: Scaled, models: Sequence[Drawn], raw: Curve | None = None) -> Panel:
+def allan(
+    curve: Curve | DeviationComparison, scaled: Scaled, models: Sequence[ModelCurve], raw: Curve | None = None
+) -> Panel:
     """Dots are measured, bars intervals of 95 %; lines are the models, thin lines the parts of the first.
 
     `raw` is the curve of the record before non-noise signals were removed.
     """
-    by = into.factor
+    by = scaled.factor
     values = curve.deviation if isinstance(curve, Curve) else curve.measured
     series: list[Line | Points] = []
     if raw is not None:
         series.append(Points(raw.tau_s, by * raw.deviation, "measured", QUIET, "circle-open", 5))
-    dots = measured_points(curve.tau_s, by * values, by * curve.low, by * curve.high, into.unit,
+    dots = measured_points(curve.tau_s, by * values, by * curve.low, by * curve.high, scaled.unit,
                            "measured" if raw is None else f"measured, {LESS}")  # fmt: skip
     first = models[0].fit
     rate_hz = first.channel.rate_hz
@@ -125,7 +127,7 @@ def allan(curve: Curve | DeviationComparison, into: Scaled, models: Sequence[Dra
     series += [_model(model, tau_s, by * deviation(model.fit, tau_s)) for model in models]
     sure = curve.edf > 1
     low, high = by * float(curve.low.min()), by * float(curve.high[sure].max() if sure.any() else curve.high.max())
-    y = Axis(f"Allan deviation ({into.unit})", log=True, low=low / 2, high=3 * high)
+    y = Axis(f"Allan deviation ({scaled.unit})", log=True, low=low / 2, high=3 * high)
     return Panel((*series, dots), Axis(TIME, log=True), y, legend="upper center")
 
 
@@ -142,44 +144,44 @@ def ratio(curve: DeviationComparison) -> Panel:
 
 
 def spectrum(
-    fit: ChannelFit, into: Scaled, models: Sequence[Drawn], bounds: tuple[Array, Array] | None = None
+    fit: ChannelFit, scaled: Scaled, models: Sequence[ModelCurve], bounds: tuple[Array, Array] | None = None
 ) -> Panel:
     """Dots are measured; 95 % of them should be in the grey band by the model `fit`; lines are the models.
 
     `bounds` (b,) are the intervals of the measured densities.
     """
-    order, by = np.argsort(fit.frequency_hz), into.factor
+    order, by = np.argsort(fit.frequency_hz), scaled.factor
     f = fit.frequency_hz[order]
     low, high = (by * root(bound[order]) for bound in fit.interval(COVERAGE))
     density = by * root(fit.seen[order])
-    hover = [f"{value:.3g} {into.unit}/√Hz at {at:.4g} Hz" for at, value in zip(f, density, strict=True)]
+    hover = [f"{value:.3g} {scaled.unit}/√Hz at {at:.4g} Hz" for at, value in zip(f, density, strict=True)]
     lowest, highest = (by * root(bound[order]) for bound in bounds) if bounds else (None, None)
     dots = Points(f, density, "measured", size=4, low=lowest, high=highest, hover=hover)
     series: list[Series] = [Band(f, low, high), dots]
     for effect in fit.effects if len(fit.effects) > 1 else ():
         series.append(_part(effect.name, f, by * root(fit.part_of(effect)[order])))
-    for drawn in models:
-        by_frequency = np.argsort(drawn.fit.frequency_hz)
-        series.append(_model(drawn, drawn.fit.frequency_hz[by_frequency], by * root(drawn.fit.expected[by_frequency])))
+    for curve in models:
+        by_frequency = np.argsort(curve.fit.frequency_hz)
+        series.append(_model(curve, curve.fit.frequency_hz[by_frequency], by * root(curve.fit.expected[by_frequency])))
     series += [mark for line in fit.lines for mark in _marked(line.frequency_hz)]
     expected = by * root(fit.expected)
     bottom = min(float(expected.min()) / ROOM, float(density.min()) / 2)  # no measured point is cut off
     top = max(ROOM * float(expected.max()), 2 * float(density.max()))
-    y = Axis(f"density ({into.unit}/√Hz)", log=True, low=bottom, high=top)
+    y = Axis(f"density ({scaled.unit}/√Hz)", log=True, low=bottom, high=top)
     return Panel(tuple(series), Axis(FREQUENCY, log=True), y, legend="upper right")
 
 
-def record(channel: Channel, into: Scaled) -> Panel:
+def record(channel: Channel, scaled: Scaled) -> Panel:
     """A still record over time: means of its samples, less the mean of all."""
-    together = max(1, -(-len(channel.means) // MOST))
-    used = len(channel.means) // together * together
-    values = into.factor * channel.means[:used].reshape(-1, together).mean(axis=1)
-    each_s = together * channel.size / channel.rate_hz
+    samples_per_point = max(1, -(-len(channel.means) // MOST))
+    used = len(channel.means) // samples_per_point * samples_per_point
+    values = scaled.factor * channel.means[:used].reshape(-1, samples_per_point).mean(axis=1)
+    each_s = samples_per_point * channel.size / channel.rate_hz
     size, unit = in_time(channel.length_s)
-    hover = f"%{{y:.4g}} {into.unit} at %{{x:.4g}} {unit}"
+    hover = f"%{{y:.4g}} {scaled.unit} at %{{x:.4g}} {unit}"
     at = np.asarray((np.arange(len(values)) + 0.5) * each_s / size)
     line = Line(at, np.asarray(values), colour=MEASURED, width=1, hover=hover)
-    x, y = f"time ({unit}); means of {rounded(each_s, 2)} s", f"{channel.axis} − mean ({into.unit})"
+    x, y = f"time ({unit}); means of {rounded(each_s, 2)} s", f"{channel.axis} − mean ({scaled.unit})"
     return Panel((line,), Axis(x), Axis(y))
 
 
@@ -196,10 +198,12 @@ def steps_chart(start: NoiseFit, steps: Sequence[Step[NoiseFit]]) -> Chart:
 
 def fit_chart(fit: NoiseFit) -> Chart:
     """The measured Allan deviation of each channel, and that of the model."""
-    into = Scaled(1.0, fit.still.unit)
+    scaled = Scaled(1.0, fit.still.unit)
     curves = (fit.still.allan[channel.channel.axis] for channel in fit.channels)
-    drawn = ([Drawn(channel, fit.model.name, INK)] for channel in fit.channels)
-    return _named([allan(curve, into, models) for curve, models in zip(curves, drawn, strict=True)], fit)
+    curves_by_channel = ([ModelCurve(channel, fit.model.name, INK)] for channel in fit.channels)
+    return _with_axis_titles(
+        [allan(curve, scaled, models) for curve, models in zip(curves, curves_by_channel, strict=True)], fit
+    )
 
 
 def _off(fit: NoiseFit) -> str:
@@ -233,31 +237,33 @@ def still_album(end: NoiseFit, start: NoiseFit) -> list[Picture]:
         f"grey band holds 95 % of them by the model {name}{dashed}."
     )
     curves, densities = [], []
-    into = Scaled(1.0, end.still.unit)
-    for after, before in zip(end.channels, start.channels, strict=True):
-        axis = after.channel.axis
-        models = [Drawn(after, _name(end, start), INK)]
+    scaled = Scaled(1.0, end.still.unit)
+    for end_fit, start_fit in zip(end.channels, start.channels, strict=True):
+        axis = end_fit.channel.axis
+        models = [ModelCurve(end_fit, _name(end, start), INK)]
         if not _alike(end, start):
-            models.append(Drawn(before, start.model.name, dash="dash"))
+            models.append(ModelCurve(start_fit, start.model.name, dash="dash"))
         raw = start.still.allan[axis] if cleaned else None
-        curves.append(allan(end.still.allan[axis], into, models, raw))
-        densities.append(spectrum(after, into, models))
+        curves.append(allan(end.still.allan[axis], scaled, models, raw))
+        densities.append(spectrum(end_fit, scaled, models))
     return [
-        Picture("allan", "Allan deviation and model", averaging, _named(curves, end)),
-        Picture("spectrum", "Spectrum and model", power, _named(densities, end)),
+        Picture("allan", "Allan deviation and model", averaging, _with_axis_titles(curves, end)),
+        Picture("spectrum", "Spectrum and model", power, _with_axis_titles(densities, end)),
     ]
 
 
-def _named(panels: Sequence[Panel], end: NoiseFit) -> Chart:
+def _with_axis_titles(panels: Sequence[Panel], end: NoiseFit) -> Chart:
     if len(panels) == 1:
-        return one(panels[0], HEIGHT)
+        return single_chart(panels[0], HEIGHT)
     titles = [f"axis {channel.channel.axis}" for channel in end.channels]
-    return beside([replace(panel, title=title) for panel, title in zip(panels, titles, strict=True)], HEIGHT)
+    return side_by_side([replace(panel, title=title) for panel, title in zip(panels, titles, strict=True)], HEIGHT)
 
 
 def _alike(end: NoiseFit, start: NoiseFit) -> bool:
     """Whether both are one curve: the same effects with the same values, on the same record."""
-    unchanged = [after.values == before.values for after, before in zip(end.channels, start.channels, strict=True)]
+    unchanged = [
+        end_fit.values == start_fit.values for end_fit, start_fit in zip(end.channels, start.channels, strict=True)
+    ]
     return all(unchanged) and end.model.effects == start.model.effects
 
 
@@ -286,32 +292,34 @@ def noise_album(analysis: NoiseAnalysis) -> list[Picture]:
     album = []
     for k, (axis, noise) in enumerate(analysis.channels.items()):
         end, of = (f"-{axis}", f" of {axis}") if k else ("", "")
-        model, into = _present_processes(noise), Scaled(1.0, noise.unit)
-        density = one(spectrum(model.fit, into, [model], noise.interval), 4.0)
-        album.append(Picture(f"allan{end}", f"Allan deviation{of}", averaging, _deviations(noise, model, into)))
+        model, scaled = _present_processes(noise), Scaled(1.0, noise.unit)
+        density = single_chart(spectrum(model.fit, scaled, [model], noise.interval), 4.0)
+        album.append(Picture(f"allan{end}", f"Allan deviation{of}", averaging, _deviations(noise, model, scaled)))
         album.append(Picture(f"spectrum{end}", f"Spectrum{of}", power, density))
     return album
 
 
-def _present_processes(noise: ChannelNoise) -> Drawn:
+def _present_processes(noise: ChannelNoise) -> ModelCurve:
     """The fit of a channel without processes of no power; one process alone has its name."""
     effects = tuple(effect for effect in noise.fit.effects if noise.power(effect) > 0)
     is_alone = len(effects) == 1 and not noise.lines
-    return Drawn(replace(noise.fit, effects=effects), effects[0].name if is_alone else SUM, INK)
+    return ModelCurve(replace(noise.fit, effects=effects), effects[0].name if is_alone else SUM, INK)
 
 
-def _deviations(noise: ChannelNoise, model: Drawn, into: Scaled) -> Chart:
+def _deviations(noise: ChannelNoise, model: ModelCurve, scaled: Scaled) -> Chart:
     """The overlapping deviation with its interval, the processes and their sum; on the right the other deviations."""
     curve = noise.allan
-    panel = allan(curve, into, [model])
-    left = replace(panel, y=replace(panel.y, label=f"deviation ({into.unit})"), title="Overlapping Allan deviation")
-    curves = [part for kind, name, colour in OTHERS for part in _other(noise.deviations[kind], name, colour)]
+    panel = allan(curve, scaled, [model])
+    left_panel = replace(
+        panel, y=replace(panel.y, label=f"deviation ({scaled.unit})"), title="Overlapping Allan deviation"
+    )
+    curves = [part for kind, name, colour in OTHERS for part in _other_deviation(noise.deviations[kind], name, colour)]
     line = Line(curve.tau_s, curve.deviation, "overlapping Allan", QUIET)
-    right = Panel((*curves, line), Axis(TIME, log=True), left.y, "Other deviations", legend="upper center")
-    return beside([left, right], 4.0, share_y=True)
+    right_panel = Panel((*curves, line), Axis(TIME, log=True), left_panel.y, "Other deviations", legend="upper center")
+    return side_by_side([left_panel, right_panel], 4.0, share_y=True)
 
 
-def _other(curve: Curve, name: str, colour: str) -> tuple[Band, Line]:
+def _other_deviation(curve: Curve, name: str, colour: str) -> tuple[Band, Line]:
     band = Band(curve.tau_s, curve.low, curve.high, colour=colour, opacity=0.18)
     return band, Line(curve.tau_s, curve.deviation, name, colour, markers=True)
 
@@ -341,14 +349,14 @@ def root(two_sided: Array) -> Array:
     return np.asarray(np.sqrt(2 * two_sided))
 
 
-def candidate(fit: ChannelFit, name: str) -> Drawn:
+def candidate(fit: ChannelFit, name: str) -> ModelCurve:
     """The curve of a model with an effect that is considered."""
-    return Drawn(fit, f"with {name}", CANDIDATE, 2.6)
+    return ModelCurve(fit, f"with {name}", CANDIDATE, 2.6)
 
 
 def _part(name: str, x: Array, values: Array) -> Line:
     return Line(x, values, name, COLOURS.get(name, PURPLE), 1.0, "dash", hover=f"{name}: %{{y:.3g}}")
 
 
-def _model(drawn: Drawn, x: Array, values: Array) -> Line:
-    return Line(x, values, drawn.label, drawn.colour, drawn.width, drawn.dash, hover=f"{drawn.label}: %{{y:.3g}}")
+def _model(curve: ModelCurve, x: Array, values: Array) -> Line:
+    return Line(x, values, curve.label, curve.colour, curve.width, curve.dash, hover=f"{curve.label}: %{{y:.3g}}")

@@ -35,8 +35,8 @@ from calibrations.presentation.chart import (
     Picture,
     Rule,
     Series,
-    beside,
-    one,
+    side_by_side,
+    single_chart,
 )
 from calibrations.table import Array, Table
 from calibrations.text import in_milli, rounded
@@ -68,7 +68,7 @@ class Falling(Protocol):
 
 
 @dataclass(frozen=True)
-class Through:
+class FittedForm:
     """A form of the catalogue through the curve of a place: its own curve, and its share of that one's variance."""
 
     name: str
@@ -95,7 +95,7 @@ def model_curves(end: Fit) -> list[PlaceCurve]:
     return sorted(curves, key=lambda curve: -_size(curve, end))[:MOST_PLACES]
 
 
-def forms_through(end: Fit, curve: PlaceCurve) -> list[Through]:
+def forms_through(end: Fit, curve: PlaceCurve) -> list[FittedForm]:
     """Forms of the catalogue fitted to the curve of unknown form at a place, the best first; none beside no such curve.
 
     They are fitted to what bias, scale factor and this place predict, without noise.
@@ -111,11 +111,13 @@ def forms_through(end: Fit, curve: PlaceCurve) -> list[Through]:
     base = replace(end.model, terms=tuple(term for term in end.model.terms if term.name in BASE))
     effects_by_name = catalogue()
     effects = [effects_by_name[name] for name in EFFECTS_AT.get(curve.place, ()) if name in effects_by_name]
-    fitted = [through for effect in effects if (through := _through(base, effect, end, table, curve)) is not None]
+    fitted = [
+        fitted_form for effect in effects if (fitted_form := _fit_form(base, effect, end, table, curve)) is not None
+    ]
     return sorted((t for t in fitted if t.share >= LEAST_SHARE), key=lambda t: -t.share)[:MOST_FORMS]
 
 
-def _through(base: Model, effect: Effect, end: Fit, table: Table, curve: PlaceCurve) -> Through | None:
+def _fit_form(base: Model, effect: Effect, end: Fit, table: Table, curve: PlaceCurve) -> FittedForm | None:
     """One form; None where it cannot be fitted to this table."""
     if effect.excluded(end.table) is not None:
         return None
@@ -130,15 +132,15 @@ def _through(base: Model, effect: Effect, end: Fit, table: Table, curve: PlaceCu
         form = np.interp(curve.at[axis], form_curve.at[axis], form_curve.value[axis])
         unexplained += float(np.sum((value - form - np.mean(value - form)) ** 2))
         total += float(np.sum((value - np.mean(value)) ** 2))
-    return Through(effect.name, form_curve, 1 - unexplained / total if total > 0 else 0.0)
+    return FittedForm(effect.name, form_curve, 1 - unexplained / total if total > 0 else 0.0)
 
 
-def curve_chart(curve: PlaceCurve, forms: Sequence[Through] = ()) -> Chart:
+def curve_chart(curve: PlaceCurve, forms: Sequence[FittedForm] = ()) -> Chart:
     """A panel for each axis: the curve with its band of 95 %, and forms of the catalogue through it."""
-    return beside([curve_panel(curve, axis, forms) for axis in curve.value], 3.2, share_y=True)
+    return side_by_side([curve_panel(curve, axis, forms) for axis in curve.value], 3.2, share_y=True)
 
 
-def curve_panel(curve: PlaceCurve, axis: str, forms: Sequence[Through] = ()) -> Panel:
+def curve_panel(curve: PlaceCurve, axis: str, forms: Sequence[FittedForm] = ()) -> Panel:
     """The curve of one axis."""
     scale, unit = in_milli(curve.unit)
     at, value, band = curve.at[axis], scale * curve.value[axis], COVERAGE * scale * curve.std[axis]
@@ -175,7 +177,7 @@ def shares_chart(steps: Falling) -> Chart:
     models = (steps.start.model.name, *(f"+ {step.name}" for step in steps.steps))
     y = Axis(low=-0.5, high=max(rows, FEWEST_BARS) - 0.5, names=models, reverse=True)
     x = Axis("remaining variance beyond the noise, % of that of the first model", low=0.0, high=135.0)
-    return one(Panel(tuple(series), x, y, legend="outside"), 0.9 + ROW * max(rows, FEWEST_BARS))
+    return single_chart(Panel(tuple(series), x, y, legend="outside"), 0.9 + ROW * max(rows, FEWEST_BARS))
 
 
 def shares_by_place(steps: Falling) -> tuple[list[str], Array]:
@@ -187,7 +189,7 @@ def shares_by_place(steps: Falling) -> tuple[list[str], Array]:
     gains = np.maximum(-np.diff(errors), 0.0)
     unexplained = max(float(errors[-1]) - 1.0, 0.0)
     total = float(gains.sum()) + unexplained or 1.0
-    at = [_named(step.name) for step in steps.steps]
+    at = [_legend_label(step.name) for step in steps.steps]
     size = {name: sum(g for g, a in zip(gains, at, strict=True) if a == name) for name in at}
     names = sorted(size, key=lambda name: (name == LINEAR, -size[name]))
     minor = [name for name in names if name != LINEAR][MOST_SHARES:]
@@ -201,7 +203,7 @@ def shares_by_place(steps: Falling) -> tuple[list[str], Array]:
     return [*names, UNEXPLAINED], shares
 
 
-def _named(effect: str) -> str:
+def _legend_label(effect: str) -> str:
     """The place of an effect, as a legend has it."""
     if effect in BASE:
         return LINEAR
@@ -219,7 +221,7 @@ def _size(curve: PlaceCurve, end: Fit) -> float:
     return rms * (np.radians(1.0) * float(np.ptp(end.table.outputs)) / 2 if curve.unit == "deg" else 1.0)
 
 
-def _picture(curve: PlaceCurve, forms: Sequence[Through]) -> Picture:
+def _picture(curve: PlaceCurve, forms: Sequence[FittedForm]) -> Picture:
     caption = "The curve of this place in the model, with its band of 95 % (grey)."
     if forms:
         share = f"{forms[0].name} takes up {100 * max(forms[0].share, 0.0):.0f} % of its variance"

@@ -42,15 +42,15 @@ LABELS = {"t_s": "time (min)", "temperature_c": "temperature (°C)", "supply_v":
 def signature_chart(effect: Effect) -> Chart:
     """A panel for each axis that the effect reaches; lines are coloured by inclination, and broken on the way back."""
     parts = signature(effect)
-    many = len(parts[0].curves) > 1
-    panels = [_drawn(part, legend=many and k == 0) for k, part in enumerate(parts)]
+    has_several = len(parts[0].curves) > 1
+    panels = [_part_panel(part, legend=has_several and k == 0) for k, part in enumerate(parts)]
     return Chart((tuple(panels),), 1.95, SMALL, share_y=True)
 
 
-def _drawn(part: Part, *, legend: bool) -> Panel:
+def _part_panel(part: Part, *, legend: bool) -> Panel:
     lines = []
-    for label, mine in groupby(part.curves, lambda curve: curve.label):
-        for k, curve in enumerate(mine):
+    for label, curves in groupby(part.curves, lambda curve: curve.label):
+        for k, curve in enumerate(curves):
             name = label if legend and k == 0 else ""
             dash: Dash = "dash" if curve.style == "--" else "solid"
             lines.append(Line(part.over[curve.rows], part.left[curve.rows], name, curve.colour, 1.6, dash))
@@ -76,12 +76,12 @@ def signature(effect: Effect) -> list[Part]:
     table = sweep() if effect.excluded(sweep()) is None else motion()
     v, a = forward(table, linear), force(table, linear)
     table = replace(table, columns={**table.columns, "vx_v": v[:, 0], "vy_v": v[:, 1]})
-    change = forward(table, [*linear, (effect, shown(effect, table))]) - v
-    lefts = [(k, _left(table, change[:, k], v[:, k], effect.name)) for k in range(v.shape[1])]
+    change = forward(table, [*linear, (effect, shown_values(effect, table))]) - v
+    lefts = [(k, _nonlinear_change(table, change[:, k], v[:, k], effect.name)) for k in range(v.shape[1])]
     return [_panel(effect, table, a, k, residual) for k, residual in lefts if residual.any()]
 
 
-def _left(table: Table, change: Array, v: Array, name: str) -> Array:
+def _nonlinear_change(table: Table, change: Array, v: Array, name: str) -> Array:
     """The change of an output, V, less the straight line in that output that follows it best; mV.
 
     For bias and scale factor, the model has all effects but these.
@@ -101,8 +101,8 @@ def _panel(effect: Effect, table: Table, a: Array, k: int, residual: Array) -> P
         rows = np.flatnonzero(close) if "output" in effect.places else np.arange(0, table.n, 8)
         return Part(axis, residual, table.time_s, "time (s)", (Curve("", BLUE, "-", rows),))
     if drivers := [name for name in effect.needs if name in LABELS]:
-        over = table.column(drivers[0]) / (60.0 if drivers[0] == "t_s" else 1.0)
-        return Part(axis, residual, over, LABELS[drivers[0]], tuple(_by_inclination(table, ("-", "-"))))
+        abscissa = table.column(drivers[0]) / (60.0 if drivers[0] == "t_s" else 1.0)
+        return Part(axis, residual, abscissa, LABELS[drivers[0]], tuple(_by_inclination(table, ("-", "-"))))
     for name, component in ((axis, a[:, k]), (other_axis, other_in_plane(a)[:, k])):
         _, rows, group = np.unique(np.round(component, 6), return_index=True, return_inverse=True)
         if np.max(np.abs(residual - residual[rows][group])) < SAME * np.ptp(residual) and _smooth(residual[rows]):
@@ -113,8 +113,8 @@ def _panel(effect: Effect, table: Table, a: Array, k: int, residual: Array) -> P
 
 def _smooth(values: Array) -> bool:
     """Whether neighbours are alike (von Neumann, 1941)."""
-    steps, away = np.diff(values), values - values.mean()
-    return float(steps @ steps) < SMOOTH * float(away @ away)
+    steps, deviations = np.diff(values), values - values.mean()
+    return float(steps @ steps) < SMOOTH * float(deviations @ deviations)
 
 
 def _by_inclination(table: Table, styles: tuple[str, ...]) -> Iterator[Curve]:
@@ -204,7 +204,7 @@ class Part:
     unit: str = "mV"
 
 
-def shown(effect: Effect, table: Table) -> Values:
+def shown_values(effect: Effect, table: Table) -> Values:
     """The values that are shown, and the effect's constants."""
     constants = {name: make(table) for name, make in effect.constants.items()}
     return Values.of(constants | {p.name: shown_value(p, effect) for p in effect.parameters})
@@ -213,9 +213,9 @@ def shown(effect: Effect, table: Table) -> Values:
 def shown_value(p: Parameter, effect: Effect) -> Array:
     """What a sensor may typically show, of shape (3,) if per axis."""
     typical = p.typical if p.starts == (0.0,) else p.starts[-1]
-    chosen = SHOWN.get(effect.name, {})
-    across = np.ones(3) if p.name in chosen else ACROSS
-    value = chosen.get(p.name, typical)
+    values = SHOWN.get(effect.name, {})
+    across = np.ones(3) if p.name in values else ACROSS
+    value = values.get(p.name, typical)
     return value * across if p.per_axis else np.asarray(value)
 
 
@@ -229,7 +229,7 @@ def of_field(effect: Effect) -> Part:
     strength = catalogue()["field-strength"]
     table = _turned_in_a_field()
     steps: list[Step] = [] if effect.name == strength.name else [(strength, Values(total=np.asarray(1.0)))]
-    steps.append((effect, shown(effect, table)))
+    steps.append((effect, shown_values(effect, table)))
     output = respond(sensed(table.outputs, table, steps), table, steps)
     residual = np.asarray(np.round(1e3 * (np.linalg.norm(output, axis=1) - 1.0), 4) + 0.0)
     curves = tuple(_curves(len(TURN_DEG)))
@@ -241,14 +241,14 @@ def of_rates(effect: Effect) -> list[Part]:
     ideal = catalogue()["gyro-scale-factor"]
     table = _turned_at_rates()
     rate = rate_deg_s(table)
-    unit_scale = Values({**shown(ideal, table), "scale": np.ones(3)})
+    unit_scale = Values({**shown_values(ideal, table), "scale": np.ones(3)})
     steps: list[Step] = [] if effect.name == ideal.name else [(ideal, unit_scale)]
-    steps.append((effect, shown(effect, table)))
+    steps.append((effect, shown_values(effect, table)))
     residual = respond(sensed(rate, table, steps), table, steps) - rate
     curves = tuple(_curves(len(RATES_DEG_S)))
-    over = table.column("rate_deg_s")
+    rates = table.column("rate_deg_s")
     return [
-        Part(axis, np.asarray(np.round(residual[:, k], 4) + 0.0), over, "rate (deg/s)", curves, "deg/s")
+        Part(axis, np.asarray(np.round(residual[:, k], 4) + 0.0), rates, "rate (deg/s)", curves, "deg/s")
         for k, axis in enumerate(AXES)
     ]
 
@@ -301,30 +301,30 @@ def shown_noise(effect: Effect) -> NoiseValues:
 
 def noise_signature_chart(effect: Effect) -> Chart:
     """Left the Allan deviation, right the spectrum; broken without the effect."""
-    without, added = _with_white(None), _with_white(effect)
+    white_fit, effect_fit = _with_white(None), _with_white(effect)
     tau_s = np.geomspace(1, SAMPLES / 8, 70).round() / RATE_HZ
-    looks: tuple[tuple[ChannelFit, Dash, str], ...] = ((without, "dash", QUIET), (added, "solid", BLUE))
+    styles: tuple[tuple[ChannelFit, Dash, str], ...] = ((white_fit, "dash", QUIET), (effect_fit, "solid", BLUE))
     deviations = tuple(
-        Line(tau_s, deviation(fit, tau_s), colour=colour, width=1.6, dash=dash) for fit, dash, colour in looks
+        Line(tau_s, deviation(fit, tau_s), colour=colour, width=1.6, dash=dash) for fit, dash, colour in styles
     )
-    right = tuple(
+    spectra = tuple(
         Line(fit.frequency_hz[::SPARE], root(fit.expected)[::SPARE], colour=colour, width=1.6, dash=dash)
-        for fit, dash, colour in looks
+        for fit, dash, colour in styles
     )
-    lines = tuple(Rule(line.frequency_hz, "x", VERMILION, 1.6) for line in added.lines)
-    panels = (_named(deviations, "averaging time (s)", "Allan deviation (V)"),
-              _named((*right, *lines), "frequency (Hz)", "density (V/√Hz)"))  # fmt: skip
+    lines = tuple(Rule(line.frequency_hz, "x", VERMILION, 1.6) for line in effect_fit.lines)
+    panels = (_log_panel(deviations, "averaging time (s)", "Allan deviation (V)"),
+              _log_panel((*spectra, *lines), "frequency (Hz)", "density (V/√Hz)"))  # fmt: skip
     return Chart((panels,), 1.95, SMALL)
 
 
-def _named(series: tuple[Line | Rule, ...], x: str, y: str) -> Panel:
+def _log_panel(series: tuple[Line | Rule, ...], x: str, y: str) -> Panel:
     values = np.concatenate([line.y for line in series if isinstance(line, Line)])
     return Panel(series, Axis(x, log=True), Axis(y, log=True, low=values.min() / 1.5, high=1.5 * values.max()))
 
 
 def _with_white(effect: Effect | None) -> ChannelFit:
     """White noise, with an effect or without, as a fit to a record without samples."""
-    nothing = Channel("x", "V", RATE_HZ, np.inf, SAMPLES, np.zeros(SAMPLES), 1, Welch(RATE_HZ).segments())
+    channel = Channel("x", "V", RATE_HZ, np.inf, SAMPLES, np.zeros(SAMPLES), 1, Welch(RATE_HZ).segments())
     white = catalogue()["white-noise"]
     effects, values = [white], {white.name: dict(WHITE)}
     lines: tuple[Sinusoid, ...] = ()
@@ -333,5 +333,5 @@ def _with_white(effect: Effect | None) -> ChannelFit:
         effects += [effect] if "spectrum" in effect.places and effect is not white else []
         values[effect.name] = spectrum
         lines = effect_lines(effect, spectrum)
-    parts = (slow_bands(nothing.means, Sampling(RATE_HZ)),)
-    return ChannelFit(nothing, parts, lines, tuple(effects), values)
+    parts = (slow_bands(channel.means, Sampling(RATE_HZ)),)
+    return ChannelFit(channel, parts, lines, tuple(effects), values)

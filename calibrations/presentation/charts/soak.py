@@ -28,7 +28,7 @@ from calibrations.presentation.chart import (
     Rule,
     Series,
     Span,
-    one,
+    single_chart,
     stacked,
 )
 from calibrations.table import Array
@@ -54,7 +54,7 @@ def soak_album(soak: Soak, foreseen: Mapping[str, ForecastHistory] = MappingProx
         "separate the remaining drift from noise. The broken line is the time from which the drift stays within it. "
         "The thin grey line is the record of the level sensor between reversals, shifted onto the bias."
     )
-    around = (
+    surroundings_words = (
         "Conditions during the soak: the sensor's temperature, its supply, and the noise of single samples hour by "
         "hour."
     )
@@ -64,7 +64,7 @@ def soak_album(soak: Soak, foreseen: Mapping[str, ForecastHistory] = MappingProx
     )
     pictures = [
         Picture("drift", "Bias and scale factor since power-on", course, drift(soak)),
-        Picture("night", "Temperature, supply and noise", around, surroundings(soak)),
+        Picture("night", "Temperature, supply and noise", surroundings_words, surroundings(soak)),
     ]
     if foreseen:
         pictures.insert(1, Picture("foreseen", "Forecasts of the final values", FORESEEN, forecasts(soak, foreseen)))
@@ -74,14 +74,14 @@ def soak_album(soak: Soak, foreseen: Mapping[str, ForecastHistory] = MappingProx
 
 def drift(soak: Soak) -> Chart:
     """A column for each axis: bias above, scale factor below, as change from the final value."""
-    above, below = [], []
+    bias_row, scale_row = [], []
     factor, unit = in_milli(soak.table.unit)
     for axis in soak.axes:
         bias = soak.courses[f"bias-{axis}"]
-        above.append(_course(soak, bias, factor, f"bias − final value ({unit})", f"axis {axis}"))
+        bias_row.append(_course(soak, bias, factor, f"bias − final value ({unit})", f"axis {axis}"))
         scale = soak.courses[f"scale-{axis}"]
-        below.append(_course(soak, scale, 1e6 / _final(scale), "scale factor − final value (ppm)"))
-    return Chart((tuple(above), tuple(below)), 2.9, share_x=True)
+        scale_row.append(_course(soak, scale, 1e6 / _final(scale), "scale factor − final value (ppm)"))
+    return Chart((tuple(bias_row), tuple(scale_row)), 2.9, share_x=True)
 
 
 def forecasts(soak: Soak, foreseen: Mapping[str, ForecastHistory]) -> Chart:
@@ -124,11 +124,11 @@ def _forecast(course: ForecastHistory, factor: float, colour: str, label: str, t
 
 def surroundings(soak: Soak) -> Chart:
     """Temperature, supply and noise over the hours, as far as they were measured."""
-    holds, begin = soak.holds, Axis(TIME, low=_begin_h(soak))
+    still_table, begin = soak.holds, Axis(TIME, low=_begin_h(soak))
     panels = []
     for name, label, colour in (("temperature_c", "sensor (°C)", AMBER), ("supply_v", "supply (V)", GREEN)):
-        if name in holds:
-            line = Line(*_thinned(holds.time_s / HOUR_S, holds.column(name)), colour=colour)
+        if name in still_table:
+            line = Line(*_thinned(still_table.time_s / HOUR_S, still_table.column(name)), colour=colour)
             panels.append(Panel((*_gaps(soak), line), begin, Axis(label)))
     lines, (factor, unit) = [], in_milli(soak.table.unit)
     for axis in soak.axes:
@@ -146,8 +146,8 @@ def allan(soak: Soak) -> Chart:
         lines.append(Line(times_s, factor * deviations, f"axis {axis}", COLOURS[axis], markers=True))
     slope = factor * deviations[0] * np.sqrt(times_s[0] / times_s)
     lines.append(Line(times_s, slope, "white noise", QUIET, dash="dot"))
-    return one(Panel(tuple(lines), Axis("averaging time (s)", log=True), Axis(f"Allan deviation ({unit})", log=True),
-                     legend="best"), 3.0)  # fmt: skip
+    x, y = Axis("averaging time (s)", log=True), Axis(f"Allan deviation ({unit})", log=True)
+    return single_chart(Panel(tuple(lines), x, y, legend="best"), 3.0)
 
 
 def _course(soak: Soak, course: Course, factor: float, label: str, title: str = "") -> Panel:

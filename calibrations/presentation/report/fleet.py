@@ -9,7 +9,7 @@ from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.fleet import Spread, rigs, shares, spreads
 from calibrations.presentation.document import Block, Page, Remark, Section, Table
 from calibrations.presentation.page import html
-from calibrations.text import estimate_text, joined, probability, rounded
+from calibrations.text import estimate_text, join_words, probability, rounded
 
 MOST = 200  # sensors in a table of those that need a person
 ONE_RIG = (
@@ -76,18 +76,18 @@ def calibration_report(
 def _headline(missing: list[BatchVerdict], faulty_rigs: set[str], persons: list[SensorVerdict]) -> str:
     parts = []
     if missing:
-        effects = joined(list(dict.fromkeys(e.effect for batch in missing for e in batch.effects)))
+        effects = join_words(list(dict.fromkeys(e.effect for batch in missing for e in batch.effects)))
         parts.append(f"{effects} missing in {_count(len(missing), 'batch', 'batches')}")
     if faulty_rigs:
         parts.append(f"{_count(len(faulty_rigs), 'rig', 'rigs')} in error")
     if persons:
         parts.append(f"{_count(len(persons), 'sensor', 'sensors')} to inspect")
-    text = joined(parts) or "no effect is missing in any sensor"
+    text = join_words(parts) or "no effect is missing in any sensor"
     return f"{text[:1].upper()}{text[1:]}."
 
 
-def _count(number: int, one: str, many: str) -> str:
-    return f"{number} {one if number == 1 else many}"
+def _count(number: int, singular: str, plural: str) -> str:
+    return f"{number} {singular if number == 1 else plural}"
 
 
 def _batches(population: Population) -> Section:
@@ -120,7 +120,7 @@ def _rigs(population: Population) -> Section:
     if len(measured_on) == 1:
         blocks.append(ONE_RIG)
     elif len(population.unconnected) > 1:
-        groups = "; ".join(joined(list(group)) for group in population.unconnected)
+        groups = "; ".join(join_words(list(group)) for group in population.unconnected)
         blocks.append(f"These groups of rigs have no batch in common and cannot be compared: {groups}.")
     if not population.rigs and not blocks:
         blocks.append("No rig differs significantly from the others.")
@@ -152,8 +152,8 @@ def _persons(sensors: list[SensorVerdict]) -> Iterable[Section]:
         for sensor in sensors[:MOST]
     ]
     head = ("sensor", "batch", "rig", "verdict", "own effects", "error / floor", "remark")
-    more = (Remark(f"{len(sensors) - MOST} more are in the JSON document."),) if len(sensors) > MOST else ()
-    yield Section("Sensors to inspect", (*_table("Sensors to inspect", head, rows), *more))
+    remarks = (Remark(f"{len(sensors) - MOST} more are in the JSON document."),) if len(sensors) > MOST else ()
+    yield Section("Sensors to inspect", (*_table("Sensors to inspect", head, rows), *remarks))
 
 
 def _table(title: str, head: Sequence[str], rows: Sequence[Sequence[object]]) -> tuple[Table, ...]:

@@ -55,7 +55,7 @@ def motion_page(page: Page, motion: MotionResult, evaluation: Picture) -> Page:
 
 
 def _motion_section(motion: MotionResult, evaluation: Picture) -> Section:
-    quantities = [(NAMES[name], *_written(quantity)) for name, quantity in motion.results.items()]
+    quantities = [(NAMES[name], *_quantity_text(quantity)) for name, quantity in motion.results.items()]
     head = ("quantity", "value (standard uncertainty)", "unit")
     filters = ("filter", "at", "amplitude", "phase", "within 1 %", "discarded at each end")
     return Section(
@@ -70,18 +70,18 @@ def _motion_section(motion: MotionResult, evaluation: Picture) -> Section:
 
 
 def _motion_summary(motion: MotionResult) -> str:
-    before, after, limit = (rounded(q.value) for q in (motion.rmse_linear, motion.rmse_physical, motion.noise_limit))
+    linear, physical, limit = (rounded(q.value) for q in (motion.rmse_linear, motion.rmse_physical, motion.noise_limit))
     return (
         f"The motion has a frequency of {motion.frequency.value:.4g} Hz and a peak of "
-        f"{rounded(motion.amplitude.value, 4)} mm/s². The rms error of the linear model is {before} mm/s², that of the "
-        f"physical model {after} mm/s², {100 * motion.improvement.value:.1f} % less. The sensor's noise alone gives "
+        f"{rounded(motion.amplitude.value, 4)} mm/s². The rms error of the linear model is {linear} mm/s², that of the "
+        f"physical model {physical} mm/s², {100 * motion.improvement.value:.1f} % less. The sensor's noise alone gives "
         f"{limit} mm/s² in this band: the physical model has {rounded(motion.excess)} × that limit. Both models were "
         "fitted to the sweep of this run, without the motion. Models that are fitted to the motion itself have a "
         "smaller error, given below, because that fit includes the changes since the sweep."
     )
 
 
-def _written(q: Quantity) -> tuple[str, str]:
+def _quantity_text(q: Quantity) -> tuple[str, str]:
     if q.unit == "1":
         return estimate_text(100 * q.value, 100 * q.std), "%"
     return estimate_text(q.value, q.std), unit(q.unit)

@@ -30,7 +30,7 @@ from calibrations.presentation.page import html
 from calibrations.presentation.report.motion import motion_page
 from calibrations.presentation.report.parameters import estimate_cells, matrices_section, name_of_file, verdicts
 from calibrations.table import Array
-from calibrations.text import capital, estimate_text, joined, minus, probability, rounded, unbroken
+from calibrations.text import capital, estimate_text, join_words, minus, probability, rounded, unbroken
 
 LONG_MIN = 120  # longer durations are given in hours
 
@@ -56,7 +56,7 @@ def _error(discovery: Discovery[Fit]) -> str:
         f"{rounded(start.held_out_excess)} to {rounded(discovery.steps[-1].held_out_after)} × the noise floor."
     )
     if discovery.refinements:
-        text += f" For the form of these effects the model also holds {joined(discovery.refinements)}."
+        text += f" For the form of these effects the model also holds {join_words(discovery.refinements)}."
     return text + pattern
 
 
@@ -80,9 +80,9 @@ def _of_floor(fit: Fit, held_out: float) -> str:
 
 def next_words(e: Experiment) -> str:
     """What to run next, which effects it separates, and why."""
-    pairs = [f"{a} from {joined([y for x, y in e.separates if x == a], 'or')}" for a in dict(e.separates)]
+    pairs = [f"{a} from {join_words([y for x, y in e.separates if x == a], 'or')}" for a in dict(e.separates)]
     settings = ", ".join(f"{name} = {value}" for name, value in e.settings.items())
-    return f"To separate {joined(pairs)}, run {e.procedure}{f' with {settings}' if settings else ''}: {e.why}."
+    return f"To separate {join_words(pairs)}, run {e.procedure}{f' with {settings}' if settings else ''}: {e.why}."
 
 
 def next_takes(e: Experiment) -> str:
@@ -90,13 +90,13 @@ def next_takes(e: Experiment) -> str:
     if e.duration_s is None:
         return ""
     minutes = e.duration_s / 60
-    takes = f"It takes {minutes:.0f} min" if minutes < LONG_MIN else f"It takes {minutes / 60:.1f} h"
+    duration = f"It takes {minutes:.0f} min" if minutes < LONG_MIN else f"It takes {minutes / 60:.1f} h"
     if e.expected is None:
-        return f"{takes}. Its result cannot be predicted."
-    alone = e.expected.probability_alone >= CERTAIN_PROBABILITY
-    percent = 100 * pairs_separated(e.expected.alone if alone else e.expected.together)
-    source = "its own data" if alone else "all data together"
-    return f"{takes} and separates them with a probability of {min(percent, 99.9):.3g} %, from {source}."
+        return f"{duration}. Its result cannot be predicted."
+    suffices_alone = e.expected.probability_alone >= CERTAIN_PROBABILITY
+    percent = 100 * pairs_separated(e.expected.alone if suffices_alone else e.expected.together)
+    source = "its own data" if suffices_alone else "all data together"
+    return f"{duration} and separates them with a probability of {min(percent, 99.9):.3g} %, from {source}."
 
 
 EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
@@ -302,8 +302,8 @@ def _probability(p: float) -> str:
 
 
 def _model(discovery: Discovery[Fit]) -> tuple[Block, ...]:
-    end, added = discovery.end, {step.name for step in discovery.steps}
-    rows = [row for term in end.model.terms for row in _parameters(term, term.name in added)]
+    end, added_effects = discovery.end, {step.name for step in discovery.steps}
+    rows = [row for term in end.model.terms for row in _parameters(term, term.name in added_effects)]
     head = ("effect", "parameter", "axis", "value (standard uncertainty)", "unit")
     birge = BY_BIRGE.format(birge=end.birge) if end.birge > NOTICEABLE_BIRGE else ""
     name = Markup('<b class="long">{}</b>').format(end.model.name)

@@ -15,7 +15,7 @@ from calibrations.presentation.charts.soak import soak_album
 from calibrations.presentation.document import Items, Page, Remark, Section, Table
 from calibrations.presentation.page import html
 from calibrations.presentation.report.parameters import verdicts
-from calibrations.text import estimate_text, in_milli, joined, minus, rounded, time_text
+from calibrations.text import estimate_text, in_milli, join_words, minus, rounded, time_text
 
 WANDERED_K = 1.0  # peak to peak; ambient that changes by more is not constant
 TOLERANCE = (
@@ -96,14 +96,14 @@ def _headline(soak: Soak, forecasts: Mapping[str, ForecastHistory]) -> str:
     if any(course.state is None for course in soak.courses.values()):
         return "Too few reversals to decide whether bias and scale factor are steady."
     waiting = [name.replace("-", " of ") for name, course in soak.courses.items() if course.time_s is None]
-    text = f"No steady state within {_span_h(soak)} h: {joined(waiting)} may still drift."
+    text = f"No steady state within {_span_h(soak)} h: {join_words(waiting)} may still drift."
     bounds = steady_time(forecasts)
     if bounds is None:
         return text
     low, value, high = (rounded(time_s / HOUR_S, 2) for time_s in bounds)
     if np.isfinite(bounds.high):
-        between = f", {low} to {high} h (95 %)" if low != high else ""
-        return f"{text} Forecast: {value} h after power-on{between}."
+        interval_words = f", {low} to {high} h (95 %)" if low != high else ""
+        return f"{text} Forecast: {value} h after power-on{interval_words}."
     return f"{text} Forecast: later than {low} h after power-on."
 
 
@@ -121,8 +121,10 @@ def _summary(soak: Soak) -> str:
     if soak.left_out:
         text += f" {soak.left_out} reversals are not used: they were interrupted, or the oven was not warm."
     if soak.gaps:
-        lost, plural = _length(sum(gap.length_s for gap in soak.gaps)), "s" if len(soak.gaps) > 1 else ""
-        text += f" {lost} are lost in {len(soak.gaps)} gap{plural}. The fit assumes that the sensor stayed powered."
+        lost_time, plural = _length(sum(gap.length_s for gap in soak.gaps)), "s" if len(soak.gaps) > 1 else ""
+        text += (
+            f" {lost_time} are lost in {len(soak.gaps)} gap{plural}. The fit assumes that the sensor stayed powered."
+        )
     return text
 
 
@@ -159,7 +161,7 @@ def _course(course: Course, of: str) -> tuple[str, ...]:
         estimate_text(*(factor * value for value in state.drift)) if state.terms else "none beyond the noise",
         rounded(factor * state.tolerance, 2),
         unit,
-        joined(taus) if taus else "–",
+        join_words(taus) if taus else "–",
         "first reversal" if state.from_start else _hours(course.time_s) if course.time_s else "not reached",
     )
 
@@ -180,9 +182,9 @@ def _outlook(name: str, history: ForecastHistory, of: str) -> tuple[str, ...]:
 
 
 def _gap(gap: RecordGap) -> str:
-    where = gap.path or "between two poses"
+    place = gap.path or "between two poses"
     left_out = "; this reversal is not used" if gap.path.startswith("reversal") else ""
-    return f"{_length(gap.length_s)} at {rounded(gap.start_s / HOUR_S, 4)} h, {where}{left_out}"
+    return f"{_length(gap.length_s)} at {rounded(gap.start_s / HOUR_S, 4)} h, {place}{left_out}"
 
 
 def _hours(time: tuple[float, float] | None) -> str:

@@ -14,7 +14,7 @@ from calibrations.presentation.page import html
 from calibrations.presentation.report.parameters import estimate_cells
 from calibrations.presentation.report.report import model_facts
 from calibrations.presentation.views.still import gains
-from calibrations.text import capital, joined, probability, rounded
+from calibrations.text import capital, join_words, probability, rounded
 
 MISMATCH = (
     "Mismatch: rms difference between the spectrum and the model, relative to the scatter by chance. Other half: the "
@@ -105,7 +105,7 @@ def _summary(discovery: Discovery[NoiseFit]) -> str:
     start, end = discovery.start, discovery.end
     if discovery.steps:
         text += (
-            f"With {joined(discovery.causes)} the mismatch of the spectrum falls from "
+            f"With {join_words(discovery.causes)} the mismatch of the spectrum falls from "
             f"{rounded(start.pooled_excess)} to {rounded(end.pooled_excess)} times the scatter by chance, and that of "
             f"the Allan deviation from {_off(start)} to {_off(end)}."
         )
@@ -115,7 +115,7 @@ def _summary(discovery: Discovery[NoiseFit]) -> str:
 
 
 def _off(fit: NoiseFit) -> str:
-    return joined(f"{rounded(100 * value, 2)} % ({axis})" for axis, value in mismatch(fit).items())
+    return join_words(f"{rounded(100 * value, 2)} % ({axis})" for axis, value in mismatch(fit).items())
 
 
 def _figures(discovery: Discovery[NoiseFit]) -> list[tuple[str, str, str]]:
@@ -128,8 +128,8 @@ def _figures(discovery: Discovery[NoiseFit]) -> list[tuple[str, str, str]]:
     return figures
 
 
-def _step(name: str, gained: float | None, alone: float | None, fit: NoiseFit) -> tuple[str, ...]:
-    likelihoods = ("–" if value is None else rounded(value) for value in (gained, alone))
+def _step(name: str, gained: float | None, loss: float | None, fit: NoiseFit) -> tuple[str, ...]:
+    likelihoods = ("–" if value is None else rounded(value) for value in (gained, loss))
     return name, *likelihoods, rounded(fit.pooled_excess), rounded(fit.held_out_excess), _off(fit)
 
 

@@ -116,8 +116,8 @@ class RowsView(View[Fit]):
         return steps_album(discovery)
 
 
-def _fall(before: float, after: float) -> str:
-    return f"{rounded(before)} → {rounded(after)} × the noise floor"
+def _fall(error_before: float, error_after: float) -> str:
+    return f"{rounded(error_before)} → {rounded(error_after)} × the noise floor"
 
 
 def _bar(fit: Fit, first: Fit) -> str:

@@ -41,9 +41,9 @@ class StillView(View[NoiseFit]):
 
     def facts(self, candidate: Candidate, diagnosis: Diagnosis[NoiseFit]) -> dict[str, str]:
         """Mismatch of the spectrum, and the gain in log-likelihood."""
-        before, held_out = diagnosis.excess_before, diagnosis.held_out_before
+        excess_before, held_out = diagnosis.excess_before, diagnosis.held_out_before
         return {
-            "Mismatch of the spectrum": f"{rounded(before)} → {rounded(candidate.excess_after)} × chance",
+            "Mismatch of the spectrum": f"{rounded(excess_before)} → {rounded(candidate.excess_after)} × chance",
             "On the other half": f"{rounded(held_out)} → {rounded(candidate.held_out_after)} × chance",
             "Log-likelihood": f"+{rounded(candidate.gain / 2)}",
         }
@@ -74,9 +74,9 @@ class StillView(View[NoiseFit]):
 
     def step_table(self, discovery: Discovery[NoiseFit]) -> Cells:
         """Gains that add up, and the mismatch after each step."""
-        chosen = [k for k in range(len(HEAD)) if k != LOST or len(discovery.steps) > 1]
+        column_numbers = [k for k in range(len(HEAD)) if k != LOST or len(discovery.steps) > 1]
         rows = (_row(*row) for row in gains(discovery))
-        return tuple(HEAD[k] for k in chosen), [tuple(row[k] for k in chosen) for row in rows]
+        return tuple(HEAD[k] for k in column_numbers), [tuple(row[k] for k in column_numbers) for row in rows]
 
     def candidate_table(self, diagnosis: Diagnosis[NoiseFit], candidates: Sequence[Candidate]) -> Cells:
         """Held-out mismatch, gain, chance and probability of each candidate."""
@@ -135,8 +135,8 @@ def gains(discovery: Discovery[NoiseFit]) -> Iterator[tuple[str, float | None, f
         yield f"+ {step.name}", step.after.log_likelihood - step.before.log_likelihood, step.alone, step.after
 
 
-def _row(name: str, gained: float | None, alone: float | None, fit: NoiseFit) -> tuple[str, ...]:
+def _row(name: str, gained: float | None, loss: float | None, fit: NoiseFit) -> tuple[str, ...]:
     """In the order of HEAD."""
     off = ", ".join(f"{100 * value:.3g} %" for value in mismatch(fit).values())
-    texts = ["" if value is None else f"{value:+.5g}" for value in (gained, None if alone is None else -alone)]
+    texts = ["" if value is None else f"{value:+.5g}" for value in (gained, None if loss is None else -loss)]
     return name, *texts, f"{fit.pooled_excess:.2f}", f"{fit.held_out_excess:.2f}", off

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from calibrations.fleet.batch import BatchEffect, Population, SensorVerdict
-from calibrations.text import columns, concise, concise_in_prefix, joined, percent
+from calibrations.text import columns, concise, concise_in_prefix, join_words, percent
 from rig.cli.terminal.complete import complete_model
 from rig.cli.terminal.output import FOLDER, bench_option, emit, json_option, note, out_option, require_outputs
 from rig.fleet.calibrate import Calibrated, Calibration
@@ -180,7 +180,7 @@ def _shared(effects: Iterable[BatchEffect]) -> str:
 
 def _with_rivals(name: str, rivals: Iterable[str]) -> str:
     rival_names = list(rivals)
-    return f"{name} (or {joined(rival_names)})" if rival_names else name
+    return f"{name} (or {join_words(rival_names)})" if rival_names else name
 
 
 def _shares(shares: Mapping[str, float], shared: set[str]) -> str:
@@ -200,7 +200,7 @@ def _rigs(result: Population) -> Iterator[str]:
         yield "All sensors were measured on one rig: an error of its stages looks like an error of all sensors."
     elif len(result.unconnected) > 1:
         yield ""
-        groups = "; ".join(joined(group) for group in result.unconnected)
+        groups = "; ".join(join_words(group) for group in result.unconnected)
         yield f"These groups of rigs cannot be compared, because no batch was measured on two of them: {groups}."
 
 

@@ -12,7 +12,7 @@ from calibrations.design.experiment import Experiment
 from calibrations.documents import discovery_document
 from calibrations.model.file import read_model
 from calibrations.table import Table
-from calibrations.text import duration, joined
+from calibrations.text import duration, join_words
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import Bench, read_bench
@@ -63,7 +63,7 @@ class Experiments:
         return joined_runs([m.part("poses") for m in measured], [begun(self.record, run) for run in self.runs])
 
     def _advise(self, interrupted: str) -> None:
-        note(f"The record has the measurements: {joined([*self.runs, interrupted])}.")
+        note(f"The record has the measurements: {join_words([*self.runs, interrupted])}.")
         note(f"To continue: rig resume {interrupted}, then rig discover {' '.join([*self.runs, interrupted])}")
 
 
@@ -148,7 +148,7 @@ def document(done: list[Measurement], standard_s: float, out: Path | None) -> di
 def _end(done: list[Measurement], live: Live, standard_s: float, out: Path | None) -> str:
     """Verdict, causes, model, and the rig time compared with that of the standard sweep."""
     discovered, used_s = done[-1].found, done[-1].used_s
-    data = f"{discovered.end.table.n} poses of {joined(m.run for m in done)}"
+    data = f"{discovered.end.table.n} poses of {join_words(m.run for m in done)}"
     time = f"Rig time {duration(used_s)}; the standard sweep takes {duration(standard_s)}."
     again = f"To repeat the analysis: rig discover {' '.join(m.run for m in done)}"
     parts = [

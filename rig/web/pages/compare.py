@@ -16,7 +16,7 @@ from calibrations.noise.fit import NoiseFit
 from calibrations.presentation.chart import Chart
 from calibrations.presentation.charts.noise import scaled, units
 from calibrations.presentation.interactive import figure, height_px
-from calibrations.presentation.residual import Shown, choices, first_choices, residual_units
+from calibrations.presentation.residual import ChannelResidual, choices, first_choices, residual_units
 from calibrations.text import estimate_in_prefix, rounded
 from rig.record import Record
 from rig.services.charts import deviations, difference, differences, residuals
@@ -92,7 +92,7 @@ def _of_rows(first: Fit, second: Fit) -> Comparison:
     x, _ = first_choices([name for name in columns if name in second_choices], first.table)
 
     def draw(c: int, in_sensed: bool) -> Sequence[Chart]:
-        one, other = Shown(first, c, in_sensed), Shown(second, c, in_sensed)
+        one, other = ChannelResidual(first, c, in_sensed), ChannelResidual(second, c, in_sensed)
         made = [residuals(one, other, columns[x], second_choices[x])]
         return made if shared is None else [*made, difference(one, shared)]
 

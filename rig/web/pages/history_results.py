@@ -13,7 +13,7 @@ from starlette.datastructures import QueryParams
 
 from calibrations.analyses.stability import YEAR_DAYS
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
-from calibrations.presentation.chart import Chart, Panel, one
+from calibrations.presentation.chart import Chart, Panel, single_chart
 from calibrations.presentation.charts.history import CONTROL_LEGENDS, control_panels, life
 from calibrations.text import estimate_in_prefix, estimate_text, minus, rounded, unit
 from rig.errors import RigError
@@ -232,7 +232,7 @@ class HistoryPictures:
 
 def bare(panel: Panel) -> Chart:
     """The panel without its title, which the page shows above the picture."""
-    return one(replace(panel, title="", remark=""))
+    return single_chart(replace(panel, title="", remark=""))
 
 
 def _legend(q: Quantity) -> str:

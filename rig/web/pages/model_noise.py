@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from nicegui import ui
 
 from calibrations.noise.comparison import compared_deviations
-from calibrations.presentation.chart import one
+from calibrations.presentation.chart import single_chart
 from calibrations.presentation.charts.noise import (
-    Drawn,
+    ModelCurve,
     allan,
     candidate,
     ratio,
@@ -96,7 +96,7 @@ class NoisePictures:
         channel = self.compared.fit.channels[c]
         curve = compared_deviations(self.compared.fit)[channel.channel.axis]
         into = scaled(still, channel.channel.axis, bool(self.unit.value))
-        models = [Drawn(channel, "model")]
+        models = [ModelCurve(channel, "model")]
         if self.step is not None:
             models.append(candidate(self.step.after.channels[c], self.step.name))
         panels = {
@@ -106,7 +106,7 @@ class NoisePictures:
             "record": record(channel.channel, into),
         }
         for name, panel in panels.items():
-            draw(self.plots[name], one(panel), f"{name} {channel.channel.axis} {into.unit}")
+            draw(self.plots[name], single_chart(panel), f"{name} {channel.channel.axis} {into.unit}")
         draw(self.plots["waterfall"], steps_chart(self.session.start, self.session.steps), "waterfall", False)
 
     def next_axis(self) -> None:

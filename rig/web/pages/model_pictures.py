@@ -12,12 +12,12 @@ from nicegui import events, ui
 
 from calibrations.discovery.places import rows_at
 from calibrations.fitting.sensed import axis_of
-from calibrations.presentation.chart import one
+from calibrations.presentation.chart import single_chart
 from calibrations.presentation.charts import motion
 from calibrations.presentation.charts.discovery import levels, waterfall
 from calibrations.presentation.charts.fit import failure, is_function, measurement, most_telling, residual
 from calibrations.presentation.interactive import figure
-from calibrations.presentation.residual import Column, Shown, choices, first_choices, residual_units
+from calibrations.presentation.residual import ChannelResidual, Column, choices, first_choices, residual_units
 from rig.web.parts import box, div, redraw, words
 from rig.web.pictures import downloads, draw, empty_plot, remember
 
@@ -156,10 +156,10 @@ class Pictures:
         return int(self.axis.value or 0)
 
     @property
-    def shown(self) -> Shown:
+    def shown(self) -> ChannelResidual:
         """The drawn rows."""
         assert self.fit is not None  # noqa: S101 nothing is drawn before there is a fit
-        return Shown(self.fit, min(self.c, len(self.fit.channels) - 1), bool(self.unit.value))
+        return ChannelResidual(self.fit, min(self.c, len(self.fit.channels) - 1), bool(self.unit.value))
 
     def draw(self) -> None:
         """Draw all pictures again."""
@@ -181,15 +181,15 @@ class Pictures:
         for name, panel in panels.items():
             linked = not moving or name == "residual"
             keep = f"{panel.x.label} {panel.y.label}"
-            drawn = figure(one(replace(panel, title="", second=None)), keep, "select" if linked else "zoom")
+            drawn = figure(single_chart(replace(panel, title="", second=None)), keep, "select" if linked else "zoom")
             if linked and self.selected:
                 drawn["data"][_dots(drawn)]["selectedpoints"] = self.selected
-            remember(self.plots[name], one(panel))
+            remember(self.plots[name], single_chart(panel))
             redraw(self.plots[name], drawn)
         draw(self.plots["waterfall"], waterfall(levels(session)), "waterfall", False)
         self._tell(shown)
 
-    def _legends(self, shown: Shown, plain: Column) -> None:
+    def _legends(self, shown: ChannelResidual, plain: Column) -> None:
         """Say what marks, lines and bands mean."""
         kind = shown.fit.table.type
         sides = "; filled clockwise, open anticlockwise" if np.any(shown.side) else ""
@@ -247,7 +247,7 @@ class Pictures:
         self._tell(self.shown)
         self.selects()
 
-    def _tell(self, shown: Shown) -> None:
+    def _tell(self, shown: ChannelResidual) -> None:
         """Show the selection, a remark on thinned points, or a hint."""
         self.clear.set_visibility(bool(self.selected))
         self.leave.set_visibility(bool(self.selected) and self.leave_out is not None)

@@ -12,7 +12,7 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from calibrations.presentation.interactive import figure
-from calibrations.text import joined
+from calibrations.text import join_words
 from rig.errors import RecordError
 from rig.record import Event, Record, Run
 from rig.record.tables import units_of
@@ -60,7 +60,7 @@ def left_out(data: str) -> dict[int, str]:
 
 def ask(data: str, numbers: Sequence[int], done: Callable[[], None]) -> None:
     """Ask for a reason, exclude the poses, and call `done`."""
-    named = joined([str(number) for number in numbers[:MOST_NAMED]])
+    named = join_words([str(number) for number in numbers[:MOST_NAMED]])
     more = f" and {len(numbers) - MOST_NAMED} more" if len(numbers) > MOST_NAMED else ""
     with named_dialog("Exclude poses") as dialog, ui.card().style("min-width: 420px"):
         words(f"Exclude pose {named}{more}" if len(numbers) == 1 else f"Exclude poses {named}{more}", "title")
