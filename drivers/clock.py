@@ -118,7 +118,7 @@ class SimulatedClock:
 
     def wait_readable(self, wire: Wire, timeout_s: float) -> bool:
         deadline = self._now_s + max(0.0, timeout_s)
-        started = time.monotonic()
+        start_s = time.monotonic()
         self._bases.setdefault(wire, self._progress(wire))
         while True:
             step(self._peers, self._now_s)
@@ -127,7 +127,7 @@ class SimulatedClock:
                 if self._arrived(wire, inbound):
                     return True
             elif outbound > 0:
-                self._wait_for_peers(wire, started)
+                self._wait_for_peers(wire, start_s)
             elif self._now_s >= deadline:
                 return False
             else:
@@ -155,13 +155,13 @@ class SimulatedClock:
         window before something is read. Of a connection that has ended nothing is to come. False if the kernel has
         dropped all of it, which is counted no longer.
         """
-        begun = grown = time.monotonic()
+        begun = growth_s = time.monotonic()
         pending = 0
         while count > 0 and (now_pending := _pending(wire.fileno())) < (count if count <= wire.chunk else 1):
             time.sleep(0)
             if now_pending != pending:
-                pending, grown = now_pending, time.monotonic()
-            if pending and not wire.lossy and time.monotonic() - grown > FULL_S:
+                pending, growth_s = now_pending, time.monotonic()
+            if pending and not wire.lossy and time.monotonic() - growth_s > FULL_S:
                 return True
             waited_s = time.monotonic() - begun
             if waited_s > DROPPED_S and wire.lossy:
@@ -171,9 +171,9 @@ class SimulatedClock:
                 raise ClockStuck(f"{wire.key}: the simulated answer did not arrive", "Report this defect")
         return True
 
-    def _wait_for_peers(self, wire: Wire, started: float) -> None:
+    def _wait_for_peers(self, wire: Wire, start_s: float) -> None:
         _readable(list(_filenos(self._peers)), 0.1)
-        if time.monotonic() - started > STUCK_S:
+        if time.monotonic() - start_s > STUCK_S:
             raise ClockStuck(f"{wire.key}: no simulated instrument took the request", "Attach it to the clock")
 
 
@@ -191,13 +191,15 @@ def step(peers: Sequence[Peer], now_s: float) -> None:
         peer.emit(now_s)
 
 
-def serve_forever(peers: Sequence[Peer], until: Callable[[], bool] = lambda: False, clock: Clock | None = None) -> None:
+def serve_forever(
+    peers: Sequence[Peer], is_over: Callable[[], bool] = lambda: False, clock: Clock | None = None
+) -> None:
     """Serve any client in real time until `until()`; the same servers that a simulated clock pumps.
 
     `clock` starts where the servers' world stands; by default at 0.
     """
     clock = clock or WallClock()
-    while not until():
+    while not is_over():
         due = min(peer.due_s() for peer in peers) - clock.now()
         _readable(list(_filenos(peers)), min(max(0.0, due), TICK_S))
         step(peers, clock.now())

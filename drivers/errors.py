@@ -117,14 +117,14 @@ class ClockStuck(DriverError):
     """Bytes in flight to or from a simulated instrument did not arrive within a bound in real time."""
 
 
-def did_you_mean(name: object, known: Iterable[str], unlisted: Iterable[str] = ()) -> str:
+def did_you_mean(name: object, known_names: Iterable[str], unlisted: Iterable[str] = ()) -> str:
     """The end of a message about an unknown `name`, after a space: the most similar name, else all that are known.
 
     `unlisted`: names of another kind, which are only suggested.
     """
     import difflib
 
-    choices = sorted(known)
+    choices = sorted(known_names)
     if similar := difflib.get_close_matches(str(name), [*choices, *unlisted], n=1, cutoff=0.5):
         return f" Did you mean {similar[0]!r}?"
     return f" There are: {', '.join(choices)}." if choices else ""

@@ -71,8 +71,8 @@ class HasAlarm(Protocol):
 
 def require_positive(settings: object, *names: str) -> None:
     """Raises ValueError with the names of the settings that are not positive and finite."""
-    if wrong := [name for name in names if not 0 < getattr(settings, name) < math.inf]:
-        raise ValueError(f"{', '.join(wrong)} must be positive")
+    if wrong_names := [name for name in names if not 0 < getattr(settings, name) < math.inf]:
+        raise ValueError(f"{', '.join(wrong_names)} must be positive")
 
 
 def require_range(settings: object, name: str) -> None:
@@ -83,10 +83,10 @@ def require_range(settings: object, name: str) -> None:
 
 
 def require_within(
-    what: str, value: float, limits: tuple[float, float], unit: str, remedy: str, effect: str = "nothing was sent"
+    subject: str, value: float, limits: tuple[float, float], unit: str, remedy: str, effect: str = "nothing was sent"
 ) -> None:
     """Raises LimitError for a `value` outside its limits; NaN is outside as well."""
     low, high = limits
     if not low <= value <= high:
-        outside = f"{value:g} {unit} is outside its limits {low:g} .. {high:g} {unit}"
-        raise LimitError(f"{what}{outside}; {effect}", remedy)
+        limits_text = f"{value:g} {unit} is outside its limits {low:g} .. {high:g} {unit}"
+        raise LimitError(f"{subject}{limits_text}; {effect}", remedy)

@@ -87,13 +87,13 @@ class Curve:
         if not off.size:
             return
         worst = float(volts.ravel()[off[0]])
-        where = f"reading {off[0]} of {volts.size}" if volts.size > 1 else "the reading"
+        place = f"reading {off[0]} of {volts.size}" if volts.size > 1 else "the reading"
         curve = f"the {side} side of the calibration curve of {self.date}"
-        what = f"D63 {self.serial}: {where}, {worst:.4f} V, is outside {curve}"
+        subject = f"D63 {self.serial}: {place}, {worst:.4f} V, is outside {curve}"
         if worst > high:
-            raise SensorFault(f"{what}: above {high:g} V it is on the optical peak", REMEDIES[side])
+            raise SensorFault(f"{subject}: above {high:g} V it is on the optical peak", REMEDIES[side])
         raise SensorFault(
-            f"{what}: {low:g} .. {high:g} V", "Check lamp, cable and target, then the distance of the tip"
+            f"{subject}: {low:g} .. {high:g} V", "Check lamp, cable and target, then the distance of the tip"
         )
 
 
@@ -107,13 +107,13 @@ def _points(side: str, values: Any) -> tuple[tuple[float, float], ...]:
         raise ValueError(f"{side}: must be a list of pairs [gap in um, output in V]") from None
 
 
-def _require_curve(what: str, points: tuple[tuple[float, float], ...], *, rising: bool) -> None:
+def _require_curve(subject: str, points: tuple[tuple[float, float], ...], *, rising: bool) -> None:
     """Points that are enough, finite, in order of the gap, and always rising or always falling."""
     steps = np.diff(np.array(points, dtype=np.float64).reshape(-1, 2), axis=0)
     if len(points) < FEWEST_POINTS:
-        raise ValueError(f"{what}: needs {FEWEST_POINTS} points or more, has {len(points)}")
-    wrong = ~((steps[:, 0] > 0) & (steps[:, 1] * (1 if rising else -1) > 0))  # NaN is wrong as well
-    if wrong.any():
-        k = int(np.flatnonzero(wrong)[0])
+        raise ValueError(f"{subject}: needs {FEWEST_POINTS} points or more, has {len(points)}")
+    is_wrong = ~((steps[:, 0] > 0) & (steps[:, 1] * (1 if rising else -1) > 0))  # NaN is wrong as well
+    if is_wrong.any():
+        k = int(np.flatnonzero(is_wrong)[0])
         goes = "rise" if rising else "fall"
-        raise ValueError(f"{what}: from {points[k]} to {points[k + 1]} the gap must grow and the output {goes}")
+        raise ValueError(f"{subject}: from {points[k]} to {points[k + 1]} the gap must grow and the output {goes}")

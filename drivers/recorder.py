@@ -53,18 +53,20 @@ class Inputs(Generic[Input]):
 
         Raises LimitError for an output that no input is wired to.
         """
-        if missing := [each for each in outputs if each not in {key.rpartition(".")[2] for key in self.wired}]:
+        if missing := [
+            name_asked for name_asked in outputs if name_asked not in {key.rpartition(".")[2] for key in self.wired}
+        ]:
             raise LimitError(
                 f"{name}: no input is wired to {', '.join(missing)}; there are {', '.join(self.wired)}",
                 "Name the inputs in the bench file, under channels or on_request of the converter's settings",
             )
-        chosen = {each: k for each, k in self.wired.items() if each.rpartition(".")[2] in outputs}
-        return replace(self, channels=chosen, on_request={})
+        channels = {name_asked: k for name_asked, k in self.wired.items() if name_asked.rpartition(".")[2] in outputs}
+        return replace(self, channels=channels, on_request={})
 
     def require_different_names(self) -> None:
         """Raises ValueError for a name that is both a channel and on request."""
-        if twice := self.channels.keys() & self.on_request.keys():
-            raise ValueError(f"{', '.join(sorted(twice))} is a channel already; remove it from on_request")
+        if duplicates := self.channels.keys() & self.on_request.keys():
+            raise ValueError(f"{', '.join(sorted(duplicates))} is a channel already; remove it from on_request")
 
 
 class NoDigitalLines:
@@ -107,9 +109,9 @@ class Recorder(Generic[Settings]):
 
     def only(self, *outputs: str) -> Self:
         """The same device with these channels and no others. Raises LimitError for one that is not there."""
-        chosen = copy(self)
-        chosen.settings = self.settings.only(self.name, outputs)
-        return chosen
+        device = copy(self)
+        device.settings = self.settings.only(self.name, outputs)
+        return device
 
     def scans(self, duration_s: float) -> int:
         """The number of whole scans in a time, at least 1."""
@@ -128,9 +130,9 @@ class Recorder(Generic[Settings]):
         """The same, and what `reading` gives in the middle of it, while the device records on."""
         with contextlib.closing(self.stream(duration_s, duration_s / 2)) as stream:
             blocks = [next(stream)]
-            read = reading()
+            value = reading()
             blocks += stream
-        return _joined(blocks), read
+        return _join(blocks), value
 
     def acquire_watched(self, duration_s: float, watch: Callable[[], object], every_s: float) -> Samples:
         """The same as `acquire`; `watch` is called about every `every_s`, and at the end. What it raises ends it."""
@@ -139,10 +141,10 @@ class Recorder(Generic[Settings]):
             for block in stream:
                 watch()
                 blocks.append(block)
-        return _joined(blocks)
+        return _join(blocks)
 
 
-def _joined(blocks: Sequence[Samples]) -> Samples:
+def _join(blocks: Sequence[Samples]) -> Samples:
     first = blocks[0]
     volts = np.concatenate([block.volts for block in blocks])
     reported = [block.temperature_c for block in blocks if block.temperature_c is not None]

@@ -45,13 +45,13 @@ class Found:
         places = np.minimum(self.starts[:, None] + np.arange(count), len(self.data) - 1)
         return np.asarray(self.data[places], dtype=np.int64)
 
-    def parts(self, chosen: Ints, first: int, count: Ints, size: int) -> Bytes:
+    def parts(self, frame_numbers: Ints, first: int, count: Ints, size: int) -> Bytes:
         """From byte `first`, `count` bytes of each chosen frame, with zeros up to `size`: shape (n, size)."""
-        out = np.zeros((len(chosen), size), dtype=np.uint8)
+        rows = np.zeros((len(frame_numbers), size), dtype=np.uint8)
         for n, of in groups(count):
             used = min(n, size)
-            out[of, :used] = self.data[self.starts[chosen[of], None] + first + np.arange(used)]
-        return out
+            rows[of, :used] = self.data[self.starts[frame_numbers[of], None] + first + np.arange(used)]
+        return rows
 
 
 def groups(values: Ints) -> Iterator[tuple[int, Any]]:
@@ -85,13 +85,13 @@ class Frames:
         array = np.frombuffer(text, dtype=np.uint8)
         self.unread += len(data)
         frames: list[tuple[Ints, ...]] = []
-        at, whole = 0, False
-        while not whole:
+        at, is_complete = 0, False
+        while not is_complete:
             starts, lengths, gaps, end, gap = self._walk(text, array, at)
             verdicts = self._judged(array, starts, lengths)
             n = self._accepted(gaps, verdicts)
             frames.append((starts[:n], lengths[:n], verdicts[:n]))
-            if whole := n == len(starts):
+            if is_complete := n == len(starts):
                 self.rest = text[end:]
                 self._inside = self._inside and not self._missed(gap)
             else:
@@ -100,8 +100,8 @@ class Frames:
                 self._inside = self._inside and not self._missed(True)
                 at = int(starts[n]) + 1
         starts, lengths, verdicts = (np.concatenate(column) for column in zip(*frames, strict=True))
-        if len(good := np.flatnonzero(verdicts == GOOD)):
-            self.unread = len(text) - int(starts[good[-1]] + lengths[good[-1]])
+        if len(good_frames := np.flatnonzero(verdicts == GOOD)):
+            self.unread = len(text) - int(starts[good_frames[-1]] + lengths[good_frames[-1]])
         return Found(array, starts, lengths, verdicts == GOOD)
 
     def _walk(self, text: bytes, array: Bytes, at: int) -> tuple[Ints, Ints, NDArray[np.bool_], int, bool]:
@@ -136,8 +136,8 @@ class Frames:
         """The number of frames before a damaged one. A frame of an unknown kind must follow a good one at once."""
         trusted = ~gaps
         trusted[:1] &= self._inside
-        wrong = (verdicts == BAD) | ((verdicts == UNKNOWN) & ~trusted)
-        n = int(np.argmax(wrong)) if wrong.any() else len(verdicts)
+        is_wrong = (verdicts == BAD) | ((verdicts == UNKNOWN) & ~trusted)
+        n = int(np.argmax(is_wrong)) if is_wrong.any() else len(verdicts)
         if n:
             self.damaged += int(gaps[1:n].sum()) + int(gaps[0] and self._inside)
             self.good += int((verdicts[:n] == GOOD).sum())
@@ -177,5 +177,5 @@ def _alike(array: Bytes, length: int, head: int) -> int:
     rows = array[: len(array) // length * length].reshape(-1, length)
     if not len(rows):
         return 0
-    same = (rows[:, :head] == rows[0, :head]).all(axis=1)
-    return len(rows) if same.all() else int(np.argmin(same))
+    is_equal = (rows[:, :head] == rows[0, :head]).all(axis=1)
+    return len(rows) if is_equal.all() else int(np.argmin(is_equal))

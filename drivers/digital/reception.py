@@ -73,9 +73,9 @@ class Numbers:
         self._last = int(numbers[-1])
         missing = np.diff(np.concatenate([[last], numbers])) % self.modulus - 1
         total = self._missing + np.cumsum(np.maximum(missing, 0))
-        before = np.diff(np.concatenate([[0], total[samples]]))
+        missing_before = np.diff(np.concatenate([[0], total[samples]]))
         self._missing = int(total[-1] - (total[samples[-1]] if len(samples) else 0))
-        return np.asarray(np.where(missing[samples] < 0, -1, before))
+        return np.asarray(np.where(missing[samples] < 0, -1, missing_before))
 
 
 @dataclass
@@ -93,9 +93,9 @@ class Thermometer:
 
     def take(self, warm_c: Floats, now_s: float) -> None:
         """Add reports that arrived by `now_s`."""
-        if len(known := warm_c[np.isfinite(warm_c)]):
-            self.last_c, self.last_s = float(known[-1]), now_s
-            self._new.append(known)
+        if len(finite_c := warm_c[np.isfinite(warm_c)]):
+            self.last_c, self.last_s = float(finite_c[-1]), now_s
+            self._new.append(finite_c)
 
     def forget(self) -> None:
         """Begin a record: earlier reports are not a part of its mean."""
@@ -199,9 +199,9 @@ class Reception:
         """Samples lost. A time of low resolution only says that a missing message may be a sample."""
         if gaps is not None and self.numbered:
             return int(gaps.sum())
-        late = np.maximum(np.rint(steps * self.base.unit_s * self.rate_hz) - 1, 0).astype(np.int64)
+        missing_by_time = np.maximum(np.rint(steps * self.base.unit_s * self.rate_hz) - 1, 0).astype(np.int64)
         fine = FINE * self.base.unit_s * self.rate_hz < 1.001
-        return int((late if gaps is None or fine else np.minimum(late, gaps)).sum())
+        return int((missing_by_time if gaps is None or fine else np.minimum(missing_by_time, gaps)).sum())
 
     def _keep(self, values: Floats, now_s: float, timed: bool) -> None:
         if not len(values):

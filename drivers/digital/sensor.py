@@ -111,9 +111,9 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
             return [Check(self.carrier, False, f"{fault}"), *self._advice(decoder, begun_s)]
         rate_hz = reception.measured_rate_hz
         fits = abs(rate_hz / self.settings.rate_hz - 1) < RATE_OFF
-        shown = f"{rate_hz:.4g} samples a second; rate_hz is {self.settings.rate_hz:g}"
+        rate_text = f"{rate_hz:.4g} samples a second; rate_hz is {self.settings.rate_hz:g}"
         state = f"{decoder.damaged} damaged, {reception.lost} samples lost, {reception.doubled} doubled"
-        checks = [Check(self.carrier, True, f"{self._content(decoder)}; {state}"), Check("rate", fits, shown)]
+        checks = [Check(self.carrier, True, f"{self._content(decoder)}; {state}"), Check("rate", fits, rate_text)]
         tally = self._new_tally()
         tally.add(reception, decoder.damaged)
         if (gain := tally.gain) is not None:
@@ -187,8 +187,8 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
             if timeout_s < QUIET_S:
                 return Batch(np.empty((0, 0)))
             raise self._silence(timeout_s)
-        while more := self._link.read(0.0):  # a read has an end, and samples must not gather behind it
-            data += more
+        while next_bytes := self._link.read(0.0):  # a read has an end, and samples must not gather behind it
+            data += next_bytes
         batch = decoder.take(data)
         self._warmth.take(batch.warm_c, self._clock.now())
         if decoder.damaged > SHOWN + decoder.good or decoder.unread > self.longest:
@@ -202,11 +202,11 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
                 f"{self.name}: the sensor's time went back: the sensor restarted during the record",
                 "Check its supply and its cable; opening its port restarts some boards",
             )
-        lost = self._lost(reception, decoder)
-        if lost > self.settings.most_lost * (reception.count + lost) and lost > 1:
+        lost_samples = self._lost(reception, decoder)
+        if lost_samples > self.settings.most_lost * (reception.count + lost_samples) and lost_samples > 1:
             raise StreamError(
-                f"{self.name}: {lost} of {reception.count + lost} samples were lost ({decoder.damaged} damaged "
-                f"{self.carrier}, {reception.doubled} doubled samples)",
+                f"{self.name}: {lost_samples} of {reception.count + lost_samples} samples were lost "
+                f"({decoder.damaged} damaged {self.carrier}, {reception.doubled} doubled samples)",
                 "Lower the sensor's rate or raise the baud rate, and check the cable; or correct rate_hz",
             )
         rate_hz = reception.measured_rate_hz if reception.length_s > 1.0 else self.settings.rate_hz
@@ -228,9 +228,12 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
                 "Keep the sensor still, or set a wider range in it",
             )
         end = self.settings.range
-        if end is not None and (over := [n for k, n in enumerate(names) if n in FORCES and _most(values[:, k]) >= end]):
+        if end is not None and (
+            saturated := [n for k, n in enumerate(names) if n in FORCES and _most(values[:, k]) >= end]
+        ):
             raise OverRange(
-                f"{self.name}: {over[0]} reached the end of its range, {end:g} {self.settings.units[over[0]]}",
+                f"{self.name}: {saturated[0]} reached the end of its range, "
+                f"{end:g} {self.settings.units[saturated[0]]}",
                 "Keep the sensor still, set a wider range in it, or correct `range` in the bench file",
             )
         if stuck := self._stuck(values, names):
@@ -246,9 +249,9 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         still = np.ptp(values, axis=0) == 0
         if still.all():  # of a coarse sensor at rest; it says nothing
             return ""
-        for name, value, same in zip(names, values[0].tolist(), still.tolist(), strict=True):
-            before, count = self._equal.get(name, (value, 0))
-            self._equal[name] = (value, count * (before == value) + len(values)) if same else (value, 0)
+        for name, value, is_constant in zip(names, values[0].tolist(), still.tolist(), strict=True):
+            previous, count = self._equal.get(name, (value, 0))
+            self._equal[name] = (value, count * (previous == value) + len(values)) if is_constant else (value, 0)
         return next((name for name in names if self._equal[name][1] >= STUCK), "")
 
 
@@ -256,8 +259,9 @@ def _most(values: NDArray[np.float64]) -> float:
     return float(np.abs(values).max())
 
 
-def no_samples(name: str, url: str, timeout_s: float, what: str) -> LinkTimeout:
-    """The error for a link on which `what` does not arrive."""
+def no_samples(name: str, url: str, timeout_s: float, expected: str) -> LinkTimeout:
+    """The error for a link on which `expected` does not arrive."""
     return LinkTimeout(
-        f"{name}: no {what} came on {url} within {timeout_s:g} s", "Check power and cable, and that the sensor sends it"
+        f"{name}: no {expected} came on {url} within {timeout_s:g} s",
+        "Check power and cable, and that the sensor sends it",
     )

@@ -219,13 +219,13 @@ class FramedTwin(DigitalTwin):
             return message
         if self.faults.size("half-message", now_s) is not None:
             return message[: len(message) // 2]
-        wrong = self.faults.size("wrong-checksum", now_s) is not None
-        return message[:-1] + bytes([message[-1] ^ 0x55]) if wrong else message
+        is_corrupted = self.faults.size("wrong-checksum", now_s) is not None
+        return message[:-1] + bytes([message[-1] ^ 0x55]) if is_corrupted else message
 
 
 def talking_port(listen: str) -> Port:
     """A port for a sensor that sends without requests. The system buffers only little unread data."""
-    return Port(listen, held=HELD)
+    return Port(listen, capacity=HELD)
 
 
 def serve_sensors(

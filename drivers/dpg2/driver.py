@@ -78,7 +78,7 @@ class Level:
     def identify(self) -> Identity:
         """Version and serial number, as the level reports them. Raises LinkTimeout, BadFrame."""
         self._silence()
-        version, serial = self._ask(VERSION, NAMED, "version")
+        version, serial = self._query(VERSION, NAMED, "version")
         return Identity("MEAS DPG2", serial, version)
 
     def self_test(self) -> list[Check]:
@@ -87,8 +87,10 @@ class Level:
             reading = self.read()
         except InstrumentError as fault:
             return [Check("reading", False, fault.what)]
-        shown = f"x {reading.x_deg:+.3f}, y {reading.y_deg:+.3f} deg, standard deviation {reading.std_deg:.4f} deg"
-        return [Check("reading", True, shown)]
+        reading_text = (
+            f"x {reading.x_deg:+.3f}, y {reading.y_deg:+.3f} deg, standard deviation {reading.std_deg:.4f} deg"
+        )
+        return [Check("reading", True, reading_text)]
 
     def close(self) -> None:
         """Nothing to release: the wire belongs to the bench."""
@@ -102,10 +104,10 @@ class Level:
             LinkTimeout, BadFrame: it is silent, or what comes are no readings.
         """
         self._silence()
-        deadline, readings = self._clock.now() + self.settings.patience_s, [self._one()]
+        deadline, readings = self._clock.now() + self.settings.patience_s, [self._read_once()]
         while not self._settled(readings, deadline):
             self._clock.sleep(self.settings.interval_s)
-            readings.append(self._one())
+            readings.append(self._read_once())
         return self._mean(readings[-self.settings.readings :])
 
     def _mean(self, readings: list[tuple[float, float]]) -> Reading:
@@ -135,44 +137,46 @@ class Level:
             "Switch the level off and on; if the level has very low noise, increase `frozen` in the bench file",
         )
 
-    def _one(self) -> tuple[float, float]:
+    def _read_once(self) -> tuple[float, float]:
         """One reading. Raises InstrumentError beyond the range."""
-        shown = self._ask(ONE_READING, PAIR, "reading")
-        for axis, text in zip("xy", shown, strict=True):
+        texts = self._query(ONE_READING, PAIR, "reading")
+        for axis, text in zip("xy", texts, strict=True):
             if not text[-1].isdigit():
                 raise InstrumentError(
                     f"{self.name}: the {axis} axis is beyond its range of {self.settings.range_deg:g} deg ({text})",
                     "Turn alpha to 0, and check that the level lies flat on the table",
                 )
-        return float(shown[0]), float(shown[1])
+        return float(texts[0]), float(texts[1])
 
     def _silence(self) -> None:
         """Stop its output and discard it. The next answer shows whether the level received the command."""
         self._link.write(STOP)
         self._link.discard(QUIET_S)
 
-    def _ask(self, command: bytes, answer: re.Pattern[bytes], what: str) -> tuple[str, str]:
+    def _query(self, command: bytes, answer: re.Pattern[bytes], quantity: str) -> tuple[str, str]:
         """The two parts of the first whole `answer`. Raises LinkTimeout after silence, BadFrame after other bytes."""
-        heard = b""
+        received = b""
         for _ in range(ATTEMPTS):
             self._link.discard()  # a late answer, or output of a level that did not receive the stop
             self._link.write(command)
-            heard, match = self._listen(answer)
+            received, match = self._listen(answer)
             if match:
                 return match[1].decode(), match[2].decode()
-        where = f"{self.name}: asking for its {what} ({command.decode()}) on {self._link.url}"
-        if heard:
-            raise BadFrame(f"{where}: received {len(heard)} bytes that are not a reading ({heard[:24]!r})", REMEDY)
-        raise LinkTimeout(f"{where}: no answer within {TIMEOUT_S:g} s, {ATTEMPTS} times", REMEDY)
+        context = f"{self.name}: asking for its {quantity} ({command.decode()}) on {self._link.url}"
+        if received:
+            raise BadFrame(
+                f"{context}: received {len(received)} bytes that are not a reading ({received[:24]!r})", REMEDY
+            )
+        raise LinkTimeout(f"{context}: no answer within {TIMEOUT_S:g} s, {ATTEMPTS} times", REMEDY)
 
     def _listen(self, answer: re.Pattern[bytes]) -> tuple[bytes, re.Match[bytes] | None]:
         """The bytes received until the answer is complete or the time is over."""
-        heard, deadline = b"", self._clock.now() + TIMEOUT_S
-        while (left_s := deadline - self._clock.now()) > 0 and (more := self._link.read(left_s)):
-            heard += more
-            if match := answer.search(heard):
-                return heard, match
-        return heard, None
+        received, deadline = b"", self._clock.now() + TIMEOUT_S
+        while (left_s := deadline - self._clock.now()) > 0 and (next_bytes := self._link.read(left_s)):
+            received += next_bytes
+            if match := answer.search(received):
+                return received, match
+        return received, None
 
 
 def _std_deg(readings: list[tuple[float, float]]) -> float:

@@ -56,7 +56,7 @@ class Inclinometer(Twin):
             if listeners := [c for c in self._port.connections.values() if self._heard_all(c)]:
                 lines = self._reading(self._next_s)
                 for connection in listeners:
-                    self._say(connection, lines, self._next_s)
+                    self._send_lines(connection, lines, self._next_s)
             self._next_s += INTERVAL_S
 
     def due_s(self) -> float:
@@ -78,13 +78,13 @@ class Inclinometer(Twin):
         began_s = now_s + self._port.timing.character_s + THINKING_S
         if letter == STOP:
             self._running = self.faults.size("deaf", now_s) is not None
-            self._say(connection, [STOP], began_s)
+            self._send_lines(connection, [STOP], began_s)
         elif letter == START:
             self._running, self._next_s = True, began_s
         elif letter == ONE_READING and not self._running:
-            self._say(connection, self._reading(now_s), began_s)
+            self._send_lines(connection, self._reading(now_s), began_s)
         elif letter == VERSION and not self._running:
-            self._say(connection, WHO.splitlines(keepends=True), began_s)
+            self._send_lines(connection, WHO.splitlines(keepends=True), began_s)
 
     def _reading(self, t_s: float) -> list[bytes]:
         """Both lines at `t_s`, or as soon after it as the world still can."""
@@ -93,9 +93,9 @@ class Inclinometer(Twin):
         x_deg += self.faults.size("lies", t_s) or 0.0
         if self.faults.size("out-of-range", t_s) is not None:
             x_deg = 2 * self._range_deg
-        return [f"{axis}={self._shown(deg)}\r\n".encode() for axis, deg in (("X", x_deg), ("Y", y_deg))]
+        return [f"{axis}={self._display_text(deg)}\r\n".encode() for axis, deg in (("X", x_deg), ("Y", y_deg))]
 
-    def _shown(self, deg: float) -> str:
+    def _display_text(self, deg: float) -> str:
         return f"{deg:+07.3f}" if abs(deg) <= self._range_deg else 7 * "+-"[deg < 0]
 
     def _heard_all(self, connection: Connection) -> bool:
@@ -103,7 +103,7 @@ class Inclinometer(Twin):
         connection.emit(self._next_s)
         return not connection.is_behind(self._next_s)
 
-    def _say(self, connection: Connection, lines: list[bytes], began_s: float) -> None:
+    def _send_lines(self, connection: Connection, lines: list[bytes], began_s: float) -> None:
         """Send line by line, each when its last character is through."""
         for line in lines:
             began_s += len(line) * self._port.timing.character_s

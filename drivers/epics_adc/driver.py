@@ -75,8 +75,8 @@ class AnalogRecords(Recorder[Settings]):
         checks = []
         for channel, reading in self._scan().items():
             ok = not reading.is_worse_than(self.settings.highest_severity)
-            shown = f"{reading.value * self._volts[channel]:.4f} V"
-            checks.append(Check(channel, ok, shown if ok else f"{shown}, alarm {reading.alarm}"))
+            voltage_text = f"{reading.value * self._volts[channel]:.4f} V"
+            checks.append(Check(channel, ok, voltage_text if ok else f"{voltage_text}, alarm {reading.alarm}"))
         return checks
 
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
@@ -90,7 +90,7 @@ class AnalogRecords(Recorder[Settings]):
         start_s, fresh = self._clock.now(), Freshness(channels)
         for first in range(0, scans, block):
             last = min(first + block, scans)
-            volts = np.array([self._taken(scan, start_s, fresh) for scan in range(first, last)])
+            volts = np.array([self._volts_of_scan(scan, start_s, fresh) for scan in range(first, last)])
             self._require_fresh(fresh, last)
             yield Samples(volts, channels, rate_hz, start_s + first / rate_hz)
 
@@ -99,7 +99,7 @@ class AnalogRecords(Recorder[Settings]):
         channels = self.settings.channels
         return dict(zip(channels, self._records.read(*channels.values()), strict=True))
 
-    def _taken(self, scan: int, start_s: float, fresh: Freshness) -> NDArray[np.float64]:
+    def _volts_of_scan(self, scan: int, start_s: float, fresh: Freshness) -> NDArray[np.float64]:
         """The volts of a scan at its time, shape (channels,)."""
         period_s = 1 / self.settings.rate_hz
         due_s = start_s + scan * period_s
@@ -116,14 +116,14 @@ class AnalogRecords(Recorder[Settings]):
         return np.array([reading.value * self._volts[channel] for channel, reading in readings.items()])
 
     def _require_sound(self, channel: str, reading: Reading) -> None:
-        where = f"{self.name}: {channel} ({self._records.beginning}{self.settings.channels[channel]})"
+        context = f"{self.name}: {channel} ({self._records.beginning}{self.settings.channels[channel]})"
         if reading.is_worse_than(self.settings.highest_severity):
             raise SensorFault(
-                f"{where} has the alarm {reading.alarm}",
+                f"{context} has the alarm {reading.alarm}",
                 "Find its cause in the IOC; set highest_severity in the bench file if the rig shall go on with it",
             )
         if not np.isfinite(reading.value):
-            raise SensorFault(f"{where} is {reading.value:g}, which is no voltage", "Check the IOC and the converter")
+            raise SensorFault(f"{context} is {reading.value:g}, which is no voltage", "Check the IOC and the converter")
 
     def _require_fresh(self, fresh: Freshness, scans: int) -> None:
         """Raises StreamError for a record that the IOC processes less often than it is read."""

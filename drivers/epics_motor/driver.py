@@ -76,11 +76,11 @@ class MotorRecord:
             alarm = Check("alarm", False, error.what)
         mode, use = mr.MODES[int(state[mr.MODE].value)], not state[mr.SET].value
         low, high = self._own_limits_deg(state)
-        shown = f"{low:g} .. {high:g} deg" if math.isfinite(high) else "none"
+        limits_text = f"{low:g} .. {high:g} deg" if math.isfinite(high) else "none"
         return [
             alarm,
             Check("mode", mode == "Go" and use, f"{mode}, {'Use' if use else 'Set'}"),
-            Check("limits of the record", True, shown),
+            Check("limits of the record", True, limits_text),
             Check("position", True, f"{self._angle_deg(state):.4f} deg"),
         ]
 
@@ -103,7 +103,7 @@ class MotorRecord:
         if self.settings.home == "none":
             return
         self._records.written(mr.HOME[self.settings.home], 1.0)
-        self._until_done(HOMING_S, "has not found its home")
+        self._wait_until_done(HOMING_S, "has not found its home")
         if not self.referenced():
             raise StageLost(
                 f"{self.name}: has sought its home and is not homed (MSTA)",
@@ -131,10 +131,10 @@ class MotorRecord:
             return
         begun_s = self._clock.now()
         self._clock.sleep(self._expected_end_s - begun_s)
-        state = self._until_done(PATIENCE_S, "is still moving")
+        state = self._wait_until_done(PATIENCE_S, "is still moving")
         while not self._is_at_target(state) and self._clock.now() < begun_s + BEGIN_S:
             self._clock.sleep(POLL_S)  # the record may not have begun yet
-            state = self._until_done(PATIENCE_S, "is still moving")
+            state = self._wait_until_done(PATIENCE_S, "is still moving")
         self._require_movable(state)
         self._require_at_target(state, "Free the stage of what holds it, check the load's balance, then resume the run")
 
@@ -222,20 +222,20 @@ class MotorRecord:
         """Write a field that has another value, and read it back: the record keeps it within limits of its own."""
         if math.isclose(state[field].value, value, rel_tol=CLOSE):
             return
-        if not math.isclose(written := self._records.written(field, value), value, rel_tol=CLOSE):
+        if not math.isclose(read_back := self._records.written(field, value), value, rel_tol=CLOSE):
             raise Interlocked(
-                f"{self.name}: the record has not accepted {value:g} in {field.strip('.')}; it is {written:g}",
+                f"{self.name}: the record has not accepted {value:g} in {field.strip('.')}; it is {read_back:g}",
                 "Compare speed_deg_s and acceleration_deg_s2 in the bench file with the record's VBAS and VMAX",
             )
 
-    def _until_done(self, timeout_s: float, what: str) -> dict[str, Reading]:
+    def _wait_until_done(self, timeout_s: float, failure: str) -> dict[str, Reading]:
         """The state in which DMOV is 1. Raises NotSettled when it is not by then, StageAlarm."""
         deadline = self._clock.now() + timeout_s
         while not (state := self._read(*STATE))[mr.DONE].value:
             self._require_no_alarm(state)
             if self._clock.now() > deadline:
                 raise NotSettled(
-                    f"{self.name}: {what} {timeout_s:.0f} s after the end was due (DMOV is 0)",
+                    f"{self.name}: {failure} {timeout_s:.0f} s after the end was due (DMOV is 0)",
                     "Free the stage of what holds it; compare speed_deg_s in the bench file with the motor's",
                 )
             self._clock.sleep(POLL_S)
@@ -260,10 +260,10 @@ class MotorRecord:
         """Raises NotSettled where the readback is not at the target of the last move."""
         if self._is_at_target(state):
             return
-        why = " (its own limits have stopped it, LVIO)" if self._records.read(mr.LIMIT_VIOLATION)[0].value else ""
+        cause = " (its own limits have stopped it, LVIO)" if self._records.read(mr.LIMIT_VIOLATION)[0].value else ""
         raise NotSettled(
             f"{self.name}: is at {self._angle_deg(state):.3f} deg instead of {self._target_deg:.3f} deg, "
-            f"more than {self.settings.settle_deg:g} deg away{why}",
+            f"more than {self.settings.settle_deg:g} deg away{cause}",
             remedy,
         )
 
@@ -287,9 +287,11 @@ class MotorRecord:
     def _require_no_alarm(self, state: Mapping[str, Reading]) -> None:
         """Raises StageAlarm for an alarm of the record, or a fault in its status word."""
         status = int(state[mr.STATUS].value)
-        for bit, (what, remedy) in mr.FAULTY.items():
-            if status & bit:
-                raise StageAlarm(f"{self.name}: {what} (MSTA is {status:#x})", f"{remedy}; then resume the run", status)
+        for mask, (fault, remedy) in mr.FAULTY.items():
+            if status & mask:
+                raise StageAlarm(
+                    f"{self.name}: {fault} (MSTA is {status:#x})", f"{remedy}; then resume the run", status
+                )
         for switch in (mr.HIGH_SWITCH, mr.LOW_SWITCH):
             if state[switch].value:
                 raise StageAlarm(

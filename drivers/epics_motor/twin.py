@@ -62,8 +62,8 @@ class Motor(Twin):
 
     def advance(self, now_s: float) -> None:
         """Brake where something stops it. The world's time is not touched: the converter may still be sampling."""
-        for what in BRAKES:
-            if strike := self.faults.once(what, now_s):
+        for fault in BRAKES:
+            if strike := self.faults.once(fault, now_s):
                 self._brake(max(strike.at_s, self._plan.start_s))
 
     def state(self) -> dict[str, Any]:
@@ -101,12 +101,12 @@ class Motor(Twin):
         return name.removeprefix(self._name) or mr.TARGET
 
     def _value(self, field: str, now_s: float) -> float:
-        moving = now_s < self._plan.end_s or self.faults.size("busy", now_s) is not None
+        is_moving = now_s < self._plan.end_s or self.faults.size("busy", now_s) is not None
         computed = {
             mr.READBACK: self._angle_deg(),
-            mr.DONE: float(not moving),
+            mr.DONE: float(not is_moving),
             mr.HIGH_SWITCH: float(self.faults.size("limit-switch", now_s) is not None),
-            mr.STATUS: float(int(self.faults.size("status", now_s) or 0) | mr.HOMED * (self._homed and not moving)),
+            mr.STATUS: float(int(self.faults.size("status", now_s) or 0) | mr.HOMED * (self._homed and not is_moving)),
         }
         if field == mr.MODE and self.faults.size("stopped", now_s) is not None:
             return 0.0
@@ -116,8 +116,8 @@ class Motor(Twin):
         """Begin a move; one beyond the limits is not begun, which LVIO shows."""
         low, high = self._own[mr.LOW_LIMIT], self._own[mr.HIGH_LIMIT]
         self._own[mr.LIMIT_VIOLATION] = float(low < high and not low <= target_deg <= high)
-        held = any(self.faults.size(what, now_s) is not None for what in BRAKES)
-        if self._own[mr.LIMIT_VIOLATION] or held:
+        is_blocked = any(self.faults.size(fault, now_s) is not None for fault in BRAKES)
+        if self._own[mr.LIMIT_VIOLATION] or is_blocked:
             return
         self._own[mr.TARGET] = target_deg
         if self.faults.size("stuck", now_s) is None:

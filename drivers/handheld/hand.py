@@ -64,26 +64,26 @@ class Script:
     def __init__(self, hand: Hand, random: np.random.Generator, up: Floats) -> None:
         self._hand, self._random = hand, random
         self._wanted = up
-        self._table = _near(np.array([0.0, 0.0, 1.0]), hand.table_deg, random)
-        at = _plain(self._on_table(up))
+        self._table = _perturbed(np.array([0.0, 0.0, 1.0]), hand.table_deg, random)
+        at = _as_tuple(self._on_table(up))
         self.segments = [Segment(0.0, math.inf, at, at)]
 
     def turn_to(self, up: Floats, now_s: float) -> None:
         """Begin to turn the sensor until `up` (3,) is upward, after the reaction time."""
         self._wanted = np.asarray(up, dtype=float)
-        here = self.up(np.array([now_s]))[0]
-        done = [s for s in self.segments if s.start_s <= now_s and s.end_s > now_s - 1]
-        self.segments = [Segment(s.start_s, min(s.end_s, now_s), s.before, s.after, s.tremor, s.bumps) for s in done]
-        self._plan(here, now_s, self._hand.reaction_s)
+        direction = self.up(np.array([now_s]))[0]
+        recent = [s for s in self.segments if s.start_s <= now_s and s.end_s > now_s - 1]
+        self.segments = [Segment(s.start_s, min(s.end_s, now_s), s.before, s.after, s.tremor, s.bumps) for s in recent]
+        self._plan(direction, now_s, self._hand.reaction_s)
 
     def force_g(self, times_s: Floats) -> Floats:
         """Specific force in the frame of the sensor at rising times (n,), shape (n, 3)."""
         self._plan_until(float(times_s[-1]))
         force = np.empty((len(times_s), 3))
         for segment in self.segments:
-            mine = (times_s >= segment.start_s) & (times_s < segment.end_s)
-            if mine.any():
-                force[mine] = self._within(segment, times_s[mine])
+            in_segment = (times_s >= segment.start_s) & (times_s < segment.end_s)
+            if in_segment.any():
+                force[in_segment] = self._segment_force(segment, times_s[in_segment])
         return force
 
     def up(self, times_s: Floats) -> Floats:
@@ -91,8 +91,8 @@ class Script:
         self._plan_until(float(times_s[-1]))
         up = np.empty((len(times_s), 3))
         for segment in self.segments:
-            mine = (times_s >= segment.start_s) & (times_s < segment.end_s)
-            up[mine] = _turned(segment, times_s[mine])
+            in_segment = (times_s >= segment.start_s) & (times_s < segment.end_s)
+            up[in_segment] = _turned(segment, times_s[in_segment])
         return up
 
     def state(self) -> dict[str, Any]:
@@ -116,28 +116,28 @@ class Script:
             last = self.segments[-1]
             self._plan(np.array(last.after), last.end_s, 0.0)
 
-    def _plan(self, here: Floats, now_s: float, reaction_s: float) -> None:
+    def _plan(self, direction: Floats, now_s: float, reaction_s: float) -> None:
         """Pick the sensor up after `reaction_s`, turn it, put it down, let it go, and leave it for a while."""
         hand, random = self._hand, self._random
         chance, size = random.random(3), random.standard_normal(2)
         target = self._aimed(chance[0])
-        turn_s = math.degrees(_angle(here, target)) / hand.turning_deg_s + 0.5
-        self._add(now_s, reaction_s, here, here)
-        self._add(self._end(now_s), turn_s, here, target, 1.0)
+        turn_s = math.degrees(_angle(direction, target)) / hand.turning_deg_s + 0.5
+        self._add(now_s, reaction_s, direction, direction)
+        self._add(self._end(now_s), turn_s, direction, target, 1.0)
         clings_s = hand.clings_s * math.exp(0.3 * size[0]) if chance[1] < hand.clings else 0.0
         self._add(self._end(now_s), hand.letting_go_s + clings_s, target, target, 0.3)
         slips = chance[2] < hand.slips
         patience_s = hand.patience_s * math.exp(0.4 * size[1])
         self._add(self._end(now_s), 1.0 if slips else patience_s, target, target, 0.0, True)
         if slips:
-            slipped = _near(target, hand.slip_deg, random)
+            slipped = _perturbed(target, hand.slip_deg, random)
             self._add(self._end(now_s), SLIP_S, target, slipped)
             self._add(self._end(now_s), patience_s, slipped, slipped)
 
     def _add(
-        self, start_s: float, length_s: float, before: Floats, after: Floats, tremor: float = 0.0, bumps: bool = False
+        self, start_s: float, length_s: float, start: Floats, end: Floats, tremor: float = 0.0, bumps: bool = False
     ) -> None:
-        self.segments.append(Segment(start_s, start_s + length_s, _plain(before), _plain(after), tremor, bumps))
+        self.segments.append(Segment(start_s, start_s + length_s, _as_tuple(start), _as_tuple(end), tremor, bumps))
 
     def _end(self, now_s: float) -> float:
         return self.segments[-1].end_s if self.segments else now_s
@@ -152,11 +152,11 @@ class Script:
     def _on_table(self, direction: Floats) -> Floats:
         hand = self._hand
         leaning = np.abs(direction).max() < 0.99
-        placed = _near(direction, hand.aim_deg if leaning else hand.side_deg, self._random)
+        placed = _perturbed(direction, hand.aim_deg if leaning else hand.side_deg, self._random)
         tilt = self._table - np.array([0.0, 0.0, 1.0])
         return _unit(placed + np.roll(tilt, int(np.argmax(np.abs(direction))) + 1))
 
-    def _within(self, segment: Segment, times_s: Floats) -> Floats:
+    def _segment_force(self, segment: Segment, times_s: Floats) -> Floats:
         hand, force = self._hand, _turned(segment, times_s)
         if segment.tremor:
             swing = segment.tremor * np.sqrt(2 / len(TREMOR_HZ))
@@ -173,33 +173,33 @@ class Script:
 
 def _turned(segment: Segment, times_s: Floats) -> Floats:
     """Directions between both ends of a segment: along the great circle, slowly at both ends."""
-    before, after = np.array(segment.before), np.array(segment.after)
-    angle = _angle(before, after)
+    start, end = np.array(segment.before), np.array(segment.after)
+    angle = _angle(start, end)
     if angle < 1e-9:
-        return np.repeat(after[None], len(times_s), axis=0)
-    across = after - (after @ before) * before
+        return np.repeat(end[None], len(times_s), axis=0)
+    across = end - (end @ start) * start
     if np.linalg.norm(across) < 1e-6:  # upside down: over any side
-        across = np.cross(before, np.eye(3)[int(np.argmin(np.abs(before)))])
+        across = np.cross(start, np.eye(3)[int(np.argmin(np.abs(start)))])
     across = _unit(across)
     share = (times_s - segment.start_s) / (segment.end_s - segment.start_s)
     turned = angle * share**2 * (3 - 2 * share)
-    return np.asarray(np.outer(np.cos(turned), before) + np.outer(np.sin(turned), across))
+    return np.asarray(np.outer(np.cos(turned), start) + np.outer(np.sin(turned), across))
 
 
-def _near(direction: Floats, std_deg: float, random: np.random.Generator) -> Floats:
+def _perturbed(direction: Floats, std_deg: float, random: np.random.Generator) -> Floats:
     """A direction turned by a normal angle about two axes."""
     offset = math.radians(std_deg) * random.standard_normal(3)
     return _unit(direction + np.cross(offset, direction))
 
 
-def _angle(one: Floats, other: Floats) -> float:
-    return math.acos(min(1.0, max(-1.0, float(one @ other))))
+def _angle(first: Floats, second: Floats) -> float:
+    return math.acos(min(1.0, max(-1.0, float(first @ second))))
 
 
 def _unit(vector: Floats) -> Floats:
     return np.asarray(vector / np.linalg.norm(vector))
 
 
-def _plain(vector: Floats) -> tuple[float, float, float]:
+def _as_tuple(vector: Floats) -> tuple[float, float, float]:
     x, y, z = (float(part) for part in vector)
     return x, y, z

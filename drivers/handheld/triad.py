@@ -49,7 +49,7 @@ class Triad:
 
 def individual(triad: Triad, random: np.random.Generator) -> Triad:
     """One sensor drawn from the spread of its kind."""
-    drawn = random.standard_normal((3, 3))
+    deviations = random.standard_normal((3, 3))
     masses = [
         replace(
             mass,
@@ -57,7 +57,7 @@ def individual(triad: Triad, random: np.random.Generator) -> Triad:
             volts_per_g=mass.volts_per_g * (1 + triad.spread_gain * gain),
             leans_deg=mass.leans_deg + triad.spread_leans_deg * leans,
         )
-        for mass, (zero, gain, leans) in zip((triad.x, triad.y, triad.z), drawn, strict=True)
+        for mass, (zero, gain, leans) in zip((triad.x, triad.y, triad.z), deviations, strict=True)
     ]
     return replace(triad, x=masses[0], y=masses[1], z=masses[2])
 
@@ -96,10 +96,10 @@ def noise_v(
     """Noise of `n` samples (n, 3), and the new `memory` of the filter and the `wander`, each (3,)."""
     from scipy.signal import lfilter  # slow to import, and only a sensor in a hand needs it
 
-    kept = math.exp(-2 * math.pi * triad.filter_hz * interval_s)
-    fresh = triad.noise_v * math.sqrt(1 - kept**2) * random.standard_normal((n, 3))
-    white, _ = lfilter([1.0], [1.0, -kept], fresh, axis=0, zi=kept * memory[None, :])
+    decay = math.exp(-2 * math.pi * triad.filter_hz * interval_s)
+    fresh = triad.noise_v * math.sqrt(1 - decay**2) * random.standard_normal((n, 3))
+    white, _ = lfilter([1.0], [1.0, -decay], fresh, axis=0, zi=decay * memory[None, :])
     step_s = n * interval_s
     stays = math.exp(-step_s / triad.wander_s)
-    after = stays * wander + triad.wander_v * math.sqrt(1 - stays**2) * random.standard_normal(3)
-    return np.asarray(white + np.linspace(wander, after, n)), np.asarray(white[-1]), after
+    wander_after = stays * wander + triad.wander_v * math.sqrt(1 - stays**2) * random.standard_normal(3)
+    return np.asarray(white + np.linspace(wander, wander_after, n)), np.asarray(white[-1]), wander_after

@@ -14,7 +14,7 @@ import numpy as np
 
 from drivers.handheld.hand import Hand, Script
 from drivers.handheld.triad import Mass, Triad, individual, noise_v, steady_v
-from drivers.world.config import WorldConfig, changed
+from drivers.world.config import WorldConfig, changed_settings
 from drivers.world.digital import TRIMS, Trim
 from drivers.world.errors import BadSetting
 from drivers.world.kernel import Floats
@@ -38,12 +38,12 @@ def handheld(settings: Mapping[str, Any]) -> tuple[dict[str, Any], Handheld | No
 
     Raises UnknownSetting, BadSetting.
     """
-    rest = {key: value for key, value in settings.items() if key not in KEYS}
-    own = {key: value for key, value in settings.items() if key in KEYS}
-    for key, value in own.items():
+    other_settings = {key: value for key, value in settings.items() if key not in KEYS}
+    hand_settings = {key: value for key, value in settings.items() if key in KEYS}
+    for key, value in hand_settings.items():
         if not isinstance(value, Mapping):
             raise BadSetting(f"{key} of the simulated world is {value!r}", "Give a mapping; {} takes the defaults")
-    return rest, changed(Handheld(), own) if own else None
+    return other_settings, changed_settings(Handheld(), hand_settings) if hand_settings else None
 
 
 class HandheldWorld(World):
@@ -51,12 +51,15 @@ class HandheldWorld(World):
 
     trims = OWN_TRIMS
 
-    def __init__(self, config: WorldConfig, seed: int, held: Handheld) -> None:
+    def __init__(self, config: WorldConfig, seed: int, handheld_settings: Handheld) -> None:
         super().__init__(config, seed)
         self._hand_random, self._noise_random = (np.random.default_rng([seed, 7, k]) for k in range(2))
-        self.triad = individual(held.triad, self._hand_random)
-        self.script = Script(held.hand, self._hand_random, np.array([0.0, 0.0, 1.0]))
-        self._memory, self._wander = np.zeros(3), held.triad.wander_v * self._noise_random.standard_normal(3)
+        self.triad = individual(handheld_settings.triad, self._hand_random)
+        self.script = Script(handheld_settings.hand, self._hand_random, np.array([0.0, 0.0, 1.0]))
+        self._memory, self._wander = (
+            np.zeros(3),
+            handheld_settings.triad.wander_v * self._noise_random.standard_normal(3),
+        )
 
     def turn_by_hand(self, up: Sequence[float]) -> None:
         """Tell the hand which direction (3,) of the sensor's frame shall be upward."""
@@ -66,16 +69,16 @@ class HandheldWorld(World):
         self, inputs: Sequence[str], start_s: float, interval_s: float, n: int, places: Sequence[int] | None = None
     ) -> Floats:
         """As `World.adc_volts`, with the inputs of INPUTS too, all three sampled at the begin of a scan."""
-        held = [k for k, name in enumerate(inputs) if name in INPUTS]
-        if not held:
+        triad_places = [k for k, name in enumerate(inputs) if name in INPUTS]
+        if not triad_places:
             return super().adc_volts(inputs, start_s, interval_s, n, places)
-        others = [k for k in range(len(inputs)) if k not in held]
+        other_places = [k for k in range(len(inputs)) if k not in triad_places]
         volts = np.empty((n, len(inputs)))
-        own = self._triad_v(np.asarray(start_s + interval_s * np.arange(n), dtype=np.float64), interval_s)
-        volts[:, held] = own[:, [INPUTS.index(inputs[k]) for k in held]]
-        if others:
-            at = others if places is None else [places[k] for k in others]
-            volts[:, others] = super().adc_volts([inputs[k] for k in others], start_s, interval_s, n, at)
+        triad_v = self._triad_v(np.asarray(start_s + interval_s * np.arange(n), dtype=np.float64), interval_s)
+        volts[:, triad_places] = triad_v[:, [INPUTS.index(inputs[k]) for k in triad_places]]
+        if other_places:
+            at = other_places if places is None else [places[k] for k in other_places]
+            volts[:, other_places] = super().adc_volts([inputs[k] for k in other_places], start_s, interval_s, n, at)
         else:
             self.advance(start_s + interval_s * (n - 1))
         return volts
@@ -97,5 +100,5 @@ class HandheldWorld(World):
         hand = state["hand"]
         self.script.restore(hand["script"])
         self._memory, self._wander = np.array(hand["memory"]), np.array(hand["wander"])
-        for generator, where in zip((self._hand_random, self._noise_random), hand["generators"], strict=True):
-            generator.bit_generator.state = where
+        for generator, generator_state in zip((self._hand_random, self._noise_random), hand["generators"], strict=True):
+            generator.bit_generator.state = generator_state

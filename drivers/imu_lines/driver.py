@@ -54,8 +54,8 @@ class Settings(DigitalSettings):
         self.require_valid()
         require_positive(self, "time_unit_s")
         if not set(self.columns) & {*OUTPUTS} or not set(self.columns) <= {*OUTPUTS, *VOLTAGES, *UNASKED}:
-            others = f"{', '.join(VOLTAGES)}, {TEMPERATURE} and {TIME}"
-            raise ValueError(f"columns must name outputs of {', '.join(OUTPUTS)}, and may name {others}")
+            other_names = f"{', '.join(VOLTAGES)}, {TEMPERATURE} and {TIME}"
+            raise ValueError(f"columns must name outputs of {', '.join(OUTPUTS)}, and may name {other_names}")
         if len(set(self.columns.values())) < len(self.columns):
             raise ValueError("columns must be different; two names have the same column")
         numbered = self.format in ("csv", "nmea")
@@ -131,8 +131,8 @@ class LineSensor(DigitalSensor[Settings, LineDecoder]):
         if proposal is None:
             return []
         columns = ", ".join(f"{name}: {column}" for name, column in proposal["columns"].items())
-        others = ", ".join(f"{name}: {value}" for name, value in proposal.items() if name != "columns")
-        text = f"the lines fit {{columns: {{{columns}}}, {others}}} in the sensor's settings, if it is at rest"
+        other_settings = ", ".join(f"{name}: {value}" for name, value in proposal.items() if name != "columns")
+        text = f"the lines fit {{columns: {{{columns}}}, {other_settings}}} in the sensor's settings, if it is at rest"
         return [Check("proposal", False, text)]
 
     def _silence(self, timeout_s: float) -> DriverError:

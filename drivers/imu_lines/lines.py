@@ -35,8 +35,8 @@ def fields(line: str, style: str) -> dict[Column, float]:
     if style == "named":
         return {name: float(value) for name, value in PAIR.findall(line)} or _none(line)
     if style == "teleplot":
-        name, _, rest = line.removeprefix(">").partition(":")
-        value = rest.partition("|")[0].partition("§")[0].rpartition(":")[2]
+        name, _, value_text = line.removeprefix(">").partition(":")
+        value = value_text.partition("|")[0].partition("§")[0].rpartition(":")[2]
         return {name: float(value)} if line.startswith(">") and name else _none(line)
     if style == "nmea":
         line = _checked(line).partition(",")[2]
@@ -52,8 +52,8 @@ def _number(text: str) -> float | None:
 
 
 def _checked(line: str) -> str:
-    text, star, stated = line.removeprefix("$").partition("*")
-    if not (line.startswith("$") and star and int(stated, 16) == checksum(text)):
+    text, star, checksum_text = line.removeprefix("$").partition("*")
+    if not (line.startswith("$") and star and int(checksum_text, 16) == checksum(text)):
         raise ValueError(f"{line!r} has a wrong checksum")
     return text
 
@@ -97,7 +97,7 @@ class Assembly:
         try:
             values = fields(line, self.style)
         except ValueError:
-            self._bad(line)
+            self._count_damaged(line)
             return None
         self.seen = tuple(dict.fromkeys([*self.seen, *values])) if self.style == "teleplot" else tuple(values)
         columns = set(self.columns.values())
@@ -112,11 +112,11 @@ class Assembly:
                 return None
             self._pending = {}
         if not columns <= values.keys() or not all(math.isfinite(values[each]) for each in columns):
-            self._bad(line)
+            self._count_damaged(line)
             return None
         self.good += 1
         return {name: values[column] for name, column in self.columns.items()}
 
-    def _bad(self, line: str) -> None:
+    def _count_damaged(self, line: str) -> None:
         self.damaged += 1
         self.unread = self.unread or line[:60]

@@ -54,21 +54,23 @@ def proposed_settings(lines: Sequence[str], length_s: float) -> dict[str, Any] |
 def _style(lines: Sequence[str]) -> str:
     """The format in which most lines can be read, the most particular first."""
     shapes = {"teleplot": r">\w+:", "nmea": r"\$\w+,.*\*[0-9A-Fa-f]{2}$", "named": r".*[A-Za-z_]\w*\s*[:=]\s*[-+.\d]"}
-    many = {style: sum(bool(re.match(shape, line)) for line in lines) for style, shape in shapes.items()}
-    return next((style for style, count in many.items() if 2 * count > len(lines)), "csv")
+    counts = {style: sum(bool(re.match(shape, line)) for line in lines) for style, shape in shapes.items()}
+    return next((style for style, count in counts.items() if 2 * count > len(lines)), "csv")
 
 
 def _columns(lines: Sequence[str], style: str) -> Mapping[Column, NDArray[np.float64]]:
     """The values of each column that is in most samples; none for too few samples."""
-    found: dict[Column, list[float]] = {}
+    values_by_column: dict[Column, list[float]] = {}
     for line in lines:
         with suppress(ValueError):
             for column, value in fields(line, style).items():
-                found.setdefault(column, []).append(value)
-    most = max(map(len, found.values()), default=0)
-    whole = {column: np.array(values) for column, values in found.items() if 2 * len(values) > most >= FEWEST}
-    shortest = min(map(len, whole.values()), default=0)  # the last sample may lack columns
-    return {column: values[:shortest] for column, values in whole.items() if np.isfinite(values).all()}
+                values_by_column.setdefault(column, []).append(value)
+    most = max(map(len, values_by_column.values()), default=0)
+    common = {
+        column: np.array(values) for column, values in values_by_column.items() if 2 * len(values) > most >= FEWEST
+    }
+    shortest = min(map(len, common.values()), default=0)  # the last sample may lack columns
+    return {column: values[:shortest] for column, values in common.items() if np.isfinite(values).all()}
 
 
 def _by_name(values: Mapping[Column, NDArray[np.float64]]) -> dict[str, Column]:
@@ -76,23 +78,25 @@ def _by_name(values: Mapping[Column, NDArray[np.float64]]) -> dict[str, Column]:
     columns: dict[str, Column] = {}
     for column in values:
         match = next((m for pattern, _ in NAMES if (m := re.match(pattern, str(column).lower()))), None)
-        ours = next((ours for pattern, ours in NAMES if re.match(pattern, str(column).lower())), "")
-        if match and ours:
-            columns.setdefault(ours if ours in (TIME, TEMPERATURE) else f"{ours}{match[2]}", column)
+        name = next((name for pattern, name in NAMES if re.match(pattern, str(column).lower())), "")
+        if match and name:
+            columns.setdefault(name if name in (TIME, TEMPERATURE) else f"{name}{match[2]}", column)
     return columns
 
 
 def _by_value(values: Mapping[Column, NDArray[np.float64]]) -> dict[str, Column]:
     """Time and accelerometer by their values, then the triads behind it by custom."""
     clock = next((column for column, series in values.items() if _grows_evenly(series)), None)
-    others = [column for column in values if column != clock]
-    fits = [(_fit([values[column] for column in others[k : k + 3]])[0], k) for k in range(len(others) - 2)]
+    other_columns = [column for column in values if column != clock]
+    fits = [
+        (_fit([values[column] for column in other_columns[k : k + 3]])[0], k) for k in range(len(other_columns) - 2)
+    ]
     misfit, start = min(fits, default=(1.0, 0))
     if misfit > NEAR:
         return {}
     names = {} if clock is None else {TIME: clock}
-    for sensor, first in zip("agm", range(start, len(others) - 2, 3), strict=False):
-        names |= {f"{sensor}{axis}": others[first + k] for k, axis in enumerate("xyz")}
+    for sensor, first in zip("agm", range(start, len(other_columns) - 2, 3), strict=False):
+        names |= {f"{sensor}{axis}": other_columns[first + k] for k, axis in enumerate("xyz")}
     return names
 
 
@@ -105,8 +109,8 @@ def _grows_evenly(values: NDArray[np.float64]) -> bool:
 def _fit(force: Sequence[NDArray[np.float64]]) -> tuple[float, str]:
     """How far the norm of a force at rest is from 1 g, as a share of it, and in which unit; only counts are whole."""
     norm = float(np.median(np.linalg.norm(np.stack(force), axis=0)))
-    whole = all(np.array_equal(axis, np.rint(axis)) for axis in force)
-    sizes = ((size, unit) for unit, sizes in ONE_G.items() for size in sizes if whole == (unit == "count"))
+    is_integer = all(np.array_equal(axis, np.rint(axis)) for axis in force)
+    sizes = ((size, unit) for unit, sizes in ONE_G.items() for size in sizes if is_integer == (unit == "count"))
     return min((abs(norm / size - 1), unit) for size, unit in sizes)
 
 

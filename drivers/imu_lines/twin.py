@@ -53,13 +53,13 @@ def decimals(settings: Settings) -> dict[str, int]:
 def line_of(values: Mapping[str, float], settings: Settings) -> bytes:
     """The text of one sample."""
     digits = decimals(settings) | {TIME: 0, TEMPERATURE: 2}
-    shown = {column: f"{values[name]:.{digits[name]}f}" for name, column in settings.columns.items()}
+    texts = {column: f"{values[name]:.{digits[name]}f}" for name, column in settings.columns.items()}
     if settings.format == "named":
-        return (" ".join(f"{name}:{text}" for name, text in shown.items()) + "\r\n").encode()
+        return (" ".join(f"{name}:{text}" for name, text in texts.items()) + "\r\n").encode()
     if settings.format == "teleplot":
-        return "".join(f">{name}:{text}\n" for name, text in shown.items()).encode()
-    last = max(column for column in shown if isinstance(column, int))
-    text = ",".join(shown.get(k, "0") for k in range(1, last + 1))
+        return "".join(f">{name}:{text}\n" for name, text in texts.items()).encode()
+    last = max(column for column in texts if isinstance(column, int))
+    text = ",".join(texts.get(k, "0") for k in range(1, last + 1))
     if settings.format == "nmea":
         text = f"PIMU,{text}"
         text = f"${text}*{checksum(text):02X}"

@@ -183,10 +183,12 @@ class T7(Recorder[Settings]):
         """As the unit's, but a refusal is explained in the device's own words."""
         try:
             self._unit.write_block(*values)
-        except Refused as refused:
+        except Refused as refusal:
             detail = int(self._unit.read(t7.LAST_ERROR))
-            why = t7.ERRORS.get(detail, "see the list of error codes in its datasheet")
-            raise Refused(f"{refused.what}; device error {detail}: {why}", refused.remedy, refused.code) from refused
+            explanation = t7.ERRORS.get(detail, "see the list of error codes in its datasheet")
+            raise Refused(
+                f"{refusal.what}; device error {detail}: {explanation}", refusal.remedy, refusal.code
+            ) from refusal
 
     def _prepare_inputs(self) -> None:
         """End a stream of a crashed program; set range and ground of all wired inputs."""
@@ -205,8 +207,8 @@ class T7(Recorder[Settings]):
 
     def _input(self, name: str) -> int:
         if name not in self.settings.channels:
-            known = ", ".join(self.settings.channels)
-            raise LimitError(f"{self.name}: no channel {name!r}; there are {known}", "Correct the name")
+            known_names = ", ".join(self.settings.channels)
+            raise LimitError(f"{self.name}: no channel {name!r}; there are {known_names}", "Correct the name")
         return self.settings.channels[name]
 
 

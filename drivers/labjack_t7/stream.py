@@ -41,8 +41,8 @@ REMEDY = "Lower the rate or the number of channels, or free the network between 
 def packet_type(samples: int) -> np.dtype[np.void]:
     """The layout of one packet of `samples` samples."""
     header = [("transaction", ">u2"), ("protocol", ">u2"), ("length", ">u2"), ("unit", "u1"), ("function", "u1")]
-    rest = [("kind", "u1"), ("reserved", "u1"), ("backlog", ">u2"), ("status", ">u2"), ("additional", ">u2")]
-    return np.dtype([*header, *rest, ("samples", ">u2", (samples,))])
+    fields = [("kind", "u1"), ("reserved", "u1"), ("backlog", ">u2"), ("status", ">u2"), ("additional", ">u2")]
+    return np.dtype([*header, *fields, ("samples", ">u2", (samples,))])
 
 
 class Packets:
@@ -76,20 +76,21 @@ class Packets:
         expected = (0, self.layout.itemsize - 6, UNIT, FUNCTION, KIND)
         fields = ("protocol", "length", "unit", "function", "kind")
         for field, value in zip(fields, expected, strict=True):
-            if (wrong := np.flatnonzero(packets[field] != value)).size:
-                fault = f"packet {self._seen + wrong[0]} has {field} {packets[field][wrong[0]]} instead of {value}"
+            if (wrong_packets := np.flatnonzero(packets[field] != value)).size:
+                got = packets[field][wrong_packets[0]]
+                fault = f"packet {self._seen + wrong_packets[0]} has {field} {got} instead of {value}"
                 raise StreamError(
                     f"{self._name}: {fault}", "Close other programs that use the device's stream, then repeat"
                 )
 
     def _require_no_loss(self, packets: NDArray[np.void]) -> None:
         status = packets["status"]
-        if (bad := np.flatnonzero((status != 0) & (status != BURST_COMPLETE))).size:
-            packet = packets[bad[-1]]
+        if (bad_packets := np.flatnonzero((status != 0) & (status != BURST_COMPLETE))).size:
+            packet = packets[bad_packets[-1]]
             words = STATUS.get(int(packet["status"]), "it reports status {status}")
             raise StreamError(
                 f"{self._name}: {words.format(additional=packet['additional'], status=packet['status'])} "
-                f"(status {packet['status']} in packet {self._seen + bad[-1]})",
+                f"(status {packet['status']} in packet {self._seen + bad_packets[-1]})",
                 REMEDY,
             )
 
@@ -97,10 +98,10 @@ class Packets:
         numbers = np.concatenate([self._last, transactions])
         steps = np.mod(np.diff(numbers), 65536)
         if (gaps := np.flatnonzero(steps != 1)).size:
-            step, before = int(steps[gaps[0]]), self._seen + int(gaps[0]) - 1
-            wrong = "are missing" if 1 < step < 32768 else "are repeated or out of order"
-            where = f"after packet {before}" if before >= 0 else "at the start"
-            raise StreamError(f"{self._name}: packets {wrong} {where} of the record", REMEDY)
+            step, packet_before = int(steps[gaps[0]]), self._seen + int(gaps[0]) - 1
+            fault = "are missing" if 1 < step < 32768 else "are repeated or out of order"
+            place = f"after packet {packet_before}" if packet_before >= 0 else "at the start"
+            raise StreamError(f"{self._name}: packets {fault} {place} of the record", REMEDY)
         self._last = numbers[-1:]
 
 
@@ -168,8 +169,8 @@ class Reception:
     def _decode(self, packets: int) -> NDArray[np.uint16]:
         """The samples of the next `packets` packets, fetched a good many at a time."""
         at_once = max(1, GATHER_BYTES // self._size)
-        for done in range(0, packets, at_once):
-            self._fetch(min(packets, done + at_once))
+        for decoded in range(0, packets, at_once):
+            self._fetch(min(packets, decoded + at_once))
         end = packets * self._size
         data, self._data = self._data[:end], self._data[end:]
         self._decoded += packets
@@ -183,10 +184,10 @@ class Reception:
         asked_s = max(due_s, clock.now())  # who asks late has not been kept waiting
         deadline = clock.now() + PATIENCE_S + self._drift_s()
         while len(self._data) < size:
-            more = self._link.read(deadline - clock.now())
-            if not more:
+            next_bytes = self._link.read(deadline - clock.now())
+            if not next_bytes:
                 self._complain(size)
-            self._data += more
+            self._data += next_bytes
             self._late_s = clock.now() - asked_s
 
     def _drift_s(self) -> float:
@@ -202,8 +203,8 @@ class Reception:
 
     def _complain(self, size: int) -> None:
         self._packets.codes(self._data)  # the status of the received packets may contain the reason
-        before = self._decoded * self._size
+        bytes_before = self._decoded * self._size
         raise LinkTimeout(
-            f"{self._name}: the stream stopped after {before + len(self._data)} of {before + size} bytes",
+            f"{self._name}: the stream stopped after {bytes_before + len(self._data)} of {bytes_before + size} bytes",
             "Check network and power of the device, and that no other program uses its stream",
         )

@@ -63,8 +63,8 @@ def spoilt(data: bytes, samples: int, faults: Faults, now_s: float) -> bytes:
 def _order(numbers: NDArray[np.int64], faults: Faults, now_s: float) -> NDArray[np.intp]:
     """In which order packets of these transaction numbers are sent, as indices."""
     order = np.arange(len(numbers), dtype=np.intp)
-    if (lost := faults.size("lost-packet", now_s)) is not None:
-        return np.flatnonzero(numbers != lost - 1)
+    if (lost_packet := faults.size("lost-packet", now_s)) is not None:
+        return np.flatnonzero(numbers != lost_packet - 1)
     if faults.size("duplicated-packet", now_s) is not None:
         return np.asarray(np.repeat(order, np.where(numbers == 1, 2, 1)))
     if faults.size("swapped-packets", now_s) is not None:
@@ -227,11 +227,11 @@ class Converter(Twin):
             return self._read_flash(count)
         self._set(t7.CORE_TIMER, round(now_s * t7.CORE_HZ) % 2**32)
         self._set(t7.LINES_STATE, self._lines(now_s))
-        return [self._known(a) for a in range(address, address + count)]
+        return [self._known_word(a) for a in range(address, address + count)]
 
     def write_words(self, address: int, values: Sequence[int], now_s: float) -> None:
         for offset, value in enumerate(values):
-            self._known(address + offset)
+            self._known_word(address + offset)
             self._words[address + offset] = value
         if address <= t7.ENABLE.address + 1 < address + len(values):
             self._enable(bool(self._value(t7.ENABLE)), now_s)
@@ -316,7 +316,7 @@ class Converter(Twin):
     def _forget_enable(self) -> None:
         self._set(t7.ENABLE, int(self._stream is not None))
 
-    def _known(self, address: int) -> int:
+    def _known_word(self, address: int) -> int:
         if address not in self._words:
             raise Refusal(ILLEGAL_ADDRESS)
         return self._words[address]
@@ -327,9 +327,9 @@ class Converter(Twin):
     def _lines(self, now_s: float) -> int:
         """The digital lines: high, but for contacts that are closed and outputs that are off."""
         line = self.faults.size("open-interlock", now_s)
-        closed = self._closed & ~(0 if line is None else 1 << int(line))
+        closed_contacts = self._closed & ~(0 if line is None else 1 << int(line))
         off = sum(1 << n for n in range(t7.LINES) if not self._value(t7.dio(n)))
-        return (1 << t7.LINES) - 1 & ~closed & ~off
+        return (1 << t7.LINES) - 1 & ~closed_contacts & ~off
 
     def _set(self, register: Register, value: float) -> None:
         self._words.update(zip(range(register.address, register.address + 2), register.encode(value), strict=True))

@@ -104,9 +104,9 @@ class SampleDecoder(FrameDecoder):
         heads = mav.heads(messages)
         for number, of in groups(heads.number):
             self.seen[mav.MESSAGES[number].name if number in mav.MESSAGES else f"{number}"] += len(heads.number[of])
-        own = np.flatnonzero((heads.system == self._target[0]) & (heads.component == self._target[1]))
-        samples = own[messages.known[own] & (heads.number[own] == self._message.number)]
-        gaps = self._numbers.gaps(heads.sequence[own], np.searchsorted(own, samples))
+        own_frames = np.flatnonzero((heads.system == self._target[0]) & (heads.component == self._target[1]))
+        samples = own_frames[messages.known[own_frames] & (heads.number[own_frames] == self._message.number)]
+        gaps = self._numbers.gaps(heads.sequence[own_frames], np.searchsorted(own_frames, samples))
         content = mav.contents(messages, heads, self._message, samples)
         if "id" in (self._message.dtype.names or ()) and len(samples):
             of_imu = content["id"] == self._settings.imu
@@ -145,7 +145,7 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
 
     def identify(self) -> Identity:
         """The autopilot by its heartbeat. Raises LinkTimeout without one, BadFrame for other bytes."""
-        system, component, name, version = self._heard()
+        system, component, name, version = self._read_heartbeat()
         protocol = "MAVLink 1" if version == mav.V1 else "MAVLink 2"
         return Identity(f"{name}, {protocol}, system {system}, component {component}")
 
@@ -159,7 +159,7 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
     def _begin(self) -> None:
         """Request the message at its rate. Raises Refused, LinkTimeout."""
         if self._autopilot is None:
-            self._heard()
+            self._read_heartbeat()
         number, interval_us = mav.IMU[self.settings.message].number, 1e6 / self.settings.rate_hz
         for attempt in range(ATTEMPTS):
             self._link.discard()
@@ -181,7 +181,7 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
             "Check that the link carries commands to the autopilot, and not only its messages",
         )
 
-    def _heard(self) -> tuple[int, int, str, int]:
+    def _read_heartbeat(self) -> tuple[int, int, str, int]:
         """System, component, name and protocol of the autopilot, by its heartbeat.
 
         Our own heartbeat goes first: many autopilots send only to who has sent to them.
@@ -251,8 +251,8 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
             )
 
     def _content(self, decoder: SampleDecoder) -> str:
-        seen = ", ".join(f"{name} {count}" for name, count in sorted(decoder.seen.items()))
-        return seen + self._warm
+        counts_text = ", ".join(f"{name} {count}" for name, count in sorted(decoder.seen.items()))
+        return counts_text + self._warm
 
     def _silence(self, timeout_s: float) -> DriverError:
         return no_samples(self.name, self._link.url, timeout_s, self.settings.message)

@@ -137,8 +137,8 @@ class Mavlink:
         for kind, of in groups(2 * _numbers(frames) + signed):
             if (message := MESSAGES.get(kind >> 1)) is not None:
                 rows = frames[of, : frames.shape[1] - SIGNATURE * (kind & 1)]
-                stated = rows[:, -2] + 256 * rows[:, -1].astype(np.uint16)
-                verdicts[of] = np.where(stated == checksum(rows[:, 1:-2], message.extra), GOOD, BAD)
+                sent_checksums = rows[:, -2] + 256 * rows[:, -1].astype(np.uint16)
+                verdicts[of] = np.where(sent_checksums == checksum(rows[:, 1:-2], message.extra), GOOD, BAD)
         return verdicts
 
 
@@ -155,21 +155,25 @@ class Heads:
     size: Ints  # its bytes
 
 
-def heads(found: Found) -> Heads:
+def heads(frames: Found) -> Heads:
     """The heads of the frames."""
-    text = found.heads(PLACES[V2][0])
+    text = frames.heads(PLACES[V2][0])
     version = text[:, 0]
     first = version == V1
     payload = np.where(first, PLACES[V1][0], PLACES[V2][0])
-    sequence, system, component = (np.where(first, text[:, one], text[:, two]) for one, two in _OTHERS)
+    sequence, system, component = (
+        np.where(first, text[:, place_v1], text[:, place_v2]) for place_v1, place_v2 in _OTHERS
+    )
     return Heads(version, sequence, system, component, _numbers(text), payload, text[:, 1])
 
 
-def contents(found: Found, of: Heads, message: Message, chosen: Ints) -> NDArray[np.void]:
+def contents(frames: Found, of: Heads, message: Message, frame_numbers: Ints) -> NDArray[np.void]:
     """The fields of the chosen frames of `message`, shape (n,); fields that a frame lacks are 0."""
-    parts = np.zeros((len(chosen), message.dtype.itemsize), dtype=np.uint8)
-    for place, those in groups(of.payload[chosen]):
-        parts[those] = found.parts(chosen[those], place, of.size[chosen[those]], message.dtype.itemsize)
+    parts = np.zeros((len(frame_numbers), message.dtype.itemsize), dtype=np.uint8)
+    for place, of_place in groups(of.payload[frame_numbers]):
+        parts[of_place] = frames.parts(
+            frame_numbers[of_place], place, of.size[frame_numbers[of_place]], message.dtype.itemsize
+        )
     return parts.view(message.dtype)[:, 0]
 
 
@@ -183,7 +187,7 @@ def frames(
     else:
         ends = np.argmax(payload[:, ::-1] != 0, axis=1)
         sizes = np.where(payload.any(axis=1), payload.shape[1] - ends, 1)
-    out: list[bytes] = [b""] * len(payload)
+    messages: list[bytes] = [b""] * len(payload)
     for size, of in groups(sizes):
         rows = np.arange(len(payload))[of]
         head = [version, size, *([] if version == V1 else [0, 0]), 0, system, component]
@@ -196,16 +200,16 @@ def frames(
         frame[:, -2], frame[:, -1] = check & 0xFF, check >> 8
         text, length = frame.tobytes(), frame.shape[1]
         for k, row in enumerate(rows.tolist()):
-            out[row] = text[k * length : (k + 1) * length]
-    return out
+            messages[row] = text[k * length : (k + 1) * length]
+    return messages
 
 
 def fields(message: Message, **values: Any) -> NDArray[np.void]:
     """The fields of one message, shape (1,); those that are not given are 0."""
-    out = np.zeros(1, dtype=message.dtype)
+    record = np.zeros(1, dtype=message.dtype)
     for name, value in values.items():
-        out[name] = value
-    return out
+        record[name] = value
+    return record
 
 
 def checksum(rows: Bytes, extra: int) -> NDArray[np.uint16]:

@@ -40,8 +40,8 @@ class Autopilot(FramedTwin):
         return min(self._beat_s, super().due_s())
 
     def state(self) -> dict[str, Any]:
-        own = {"sending": self._sending, "beat_s": self._beat_s, "sequence": self._sequence}
-        return super().state() | own
+        own_state = {"sending": self._sending, "beat_s": self._beat_s, "sequence": self._sequence}
+        return super().state() | own_state
 
     def restore(self, state: Mapping[str, Any]) -> None:
         super().restore(state)
@@ -85,8 +85,8 @@ class Autopilot(FramedTwin):
 
     def _result(self, command: Any, now_s: float) -> int:
         """Set the interval of the message: the result of a command. 0 is the usual one, -1 stops it."""
-        if self.faults and (refused := self.faults.size("refuses", now_s)) is not None:
-            return int(refused)
+        if self.faults and (refusal_code := self.faults.size("refuses", now_s)) is not None:
+            return int(refusal_code)
         number, interval_us = command["parameters"][:2].tolist()
         if command["command"] != mav.SET_MESSAGE_INTERVAL or number != self._message.number:
             return 3

@@ -73,7 +73,7 @@ class Controller(Twin):
     def read_words(self, address: int, count: int, now_s: float) -> list[int]:
         self._world.advance(now_s)
         words = {
-            PROCESS_VALUE.address: self._shown(now_s),
+            PROCESS_VALUE.address: self._displayed_words(now_s),
             SET_POINT.address: SET_POINT.encode(self._set_point_c),
             CONTROL_METHOD.address: [0],
         }
@@ -93,7 +93,7 @@ class Controller(Twin):
         self._world.advance(now_s)
         self._world.oven_set(self._goal_c(now_s), running)
 
-    def _shown(self, now_s: float) -> list[int]:
+    def _displayed_words(self, now_s: float) -> list[int]:
         if (code := self.faults.size("no-temperature", now_s)) is not None:
             return [int(code)]
         return PROCESS_VALUE.encode(self._temperature_c(now_s) + (self.faults.size("lies", now_s) or 0.0))

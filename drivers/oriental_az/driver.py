@@ -132,7 +132,7 @@ class RotaryStage:
 
         Raises StageAlarm, StageLost, Interlocked, NotSettled.
         """
-        self._until(self._expected_end_s)
+        self._wait_until(self._expected_end_s)
         outputs = self._poll_until(az.IN_POSITION, PATIENCE_S, "is still moving, or not in position,")
         self._require_coordinates(outputs)
         self._require_ready(outputs)
@@ -157,7 +157,7 @@ class RotaryStage:
         self.move_to(start_deg)
         try:
             begun_s = self._begin_turn(rate, end_deg)
-            self._until(begun_s + abs(rate) / self.settings.acceleration_deg_s2 + LEAD_S)
+            self._wait_until(begun_s + abs(rate) / self.settings.acceleration_deg_s2 + LEAD_S)
             yield Turn(rate, min(self._beat_s, UNWATCHED_S), lambda: self._require_turning(rate))
             if self.settings.endless:
                 self.stop()
@@ -176,7 +176,7 @@ class RotaryStage:
         """
         outputs = self._status()
         self._require_coordinates(outputs)
-        if not _stands(outputs, az.IN_POSITION):
+        if not _is_at_rest(outputs, az.IN_POSITION):
             remedy = "Find out what moves it: the load's balance, a hand, the drive's current; then resume the run"
             raise NotSettled(f"{self.name}: has not stood still", remedy)
         self._require_ready(outputs)
@@ -211,10 +211,10 @@ class RotaryStage:
         A stop whose answers were lost, or a program that crashed in it, leaves the input on, and the drive then
         accepts moves without making them. The emergency stop has a contact of its own and is not affected.
         """
-        held = bool(int(self._unit.read(az.INPUTS)) & az.STOP)
-        if held:
+        is_on = bool(int(self._unit.read(az.INPUTS)) & az.STOP)
+        if is_on:
             self._unit.write(az.INPUTS, 0)
-        return held
+        return is_on
 
     def home(self) -> None:
         """Seek the zero of the angle; needed once after power-on. Raises StageAlarm, NotSettled."""
@@ -272,9 +272,11 @@ class RotaryStage:
         limits = (az.BRAKE_AND_ALARM, high, low)
         self._unit.write_block(*zip(az.OWN_LIMITS, limits, strict=True))
         if (stored := self._unit.read_block(*az.OWN_LIMITS)) != list(limits):
-            shown = ", ".join(f"{value:g} in {register}" for register, value in zip(az.OWN_LIMITS, stored, strict=True))
+            limits_text = ", ".join(
+                f"{value:g} in {register}" for register, value in zip(az.OWN_LIMITS, stored, strict=True)
+            )
             raise Interlocked(
-                f"{self.name}: has not accepted its limits of {low} .. {high} steps: it shows {shown}",
+                f"{self.name}: has not accepted its limits of {low} .. {high} steps: it shows {limits_text}",
                 "Compare the addresses with the drive's manual, or take own_limits out of the bench file",
             )
         self._limited = True
@@ -293,7 +295,7 @@ class RotaryStage:
         distance_deg = abs(angle_deg - self.angle_deg())
         self._target_deg, self._expected_end_s = angle_deg, self._clock.now()
         self._holds_target = True
-        if _stands(outputs, az.IN_POSITION) and distance_deg < 180 / settings.steps_per_turn:
+        if _is_at_rest(outputs, az.IN_POSITION) and distance_deg < 180 / settings.steps_per_turn:
             return None
         self._watch(True)
         begun_s = self._operate(az.ABSOLUTE, angle_deg, settings.speed_deg_s)
@@ -337,7 +339,7 @@ class RotaryStage:
         """How often a drive has to hear of its controller if it watches over it."""
         return self.settings.communication_timeout_s / BEATS or math.inf
 
-    def _until(self, end_s: float) -> None:
+    def _wait_until(self, end_s: float) -> None:
         """Let a move take its time until `end_s`, and let the drive hear of its controller meanwhile."""
         while (left_s := end_s - self._clock.now()) > self._beat_s:
             self._clock.sleep(self._beat_s)
@@ -359,15 +361,15 @@ class RotaryStage:
         """The outputs at a standstill with `outputs_on`; an alarm ends it unless `outputs` passes over it."""
         deadline = self._clock.now() + timeout_s
         while True:
-            if _stands(now := (outputs or self._status)(), outputs_on):
-                return now
+            if _is_at_rest(current := (outputs or self._status)(), outputs_on):
+                return current
             if self._clock.now() >= deadline:
                 remedy = "Look at the stage: is it blocked? Then home it and repeat"
                 raise NotSettled(f"{self.name}: {complaint} after {timeout_s:g} s", remedy)
             self._clock.sleep(POLL_S)
 
 
-def _stands(outputs: int, outputs_on: int) -> bool:
+def _is_at_rest(outputs: int, outputs_on: int) -> bool:
     """Whether it is at rest with `outputs_on`."""
     return not outputs & az.MOVE and outputs & outputs_on == outputs_on
 

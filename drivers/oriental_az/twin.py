@@ -104,14 +104,14 @@ class Drive(Twin):
 
     def write_words(self, address: int, values: Sequence[int], now_s: float) -> None:
         self._catch_up(now_s)
-        before = self._words.get(az.INPUTS.address, 0)
-        written = range(address, address + len(values))
-        self._words.update(zip(written, values, strict=True))
-        if az.INPUTS.address in written:
-            self._inputs(self._words[az.INPUTS.address] & ~before, now_s)
-        if az.RESET_ALARM.address in written and self._value(az.RESET_ALARM) == 1:
+        inputs_before = self._words.get(az.INPUTS.address, 0)
+        addresses = range(address, address + len(values))
+        self._words.update(zip(addresses, values, strict=True))
+        if az.INPUTS.address in addresses:
+            self._inputs(self._words[az.INPUTS.address] & ~inputs_before, now_s)
+        if az.RESET_ALARM.address in addresses and self._value(az.RESET_ALARM) == 1:
             self._reset()
-        if self._triggered(written):
+        if self._triggered(addresses):
             self._start(now_s)
 
     def _catch_up(self, now_s: float) -> None:
@@ -139,20 +139,20 @@ class Drive(Twin):
         return {r.address + i: word for r, value in values.items() for i, word in enumerate(r.encode(value))}
 
     def _outputs(self, now_s: float) -> int:
-        moving = now_s < self._plan.end_s or self.faults.size("busy", now_s) is not None
+        is_moving = now_s < self._plan.end_s or self.faults.size("busy", now_s) is not None
         in_position = abs(self._world.motor_angle_deg(self._axis) - self._plan.angle_deg(now_s)) <= IN_POSITION_DEG
         return (
             az.HOME_END * self._referenced
-            | az.READY * (not moving and not self._alarm and not self._held(now_s))
+            | az.READY * (not is_moving and not self._alarm and not self._is_stop_on(now_s))
             | az.ALARM_ON * (self._alarm != 0)
-            | az.MOVE * moving
-            | az.IN_POSITION * (in_position and not moving)
+            | az.MOVE * is_moving
+            | az.IN_POSITION * (in_position and not is_moving)
         )
 
     def _inputs(self, rising: int, now_s: float) -> None:
         if rising & az.STOP:
             self._follow(self._plan.stopped(now_s))
-        elif rising & az.ZHOME and not self._alarm and not self._held(now_s):
+        elif rising & az.ZHOME and not self._alarm and not self._is_stop_on(now_s):
             self._homing, self._referenced = True, False
             self._turn(Trajectory(now_s, self._angle_deg(), 0.0, HOMING_DEG_S, HOMING_DEG_S2))
         elif rising & az.ALARM_RESET:
@@ -162,15 +162,15 @@ class Drive(Twin):
         if self._alarm not in az.RESETTABLE_BY_POWER_ONLY:
             self._alarm = 0
 
-    def _triggered(self, written: range) -> bool:
+    def _triggered(self, addresses: range) -> bool:
         trigger = int(self._value(az.TRIGGER))
         if trigger == az.TRIGGER_ALL:
-            return az.TRIGGER.address in written
-        return TRIGGERS.get(trigger) in written
+            return az.TRIGGER.address in addresses
+        return TRIGGERS.get(trigger) in addresses
 
     def _start(self, now_s: float) -> None:
         """Begin the move of the direct data; what is not allowed raises the drive's alarm."""
-        if self._alarm or self._held(now_s) or self._words.get(az.INPUTS.address, 0) & az.STOP:
+        if self._alarm or self._is_stop_on(now_s) or self._words.get(az.INPUTS.address, 0) & az.STOP:
             return
         kind = int(self._value(az.TYPE))
         speed, rate = (self._value(r) / self._steps_per_deg for r in (az.SPEED, az.ACCELERATION))
@@ -188,18 +188,18 @@ class Drive(Twin):
             self._fail(az.COORDINATES_NOT_SET, now_s)
         else:
             target = origins[kind]() + self._value(az.POSITION) / self._steps_per_deg
-            within = self._within(target)
-            self._turn(Trajectory(now_s, self._angle_deg(), within, speed, rate))
-            self._beyond = within != target
+            limited_deg = self._limit_deg(target)
+            self._turn(Trajectory(now_s, self._angle_deg(), limited_deg, speed, rate))
+            self._beyond = limited_deg != target
 
-    def _within(self, target_deg: float) -> float:
+    def _limit_deg(self, target_deg: float) -> float:
         """The target, or the drive's own limit before it; limits are kept once coordinates and an action are set."""
         if not self._referenced or self._value(az.OVERTRAVEL) != az.BRAKE_AND_ALARM:
             return target_deg
         low, high = (self._value(limit) / self._steps_per_deg for limit in (az.LOW_LIMIT, az.HIGH_LIMIT))
         return min(max(target_deg, low), high)
 
-    def _held(self, now_s: float) -> bool:
+    def _is_stop_on(self, now_s: float) -> bool:
         """Whether the stop input is on."""
         return self.faults.size("e-stop", now_s) is not None
 
@@ -207,9 +207,9 @@ class Drive(Twin):
         self._alarm = code
         self._follow(self._plan.stopped(max(at_s, self._plan.start_s)))
 
-    def _turn(self, way: Trajectory) -> None:
-        if self.faults.size("stuck", way.start_s) is None:
-            self._follow(way)
+    def _turn(self, trajectory: Trajectory) -> None:
+        if self.faults.size("stuck", trajectory.start_s) is None:
+            self._follow(trajectory)
 
     def _follow(self, plan: Trajectory) -> None:
         self._plan, self._beyond = plan, False

@@ -108,7 +108,7 @@ class Positioner:
 
     def self_test(self) -> list[Check]:
         """Model, axes, travel, readiness. A servo that is off passes, with a remark."""
-        model, known, ids = self.identify().model, self._gcs.ask(e727.AXES), self.settings.axes.values()
+        model, known_ids, ids = self.identify().model, self._gcs.ask(e727.AXES), self.settings.axes.values()
         low, high = self._travel_um()
         lower, upper = self.settings.limits_um
         ready = self._gcs.ask_byte(e727.READY) == e727.IS_READY
@@ -116,7 +116,7 @@ class Positioner:
         off = [name for name, axis in self.settings.axes.items() if not servo.get(axis)]
         return [
             Check("model", "E-727" in model, model),
-            Check("axes", set(ids) <= set(known), f"{', '.join(ids)} of {', '.join(known)}"),
+            Check("axes", set(ids) <= set(known_ids), f"{', '.join(ids)} of {', '.join(known_ids)}"),
             Check("travel", low <= lower and upper <= high, f"{low:g} .. {high:g} um, used {lower:g} .. {upper:g} um"),
             Check("ready", ready, "ready" if ready else "busy: wait until it has finished"),
             Check("servo", True, f"off: {', '.join(off)}" if off else "on"),
@@ -140,13 +140,15 @@ class Positioner:
         Raises LimitError before anything is sent, Refused with the controller's error, NotSettled.
         """
         self._require_within_limits(axis, um)
-        which = self._id(axis)
-        self._gcs.tell(f"{e727.MOVE} {which} {um:.6f}")
-        self._poll_until(lambda: self._gcs.number(f"{e727.ON_TARGET} {which}") == 1, PATIENCE_S, f"{axis} is not there")
-        here = self.position_um(axis)
-        if not abs(here - um) <= self.settings.settle_um:
+        axis_id = self._id(axis)
+        self._gcs.tell(f"{e727.MOVE} {axis_id} {um:.6f}")
+        self._poll_until(
+            lambda: self._gcs.number(f"{e727.ON_TARGET} {axis_id}") == 1, PATIENCE_S, f"{axis} is not there"
+        )
+        position_um = self.position_um(axis)
+        if not abs(position_um - um) <= self.settings.settle_um:
             raise NotSettled(
-                f"{self.name}: {axis} is at {here:.3f} um instead of {um:.3f} um, "
+                f"{self.name}: {axis} is at {position_um:.3f} um instead of {um:.3f} um, "
                 f"more than {self.settings.settle_um:g} um away",
                 "Take the load off the stage, check the servo's settings, then repeat the move",
             )
@@ -178,8 +180,8 @@ class Positioner:
             raise StreamError(f"{self.name}: the recorder has no values of {axis}", remedy)
         header, rows = self._gcs.rows(f"{e727.RECORDED} 1 {count} {place}")
         if len(rows) != count or not all(len(row) == 1 for row in rows) or "SAMPLE_TIME" not in header:
-            what = f"{self.name}: the record of {axis} has {len(rows)} rows instead of {count}"
-            raise StreamError(what, "Close other programs that use the controller, then repeat")
+            fault = f"{self.name}: the record of {axis} has {len(rows)} rows instead of {count}"
+            raise StreamError(fault, "Close other programs that use the controller, then repeat")
         return Recording(np.array(rows)[:, 0], float(header["SAMPLE_TIME"]))
 
     def require_steady(self) -> None:
@@ -210,8 +212,8 @@ class Positioner:
 
     def _id(self, axis: str) -> str:
         if axis not in self.settings.axes:
-            known = ", ".join(self.settings.axes)
-            raise LimitError(f"{self.name}: there is no axis {axis!r}; nothing was sent", f"Use one of {known}")
+            known_axes = ", ".join(self.settings.axes)
+            raise LimitError(f"{self.name}: there is no axis {axis!r}; nothing was sent", f"Use one of {known_axes}")
         return self.settings.axes[axis]
 
     def _place(self, axis: str) -> int:
@@ -229,8 +231,8 @@ class Positioner:
 
     def _require_swing(self, peak_to_peak_um: float) -> None:
         if not peak_to_peak_um > 0:
-            what = f"{self.name}: an oscillation of {peak_to_peak_um:g} um is none; nothing was sent"
-            raise LimitError(what, "Ask for a positive width, peak to peak")
+            fault = f"{self.name}: an oscillation of {peak_to_peak_um:g} um is none; nothing was sent"
+            raise LimitError(fault, "Ask for a positive width, peak to peak")
 
     def _wave(self, frequency_hz: float) -> Wave:
         """How the controller plays a frequency. Raises LimitError for one that it cannot play."""

@@ -12,7 +12,16 @@ from drivers.pi_e727.twin_axes import CYCLE_S, Axes, Handler, World
 from drivers.pi_e727.twin_waves import Recorder, Waves
 from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
-from drivers.transport.gcs_server import OUT_OF_RANGE, UNKNOWN_COMMAND, Refusal, gcs_port, groups, lines, one_of, whole
+from drivers.transport.gcs_server import (
+    OUT_OF_RANGE,
+    UNKNOWN_COMMAND,
+    Refusal,
+    gcs_port,
+    groups,
+    lines,
+    one_of,
+    parse_integer,
+)
 from drivers.transport.server import Server, Twin
 
 LISTEN = "tcp://127.0.0.1:0"
@@ -101,9 +110,9 @@ class Controller(Twin):
     def _urgent(self, number: int, now_s: float) -> str | None:
         """A command of one byte; those that do not exist are passed over."""
         questions: dict[int, Callable[[], str]] = {
-            e727.MOVING: lambda: _bits(self._axes.moving(axis, now_s) for axis in self._axes.ids),
+            e727.MOVING: lambda: _hexadecimal(self._axes.moving(axis, now_s) for axis in self._axes.ids),
             e727.READY: lambda: e727.IS_READY,
-            e727.WAVES: lambda: _bits(self._waves.running(now_s)),
+            e727.WAVES: lambda: _hexadecimal(self._waves.running(now_s)),
         }
         if number == e727.STOP:
             self._stop(now_s)
@@ -132,10 +141,10 @@ class Controller(Twin):
     def _identified(self, requests: Sequence[Sequence[str]]) -> list[tuple[str, str, int]]:
         items = {"1", *self._axes.ids}  # the controller itself is item 1, whatever its axes are called
         pairs = [(one_of(item, items, e727.BAD_AXIS), text) for item, text, *_ in requests]
-        known = [(item, text, whole(text, 0, math.inf)) for item, text in pairs]
-        if any(parameter not in PARAMETERS for *_, parameter in known):
+        numbered = [(item, text, parse_integer(text, 0, math.inf)) for item, text in pairs]
+        if any(parameter not in PARAMETERS for *_, parameter in numbered):
             raise Refusal(e727.UNKNOWN_PARAMETER)
-        return known
+        return numbered
 
 
 def _described() -> Iterable[str]:
@@ -143,9 +152,9 @@ def _described() -> Iterable[str]:
     return (f"0x{number:X}=\t0\t1\t{kind}\tSystem\t{name}" for number, (_, kind, name) in PARAMETERS.items())
 
 
-def _bits(on: Iterable[bool]) -> str:
+def _hexadecimal(on: Iterable[bool]) -> str:
     """Hexadecimal; the first is the lowest bit."""
-    return f"{sum(1 << k for k, bit in enumerate(on) if bit):X}"
+    return f"{sum(1 << k for k, flag in enumerate(on) if flag):X}"
 
 
 def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:

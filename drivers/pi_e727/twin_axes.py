@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from drivers.pi_e727 import parameters as e727
 from drivers.transport.faults import Faults
-from drivers.transport.gcs_server import OUT_OF_RANGE, Refusal, groups, number, one_of, table, whole
+from drivers.transport.gcs_server import OUT_OF_RANGE, Refusal, groups, number, one_of, parse_integer, table
 from drivers.world.kernel import Floats
 from drivers.world.positioner import Command, standing
 
@@ -95,9 +95,9 @@ class Axes:
         """Ramp the command from where it is to `um`."""
         if self.faults.size("stuck", now_s) is not None:
             return
-        here, velocity = self.commanded_um(axis, now_s), self._velocity_um_s[axis]
-        rate = velocity if um > here else -velocity
-        self.follow(axis, Command(now_s, here, rate, end_s=now_s + (um - here) / rate), now_s)
+        present_um, velocity = self.commanded_um(axis, now_s), self._velocity_um_s[axis]
+        rate = velocity if um > present_um else -velocity
+        self.follow(axis, Command(now_s, present_um, rate, end_s=now_s + (um - present_um) / rate), now_s)
 
     def follow(self, axis: str, command: Command, now_s: float) -> None:
         """Hand a command to the world."""
@@ -134,7 +134,7 @@ class Axes:
         return self._servo[axis] and not self.moving(axis, now_s)
 
     def _set_servo(self, arguments: Sequence[str], now_s: float) -> None:
-        states = {one_of(axis, self.ids, e727.BAD_AXIS): whole(on, 0, 1) for axis, on in groups(arguments, 2)}
+        states = {one_of(axis, self.ids, e727.BAD_AXIS): parse_integer(on, 0, 1) for axis, on in groups(arguments, 2)}
         for axis, on in states.items():
             if bool(on) != self._servo[axis]:
                 self._servo[axis] = bool(on)

@@ -19,8 +19,8 @@ from drivers.transport.gcs_server import (
     lines,
     number,
     one_of,
+    parse_integer,
     table,
-    whole,
 )
 from drivers.world.kernel import Floats
 from drivers.world.positioner import FOREVER_S, Command
@@ -44,13 +44,13 @@ class Recorder:
     def handlers(self) -> dict[str, Handler]:
         return {
             "DRC": self._set_what,
-            "DRC?": lambda a, _: table((k, f"{self._what[k][0]} {self._what[k][1]}") for k in self._asked(a)),
+            "DRC?": lambda a, _: table((k, f"{self._what[k][0]} {self._what[k][1]}") for k in self._tables_asked(a)),
             "DRT": self._set_triggers,
-            "DRT?": lambda a, _: table((k, f"{self._triggers[k]} 0") for k in self._asked(a)),
+            "DRT?": lambda a, _: table((k, f"{self._triggers[k]} 0") for k in self._tables_asked(a)),
             "RTR": lambda a, _: self._set_rate(a),
             "RTR?": lambda _a, _: f"{self._rate}\n",
             "TNR?": lambda _a, _: f"{len(TABLES)}\n",
-            "DRL?": lambda a, _: table((k, self._count(k)) for k in self._asked(a)),
+            "DRL?": lambda a, _: table((k, self._count(k)) for k in self._tables_asked(a)),
             "DRR?": self._read,
         }
 
@@ -90,13 +90,13 @@ class Recorder:
     def _count(self, place: str) -> int:
         return sum(len(values) for values in self._data[place])
 
-    def _asked(self, arguments: Sequence[str]) -> list[str]:
+    def _tables_asked(self, arguments: Sequence[str]) -> list[str]:
         return [one_of(place, TABLES, OUT_OF_RANGE) for place in arguments] or TABLES
 
     def _set_what(self, arguments: Sequence[str], _now_s: float) -> None:
         for place, source, option in groups(arguments, 3):
             axis = one_of(source, self._axes.ids, e727.ILLEGAL_AXIS)
-            self._what[one_of(place, TABLES, OUT_OF_RANGE)] = axis, whole(option, 0, len(OPTIONS) - 1)
+            self._what[one_of(place, TABLES, OUT_OF_RANGE)] = axis, parse_integer(option, 0, len(OPTIONS) - 1)
 
     def _set_triggers(self, arguments: Sequence[str], now_s: float) -> None:
         for place, source, _value in groups(arguments, 3):
@@ -106,16 +106,16 @@ class Recorder:
         self.trigger(now_s, e727.AT_ONCE)
 
     def _set_rate(self, arguments: Sequence[str]) -> None:
-        self._rate = whole(groups(arguments, 1)[0][0], 1, 10**6)
+        self._rate = parse_integer(groups(arguments, 1)[0][0], 1, 10**6)
         self._start_s = math.inf
 
     def _read(self, arguments: Sequence[str], _now_s: float) -> str:
         """`DRR? offset count tables`: a header, and a row for each sample."""
         groups(arguments[:3], 3)
-        places = self._asked(arguments[2:])
+        places = self._tables_asked(arguments[2:])
         most = min(self._count(place) for place in places)
-        offset = whole(arguments[0], 1, most)
-        count = whole(arguments[1], 1, most - offset + 1)
+        offset = parse_integer(arguments[0], 1, most)
+        count = parse_integer(arguments[1], 1, most - offset + 1)
         columns = [np.concatenate(self._data[place])[offset - 1 : offset - 1 + count] for place in places]
         rows = (" ".join(f"{value:.6f}" for value in row) for row in zip(*columns, strict=True))
         return lines([*self._header(places, count), *rows])
@@ -123,8 +123,8 @@ class Recorder:
     def _header(self, places: Sequence[str], count: int) -> list[str]:
         names = [f"{OPTIONS[self._what[place][1]]} {self._what[place][0]}" for place in places]
         fields = {"TYPE": 1, "SEPARATOR": 32, "DIM": len(places), "SAMPLE_TIME": self._rate * CYCLE_S, "NDATA": count}
-        named = {f"NAME{k}": name for k, name in enumerate(names)}
-        return [*(f"# {key} = {value}" for key, value in (fields | named).items()), "# END_HEADER"]
+        name_fields = {f"NAME{k}": name for k, name in enumerate(names)}
+        return [*(f"# {key} = {value}" for key, value in (fields | name_fields).items()), "# END_HEADER"]
 
 
 # The simulated E-727's wave tables and generators. Whole symmetric sines alone; played ideally smooth.
@@ -150,14 +150,14 @@ class Sine:
         return Command(start_s, self.lowest_um + half_um, 0.0, half_um, 1 / period_s, phase, end_s)
 
 
-def written(shape: Sequence[str]) -> Sine:
+def parse_sine(shape: Sequence[str]) -> Sine:
     """The table that `X SIN_P points width lowest period first center` asks for."""
     if len(shape) != 8:
         raise Refusal(PARAMETER_COUNT)
-    for text, known in zip(shape, ("X", e727.SINE), strict=False):
-        one_of(text, [known], OUT_OF_RANGE)
-    points, period = (whole(shape[k], 1, e727.WAVE_POINTS) for k in (2, 5))
-    first, center = whole(shape[6], 0, points - 1), whole(shape[7], 0, period)
+    for text, expected in zip(shape, ("X", e727.SINE), strict=False):
+        one_of(text, [expected], OUT_OF_RANGE)
+    points, period = (parse_integer(shape[k], 1, e727.WAVE_POINTS) for k in (2, 5))
+    first, center = parse_integer(shape[6], 0, points - 1), parse_integer(shape[7], 0, period)
     if points != period or 2 * center != period:
         raise Refusal(OUT_OF_RANGE)
     return Sine(points, number(shape[3]), number(shape[4]), first)
@@ -181,13 +181,13 @@ class Waves:
             "WAV?": self._lengths,
             "WCL": self._clear,
             "WSL": lambda a, _: self._selected.update(self._values(a, len(TABLES))),
-            "WSL?": lambda a, _: table((k, self._selected[k]) for k in self._asked(a)),
+            "WSL?": lambda a, _: table((k, self._selected[k]) for k in self._tables_asked(a)),
             "WTR": self._set_rates,
-            "WTR?": lambda a, _: table((k, f"{self._rates[k][0]} {self._rates[k][1]}") for k in self._asked(a)),
+            "WTR?": lambda a, _: table((k, f"{self._rates[k][0]} {self._rates[k][1]}") for k in self._tables_asked(a)),
             "WGC": lambda a, _: self._cycles.update(self._values(a, MOST_CYCLES)),
-            "WGC?": lambda a, _: table((k, self._cycles[k]) for k in self._asked(a)),
+            "WGC?": lambda a, _: table((k, self._cycles[k]) for k in self._tables_asked(a)),
             "WGO": self._play,
-            "WGO?": lambda a, now_s: table((k, int(now_s < self._until_s[k])) for k in self._asked(a)),
+            "WGO?": lambda a, now_s: table((k, int(now_s < self._until_s[k])) for k in self._tables_asked(a)),
             "MOV": self._move,
         }
 
@@ -213,16 +213,18 @@ class Waves:
         """End all waves; where the axes go is not decided here."""
         self._until_s = {generator: min(until_s, now_s) for generator, until_s in self._until_s.items()}
 
-    def _asked(self, arguments: Sequence[str]) -> list[str]:
+    def _tables_asked(self, arguments: Sequence[str]) -> list[str]:
         return [one_of(k, self._axis, e727.ILLEGAL_AXIS) for k in arguments] or list(self._axis)
 
     def _values(self, arguments: Sequence[str], high: float) -> dict[str, int]:
-        return {one_of(k, self._axis, e727.ILLEGAL_AXIS): whole(text, 0, high) for k, text in groups(arguments, 2)}
+        return {
+            one_of(k, self._axis, e727.ILLEGAL_AXIS): parse_integer(text, 0, high) for k, text in groups(arguments, 2)
+        }
 
     def _write(self, arguments: Sequence[str], _now_s: float) -> None:
         if not arguments:
             raise Refusal(PARAMETER_COUNT)
-        place, sine = one_of(arguments[0], TABLES, OUT_OF_RANGE), written(arguments[1:])
+        place, sine = one_of(arguments[0], TABLES, OUT_OF_RANGE), parse_sine(arguments[1:])
         tables = self._tables | {place: sine}
         if sum(table.points for table in tables.values()) > e727.WAVE_POINTS:
             raise Refusal(e727.WAVE_MEMORY)
@@ -239,12 +241,14 @@ class Waves:
 
     def _set_rates(self, arguments: Sequence[str], _now_s: float) -> None:
         for k, rate, kind in groups(arguments, 3):
-            rates = [whole(rate, 1, MOST_CYCLES), whole(kind, 0, 1)]
+            rates = [parse_integer(rate, 1, MOST_CYCLES), parse_integer(kind, 0, 1)]
             for generator in self._axis if k == "0" else [one_of(k, self._axis, e727.ILLEGAL_AXIS)]:
                 self._rates[generator] = rates
 
     def _play(self, arguments: Sequence[str], now_s: float) -> None:
-        modes = {one_of(k, self._axis, e727.ILLEGAL_AXIS): whole(mode, 0, 1) for k, mode in groups(arguments, 2)}
+        modes = {
+            one_of(k, self._axis, e727.ILLEGAL_AXIS): parse_integer(mode, 0, 1) for k, mode in groups(arguments, 2)
+        }
         starting = {k: self._selected_wave(k, now_s) for k, mode in modes.items() if mode}
         for generator, command in starting.items():
             self._axes.follow(self._axis[generator], command, now_s)

@@ -86,8 +86,8 @@ class Settings(Inputs[int], NoDigitalLines):
         """The commands that prepare a record of `scans` scans."""
         numbers = sorted(set(self.channels.values()) - {0})
         inputs = f"(@{','.join(str(number) for number in numbers)})" if numbers else ""
-        also = f",{inputs}" if inputs else ""
-        begin = [f"CONF:VOLT:DC {self.range_v:g}{also}", f"VOLT:DC:NPLC {self.nplc:g}{also}"]
+        inputs_text = f",{inputs}" if inputs else ""
+        begin = [f"CONF:VOLT:DC {self.range_v:g}{inputs_text}", f"VOLT:DC:NPLC {self.nplc:g}{inputs_text}"]
         return [*begin, *([f"ROUT:SCAN {inputs}"] if inputs else []), *self._pace(scans, bool(inputs)), *self.setup]
 
     def _pace(self, scans: int, scanner: bool) -> list[str]:
@@ -126,8 +126,8 @@ class Meter(Recorder[Settings]):
         scan = f"{', '.join(self.settings.channels)} at {self.settings.rate_hz:g} Hz, {self.settings.range_v:g} V"
         try:
             self._configure(1)
-        except Refused as refused:
-            return [Check("settings", False, refused.what)]
+        except Refused as refusal:
+            return [Check("settings", False, refusal.what)]
         return [Check("settings", True, scan)]
 
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
@@ -244,27 +244,27 @@ class Meter(Recorder[Settings]):
 
     def _require_in_range(self, volts: NDArray[np.float64]) -> None:
         """An overload has no voltage, and a mean with one has no meaning."""
-        over = ~(np.abs(volts) < INFINITE_V)
-        if not over.any():
+        is_overload = ~(np.abs(volts) < INFINITE_V)
+        if not is_overload.any():
             return
-        k = int(np.argmax(over.sum(axis=0)))
+        k = int(np.argmax(is_overload.sum(axis=0)))
         name = list(self.settings.channels)[k]
         raise OverRange(
             f"{self.name}: {name} (input {self.settings.channels[name]}) was beyond its range of "
-            f"{self.settings.range_v:g} V in {over[:, k].sum()} of {len(volts)} readings",
+            f"{self.settings.range_v:g} V in {is_overload[:, k].sum()} of {len(volts)} readings",
             "Check the sensor's supply and wiring, or set a wider range_v in the bench file",
         )
 
-    def _require_no_error(self, when: str) -> None:
+    def _require_no_error(self, occasion: str) -> None:
         """Raises Refused with the first of the instrument's errors; its queue is empty afterwards."""
         errors = list[tuple[int, str]]()
         while len(errors) < MOST_ERRORS and (error := self._error())[0]:
             errors.append(error)
         if errors:
             code, text = errors[0]
-            more = f", and {len(errors) - 1} more" if len(errors) > 1 else ""
-            what = f"{self.name}: reports error {code}, {text}, {when}{more} (SYST:ERR?)"
-            raise Refused(what, HINTS.get(code, HINT), code)
+            others_text = f", and {len(errors) - 1} more" if len(errors) > 1 else ""
+            fault = f"{self.name}: reports error {code}, {text}, {occasion}{others_text} (SYST:ERR?)"
+            raise Refused(fault, HINTS.get(code, HINT), code)
 
     def _error(self) -> tuple[int, str]:
         answer = self._ask("SYST:ERR?")

@@ -66,34 +66,34 @@ class Scanner(Twin):
 
     def answer(self, command: str, now_s: float) -> str | None:
         """Obey a line; the answer to a question."""
-        head, _, rest = command.strip().partition(" ")
+        head, _, arguments = command.strip().partition(" ")
         obey = self._commands.get(head.upper())
         if obey is None:
             self._fail(-113)
             return None
-        return obey(rest, now_s)
+        return obey(arguments, now_s)
 
     @property
     def _commands(self) -> dict[str, Callable[[str, float], str | None]]:
         return {
-            "*IDN?": lambda _rest, _now_s: WHO,
-            "*RST": lambda _rest, _now_s: self._reset(),
-            "*CLS": lambda _rest, _now_s: self._errors.clear(),
-            "SYST:ERR?": lambda _rest, _now_s: self._error(),
-            "ABOR": lambda _rest, _now_s: self._stop(),
-            "CONF:VOLT:DC": lambda rest, _now_s: self._configure(rest),
-            "VOLT:DC:NPLC": lambda _rest, _now_s: None,
-            "ROUT:SCAN": lambda rest, _now_s: self._list(rest),
-            "TRIG:SOUR": lambda _rest, _now_s: None,
-            "SAMP:SOUR": lambda _rest, _now_s: None,
-            "TRIG:TIM": lambda rest, _now_s: self._set_rate(rest),
-            "SAMP:TIM": lambda rest, _now_s: self._set_rate(rest),
-            "TRIG:COUN": lambda rest, _now_s: self._set_count(rest),
-            "SAMP:COUN": lambda rest, _now_s: self._set_count(rest),
-            "INIT": lambda _rest, now_s: self._begin(now_s),
-            "READ?": lambda _rest, now_s: _numbers_text(self._scans(now_s, 0.0, 1, now_s).ravel()),
-            "DATA:POIN?": lambda _rest, _now_s: str(len(self._memory)),
-            "DATA:REM?": lambda rest, _now_s: self._remove(rest),
+            "*IDN?": lambda _arguments, _now_s: WHO,
+            "*RST": lambda _arguments, _now_s: self._reset(),
+            "*CLS": lambda _arguments, _now_s: self._errors.clear(),
+            "SYST:ERR?": lambda _arguments, _now_s: self._error(),
+            "ABOR": lambda _arguments, _now_s: self._stop(),
+            "CONF:VOLT:DC": lambda arguments, _now_s: self._configure(arguments),
+            "VOLT:DC:NPLC": lambda _arguments, _now_s: None,
+            "ROUT:SCAN": lambda arguments, _now_s: self._list(arguments),
+            "TRIG:SOUR": lambda _arguments, _now_s: None,
+            "SAMP:SOUR": lambda _arguments, _now_s: None,
+            "TRIG:TIM": lambda arguments, _now_s: self._set_rate(arguments),
+            "SAMP:TIM": lambda arguments, _now_s: self._set_rate(arguments),
+            "TRIG:COUN": lambda arguments, _now_s: self._set_count(arguments),
+            "SAMP:COUN": lambda arguments, _now_s: self._set_count(arguments),
+            "INIT": lambda _arguments, now_s: self._begin(now_s),
+            "READ?": lambda _arguments, now_s: _numbers_text(self._scans(now_s, 0.0, 1, now_s).ravel()),
+            "DATA:POIN?": lambda _arguments, _now_s: str(len(self._memory)),
+            "DATA:REM?": lambda arguments, _now_s: self._remove(arguments),
         }
 
     def _reset(self) -> None:
@@ -104,31 +104,31 @@ class Scanner(Twin):
     def _stop(self) -> None:
         self._start_s, self._taken, self._left = 0.0, 0, 0
 
-    def _configure(self, rest: str) -> None:
+    def _configure(self, arguments: str) -> None:
         self._stop()
-        range_v = float(rest.partition(",")[0])
+        range_v = float(arguments.partition(",")[0])
         if range_v > MOST_RANGE_V:
             self._fail(-222)
             return
         self._range_v = range_v
-        self._list(rest)
+        self._list(arguments)
 
-    def _list(self, rest: str) -> None:
-        self._numbers = sorted(int(k) for k in match[1].split(",")) if (match := LIST.search(rest)) else [0]
+    def _list(self, arguments: str) -> None:
+        self._numbers = sorted(int(k) for k in match[1].split(",")) if (match := LIST.search(arguments)) else [0]
 
-    def _set_rate(self, rest: str) -> None:
-        self._rate_hz = 1 / float(rest)
+    def _set_rate(self, arguments: str) -> None:
+        self._rate_hz = 1 / float(arguments)
 
-    def _set_count(self, rest: str) -> None:
-        self._count = int(rest)
+    def _set_count(self, arguments: str) -> None:
+        self._count = int(arguments)
 
     def _begin(self, now_s: float) -> None:
         self._memory.clear()
         self._start_s, self._taken, self._left = now_s, 0, self._count
         self.advance(now_s)
 
-    def _remove(self, rest: str) -> str | None:
-        if (count := int(rest)) > len(self._memory):
+    def _remove(self, arguments: str) -> str | None:
+        if (count := int(arguments)) > len(self._memory):
             self._fail(-222)
             return None
         return _numbers_text([self._memory.popleft() for _ in range(count)])

@@ -32,12 +32,12 @@ ACCESS = "Ask who manages the IOC for access (its access security file)"
 READ, WRITE = 1, 2  # access rights
 
 
-def channel_access(where: str) -> Any:
+def channel_access(context: str) -> Any:
     """The library caproto. Raises LinkRefused where it is not installed."""
     try:
         import caproto
     except ImportError as error:
-        raise LinkRefused(f"{where}: needs caproto, which is not installed", NO_CAPROTO) from error
+        raise LinkRefused(f"{context}: needs caproto, which is not installed", NO_CAPROTO) from error
     return caproto
 
 
@@ -71,7 +71,7 @@ class Circuit:
         self._circuit: Any = None
         self._channels: dict[str, Any] = {}
 
-    def open(self, names: Sequence[str], who: str, timeout_s: float) -> None:
+    def open(self, names: Sequence[str], device: str, timeout_s: float) -> None:
         """Open the channels of these fields that are not open yet. Raises LinkRefused, LinkTimeout."""
         if missing := [name for name in names if name not in self._channels]:
             self._begin()
@@ -81,52 +81,54 @@ class Circuit:
             def complete(_command: object) -> bool:
                 states = {name: channel.states[self._ca.CLIENT] for name, channel in channels.items()}
                 if absent := [name for name, state in states.items() if state is self._ca.FAILED]:
-                    more = f", and {len(absent) - 1} more are not there" if absent[1:] else ""
-                    raise LinkRefused(f"{who}: the server {self.link.url} has no {absent[0]}{more}", ELSEWHERE)
+                    others_text = f", and {len(absent) - 1} more are not there" if absent[1:] else ""
+                    raise LinkRefused(
+                        f"{device}: the server {self.link.url} has no {absent[0]}{others_text}", ELSEWHERE
+                    )
                 return all(state is self._ca.CONNECTED for state in states.values())
 
-            self._until(complete, missing[0], who, timeout_s)
+            self._receive_until(complete, missing[0], device, timeout_s)
             self._channels |= channels
 
-    def read(self, names: Sequence[str], who: str, timeout_s: float) -> list[Reading]:
+    def read(self, names: Sequence[str], device: str, timeout_s: float) -> list[Reading]:
         """The values of these fields, all asked for at once. Raises LinkTimeout, LinkRefused, Refused, BadFrame."""
         kind = self._ca.ChannelType.TIME_DOUBLE
-        return [self._decoded(_reading, answer, who) for answer in self._asked(names, kind, who, timeout_s)]
+        return [self._decode(_reading, answer, device) for answer in self._request(names, kind, device, timeout_s)]
 
-    def units(self, name: str, who: str, timeout_s: float) -> str:
+    def units(self, name: str, device: str, timeout_s: float) -> str:
         """The engineering units of a record (EGU)."""
-        (answer,) = self._asked([name], self._ca.ChannelType.GR_DOUBLE, who, timeout_s)
-        return str(self._decoded(_units, answer, who))
+        (answer,) = self._request([name], self._ca.ChannelType.GR_DOUBLE, device, timeout_s)
+        return str(self._decode(_units, answer, device))
 
-    def write(self, name: str, value: float, who: str, timeout_s: float) -> None:
+    def write(self, name: str, value: float, device: str, timeout_s: float) -> None:
         """Write a field and do not wait until its record is processed: a motor's is so at the end of its move."""
-        self.open([name], who, timeout_s)
+        self.open([name], device, timeout_s)
         channel = self._channels[name]
         if not (channel.access_rights or 0) & WRITE:
             raise Refused(
-                f"{who}: the IOC does not let this computer and user write {name}",
+                f"{device}: the IOC does not let this computer and user write {name}",
                 ACCESS,
                 int(channel.access_rights or 0),
             )
         self._send(channel.write([value], notify=False, data_type=self._ca.ChannelType.DOUBLE))
 
-    def _asked(self, names: Sequence[str], kind: Any, who: str, timeout_s: float) -> list[Any]:
-        self.open(names, who, timeout_s)
+    def _request(self, names: Sequence[str], kind: Any, device: str, timeout_s: float) -> list[Any]:
+        self.open(names, device, timeout_s)
         requests = [self._channels[name].read(data_type=kind, data_count=1) for name in names]
         self._send(*requests)
-        heard: dict[int, Any] = {}
+        replies: dict[int, Any] = {}
 
         def complete(command: Any) -> bool:
             if isinstance(command, self._ca.ReadNotifyResponse):
-                heard[command.ioid] = command
-            return all(request.ioid in heard for request in requests)
+                replies[command.ioid] = command
+            return all(request.ioid in replies for request in requests)
 
-        self._until(complete, names[0], who, timeout_s)
-        answers = [heard[request.ioid] for request in requests]
+        self._receive_until(complete, names[0], device, timeout_s)
+        answers = [replies[request.ioid] for request in requests]
         for name, answer in zip(names, answers, strict=True):
-            if not (status := self._decoded(_status, answer, who)).success:
+            if not (status := self._decode(_status, answer, device)).success:
                 code = int(status.code_with_severity)
-                raise Refused(f"{who}: the IOC does not let this program read {name} ({status.name})", ACCESS, code)
+                raise Refused(f"{device}: the IOC does not let this program read {name} ({status.name})", ACCESS, code)
         return answers
 
     def _begin(self) -> None:
@@ -148,7 +150,7 @@ class Circuit:
             self._forget()
             raise
 
-    def _until(self, complete: Any, what: str, who: str, timeout_s: float) -> None:
+    def _receive_until(self, complete: Any, field: str, device: str, timeout_s: float) -> None:
         """Take in messages until one of them makes `complete` true."""
         deadline = self.link.clock.now() + timeout_s
         while True:
@@ -160,46 +162,46 @@ class Circuit:
                 raise
             if not data:
                 self._forget()
-                raise LinkTimeout(f"{who}: no answer to {what} within {timeout_s:g} s on {self.link.url}", SILENT)
-            if self._taken(data, complete, who):
+                raise LinkTimeout(f"{device}: no answer to {field} within {timeout_s:g} s on {self.link.url}", SILENT)
+            if self._take(data, complete, device):
                 return
 
-    def _taken(self, data: bytes, complete: Any, who: str) -> bool:
+    def _take(self, data: bytes, complete: Any, device: str) -> bool:
         try:
             commands, _ = self._circuit.recv(data)
             for command in commands:
                 self._circuit.process_command(command)
             for command in commands:
-                self._require_no_error(command, who)
+                self._require_no_error(command, device)
             return any(complete(command) for command in commands)
         except DriverError:
             raise
         except Exception as error:  # caproto has many, and those of struct and ctypes
-            raise self._not_ours(f"{len(data)} bytes", who, error) from error
+            raise self._not_ours(f"{len(data)} bytes", device, error) from error
 
-    def _decoded(self, take: Callable[[Any], Any], answer: Any, who: str) -> Any:
+    def _decode(self, take: Callable[[Any], Any], answer: Any, device: str) -> Any:
         """What `take` finds in a message; caproto unpacks it only now. Raises BadFrame."""
         try:
             return take(answer)
         except Exception as error:
-            raise self._not_ours("a message", who, error) from error
+            raise self._not_ours("a message", device, error) from error
 
-    def _not_ours(self, what: str, who: str, error: Exception) -> BadFrame:
+    def _not_ours(self, content: str, device: str, error: Exception) -> BadFrame:
         self._forget()
         reason = str(error) or type(error).__name__
         return BadFrame(
-            f"{who}: {what} from {self.link.url} cannot be read as Channel Access ({reason})",
+            f"{device}: {content} from {self.link.url} cannot be read as Channel Access ({reason})",
             "Check that the address is that of an EPICS server",
         )
 
-    def _require_no_error(self, command: Any, who: str) -> None:
+    def _require_no_error(self, command: Any, device: str) -> None:
         if isinstance(command, self._ca.ErrorResponse):
             status = _status(command)
             words = command.error_message.decode("latin-1").strip("\0 ")
-            raise Refused(f"{who}: the IOC reports {status.name} ({words})", SILENT, int(status.code_with_severity))
+            raise Refused(f"{device}: the IOC reports {status.name} ({words})", SILENT, int(status.code_with_severity))
         if isinstance(command, self._ca.ServerDisconnResponse):
             self._forget()
-            raise LinkRefused(f"{who}: the IOC has removed the record", "Restart the IOC, then resume the run")
+            raise LinkRefused(f"{device}: the IOC has removed the record", "Restart the IOC, then resume the run")
 
     def _forget(self) -> None:
         """Reconnect at the next request: the answers on this connection can no longer be assigned to requests."""
@@ -210,9 +212,9 @@ class Circuit:
 class Records:
     """The fields of the records with one beginning of a name, for the instrument `who`."""
 
-    def __init__(self, circuit: Circuit, beginning: str, who: str, timeout_s: float) -> None:
+    def __init__(self, circuit: Circuit, beginning: str, device: str, timeout_s: float) -> None:
         self.beginning = beginning
-        self._circuit, self._who, self._timeout_s = circuit, who, timeout_s
+        self._circuit, self._who, self._timeout_s = circuit, device, timeout_s
 
     def read(self, *fields: str) -> list[Reading]:
         """The values of fields, all asked for at once. Raises LinkTimeout, LinkRefused, Refused, BadFrame."""
@@ -232,12 +234,12 @@ class Records:
         return self._circuit.units(self.beginning + field, self._who, self._timeout_s)
 
 
-def found_server(record: str, who: str, timeout_s: float) -> tuple[str, int]:
+def found_server(record: str, device: str, timeout_s: float) -> tuple[str, int]:
     """Host and port of the server that has a record, by a search on the network. Raises LinkRefused.
 
     The addresses are those of EPICS_CA_ADDR_LIST, and the broadcast address unless EPICS_CA_AUTO_ADDR_LIST is NO.
     """
-    ca = channel_access(f"{who}: {record}")
+    ca = channel_access(f"{device}: {record}")
     broadcaster, number = ca.Broadcaster(our_role=ca.CLIENT), 1
     addresses = ca.get_client_address_list()
     question = broadcaster.send(
@@ -252,8 +254,10 @@ def found_server(record: str, who: str, timeout_s: float) -> tuple[str, int]:
             if answer := _answer(udp, broadcaster, number, time.monotonic() + timeout_s / SEARCHES):
                 return answer
     places = ", ".join(f"{host}:{port}" for host, port in addresses)
-    why = f"; {unreachable[0]}" if unreachable else ""
-    raise LinkRefused(f"{who}: no EPICS server has {record} (asked {places} for {timeout_s:g} s{why})", ELSEWHERE)
+    cause_text = f"; {unreachable[0]}" if unreachable else ""
+    raise LinkRefused(
+        f"{device}: no EPICS server has {record} (asked {places} for {timeout_s:g} s{cause_text})", ELSEWHERE
+    )
 
 
 def _sent(udp: socket.socket, question: bytes, address: tuple[str, int]) -> OSError | None:

@@ -56,12 +56,12 @@ def records_port(listen: str, hosts: Sequence[RecordHost]) -> Port:
             session = circuits[connection] = Session(hosts)
         data, connection.inbox[:] = bytes(connection.inbox), b""
         try:
-            said = session.answers(data, now_s)
+            reply = session.answers(data, now_s)
         except ValueError:
             connection.ended = True  # as a server does with a stranger
             return
-        if said:
-            connection.send(said, now_s + THINKING_S + port.timing.line_s(len(said)))
+        if reply:
+            connection.send(reply, now_s + THINKING_S + port.timing.line_s(len(reply)))
 
     port.answer = answer
     return port
@@ -94,7 +94,7 @@ class Session:
         if isinstance(command, ca.VersionRequest):
             return [ca.VersionResponse(ca.DEFAULT_PROTOCOL_VERSION)]
         if isinstance(command, ca.CreateChanRequest):
-            return self._opened(command)
+            return self._open_channel(command)
         if isinstance(command, ca.ReadNotifyRequest):
             return [self._read(command, now_s)]
         if isinstance(command, ca.WriteRequest):
@@ -104,7 +104,7 @@ class Session:
             return [ca.EchoResponse()]
         return []
 
-    def _opened(self, command: Any) -> list[Any]:
+    def _open_channel(self, command: Any) -> list[Any]:
         name = command.name.decode("latin-1") if isinstance(command.name, bytes) else command.name
         for host in self._hosts:
             if host.has(name):

@@ -109,29 +109,29 @@ class Faults:
         """Count a request."""
         self._asked += 1
 
-    def size(self, what: str, now_s: float) -> float | None:
+    def size(self, name: str, now_s: float) -> float | None:
         """The size of a fault that is there now; None where it is not."""
         for fault, size in self._faults:
             active = fault.has_begun(now_s, self._asked) and not fault.has_ended(now_s, self._asked)
-            if fault.what == what and active and fault.happens(now_s, self._asked):
+            if fault.what == name and active and fault.happens(now_s, self._asked):
                 return size
         return None
 
-    def once(self, what: str, now_s: float) -> Strike | None:
+    def once(self, name: str, now_s: float) -> Strike | None:
         """A fault that has begun and is not reported yet."""
         for k, (fault, size) in enumerate(self._faults):
             begun = k not in self._struck and fault.has_begun(now_s, self._asked)
-            if fault.what == what and begun and fault.happens(self._asked):
+            if fault.what == name and begun and fault.happens(self._asked):
                 self._struck.append(k)
                 return Strike(size, now_s if fault.after else fault.at_s)
         return None
 
-    def held(self, what: str, now_s: float, value: Any) -> Any:
+    def held(self, name: str, now_s: float, value: Any) -> Any:
         """`value`, which is JSON-able; as long as the fault is there, the one that it began with."""
-        if self.size(what, now_s) is None:
-            self._held.pop(what, None)
+        if self.size(name, now_s) is None:
+            self._held.pop(name, None)
             return value
-        return self._held.setdefault(what, value)
+        return self._held.setdefault(name, value)
 
     def state(self) -> dict[str, Any]:
         """What a resumed run needs, JSON-able."""
@@ -151,7 +151,7 @@ BABBLE_S = 60.0  # how long it babbles for one message
 MOST_PIECES = 1000  # of a message
 
 
-class Said(NamedTuple):
+class Message(NamedTuple):
     """A message of an instrument, and when its last byte is through."""
 
     data: bytes
@@ -171,84 +171,84 @@ class Wire:
     of_unit: Callable[[bytes, int], bytes] = lambda data, _: bytes([(data[0] + 1) % 256]) + data[1:]
 
 
-Effect = Callable[[Said, float, Wire], list[Said]]
+Effect = Callable[[Message, float, Wire], list[Message]]
 
 
-def nothing(_said: Said, _size: float, _wire: Wire) -> list[Said]:
+def drop_message(_message: Message, _size: float, _wire: Wire) -> list[Message]:
     """Nothing arrives."""
     return []
 
 
-def the_end(sent: Said, _size: float, _wire: Wire) -> list[Said]:
+def the_end(sent: Message, _size: float, _wire: Wire) -> list[Message]:
     """The connection closes in place of the answer."""
-    return [Said(END, sent.due_s)]
+    return [Message(END, sent.due_s)]
 
 
-def later(sent: Said, size: float, _wire: Wire) -> list[Said]:
+def later(sent: Message, size: float, _wire: Wire) -> list[Message]:
     """The same, `size` s later."""
-    return [Said(sent.data, sent.due_s + size)]
+    return [Message(sent.data, sent.due_s + size)]
 
 
-def noise(sent: Said, size: float, _wire: Wire) -> list[Said]:
+def noise(sent: Message, size: float, _wire: Wire) -> list[Message]:
     """So many other bytes; the same ones for the same message."""
-    return [Said(Random(sent.data).randbytes(int(size)), sent.due_s)]  # noqa: S311 - nothing is secret
+    return [Message(Random(sent.data).randbytes(int(size)), sent.due_s)]  # noqa: S311 - nothing is secret
 
 
-def babble(sent: Said, size: float, wire: Wire) -> list[Said]:
+def babble(sent: Message, size: float, wire: Wire) -> list[Message]:
     """A byte of noise every `size` s."""
     (long,) = noise(sent, BABBLE_S / size, wire)
-    return [Said(long.data[k : k + 1], sent.due_s + k * size) for k in range(len(long.data))]
+    return [Message(long.data[k : k + 1], sent.due_s + k * size) for k in range(len(long.data))]
 
 
-def truncated(sent: Said, size: float, _wire: Wire) -> list[Said]:
+def truncated(sent: Message, size: float, _wire: Wire) -> list[Message]:
     """The first `size` bytes of it."""
-    return [Said(sent.data[: int(size)], sent.due_s)]
+    return [Message(sent.data[: int(size)], sent.due_s)]
 
 
-def merged(sent: Said, _size: float, _wire: Wire) -> list[Said]:
+def merged(sent: Message, _size: float, _wire: Wire) -> list[Message]:
     """The message and its copy in one piece."""
-    return [Said(2 * sent.data, sent.due_s)]
+    return [Message(2 * sent.data, sent.due_s)]
 
 
-def trickled(sent: Said, size: float, _wire: Wire) -> list[Said]:
+def trickled(sent: Message, size: float, _wire: Wire) -> list[Message]:
     """Byte by byte, one every `size` s; a long one in MOST_PIECES equal pieces."""
     step = -(-len(sent.data) // MOST_PIECES)
     starts = range(0, len(sent.data), step)
-    return [Said(sent.data[k : k + step], sent.due_s + place * size) for place, k in enumerate(starts)]
+    return [Message(sent.data[k : k + step], sent.due_s + place * size) for place, k in enumerate(starts)]
 
 
-def after_noise(sent: Said, size: float, wire: Wire) -> list[Said]:
+def after_noise(sent: Message, size: float, wire: Wire) -> list[Message]:
     """The message behind so many other bytes, in one piece."""
-    return [Said(noise(sent, size, wire)[0].data + sent.data, sent.due_s)]
+    return [Message(noise(sent, size, wire)[0].data + sent.data, sent.due_s)]
 
 
-def before_noise(sent: Said, size: float, wire: Wire) -> list[Said]:
+def before_noise(sent: Message, size: float, wire: Wire) -> list[Message]:
     """The message before so many other bytes, in one piece."""
-    return [Said(sent.data + noise(sent, size, wire)[0].data, sent.due_s)]
+    return [Message(sent.data + noise(sent, size, wire)[0].data, sent.due_s)]
 
 
-def flipped(sent: Said, size: float, wire: Wire) -> list[Said]:
+def flip_bit(sent: Message, size: float, wire: Wire) -> list[Message]:
     """One bit turned over; on TCP the segment comes again."""
     if wire.mends:
         return later(sent, MENDED_S, wire)
-    byte, bit = divmod(int(size) % (8 * len(sent.data)), 8)
+    byte, bit_number = divmod(int(size) % (8 * len(sent.data)), 8)
     data = bytearray(sent.data)
-    data[byte] ^= 1 << bit
-    return [Said(bytes(data), sent.due_s)]
+    data[byte] ^= 1 << bit_number
+    return [Message(bytes(data), sent.due_s)]
 
 
-def other_unit(sent: Said, size: float, wire: Wire) -> list[Said]:
+def other_unit(sent: Message, size: float, wire: Wire) -> list[Message]:
     """The message of another unit; on a wire with one instrument, one about something else."""
-    return [Said(wire.of_unit(sent.data, (wire.unit_of(sent.data) or 0) + int(size)), sent.due_s)]
+    return [Message(wire.of_unit(sent.data, (wire.unit_of(sent.data) or 0) + int(size)), sent.due_s)]
 
 
 EFFECTS: dict[str, tuple[Kind, Effect]] = {
-    "silence": (Kind("receives and sends nothing, as with an unplugged cable"), nothing),
+    "silence": (Kind("receives and sends nothing, as with an unplugged cable"), drop_message),
     "disconnect": (
         Kind("closes the connection at the next message; it can be opened again"),
         the_end,
     ),
-    "lost-answers": (Kind("executes commands, but its answers are lost"), nothing),
+    "lost-answers": (Kind("executes commands, but its answers are lost"), drop_message),
     "delay": (Kind("its answers come late", 0.7, "s", least=0), later),
     "garbage": (Kind("sends random bytes instead of an answer", 8, "byte", least=1), noise),
     "garbage-before": (Kind("random bytes come before its answer", 3, "byte", least=1), after_noise),
@@ -260,21 +260,21 @@ EFFECTS: dict[str, tuple[Kind, Effect]] = {
     "truncated": (Kind("only the first bytes of its answer arrive", 4, "byte", least=1), truncated),
     "merged": (Kind("its answer arrives twice in one piece"), merged),
     "trickle": (Kind("its answer arrives byte by byte, at this interval", 0.002, "s", least=0), trickled),
-    "flipped-bit": (Kind("this bit of every answer is inverted; TCP corrects it", 13, "bit", least=0), flipped),
+    "flipped-bit": (Kind("this bit of every answer is inverted; TCP corrects it", 13, "bit", least=0), flip_bit),
     "wrong-unit": (Kind("another unit answers; its number is larger by this", 1), other_unit),
 }
 
 
-def disturbed(sent: Said, faults: Faults, wire: Wire) -> list[Said]:
+def disturb(sent: Message, faults: Faults, wire: Wire) -> list[Message]:
     """What becomes of a message."""
     messages = [sent]
-    for what, (_, effect) in EFFECTS.items() if faults else ():
-        if (size := faults.size(what, sent.due_s)) is not None:
+    for name, (_, effect) in EFFECTS.items() if faults else ():
+        if (size := faults.size(name, sent.due_s)) is not None:
             messages = [part for message in messages for part in _effect(effect, message, size, wire)]
     return messages
 
 
-def _effect(effect: Effect, message: Said, size: float, wire: Wire) -> list[Said]:
+def _effect(effect: Effect, message: Message, size: float, wire: Wire) -> list[Message]:
     """What becomes of one message; of an end, nothing else."""
     return [message] if message.data == END else effect(message, size, wire)
 
@@ -282,8 +282,8 @@ def _effect(effect: Effect, message: Said, size: float, wire: Wire) -> list[Said
 def kinds_of(driver: str) -> dict[str, Kind]:
     """All faults that the twin of a driver can have, by name; those of a wire where it has one."""
     twin = importlib.import_module(f"drivers.{driver}.twin")
-    own: dict[str, Kind] = getattr(twin, "FAULTS", {})
-    return own if twin.LISTEN == PERSON else {what: kind for what, (kind, _) in EFFECTS.items()} | own
+    own_faults: dict[str, Kind] = getattr(twin, "FAULTS", {})
+    return own_faults if twin.LISTEN == PERSON else {name: kind for name, (kind, _) in EFFECTS.items()} | own_faults
 
 
 def faults_of(driver: str, faults: Iterable[Fault]) -> Faults:

@@ -79,10 +79,10 @@ class Gcs:
         return {key.strip(): text.strip() for key, _, text in header}, rows
 
     def _pairs(self, question: str) -> list[tuple[str, str]]:
-        split = [(line, line.partition("=")) for line in self.ask(question)]
-        if wrong := [line for line, (_, equals, _) in split if not equals]:
-            raise self._odd(question, wrong[0])
-        return [(key.strip(), text) for _, (key, _, text) in split]
+        parted = [(line, line.partition("=")) for line in self.ask(question)]
+        if bad_lines := [line for line, (_, equals, _) in parted if not equals]:
+            raise self._odd(question, bad_lines[0])
+        return [(key.strip(), text) for _, (key, _, text) in parted]
 
     def _number(self, question: str, text: str) -> float:
         try:
@@ -99,11 +99,11 @@ class Gcs:
     def _lines(self, question: str) -> list[str]:
         data, deadline = b"", self.link.clock.now() + LONGEST_S
         while not data.endswith(b"\n") or data.endswith(b" \n"):
-            more = self.link.read(TIMEOUT_S)
-            if not more or self.link.clock.now() > deadline:
+            next_bytes = self.link.read(TIMEOUT_S)
+            if not next_bytes or self.link.clock.now() > deadline:
                 self._owed = True
                 raise self._silent(question, data)
-            data += more
+            data += next_bytes
         return [line.rstrip() for line in data.decode(LATIN).splitlines()]
 
     def _silent(self, question: str, data: bytes) -> LinkTimeout | BadFrame:

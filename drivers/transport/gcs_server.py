@@ -73,9 +73,9 @@ def groups(arguments: Sequence[str], size: int) -> list[Sequence[str]]:
     return [arguments[k : k + size] for k in range(0, len(arguments), size)]
 
 
-def one_of(text: str, known: Iterable[str], code: int) -> str:
+def one_of(text: str, allowed: Iterable[str], code: int) -> str:
     """`text`, refused with `code` unless it is known."""
-    if text not in known:
+    if text not in allowed:
         raise Refusal(code)
     return text
 
@@ -85,7 +85,7 @@ def number(text: str) -> float:
     return _converted(float, text)
 
 
-def whole(text: str, low: int, high: float) -> int:
+def parse_integer(text: str, low: int, high: float) -> int:
     """An integer within its bounds, in decimal or as 0x hexadecimal."""
     value = _converted(lambda digits: int(digits, 0), text)
     if not low <= value <= high:

@@ -45,13 +45,13 @@ class LinkLines:
     def query(self, command: str, timeout_s: float) -> str:
         self._link.discard()  # a late answer to an earlier question
         self.write(command)
-        heard, deadline = b"", self._link.clock.now() + timeout_s
-        while b"\n" not in heard and len(heard) < LONGEST:
+        received, deadline = b"", self._link.clock.now() + timeout_s
+        while b"\n" not in received and len(received) < LONGEST:
             left_s = deadline - self._link.clock.now()
-            if left_s <= 0 or not (more := self._link.read(left_s)):
+            if left_s <= 0 or not (next_bytes := self._link.read(left_s)):
                 raise _silence(self._name, command, self._link.url, timeout_s)
-            heard += more
-        return _text(heard.partition(b"\n")[0], self._name, command)
+            received += next_bytes
+        return _text(received.partition(b"\n")[0], self._name, command)
 
 
 class VisaLines:
@@ -65,7 +65,7 @@ class VisaLines:
         self._url, self._clock, self._name, self._tap = url, clock, name, tap
         self._visa = _pyvisa(f"{name}: {url.text}")
         self._closed = False
-        self._resource: Any = self._opened()
+        self._resource: Any = self._open()
 
     def write(self, command: str) -> None:
         try:
@@ -80,10 +80,10 @@ class VisaLines:
             session.timeout = 1000 * timeout_s
             session.write(command)
             self._note("sent", command)
-            heard = session.read_raw()
+            received = session.read_raw()
         except (self._visa.Error, OSError) as error:
             raise self._failed(error, command, timeout_s) from error
-        text = _text(bytes(heard).rstrip(b"\r\n"), self._name, command)
+        text = _text(bytes(received).rstrip(b"\r\n"), self._name, command)
         self._note("heard", text)
         return text
 
@@ -96,18 +96,18 @@ class VisaLines:
         if self._closed:
             raise LinkRefused(f"{self._name}: {self._url.text}: is closed", "Connect again")
         if self._resource is None:
-            self._resource = self._opened()
+            self._resource = self._open()
         return self._resource
 
-    def _opened(self) -> Any:
+    def _open(self) -> Any:
         try:
             resource = self._visa.ResourceManager(self._url.library).open_resource(self._url.path)
         except Exception as error:  # each backend has its own: no such interface, host, bus, library
             remedy = (
                 "`pyvisa-info` lists the interfaces that PyVISA can open, and the libraries that are missing for others"
             )
-            where = f"{self._name}: {self._url.text}"
-            raise LinkRefused(f"{where}: cannot be opened ({error})", f"{SILENT}; {remedy}") from error
+            context = f"{self._name}: {self._url.text}"
+            raise LinkRefused(f"{context}: cannot be opened ({error})", f"{SILENT}; {remedy}") from error
         resource.read_termination = resource.write_termination = "\n"
         return resource
 
@@ -134,12 +134,12 @@ class VisaLines:
             self._tap(self._clock.now(), self._name, direction, text.encode("ascii") + b"\n")
 
 
-def _pyvisa(where: str) -> Any:
+def _pyvisa(context: str) -> Any:
     try:
         import pyvisa
         import pyvisa_py  # noqa: F401 - PyVISA finds it by its name; without it the message would come later
     except ImportError as error:
-        raise LinkRefused(f"{where}: needs PyVISA, and {error.name} is not installed", NO_PYVISA) from error
+        raise LinkRefused(f"{context}: needs PyVISA, and {error.name} is not installed", NO_PYVISA) from error
     return pyvisa
 
 

@@ -79,7 +79,7 @@ class Link:
         self._parsed, self._place = url, f"{name}: {url.text}" if name else url.text
         self.users, self._tap = [name] if name else [], tap  # instruments whose wire it is
         self._closed = False
-        self._line: Connected | None = self._opened()
+        self._line: Connected | None = self._connect()
 
     def write(self, data: bytes) -> None:
         """Send all of `data`; raises LinkRefused when the connection is gone."""
@@ -87,7 +87,7 @@ class Link:
         try:
             line.sent += line.port.write(data)
         except LOST as error:
-            raise self._lost(error) from error
+            raise self._connection_lost(error) from error
         if self._tap:
             self._tap(self.clock.now(), self._names, "sent", data)
 
@@ -99,11 +99,11 @@ class Link:
         try:
             data = line.port.read()
         except LOST as error:
-            raise self._lost(error) from error
+            raise self._connection_lost(error) from error
         if not data and line.lossy:  # an empty datagram, or a damaged one
             return b""
         if not data:
-            raise self._lost("the instrument closed it")
+            raise self._connection_lost("the instrument closed it")
         line.received += len(data)
         if self._tap:
             self._tap(self.clock.now(), self._names, "heard", data)
@@ -136,7 +136,7 @@ class Link:
         if self._closed:
             raise LinkRefused(f"{self._place}: is closed", "Connect again")
         if self._line is None:
-            self._line = self._opened()
+            self._line = self._connect()
         return self._line
 
     def _drop(self) -> None:
@@ -144,7 +144,7 @@ class Link:
             self._line.port.close()
             self._line = None
 
-    def _opened(self) -> Connected:
+    def _connect(self) -> Connected:
         try:
             line = Connected(_open_port(self._parsed))
         except (*LOST, ValueError) as error:
@@ -152,10 +152,10 @@ class Link:
         self.clock.wait_readable(line, 0.0)  # a simulated clock takes its bearings before the first byte
         return line
 
-    def _lost(self, why: object) -> LinkRefused:
+    def _connection_lost(self, cause: object) -> LinkRefused:
         self._drop()
         return LinkRefused(
-            f"{self._place}: the connection is lost ({why})", "Check cable and power, then connect again"
+            f"{self._place}: the connection is lost ({cause})", "Check cable and power, then connect again"
         )
 
 

@@ -103,8 +103,8 @@ class Bus:
         self._transaction = 0
         self._owed = False  # whether answers to earlier requests may still arrive
 
-    def ask(self, request: ModbusPDU, unit: int, what: str, retries: int = RETRIES) -> ModbusPDU:
-        """The answer of `unit`; `what` begins every error, as in 'alpha: reading register 0x0080 (alarm)'.
+    def ask(self, request: ModbusPDU, unit: int, action: str, retries: int = RETRIES) -> ModbusPDU:
+        """The answer of `unit`; `action` begins every error, as in 'alpha: reading register 0x0080 (alarm)'.
 
         Raises Refused, or after the retries LinkTimeout, BadFrame or WrongUnit.
         """
@@ -113,12 +113,12 @@ class Bus:
         try:
             for _ in range(retries):
                 try:
-                    return self._attempt(request, what)
+                    return self._attempt(request, action)
                 except (LinkTimeout, BadFrame, WrongUnit):
                     self.link.discard(self._url.gap_s)
-            return self._attempt(request, what)
-        except LinkRefused as lost:
-            raise LinkRefused(f"{what}: {lost.what}", lost.remedy) from lost
+            return self._attempt(request, action)
+        except LinkRefused as link_error:
+            raise LinkRefused(f"{action}: {link_error.what}", link_error.remedy) from link_error
 
     def _let_late_answers_pass(self, request: ModbusPDU) -> None:
         """RTU frames do not identify their request: a late answer must not be taken for that of the next request.
@@ -129,55 +129,55 @@ class Bus:
             self.link.discard(LATE_S)
             self._owed = False
 
-    def _attempt(self, request: ModbusPDU, what: str) -> ModbusPDU:
+    def _attempt(self, request: ModbusPDU, action: str) -> ModbusPDU:
         self._transaction = request.transaction_id = self._transaction % 0xFFFF + 1
         self.link.discard()
         self.link.write(self._framer.buildFrame(request))
-        answer = self._receive(what)
+        answer = self._receive(action)
         if self._url.scheme == "serial":  # a converter keeps the silence between frames itself
             self.link.clock.sleep(self._url.gap_s)
         if answer.dev_id != request.dev_id:
             raise WrongUnit(
-                f"{what}: unit {answer.dev_id} answered instead of unit {request.dev_id}",
+                f"{action}: unit {answer.dev_id} answered instead of unit {request.dev_id}",
                 "Give every instrument on the bus a unit id of its own",
             )
         if answer.isError() and answer.function_code & 0x7F == request.function_code:
-            raise _refused(what, answer.exception_code)
+            raise _refusal(action, answer.exception_code)
         if not _fits(request, answer):
-            raise self._bad_frame(what, "received the answer to another request")
+            raise self._bad_frame(action, "received the answer to another request")
         return answer
 
-    def _receive(self, what: str) -> ModbusPDU:
+    def _receive(self, action: str) -> ModbusPDU:
         clock = self.link.clock
         deadline = clock.now() + TIMEOUT_S
         data = b""
-        while (left_s := deadline - clock.now()) > 0 and (more := self.link.read(left_s)):
-            data += more
-            used, answer = self._decode(data, what)
+        while (left_s := deadline - clock.now()) > 0 and (next_bytes := self.link.read(left_s)):
+            data += next_bytes
+            used, answer = self._decode(data, action)
             if answer is not None:
                 return answer
             data = data[used:]
         self._owed = self._url.rtu
         if data:
-            raise self._bad_frame(what, f"received {len(data)} bytes that are not an answer ({data[:16].hex(' ')})")
+            raise self._bad_frame(action, f"received {len(data)} bytes that are not an answer ({data[:16].hex(' ')})")
         raise LinkTimeout(
-            f"{what}: no answer within {TIMEOUT_S:g} s on {self.link.url}",
+            f"{action}: no answer within {TIMEOUT_S:g} s on {self.link.url}",
             f"Check power, cable and unit id, and {self._look_at[0]}",
         )
 
-    def _decode(self, data: bytes, what: str) -> tuple[int, ModbusPDU | None]:
+    def _decode(self, data: bytes, action: str) -> tuple[int, ModbusPDU | None]:
         """Bytes used up, and the answer if there is one; a TCP frame of an earlier request is passed over."""
         expected = 0 if self._url.rtu else self._transaction
         try:
             used, answer = self._framer.handleFrame(data, 0, expected)
         except ModbusException as error:
-            raise self._bad_frame(what, str(error)) from error
+            raise self._bad_frame(action, str(error)) from error
         if self._url.rtu and used and answer is None:
-            raise self._bad_frame(what, f"the checksum of {data[:16].hex(' ')} is wrong")
+            raise self._bad_frame(action, f"the checksum of {data[:16].hex(' ')} is wrong")
         return used, answer
 
-    def _bad_frame(self, what: str, why: str) -> LinkError:
-        return BadFrame(f"{what}: {why}", f"Check {self._look_at[1]}")
+    def _bad_frame(self, action: str, fault: str) -> LinkError:
+        return BadFrame(f"{action}: {fault}", f"Check {self._look_at[1]}")
 
 
 class Unit:
@@ -240,6 +240,6 @@ def _fits(request: ModbusPDU, answer: ModbusPDU) -> bool:
     return isinstance(request, ReadDiscreteInputsRequest) or answer.address == request.address
 
 
-def _refused(what: str, code: int) -> Refused:
-    why, remedy = REFUSALS.get(code, ("it declined", "Look the code up in the instrument's manual"))
-    return Refused(f"{what}: exception {code}, {why}", remedy, code)
+def _refusal(action: str, code: int) -> Refused:
+    explanation, remedy = REFUSALS.get(code, ("it declined", "Look the code up in the instrument's manual"))
+    return Refused(f"{action}: exception {code}, {explanation}", remedy, code)

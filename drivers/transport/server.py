@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from drivers.transport.address import UDP, Address, Url
-from drivers.transport.faults import END, Faults, Said, Wire, disturbed
+from drivers.transport.faults import END, Faults, Message, Wire, disturb
 from drivers.transport.link import LARGEST, connection_key, datagram_key
 
 NO_FAULTS = Faults()
@@ -50,7 +50,7 @@ class Connection:
     """One client: bytes that came, and bytes that go out when they are due."""
 
     def __init__(
-        self, fileno: int, key: str, close: Callable[[], None], leaving: Callable[[Said], Iterable[Said]]
+        self, fileno: int, key: str, close: Callable[[], None], leaving: Callable[[Message], Iterable[Message]]
     ) -> None:
         self.fileno, self.key, self.close = fileno, key, close
         self.inbox = bytearray()
@@ -86,7 +86,7 @@ class Connection:
         if not data:
             return
         self._last_s = max(self._last_s, due_s)
-        pieces = list(self._leaving(Said(data, self._last_s)))
+        pieces = list(self._leaving(Message(data, self._last_s)))
         for piece in pieces:
             heapq.heappush(self._outbox, (piece.due_s, next(self._order), piece.data))
         if pieces and b"".join(piece.data for piece in pieces) == data:  # what is only late is not overtaken
@@ -98,11 +98,11 @@ class Connection:
         while self._outbox and not self._full and self._outbox[0][0] <= now_s:
             due_s, order, data = heapq.heappop(self._outbox)
             self.ended = self.ended or data == END
-            written = self._write(data)
-            self.emitted += written
-            if written < len(data):
+            count = self._write(data)
+            self.emitted += count
+            if count < len(data):
                 self._full = True
-                heapq.heappush(self._outbox, (due_s, order, data[written:]))
+                heapq.heappush(self._outbox, (due_s, order, data[count:]))
 
     def due_s(self) -> float:
         """When it must write next; never while the client does not read."""
@@ -129,10 +129,10 @@ class Datagrams(Connection):
     """A UDP socket: its client is at `to`, or is the last who sent something."""
 
     def __init__(
-        self, own: socket.socket, to: tuple[str, int] | None, leaving: Callable[[Said], Iterable[Said]]
+        self, udp_socket: socket.socket, to: tuple[str, int] | None, leaving: Callable[[Message], Iterable[Message]]
     ) -> None:
-        super().__init__(own.fileno(), datagram_key(to[1]) if to else "", own.close, leaving)
-        self._socket, self._fixed, self._client = own, to, to
+        super().__init__(udp_socket.fileno(), datagram_key(to[1]) if to else "", udp_socket.close, leaving)
+        self._socket, self._fixed, self._client = udp_socket, to, to
         self._earlier: dict[str, tuple[int, int]] = {}  # clients before this one
 
     def read(self, now_s: float, patience_s: float) -> bool:  # noqa: ARG002 - a datagram is whole
@@ -178,13 +178,13 @@ class Port:
     """
 
     def __init__(
-        self, listen: str, answer: Callable[[Connection, float], None] | None = None, held: int | None = None
+        self, listen: str, answer: Callable[[Connection, float], None] | None = None, capacity: int | None = None
     ) -> None:
         self.timing = Url.parse(listen)
         self.wire = Wire(mends=self.timing.scheme == "tcp")
         self._faults: dict[int, Faults] = {}  # by unit
         self.connections: dict[int, Connection] = {}
-        self.answer, self._held = answer or _ignore, held
+        self.answer, self._held = answer or _ignore, capacity
         self._socket: socket.socket | None = None
         if self.timing.scheme == "pty":
             self.url = self._open_pty()
@@ -194,8 +194,8 @@ class Port:
             self.url = self._listen()
 
     def filenos(self) -> list[int]:
-        own = [self._socket.fileno()] if self._socket else []
-        return [*own, *self.connections]
+        listening = [self._socket.fileno()] if self._socket else []
+        return [*listening, *self.connections]
 
     def emit(self, now_s: float) -> None:
         for connection in list(self.connections.values()):
@@ -210,7 +210,7 @@ class Port:
         connection = self.connections[fileno]
         if not connection.read(now_s, SILENCE_S if self.timing.rtu else math.inf):
             self._drop(connection)
-        elif self._hears(connection, now_s):
+        elif self._accepts_request(connection, now_s):
             self.answer(connection, now_s)
 
     def afflict(self, unit: int, faults: Faults) -> None:
@@ -238,7 +238,7 @@ class Port:
         del self.connections[connection.fileno]
         connection.close()
 
-    def _hears(self, connection: Connection, now_s: float) -> bool:
+    def _accepts_request(self, connection: Connection, now_s: float) -> bool:
         """Whether a request reaches the instrument."""
         if not (faults := self._faults_of(bytes(connection.inbox))):
             return True
@@ -250,8 +250,8 @@ class Port:
             connection.inbox.clear()
         return bool(connection.inbox)
 
-    def _leaving(self, sent: Said) -> list[Said]:
-        return disturbed(sent, self._faults_of(sent.data), self.wire)
+    def _leaving(self, sent: Message) -> list[Message]:
+        return disturb(sent, self._faults_of(sent.data), self.wire)
 
     def _faults_of(self, message: bytes) -> Faults:
         """Those of the unit that a message is to or from; on a wire of one instrument, its own."""
@@ -278,14 +278,14 @@ class Port:
 
     def _open_datagrams(self) -> str:
         """A UDP socket, which sends to an address, or listens at one; the url is that of the other end."""
-        own, sends = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), self.timing.scheme == "udpout"
-        own.setblocking(False)
+        udp_socket, sends = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), self.timing.scheme == "udpout"
+        udp_socket.setblocking(False)
         place = (self.timing.host, self.timing.port)
-        own.bind(("", 0) if sends else place)
-        self.connections[own.fileno()] = Datagrams(own, place if sends else None, self._leaving)
+        udp_socket.bind(("", 0) if sends else place)
+        self.connections[udp_socket.fileno()] = Datagrams(udp_socket, place if sends else None, self._leaving)
         if sends:
             return f"udpin://{self.timing.host}:{self.timing.port}"
-        return f"udpout://{self.timing.host}:{own.getsockname()[1]}"
+        return f"udpout://{self.timing.host}:{udp_socket.getsockname()[1]}"
 
     def _open_pty(self) -> str:
         """A raw pseudo-terminal; its far end stays open, so that clients can reconnect."""
@@ -360,8 +360,8 @@ class Server:
         for role, twin in self._twins.items():
             twin.restore(state[role])
         for role, faults in self._faults.items():
-            if (kept := state.get(f"{FAULTS_OF} {role}")) is not None:
-                faults.restore(kept)
+            if (fault_state := state.get(f"{FAULTS_OF} {role}")) is not None:
+                faults.restore(fault_state)
 
     def close(self) -> None:
         """Close all ports; clients see the end of their connections."""

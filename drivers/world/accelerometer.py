@@ -146,8 +146,8 @@ def divided(plates: Plates, overlap: float, u: float) -> float:
 @kernel
 def slope(plates: Plates) -> float:
     """Slope of `divided` at rest, which the factory trims."""
-    whole = 2 + plates.stray_fraction
-    return 2 / whole - (2 * plates.plate_mismatch_fraction / whole) ** 2
+    plate_sum = 2 + plates.stray_fraction
+    return 2 / plate_sum - (2 * plates.plate_mismatch_fraction / plate_sum) ** 2
 
 
 @kernel
@@ -156,8 +156,10 @@ def read_v(
 ) -> float:
     """Output in V for a displaced finger; clipped near the rails."""
     gap_nm = 1e3 * plates.gap_um
-    lost = (plates.height_step_nm + sag_nm) ** 2 - plates.height_step_nm**2
-    overlap = 1 - 1e-6 * plates.overlap_loss_per_um2 * lost + 1e-3 * plates.overlap_slide_per_um * neighbour_nm
+    height_change_nm2 = (plates.height_step_nm + sag_nm) ** 2 - plates.height_step_nm**2
+    overlap = (
+        1 - 1e-6 * plates.overlap_loss_per_um2 * height_change_nm2 + 1e-3 * plates.overlap_slide_per_um * neighbour_nm
+    )
     change = divided(plates, overlap, x_nm / gap_nm) - divided(plates, 1.0, 0.0)
     seen_nm = gap_nm * change / slope(plates)
     seen_nm = math.copysign(max(0.0, abs(seen_nm) - plates.dead_band_nm), seen_nm)

@@ -100,9 +100,9 @@ class Batch:
             places[self._sensor(name)].append(place)
         volts = np.empty((n, len(inputs)))
         for sensor, world in self._worlds.items():
-            mine = places[sensor]
-            outputs = [inputs[place].rpartition(".")[2] for place in mine]
-            volts[:, mine] = world.adc_volts(outputs, start_s, interval_s, n, mine)
+            own_places = places[sensor]
+            outputs = [inputs[place].rpartition(".")[2] for place in own_places]
+            volts[:, own_places] = world.adc_volts(outputs, start_s, interval_s, n, own_places)
         return volts
 
     def state(self) -> dict[str, Any]:

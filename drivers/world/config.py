@@ -118,38 +118,44 @@ class WorldConfig:
             raise UnknownSetting(f"unknown preset {preset!r} of the simulated world", did_you_mean(preset, PRESETS))
         return (cls.ideal() if preset == "ideal" else cls.adxl203()).changed(changes)
 
-    def changed(self, changes: Mapping[str, Any]) -> WorldConfig:
+    def changed_settings(self, changes: Mapping[str, Any]) -> WorldConfig:
         """A copy with nested `changes`; raises as `from_mapping` does."""
-        return changed(self, changes)
+        return changed_settings(self, changes)
 
 
-def changed(settings: Settings, changes: Mapping[str, Any], path: str = "") -> Settings:
+def changed_settings(settings: Settings, changes: Mapping[str, Any], path: str = "") -> Settings:
     """A copy of a (nested) dataclass with nested `changes`."""
     names = [f.name for f in fields(settings)]  # type: ignore[arg-type]
     new = {}
     for name, value in changes.items():
-        where = f"{path}{name}"
+        path_of_name = f"{path}{name}"
         if name not in names:
-            raise UnknownSetting(f"unknown setting {where!r} of the simulated world", did_you_mean(name, names))
-        new[name] = _value(getattr(settings, name), value, where)
+            raise UnknownSetting(f"unknown setting {path_of_name!r} of the simulated world", did_you_mean(name, names))
+        new[name] = _value(getattr(settings, name), value, path_of_name)
     return replace(settings, **new)  # type: ignore[type-var]
 
 
-def _value(present: Any, value: Any, where: str) -> Any:
+def _value(present: Any, value: Any, path: str) -> Any:
     if is_dataclass(present):
         if not isinstance(value, Mapping):
-            raise BadSetting(f"{where} of the simulated world is {value!r}", f"Give a mapping of {_names(present)}")
-        return _noises(present, value, where) if isinstance(present, Noises) else changed(present, value, f"{where}.")
+            raise BadSetting(f"{path} of the simulated world is {value!r}", f"Give a mapping of {_names(present)}")
+        return (
+            _noises(present, value, path)
+            if isinstance(present, Noises)
+            else changed_settings(present, value, f"{path}.")
+        )
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise BadSetting(f"{where} of the simulated world is {value!r}", "Give a finite number")
+        raise BadSetting(f"{path} of the simulated world is {value!r}", "Give a finite number")
     return float(value)
 
 
-def _noises(present: Noises, value: Mapping[str, Any], where: str) -> Noises:
+def _noises(present: Noises, value: Mapping[str, Any], path: str) -> Noises:
     """What names no output is meant for both."""
-    both = {name: each for name, each in value.items() if name not in ("x", "y")}
-    alike = Noises(changed(present.x, both, f"{where}."), changed(present.y, both, f"{where}."))
-    return changed(alike, {name: each for name, each in value.items() if name not in both}, f"{where}.")
+    common = {name: settings for name, settings in value.items() if name not in ("x", "y")}
+    alike = Noises(changed_settings(present.x, common, f"{path}."), changed_settings(present.y, common, f"{path}."))
+    return changed_settings(
+        alike, {name: settings for name, settings in value.items() if name not in common}, f"{path}."
+    )
 
 
 def _names(settings: Any) -> str:

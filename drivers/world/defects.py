@@ -26,10 +26,10 @@ class Defect:
         changes: dict[str, Any] = {}
         for path, value in self.knobs.items():
             for place, share in _places(path, y_share):
-                _put(changes, place, size * share * value)
+                _set_nested(changes, place, size * share * value)
         for path, value in self.fixed.items():
             for place, _ in _places(path, y_share):
-                _put(changes, place, value)
+                _set_nested(changes, place, value)
         return changes
 
 
@@ -41,7 +41,7 @@ def _places(path: str, y_share: float) -> Iterator[tuple[str, float]]:
         yield path.replace("*", "y"), y_share
 
 
-def _put(changes: dict[str, Any], path: str, value: float) -> None:
+def _set_nested(changes: dict[str, Any], path: str, value: float) -> None:
     *sections, name = path.split(".")
     for section in sections:
         changes = changes.setdefault(section, {})

@@ -29,12 +29,12 @@ VOLTAGES = {name: Trim(name) for name in ("supply", "d63")}  # of a converter on
 TRIMS: Mapping[str, Trim] = MappingProxyType(ACCELEROMETER | GYROSCOPE | MAGNETOMETER | VOLTAGES)
 
 
-def trims(names: Sequence[str], known: Mapping[str, Trim]) -> list[Trim]:
+def trims(names: Sequence[str], trims_by_name: Mapping[str, Trim]) -> list[Trim]:
     """The trims of these outputs. Raises UnknownInput for one that the simulated sensor does not have."""
     for name in names:
-        if name not in known:
-            raise UnknownInput(f"the simulated sensor has no output {name!r}", did_you_mean(name, known))
-    return [known[name] for name in names]
+        if name not in trims_by_name:
+            raise UnknownInput(f"the simulated sensor has no output {name!r}", did_you_mean(name, trims_by_name))
+    return [trims_by_name[name] for name in names]
 
 
 def trimmed(volts: Floats, of: Sequence[Trim]) -> Floats:

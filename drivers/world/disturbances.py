@@ -55,9 +55,9 @@ def displacement_nm(world: State, odd: Oddities, beta_deg: float, t_s: float) ->
     pm = odd.seat_pm * world.seat + odd.lid_pm * world.lid_in
     if t_s >= odd.charge_s:
         pm += odd.charge_pm
-    away = (beta_deg - odd.tug_middle_deg + 180) % 360 - 180
-    if abs(away) < odd.tug_half_width_deg:
-        pm += odd.tug_pm * math.cos(math.pi / 2 * away / odd.tug_half_width_deg) ** 2
+    distance_deg = (beta_deg - odd.tug_middle_deg + 180) % 360 - 180
+    if abs(distance_deg) < odd.tug_half_width_deg:
+        pm += odd.tug_pm * math.cos(math.pi / 2 * distance_deg / odd.tug_half_width_deg) ** 2
     return 1e-3 * pm
 
 

@@ -88,8 +88,8 @@ def tick(warmth: Warmth, heat: Heat, oven: Oven, powered: int, t_s: float, step_
     warmth.body_c = lagged(warmth.body_c, warmth.chamber_c, step_s, heat.body_lag_s)
     warmth.board_k = lagged(warmth.board_k, powered * heat.board_rise_k, step_s, heat.board_rise_s)
     warmth.package_k = lagged(warmth.package_k, powered * heat.package_rise_k, step_s, heat.package_rise_s)
-    outside = warmth.body_c + warmth.board_k + heat.thermocouple_offset_k
-    warmth.thermocouple_c = lagged(warmth.thermocouple_c, outside, step_s, heat.thermocouple_lag_s)
+    case_c = warmth.body_c + warmth.board_k + heat.thermocouple_offset_k
+    warmth.thermocouple_c = lagged(warmth.thermocouple_c, case_c, step_s, heat.thermocouple_lag_s)
     warmth.glue_c = min(max(warmth.glue_c, die_c(warmth) - heat.glue_play_k / 2), die_c(warmth) + heat.glue_play_k / 2)
 
 

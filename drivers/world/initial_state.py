@@ -44,10 +44,10 @@ def beginning(config: WorldConfig, numbers: WorldConfig, room: np.random.Generat
 def _stir(world: State, numbers: WorldConfig, slow: np.random.Generator) -> None:
     """White noise of both outputs, then what is slow in each, then what each picks up."""
     outputs = (world.x, numbers.noise.x, world.pickup_x), (world.y, numbers.noise.y, world.pickup_y)
-    for own, _, _ in outputs:
-        own.white = slow.standard_normal()
-    for own, settings, _ in outputs:
-        noise.begin(own, settings, slow)
+    for fluctuation, _, _ in outputs:
+        fluctuation.white = slow.standard_normal()
+    for fluctuation, settings, _ in outputs:
+        noise.begin(fluctuation, settings, slow)
     for _, settings, picked_up in outputs:
         pickup.begin(picked_up, settings, numbers.floor, slow)
 

@@ -46,9 +46,9 @@ def dipole_ut(x_mm: float, y_mm: float, z_mm: float, mx: float, my: float, mz: f
     """Field at the sensor of a moment (mA m^2) that lies at (x, y, z) from it."""
     r = math.sqrt(x_mm * x_mm + y_mm * y_mm + z_mm * z_mm)
     ux, uy, uz = x_mm / r, y_mm / r, z_mm / r
-    along = 3 * (mx * ux + my * uy + mz * uz)
+    radial = 3 * (mx * ux + my * uy + mz * uz)
     size = UT_PER_MOMENT / (r * r * r)
-    return size * (along * ux - mx), size * (along * uy - my), size * (along * uz - mz)
+    return size * (radial * ux - mx), size * (radial * uy - my), size * (radial * uz - mz)
 
 
 @kernel

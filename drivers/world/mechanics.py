@@ -49,13 +49,13 @@ def next_event_ns(world: State, step_ns: int) -> int:
     """The next tick, or the next step of a stage or carriage that moves, or the moment at which it comes to rest."""
     event = (world.ticks + 1) * TICK_NS
     for axis in range(2):
-        rest = world.rest_ns[axis]
-        if world.mechanics_ns < rest:
-            event = min(event, rest, (world.mechanics_ns // step_ns + 1) * step_ns)
+        rest_ns = world.rest_ns[axis]
+        if world.mechanics_ns < rest_ns:
+            event = min(event, rest_ns, (world.mechanics_ns // step_ns + 1) * step_ns)
     for axis in range(3):
-        rest = world.carriage_rest_ns[axis]
-        if world.mechanics_ns < rest:
-            event = min(event, rest, (world.mechanics_ns // SHAKE_NS + 1) * SHAKE_NS)
+        rest_ns = world.carriage_rest_ns[axis]
+        if world.mechanics_ns < rest_ns:
+            event = min(event, rest_ns, (world.mechanics_ns // SHAKE_NS + 1) * SHAKE_NS)
     return event
 
 
@@ -187,9 +187,9 @@ def moved_nm(
 ) -> float:
     """Where a finger ends up, given where the springs alone would balance the loads."""
     stuck = accelerometer.drag_nm(axis.friction, seats_nm, own_nm, neighbour_g)
-    drawn = accelerometer.drawn_aside_nm(axis.springs, neighbour_nm, sag_nm, world.warmth.glue_c - REFERENCE_C)
+    attraction_nm = accelerometer.drawn_aside_nm(axis.springs, neighbour_nm, sag_nm, world.warmth.glue_c - REFERENCE_C)
     charged = 1e-3 * axis.plates.charging_pm * world.charged
-    return own_nm - stuck + drawn + charged + disturbances.stopped_nm(odd, own_nm)
+    return own_nm - stuck + attraction_nm + charged + disturbances.stopped_nm(odd, own_nm)
 
 
 # A magnetometer and a gyroscope on one board, which turn with the table.

@@ -95,13 +95,13 @@ def ticked_v(noise: Noise) -> float:
     return noise.wander_v if noise.wander_s >= TICKED_S else 0.0
 
 
-def begin(own: Fluctuation, noise: Noise, random: Generator) -> None:
+def begin(state: Fluctuation, noise: Noise, random: Generator) -> None:
     """Draw the state of traps and wander; white noise is drawn separately."""
     traps_v = np.array([trap_v(noise, release_s) for release_s in FLICKER_S])
-    own.flicker_v = traps_v * random.standard_normal(len(FLICKER_S))
+    state.flicker_v = traps_v * random.standard_normal(len(FLICKER_S))
     if ticked_v(noise):
-        own.wander_v = ticked_v(noise) * random.standard_normal()
-    settle(own, noise, 0.0)
+        state.wander_v = ticked_v(noise) * random.standard_normal()
+    settle(state, noise, 0.0)
 
 
 @kernel
@@ -116,55 +116,55 @@ def tick(x: Fluctuation, y: Fluctuation, noise: Noises, t_s: float, step_s: floa
 
 
 @kernel
-def release(own: Fluctuation, noise: Noise, step_s: float, random: Generator) -> None:
+def release(state: Fluctuation, noise: Noise, step_s: float, random: Generator) -> None:
     """Let slow traps catch and release."""
     for k in range(len(FLICKER_S)):
         rms, release_s = trap_v(noise, FLICKER_S[k]), FLICKER_S[k]
-        own.flicker_v[k] = wandered(own.flicker_v[k], rms, release_s, step_s, random.standard_normal())
+        state.flicker_v[k] = wandered(state.flicker_v[k], rms, release_s, step_s, random.standard_normal())
 
 
 @kernel
-def stray(own: Fluctuation, noise: Noise, step_s: float, random: Generator) -> None:
+def stray(state: Fluctuation, noise: Noise, step_s: float, random: Generator) -> None:
     """Let the walk walk and the wander wander."""
-    own.walk_v += noise.walk_v_per_sqrt_h * math.sqrt(step_s / HOUR_S) * random.standard_normal()
+    state.walk_v += noise.walk_v_per_sqrt_h * math.sqrt(step_s / HOUR_S) * random.standard_normal()
     if ticked_v(noise) != 0:
-        own.wander_v = wandered(own.wander_v, noise.wander_v, noise.wander_s, step_s, random.standard_normal())
+        state.wander_v = wandered(state.wander_v, noise.wander_v, noise.wander_s, step_s, random.standard_normal())
 
 
 @kernel
-def settle(own: Fluctuation, noise: Noise, t_s: float) -> None:
+def settle(state: Fluctuation, noise: Noise, t_s: float) -> None:
     """Add up what is slow at `t_s`."""
-    own.slow_v = own.flicker_v.sum() + own.walk_v + own.wander_v + noise.ramp_v_per_h * t_s / HOUR_S
+    state.slow_v = state.flicker_v.sum() + state.walk_v + state.wander_v + noise.ramp_v_per_h * t_s / HOUR_S
 
 
 @kernel
-def remember(own: Fluctuation, noise: Noise, gap_ns: int) -> None:
+def remember(state: Fluctuation, noise: Noise, gap_ns: int) -> None:
     """Work out what the filter keeps over `gap_ns`, unless that was asked last."""
-    if gap_ns != own.kept_ns:
-        own.kept_ns = gap_ns
-        own.kept = math.exp(-1e-9 * gap_ns / filter_s(noise))
-        own.fresh = math.sqrt(1 - own.kept * own.kept)
+    if gap_ns != state.kept_ns:
+        state.kept_ns = gap_ns
+        state.kept = math.exp(-1e-9 * gap_ns / filter_s(noise))
+        state.fresh = math.sqrt(1 - state.kept * state.kept)
 
 
 @kernel
-def charge(own: Fluctuation, noise: Noise, volts: float, t_ns: int) -> None:
+def charge(state: Fluctuation, noise: Noise, volts: float, t_ns: int) -> None:
     """Let the capacitor follow the `volts` and the slow noise that have stood at its input until `t_ns`."""
-    gap_ns = t_ns - own.filtered_ns
+    gap_ns = t_ns - state.filtered_ns
     if gap_ns > 0:
-        remember(own, noise, gap_ns)
-        target = volts + own.slow_v
-        own.filtered_v = target + own.kept * (own.filtered_v - target)
-        own.filtered_ns = t_ns
+        remember(state, noise, gap_ns)
+        target = volts + state.slow_v
+        state.filtered_v = target + state.kept * (state.filtered_v - target)
+        state.filtered_ns = t_ns
 
 
 @kernel
-def output_v(own: Fluctuation, noise: Noise, volts: float, t_ns: int, normal: float) -> float:
+def output_v(state: Fluctuation, noise: Noise, volts: float, t_ns: int, normal: float) -> float:
     """What the capacitor holds at `t_ns`, noise included, where `volts` have stood in front of the filter."""
-    charge(own, noise, volts, t_ns)
-    gap_ns = t_ns - own.white_ns
+    charge(state, noise, volts, t_ns)
+    gap_ns = t_ns - state.white_ns
     if gap_ns > 0:
-        remember(own, noise, gap_ns)
-        own.white = own.kept * own.white + own.fresh * normal
-        own.white_ns = t_ns
-    held: float = own.filtered_v + noise.white_v * own.white
-    return held
+        remember(state, noise, gap_ns)
+        state.white = state.kept * state.white + state.fresh * normal
+        state.white_ns = t_ns
+    output: float = state.filtered_v + noise.white_v * state.white
+    return output

@@ -79,37 +79,37 @@ def process(noise: Noise, k: int) -> tuple[float, float]:
     return noise.wander_v if noise.wander_s < TICKED_S else 0.0, noise.wander_s
 
 
-def begin(own: Pickup, noise: Noise, shaking: Floor, random: Generator) -> None:
+def begin(state: Pickup, noise: Noise, shaking: Floor, random: Generator) -> None:
     """Draw the state at time 0; draws nothing for disturbances that are off."""
     amplitudes_v = [process(noise, k)[0] for k in range(FAST)]
-    own.fast_v = np.array([rms * random.standard_normal() if rms else 0.0 for rms in amplitudes_v])
-    own.left_v_s = noise.pulse_v_s * random.random() if noise.pulse_v_s else 0.0
-    own.is_any = int(any(amplitudes_v) or noise.hum_v != 0 or noise.pulse_v_s != 0 or shakes(shaking))
+    state.fast_v = np.array([rms * random.standard_normal() if rms else 0.0 for rms in amplitudes_v])
+    state.left_v_s = noise.pulse_v_s * random.random() if noise.pulse_v_s else 0.0
+    state.is_any = int(any(amplitudes_v) or noise.hum_v != 0 or noise.pulse_v_s != 0 or shakes(shaking))
 
 
 @kernel
-def with_pickup_v(own: Pickup, noise: Noise, shaking: Floor, volts: float, t_ns: int, random: Generator) -> float:
+def with_pickup_v(state: Pickup, noise: Noise, shaking: Floor, volts: float, t_ns: int, random: Generator) -> float:
     """`volts` behind the filter at `t_ns`, with all that is picked up there."""
-    gap_ns = t_ns - own.t_ns
+    gap_ns = t_ns - state.t_ns
     if gap_ns > 0:
-        own.t_ns = t_ns
-        stir(own, noise, gap_ns, random)
-    total_v = volts + own.fast_v.sum() + hum_v(noise, t_ns) + shaken_v(own, noise, shaking, t_ns)
-    return pulsed_v(own, noise, total_v, gap_ns)
+        state.t_ns = t_ns
+        stir(state, noise, gap_ns, random)
+    total_v = volts + state.fast_v.sum() + hum_v(noise, t_ns) + shaken_v(state, noise, shaking, t_ns)
+    return pulsed_v(state, noise, total_v, gap_ns)
 
 
 @kernel
-def stir(own: Pickup, noise: Noise, gap_ns: int, random: Generator) -> None:
+def stir(state: Pickup, noise: Noise, gap_ns: int, random: Generator) -> None:
     """Let `gap_ns` pass for the fast processes."""
-    if gap_ns != own.gap_ns:
-        own.gap_ns = gap_ns
+    if gap_ns != state.gap_ns:
+        state.gap_ns = gap_ns
         for k in range(FAST):
             rms, time_s = process(noise, k)
-            own.kept[k] = math.exp(-1e-9 * gap_ns / time_s)
-            own.fresh_v[k] = rms * math.sqrt(1 - own.kept[k] ** 2)
+            state.kept[k] = math.exp(-1e-9 * gap_ns / time_s)
+            state.fresh_v[k] = rms * math.sqrt(1 - state.kept[k] ** 2)
     for k in range(FAST):
-        if own.fresh_v[k] > 0:
-            own.fast_v[k] = own.kept[k] * own.fast_v[k] + own.fresh_v[k] * random.standard_normal()
+        if state.fresh_v[k] > 0:
+            state.fast_v[k] = state.kept[k] * state.fast_v[k] + state.fresh_v[k] * random.standard_normal()
 
 
 @kernel
@@ -119,22 +119,22 @@ def hum_v(noise: Noise, t_ns: int) -> float:
 
 
 @kernel
-def shaken_v(own: Pickup, noise: Noise, shaking: Floor, t_ns: int) -> float:
+def shaken_v(state: Pickup, noise: Noise, shaking: Floor, t_ns: int) -> float:
     """What the floor's shaking does at the output."""
-    if own.shaken_v == 0:
+    if state.shaken_v == 0:
         return 0.0
     lag = passed(shaking, filter_s(noise))[1]
-    return own.shaken_v * math.sin(2 * math.pi * shaking.shaking_hz * 1e-9 * t_ns - lag)
+    return state.shaken_v * math.sin(2 * math.pi * shaking.shaking_hz * 1e-9 * t_ns - lag)
 
 
 @kernel
-def pulsed_v(own: Pickup, noise: Noise, volts: float, gap_ns: int) -> float:
+def pulsed_v(state: Pickup, noise: Noise, volts: float, gap_ns: int) -> float:
     """`volts` in whole pulses since the last sample, `gap_ns` ago; as they are where there are none."""
     if noise.pulse_v_s == 0 or gap_ns <= 0:
         return volts
-    own.left_v_s += 1e-9 * gap_ns * volts
-    pulses_v_s = math.floor(own.left_v_s / noise.pulse_v_s) * noise.pulse_v_s
-    own.left_v_s -= pulses_v_s
+    state.left_v_s += 1e-9 * gap_ns * volts
+    pulses_v_s = math.floor(state.left_v_s / noise.pulse_v_s) * noise.pulse_v_s
+    state.left_v_s -= pulses_v_s
     return pulses_v_s / (1e-9 * gap_ns)
 
 

@@ -95,27 +95,27 @@ def following(positioner: Positioner, pieces: Floats, command: Command) -> tuple
 
 def _settled(positioner: Positioner, command: Command) -> tuple[float, ...]:
     """What the loop follows a command with, once its beginning is forgotten: later, weaker, turned in phase."""
-    own, driven = 2 * math.pi * positioner.servo_hz, 2 * math.pi * command.frequency_hz
-    answer = own**2 / complex(own**2 - driven**2, 2 * positioner.damping_fraction * own * driven)
-    late_s = 2 * positioner.damping_fraction / own
+    natural, driven = 2 * math.pi * positioner.servo_hz, 2 * math.pi * command.frequency_hz
+    answer = natural**2 / complex(natural**2 - driven**2, 2 * positioner.damping_fraction * natural * driven)
+    late_s = 2 * positioner.damping_fraction / natural
     phase = command.phase_rad + math.atan2(answer.imag, answer.real)
     place = command.at_um - late_s * command.rate_um_s
     return command.start_s, place, command.rate_um_s, command.amplitude_um * abs(answer), driven, phase
 
 
-def _begin(positioner: Positioner, piece: Floats, before: Floats) -> None:
-    """Set the exponential of `piece` so that place and speed go on where `before` is at its start."""
+def _begin(positioner: Positioner, piece: Floats, earlier: Floats) -> None:
+    """Set the exponential of `piece` so that place and speed go on where `earlier` is at its start."""
     decay, swing = _poles(positioner)
-    before_move, here = (motion(positioner, pieces, piece[0]) for pieces in (before, piece[None, :]))
-    piece[6] = before_move[0] - here[0]
-    piece[7] = (before_move[1] - here[1] + decay * piece[6]) / swing
+    before_move, new_move = (motion(positioner, pieces, piece[0]) for pieces in (earlier, piece[None, :]))
+    piece[6] = before_move[0] - new_move[0]
+    piece[7] = (before_move[1] - new_move[1] + decay * piece[6]) / swing
 
 
 @kernel
 def _poles(positioner: Positioner) -> tuple[float, float]:
     """Decay and angular frequency of the loop's own motion, in 1/s."""
-    own = 2 * math.pi * positioner.servo_hz
-    return positioner.damping_fraction * own, own * math.sqrt(1 - positioner.damping_fraction**2)
+    natural = 2 * math.pi * positioner.servo_hz
+    return positioner.damping_fraction * natural, natural * math.sqrt(1 - positioner.damping_fraction**2)
 
 
 @kernel
@@ -152,21 +152,21 @@ def read_um(positioner: Positioner, pieces: Floats, times_s: ArrayLike, salt: in
     """What the position sensor shows at `times_s`: the place, and noise that depends on time and `salt` alone."""
     times = np.atleast_1d(np.asarray(times_s, dtype=np.float64))
     noise = normal_at(np.rint(1e9 * times).astype(np.int64), salt)
-    read: Floats = places_um(positioner, pieces, times) + 1e-3 * positioner.noise_nm * noise
-    return read
+    position_um: Floats = places_um(positioner, pieces, times) + 1e-3 * positioner.noise_nm * noise
+    return position_um
 
 
 def normal_at(times_ns: Ints, salt: int) -> Floats:
     """Standard normal numbers that belong to instants: asked twice, the same. Box-Muller on mixed bits."""
-    bits = times_ns.astype(np.uint64) * np.uint64(2) + _mixed(np.array([salt], dtype=np.uint64))
-    first, second = (1.0 - _mixed(bits + np.uint64(k)) / 2.0**64 for k in range(2))
+    words = times_ns.astype(np.uint64) * np.uint64(2) + _mixed(np.array([salt], dtype=np.uint64))
+    first, second = (1.0 - _mixed(words + np.uint64(k)) / 2.0**64 for k in range(2))
     return np.asarray(np.sqrt(-2 * np.log(first)) * np.cos(2 * math.pi * second))
 
 
-def _mixed(bits: Bits) -> Bits:
+def _mixed(words: Bits) -> Bits:
     """SplitMix64 (Steele, Lea and Flood 2014): neighbouring numbers become unrelated ones."""
-    bits = bits + np.uint64(0x9E3779B97F4A7C15)
-    bits = (bits ^ (bits >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    bits = (bits ^ (bits >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    mixed: Bits = bits ^ (bits >> np.uint64(31))
+    words = words + np.uint64(0x9E3779B97F4A7C15)
+    words = (words ^ (words >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    words = (words ^ (words >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    mixed: Bits = words ^ (words >> np.uint64(31))
     return mixed

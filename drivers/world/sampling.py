@@ -31,14 +31,14 @@ def sample(
 
     Chance is drawn from `room` and `slow` tick by tick, from `fast` sample by sample.
     """
-    done = 0
-    while done < len(times_ns):
-        run_to(world, config, times_ns[done], STEP_NS, room, slow)
-        event_ns, first = next_event_ns(world, STEP_NS), done
-        while done < len(times_ns) and times_ns[done] < event_ns:
-            done += 1
-        convert(world, config, channels, late_ns, times_ns[first:done], fast, volts[first:done])
-        world.now_ns = max(times_ns[done - 1], world.now_ns)
+    count = 0
+    while count < len(times_ns):
+        run_to(world, config, times_ns[count], STEP_NS, room, slow)
+        event_ns, first = next_event_ns(world, STEP_NS), count
+        while count < len(times_ns) and times_ns[count] < event_ns:
+            count += 1
+        convert(world, config, channels, late_ns, times_ns[first:count], fast, volts[first:count])
+        world.now_ns = max(times_ns[count - 1], world.now_ns)
 
 
 @kernel

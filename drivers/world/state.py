@@ -71,7 +71,7 @@ class State:
 
 def to_json(world: State) -> dict[str, JSON]:
     """The record as plain numbers and lists, one mapping for each part."""
-    return _plain(world, State())
+    return _as_json(world, State())
 
 
 def from_json(values: dict[str, Any]) -> State:
@@ -85,10 +85,10 @@ def from_json(values: dict[str, Any]) -> State:
     return world
 
 
-def _plain(part: Any, like: Any) -> dict[str, Any]:
+def _as_json(part: Any, like: Any) -> dict[str, Any]:
     """`part` is a record with the names of the dataclass `like`."""
     pairs = [(f.name, getattr(part, f.name), getattr(like, f.name)) for f in fields(like)]
-    return {name: _plain(own, of) if is_dataclass(of) else np.asarray(own).tolist() for name, own, of in pairs}
+    return {name: _as_json(value, of) if is_dataclass(of) else np.asarray(value).tolist() for name, value, of in pairs}
 
 
 def _fill(part: Any, values: Any, like: Any) -> None:

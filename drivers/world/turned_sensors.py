@@ -137,5 +137,5 @@ def magnetometer_v(
 @kernel
 def hall_v(plate: HallPlate, b_ut: float, warmer_k: float) -> float:
     """Output of one plate in a field along its normal."""
-    lost = plate.bend_per_mt2 * (1e-3 * b_ut) ** 2 - 1e-6 * plate.softening_ppm_per_k * warmer_k
-    return plate.offset_v + plate.volts_per_ut * b_ut / (1 + lost)
+    loss = plate.bend_per_mt2 * (1e-3 * b_ut) ** 2 - 1e-6 * plate.softening_ppm_per_k * warmer_k
+    return plate.offset_v + plate.volts_per_ut * b_ut / (1 + loss)

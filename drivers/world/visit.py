@@ -75,14 +75,14 @@ def poses(
     """Poses from arrays or scalars; the direction follows from the path unless it is given."""
     alpha, beta, mount = (np.asarray(v, dtype=np.float64) for v in (alpha_deg, beta_deg, mount_deg))
     alpha, beta, mount, face = np.broadcast_arrays(np.atleast_1d(alpha), beta, mount, np.asarray(flip, dtype=np.int64))
-    way = path_direction(beta) if direction is None else np.asarray(direction, dtype=np.int64)
-    return Poses(alpha, beta, np.broadcast_to(way, alpha.shape), mount, face)
+    sense = path_direction(beta) if direction is None else np.asarray(direction, dtype=np.int64)
+    return Poses(alpha, beta, np.broadcast_to(sense, alpha.shape), mount, face)
 
 
 def path_direction(beta_deg: Floats) -> Ints:
     """Sign of the move of beta to each pose; where beta stood, that of the move after it."""
-    way = np.sign(np.diff(beta_deg, prepend=beta_deg[:1])).astype(np.int64)
-    return np.where(way == 0, np.append(way[1:], 0), way)
+    sense = np.sign(np.diff(beta_deg, prepend=beta_deg[:1])).astype(np.int64)
+    return np.where(sense == 0, np.append(sense[1:], 0), sense)
 
 
 def plan(visited: Poses, timing: Timing, package: Package, now_s: float, motors_deg: tuple[float, float]) -> Plan:
@@ -92,9 +92,9 @@ def plan(visited: Poses, timing: Timing, package: Package, now_s: float, motors_
     motions, rests, dwells = [], [], []
     for target in zip(visited.alpha_deg.tolist(), visited.beta_deg.tolist(), strict=True):
         for axis, angle in enumerate(target):
-            here = moves[axis].target_deg
-            if angle != here:
-                moves[axis] = Trajectory(now_s, here, angle, timing.speed_deg_s, timing.acceleration_deg_s2)
+            present_deg = moves[axis].target_deg
+            if angle != present_deg:
+                moves[axis] = Trajectory(now_s, present_deg, angle, timing.speed_deg_s, timing.acceleration_deg_s2)
                 tables[axis] = motion(moves[axis])
                 now_s = moves[axis].end_s
         start_s = now_s + timing.settle_s
@@ -176,7 +176,7 @@ def columns(
 
 
 def volts(
-    means: Floats, middle_s: Floats, own: Noise, shaking: Floor, converter: Converter, timing: Timing, random: Any
+    means: Floats, middle_s: Floats, noise: Noise, shaking: Floor, converter: Converter, timing: Timing, random: Any
 ) -> tuple[Floats, Floats]:
     """Mean and sample standard deviation of one output over each dwell; without noise if `random` is None.
 
@@ -185,42 +185,44 @@ def volts(
     still, slow, square, shaken = means.T
     if random is None:
         return bowed_mean_v(converter, still, 0.0), np.zeros(len(means))
-    sinusoids_v, sinusoids_variance = sinusoids(shaken, middle_s, own, shaking, timing)
-    variance = sample_variance(own, converter, timing) + np.maximum(square - slow**2, 0.0) + sinusoids_variance
-    mean_std, relative = spreads(own, converter, timing)
+    sinusoids_v, sinusoids_variance = sinusoids(shaken, middle_s, noise, shaking, timing)
+    variance = sample_variance(noise, converter, timing) + np.maximum(square - slow**2, 0.0) + sinusoids_variance
+    mean_std, relative = spreads(noise, converter, timing)
     mean = still + slow + sinusoids_v + mean_std * random.standard_normal(len(means))
     std = np.sqrt(np.maximum(variance - mean_std**2, 0.0)) * (1 + relative * random.standard_normal(len(means)))
     return bowed_mean_v(converter, mean, variance), np.abs(std)
 
 
-def sinusoids(shaken_v: Floats, middle_s: Floats, own: Noise, shaking: Floor, timing: Timing) -> tuple[Floats, Floats]:
+def sinusoids(
+    shaken_v: Floats, middle_s: Floats, noise: Noise, shaking: Floor, timing: Timing
+) -> tuple[Floats, Floats]:
     """Mean and variance of the hum, and of the floor's shaking of amplitude `shaken_v`, over each dwell."""
     samples = middle_s, timing.interval_s, timing.samples
-    floors = shaking.shaking_hz, pickup.passed(shaking, filter_s(own))[1], *samples
-    hums = own.hum_hz, 0.0, *samples
-    mean = own.hum_v * pickup.sinusoid_mean(*hums) + shaken_v * pickup.sinusoid_mean(*floors)
-    square = own.hum_v**2 * pickup.sinusoid_variance(*hums) + shaken_v**2 * pickup.sinusoid_variance(*floors)
+    floors = shaking.shaking_hz, pickup.passed(shaking, filter_s(noise))[1], *samples
+    hums = noise.hum_hz, 0.0, *samples
+    mean = noise.hum_v * pickup.sinusoid_mean(*hums) + shaken_v * pickup.sinusoid_mean(*floors)
+    square = noise.hum_v**2 * pickup.sinusoid_variance(*hums) + shaken_v**2 * pickup.sinusoid_variance(*floors)
     return np.asarray(mean), np.asarray(square)
 
 
-def sample_variance(own: Noise, converter: Converter, timing: Timing) -> float:
+def sample_variance(noise: Noise, converter: Converter, timing: Timing) -> float:
     """Variance of single samples in V^2: filtered noise, converter, rounding to codes, what is picked up at random."""
-    return own.white_v**2 + _converter_variance(converter) + pickup.random_variance(own, timing.interval_s)
+    return noise.white_v**2 + _converter_variance(converter) + pickup.random_variance(noise, timing.interval_s)
 
 
 def _converter_variance(converter: Converter) -> float:
     return converter.noise_v**2 + converter.step_v**2 / 12
 
 
-def spreads(own: Noise, converter: Converter, timing: Timing) -> tuple[float, float]:
+def spreads(noise: Noise, converter: Converter, timing: Timing) -> tuple[float, float]:
     """Standard deviation of a dwell's mean in V; relative one of a dwell's sample standard deviation.
 
     Neighbouring samples behind the filter correlate by rho: n (1 - rho^2) / (1 + rho^2) of n are independent for the
     spread.
     """
     n, interval_s = timing.samples, timing.interval_s
-    rho = math.exp(-interval_s / filter_s(own))
-    white = mean_variance(own.white_v, filter_s(own), interval_s, n)
-    picked_up = pickup.random_mean_variance(own, interval_s, n)
+    rho = math.exp(-interval_s / filter_s(noise))
+    white = mean_variance(noise.white_v, filter_s(noise), interval_s, n)
+    picked_up = pickup.random_mean_variance(noise, interval_s, n)
     mean_std = math.sqrt(white + _converter_variance(converter) / n + picked_up)
     return mean_std, math.sqrt((1 + rho**2) / (1 - rho**2) / (2 * n))

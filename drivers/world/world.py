@@ -33,9 +33,10 @@ class World:
         self.config = individual(config, seed, place)
         self._numbers = record(self.config)
         self._seed, self._number = seed, place
-        own = [place] if place else []
+        place_key = [place] if place else []
         self._slow, self._fast, self._room = (
-            np.random.Generator(np.random.PCG64(key)) for key in ([seed, 1, *own], [seed, 2, *own], [seed, 3])
+            np.random.Generator(np.random.PCG64(key))
+            for key in ([seed, 1, *place_key], [seed, 2, *place_key], [seed, 3])
         )
         self._world = beginning(self.config, self._numbers, self._room, self._slow)
 
@@ -185,15 +186,15 @@ class World:
         generators: Any = [g.bit_generator.state for g in (self._slow, self._fast, self._room)]
         return {"world": state.to_json(self._world), "generators": generators}
 
-    def restore(self, kept: dict[str, Any]) -> None:
+    def restore(self, saved: dict[str, Any]) -> None:
         """Continue from what `state` gave, in a world of the same configuration and seed.
 
         Raises:
             BadSetting: the state is of another version.
         """
-        self._world = state.from_json(kept["world"])
-        for generator, where in zip((self._slow, self._fast, self._room), kept["generators"], strict=True):
-            generator.bit_generator.state = where
+        self._world = state.from_json(saved["world"])
+        for generator, generator_state in zip((self._slow, self._fast, self._room), saved["generators"], strict=True):
+            generator.bit_generator.state = generator_state
 
     def _later_ns(self, t_s: float) -> int:
         """`t_s` in ns; a nanosecond of rounding is forgiven."""
@@ -203,7 +204,7 @@ class World:
         return max(t_ns, now_ns)
 
 
-def _place(name: str, names: tuple[str, ...], what: str) -> int:
+def _place(name: str, names: tuple[str, ...], kind: str) -> int:
     if name not in names:
-        raise UnknownInput(f"The simulated world has no {what} {name!r}", did_you_mean(name, names))
+        raise UnknownInput(f"The simulated world has no {kind} {name!r}", did_you_mean(name, names))
     return names.index(name)

@@ -219,8 +219,8 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
             self._link.discard()
             self._link.write(xbus.message(number, data))
             begun_s = self._clock.now()
-            while (left_s := begun_s + ANSWER_S - self._clock.now()) > 0 and (heard := self._link.read(left_s)):
-                for kind, answer in xbus.messages(stream.take(heard)):
+            while (left_s := begun_s + ANSWER_S - self._clock.now()) > 0 and (received := self._link.read(left_s)):
+                for kind, answer in xbus.messages(stream.take(received)):
                     if kind == xbus.ERROR:
                         raise self._refused(number, answer)
                     if kind == number + 1:

@@ -149,11 +149,11 @@ def data_messages(columns: Sequence[tuple[int, NDArray[np.generic]]]) -> list[by
         data = np.ascontiguousarray(values).reshape(n, -1).view(np.uint8)
         parts += [np.tile(np.array([number >> 8, number & 0xFF, data.shape[1]], dtype=np.uint8), (n, 1)), data]
     body = np.concatenate(parts, axis=1)
-    out = np.empty((n, head + body.shape[1] + 1), dtype=np.uint8)
-    out[:, :head] = PREAMBLE, MASTER, DATA, body.shape[1]
-    out[:, head:-1] = body
-    out[:, -1] = -out[:, 1:-1].sum(axis=1, dtype=np.int64) % 256
-    text, length = out.tobytes(), out.shape[1]
+    messages = np.empty((n, head + body.shape[1] + 1), dtype=np.uint8)
+    messages[:, :head] = PREAMBLE, MASTER, DATA, body.shape[1]
+    messages[:, head:-1] = body
+    messages[:, -1] = -messages[:, 1:-1].sum(axis=1, dtype=np.int64) % 256
+    text, length = messages.tobytes(), messages.shape[1]
     return [text[k * length : (k + 1) * length] for k in range(n)]
 
 
@@ -164,11 +164,11 @@ def of_one_layout(frames: Found) -> Iterator[tuple[Ints, Bytes, list[Packet]]]:
     """
     data = np.flatnonzero(frames.heads(3)[:, 2] == DATA)
     for length, of in groups(frames.lengths[data]):
-        rest = data[of]
-        while len(rest):
-            rows = frames.data[frames.starts[rest, None] + np.arange(length)]
+        remaining = data[of]
+        while len(remaining):
+            rows = frames.data[frames.starts[remaining, None] + np.arange(length)]
             packets = layout(rows[0].tobytes())
-            same = alike(rows, packets) if packets else np.arange(len(rows)) == 0
+            is_alike = alike(rows, packets) if packets else np.arange(len(rows)) == 0
             if packets:
-                yield rest[same], rows[same], packets
-            rest = rest[~same]
+                yield remaining[is_alike], rows[is_alike], packets
+            remaining = remaining[~is_alike]

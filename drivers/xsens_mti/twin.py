@@ -78,8 +78,8 @@ class MotionTracker(FramedTwin):
             return xbus.message(number + 1)
         if number == xbus.OUTPUT_CONFIGURATION:
             return self._configured(data)
-        known = {xbus.DEVICE_ID: struct.pack(">I", SERIAL), xbus.PRODUCT_CODE: PRODUCT, xbus.FIRMWARE: FIRMWARE}
-        return xbus.message(number + 1, known[number]) if number in known else xbus.message(xbus.ERROR, b"\x04")
+        replies = {xbus.DEVICE_ID: struct.pack(">I", SERIAL), xbus.PRODUCT_CODE: PRODUCT, xbus.FIRMWARE: FIRMWARE}
+        return xbus.message(number + 1, replies[number]) if number in replies else xbus.message(xbus.ERROR, b"\x04")
 
     def _measure(self, now_s: float) -> None:
         """Begin to send; the messages are counted from 0."""
@@ -109,21 +109,21 @@ class MotionTracker(FramedTwin):
         columns += [(kind, self._triad(values, TRIADS[kind])) for kind in self._rates]
         columns.append((xbus.STATUS, status.astype(">u4")))
         temperature = np.full(len(ticks), self._world.die_c(), dtype=">f4")
-        out = [b""] * len(ticks)
-        for of, more in ((~warm, []), (warm, [(xbus.TEMPERATURE, temperature)])):
+        packets = [b""] * len(ticks)
+        for of, extra in ((~warm, []), (warm, [(xbus.TEMPERATURE, temperature)])):
             if of.any():
-                messages = xbus.data_messages([(kind, column[of]) for kind, column in (*more, *columns)])
+                messages = xbus.data_messages([(kind, column[of]) for kind, column in (*extra, *columns)])
                 for place, data in zip(np.flatnonzero(of).tolist(), messages, strict=True):
-                    out[place] = data
-        return out
+                    packets[place] = data
+        return packets
 
     def _triad(self, values: Floats, names: tuple[str, ...]) -> NDArray[Any]:
         """The three outputs of a sensor; one that the world does not have is 0."""
-        out = np.zeros((len(values), 3), dtype=">f4")
+        triad = np.zeros((len(values), 3), dtype=">f4")
         for k, name in enumerate(names):
             if name in self._outputs:
-                out[:, k] = values[:, self._outputs.index(name)]
-        return out
+                triad[:, k] = values[:, self._outputs.index(name)]
+        return triad
 
 
 def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from drivers.transport.faults import Fault, Faults, Kind, Said, Wire, disturbed, faults_of, kinds_of
+from drivers.transport.faults import Fault, Faults, Kind, Message, Wire, disturb, faults_of, kinds_of
 from drivers.transport.modbus_server import RTU, TCP
 
 DRIVERS = ["oriental_az", "labjack_t7", "omega_cn7500", "dpg2", "pi_e727"]
@@ -120,31 +120,31 @@ def test_a_fault_that_a_twin_cannot_have_is_refused() -> None:
     ],
 )
 def test_what_a_wire_makes_of_an_answer(what: str, wire: Wire, becomes: list[Any]) -> None:
-    assert disturbed(Said(ANSWER, 1.0), faults_of("oriental_az", [Fault(what)]), wire) == becomes
+    assert disturb(Message(ANSWER, 1.0), faults_of("oriental_az", [Fault(what)]), wire) == becomes
 
 
 def test_noise_is_the_same_every_time() -> None:
     faults = faults_of("oriental_az", [Fault("garbage", size=5)])
-    (noise,) = disturbed(Said(ANSWER, 1.0), faults, RTU)
+    (noise,) = disturb(Message(ANSWER, 1.0), faults, RTU)
     assert (len(noise.data), noise.due_s) == (5, 1.0)
-    assert disturbed(Said(ANSWER, 1.0), faults, RTU) == [noise]
+    assert disturb(Message(ANSWER, 1.0), faults, RTU) == [noise]
 
 
 def test_noise_stands_before_or_after_what_is_said() -> None:
-    (before,) = disturbed(Said(ANSWER, 1.0), faults_of("oriental_az", [Fault("garbage-before")]), RTU)
-    (after,) = disturbed(Said(ANSWER, 1.0), faults_of("oriental_az", [Fault("garbage-after")]), RTU)
+    (before,) = disturb(Message(ANSWER, 1.0), faults_of("oriental_az", [Fault("garbage-before")]), RTU)
+    (after,) = disturb(Message(ANSWER, 1.0), faults_of("oriental_az", [Fault("garbage-after")]), RTU)
     assert (before.data[3:], after.data[:-3], len(before.data)) == (ANSWER, ANSWER, len(ANSWER) + 3)
 
 
 def test_a_long_message_trickles_in_at_most_a_thousand_pieces() -> None:
-    pieces = disturbed(Said(bytes(32768), 0.0), faults_of("labjack_t7", [Fault("trickle")]), TCP)
+    pieces = disturb(Message(bytes(32768), 0.0), faults_of("labjack_t7", [Fault("trickle")]), TCP)
     assert len(pieces) <= 1000
     assert b"".join(piece.data for piece in pieces) == bytes(32768)
 
 
 def test_faults_add_up() -> None:
     faults = faults_of("oriental_az", [Fault("delay", size=0.5), Fault("garbage", size=3)])
-    (said,) = disturbed(Said(ANSWER, 1.0), faults, RTU)
+    (said,) = disturb(Message(ANSWER, 1.0), faults, RTU)
     assert (len(said.data), said.due_s) == (3, 1.5)
 
 
