@@ -181,13 +181,13 @@ class Waves:
             "WAV?": self._lengths,
             "WCL": self._clear,
             "WSL": lambda a, _: self._selected.update(self._values(a, len(TABLES))),
-            "WSL?": lambda a, _: table((k, self._selected[k]) for k in self._tables_asked(a)),
+            "WSL?": lambda a, _: table((k, self._selected[k]) for k in self._generators_asked(a)),
             "WTR": self._set_rates,
-            "WTR?": lambda a, _: table((k, f"{self._rates[k][0]} {self._rates[k][1]}") for k in self._tables_asked(a)),
+            "WTR?": lambda a, _: table((k, f"{self._rates[k][0]} {self._rates[k][1]}") for k in self._generators_asked(a)),
             "WGC": lambda a, _: self._cycles.update(self._values(a, MOST_CYCLES)),
-            "WGC?": lambda a, _: table((k, self._cycles[k]) for k in self._tables_asked(a)),
+            "WGC?": lambda a, _: table((k, self._cycles[k]) for k in self._generators_asked(a)),
             "WGO": self._play,
-            "WGO?": lambda a, now_s: table((k, int(now_s < self._until_s[k])) for k in self._tables_asked(a)),
+            "WGO?": lambda a, now_s: table((k, int(now_s < self._until_s[k])) for k in self._generators_asked(a)),
             "MOV": self._move,
         }
 
@@ -213,7 +213,7 @@ class Waves:
         """End all waves; where the axes go is not decided here."""
         self._until_s = {generator: min(until_s, now_s) for generator, until_s in self._until_s.items()}
 
-    def _tables_asked(self, arguments: Sequence[str]) -> list[str]:
+    def _generators_asked(self, arguments: Sequence[str]) -> list[str]:
         return [one_of(k, self._axis, e727.ILLEGAL_AXIS) for k in arguments] or list(self._axis)
 
     def _values(self, arguments: Sequence[str], high: float) -> dict[str, int]:

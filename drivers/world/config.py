@@ -118,7 +118,7 @@ class WorldConfig:
             raise UnknownSetting(f"unknown preset {preset!r} of the simulated world", did_you_mean(preset, PRESETS))
         return (cls.ideal() if preset == "ideal" else cls.adxl203()).changed(changes)
 
-    def changed_settings(self, changes: Mapping[str, Any]) -> WorldConfig:
+    def changed(self, changes: Mapping[str, Any]) -> WorldConfig:
         """A copy with nested `changes`; raises as `from_mapping` does."""
         return changed_settings(self, changes)
 
