@@ -63,15 +63,15 @@ def summary(path: Path) -> str:
     return _doc(path).partition("\n")[0].removeprefix(f"{name(path)}: ").rstrip(".")
 
 
-def find(wanted: str, folder: Path | None = None) -> Procedure:
-    """The procedure with the name `wanted`.
+def find(procedure_name: str, folder: Path | None = None) -> Procedure:
+    """The procedure with the name `procedure_name`.
 
     Raises UnknownProcedure with a suggestion, ProcedureError for a file that cannot be loaded.
     """
-    known = paths(folder)
-    path = known.get(wanted.replace("_", "-"))
+    paths_by_name = paths(folder)
+    path = paths_by_name.get(procedure_name.replace("_", "-"))
     if path is None:
-        raise UnknownProcedure(f"no procedure {wanted!r}.{did_you_mean(wanted, known)}")
+        raise UnknownProcedure(f"no procedure {procedure_name!r}.{did_you_mean(procedure_name, paths_by_name)}")
     module = _load(path)
     kind, adaptive = getattr(module, "KIND", "poses"), getattr(module, "ADAPTIVE", False)
     return Procedure(name(path), getattr(module, path.stem), summary(path), _doc(path), path, kind, adaptive)

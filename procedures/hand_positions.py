@@ -33,7 +33,7 @@ FLAT = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
-class Rest:
+class RestWindows:
     """Successive windows of one rest, as one block of samples."""
 
     volts: NDArray[np.float64]
@@ -43,13 +43,13 @@ class Rest:
     temperature_c: float | None
 
     @staticmethod
-    def of(windows: Sequence[Samples]) -> Rest:
+    def of(windows: Sequence[Samples]) -> RestWindows:
         """All `windows` joined."""
         first = windows[0]
         volts = np.concatenate([w.volts for w in windows])
         reported = [w.temperature_c for w in windows if w.temperature_c is not None]
         temperature_c = float(np.mean(reported)) if reported else None
-        return Rest(volts, first.channels, first.rate_hz, first.start_s, temperature_c)
+        return RestWindows(volts, first.channels, first.rate_hz, first.start_s, temperature_c)
 
 
 def hand_positions(
@@ -75,31 +75,31 @@ def hand_positions(
     while not _suffices(course := analysis.course(rig.measured(), noise, skipped), target_g, most_positions):
         rig.host.expect(max(1, FEWEST - course.count))
         rig.host.guide(_guidance(course, target_g))
-        rest = _next_rest(rig, analysis, course, noise, rest_s, wait_s)
-        if rest is None:
+        next_rest = _next_rest(rig, analysis, course, noise, rest_s, wait_s)
+        if next_rest is None:
             skipped.append(course.words)
             continue
         if course.count >= SIDES:  # the directions are known, so no position has a wrong name any more
             skipped.clear()
-        rig.keep(Pose(0.0, 0.0, path=course.words), samples=rest, temperature_c=rig.oven.temperature_c())
-    rig.host.guide(_guidance(course, target_g, ended=True))
+        rig.keep(Pose(0.0, 0.0, path=course.words), samples=next_rest, temperature_c=rig.oven.temperature_c())
+    rig.host.guide(_guidance(course, target_g, is_complete=True))
 
 
 def _suffices(course: HandCourse, target_g: float, most: int) -> bool:
     return course.count >= most or course.uncertainty_g[0] <= target_g
 
 
-def _guidance(course: HandCourse, target_g: float, ended: bool = False) -> Guidance:
+def _guidance(course: HandCourse, target_g: float, is_complete: bool = False) -> Guidance:
     """What the person does next, in words, and what the drawing shows."""
     worst_g, parameter = course.uncertainty_g
-    known = f"{parameter} is known to {1e3 * worst_g:.2g} mg, wanted {1e3 * target_g:g} mg" if parameter else ""
-    if ended:
-        text = f"{course.count} positions taken; {known}"
+    progress = f"{parameter} is known to {1e3 * worst_g:.2g} mg, wanted {1e3 * target_g:g} mg" if parameter else ""
+    if is_complete:
+        text = f"{course.count} positions taken; {progress}"
     else:
         turn = f" ({course.turn})" if course.turn else ""
-        text = "; ".join(filter(None, (f"position {course.count + 1}: {course.words}{turn}, then let go", known)))
+        text = "; ".join(filter(None, (f"position {course.count + 1}: {course.words}{turn}, then let go", progress)))
     ups = tuple(tuple(map(float, up)) for up in course.ups)
-    return Guidance(text, course.up, ups, not ended)
+    return Guidance(text, course.up, ups, not is_complete)
 
 
 def _learn_noise(rig: Session, analysis: HandAnalysis, wait_s: float) -> NoiseAtRest:
@@ -121,28 +121,30 @@ def _learn_noise(rig: Session, analysis: HandAnalysis, wait_s: float) -> NoiseAt
 
 def _next_rest(
     rig: Session, analysis: HandAnalysis, course: HandCourse, noise: NoiseAtRest, rest_s: float, wait_s: float
-) -> Rest | None:
+) -> RestWindows | None:
     """The next rest at a new position. The first window of a rest is left out: the hand has just let go.
 
     None after TRIES rests at known positions: an earlier position was not the one that the person was told, and is the
     wanted one. Raises NoAnswer after `wait_s` without one.
     """
     windows: list[Samples] = []
-    doing, refused = _Doing(rig), 0
+    doing, refusals = _Doing(rig), 0
     for _ in range(round(wait_s / WINDOW_S)):
         windows.append(rig.adc.acquire(WINDOW_S))
-        found = analysis.judge([w.volts for w in windows], noise)
-        if not found.still:
-            doing.say(f"{course.words}: the sensor moves ({found.noise:.2g} times the noise at rest, by {found.by})")
-            windows = windows[1:] if found.by == "creep" else []
-            if refused >= TRIES:
+        stillness = analysis.judge([w.volts for w in windows], noise)
+        if not stillness.still:
+            doing.say(
+                f"{course.words}: the sensor moves ({stillness.noise:.2g} times the noise at rest, by {stillness.by})"
+            )
+            windows = windows[1:] if stillness.by == "creep" else []
+            if refusals >= TRIES:
                 return None
         elif len(windows) * WINDOW_S <= rest_s:
             doing.say(f"{course.words}: at rest, wait")
-        elif course.is_new((rest := Rest.of(windows[1:])).volts.mean(axis=0)):
-            return rest
+        elif course.is_new((candidate := RestWindows.of(windows[1:])).volts.mean(axis=0)):
+            return candidate
         else:
-            refused += not doing.text.startswith(KNOWN)
+            refusals += not doing.text.startswith(KNOWN)
             doing.say(f"{KNOWN}; needed: {course.words}")
             windows = windows[1:]
     raise NoAnswer(f"no new position for {wait_s:g} s; needed: {course.words}; {doing.text}; resume the run to go on")

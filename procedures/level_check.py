@@ -31,7 +31,7 @@ def level_check(rig: Session, *, settle_s: float = 2.0, on: Place = "table") -> 
     repeated = all(_is_read(rig, side) for side, _ in HALF_TURN) and _is_tilted(rig)  # a person has levelled the base
     for side, beta_deg in HALF_TURN:
         if repeated or not _is_read(rig, side):
-            _read(rig, side, beta_deg, settle_s)
+            _read_level(rig, side, beta_deg, settle_s)
     if _is_tilted(rig):
         x_deg, y_deg = tilt_deg(rig)
         raise SafetyLimit(
@@ -78,7 +78,7 @@ def _is_tilted(rig: Session) -> bool:
     return limit is not None and max(map(abs, tilt_deg(rig))) > limit
 
 
-def _read(rig: Session, side: str, beta_deg: float, settle_s: float) -> None:
+def _read_level(rig: Session, side: str, beta_deg: float, settle_s: float) -> None:
     """Read both axes: from the level, or typed by a person if the bench has no level."""
     rig.alpha.move_to(0.0)
     rig.beta.move_to(beta_deg)

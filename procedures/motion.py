@@ -64,15 +64,15 @@ def motion(
     _centre_carriage(rig, centre_um)
     if calibration[0] in missing:
         _remove_history(rig)
-    for pose in _only(missing, calibration):
+    for pose in _missing_of_part(missing, calibration):
         rig.hold(pose, dwell_s, settle_s)
     _remove_hysteresis(rig)
     rig.wait(settle_s)
-    if todo := _only(missing, still):
+    if todo := _missing_of_part(missing, still):
         rig.host.doing(f"recording the still sensor for {len(todo) * block_s:g} s")
         rig.keep_stretch(todo, block_s)
     for hz, poses in motions.items():
-        if todo := _only(missing, poses):
+        if todo := _missing_of_part(missing, poses):
             with _oscillation(rig, peak_to_peak_um, hz, centre_um):
                 rig.keep_stretch(todo, block_s)
 
@@ -89,7 +89,7 @@ def blocks(path: str, duration_s: float, block_s: float) -> list[Pose]:
     return bounded(Pose(ALPHA_DEG, BETA_DEG, 0, f"{path} {k}") for k in range(max(1, round(duration_s / block_s))))
 
 
-def _only(missing: Sequence[Pose], part: Sequence[Pose]) -> list[Pose]:
+def _missing_of_part(missing: Sequence[Pose], part: Sequence[Pose]) -> list[Pose]:
     """The missing poses of one part of the run."""
     return [pose for pose in missing if pose in part]
 

@@ -30,13 +30,13 @@ def parse_poses(lines: Sequence[str]) -> list[Pose]:
     numbered = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
     bounded(numbered[1:])
     rows = [(number, [cell.strip() for cell in row]) for number, line in numbered for row in csv.reader([line])]
-    (first, head), *rest = rows or [(1, [])]
+    (first, head), *data_rows = rows or [(1, [])]
     for name in head:
         if name not in NAMES:
             raise SettingError(f"pose_list, line {first}: a pose has no column {name!r}.{did_you_mean(name, NAMES)}")
-    if not {"alpha_deg", "beta_deg"} <= set(head) or not rest:
+    if not {"alpha_deg", "beta_deg"} <= set(head) or not data_rows:
         raise SettingError("pose_list: give a header with alpha_deg and beta_deg, and at least one pose below it")
-    return [_pose(number, head, row) for number, row in rest]
+    return [_pose(number, head, row) for number, row in data_rows]
 
 
 def format_poses(poses: Iterable[Pose]) -> tuple[str, ...]:
@@ -55,15 +55,15 @@ def _pose(number: int, head: Sequence[str], row: Sequence[str]) -> Pose:
 def _value(number: int, name: str, cell: str) -> str | float | int:
     if name == "path":
         return cell
-    allowed = {"direction": (-1, 0, 1), "flip": (0, 1)}.get(name)
+    allowed_values = {"direction": (-1, 0, 1), "flip": (0, 1)}.get(name)
     try:
         value = float(cell)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value) or (allowed and value not in allowed):
-        expected = f"one of {', '.join(map(str, allowed))}" if allowed else "a number"
+    if not math.isfinite(value) or (allowed_values and value not in allowed_values):
+        expected = f"one of {', '.join(map(str, allowed_values))}" if allowed_values else "a number"
         raise SettingError(f"pose_list, line {number}, column {name}: the value is {cell!r}; give {expected}")
-    return int(value) if allowed else value
+    return int(value) if allowed_values else value
 
 
 def _text(value: str | float | int) -> str:

@@ -35,7 +35,7 @@ class Question:
         """The answer in the form for the record. Raises BadAnswer."""
         return answer.strip()
 
-    def _refused(self, answer: str) -> BadAnswer:
+    def _bad_answer(self, answer: str) -> BadAnswer:
         return BadAnswer(f"{self.name}: {answer!r} does not answer {self.text!r}; answer with {self.accepts}")
 
 
@@ -48,10 +48,10 @@ class Confirm(Question):
         return "yes or no"
 
     def checked(self, answer: str) -> str:
-        known = {"yes": "yes", "y": "yes", "true": "yes", "no": "no", "n": "no", "false": "no"}
-        if (word := answer.strip().lower()) not in known:
-            raise self._refused(answer)
-        return known[word]
+        words = {"yes": "yes", "y": "yes", "true": "yes", "no": "no", "n": "no", "false": "no"}
+        if (word := answer.strip().lower()) not in words:
+            raise self._bad_answer(answer)
+        return words[word]
 
 
 @dataclass(frozen=True)
@@ -71,13 +71,13 @@ class Mounting(Confirm):
         """The question for one mounting."""
         side = "down" if flip else "up"
         if up != "z":
-            along = EDGES[(EDGES.index(up) + 1) % 3]
-            text = f"Does the sensor stand on edge, its {up} axis {side} and its {along} axis along the table's x"
+            edge = EDGES[(EDGES.index(up) + 1) % 3]
+            text = f"Does the sensor stand on edge, its {up} axis {side} and its {edge} axis along the table's x"
             text += f", turned by {mount_deg:g} deg?" if mount_deg else "?"
             return Mounting(f"mount-{mount_deg:g}-{up}-{side}", text, "", mount_deg=mount_deg, flip=flip, up=up)
         text = f"Is the sensor mounted face {side}, turned by {mount_deg:g} deg about its z axis?"
-        drawing = f"face-{side}"
-        return Mounting(f"mount-{mount_deg:g}-{side}", text, drawing, mount_deg=mount_deg, flip=flip)
+        drawing_name = f"face-{side}"
+        return Mounting(f"mount-{mount_deg:g}-{side}", text, drawing_name, mount_deg=mount_deg, flip=flip)
 
 
 @dataclass(frozen=True)
@@ -96,9 +96,9 @@ class Number(Question):
         try:
             value = float(answer.strip().removesuffix(self.unit).strip().replace(",", "."))
         except ValueError:
-            raise self._refused(answer) from None
+            raise self._bad_answer(answer) from None
         if not self.low <= value <= self.high:
-            raise self._refused(answer)
+            raise self._bad_answer(answer)
         return repr(value)
 
 
@@ -149,5 +149,5 @@ class Choice(Question):
     def checked(self, answer: str) -> str:
         word = answer.strip()
         if word not in self.choices:
-            raise BadAnswer(f"{self._refused(answer)}.{did_you_mean(word, self.choices)}")
+            raise BadAnswer(f"{self._bad_answer(answer)}.{did_you_mean(word, self.choices)}")
         return word

@@ -150,7 +150,7 @@ class HandAnalysis(Protocol):
     def learn(self, windows: Sequence[NDArray[np.float64]], rate_hz: float) -> NoiseAtRest | None:
         """The noise from windows at rest, each (n, 3); None if they are too few or differ."""
 
-    def judge(self, rest: Sequence[NDArray[np.float64]], noise: NoiseAtRest) -> Stillness:
+    def judge(self, windows: Sequence[NDArray[np.float64]], noise: NoiseAtRest) -> Stillness:
         """The test of the last of successive windows, each (n, 3)."""
 
     def course(self, dwells: Sequence[Dwell], noise: NoiseAtRest, skipped: Sequence[str]) -> HandCourse:

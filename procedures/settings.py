@@ -19,56 +19,58 @@ Value = Any
 YES_OR_NO = ("yes", "no")
 
 
-def parse(procedure: Procedure, given: Mapping[str, Value]) -> dict[str, Value]:
-    """All settings of `procedure`: its defaults, replaced by `given` (texts, or values of a file).
+def parse(procedure: Procedure, entries: Mapping[str, Value]) -> dict[str, Value]:
+    """All settings of `procedure`: its defaults, replaced by `entries` (texts, or values of a file).
 
     Raises SettingError for an unknown name, with a suggestion, and for a value of the wrong type.
     """
     defaults = procedure.defaults
     types = get_type_hints(procedure.function)
-    for name in given:
+    for name in entries:
         if name not in defaults:
             raise SettingError(f"{procedure.name} has no setting {name!r}.{did_you_mean(name, defaults)}")
     return defaults | {
         name: _value(f"{procedure.name}: the setting {name}", types.get(name, str), value)
-        for name, value in given.items()
+        for name, value in entries.items()
     }
 
 
 def choices(procedure: Procedure) -> dict[str, tuple[str, ...]]:
     """The settings that have a list of allowed texts, with this list."""
     types = get_type_hints(procedure.function)
-    few = {name: tuple(map(str, get_args(kind))) for name, kind in types.items() if get_origin(kind) is Literal}
-    return few | {name: YES_OR_NO for name, kind in types.items() if kind is bool}
+    choices_by_name = {
+        name: tuple(map(str, get_args(kind))) for name, kind in types.items() if get_origin(kind) is Literal
+    }
+    return choices_by_name | {name: YES_OR_NO for name, kind in types.items() if kind is bool}
 
 
-def _value(what: str, kind: Any, value: Value) -> Value:
+def _value(subject: str, kind: Any, value: Value) -> Value:
     choices = get_args(kind) if get_origin(kind) is Literal else ()
     try:
         if choices:
             return choices[[str(choice) for choice in choices].index(str(value))]
         if get_origin(kind) is tuple:
-            return tuple(_scalar(get_args(kind)[0], part) for part in _parts(what, kind, value))
+            return tuple(_scalar(get_args(kind)[0], part) for part in _parts(subject, kind, value))
         return _scalar(kind, value)
     except (ValueError, TypeError):
         listed = f"one of {', '.join(map(str, choices))}"
         expected = listed if choices else _WANTED.get(kind, "numbers such as 90,30")
-        raise SettingError(f"{what} is {value!r}; give {expected}") from None
+        raise SettingError(f"{subject} is {value!r}; give {expected}") from None
 
 
-def _parts(what: str, kind: Any, value: Value) -> Sequence[Value]:
+def _parts(subject: str, kind: Any, value: Value) -> Sequence[Value]:
     if not isinstance(value, str):
         return list(value)
-    return value.split(",") if get_args(kind)[0] is not str else _lines(what, Path(value))
+    return value.split(",") if get_args(kind)[0] is not str else _lines(subject, Path(value))
 
 
-def _lines(what: str, path: Path) -> list[str]:
+def _lines(subject: str, path: Path) -> list[str]:
     """The lines of a file. Raises SettingError for a file that cannot be read."""
     try:
         return path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        why = error.strerror if isinstance(error, OSError) else "it is not a text file"
-        raise SettingError(f"{what}: cannot read the file {path}: {why}; give another file") from None
+        reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
+        raise SettingError(f"{subject}: cannot read the file {path}: {reason}; give another file") from None
 
 
 def _scalar(kind: Any, value: Value) -> Value:
@@ -83,10 +85,10 @@ def _number(value: Value) -> float:
 
 
 def _yes_or_no(value: Value) -> bool:
-    known = {"true": True, "yes": True, "false": False, "no": False}
-    if (text := str(value).lower()) not in known:
+    switches = {"true": True, "yes": True, "false": False, "no": False}
+    if (text := str(value).lower()) not in switches:
         raise ValueError
-    return known[text]
+    return switches[text]
 
 
 _READ: Mapping[Any, Callable[[Value], Value]] = {float: _number, bool: _yes_or_no}

@@ -11,14 +11,14 @@ from pathlib import Path
 from rig.errors import OutputError
 
 
-def require_out(out: Path, *inputs: str | Path | None) -> None:
-    """Raises OutputError if the folder of `out` is missing, or if `out` is a device or one of the input files."""
-    if not out.parent.is_dir():
-        raise OutputError(f"{out}: there is no folder {out.parent}; make it, or give another file")
-    _require_regular(out)
+def require_out(path: Path, *inputs: str | Path | None) -> None:
+    """Raises OutputError if the folder of `path` is missing, or if `path` is a device or one of the input files."""
+    if not path.parent.is_dir():
+        raise OutputError(f"{path}: there is no folder {path.parent}; make it, or give another file")
+    _require_regular(path)
     for file in inputs:
-        if file is not None and Path(file).exists() and out.exists() and out.samefile(file):
-            raise OutputError(f"{out}: this would overwrite the input file {file}; give another file")
+        if file is not None and Path(file).exists() and path.exists() and path.samefile(file):
+            raise OutputError(f"{path}: this would overwrite the input file {file}; give another file")
 
 
 def require_new(*paths: Path) -> None:
@@ -27,9 +27,9 @@ def require_new(*paths: Path) -> None:
         raise OutputError(f"{existing}: this file exists; give another file, or replace this one with --force")
 
 
-def _require_regular(out: Path) -> None:
-    if out.exists() and not out.is_file():
-        raise OutputError(f"{out}: is not a regular file, so it is not overwritten; give another file")
+def _require_regular(path: Path) -> None:
+    if path.exists() and not path.is_file():
+        raise OutputError(f"{path}: is not a regular file, so it is not overwritten; give another file")
 
 
 def make_folder(folder: Path) -> None:
@@ -40,25 +40,26 @@ def make_folder(folder: Path) -> None:
         raise OutputError(f"{folder}: cannot make the folder: {error.strerror}; give another folder") from None
 
 
-def write_whole(out: Path, content: str | bytes) -> None:
+def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file completely or not at all, and never in the place of a device. Raises OutputError."""
-    with draft_of(out) as draft:
+    with draft_of(path) as draft:
         draft.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 @contextmanager
-def draft_of(out: Path) -> Iterator[Path]:
-    """A file in the same folder to write to; it takes the place of `out` at the end of the block.
+def draft_of(path: Path) -> Iterator[Path]:
+    """A file in the same folder to write to; it takes the place of `path` at the end of the block.
 
-    A process that is killed leaves `out` as it was. Raises OutputError for a device, and if the file cannot be written.
+    A process that is killed leaves `path` as it was. Raises OutputError for a device, and for a file that cannot be
+    written.
     """
-    _require_regular(out)
-    draft = out.with_name(f".{out.name}.{os.getpid()}")
+    _require_regular(path)
+    draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         yield draft
-        draft.replace(out)
+        draft.replace(path)
     except OSError as error:
-        raise OutputError(f"{out}: cannot write the file: {error.strerror}; give another file") from None
+        raise OutputError(f"{path}: cannot write the file: {error.strerror}; give another file") from None
     finally:
         with suppress(OSError):
             draft.unlink(missing_ok=True)
@@ -91,8 +92,8 @@ def machine() -> Path:
 
 def home() -> Path:
     """The folder of the record. The first write makes it."""
-    if named := os.environ.get("RIG_HOME"):
-        return Path(named).expanduser()
+    if folder_name := os.environ.get("RIG_HOME"):
+        return Path(folder_name).expanduser()
     import platformdirs
 
     return Path(platformdirs.user_data_dir("inertial-rig"))

@@ -23,9 +23,11 @@ ATTEMPTS, PAUSE_S = 20, 0.01  # `is_held` in another process holds the lock for 
 
 
 @contextmanager
-def lease(folder: Path, name: str, what: str, runs: Path | None = None) -> Iterator[None]:
-    """Hold the lock `name` in `folder`; `what` names it for people. `runs`: the folder with the locks of runs, if it is
-    another one; then all users share this lock. Raises Busy if another process holds it.
+def lease(folder: Path, name: str, purpose: str, runs: Path | None = None) -> Iterator[None]:
+    """Hold the lock `name` in `folder`; `purpose` names it for people.
+
+    `runs`: the folder with the locks of runs, if it is another one; then all users share this lock. Raises Busy
+    if another process holds it.
     """
     path = _path(folder, name)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -35,11 +37,17 @@ def lease(folder: Path, name: str, what: str, runs: Path | None = None) -> Itera
                 path.parent.chmod(0o777)
                 path.chmod(0o666)
         if not _lock(file.fileno()):
-            raise Busy(f"{_describe_holder(path)} uses {what}; wait until it ends, or stop it with Ctrl-C")
-        since = datetime.now().astimezone()
+            raise Busy(f"{_describe_holder(path)} uses {purpose}; wait until it ends, or stop it with Ctrl-C")
+        start_time = datetime.now().astimezone()
         file.truncate(0)
         json.dump(
-            {"pid": os.getpid(), "what": what, "since": f"{since:%Y-%m-%d %H:%M:%S}", "runs": str(runs or folder)}, file
+            {
+                "pid": os.getpid(),
+                "what": purpose,
+                "since": f"{start_time:%Y-%m-%d %H:%M:%S}",
+                "runs": str(runs or folder),
+            },
+            file,
         )
         file.flush()
         yield  # the file stays: without it two processes could hold locks with the same name
@@ -74,8 +82,8 @@ def _describe_holder(path: Path) -> str:
     if not holder:
         return "another process"
     locks = Path(str(holder.get("runs", path.parent.parent))) / FOLDER
-    others = [_holder(other) for other in sorted(locks.glob("*.lock")) if other != path]
-    runs = [str(o["what"]) for o in others if o.get("pid") == holder["pid"] and str(o["what"]).startswith("run ")]
+    holders = [_holder(lock_path) for lock_path in sorted(locks.glob("*.lock")) if lock_path != path]
+    runs = [str(o["what"]) for o in holders if o.get("pid") == holder["pid"] and str(o["what"]).startswith("run ")]
     at = f", with {runs[-1]}" if runs else ""
     return f"another process ({holder['pid']}, since {holder['since']}{at})"
 

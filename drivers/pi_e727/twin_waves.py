@@ -183,7 +183,9 @@ class Waves:
             "WSL": lambda a, _: self._selected.update(self._values(a, len(TABLES))),
             "WSL?": lambda a, _: table((k, self._selected[k]) for k in self._generators_asked(a)),
             "WTR": self._set_rates,
-            "WTR?": lambda a, _: table((k, f"{self._rates[k][0]} {self._rates[k][1]}") for k in self._generators_asked(a)),
+            "WTR?": lambda a, _: table(
+                (k, f"{self._rates[k][0]} {self._rates[k][1]}") for k in self._generators_asked(a)
+            ),
             "WGC": lambda a, _: self._cycles.update(self._values(a, MOST_CYCLES)),
             "WGC?": lambda a, _: table((k, self._cycles[k]) for k in self._generators_asked(a)),
             "WGO": self._play,

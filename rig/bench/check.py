@@ -32,10 +32,10 @@ def describe_error(error: ValidationError, model: type[BaseModel]) -> str:
     """The first fault with its key. A misspelt key comes before the missing key that it stands for."""
     faults = error.errors()
     fault = min(faults, key=lambda fault: fault["type"] not in UNKNOWN)
-    where = [str(part) for part in fault["loc"] if "[" not in str(part)]  # the type of a union is not a key
-    if where[0] == "lab":  # a URL may hold a password
+    key_path = [str(part) for part in fault["loc"] if "[" not in str(part)]  # the type of a union is not a key
+    if key_path[0] == "lab":  # a URL may hold a password
         fault = {**fault, "input": "..."}
-    return f"key {'.'.join(where)}: {describe_fault(fault, _keys(model, where[:-1]))}"
+    return f"key {'.'.join(key_path)}: {describe_fault(fault, _keys(model, key_path[:-1]))}"
 
 
 def describe_fault(fault: Any, keys: list[str]) -> str:
@@ -44,20 +44,20 @@ def describe_fault(fault: Any, keys: list[str]) -> str:
         return f"no such key.{did_you_mean(str(fault['loc'][-1]), keys)}"
     if fault["type"] == "missing":
         return "this key is missing; `rig check --example` prints a complete bench file"
-    why = fault["msg"].removeprefix("Value error, ")  # the message of our own validator
+    reason = fault["msg"].removeprefix("Value error, ")  # the message of our own validator
     comma = fault["type"] == "float_parsing" and str(fault["input"]).count(",") == 1
     hint = f"; write {str(fault['input']).replace(',', '.')}, with a decimal point" if comma else ""
-    return f"{why}; the value is {fault['input']!r}{hint}"
+    return f"{reason}; the value is {fault['input']!r}{hint}"
 
 
-def _keys(model: Any, where: list[str]) -> list[str]:
+def _keys(model: Any, key_path: list[str]) -> list[str]:
     """The known keys at a place of the file."""
     parts: dict[str, Any] = {"limits": Limits, "d63": Displacement, "uncertainty": Uncertainty, "lab": Lab}
     parts |= {"instruments": Instrument, "sensor": Sensor, "folders": Folders}
-    part = parts.get(where[0], model) if where else model
-    if where and (where[0] == "certificates" or where[-1] == "certificate"):
+    part = parts.get(key_path[0], model) if key_path else model
+    if key_path and (key_path[0] == "certificates" or key_path[-1] == "certificate"):
         part = Certificate
-    if "faults" in where:
+    if "faults" in key_path:
         part = Fault
     if dataclasses.is_dataclass(part):
         return [field.name for field in dataclasses.fields(part)]
@@ -75,15 +75,15 @@ def check(bench: Bench, path: Path) -> None:
     _check_lab(bench, path)
 
 
-def check_lines(bench: Bench, where: str) -> None:
+def check_lines(bench: Bench, source: str) -> None:
     """Raises BenchError for two roles on one unit of one line: each would execute the commands of the other.
 
-    `where` begins the message. Stages that a person turns share the person.
+    `source` begins the message. Stages that a person turns share the person.
     """
     claims = [claim for role, instrument in bench.instruments.items() for claim in _claims(role, instrument)]
-    for one, other in itertools.combinations(claims, 2):
-        if one.line == other.line and (fault := _conflict(one, other)):
-            raise BenchError(f"{where}.{other.key}: {fault}")
+    for first, second in itertools.combinations(claims, 2):
+        if first.line == second.line and (fault := _conflict(first, second)):
+            raise BenchError(f"{source}.{second.key}: {fault}")
 
 
 def drivers() -> list[str]:
@@ -104,9 +104,9 @@ def _check_instrument(role: str, instrument: Instrument, path: Path) -> None:
     except ValidationError as error:
         kind = importlib.import_module(f"drivers.{instrument.driver}.driver").Settings
         fault = error.errors()[0]
-        where = ".".join(str(part) for part in fault["loc"])
+        setting = ".".join(str(part) for part in fault["loc"])
         names = [field.name for field in dataclasses.fields(kind)]
-        raise BenchError(f"{key}.{where}: {describe_fault(fault, names)}") from None
+        raise BenchError(f"{key}.{setting}: {describe_fault(fault, names)}") from None
     _check_faults(f"{key}.faults", instrument)
 
 
@@ -137,22 +137,22 @@ def _claims(role: str, instrument: Instrument) -> list[_Claim]:
     return [replace(claim, line=Url.parse(claim.url).line) for claim in claims]
 
 
-def _conflict(one: _Claim, other: _Claim) -> str | None:
+def _conflict(first: _Claim, second: _Claim) -> str | None:
     """Why two roles cannot share a line, and what to do; None if they can."""
-    at = one.url if one.url == other.url else f"{one.url} (also written {other.url})"
-    if one.unit is None or other.unit is None:
-        alone = one if one.unit is None else other
+    at = first.url if first.url == second.url else f"{first.url} (also written {second.url})"
+    if first.unit is None or second.unit is None:
+        whole_line = first if first.unit is None else second
         return (
-            f"{one.role} and {other.role} are both at {at}, but {alone.key.removesuffix('.unit')} "
+            f"{first.role} and {second.role} are both at {at}, but {whole_line.key.removesuffix('.unit')} "
             "has no unit number and cannot share a line; give each its own address"
         )
-    if one.unit == other.unit:
+    if first.unit == second.unit:
         return (
-            f"{one.role} and {other.role} are both unit {one.unit} at {at}, so both execute the same commands; set "
-            "another unit number at one instrument and write it here as `unit` (default: 1)"
+            f"{first.role} and {second.role} are both unit {first.unit} at {at}, so both execute the same commands; "
+            "set another unit number at one instrument and write it here as `unit` (default: 1)"
         )
-    if one.url != other.url:
-        return f"{one.role} and {other.role} are on one line, {at}; write the same address for both"
+    if first.url != second.url:
+        return f"{first.role} and {second.role} are on one line, {at}; write the same address for both"
     return None
 
 
@@ -165,8 +165,8 @@ def _check_addresses(key: str, instrument: Instrument) -> None:
     for name, url in (("url", address), ("stream_url", instrument.stream_url)):
         try:
             _ = url and Url.parse(url)
-        except LinkRefused as refused:
-            raise BenchError(f"{key}.{name}: {refused}") from None
+        except LinkRefused as error:
+            raise BenchError(f"{key}.{name}: {error}") from None
     if address is not None and Url.parse(address).rtu and not 1 <= instrument.unit <= 247:
         raise BenchError(f"{key}.unit: unit {instrument.unit} is not possible on a serial line; give 1 to 247")
 
@@ -207,9 +207,9 @@ def _check_worlds(bench: Bench, path: Path) -> None:
 
     key = f"{path}, key world"
     try:
-        settings, held = handheld(bench.world)
+        settings, hand = handheld(bench.world)
         config = WorldConfig.from_mapping(settings)
-        if held is not None and bench.sensors:
+        if hand is not None and bench.sensors:
             raise BenchError(f"{key}: a hand holds one sensor; remove `hand` and `triad`, or the batch in `sensors`")
         for name, sensor in bench.sensors.items():
             key = f"{path}, key sensors.{name}.world"
@@ -226,8 +226,8 @@ def _check_batch(bench: Bench, path: Path) -> None:
         raise BenchError(f"{path}, key sensor.world: only a sensor of a batch has its own world; move it to `world`")
     if "adc" not in bench.instruments:
         return
-    named = {name.partition(".")[0] for name in bench.channels if "." in name}
-    for name in sorted(named - set(bench.sensors)):
+    sensor_names = {name.partition(".")[0] for name in bench.channels if "." in name}
+    for name in sorted(sensor_names - set(bench.sensors)):
         key = f"{path}, key instruments.adc.settings.channels"
         raise BenchError(f"{key}: no sensor {name!r} in `sensors`.{did_you_mean(name, bench.sensors)}")
     for name in bench.sensors:
@@ -274,8 +274,11 @@ def _of_sensor(key: str, sensor: Sensor) -> Iterator[KeyFault]:
 def _of_channels(bench: Bench) -> Iterator[KeyFault]:
     names: dict[int, str] = {}
     for name, number in bench.wired.items():
-        if (other := names.setdefault(number, name)) != name:
-            yield "instruments.adc.settings.channels", f"{other} and {name} are both input {number}; give each its own"
+        if (earlier := names.setdefault(number, name)) != name:
+            yield (
+                "instruments.adc.settings.channels",
+                f"{earlier} and {name} are both input {number}; give each its own",
+            )
 
 
 def _of_limits(bench: Bench) -> Iterator[KeyFault]:
@@ -299,10 +302,10 @@ def _of_result_limits(bench: Bench) -> Iterator[KeyFault]:
     if bench.limits.results and bench.folders.procedures is None:
         from rig.results.evaluate import names  # it imports the bench
 
-        known = names()
+        result_names = names()
         for name in bench.limits.results:
-            if name not in known:
-                yield f"limits.results.{name}", f"no procedure has such a result.{did_you_mean(name, known)}"
+            if name not in result_names:
+                yield f"limits.results.{name}", f"no procedure has such a result.{did_you_mean(name, result_names)}"
 
 
 def _pair(values: tuple[float, float]) -> str:

@@ -48,23 +48,23 @@ def _with_error_table(role: str, instrument: Instrument, path: Path) -> Instrume
     return instrument.model_copy(update={"error_table": _error_table(role, instrument.error_table, path)})
 
 
-def _error_table(role: str, stated: tuple[Point, ...] | Path | None, path: Path) -> tuple[Point, ...] | None:
+def _error_table(role: str, entry: tuple[Point, ...] | Path | None, path: Path) -> tuple[Point, ...] | None:
     """The points of the error table of a stage, read from its file if it is one."""
     key = f"{path}, key instruments.{role}.error_table"
-    if stated is None:
+    if entry is None:
         return None
     if role not in TURNING:
         raise BenchError(f"{key}: only {' and '.join(TURNING)} have an error table; remove this key")
     try:
-        points = read_error_table(own_file(path, stated, key)) if isinstance(stated, Path) else stated
+        points = read_error_table(own_file(path, entry, key)) if isinstance(entry, Path) else entry
         return ErrorTable(points).points
     except DataError as error:
         raise BenchError(f"{key}: {error}") from None
 
 
-def _with_curve(stated: Any, path: Path) -> dict[str, Any]:
+def _with_curve(entry: Any, path: Path) -> dict[str, Any]:
     """The key d63 with the points of its curve. Raises BenchError."""
-    if not isinstance(stated, dict) or not isinstance(name := stated.get("curve"), str) or name == SIMULATED:
+    if not isinstance(entry, dict) or not isinstance(name := entry.get("curve"), str) or name == SIMULATED:
         return {}
     file = own_file(path, Path(name), f"{path}, key d63.curve")
     document = read_mapping(file, "curve", lambda text: BenchError(f"{path}, key d63.curve: {text}"), CURVE)
@@ -72,25 +72,27 @@ def _with_curve(stated: Any, path: Path) -> dict[str, Any]:
         curve = Curve.from_mapping(document)
     except ValueError as error:
         raise BenchError(f"{path}, key d63.curve: {file}: {error}") from None
-    return {"d63": {**stated, "curve": dataclasses.asdict(curve)}}
+    return {"d63": {**entry, "curve": dataclasses.asdict(curve)}}
 
 
-def own_file(path: Path, named: Path, key: str) -> Path:
+def own_file(path: Path, relative: Path, key: str) -> Path:
     """A file in the folder of the bench file, which may come from a stranger. Raises BenchError for another folder.
 
     A link in this folder may point elsewhere, because a person has made it.
     """
     folder = Path(os.path.abspath(path.parent))  # noqa: PTH100 - resolve() would follow links
-    target = Path(os.path.abspath(folder / named))  # noqa: PTH100
-    if not target.is_relative_to(folder) or "\0" in str(named):
-        raise BenchError(f"{key}: {named} is outside the folder of the bench file; move or link it into {folder}")
-    return path.parent / named
+    target = Path(os.path.abspath(folder / relative))  # noqa: PTH100
+    if not target.is_relative_to(folder) or "\0" in str(relative):
+        raise BenchError(f"{key}: {relative} is outside the folder of the bench file; move or link it into {folder}")
+    return path.parent / relative
 
 
 def _resolve(folders: Folders, path: Path) -> Folders:
     """Absolute paths of the folders, which are relative to the bench file. Raises BenchError for a missing folder."""
-    stated = {name: place for name, place in folders if place is not None}
-    resolved = {name: own_file(path, place, f"{path}, key folders.{name}").resolve() for name, place in stated.items()}
+    given_folders = {name: place for name, place in folders if place is not None}
+    resolved = {
+        name: own_file(path, place, f"{path}, key folders.{name}").resolve() for name, place in given_folders.items()
+    }
     for name, place in resolved.items():
         if not place.is_dir():
             raise BenchError(f"{path}, key folders.{name}: there is no folder {place}; make it, or correct the key")

@@ -26,16 +26,16 @@ def orientation_map(guidance: Guidance) -> list[str]:
         squares = ("  ".join(marks.get((x, y, z), " ") for x in COLUMNS) for z, _ in LAYERS)
         lines.append(f"{('+y', '  ', '-y')[1 - y]}   {'   '.join(f'{square:<13}' for square in squares)}".rstrip())
     lines.append("   " + "   ".join(f"{'-x':<5}{'+x':<8}" for _ in LAYERS).rstrip())
-    has = sum(mark == TAKEN for mark in marks.values())
-    return [*lines, f"{TAKEN} taken ({has} of {len(marks)})   {WANTED} next   {LACKING} not yet"]
+    taken_count = sum(mark == TAKEN for mark in marks.values())
+    return [*lines, f"{TAKEN} taken ({taken_count} of {len(marks)})   {WANTED} next   {LACKING} not yet"]
 
 
 def _marks(guidance: Guidance) -> dict[tuple[int, int, int], str]:
     """The mark of each orientation by the signs of its three parts."""
-    has = covered(np.array(guidance.taken).reshape(-1, 3))
+    is_taken = covered(np.array(guidance.taken).reshape(-1, 3))
     marks = {}
-    for up, known in zip(ORIENTATIONS, has, strict=True):
+    for up, is_covered in zip(ORIENTATIONS, is_taken, strict=True):
         x, y, z = (int(part) for part in np.sign(np.round(up, 6)))
         is_target = guidance.moves and bool(up @ np.array(guidance.up) > 1 - 1e-6)
-        marks[x, y, z] = WANTED if is_target else TAKEN if known else LACKING
+        marks[x, y, z] = WANTED if is_target else TAKEN if is_covered else LACKING
     return marks

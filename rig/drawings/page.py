@@ -96,10 +96,10 @@ ROW_PX, NAME_PX, VALUE_PX = 22, 24, 74
 
 def force_view(attitude: Attitude, corner: tuple[float, float], width: float) -> Iterator[str]:
     """Three bars below `corner`, the upper left one."""
-    left, half = corner[0] + NAME_PX, (width - NAME_PX - VALUE_PX) / 2
-    middle = left + half
+    left_px, half = corner[0] + NAME_PX, (width - NAME_PX - VALUE_PX) / 2
+    middle = left_px + half
     bottom = corner[1] + 3 * ROW_PX
-    for x, words in ((left, "-1 g"), (middle, "0"), (left + 2 * half, "+1 g")):
+    for x, words in ((left_px, "-1 g"), (middle, "0"), (left_px + 2 * half, "+1 g")):
         yield svg.line([(x, corner[1]), (x, bottom)], svg.FAINT, 1.0)
         yield svg.text((x, bottom + 10), words, 10, svg.QUIET)
     colours = (svg.RED, svg.GREEN, svg.BLUE)
@@ -109,7 +109,7 @@ def force_view(attitude: Attitude, corner: tuple[float, float], width: float) ->
         yield svg.polygon([(ends[0], y - 6), (ends[1], y - 6), (ends[1], y + 6), (ends[0], y + 6)], colour)
         yield svg.line([(middle, y - 8), (middle, y + 8)], svg.INK, 1.2)
         yield svg.text((corner[0] + 8, y), name, 13, colour, bold=True)
-        yield svg.text((left + 2 * half + VALUE_PX - 4, y), f"{value:+.3f} g", 12, anchor="end")
+        yield svg.text((left_px + 2 * half + VALUE_PX - 4, y), f"{value:+.3f} g", 12, anchor="end")
 
 
 # Along the axis of alpha: how far the table is tilted, and which face of the sensor is up.
@@ -138,8 +138,10 @@ def _edge_on(attitude: Attitude, radius: float) -> Iterator[str]:
     yield _block(-34, 34, foot + board[1], foot + board[0], BOARD, unit)
 
 
-def _block(left: float, right: float, top: float, bottom: float, fill: str, unit: float, stroke: str = "none") -> str:
-    corners = [(left, top), (right, top), (right, bottom), (left, bottom)]
+def _block(
+    left_px: float, right_px: float, top: float, bottom: float, fill: str, unit: float, stroke: str = "none"
+) -> str:
+    corners = [(left_px, top), (right_px, top), (right_px, bottom), (left_px, bottom)]
     return svg.polygon([(unit * x, unit * y) for x, y in corners], fill, stroke, 0.8)
 
 

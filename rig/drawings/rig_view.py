@@ -32,10 +32,10 @@ class Camera:
 
     def project(self, points: Vectors) -> Vectors:
         """Points of the lab, shape (n, 3), as px, shape (n, 2)."""
-        right = np.cross([0.0, 0.0, 1.0], self.toward)
-        right /= np.linalg.norm(right)
-        up = np.cross(self.toward, right)
-        flat: Vectors = np.atleast_2d(points) @ np.array([right, -up]).T
+        right_axis = np.cross([0.0, 0.0, 1.0], self.toward)
+        right_axis /= np.linalg.norm(right_axis)
+        up = np.cross(self.toward, right_axis)
+        flat: Vectors = np.atleast_2d(points) @ np.array([right_axis, -up]).T
         return np.array(self.centre) + self.scale * flat
 
 
@@ -78,8 +78,8 @@ def cylinder(radius: float, low: float, high: float, axis: int, axes: Vectors, c
     ring[:, (axis + 1) % 3], ring[:, (axis + 2) % 3] = radius * np.cos(phi), radius * np.sin(phi)
     bottom, top = ring.copy(), ring.copy()
     bottom[:, axis], top[:, axis] = low, high
-    around = [np.array([bottom[k - 1], bottom[k], top[k], top[k - 1]]) for k in range(ROUND)]
-    return Solid(tuple(face @ axes for face in (bottom[::-1], *around, top)), colour)
+    side_faces = [np.array([bottom[k - 1], bottom[k], top[k], top[k - 1]]) for k in range(ROUND)]
+    return Solid(tuple(face @ axes for face in (bottom[::-1], *side_faces, top)), colour)
 
 
 def shaded(colour: str, light: float) -> str:
@@ -115,7 +115,7 @@ def rig_view(attitude: Attitude, centre: tuple[float, float], scale: float) -> I
     if faces_us and not attitude.flip:
         yield _pin(attitude, camera)
     if not faces_us:
-        yield _hidden(attitude, camera)
+        yield _hidden_outline(attitude, camera)
     yield from _axes(attitude, camera)
 
 
@@ -131,17 +131,19 @@ def _stand() -> list[Solid]:
 
 def _bracket(attitude: Attitude, faces_us: bool) -> list[Solid]:
     """What alpha tilts: the angle that carries beta, seen from the side that looks this way."""
-    back = box((-0.42, 0.74, -0.74), (0.42, 0.86, 0.42), attitude.tilted, ALUMINIUM)
+    back_plate = box((-0.42, 0.74, -0.74), (0.42, 0.86, 0.42), attitude.tilted, ALUMINIUM)
     floor = box((-0.42, -0.5, -0.74), (0.42, 0.74, -0.62), attitude.tilted, ALUMINIUM)
-    return [back, floor] if faces_us else [back]
+    return [back_plate, floor] if faces_us else [back_plate]
 
 
 def _stack(attitude: Attitude) -> list[Solid]:
     """What lies on the bracket, from the floor up: drive of beta, its table, what is between, the sensor."""
     frame, plate, case = _on_table(attitude), BOARD_HALF, PACKAGE_HALF
     foot = foot_of(attitude)
-    under, thin, package = (foot + 0.12, foot + 0.17, foot) if attitude.flip else (foot, foot + 0.05, foot + 0.05)
-    board = box((-plate, -plate, under), (plate, plate, thin), frame, BOARD)
+    board_bottom, thin, package = (
+        (foot + 0.12, foot + 0.17, foot) if attitude.flip else (foot, foot + 0.05, foot + 0.05)
+    )
+    board = box((-plate, -plate, board_bottom), (plate, plate, thin), frame, BOARD)
     case_of = box((-case, -case, package), (case, case, package + 0.12), frame, PACKAGE)
     return [
         box((-0.42, -0.5, -0.74), (0.42, 0.74, -0.62), attitude.tilted, ALUMINIUM),
@@ -185,7 +187,7 @@ def _pin(attitude: Attitude, camera: Camera) -> str:
     return svg.circle(at, 0.035 * camera.scale, "#f7c948", "none", 0)
 
 
-def _hidden(attitude: Attitude, camera: Camera) -> str:
+def _hidden_outline(attitude: Attitude, camera: Camera) -> str:
     """The outline of a board that the table hides."""
     h, foot = BOARD_HALF, foot_of(attitude)
     corners = np.array([[-h, -h, foot], [h, -h, foot], [h, h, foot], [-h, h, foot], [-h, -h, foot]])

@@ -25,9 +25,9 @@ def sketch(attitude: Attitude) -> list[str]:
     _set(dots, (_polar(r, -attitude.beta_deg) for r in (TABLE + 1, TABLE + 2, TABLE - 1, TABLE - 2)))
     corners = [_polar(BOARD * 1.414, x_deg + 45 + 90 * k) for k in range(5)]
     for a, b in pairwise(corners):
-        _set(dots, _between(a, b))
+        _set(dots, _line_points(a, b))
     for deg in (x_deg, y_deg):
-        _set(dots, _between((0, 0), _polar(AXIS, deg)))
+        _set(dots, _line_points((0, 0), _polar(AXIS, deg)))
     lines = [
         [chr(BLANK + _code(dots[4 * r : 4 * r + 4, 2 * c : 2 * c + 2])) for c in range(COLUMNS)] for r in range(ROWS)
     ]
@@ -44,7 +44,7 @@ def _polar(radius: float, deg: float) -> tuple[float, float]:
     return radius * float(np.cos(np.radians(deg))), radius * float(np.sin(np.radians(deg)))
 
 
-def _between(a: tuple[float, float], b: tuple[float, float]) -> list[tuple[float, float]]:
+def _line_points(a: tuple[float, float], b: tuple[float, float]) -> list[tuple[float, float]]:
     steps = np.linspace(0, 1, 2 + int(np.hypot(b[0] - a[0], b[1] - a[1])))
     return [(a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])) for t in steps]
 
@@ -66,4 +66,9 @@ def _set(dots: NDArray[np.bool_], points: Iterable[tuple[float, float]]) -> None
 
 
 def _code(cell: NDArray[np.bool_]) -> int:
-    return sum(bit for row, bits in zip(cell, DOTS, strict=True) for on, bit in zip(row, bits, strict=True) if on)
+    return sum(
+        dot_bit
+        for row, row_bits in zip(cell, DOTS, strict=True)
+        for on, dot_bit in zip(row, row_bits, strict=True)
+        if on
+    )

@@ -18,19 +18,19 @@ Point = Sequence[float] | NDArray[np.float64]
 
 def element(name: str, content: str = "", /, **attributes: object) -> str:
     """One element; `stroke_width` stands for `stroke-width`, numbers are rounded to 0.01 px."""
-    written = "".join(f' {key.replace("_", "-")}="{_text(value)}"' for key, value in attributes.items())
-    return f"<{name}{written}>{content}</{name}>" if content else f"<{name}{written}/>"
+    attribute_text = "".join(f' {key.replace("_", "-")}="{_text(value)}"' for key, value in attributes.items())
+    return f"<{name}{attribute_text}>{content}</{name}>" if content else f"<{name}{attribute_text}/>"
 
 
-def polygon(points: Iterable[Point], fill: str, stroke: str = "none", width: float = 1.0, **more: str) -> str:
+def polygon(points: Iterable[Point], fill: str, stroke: str = "none", width: float = 1.0, **attributes: str) -> str:
     """A closed shape."""
-    look = {"fill": fill, "stroke": stroke, "stroke_width": width, **more}
+    look = {"fill": fill, "stroke": stroke, "stroke_width": width, **attributes}
     return element("polygon", points=_path(points), **look)
 
 
-def line(points: Iterable[Point], stroke: str = INK, width: float = 1.0, **more: str) -> str:
+def line(points: Iterable[Point], stroke: str = INK, width: float = 1.0, **attributes: str) -> str:
     """An open line."""
-    look = {"fill": "none", "stroke": stroke, "stroke_width": width, **more}
+    look = {"fill": "none", "stroke": stroke, "stroke_width": width, **attributes}
     return element("polyline", points=_path(points), **look)
 
 
@@ -49,9 +49,9 @@ def arrow(start: Point, end: Point, colour: str, width: float = 2.2) -> str:
     return line([a, foot], colour, width, stroke_linecap="round") + head(b, b - a, colour)
 
 
-def head(tip: Point, along: Point, colour: str) -> str:
+def head(tip: Point, towards: Point, colour: str) -> str:
     """The head of an arrow that points along a direction of any length."""
-    b, direction = np.asarray(tip, float), np.asarray(along, float)
+    b, direction = np.asarray(tip, float), np.asarray(towards, float)
     direction = direction / np.hypot(*direction)
     across = np.array([-direction[1], direction[0]])
     foot = b - HEAD_PX * direction

@@ -74,28 +74,30 @@ class Calibration:
 def calibrate_fleet(fleet: Fleet, members: Sequence[Member], guide: Guide) -> Calibration:
     """Fit all sensors, and pool those of a batch that have the same parameters."""
     faults = {member: member.fault for member in members if member.fault}
-    looks: dict[Member, Screening] = {}
+    screenings: dict[Member, Screening] = {}
     for member, answer in fleet.ask([(m, guide.question(m)) for m in members if m not in faults]):
         if "fault" in answer:
             faults[member] = answer["fault"]
         else:
-            looks[member] = replace(read_look(answer), scores=(), stage=NOWHERE)  # pooling needs no scores
+            screenings[member] = replace(read_look(answer), scores=(), stage=NOWHERE)  # pooling needs no scores
     groups: dict[tuple[str, Names], list[Member]] = defaultdict(list)
     for member in members:
-        if member in looks:
-            groups[member.batch, looks[member].names].append(member)
-    batches = (_batch(batch, names, of, looks, guide) for (batch, names), of in groups.items())
+        if member in screenings:
+            groups[member.batch, screenings[member].names].append(member)
+    batches = (_batch(batch, names, of, screenings, guide) for (batch, names), of in groups.items())
     return Calibration(tuple(batches), faults)
 
 
-def _batch(batch: str, names: Names, of: list[Member], looks: Mapping[Member, Screening], guide: Guide) -> Calibrated:
-    mine = tuple(looks[member] for member in of)
-    together = pool_siblings(
-        np.array([look.theta for look in mine]),
-        np.array([look.information for look in mine]),
-        np.median([look.typical for look in mine], axis=0),
+def _batch(
+    batch: str, names: Names, of: list[Member], screenings: Mapping[Member, Screening], guide: Guide
+) -> Calibrated:
+    batch_screenings = tuple(screenings[member] for member in of)
+    pooled = pool_siblings(
+        np.array([look.theta for look in batch_screenings]),
+        np.array([look.information for look in batch_screenings]),
+        np.median([look.typical for look in batch_screenings], axis=0),
     )
-    return Calibrated(batch, names, tuple(of), mine, together, guide.question(of[0]))
+    return Calibrated(batch, names, tuple(of), batch_screenings, pooled, guide.question(of[0]))
 
 
 def models(calibrated: Calibrated) -> dict[str, Model]:
@@ -155,13 +157,13 @@ def write_models(result: Calibration, folder: Path) -> list[Path]:
     return [folder / f"{sensor}.yaml" for sensor in texts]
 
 
-def read_guide(source: str, batches: set[str], own: Own = ()) -> Guide:
+def read_guide(source: str, batches: set[str], effect_files: Own = ()) -> Guide:
     """The guide from a folder, or from the name or file of one model. Raises ModelError, UnknownName."""
-    folder, effects = Path(source), effects_of(own)
+    folder, effects = Path(source), effects_of(effect_files)
     if not folder.is_dir():
-        return Guide({}, dump_model(read_model(source, effects)), {}, own)
+        return Guide({}, dump_model(read_model(source, effects)), {}, effect_files)
     texts = {batch: dump_model(read_model(folder / f"{safe(batch)}.yaml", effects)) for batch in batches}
-    return Guide(texts, "", _rigs(folder / RIGS), own)
+    return Guide(texts, "", _rigs(folder / RIGS), effect_files)
 
 
 def safe(name: str) -> str:

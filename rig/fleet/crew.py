@@ -72,7 +72,7 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
             yield client
 
 
-def answered(
+def run_tasks(
     client: Client, work: Callable[[list[T]], Any], chunks: Iterator[list[T]]
 ) -> Iterator[tuple[list[T], Any]]:
     """Chunks of tasks with the results of `work`, in the order of completion; None for a task that kills its worker.
@@ -85,9 +85,9 @@ def answered(
 
     under_way: dict[Any, list[T]] = {}
     suspects: list[T] = []
-    done = as_completed(loop=client.loop)
+    completed = as_completed(loop=client.loop)
     try:
-        ahead = AHEAD * max(sum(client.nthreads().values()), 1)
+        queue_limit = AHEAD * max(sum(client.nthreads().values()), 1)
         while True:
             for chunk in chunks:
                 if not chunk:
@@ -95,12 +95,12 @@ def answered(
                     continue
                 future = client.submit(work, chunk, pure=False)
                 under_way[future] = chunk
-                done.add(future)
-                if len(under_way) >= ahead:
+                completed.add(future)
+                if len(under_way) >= queue_limit:
                     break
             if not under_way:
                 break
-            future = next(done)
+            future = next(completed)
             chunk = under_way.pop(future)
             try:
                 yield chunk, future.result()

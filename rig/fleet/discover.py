@@ -43,7 +43,7 @@ Batches = Mapping[str, Sequence[Member]]
 
 
 @dataclass(frozen=True)
-class Seen:
+class ScreeningSummary:
     """The part of a screening that is kept, see Screening. `on_stages`: whether stages turned the sensor."""
 
     excess: float
@@ -59,14 +59,14 @@ class Stand:
 
     start: Question
     faults: Mapping[Member, str]
-    seen: Mapping[Member, Seen] = field(default_factory=dict)
+    seen: Mapping[Member, ScreeningSummary] = field(default_factory=dict)
     effects: Mapping[str, tuple[BatchEffect, ...]] = field(default_factory=dict)
     errors: tuple[RigError, ...] = ()
 
-    def question(self, what: Any, member: Member) -> Question:
+    def question(self, kind: Any, member: Member) -> Question:
         """The present question for a sensor."""
         effects = tuple(effect.effect for effect in self.effects.get(member.batch, ()))
-        return replace(self.start, what=what, effects=effects, errors=errors_of(self.errors, member.rig))
+        return replace(self.start, what=kind, effects=effects, errors=errors_of(self.errors, member.rig))
 
     def judged_beside(self, batch: str, effects: tuple[BatchEffect, ...]) -> Stand:
         """This state with other effects of a batch."""
@@ -79,7 +79,7 @@ def discover_fleet(fleet: Fleet, members: Sequence[Member], start: Question) -> 
     for member in members:
         batches[member.batch].append(member)
     stand = _rigs(fleet, Stand(start, {m: m.fault for m in members if m.fault}), batches)
-    stand = _settled(fleet, _grown(fleet, stand, batches), batches)
+    stand = _settled(fleet, _add_missing_effects(fleet, stand, batches), batches)
     return _population(stand, _diagnosed(fleet, stand, batches), members)
 
 
@@ -97,12 +97,12 @@ def _rigs(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
     if len({member.rig for of in batches.values() for member in of}) < 2:
         return stand
     faults = dict(stand.faults)
-    stages = {member: look.stage for member, look in _looks(fleet, stand, batches, faults) if look}
+    stages = {member: look.stage for member, look in _screen_members(fleet, stand, batches, faults) if look}
     measured = [Measured(m.batch, m.rig, stages[m]) for of in batches.values() for m in of if m in stages]
     return replace(stand, faults=faults, errors=tuple(find_rig_errors(measured)))
 
 
-def _looks(
+def _screen_members(
     fleet: Fleet, stand: Stand, batches: Batches, faults: dict[Member, str]
 ) -> Iterator[tuple[Member, Screening | None]]:
     """Every sensor with its screening, batch by batch; without one, the reason is added to `faults`."""
@@ -113,7 +113,7 @@ def _looks(
         yield member, None if "fault" in answer else read_look(answer)
 
 
-def _grown(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
+def _add_missing_effects(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
     """The state with the missing effects of every batch, added one after another."""
     open_ = batches
     for rounds_left in reversed(range(MOST_ROUNDS + 1)):
@@ -129,45 +129,49 @@ def _judged(fleet: Fleet, stand: Stand, batches: Batches) -> tuple[Stand, dict[s
     stage = {name for name, effect in effects_of(stand.start.own).items() if "pose" in effect.places}
     faults, screened = dict(stand.faults), dict(stand.seen)
     waiting = {batch: sum(m not in faults for m in of) for batch, of in batches.items()}
-    looks: dict[str, dict[Member, Screening]] = defaultdict(dict)
+    screenings: dict[str, dict[Member, Screening]] = defaultdict(dict)
     missing = {}
-    for member, look in _looks(fleet, stand, batches, faults):
+    for member, look in _screen_members(fleet, stand, batches, faults):
         batch = member.batch
         if look is not None:
-            looks[batch][member] = look
-            screened[member] = Seen(look.excess, look.free, look.chance, bool(look.outliers), bool(look.stage.names))
+            screenings[batch][member] = look
+            screened[member] = ScreeningSummary(
+                look.excess, look.free, look.chance, bool(look.outliers), bool(look.stage.names)
+            )
         waiting[batch] -= 1
         if not waiting[batch]:
-            mine = looks.pop(batch, {})
-            missing[batch] = find_batch_effects([mine[m] for m in batches[batch] if m in mine], stage)
+            batch_screenings = screenings.pop(batch, {})
+            missing[batch] = find_batch_effects(
+                [batch_screenings[m] for m in batches[batch] if m in batch_screenings], stage
+            )
     return replace(stand, faults=faults, seen=screened), missing
 
 
 def _settled(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
     """The state without the effects of a batch that are not needed with the others."""
     for batch in [batch for batch, effects in stand.effects.items() if len(effects) > 1]:
-        stand = _needed(fleet, stand, batch, batches[batch])
+        stand = _drop_needless_effects(fleet, stand, batch, batches[batch])
     return stand
 
 
-def _needed(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Member]) -> Stand:
+def _drop_needless_effects(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Member]) -> Stand:
     """The state with the needed effects of a batch; the unneeded effect that was found first is removed first."""
-    beside = _beside(fleet, stand, batch, members)
-    needed = tuple(effect for effect in beside if effect is not None)
-    if len(needed) == len(beside):
-        return stand.judged_beside(batch, needed)
-    k, effects = beside.index(None), stand.effects[batch]
+    tested = _test_jointly(fleet, stand, batch, members)
+    significant = tuple(effect for effect in tested if effect is not None)
+    if len(significant) == len(tested):
+        return stand.judged_beside(batch, significant)
+    k, effects = tested.index(None), stand.effects[batch]
     fewer, _ = _judged(fleet, stand.judged_beside(batch, (*effects[:k], *effects[k + 1 :])), {batch: members})
-    return _needed(fleet, fewer, batch, members) if len(effects) > 2 else fewer
+    return _drop_needless_effects(fleet, fewer, batch, members) if len(effects) > 2 else fewer
 
 
-def _beside(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Member]) -> list[BatchEffect | None]:
+def _test_jointly(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Member]) -> list[BatchEffect | None]:
     """Each effect of a batch, tested with all others in the model; None if it is not significant."""
     effects = stand.effects[batch]
     tested = []
     for k, effect in enumerate(effects):
-        without = stand.judged_beside(batch, (*effects[:k], *effects[k + 1 :]))
-        missed = _judged(fleet, without, {batch: members})[1].get(batch, [])
+        reduced = stand.judged_beside(batch, (*effects[:k], *effects[k + 1 :]))
+        missed = _judged(fleet, reduced, {batch: members})[1].get(batch, [])
         tested.append(next((candidate for candidate in missed if candidate.effect == effect.effect), None))
     return tested
 
@@ -175,11 +179,13 @@ def _beside(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Member]) -
 def _diagnosed(fleet: Fleet, stand: Stand, batches: Batches) -> dict[Member, Any]:
     """The diagnoses of the sensors that differ from their batch."""
     usual = {batch: [stand.seen[m].excess for m in of if m in stand.seen] for batch, of in batches.items()}
-    out = [m for m, screened in stand.seen.items() if m not in stand.faults and stands_out(screened, usual[m.batch])]
-    return dict(fleet.ask([(m, stand.question("diagnosis", m)) for m in out]))
+    outliers = [
+        m for m, screened in stand.seen.items() if m not in stand.faults and stands_out(screened, usual[m.batch])
+    ]
+    return dict(fleet.ask([(m, stand.question("diagnosis", m)) for m in outliers]))
 
 
-def stands_out(look: Screening | Seen, batch: Sequence[float]) -> bool:
+def stands_out(look: Screening | ScreeningSummary, batch: Sequence[float]) -> bool:
     """Whether the residual is more than noise: by a pattern, an outlier, or an excess above that of the batch."""
     usual = max(1.0, float(np.median(batch))) if len(batch) >= FEWEST else 1.0
     noisy = chdtrc(look.free, look.free * (look.excess / usual) ** 2) < STANDS_OUT
@@ -190,8 +196,8 @@ def _population(stand: Stand, diagnosed: Mapping[Member, Any], members: Sequence
     sensors = tuple(_verdict(member, stand, diagnosed.get(member)) for member in members)
     batches = []
     for batch in dict.fromkeys(member.batch for member in members):
-        mine = tuple(verdict for verdict in sensors if verdict.batch == batch)
-        batches.append(batch_verdict(batch, stand.effects.get(batch, ()), mine))
+        batch_sensors = tuple(verdict for verdict in sensors if verdict.batch == batch)
+        batches.append(batch_verdict(batch, stand.effects.get(batch, ()), batch_sensors))
     unconnected = unconnected_rigs(
         [Measured(m.batch, m.rig, NOWHERE) for m, screened in stand.seen.items() if screened.on_stages]
     )
@@ -206,14 +212,16 @@ def _verdict(member: Member, stand: Stand, diagnosis: Any | None) -> SensorVerdi
     if fault:
         return SensorVerdict(*of, "failed", remark=fault)
     facts = diagnosis or {"effects": (), "rivals": {}, "excess": stand.seen[member].excess}
-    own = tuple(facts["effects"])
-    rivals |= {name: tuple(others) for name, others in facts["rivals"].items()}
+    own_effects = tuple(facts["effects"])
+    rivals |= {name: tuple(alternatives) for name, alternatives in facts["rivals"].items()}
     judgement = Judgement(
         model=stand.start.model,
-        missing=(*names, *own),
+        missing=(*names, *own_effects),
         alternatives=rivals,
         **{name: facts[name] for name in JUDGED if name in facts},
     )
     remark = "; ".join(filter(None, (facts.get("left"), facts.get("caution")))) or None
     scope = FULL_SEARCH if diagnosis else WITH_BATCH
-    return SensorVerdict(*of, decide(judgement).value, judgement.missing, own, facts["excess"], scope, rivals, remark)
+    return SensorVerdict(
+        *of, decide(judgement).value, judgement.missing, own_effects, facts["excess"], scope, rivals, remark
+    )

@@ -31,24 +31,24 @@ def population_document(population: Population, model: str) -> Document:
         "verdicts": dict(population.verdicts),
         "batches": [
             {
-                "batch": each.batch,
-                "sensors": each.sensors,
-                "effects": [{**vars(e), "rivals": list(e.rivals)} for e in each.effects],
-                "shares": dict(each.shares),
+                "batch": batch.batch,
+                "sensors": batch.sensors,
+                "effects": [{**vars(e), "rivals": list(e.rivals)} for e in batch.effects],
+                "shares": dict(batch.shares),
             }
-            for each in population.batches
+            for batch in population.batches
         ],
         "rigs": [vars(error) for error in population.rigs],
         "unconnected": [list(group) for group in population.unconnected] if len(population.unconnected) > 1 else [],
         "sensors": [
             {
-                **vars(each),
-                "effects": list(each.effects),
-                "own": list(each.own),
-                "rivals": {name: list(of) for name, of in each.rivals.items()},
-                "needs_a_person": each.needs_a_person,
+                **vars(batch),
+                "effects": list(batch.effects),
+                "own": list(batch.own),
+                "rivals": {name: list(of) for name, of in batch.rivals.items()},
+                "needs_a_person": batch.needs_a_person,
             }
-            for each in population.sensors
+            for batch in population.sensors
         ],
     }
 
@@ -60,7 +60,7 @@ def calibration_document(calibration: Calibration, model: str) -> Document:
         "what": "calibration",
         "model": model,
         "batches": [_batch(batch) for batch in calibration.batches],
-        "failed": [{"sensor": m.sensor, "data": m.data, "why": why} for m, why in calibration.faults.items()],
+        "failed": [{"sensor": m.sensor, "data": m.data, "why": reason} for m, reason in calibration.faults.items()],
     }
 
 
@@ -68,13 +68,13 @@ def _batch(batch: Calibrated) -> Document:
     scale = batch.pooled.scale
     population = [
         {
-            **_named(name),
+            **_name_document(name),
             "mean": parameter.mean * size,
             "mean_std": parameter.mean_std * size,
             "spread": parameter.spread * size,
             "spread_interval": (parameter.spread_interval(0.025, 0.975) * size).tolist(),
             "pooled": parameter.pooled,
-            "apart": [m.sensor for m, out in zip(batch.members, parameter.apart, strict=True) if out],
+            "apart": [m.sensor for m, is_outlier in zip(batch.members, parameter.apart, strict=True) if is_outlier],
         }
         for name, parameter, size in zip(batch.names, batch.pooled.parameters, scale, strict=True)
     ]
@@ -82,8 +82,8 @@ def _batch(batch: Calibrated) -> Document:
 
 
 def _sensors(batch: Calibrated) -> list[Document]:
-    together, (low, high) = batch.pooled, batch.pooled.intervals()
-    values, stds, alone, apart = together.values, together.stds, together.alone, together.apart
+    pooled, (low, high) = batch.pooled, batch.pooled.intervals()
+    values, stds, own_stds, is_outlier = pooled.values, pooled.stds, pooled.alone, pooled.apart
     return [
         {
             "sensor": member.sensor,
@@ -93,13 +93,13 @@ def _sensors(batch: Calibrated) -> list[Document]:
             "stands_out": batch.unlike[k],
             "parameters": [
                 {
-                    **_named(name),
+                    **_name_document(name),
                     "value": float(values[k, j]),
                     "std": float(stds[k, j]),
                     "interval": [float(low[k, j]), float(high[k, j])],
                     "alone": float(batch.looks[k].theta[j]),
-                    "std_alone": float(alone[k, j]) if math.isfinite(alone[k, j]) else None,
-                    "apart": bool(apart[k, j]),
+                    "std_alone": float(own_stds[k, j]) if math.isfinite(own_stds[k, j]) else None,
+                    "apart": bool(is_outlier[k, j]),
                 }
                 for j, name in enumerate(batch.names)
             ],
@@ -108,7 +108,7 @@ def _sensors(batch: Calibrated) -> list[Document]:
     ]
 
 
-def _named(name: tuple[str, str, str, str]) -> Document:
+def _name_document(name: tuple[str, str, str, str]) -> Document:
     return dict(zip(("effect", "name", "axis", "unit"), name, strict=True))
 
 
@@ -130,7 +130,7 @@ def calibration_page(calibration: Calibration, model: str) -> str:
             quantities.setdefault(_titled(batch, name), []).append(_spread(batch, k))
     rows = [row for batch in calibration.batches for row in _rows(batch)]
     head = ("batch", "sensors", "parameter", "mean", "spread", "standard uncertainty / alone", "unlike the rest")
-    failed = [f"{member.sensor}: {why}" for member, why in calibration.faults.items()]
+    failed = [f"{member.sensor}: {reason}" for member, reason in calibration.faults.items()]
     not_calibrated = (f"Not calibrated: {'; '.join(failed)}",) if failed else ()
     batches = Section("Batches", (*not_calibrated, Table("Batches", head, rows, headed=False)))
     count = sum(len(batch.members) for batch in calibration.batches)
@@ -166,7 +166,8 @@ def _rows(batch: Calibrated) -> list[tuple[object, ...]]:
             estimate_text(parameter.mean * size, parameter.mean_std * size),
             rounded(parameter.spread * size, 2),
             rounded(float(gain), 2),
-            ", ".join(m.sensor for m, out in zip(batch.members, parameter.apart, strict=True) if out) or "-",
+            ", ".join(m.sensor for m, is_outlier in zip(batch.members, parameter.apart, strict=True) if is_outlier)
+            or "-",
         )
         for name, parameter, size, gain in zip(
             batch.names, batch.pooled.parameters, batch.pooled.scale, gains, strict=True

@@ -53,16 +53,18 @@ def fleet_of(sources: Iterable[str]) -> list[Member]:
     A table that cannot be read gives a member with a fault. Raises RigError for a missing source, and for two members
     with the same name.
     """
-    named = list(sources)
-    members = [member for source in named for member in _of(source)] if named else list(_of_record())
+    source_names = list(sources)
+    members = [member for source in source_names for member in _of(source)] if source_names else list(_of_record())
     if not members:
-        raise RigError(f"no sensor in {', '.join(named) or 'the record'}; name an index, a folder, tables or runs")
+        raise RigError(
+            f"no sensor in {', '.join(source_names) or 'the record'}; name an index, a folder, tables or runs"
+        )
     unique = list({(member.data, member.sensor): member for member in members}.values())
     by_name: dict[str, Member] = {}
     for member in unique:
-        if (other := by_name.setdefault(member.sensor, member)) is not member:
+        if (earlier := by_name.setdefault(member.sensor, member)) is not member:
             raise RigError(
-                f"the sensor {member.sensor} occurs twice: {other.data} and {member.data}; "
+                f"the sensor {member.sensor} occurs twice: {earlier.data} and {member.data}; "
                 "give each its name in the column `sensor` of an index, or leave one out"
             )
     return unique
@@ -112,19 +114,21 @@ def _of_index(path: Path) -> Iterator[Member]:
             raise RigError(
                 f"{path}: an index can have the columns {', '.join(COLUMNS)}, but not {', '.join(sorted(unknown))}"
             )
-        named = cells.get("file") or cells.get("data")
-        if not named:
+        file_name = cells.get("file") or cells.get("data")
+        if not file_name:
             raise RigError(f"{path}, line {number}: has no file and no run; fill in the column `file` or `data`")
-        beside = path.parent / named
-        known = {name: cells[name] for name in ("sensor", "batch", "rig") if cells.get(name)}
-        if cells.get("file") or beside.is_file():
-            yield _of_file(beside, known)
+        data_path = path.parent / file_name
+        cells_given = {name: cells[name] for name in ("sensor", "batch", "rig") if cells.get(name)}
+        if cells.get("file") or data_path.is_file():
+            yield _of_file(data_path, cells_given)
         else:
-            yield from _of_run(named, known)
+            yield from _of_run(file_name, cells_given)
 
 
-def _of_file(path: Path, stated: dict[str, str]) -> Member:
-    member = Member(stated.get("sensor", path.stem), stated.get("batch", ""), stated.get("rig", ""), str(path))
+def _of_file(path: Path, given_names: dict[str, str]) -> Member:
+    member = Member(
+        given_names.get("sensor", path.stem), given_names.get("batch", ""), given_names.get("rig", ""), str(path)
+    )
     try:
         text = content(member)
     except DataError as error:
@@ -133,9 +137,9 @@ def _of_file(path: Path, stated: dict[str, str]) -> Member:
         key.strip(): value.strip() for key, _, value in map(_constant, text.splitlines()[:50]) if value.strip()
     }
     return Member(
-        sensor=stated.get("sensor") or constants.get("serial") or constants.get("sensor") or path.stem,
-        batch=stated.get("batch") or constants.get("batch", ""),
-        rig=stated.get("rig") or constants.get("rig", ""),
+        sensor=given_names.get("sensor") or constants.get("serial") or constants.get("sensor") or path.stem,
+        batch=given_names.get("batch") or constants.get("batch", ""),
+        rig=given_names.get("rig") or constants.get("rig", ""),
         data=str(path),
         digest=hashlib.sha256(text.encode()).hexdigest(),
     )
@@ -145,9 +149,9 @@ def _constant(line: str) -> tuple[str, str, str]:
     return line[1:].partition(":") if line.startswith("#") else ("", "", "")
 
 
-def _of_run(name: str, stated: dict[str, str]) -> Iterator[Member]:
+def _of_run(name: str, given_names: dict[str, str]) -> Iterator[Member]:
     """The sensors of a run, or the named sensor. Raises UnknownRun."""
-    run_id, slash, chosen = name.partition("/")
+    run_id, slash, sensor_name = name.partition("/")
     if not run_id:
         raise UnknownRun(f"{name}: there is no such file or folder")
     try:
@@ -156,12 +160,15 @@ def _of_run(name: str, stated: dict[str, str]) -> Iterator[Member]:
             sensors = list(_members(record, run))
     except UnknownRun as error:
         raise UnknownRun(f"{name}: there is no such file or folder, and {error}") from None
-    mine = [member for member in sensors if not slash or member.data == f"{run.run}/{chosen}"]
-    if not mine:
-        raise UnknownRun(f"run {run_id} has no sensor {chosen!r}; it has {', '.join(m.data for m in sensors)}")
-    for m in mine:
+    selected = [member for member in sensors if not slash or member.data == f"{run.run}/{sensor_name}"]
+    if not selected:
+        raise UnknownRun(f"run {run_id} has no sensor {sensor_name!r}; it has {', '.join(m.data for m in sensors)}")
+    for m in selected:
         yield replace(
-            m, sensor=stated.get("sensor", m.sensor), batch=stated.get("batch", m.batch), rig=stated.get("rig", m.rig)
+            m,
+            sensor=given_names.get("sensor", m.sensor),
+            batch=given_names.get("batch", m.batch),
+            rig=given_names.get("rig", m.rig),
         )
 
 
@@ -170,11 +177,11 @@ def _of_record() -> Iterator[Member]:
     if not Record.is_there():
         return
     with Record.to_read() as record:
-        known: set[str] = set()
+        sensor_names: set[str] = set()
         for run in record.runs():
             if run.state == "complete" and run.kind in MEANS:
-                yield from (m for m in _members(record, run) if m.sensor not in known)
-                known |= set(members(run))
+                yield from (m for m in _members(record, run) if m.sensor not in sensor_names)
+                sensor_names |= set(members(run))
 
 
 def _members(record: Record, run: Run) -> Iterator[Member]:

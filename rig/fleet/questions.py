@@ -20,12 +20,12 @@ from sqlalchemy import select
 import calibrations
 from calibrations.errors import DataError
 from rig.files import RECORD, program
-from rig.fleet.crew import answered
+from rig.fleet.crew import run_tasks
 from rig.fleet.members import Member, content
 from rig.fleet.worker import Question, Task, answer
 from rig.record import Record
 from rig.record.schema import answers, insert_or
-from rig.record.store import now
+from rig.record.store import timestamp
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -53,7 +53,7 @@ def _program() -> str:
 
 def keep(record: Record, answered_rows: Iterable[tuple[str, str, str, Mapping[str, Any]]]) -> None:
     """Store rows (key, sensor, data, answer) in one transaction; rows that exist do not change."""
-    rows = [{"key": k, "sensor": s, "data": d, "at": now(), "answer": dict(a)} for k, s, d, a in answered_rows]
+    rows = [{"key": k, "sensor": s, "data": d, "at": timestamp(), "answer": dict(a)} for k, s, d, a in answered_rows]
     with record.engine.begin() as to:
         if rows:
             to.execute(insert_or(to, answers).on_conflict_do_nothing(), rows)
@@ -85,26 +85,27 @@ class Fleet:
 
     def ask(self, questions: Sequence[tuple[Member, Question]]) -> Iterator[tuple[Member, Any]]:
         """Every member with its answer or a `fault`, roughly in the order of `questions`."""
-        known: list[tuple[Member, Any]] = []
+        stored_answers: list[tuple[Member, Any]] = []
         open_: dict[str, list[tuple[Member, Question]]] = {}
-        chunks, done = self._chunks(questions, known, open_), 0
+        chunks, answered_count = self._chunks(questions, stored_answers, open_), 0
         for new_answers in self._answers(chunks, open_):
-            ready = [*known, *new_answers]
-            known.clear()
+            ready = [*stored_answers, *new_answers]
+            stored_answers.clear()
             yield from ready
-            done += len(ready)
+            answered_count += len(ready)
             if new_answers:
-                self.tell(done, len(questions))
+                self.tell(answered_count, len(questions))
 
     def _chunks(
         self,
         questions: Sequence[tuple[Member, Question]],
-        known: list[tuple[Member, Any]],
+        stored_answers: list[tuple[Member, Any]],
         open_: dict[str, list[tuple[Member, Question]]],
     ) -> Iterator[list[Task]]:
         """Tasks for the questions without a stored answer, in chunks; these questions are added to `open_`.
 
-        Stored answers are added to `known`. An empty chunk means: use the answers in `known` first, to save memory.
+        The answers in the record are added to `stored_answers`. An empty chunk means: use these answers first, to save
+        memory.
         """
         tasks: list[Task] = []
         size = min((CHUNK[question.what] for _, question in questions), default=1)
@@ -112,8 +113,10 @@ class Fleet:
             part = questions[first : first + SLICE]
             keys = [key_of(member.digest, question) for member, question in part]
             stored = kept(self.record, keys)
-            known += [(member, stored[key]) for key, (member, _) in zip(keys, part, strict=True) if key in stored]
-            if known:
+            stored_answers += [
+                (member, stored[key]) for key, (member, _) in zip(keys, part, strict=True) if key in stored
+            ]
+            if stored_answers:
                 yield []
             for key, pair in zip(keys, part, strict=True):
                 if key in stored:
@@ -136,7 +139,7 @@ class Fleet:
             yield []
         else:
             return
-        for tasks, results in answered(self.client, answer, chain([chunk], chunks)):
+        for tasks, results in run_tasks(self.client, answer, chain([chunk], chunks)):
             pairs = results if results is not None else [(task.key, {"fault": KILLED}) for task in tasks]
             rows = [(key, *pair, document) for key, document in pairs for pair in open_.pop(key)]
             keep(

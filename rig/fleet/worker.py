@@ -41,9 +41,9 @@ from rig.services.tables import averaged
 def write_look(look: Screening) -> dict[str, Any]:
     """The screening as plain values, without rounding."""
     return {
-        **_plain(look),
-        "scores": [_plain(score) for score in look.scores],
-        "stage": _plain(look.stage),
+        **_as_document(look),
+        "scores": [_as_document(score) for score in look.scores],
+        "stage": _as_document(look.stage),
     }
 
 
@@ -52,14 +52,14 @@ def read_look(document: dict[str, Any]) -> Screening:
     values = dict(document)
     stage = values.pop("stage")
     scores = tuple(Score(**_arrays(score) | {"effect": intern(score["effect"])}) for score in values.pop("scores"))
-    names = _one(tuple(tuple(name) for name in values.pop("names")))
+    names = _shared_names(tuple(tuple(name) for name in values.pop("names")))
     k = len(stage["names"])
     return Screening(
         **_arrays(values) | {"outliers": tuple(values["outliers"])},
         names=names,
         scores=scores,
         stage=StageScore(
-            _one(tuple(tuple(name) for name in stage["names"])),
+            _shared_names(tuple(tuple(name) for name in stage["names"])),
             np.array(stage["score"], dtype=float),
             np.array(stage["information"], dtype=float).reshape(k, k),
         ),
@@ -67,12 +67,12 @@ def read_look(document: dict[str, Any]) -> Screening:
 
 
 @lru_cache(maxsize=1000)
-def _one(names: tuple[Any, ...]) -> tuple[Any, ...]:
+def _shared_names(names: tuple[Any, ...]) -> tuple[Any, ...]:
     """The same object for the same names, which all sensors of a batch have."""
     return names
 
 
-def _plain(value: Any) -> dict[str, Any]:
+def _as_document(value: Any) -> dict[str, Any]:
     values = {field.name: getattr(value, field.name) for field in fields(value)}
     return {name: item.tolist() if isinstance(item, np.ndarray) else item for name, item in values.items()}
 
@@ -112,14 +112,14 @@ class Task:
 
 def answer(tasks: Sequence[Task]) -> list[tuple[str, Answer]]:
     """Key and answer of each task; an answer can be a `fault`."""
-    return [(task.key, _answered(task)) for task in tasks]
+    return [(task.key, _answer(task)) for task in tasks]
 
 
-def _answered(task: Task) -> Answer:
+def _answer(task: Task) -> Answer:
     question = task.question
     try:
-        model, columns = _beside(question.model, question.effects, question.own)
-        table = correct_stage_errors(_checked(_read(task), model), question.errors, columns.effects)
+        model, columns = _model_and_designs(question.model, question.effects, question.own)
+        table = correct_stage_errors(_checked(_read_table(task), model), question.errors, columns.effects)
         if question.what == "look":
             return write_look(screen_sensor(table, model, columns))
         return _diagnosis_answer(diagnose(table, model, columns.effects))
@@ -130,9 +130,9 @@ def _answered(task: Task) -> Answer:
 
 
 @lru_cache(maxsize=8)
-def _beside(model: str, effects: tuple[str, ...], own: Own) -> tuple[Model, SharedDesigns]:
+def _model_and_designs(model: str, effects: tuple[str, ...], effect_files: Own) -> tuple[Model, SharedDesigns]:
     """The model, and the designs that the sensors of this worker share."""
-    return model_of(Question("look", model, effects, own=own)), SharedDesigns(effects_of(own))
+    return model_of(Question("look", model, effects, own=effect_files)), SharedDesigns(effects_of(effect_files))
 
 
 def model_of(question: Question) -> Model:
@@ -165,7 +165,7 @@ def _instead(source: str, kind: str) -> str:
     )
 
 
-def _read(task: Task) -> Table:
+def _read_table(task: Task) -> Table:
     """Raises DataError, RecordError."""
     if task.text is not None:
         if channels_alone(task.text[:LONGEST_BEGINNING]):
@@ -187,7 +187,7 @@ def _diagnosis_answer(diagnosis: Diagnosis[Fit]) -> Answer:
     facts = diagnosis.judgement
     return {
         "effects": list(facts.missing),
-        "rivals": {name: list(others) for name, others in facts.alternatives.items()},
+        "rivals": {name: list(alternatives) for name, alternatives in facts.alternatives.items()},
         "excess": diagnosis.findings.end.pooled_excess,
         "left": facts.left,
         "share_left": facts.share_left,
@@ -217,12 +217,12 @@ def own_files(bench_file: Path | None) -> Own:
 
 
 @lru_cache(maxsize=8)
-def effects_of(own: Own) -> Mapping[str, Effect]:
+def effects_of(effect_files: Own) -> Mapping[str, Effect]:
     """The shipped effects and those of the user's files. Raises ModelError."""
-    if not own:
+    if not effect_files:
         return catalogue()
     with TemporaryDirectory(prefix="effects-") as folder:
-        for name, text in own:
+        for name, text in effect_files:
             Path(folder, name).write_text(text, encoding="utf-8")
         LOG.addFilter(_silent)
         try:

@@ -22,11 +22,11 @@ class HandAnalysis:
 
         return learn_noise(windows, rate_hz)
 
-    def judge(self, rest: Sequence[NDArray[np.float64]], noise: NoiseAtRest) -> Stillness:
+    def judge(self, windows: Sequence[NDArray[np.float64]], noise: NoiseAtRest) -> Stillness:
         """The test of the last of successive windows."""
         from calibrations.analyses.stillness import judge_window
 
-        return judge_window(rest, cast(Any, noise))
+        return judge_window(windows, cast(Any, noise))
 
     def course(self, dwells: Sequence[Dwell], noise: NoiseAtRest, skipped: Sequence[str] = ()) -> HandCourse:
         """The positions so far; orientations with the words `skipped` are not wanted.

@@ -54,9 +54,9 @@ class GuardedClock:
         self.inner.sleep(deadline - self.inner.now())
 
     @contextmanager
-    def guarded(self, looks: Sequence[Look]) -> Iterator[None]:
+    def guarded(self, checks: Sequence[Look]) -> Iterator[None]:
         """Run the checks in every sleep inside the context."""
-        self._looks = looks
+        self._looks = checks
         try:
             yield
         finally:
@@ -74,7 +74,7 @@ class GuardedClock:
 
     def _take(self, due: Sequence[Look]) -> None:
         """Run the checks. During a check, and after a failed one, there are no further checks."""
-        looks, self._looks = self._looks, ()
+        checks, self._looks = self._looks, ()
         for check in due:
             check.look()
-        self._looks = looks
+        self._looks = checks

@@ -59,7 +59,7 @@ class Absent:
         """An absent stage needs no homing."""
         return True
 
-    def __getattr__(self, what: str) -> Any:
+    def __getattr__(self, name: str) -> Any:
         raise ProcedureError(f"the bench has no {self._role}, but this procedure needs it; add it to the bench file")
 
 
@@ -122,8 +122,8 @@ class Rig:
         if self.world is None or not isinstance(clock, SimulatedClock):
             return
         self.world.restore(state["world"])
-        for server, kept in zip(self.servers, state["servers"], strict=True):
-            server.restore(kept)
+        for server, server_state in zip(self.servers, state["servers"], strict=True):
+            server.restore(server_state)
         clock.restore(state["clock_s"])
 
     def tally(self) -> dict[str, tuple[float, str]]:
@@ -133,8 +133,8 @@ class Rig:
 
     def require_steady(self) -> None:
         """Raises the error of a stage that has left its position, or of an oscillation that has ended."""
-        for driver in self._moving():
-            getattr(driver, "require_steady", _nothing)()
+        for driver in self._moving_drivers():
+            getattr(driver, "require_steady", _do_nothing)()
 
     def look(self) -> None:
         """Raises the error of an open interlock or an alarm."""
@@ -143,12 +143,12 @@ class Rig:
 
     def guarded(self, session: Session) -> AbstractContextManager[None]:
         """Inside the context every wait checks interlocks, alarms and the oven, and raises their errors."""
-        looks = [Look(driver.look) for driver in self._watched()]
+        checks = [Look(driver.look) for driver in self._watched()]
         if "oven" in self.drivers:
-            looks.append(
+            checks.append(
                 Look(lambda: session.check_temperature(session.oven.temperature_c()), NOW_AND_THEN_S, OVEN_TAKES_S)
             )
-        return self.clock.guarded(looks)
+        return self.clock.guarded(checks)
 
     def _watched(self) -> list[Any]:
         """Drivers with a check.
@@ -167,7 +167,7 @@ class Rig:
         """
         if self.bench.simulated:
             return []
-        left_on = [mover.name for mover in self._moving() if getattr(mover, "release", bool)()]
+        left_on = [mover.name for mover in self._moving_drivers() if getattr(mover, "release", bool)()]
         return [f"{name}: the stop input was still on from an earlier stop; it is off now" for name in left_on]
 
     def stop(self) -> list[str]:
@@ -176,15 +176,15 @@ class Rig:
         Every instrument gets its stop command before the first wait. The oven is switched off, because only a run
         checks its temperature.
         """
-        movers, oven = self._moving(), cast(Any, self.drivers.get("oven"))
+        movers, oven = self._moving_drivers(), cast(Any, self.drivers.get("oven"))
         for mover in movers:
-            _failure(getattr(mover, "halt", _nothing))
+            _failure(getattr(mover, "halt", _do_nothing))
         failed = [(f"{mover.name} may still move", _failure(mover.stop)) for mover in movers]
         if oven is not None:
             failed.append((f"{oven.name} may still heat", _failure(lambda: oven.run(False))))
-        return [f"{what}: {failure}" for what, failure in failed if failure is not None]
+        return [f"{instrument}: {failure}" for instrument, failure in failed if failure is not None]
 
-    def _moving(self) -> list[Any]:
+    def _moving_drivers(self) -> list[Any]:
         return [self.drivers[role] for role in MOVING if role in self.drivers]
 
 
@@ -197,7 +197,7 @@ def _failure(act: Callable[[], object]) -> Exception | None:
     return None
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     """For an instrument without this method."""
 
 
@@ -221,21 +221,23 @@ def connected(bench: Bench, tap: Tap | None = None) -> Iterator[Rig]:
 
 
 def checked(
-    bench: Bench, before: Callable[[Driver], object] | None = None
+    bench: Bench, prepare: Callable[[Driver], object] | None = None
 ) -> dict[str, tuple[Identity | None, list[Check]]]:
     """Identity and self-test of every instrument. One that does not answer has no identity and a failed check.
 
-    `before`, if given, is called with each driver before its self-test.
+    `prepare`, if given, is called with each driver before its self-test.
     """
     with wired(bench) as wiring:
-        return {role: _check(wiring, role, before) for role in bench.instruments}
+        return {role: _check(wiring, role, prepare) for role in bench.instruments}
 
 
-def _check(wiring: Wiring, role: str, before: Callable[[Driver], object] | None) -> tuple[Identity | None, list[Check]]:
+def _check(
+    wiring: Wiring, role: str, prepare: Callable[[Driver], object] | None
+) -> tuple[Identity | None, list[Check]]:
     try:
         driver = wiring.connect(role)
-        if before is not None:
-            before(driver)
+        if prepare is not None:
+            prepare(driver)
         return driver.identify(), driver.self_test()
     except (DriverError, InstrumentFailed) as error:
         return None, [Check("answers", False, str(error))]

@@ -21,7 +21,7 @@ def answer(question: Question, rig: Rig) -> str | None:
     if rig.world is None or not rig.bench.simulated:
         return None
     rig.world.advance(max(rig.clock.now(), rig.world.now_s))
-    return _done(question, rig, rig.world)
+    return _do_work(question, rig, rig.world)
 
 
 def follow(guidance: Guidance, rig: Rig) -> None:
@@ -32,34 +32,34 @@ def follow(guidance: Guidance, rig: Rig) -> None:
 
 
 @singledispatch
-def _done(question: Question, rig: Rig, world: World | Batch) -> str | None:  # noqa: ARG001
+def _do_work(question: Question, rig: Rig, world: World | Batch) -> str | None:  # noqa: ARG001
     """Do the work, and answer. Each kind of question has its own function."""
     return None
 
 
-@_done.register
+@_do_work.register
 def _(question: Confirm, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
     return "yes"
 
 
-@_done.register
+@_do_work.register
 def _(question: Choice, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
     return question.choices[0]
 
 
-@_done.register
+@_do_work.register
 def _(question: Mounting, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
     world.mount_sensor(question.mount_deg, question.flip, question.up)
     return "yes"
 
 
-@_done.register
+@_do_work.register
 def _(question: Remount, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
     world.mount_sensor()
     return "yes"
 
 
-@_done.register
+@_do_work.register
 def _(question: PowerCycle, rig: Rig, world: World | Batch) -> str:
     world.power(False)
     rig.clock.sleep(question.off_s)
@@ -68,7 +68,7 @@ def _(question: PowerCycle, rig: Rig, world: World | Batch) -> str:
     return "yes"
 
 
-@_done.register
+@_do_work.register
 def _(question: Number, rig: Rig, world: World | Batch) -> str | None:  # noqa: ARG001
     if not question.name.startswith("level-"):
         return None
@@ -76,7 +76,7 @@ def _(question: Number, rig: Rig, world: World | Batch) -> str | None:  # noqa: 
     return f"{x_deg if question.name.endswith('-x') else y_deg:.2f}"
 
 
-@_done.register
+@_do_work.register
 def _(question: Dial, rig: Rig, world: World | Batch) -> str:
     """Turn the stage if needed, which takes time, and read the dial."""
     settings = rig.bench.instruments[question.stage].typed_settings()

@@ -87,16 +87,18 @@ def wired(bench: Bench, tap: Tap | None = None) -> Iterator[Wiring]:
 
 def on_a_network(bench: Bench) -> list[str]:
     """The roles of real instruments that other computers can reach. The lock of a wire holds for this computer only."""
-    own = {role: part for role, part in bench.instruments.items() if not part.simulated and part.url != PERSON}
-    return [role for role, part in own.items() if Url.parse(part.url).on_a_network]
+    real_instruments = {
+        role: part for role, part in bench.instruments.items() if not part.simulated and part.url != PERSON
+    }
+    return [role for role, part in real_instruments.items() if Url.parse(part.url).on_a_network]
 
 
 def world_of(bench: Bench) -> World | Batch:
     """The simulated world of the bench file, with every sensor of a batch, or with a sensor in a hand."""
-    settings, held = handheld(bench.world)
+    settings, hand = handheld(bench.world)
     config = WorldConfig.from_mapping(settings)
-    if held is not None:
-        return HandheldWorld(config, bench.seed, held)
+    if hand is not None:
+        return HandheldWorld(config, bench.seed, hand)
     if not bench.sensors:
         return World(config, bench.seed)
     return Batch(config, bench.seed, {name: sensor.world for name, sensor in bench.sensors.items()})
@@ -127,13 +129,13 @@ def _pumped(servers: list[Server], clock: Clock) -> Iterator[None]:
             clock.attach(server)
         yield
         return
-    ended = threading.Event()
-    thread = threading.Thread(target=serve_forever, args=(servers, ended.is_set, clock), daemon=True)
+    stop_event = threading.Event()
+    thread = threading.Thread(target=serve_forever, args=(servers, stop_event.is_set, clock), daemon=True)
     if servers:
         thread.start()
     try:
         yield
     finally:
-        ended.set()
+        stop_event.set()
         if servers:
             thread.join()

@@ -50,9 +50,12 @@ class Dispute:
     def of(cls, best: Fit, pairs: Iterable[tuple[str, str]], effects: Mapping[str, Effect]) -> Dispute:
         """The best explanation, and the same with each rival effect. Raises the errors of `refit`."""
         rivals = {(a, b): refit(best, best.model.without(a).with_effect(effects[b])) for a, b in pairs}
-        nothing = refit(best, best.model.without(next(iter(rivals))[0]))
+        without_rivals = refit(best, best.model.without(next(iter(rivals))[0]))
         return cls(
-            best, rivals, nothing, any("temperature_c" in effects[name].needs for pair in rivals for name in pair)
+            best,
+            rivals,
+            without_rivals,
+            any("temperature_c" in effects[name].needs for pair in rivals for name in pair),
         )
 
 
@@ -66,7 +69,7 @@ def proposed(result: Answer, effects: Mapping[str, Effect], bench: Bench, bench_
     if not findings.data.foreseeable or frees or not e.separates:
         return replace(result, next_experiment=as_proposed(e, bench, bench_file))
     dispute = Dispute.of(without_forms(findings.end), e.separates, effects)
-    return replace(result, next_experiment=chosen(dispute, e, bench, bench_file))
+    return replace(result, next_experiment=choose_experiment(dispute, e, bench, bench_file))
 
 
 def possible(experiments: Iterable[Experiment], bench: Bench, within_s: float) -> Iterator[Experiment]:
@@ -105,7 +108,7 @@ def _text(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def chosen(
+def choose_experiment(
     dispute: Dispute,
     by_physics: Experiment,
     bench: Bench,
@@ -171,10 +174,12 @@ def _predicted(dispute: Dispute, e: Experiment, planned: Plan) -> Experiment | N
     separated = {
         pair: gains[pair] for pair in gains if pairs_separated(gains[pair].together) >= CERTAIN_PROBABILITY
     } or gains
-    shown = [
+    distances = [
         distance_alone(explanation, dispute.nothing, table) for explanation in (dispute.best, *dispute.rivals.values())
     ]
-    worst = Expected(min(x.alone for x in separated.values()), min(x.together for x in separated.values()), min(shown))
+    worst = Expected(
+        min(x.alone for x in separated.values()), min(x.together for x in separated.values()), min(distances)
+    )
     return replace(e, separates=tuple(separated), expected=worst)
 
 

@@ -76,7 +76,7 @@ class Optimal:
     def height_correlation(self) -> float:
         """Correlation of height (gravity across the table) with time over the poses."""
         heights = np.cos(np.radians([pose.alpha_deg for pose in self.equal.poses]))
-        times_s = [held.start_s for held in self.equal.plan.held]
+        times_s = [dwell.start_s for dwell in self.equal.plan.held]
         return float(np.corrcoef(heights, times_s)[0, 1]) if np.ptp(heights) else 0.0
 
     def worst(self, judged: Judged) -> int:
@@ -86,14 +86,14 @@ class Optimal:
 
 def relative(standard: Judged, judged: Judged) -> float:
     """Ratio of the worst standard errors to the standard sweep, for the parameters that it determines."""
-    known = standard.told
-    return float(np.max(judged.errors[known]) / np.max(standard.errors[known]))
+    determined = standard.told
+    return float(np.max(judged.errors[determined]) / np.max(standard.errors[determined]))
 
 
 def most_relative(standard: Judged, judged: Judged) -> float:
     """The largest ratio of a standard error to that of the same parameter in the standard sweep."""
-    known = standard.told
-    return float(np.max(judged.errors[known] / standard.errors[known]))
+    determined = standard.told
+    return float(np.max(judged.errors[determined] / standard.errors[determined]))
 
 
 def optimal(
@@ -110,50 +110,52 @@ def optimal(
     `criterion` is a name of CRITERIA. Raises PlanError where `poses` are too few or too many; what a plan and a fit
     raise.
     """
-    over = Range(bench, sweep, settings, model)
-    if not over.standard.told.any():
+    design_range = Range(bench, sweep, settings, model)
+    if not design_range.standard.told.any():
         raise PlanError(f"this sweep determines no parameter of {model.name}; give it more inclinations")
-    parameters = len(over.fit.theta)
-    least = 3 * FEWEST + -(-parameters // len(over.axes))
-    poses = min(MOST_POSES, max(least, over.standard.plan.poses // 4)) if poses is None else poses
+    parameters = len(design_range.fit.theta)
+    least = 3 * FEWEST + -(-parameters // len(design_range.axes))
+    poses = min(MOST_POSES, max(least, design_range.standard.plan.poses // 4)) if poses is None else poses
     if not least <= poses <= MOST_POSES:
         raise PlanError(f"{poses} poses: give {least} to {MOST_POSES} for the {parameters} parameters of {model.name}")
-    chosen, rows = _chosen(over, CRITERIA[criterion](over.white), poses)
-    between_s = moves_s(bench, chosen) + APART_S * _same(chosen)
-    tour = Tour(from_home_s(bench, chosen), between_s, rows, _dwell_s(over, chosen))
+    design, rows = _choose_poses(design_range, CRITERIA[criterion](design_range.white), poses)
+    between_s = moves_s(bench, design) + APART_S * _equal_poses(design)
+    tour = Tour(from_home_s(bench, design), between_s, rows, _dwell_s(design_range, design))
     order = order_tour(tour)
-    short = over.judged(_listing(settings, [chosen[k] for k in order]))
-    equal, all_equal = (_as_good(over, short, ratio) for ratio in (relative, most_relative))
-    return Optimal(over, criterion, short, equal, all_equal, tour.drift_loss(order))
+    short = design_range.judged(_listing(settings, [design[k] for k in order]))
+    equal, all_equal = (_as_good(design_range, short, ratio) for ratio in (relative, most_relative))
+    return Optimal(design_range, criterion, short, equal, all_equal, tour.drift_loss(order))
 
 
-def _chosen(over: Range, criterion: Criterion, poses: int) -> tuple[list[Pose], Array]:
+def _choose_poses(design_range: Range, criterion: Criterion, poses: int) -> tuple[list[Pose], Array]:
     """Poses with their paths, and their information: 0 for those that no fit sees, (poses, axes, p)."""
     aside = max(FEWEST, round(poses / ONE_IN))
-    design = exchange_design(over.white, poses - 2 * aside, criterion)
-    more = choose_repeats(over.white, design, aside, criterion)
-    fitted = np.concatenate([design, more])
-    checks = farthest_poses(over.places, fitted, poses - len(fitted))
-    paths = [DESIGN] * len(design) + [AGAIN] * len(more) + [CHECK] * len(checks)
+    design = exchange_design(design_range.white, poses - 2 * aside, criterion)
+    repeats = choose_repeats(design_range.white, design, aside, criterion)
+    fitted = np.concatenate([design, repeats])
+    checks = farthest_poses(design_range.places, fitted, poses - len(fitted))
+    paths = [DESIGN] * len(design) + [AGAIN] * len(repeats) + [CHECK] * len(checks)
     numbers = np.concatenate([fitted, checks])
-    rows = np.concatenate([over.white[fitted], 0 * over.white[checks]])
-    return [replace(over.candidates[k], path=path) for k, path in zip(numbers, paths, strict=True)], rows
+    rows = np.concatenate([design_range.white[fitted], 0 * design_range.white[checks]])
+    return [replace(design_range.candidates[k], path=path) for k, path in zip(numbers, paths, strict=True)], rows
 
 
-def _same(poses: Sequence[Pose]) -> Array:
+def _equal_poses(poses: Sequence[Pose]) -> Array:
     """1 where two poses are the same but for their paths, else 0, (n, n)."""
     places = [replace(pose, path="") for pose in poses]
     return np.array([[float(a == b) for b in places] for a in places])
 
 
-def _dwell_s(over: Range, chosen: Sequence[Pose]) -> float:
+def _dwell_s(design_range: Range, design: Sequence[Pose]) -> float:
     """All dwells together at equal worst standard error: in any order about the same. Raises PlanError."""
-    unordered = over.judged(_listing(over.settings, chosen))
-    if lost := [over.name(int(k)) for k in np.flatnonzero(over.standard.told & ~unordered.told)]:
+    unordered = design_range.judged(_listing(design_range.settings, design))
+    if undetermined := [
+        design_range.name(int(k)) for k in np.flatnonzero(design_range.standard.told & ~unordered.told)
+    ]:
         raise PlanError(
-            f"{len(chosen)} poses do not determine {', '.join(lost)}, but the sweep does; choose more poses"
+            f"{len(design)} poses do not determine {', '.join(undetermined)}, but the sweep does; choose more poses"
         )
-    return len(chosen) * _longer(unordered.dwell_s, relative(over.standard, unordered))
+    return len(design) * _longer(unordered.dwell_s, relative(design_range.standard, unordered))
 
 
 def _listing(settings: Mapping[str, Any], poses: Sequence[Pose]) -> dict[str, Any]:
@@ -161,20 +163,20 @@ def _listing(settings: Mapping[str, Any], poses: Sequence[Pose]) -> dict[str, An
     return {**settings, "face": "up", "reference_every": 0, "pose_list": format_poses(poses)}
 
 
-def _as_good(over: Range, short: Judged, ratio: Callable[[Judged, Judged], float]) -> Judged:
+def _as_good(design_range: Range, short: Judged, ratio: Callable[[Judged, Judged], float]) -> Judged:
     """The plan with the dwell at which its `ratio` to the standard sweep is 1.
 
     White noise gives it at once. Where time itself tells something, a longer run tells more than its dwells: halving.
     """
-    low, high = short, _with_dwell(over, short, _longer(short.dwell_s, ratio(over.standard, short)))
-    while ratio(over.standard, high) < NEARLY and high.dwell_s - low.dwell_s > 0.15:
-        middle = _with_dwell(over, short, round(float(np.sqrt(low.dwell_s * high.dwell_s)), 1))
-        low, high = (low, middle) if ratio(over.standard, middle) <= 1 else (middle, high)
+    low, high = short, _with_dwell(design_range, short, _longer(short.dwell_s, ratio(design_range.standard, short)))
+    while ratio(design_range.standard, high) < NEARLY and high.dwell_s - low.dwell_s > 0.15:
+        middle = _with_dwell(design_range, short, round(float(np.sqrt(low.dwell_s * high.dwell_s)), 1))
+        low, high = (low, middle) if ratio(design_range.standard, middle) <= 1 else (middle, high)
     return high
 
 
-def _with_dwell(over: Range, judged: Judged, dwell_s: float) -> Judged:
-    return over.judged({**judged.plan.settings, "dwell_s": dwell_s})
+def _with_dwell(design_range: Range, judged: Judged, dwell_s: float) -> Judged:
+    return design_range.judged({**judged.plan.settings, "dwell_s": dwell_s})
 
 
 def _longer(dwell_s: float, error_ratio: float) -> float:

@@ -27,10 +27,10 @@ from rig.errors import BenchError
 from rig.instruments.instruments import Rig, absent, connected
 from rig.instruments.person import answer, follow
 from rig.planning.planned import (
-    Held,
     Ledger,
     PlanHost,
     PlannedAdc,
+    PlannedDwell,
     PlannedLevel,
     PlannedOven,
     PlannedPositioner,
@@ -50,16 +50,16 @@ class RecordedTwin:
     def __init__(self, planned: Any, twin: Any) -> None:
         self._planned, self._twin = planned, twin
 
-    def __getattr__(self, what: str) -> Any:
-        count, act = getattr(self._planned, what), getattr(self._twin, what)
-        if what == "only":
+    def __getattr__(self, name: str) -> Any:
+        count, act = getattr(self._planned, name), getattr(self._twin, name)
+        if name == "only":
             return lambda *outputs: RecordedTwin(count(*outputs), act(*outputs))
 
-        def both(*arguments: Any, **named: Any) -> Any:
-            counted = count(*arguments, **named)
+        def both(*arguments: Any, **keywords: Any) -> Any:
+            counted = count(*arguments, **keywords)
             if isgenerator(counted):
                 deque(counted, maxlen=0)  # run it to its end
-            return act(*arguments, **named)
+            return act(*arguments, **keywords)
 
         return both
 
@@ -78,19 +78,19 @@ class RehearsalHost(PlanHost):
         return self.dwells
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
-        self.ledger.held.append(Held(self.ledger.now_s, pose))  # the clock of the twins differs
-        kept = Kept(pose, samples, samples.start_s, temperature_c)
-        self.dwells.append(of_sensor(kept, self.rig.bench.first_sensor).dwell)
+        self.ledger.held.append(PlannedDwell(self.ledger.now_s, pose))  # the clock of the twins differs
+        recorded = Kept(pose, samples, samples.start_s, temperature_c)
+        self.dwells.append(of_sensor(recorded, self.rig.bench.first_sensor).dwell)
 
     def guide(self, guidance: Guidance) -> None:
         follow(guidance, self.rig)
 
     def ask(self, question: Question) -> str:
-        done = answer(question, self.rig)
-        if isinstance(question, Dial) and done is not None:  # the planned stage has recorded the move
-            return done
+        reply = answer(question, self.rig)
+        if isinstance(question, Dial) and reply is not None:  # the planned stage has recorded the move
+            return reply
         planned = super().ask(question)
-        return done or planned
+        return reply or planned
 
 
 @contextmanager
@@ -142,7 +142,7 @@ class Plan:
     steps: tuple[Step, ...]
     reach: Mapping[str, tuple[tuple[float, float], tuple[float, float]]]
     asked: tuple[Question, ...]
-    held: tuple[Held, ...]
+    held: tuple[PlannedDwell, ...]
     duration_s: float
     bytes: int
 
@@ -168,7 +168,7 @@ def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Pla
     with dry(bench, parts, ledger) as session:
         session.reference()
         procedure.function(session, **settings)
-    _require_known_angles(bench, [held.pose for held in ledger.held])
+    _require_known_angles(bench, [dwell.pose for dwell in ledger.held])
     stages = {role: part for role, part in parts.items() if isinstance(part, PlannedStage)}
     return Plan(
         procedure=procedure.name,
@@ -232,17 +232,17 @@ class Stretch:
         """The stretch in one line."""
         number = f"{len(self.poses)} pose{'s' * (len(self.poses) > 1)}"
         alpha, beta = _range([p.alpha_deg for p in self.poses]), _range([p.beta_deg for p in self.poses])
-        return "  ".join([f"alpha {alpha}, beta {beta} deg: {number}", *_named(self.poses)])
+        return "  ".join([f"alpha {alpha}, beta {beta} deg: {number}", *_path_words(self.poses)])
 
 
 def stretches(plan: Plan) -> list[Stretch]:
     """The stretches of a plan, in order."""
     parts, before_s = [], 0.0
-    for _, group in groupby(plan.held, lambda held: _kind(held.pose)):
-        held = list(group)
-        also = tuple(_besides(plan, before_s, held[-1].start_s))
-        parts.append(Stretch(held[0].start_s, tuple(dwell.pose for dwell in held), also))
-        before_s = held[-1].start_s
+    for _, group in groupby(plan.held, lambda dwells: _kind(dwells.pose)):
+        dwells = list(group)
+        other_steps = tuple(_other_steps(plan, before_s, dwells[-1].start_s))
+        parts.append(Stretch(dwells[0].start_s, tuple(dwell.pose for dwell in dwells), other_steps))
+        before_s = dwells[-1].start_s
     return parts
 
 
@@ -258,11 +258,13 @@ def turn_words(pose: Pose) -> str:
     return f"{WAY_ROUND.sub('', pose.path)} alpha {pose.alpha_deg:g} deg{turning}".lstrip()
 
 
-def _besides(plan: Plan, from_s: float, to_s: float) -> Iterator[str]:
+def _other_steps(plan: Plan, from_s: float, to_s: float) -> Iterator[str]:
     """Other steps between two times, each once, and long waits."""
-    mine = [step for step in plan.steps if from_s <= step.start_s < to_s]
-    yield from dict.fromkeys(step.what for step in mine if not PLAIN.match(step.what))
-    waited_s = sum(step.duration_s for step in mine if step.what.startswith("wait ") and step.duration_s >= LONG_WAIT_S)
+    between_steps = [step for step in plan.steps if from_s <= step.start_s < to_s]
+    yield from dict.fromkeys(step.what for step in between_steps if not PLAIN.match(step.what))
+    waited_s = sum(
+        step.duration_s for step in between_steps if step.what.startswith("wait ") and step.duration_s >= LONG_WAIT_S
+    )
     if waited_s:
         yield f"waiting for {waited_s:g} s"
 
@@ -275,7 +277,7 @@ def _range(angles_deg: Sequence[float]) -> str:
     return f"{first:g} to {last:g}" if {first, last} == {low, high} else f"{low:g} .. {high:g}"
 
 
-def _named(poses: Sequence[Pose]) -> Iterator[str]:
+def _path_words(poses: Sequence[Pose]) -> Iterator[str]:
     """The path, the rates, and an unusual mounting of the sensor."""
     numbers = [match[1] for pose in (poses[0], poses[-1]) if (match := COUNTER.search(pose.path))]
     path = WAY_ROUND.sub("", COUNTER.sub("", poses[0].path))

@@ -41,7 +41,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Held:
+class PlannedDwell:
     """A recorded pose: its dwell begins at `start_s`."""
 
     start_s: float
@@ -55,7 +55,7 @@ class Ledger:
     now_s: float = 0.0
     steps: list[Step] = field(default_factory=list)
     asked: list[Question] = field(default_factory=list)
-    held: list[Held] = field(default_factory=list)
+    held: list[PlannedDwell] = field(default_factory=list)
     samples: int = 0
 
     def now(self) -> float:
@@ -64,12 +64,12 @@ class Ledger:
     def sleep(self, seconds: float) -> None:
         self.add(f"wait {seconds:g} s", seconds)
 
-    def add(self, what: str, duration_s: float) -> None:
+    def add(self, action: str, duration_s: float) -> None:
         if len(self.steps) >= MOST_STEPS:
             raise PlanError(
                 f"the plan has more than {MOST_STEPS} steps; give larger steps, a shorter time, or fewer repetitions"
             )
-        self.steps.append(Step(self.now_s, duration_s, what))
+        self.steps.append(Step(self.now_s, duration_s, action))
         self.now_s += duration_s
         if not self.now_s < MOST_S:
             raise PlanError(
@@ -249,8 +249,8 @@ class PlannedPositioner:
     def oscillate(self, axis: str, *, peak_to_peak_um: float, frequency_hz: float, centre_um: float) -> float:
         self._require_within(axis, centre_um - peak_to_peak_um / 2, centre_um + peak_to_peak_um / 2)
         really_hz: float = self._settings.wave(self._name, frequency_hz).frequency_hz
-        what = f"{self._name} swings {axis} by {peak_to_peak_um:g} um peak to peak at {really_hz:g} Hz"
-        self._ledger.add(what, EXCHANGE_S)
+        action = f"{self._name} swings {axis} by {peak_to_peak_um:g} um peak to peak at {really_hz:g} Hz"
+        self._ledger.add(action, EXCHANGE_S)
         return really_hz
 
     def stop(self) -> None:
@@ -288,7 +288,7 @@ class PlanHost:
         return list(self.read.values())
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:  # noqa: ARG002
-        self.ledger.held.append(Held(samples.start_s, pose))
+        self.ledger.held.append(PlannedDwell(samples.start_s, pose))
 
     def keep_readings(self, *readings: Reading) -> None:
         self.read |= {reading.name: reading for reading in readings}

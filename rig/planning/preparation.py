@@ -39,9 +39,9 @@ def checks(plan: Plan) -> list[str]:
 
 def mounting(plan: Plan) -> Attitude:
     """The first mounting of the sensor: from the first question with a drawing, else from the first pose."""
-    drawn = [attitude for question in plan.asked if (attitude := drawing_of(question)) is not None]
-    posed = [Attitude(mount_deg=held.pose.mount_deg, flip=held.pose.flip) for held in plan.held]
-    return next(iter([*drawn, *posed]), Attitude())
+    drawings = [attitude for question in plan.asked if (attitude := drawing_of(question)) is not None]
+    posed = [Attitude(mount_deg=dwell.pose.mount_deg, flip=dwell.pose.flip) for dwell in plan.held]
+    return next(iter([*drawings, *posed]), Attitude())
 
 
 def first_question(plan: Plan) -> Confirm | None:

@@ -30,11 +30,11 @@ OVEN_S = 1200.0  # in which an oven with what is in it comes near to its set poi
 
 def columns(planned: Plan, data: Table) -> dict[str, Array]:
     """The columns of a planned run's poses: angles, side, mounting, time after `data`, temperature, length."""
-    poses = [held.pose for held in planned.held]
+    poses = [dwell.pose for dwell in planned.held]
     names = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")
     columns = {name: np.array([getattr(pose, name) for pose in poses], dtype=float) for name in names}
     dwell_s = np.array([_dwell_s(planned.settings, pose.path) for pose in poses])
-    since_s = np.array([held.start_s for held in planned.held]) + dwell_s / 2
+    since_s = np.array([dwell.start_s for dwell in planned.held]) + dwell_s / 2
     columns["t_s"] = float(data.time_s.max()) + PAUSE_S + since_s
     if "temperature_c" in data and {"oven_c", "temperatures_c"} & {k for k, v in planned.settings.items() if v}:
         last_c = float(data.column("temperature_c")[data.order[-1]])
@@ -50,8 +50,8 @@ def _dwell_s(settings: Mapping[str, Any], path: str) -> float:
 def _temperature_c(planned: Plan, last_c: float, since_s: Array) -> Array:
     """The sensor's temperature, from what it was last on its way to what the oven is set to (of first order)."""
     now_c, at_s, course = last_c, 0.0, []
-    for held, t_s in zip(planned.held, since_s, strict=True):
-        now_c += (_oven_c(planned.settings, held.pose.path) - now_c) * -np.expm1(-(t_s - at_s) / OVEN_S)
+    for dwell, t_s in zip(planned.held, since_s, strict=True):
+        now_c += (_oven_c(planned.settings, dwell.pose.path) - now_c) * -np.expm1(-(t_s - at_s) / OVEN_S)
         at_s = t_s
         course.append(now_c)
     return np.array(course)
@@ -94,7 +94,7 @@ class Judged:
     @property
     def poses(self) -> tuple[Pose, ...]:
         """All, in order."""
-        return tuple(held.pose for held in self.plan.held)
+        return tuple(dwell.pose for dwell in self.plan.held)
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class Range:
     @cached_property
     def candidates(self) -> list[Pose]:
         """Poses to choose from."""
-        return list(_candidates([held.pose for held in self._plan.held]))
+        return list(_candidates([dwell.pose for dwell in self._plan.held]))
 
     @cached_property
     def white(self) -> Array:
@@ -144,7 +144,7 @@ class Range:
     def judged(self, settings: Mapping[str, Any]) -> Judged:
         """The sweep with other settings; its fit does not use the check poses. Raises what a plan raises."""
         planned = plan(self.bench, self.sweep, settings)
-        fitted = replace(planned, held=tuple(held for held in planned.held if not held.pose.path.startswith(MARK)))
+        fitted = replace(planned, held=tuple(dwell for dwell in planned.held if not dwell.pose.path.startswith(MARK)))
         rows = information(self.fit, predict_data(self.fit, _columns(fitted)))
         std = np.sqrt(np.diag(covariance_of(rows)))
         unknown = np.full(len(std), np.inf)
@@ -184,16 +184,16 @@ def _candidates(standard: Sequence[Pose]) -> Iterator[Pose]:
 
 def _filled(angles_deg: Iterable[float]) -> list[float]:
     """Angles in order, with others between those that are farther apart than GRID_DEG."""
-    known = sorted(set(angles_deg))
-    steps = [(a, b, max(1, round((b - a) / GRID_DEG))) for a, b in pairwise(known)]
-    return [a + (b - a) * k / n for a, b, n in steps for k in range(n)] + known[-1:]
+    angles = sorted(set(angles_deg))
+    steps = [(a, b, max(1, round((b - a) / GRID_DEG))) for a, b in pairwise(angles)]
+    return [a + (b - a) * k / n for a, b, n in steps for k in range(n)] + angles[-1:]
 
 
 def _columns(planned: Plan) -> dict[str, Array]:
     """Of the poses that a plan holds, in order, with their times and dwells."""
     dwell_s = float(planned.settings["dwell_s"])
-    columns = _of_poses([held.pose for held in planned.held])
-    columns["t_s"] = np.array([held.start_s + dwell_s / 2 for held in planned.held])
+    columns = _of_poses([dwell.pose for dwell in planned.held])
+    columns["t_s"] = np.array([dwell.start_s + dwell_s / 2 for dwell in planned.held])
     return columns | {"dwell_s": np.full(planned.poses, dwell_s)}
 
 

@@ -52,11 +52,11 @@ def is_damaged(table: Table, row: Mapping[Any, Any], required: bool = False) -> 
 
 
 def _checksum(table: Table, values: Mapping[str, Any]) -> int:
-    parts = [_plain(table.c[name], values.get(name)) for name in COVERED[table]]
+    parts = [_stored_value(table.c[name], values.get(name)) for name in COVERED[table]]
     return zlib.crc32(json.dumps(parts).encode())
 
 
-def _plain(column: Column[Any], value: Any) -> Any:
+def _stored_value(column: Column[Any], value: Any) -> Any:
     """The value as the database returns it."""
     if value is None:
         return None

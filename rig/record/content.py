@@ -53,8 +53,8 @@ def head(at: Connection, run: str) -> str:
 
 def run_row(at: Connection, run: str) -> Row[Any]:
     """The row of the run, without its names and its checksum. Raises UnknownRun."""
-    chosen = [column for column in runs.c if column not in (runs.c.run, runs.c.uid, runs.c.checksum)]
-    row = at.execute(select(*chosen).where(runs.c.run == run)).one_or_none()
+    columns = [column for column in runs.c if column not in (runs.c.run, runs.c.uid, runs.c.checksum)]
+    row = at.execute(select(*columns).where(runs.c.run == run)).one_or_none()
     if row is None:
         raise UnknownRun(f"no run {run!r}")
     return row
@@ -71,14 +71,14 @@ def rows_of(table: Table, run: str, counted: bool = False) -> Select[Any]:
 
     With `counted`, bytes are replaced by their SHA-256, and checksums are omitted: older records have none.
     """
-    kept: Iterable[ColumnElement[Any]] = (column for column in table.c if column not in (*GIVEN, table.c.run))
+    columns: Iterable[ColumnElement[Any]] = (column for column in table.c if column not in (*GIVEN, table.c.run))
     if counted:
-        kept = (
+        columns = (
             func.sha256(column) if isinstance(column.type, LargeBinary) else column
-            for column in kept
+            for column in columns
             if column.name != "checksum"
         )
-    query = select(*kept).where(table.c.run == run).order_by(ORDER[table])
+    query = select(*columns).where(table.c.run == run).order_by(ORDER[table])
     return query.execution_options(yield_per=32)
 
 
@@ -90,8 +90,8 @@ def count(at: Connection, run: str) -> dict[Table, int]:
 
 def _line(row: object) -> bytes:
     """A row, or several, as canonical JSON; floats to their last bit."""
-    return json.dumps(row, default=_plain).encode()
+    return json.dumps(row, default=_json_value).encode()
 
 
-def _plain(value: object) -> object:
+def _json_value(value: object) -> object:
     return value.hex() if isinstance(value, bytes | memoryview) else tuple(value)  # type: ignore[arg-type]

@@ -41,20 +41,20 @@ SIDES = ("-wal", "-shm")  # of the record's file: write-ahead log, and its index
 REMOVED = "another program removed the write-ahead log of the record during this command"
 
 
-def open_file(path: Path, tell: Callable[[str], None] = lambda _: None) -> Engine:
+def open_file(path: Path, notify: Callable[[str], None] = lambda _: None) -> Engine:
     """The engine of the file. Missing tables are made, old tables are migrated.
 
     In a folder without write permission the file is opened read-only. Raises RecordError if the file cannot be opened,
-    is damaged, or belongs to a newer program. Later use of the engine raises it as well. `tell` gets a message if the
+    is damaged, or belongs to a newer program. Later use of the engine raises it as well. `notify` gets a message if the
     write-ahead log was removed.
     """
     engine = create_engine(f"sqlite:///{path}", creator=lambda: _connected(path))
     event.listen(engine, "connect", lambda connection, _: give_sha256(connection))
     event.listen(engine, "connect", lambda _, info: info.info.update(sides=_sides(path), inode=_inode(path)))
-    event.listen(engine, "checkout", lambda connection, info, _: _require_sides(connection, info.info, path, tell))
-    event.listen(engine, "checkin", lambda connection, info: _save_rows(connection, info.info, path, tell))
-    event.listen(engine, "close", lambda connection, info: _save_rows(connection, info.info, path, tell))
-    event.listen(engine, "handle_error", lambda context: _tell(context, path))
+    event.listen(engine, "checkout", lambda connection, info, _: _require_sides(connection, info.info, path, notify))
+    event.listen(engine, "checkin", lambda connection, info: _save_rows(connection, info.info, path, notify))
+    event.listen(engine, "close", lambda connection, info: _save_rows(connection, info.info, path, notify))
+    event.listen(engine, "handle_error", lambda context: _raise_record_error(context, path))
     event.listen(engine, "begin", lambda connection: _require_there(connection, path))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -106,15 +106,15 @@ def _sides(path: Path) -> tuple[int | None, ...]:
     return tuple(_inode(path.with_name(path.name + side)) for side in SIDES)
 
 
-def _require_sides(connection: Any, info: dict[str, Any], path: Path, tell: Callable[[str], None]) -> None:
+def _require_sides(connection: Any, info: dict[str, Any], path: Path, notify: Callable[[str], None]) -> None:
     """Go on with a new connection if the write-ahead log was removed. Raises RecordError if rows cannot be saved."""
-    if not _save_rows(connection, info, path, tell):
+    if not _save_rows(connection, info, path, notify):
         raise RecordError(f"{path}: {REMOVED}, and its rows cannot be saved; {RECOVER}")
     if info.get("replaced"):
         raise InvalidatePoolError  # the pool makes a new connection
 
 
-def _save_rows(connection: Any, info: dict[str, Any], path: Path, tell: Callable[[str], None]) -> bool:
+def _save_rows(connection: Any, info: dict[str, Any], path: Path, notify: Callable[[str], None]) -> bool:
     """Copy the rows of a removed write-ahead log into the record. Returns False if that fails.
 
     A record that was removed or exchanged itself is found at the begin of the next transaction.
@@ -129,7 +129,7 @@ def _save_rows(connection: Any, info: dict[str, Any], path: Path, tell: Callable
         busy = True
     info["replaced"] = not busy
     remedy = "check the poses of this run" if busy else "all rows were saved"
-    tell(f"{path}: {REMOVED}; {remedy}; do not let a program remove files from this folder")
+    notify(f"{path}: {REMOVED}; {remedy}; do not let a program remove files from this folder")
     return not busy
 
 
@@ -143,7 +143,7 @@ def _require_there(connection: Connection, path: Path) -> None:
         raise RecordError(f"{path}: the record was exchanged during this command; run the command again")
 
 
-def _tell(context: ExceptionContext, path: Path) -> None:
+def _raise_record_error(context: ExceptionContext, path: Path) -> None:
     """Raises RecordError for a fault of the file or its disk."""
     error = context.original_exception
     if isinstance(error, UnicodeDecodeError):

@@ -39,7 +39,7 @@ def lab_url(text_url: str, source: str = "what was given") -> URL:
     return url.set(drivername="postgresql+psycopg")
 
 
-def shown(url: URL) -> str:
+def masked_url(url: URL) -> str:
     """The URL for messages and logs, with stars for a password."""
     return url.set(drivername="postgresql").difference_update_query(SECRET).render_as_string()
 
@@ -73,9 +73,13 @@ for _name in ("psycopg", "sqlalchemy"):  # our own message reports a lost connec
 def connected(url: URL) -> Engine:
     """The engine of the server. It does not connect yet."""
     engine = create_engine(url, connect_args=options(url))
-    event.listen(engine, "do_connect", lambda _dialect, _record, args, named: patient().connect(*args, **named))
+    event.listen(
+        engine,
+        "do_connect",
+        lambda _dialect, _record, args, options_by_name: patient().connect(*args, **options_by_name),
+    )
     event.listen(engine, "connect", lambda connection, _: _bound_locks(connection))
-    event.listen(engine, "handle_error", lambda context: _tell(context, url))
+    event.listen(engine, "handle_error", lambda context: _raise_lab_error(context, url))
     return engine
 
 
@@ -85,12 +89,12 @@ def patient() -> Any:
     import psycopg  # only a rig with a lab needs the database driver
 
     class PatientConnection(psycopg.Connection[Any]):
-        def wait(self, *args: Any, **named: Any) -> Any:
+        def wait(self, *args: Any, **options_by_name: Any) -> Any:
             timer = threading.Timer(SILENCE_S, hang_up, (self.pgconn.socket,))
             timer.daemon = True
             timer.start()
             try:
-                return super().wait(*args, **named)
+                return super().wait(*args, **options_by_name)
             finally:
                 timer.cancel()
 
@@ -113,14 +117,14 @@ def _bound_locks(connection: Any) -> None:
 
 def options(url: URL) -> dict[str, str]:
     """The options for libpq that the URL does not set."""
-    stated = {"service", "sslmode"} & set(url.query) or "PGSSLMODE" in os.environ or _is_here(url)
-    return {k: v for k, v in PATIENCE.items() if k not in url.query} | ({} if stated else ENCRYPTED)
+    security_options = {"service", "sslmode"} & set(url.query) or "PGSSLMODE" in os.environ or _is_here(url)
+    return {k: v for k, v in PATIENCE.items() if k not in url.query} | ({} if security_options else ENCRYPTED)
 
 
 def _is_here(url: URL) -> bool:
     """Whether every host of the URL is this machine."""
-    named = url.query.get("host") or url.host or os.environ.get("PGHOST", "")
-    hosts = named.split(",") if isinstance(named, str) else named
+    host_names = url.query.get("host") or url.host or os.environ.get("PGHOST", "")
+    hosts = host_names.split(",") if isinstance(host_names, str) else host_names
     return all(not host or host.startswith(HERE) for host in hosts)
 
 
@@ -128,7 +132,7 @@ def open_server(url: URL) -> Engine:
     """The engine of a record with the tables of this program. Raises LabAway, RecordError."""
     engine = connected(url)
     with engine.connect() as at:
-        require_current(version(at), shown(url))
+        require_current(version(at), masked_url(url))
     return engine
 
 
@@ -138,38 +142,38 @@ def version(at: Connection) -> int:
     return int(comment.removeprefix("schema ")) if comment else 0
 
 
-def require_current(schema: int, where: str) -> None:
+def require_current(schema: int, place: str) -> None:
     """Raises RecordError for tables of another version of this program, and without tables."""
     if schema > SCHEMA:
-        raise RecordError(f"{where}: the record is of a newer version of this program (schema {schema}, this one knows "
+        raise RecordError(f"{place}: the record is of a newer version of this program (schema {schema}, this one knows "
                           f"{SCHEMA}); get the new version")  # fmt: skip
     if not schema:
-        raise RecordError(f"{where}: there is no record yet; {PREPARE} makes one")
+        raise RecordError(f"{place}: there is no record yet; {PREPARE} makes one")
     if schema < SCHEMA:
-        raise RecordError(f"{where}: this record has an older schema ({schema} of {SCHEMA}); {PREPARE} updates it")
+        raise RecordError(f"{place}: this record has an older schema ({schema} of {SCHEMA}); {PREPARE} updates it")
 
 
-def _tell(context: ExceptionContext, url: URL) -> None:
+def _raise_lab_error(context: ExceptionContext, url: URL) -> None:
     """Raises LabAway or RecordError for an error of the server. A defect of this program passes."""
     error = context.original_exception
     if getattr(error, "sqlstate", None) in (FORBIDDEN, READ_ONLY):
         role = url.username or "this role"
-        raise RecordError(f"{shown(url)}: {role} has no permission for this ({_first_line(error)}); the owner can "
+        raise RecordError(f"{masked_url(url)}: {role} has no permission for this ({_first_line(error)}); the owner can "
                           "grant it rig_writer, or rig_reader for reading") from None  # fmt: skip
     if getattr(error, "sqlstate", None) == LOCKED:
         raise RecordError(
-            f"{shown(url)}: another push has locked this run for more than {LOCK_S} s; push it again later (the server "
-            f"releases the lock of a stopped program after {IDLE_S} s)"
+            f"{masked_url(url)}: another push has locked this run for more than {LOCK_S} s; push it again later "
+            f"(the server releases the lock of a stopped program after {IDLE_S} s)"
         ) from None
     if context.connection is None and any(word in (reason := _first_line(error)) for word in TLS):
-        raise RecordError(f"{shown(url)}: there is no encrypted connection to a trusted server ({reason}); nothing was "
-                          "sent. Give the certificate of the server's signer in sslrootcert, and set `ssl = on` in the "
-                          "server's postgresql.conf (docs/lab.md)") from None  # fmt: skip
+        raise RecordError(f"{masked_url(url)}: there is no encrypted connection to a trusted server ({reason}); "
+                          "nothing was sent. Give the certificate of the server's signer in sslrootcert, and set "
+                          "`ssl = on` in the server's postgresql.conf (docs/lab.md)") from None  # fmt: skip
     if context.is_disconnect or isinstance(context.sqlalchemy_exception, OperationalError | InterfaceError):
-        raise LabAway(f"{shown(url)}: no connection to the lab's record ({_first_line(error)}); nothing is lost, "
+        raise LabAway(f"{masked_url(url)}: no connection to the lab's record ({_first_line(error)}); nothing is lost, "
                       "the next `rig push` continues") from None  # fmt: skip
     if context.connection is None:  # libpq refuses the URL
-        raise RecordError(f"{shown(url)}: {_first_line(error)}; correct the URL") from None
+        raise RecordError(f"{masked_url(url)}: {_first_line(error)}; correct the URL") from None
 
 
 def _first_line(error: BaseException) -> str:
@@ -193,15 +197,15 @@ def prepare(url: URL) -> int:
     try:
         with engine.begin() as to:
             to.execute(text(f"SELECT pg_advisory_xact_lock({ONE_AT_A_TIME})"))
-            before = version(to)
-            if before > SCHEMA:
-                require_current(before, shown(url))
-            upgrade(to, before)
+            schema_before = version(to)
+            if schema_before > SCHEMA:
+                require_current(schema_before, masked_url(url))
+            upgrade(to, schema_before)
             to.execute(text(f"COMMENT ON TABLE runs IS 'schema {SCHEMA:d}'"))
             _grant(to)
     finally:
         engine.dispose()
-    return before
+    return schema_before
 
 
 def _grant(to: Connection) -> None:

@@ -40,20 +40,20 @@ NOT_OF_THESE = ("filter_corner_hz", "approach_deg")  # constants of poses only
 
 def positions_table(run: Run, poses: Iterable[Kept]) -> Table:
     """A row for each position of a magnetometer or an accelerometer. Raises RecordError without one."""
-    kept = list(poses)
-    outputs = FORCE if kept and FORCE[0] in kept[0].dwell.means else FIELD
-    return _table(run, kept, outputs, {})
+    rows = list(poses)
+    outputs = FORCE if rows and FORCE[0] in rows[0].dwell.means else FIELD
+    return _table(run, rows, outputs, {})
 
 
 def rates_table(run: Run, poses: Iterable[Kept]) -> Table:
     """A row for each turn or rest of a gyroscope. Raises RecordError without one."""
-    kept = list(poses)
-    normal = np.array([sensor_from_table(turn.pose)[:, 2] for turn in kept]).reshape(-1, 3)
-    force = np.array([specific_force_g(turn.pose) for turn in kept]).reshape(-1, 3)
-    columns = {"rate_deg_s": np.array([-turn.pose.rate_deg_s for turn in kept]) + 0.0}
+    turns = list(poses)
+    normal = np.array([sensor_from_table(turn.pose)[:, 2] for turn in turns]).reshape(-1, 3)
+    force = np.array([specific_force_g(turn.pose) for turn in turns]).reshape(-1, 3)
+    columns = {"rate_deg_s": np.array([-turn.pose.rate_deg_s for turn in turns]) + 0.0}
     columns |= {f"axis_{axis}": normal[:, k] for k, axis in enumerate("xyz")}
     columns |= {f"a{axis}": force[:, k] for k, axis in enumerate("xyz")}
-    return _table(run, kept, RATE, columns)
+    return _table(run, turns, RATE, columns)
 
 
 def sensor_from_table(pose: Pose) -> Array:
@@ -75,27 +75,27 @@ def sensor_from_base(pose: Pose) -> Array:
 def specific_force_g(pose: Pose) -> Array:
     """Specific force in the sensor's frame, g, shape (3,). In a turn it is the mean, along the table's normal."""
     felt = sensor_from_base(pose)[:, 2]
-    along = sensor_from_table(pose)[:, 2]
-    return np.round(along * (along @ felt) if pose.rate_deg_s else felt, 12) + 0.0
+    normal = sensor_from_table(pose)[:, 2]
+    return np.round(normal * (normal @ felt) if pose.rate_deg_s else felt, 12) + 0.0
 
 
-def _table(run: Run, kept: Sequence[Kept], outputs: Sequence[str], more: Mapping[str, Array]) -> Table:
-    if not kept:
+def _table(run: Run, recorded: Sequence[Kept], outputs: Sequence[str], extra_columns: Mapping[str, Array]) -> Table:
+    if not recorded:
         raise RecordError(f"run {run.run} has no pose yet; `rig resume` continues it")
-    rows = [pose.dwell for pose in kept]
-    columns = dict(more) | {"t_s": np.array([pose.t_s for pose in kept])}
-    if all(pose.temperature_c is not None for pose in kept):
-        columns["temperature_c"] = np.array([pose.temperature_c for pose in kept], dtype=float)
+    rows = [pose.dwell for pose in recorded]
+    columns = dict(extra_columns) | {"t_s": np.array([pose.t_s for pose in recorded])}
+    if all(pose.temperature_c is not None for pose in recorded):
+        columns["temperature_c"] = np.array([pose.temperature_c for pose in recorded], dtype=float)
     columns |= {name: np.array([row.means[name] for row in rows]) for name in outputs}
     columns |= {f"{name}_std": np.array([row.stds[name] for row in rows]) for name in outputs}
     columns |= {"n": np.array([float(row.n) for row in rows])}
-    blocks = [pose.samples for pose in kept[:: 1 + len(kept) // MOST_BLOCKS]]
-    known = {name: value for name, value in run.constants.items() if name not in NOT_OF_THESE}
+    blocks = [pose.samples for pose in recorded[:: 1 + len(recorded) // MOST_BLOCKS]]
+    constants_kept = {name: value for name, value in run.constants.items() if name not in NOT_OF_THESE}
     unit = stated_unit(units_of(run, outputs)) or {"unit": "V"}
-    constants = {**known, **unit, "sample_rate_hz": blocks[0].rate_hz, **inflations(blocks, outputs)}
-    labels = {"path": tuple(pose.pose.path for pose in kept)}
+    constants = {**constants_kept, **unit, "sample_rate_hz": blocks[0].rate_hz, **inflations(blocks, outputs)}
+    labels = {"path": tuple(pose.pose.path for pose in recorded)}
     table = Table.from_columns(run.kind, columns, constants, run.run, labels)
-    return replace(table, numbers=np.array([pose.number for pose in kept]))
+    return replace(table, numbers=np.array([pose.number for pose in recorded]))
 
 
 # Tables with a row for each pose or turn; the others have a row for each sample.
@@ -118,23 +118,25 @@ class Measured:
         """
         run_id, slash, sensor = name.partition("/")
         run = record.run(run_id)
-        known = sensors_of(run)
-        if known and not slash and not run.run.startswith(run_id):
+        sensor_names = sensors_of(run)
+        if sensor_names and not slash and not run.run.startswith(run_id):
             last = [
-                member for written, member in run.sensors.items() if member and f" {run_id}".endswith(f" {written}")
+                member for pattern, member in run.sensors.items() if member and f" {run_id}".endswith(f" {pattern}")
             ]
             slash, sensor = ("/", last[0]) if last else ("", "")
-        if slash and sensor not in known:
-            listed = did_you_mean(sensor, known) if known else f" It has one sensor; write {run_id}."
+        if slash and sensor not in sensor_names:
+            listed = did_you_mean(sensor, sensor_names) if sensor_names else f" It has one sensor; write {run_id}."
             raise UnknownRun(f"run {run_id} has no sensor {sensor!r}.{listed}")
-        if known and not slash:
-            listed = ", ".join(known)
-            raise RecordError(f"run {run_id} has the sensors {listed}; choose one, such as {run_id}/{known[0]}")
+        if sensor_names and not slash:
+            listed = ", ".join(sensor_names)
+            raise RecordError(f"run {run_id} has the sensors {listed}; choose one, such as {run_id}/{sensor_names[0]}")
         return cls(record, run, sensor or None)
 
     def kept(self) -> Iterator[Kept]:
         """Every pose without an exclusion, in order, with the channels of the sensor and the common ones."""
-        return (of_sensor(kept, self.sensor) for kept in self.record.kept(self.run.run) if kept.excluded is None)
+        return (
+            of_sensor(recorded, self.sensor) for recorded in self.record.kept(self.run.run) if recorded.excluded is None
+        )
 
     def readings(self) -> Sequence[Reading]:
         """The readings of the run."""
@@ -153,7 +155,7 @@ class Measured:
 
     def table(self) -> Table:
         """A row for each pose or, in a run of another kind, for each sample. Raises RecordError without a row."""
-        return self.part(self.run.kind) if (whole := self.imported()) is None else self._included(whole)
+        return self.part(self.run.kind) if (imported := self.imported()) is None else self._included(imported)
 
     def imported(self) -> Table | None:
         """The table as it was imported, with the excluded rows; None for a measured run."""
@@ -178,7 +180,11 @@ class Measured:
         """A table of `kind` from the poses whose path begins with `path`. Raises RecordError."""
         run = replace(self.run, run=self.name, constants=self.constants, kind=kind)
         on_s = self.power_on_s()
-        poses = (replace(kept, t_s=kept.t_s - on_s) for kept in self.kept() if kept.pose.path.startswith(path))
+        poses = (
+            replace(recorded, t_s=recorded.t_s - on_s)
+            for recorded in self.kept()
+            if recorded.pose.path.startswith(path)
+        )
         return MADE.get(kind, samples_table)(run, poses)
 
     def power_on_s(self) -> float:
@@ -209,12 +215,12 @@ def sensors_of(run: Run) -> list[str]:
     return list(run.bench.get("sensors", {}))
 
 
-def of_sensor(kept: Kept, sensor: str | None) -> Kept:
+def of_sensor(recorded: Kept, sensor: str | None) -> Kept:
     """A pose with the channels of one sensor, without its name in them, and the common channels."""
     if sensor is None:
-        return kept
-    samples = kept.samples
+        return recorded
+    samples = recorded.samples
     names = {name.removeprefix(f"{sensor}."): k for k, name in enumerate(samples.channels)}
-    mine = {name: k for name, k in names.items() if "." not in name}
-    block = Block(samples.volts[:, list(mine.values())], tuple(mine), samples.rate_hz, samples.start_s)
-    return replace(kept, samples=block)
+    own_channels = {name: k for name, k in names.items() if "." not in name}
+    block = Block(samples.volts[:, list(own_channels.values())], tuple(own_channels), samples.rate_hz, samples.start_s)
+    return replace(recorded, samples=block)

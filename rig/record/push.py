@@ -18,12 +18,12 @@ from rig.bench import Lab
 from rig.errors import LabAway, RecordError
 from rig.record.content import count, digest, head, rows_of, run_row, uid_of
 from rig.record.schema import arrivals, is_new, poses, runs
-from rig.record.store import Record, now
+from rig.record.store import Record, timestamp
 from rig.record.values import Run
 
 
-def push_after(record: Record, run: Run, lab: Lab | None, tell: Callable[[str], None]) -> None:
-    """After a complete `run`, push all finished runs that are not in the lab. `tell` gets a message for each.
+def push_after(record: Record, run: Run, lab: Lab | None, notify: Callable[[str], None]) -> None:
+    """After a complete `run`, push all finished runs that are not in the lab. `notify` gets a message for each.
 
     A failure of the lab does not affect the run.
     """
@@ -34,9 +34,11 @@ def push_after(record: Record, run: Run, lab: Lab | None, tell: Callable[[str], 
     try:
         with Record(lab_url(lab.url)) as lab_record:
             for pushed in push_all(record, lab_record, unsent(record, lab_record)):
-                tell(str(pushed) if isinstance(pushed, RecordError) else f"{pushed.run}: pushed to {lab_record.where}")
+                notify(
+                    str(pushed) if isinstance(pushed, RecordError) else f"{pushed.run}: pushed to {lab_record.where}"
+                )
     except RecordError as error:
-        tell(f"not pushed: {error}")
+        notify(f"not pushed: {error}")
 
 
 MOST_BYTES = 4 << 20  # of a batch: lost by an interruption, and held in memory
@@ -65,51 +67,51 @@ class _Parcel:
     digest: str
 
 
-def unsent(own: Record, lab: Record, named: Sequence[str] = ()) -> list[str]:
-    """The finished runs that are missing or different in the lab, oldest first; only the `named` ones, if any.
+def unsent(local: Record, lab: Record, run_names: Sequence[str] = ()) -> list[str]:
+    """The finished runs that are missing or different in the lab, oldest first; only the `run_names` ones, if any.
 
     Raises UnknownRun, RecordError for an unfinished named run, LabAway.
     """
-    finished = [own.run(name).run for name in named]
+    finished = [local.run(name).run for name in run_names]
     for run in finished:
-        _require_finished(own, run)
-    finished = finished or [run.run for run in reversed(own.runs()) if run.state == FINISHED]
-    with own.engine.connect() as at:
+        _require_finished(local, run)
+    finished = finished or [run.run for run in reversed(local.runs()) if run.state == FINISHED]
+    with local.engine.connect() as at:
         heads = {run: (uid_of(at, run), head(at, run)) for run in finished}
     with lab.engine.connect() as at:
         lab_heads = {row.uid: row.head for row in at.execute(select(arrivals.c.uid, arrivals.c.head))}
-    return [run for run, (uid, here) in heads.items() if lab_heads.get(uid) != here]
+    return [run for run, (uid, local_head) in heads.items() if lab_heads.get(uid) != local_head]
 
 
-def push_all(own: Record, lab: Record, named: Sequence[str]) -> Iterator[Pushed | RecordError]:
+def push_all(local: Record, lab: Record, run_names: Sequence[str]) -> Iterator[Pushed | RecordError]:
     """Push each run. A run that the lab refuses does not hinder the others. Raises LabAway."""
-    for run in named:
+    for run in run_names:
         try:
-            yield push(own, lab, run)
+            yield push(local, lab, run)
         except LabAway:
             raise
         except RecordError as error:
             yield RecordError(f"run {run} is not pushed: {error}")
 
 
-def push(own: Record, lab: Record, run: str) -> Pushed:
+def push(local: Record, lab: Record, run: str) -> Pushed:
     """Push the missing rows of a finished run. Raises LabAway; then the next push continues.
 
     Raises RecordError if the copy in the lab was changed there. The copy stays unchanged.
     """
-    _require_finished(own, run)
-    with own.engine.connect() as at:
+    _require_finished(local, run)
+    with local.engine.connect() as at:
         row = {**run_row(at, run)._mapping, "checksum": at.scalar(select(runs.c.checksum).where(runs.c.run == run))}
         parcel = _Parcel(run, uid_of(at, run), row, head(at, run), digest(at, run))
-        done = None
-        while done is None:
+        pushed = None
+        while pushed is None:
             with lab.engine.begin() as to:
-                done = _step(at, to, parcel)
-    return done
+                pushed = _step(at, to, parcel)
+    return pushed
 
 
-def _require_finished(own: Record, run: str) -> None:
-    if (state := own.run(run).state) != FINISHED:
+def _require_finished(local: Record, run: str) -> None:
+    if (state := local.run(run).state) != FINISHED:
         raise RecordError(f"run {run} is {state}, and only complete runs are pushed; `rig resume {run}` continues it")
 
 
@@ -126,13 +128,13 @@ def _step(at: Connection, to: Connection, parcel: _Parcel) -> Pushed | None:
 
 def _arrival(to: Connection, parcel: _Parcel) -> tuple[str, str | None]:
     """The name of the run in the lab, and its head there; locked until the end of the transaction."""
-    mine = select(arrivals.c.run, arrivals.c.head).where(arrivals.c.uid == parcel.uid).with_for_update()
+    arrival_query = select(arrivals.c.run, arrivals.c.head).where(arrivals.c.uid == parcel.uid).with_for_update()
     for name in (parcel.run, f"{parcel.run}-{parcel.uid[:8]}"):  # the second if a run of another rig has the first
-        if (row := to.execute(mine).one_or_none()) is not None:
+        if (row := to.execute(arrival_query).one_or_none()) is not None:
             return row.run, row.head
         values = {**parcel.row, "run": name, "uid": parcel.uid}
         if is_new(to, runs, values):
-            to.execute(insert(arrivals), {"uid": parcel.uid, "run": name, "at": now()})
+            to.execute(insert(arrivals), {"uid": parcel.uid, "run": name, "at": timestamp()})
             return name, None
     raise RecordError(f"run {parcel.run}: the lab has two other runs with this name; ask the owner of the lab's record")
 
@@ -169,14 +171,14 @@ def _seal(at: Connection, to: Connection, parcel: _Parcel, name: str) -> None:
     excluded = poses.c.excluded.is_not(None)
     to.execute(update(poses).where(poses.c.run == name, excluded).values(excluded=None))
     for row in at.execute(select(poses.c.number, poses.c.excluded).where(poses.c.run == parcel.run, excluded)):
-        one = (poses.c.run == name) & (poses.c.number == row.number)
-        to.execute(update(poses).where(one).values(excluded=row.excluded))
+        is_pose = (poses.c.run == name) & (poses.c.number == row.number)
+        to.execute(update(poses).where(is_pose).values(excluded=row.excluded))
     if digest(to, name) != parcel.digest:
         raise RecordError(
             f"run {parcel.run}: the copy in the lab is different from the run of this rig, so nothing was replaced; if "
             "the run has just changed here, push it again; else the copy was changed in the lab"
         )
-    sealed = {"head": parcel.head, "digest": parcel.digest, "at": now()}
+    sealed = {"head": parcel.head, "digest": parcel.digest, "at": timestamp()}
     to.execute(update(arrivals).where(arrivals.c.uid == parcel.uid).values(sealed))
 
 
@@ -194,7 +196,7 @@ def verify(lab: Record) -> Verified:
     with lab.engine.connect() as at:
         rows = at.execute(select(arrivals.c.run, arrivals.c.digest).order_by(arrivals.c.run)).all()
         is_sound_by_run = {row.run: digest(at, row.run) == row.digest for row in rows if row.digest is not None}
-    sound, changed = (
+    sound, changed_runs = (
         tuple(run for run, is_sound in is_sound_by_run.items() if is_sound is state) for state in (True, False)
     )
-    return Verified(sound, tuple(row.run for row in rows if row.digest is None), changed)
+    return Verified(sound, tuple(row.run for row in rows if row.digest is None), changed_runs)

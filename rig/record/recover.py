@@ -56,7 +56,7 @@ def recover(source: Path, folder: Path) -> Recovered:
         for leftover in folder.glob(f"{file.name}*"):
             leftover.unlink()  # of an attempt that failed
     try:
-        recovered = _recovered(_whole(source, padded), begun)
+        recovered = _recovered(_completed_copy(source, padded), begun)
         begun.rename(target)
     finally:
         for leftover in (*folder.glob(f"{begun.name}*"), *folder.glob(f"{padded.name}*")):
@@ -66,31 +66,31 @@ def recover(source: Path, folder: Path) -> Recovered:
 
 def _recovered(source: Path, target: Path) -> Recovered:
     """Copy the readable rows of the file `source` into the new file `target`."""
-    with closing(_opened(source)) as old:
+    with closing(_open_damaged(source)) as old:
         open_file(target).dispose()
         new = sqlite3.connect(target)
         rows, damaged = {}, []
         for table in metadata.sorted_tables:
-            copied, whole = _copied(old, new, table.name)
+            copied, is_complete = _copied(old, new, table.name)
             rows[table.name] = copied
-            if not whole:
+            if not is_complete:
                 damaged.append(table.name)
         new.commit()
-        changed = tuple(_checked(target))
+        replaced_runs = tuple(_checked(target))
         spoilt = tuple(_spoilt(new))
-        for name, other in (("poses", "blocks"), ("blocks", "poses"), ("dwells", "poses")):
-            match = f"{other}.run = {name}.run AND {other}.number = {name}.number"
-            new.execute(f"DELETE FROM {name} WHERE NOT EXISTS (SELECT 1 FROM {other} WHERE {match})")  # noqa: S608
+        for name, other_table in (("poses", "blocks"), ("blocks", "poses"), ("dwells", "poses")):
+            match = f"{other_table}.run = {name}.run AND {other_table}.number = {name}.number"
+            new.execute(f"DELETE FROM {name} WHERE NOT EXISTS (SELECT 1 FROM {other_table} WHERE {match})")  # noqa: S608
         new.commit()
         new.execute("PRAGMA journal_mode = DELETE")  # all is in one file, which gets its name now
         new.close()
-    return Recovered(rows, tuple(damaged), spoilt, changed)
+    return Recovered(rows, tuple(damaged), spoilt, replaced_runs)
 
 
 _HEADER = struct.Struct(">16x H 10x I")  # of SQLite's file: bytes of a page, number of pages
 
 
-def _whole(source: Path, padded: Path) -> Path:
+def _completed_copy(source: Path, padded: Path) -> Path:
     """The file, or a copy that is filled up with zeros if the end is missing, and has a sound schema."""
     with source.open("rb") as file:
         head = file.read(_HEADER.size)
@@ -98,13 +98,13 @@ def _whole(source: Path, padded: Path) -> Path:
         return source  # is refused when it is opened
     page, pages = _HEADER.unpack(head)
     size = (65536 if page == 1 else page) * pages
-    whole, sound = source.stat().st_size >= size, is_sound(source)
-    if whole and sound:
+    is_complete, sound = source.stat().st_size >= size, is_sound(source)
+    if is_complete and sound:
         return source
     shutil.copyfile(source, padded)
     if (log := source.with_name(f"{source.name}-wal")).exists():
         shutil.copyfile(log, padded.with_name(f"{padded.name}-wal"))
-    if not whole:
+    if not is_complete:
         with padded.open("r+b") as file:
             file.truncate(size)
     if not sound:
@@ -123,12 +123,12 @@ def _checked(target: Path) -> Iterator[str]:
                 place = "name" if "name" in table.c else "number"
                 key = (table.c.run, table.c[place])
                 rows = to.execute(select(table))
-                bad = [
+                wrong_rows = [
                     (row.run, getattr(row, place))
                     for row in rows
                     if is_damaged(table, row._mapping, row.run in checked)
                 ]
-                for run, number in bad:
+                for run, number in wrong_rows:
                     to.execute(delete(table).where(key[0] == run, key[1] == number))
                     yield f"run {run}, {table.name}: {number}"
             yield from _mend_runs(to)
@@ -140,8 +140,8 @@ def _mend_runs(to: Connection) -> Iterator[str]:
     for row in to.execute(select(runs)).all():
         if is_damaged(runs, row._mapping):
             values: dict[str, Any] = {name: value for name, value in row._mapping.items() if value is DAMAGED}
-            lost = ", ".join(values) or "one value; check its settings, constants and bench"
-            message = f"recovered from a damaged record; unreadable: {lost}"
+            lost_values = ", ".join(values) or "one value; check its settings, constants and bench"
+            message = f"recovered from a damaged record; unreadable: {lost_values}"
             mended: dict[str, Any] = {
                 **{name: {} for name in values},
                 "state": "failed",
@@ -149,7 +149,7 @@ def _mend_runs(to: Connection) -> Iterator[str]:
                 "checksum": None,
             }
             to.execute(update(runs).where(runs.c.run == row.run).values(mended))
-            yield f"run {row.run}: {lost}"
+            yield f"run {row.run}: {lost_values}"
     numbers = union(*[select(table.c.run) for table in (poses, blocks, readings)]).subquery()
     for run in to.execute(select(numbers.c.run).where(numbers.c.run.not_in(select(runs.c.run)))).scalars().all():
         documents: dict[str, Any] = {name: {} for name in ("settings", "bench", "identities", "constants", "results")}
@@ -161,7 +161,7 @@ def _mend_runs(to: Connection) -> Iterator[str]:
         yield f"run {run}: its entry; settings, bench and constants are empty now"
 
 
-def _opened(source: Path) -> sqlite3.Connection:
+def _open_damaged(source: Path) -> sqlite3.Connection:
     """The damaged file with its log, read-only."""
     try:
         old = sqlite3.connect(f"{source.resolve().as_uri()}?mode=ro", uri=True)
@@ -174,34 +174,34 @@ def _opened(source: Path) -> sqlite3.Connection:
 
 def _copied(old: sqlite3.Connection, new: sqlite3.Connection, table: str) -> tuple[int, bool]:
     """The number of copied rows of a table, and whether these are all."""
-    known = {row[1] for row in new.execute(f"PRAGMA table_info({table})")}
+    columns = {row[1] for row in new.execute(f"PRAGMA table_info({table})")}
     try:
-        names = [row[1] for row in old.execute(f"PRAGMA table_info({table})") if row[1] in known]
+        names = [row[1] for row in old.execute(f"PRAGMA table_info({table})") if row[1] in columns]
     except UNREADABLE:
         return 0, False
     if not names:
         return 0, True  # this table is newer than the record
     places = ", ".join("?" * len(names))
     insert = f"INSERT OR IGNORE INTO {table} ({', '.join(names)}) VALUES ({places})"  # noqa: S608 - our own schema's
-    copied, whole = 0, True
+    copied, is_complete = 0, True
     for order in ("ASC", "DESC"):
         select = f"SELECT {', '.join(names)} FROM {table} ORDER BY rowid {order}"  # noqa: S608
         for row in _readable(old, select):
             if row is None:
-                whole = False
+                is_complete = False
             else:
                 copied += new.execute(insert, [_writable(value) for value in row]).rowcount
-        if whole:
+        if is_complete:
             break
-    return copied, whole
+    return copied, is_complete
 
 
 def _writable(value: object) -> object:
     """The value. A text with unreadable bytes gets replacement characters, one of them first: it is no JSON then."""
     if isinstance(value, str) and not value.isascii():
         data = value.encode("utf-8", "surrogateescape")
-        whole = data.decode("utf-8", "replace")
-        return whole if whole == value else f"\ufffd{whole}"
+        decoded = data.decode("utf-8", "replace")
+        return decoded if decoded == value else f"\ufffd{decoded}"
     return value
 
 

@@ -37,10 +37,10 @@ BESIDE = ("t_s", "temperature_c", "alpha_read_deg", "beta_read_deg")
 
 def select_runs() -> Select[Any]:
     """Every complete run, with the number of its rows: poses, or the values of an imported column."""
-    kept = select(func.count()).where(poses.c.run == runs.c.run).scalar_subquery()
+    pose_count = select(func.count()).where(poses.c.run == runs.c.run).scalar_subquery()
     imported = select(func.max(func.length(columns.c.numbers, type_=Integer) // 8)).where(columns.c.run == runs.c.run)
     on_its_way = exists().where(arrivals.c.run == runs.c.run, arrivals.c.digest.is_(None))
-    return select(runs, func.coalesce(imported.scalar_subquery(), kept).label("rows")).where(~on_its_way)
+    return select(runs, func.coalesce(imported.scalar_subquery(), pose_count).label("rows")).where(~on_its_way)
 
 
 def select_named(at: Connection, name: str) -> Select[Any]:
@@ -48,8 +48,8 @@ def select_named(at: Connection, name: str) -> Select[Any]:
     last, _, procedure = name.partition(" ")
     if last != LAST:
         return select_runs().where(runs.c.run == name)
-    chosen = select_runs().where(runs.c.procedure == procedure) if procedure else select_runs()
-    return chosen.order_by(newest_first(at)).limit(1)
+    query = select_runs().where(runs.c.procedure == procedure) if procedure else select_runs()
+    return query.order_by(newest_first(at)).limit(1)
 
 
 def select_beginning(name: str) -> Select[Any]:
@@ -59,10 +59,10 @@ def select_beginning(name: str) -> Select[Any]:
 
 def runs_of_sensor(runs: Sequence[Run], name: str) -> list[Run]:
     """The runs, in their order, of the sensor that `SENSOR`, `last SENSOR` or `last PROCEDURE SENSOR` names."""
-    wanted = name.removeprefix(f"{LAST} ")
-    procedure, _, sensor = wanted.partition(" ")
+    selector = name.removeprefix(f"{LAST} ")
+    procedure, _, sensor = selector.partition(" ")
     of_procedure = [run for run in runs if run.procedure == procedure and sensor in run.sensors]
-    return [run for run in runs if wanted in run.sensors] or (of_procedure if wanted != name else [])
+    return [run for run in runs if selector in run.sensors] or (of_procedure if selector != name else [])
 
 
 def run_of(row: Row[Any]) -> Run:
@@ -124,19 +124,19 @@ def require_whole(at: Connection, run: str) -> set[int]:
     changed in an index of SQLite hides rows, and no checksum of a row shows it; each table has its own index.
     """
     for number in _incomplete(at, run):
-        raise lost(run, number)
+        raise lost_pose_error(run, number)
     return set(at.execute(select(poses.c.number).where(poses.c.run == run, poses.c.excluded.is_(None))).scalars())
 
 
-def lost(run: str, number: int) -> RecordError:
+def lost_pose_error(run: str, number: int) -> RecordError:
     """The error of a pose that the record holds only in part."""
     return RecordError(f"{_lost_text(run, number)}; {RECOVER}")
 
 
 def lost_rows(at: Connection) -> list[str]:
     """A phrase for each incomplete pose of all runs."""
-    known = at.execute(select(runs.c.run)).scalars().all()
-    return [_lost_text(run, number) for run in known for number in _incomplete(at, run)]
+    run_ids = at.execute(select(runs.c.run)).scalars().all()
+    return [_lost_text(run, number) for run in run_ids for number in _incomplete(at, run)]
 
 
 def _incomplete(at: Connection, run: str) -> list[int]:
@@ -151,11 +151,13 @@ def _incomplete(at: Connection, run: str) -> list[int]:
     for place, number in at.execute(union_all(*parts)):
         places[place].append(number)
     expected, sampled = map(Counter, places)
-    wrong = {number for number in expected.keys() | sampled.keys() if (expected[number], sampled[number]) != (1, 1)}
-    if not wrong:
+    inconsistent = {
+        number for number in expected.keys() | sampled.keys() if (expected[number], sampled[number]) != (1, 1)
+    }
+    if not inconsistent:
         return []
     excluded = at.execute(select(poses.c.number).where(poses.c.run == run, poses.c.excluded.is_not(None))).scalars()
-    return sorted(wrong - set(excluded))
+    return sorted(inconsistent - set(excluded))
 
 
 def _lost_text(run: str, number: int) -> str:
@@ -165,8 +167,8 @@ def _lost_text(run: str, number: int) -> str:
 def require_rows(at: Connection, table: SqlTable, run: str) -> None:
     """Raises RecordError if the index of SQLite hides a row of a run in a small table."""
     by_index = select(func.count()).where(table.c.run == run).scalar_subquery()
-    other = cast(list(table.c)[2], String)  # is not in the index, so that this count reads the rows themselves
-    by_table = select(func.count(other)).where(table.c.run.concat("") == run).scalar_subquery()
+    unindexed = cast(list(table.c)[2], String)  # is not in the index, so that this count reads the rows themselves
+    by_table = select(func.count(unindexed)).where(table.c.run.concat("") == run).scalar_subquery()
     indexed, counted = at.execute(select(by_index, by_table)).one()
     if indexed != counted:
         raise RecordError(f"run {run}: a row of its {table.name} is lost on the disk; {RECOVER}")
@@ -184,13 +186,13 @@ def dwell_of(row: Row[Any]) -> Dwell:
 
 def kept_of(row: Row[Any]) -> Kept:
     """A pose and its samples. Raises RecordError if the samples have an unknown format or cannot be decoded."""
-    where = f"run {row.run}, pose {row.number}"
+    place = f"run {row.run}, pose {row.number}"
     if row.codec != codec.CODEC:
-        raise RecordError(f"{where}: the samples have the unknown format {row.codec!r}; update the program")
+        raise RecordError(f"{place}: the samples have the unknown format {row.codec!r}; update the program")
     try:
         volts = codec.decode(row.samples)
     except ValueError as error:
-        raise RecordError(f"{where}: {error}; restore a copy of the record") from None
+        raise RecordError(f"{place}: {error}; restore a copy of the record") from None
     pose = pose_of(row)
     block = Block(volts, tuple(row.channels), row.rate_hz, row.start_s)
     return Kept(pose, block, excluded=row.excluded, number=row.number, **{name: row._mapping[name] for name in BESIDE})
@@ -198,9 +200,9 @@ def kept_of(row: Row[Any]) -> Kept:
 
 def put_state(to: Connection, run: str, state: Mapping[str, Any]) -> None:
     """Insert or replace the state of the simulated bench of a run."""
-    put(to, states, {"run": run, "state": dict(state)}, ("run",))
+    insert_or_replace(to, states, {"run": run, "state": dict(state)}, ("run",))
 
 
-def put(to: Connection, table: SqlTable, values: Mapping[str, Any], key: Sequence[str]) -> None:
+def insert_or_replace(to: Connection, table: SqlTable, values: Mapping[str, Any], key: Sequence[str]) -> None:
     """Insert a row, or replace the one of the same key."""
     to.execute(insert_or(to, table).values(values).on_conflict_do_update(index_elements=list(key), set_=dict(values)))

@@ -39,12 +39,12 @@ from rig.record.rows import (
     excluded_rows,
     has_checksums,
     imported_rows,
+    insert_or_replace,
     kept_of,
-    lost,
+    lost_pose_error,
     lost_rows,
     place_text,
     pose_of,
-    put,
     put_state,
     require_rows,
     require_whole,
@@ -87,7 +87,7 @@ class Record:
         self.path = self.folder / FILE
         self.remarks: list[str] = []  # on the file: it was repaired during this command
         if isinstance(place, URL):
-            self.where, self._engine = _opened(place)
+            self.where, self._engine = _open_engine(place)
         else:
             self.where, self._engine = str(self.path), open_file(self.path, self.remarks.append)
         self._lines: list[dict[str, Any]] = []  # of the log, not written yet
@@ -102,11 +102,11 @@ class Record:
         return cls(lab_url(url, RECORD))
 
     @classmethod
-    def to_find(cls, run: str, own: bool = False) -> Self:
-        """The record for reading, or the rig's `own`, for a search. It does not make a record. Raises UnknownRun."""
-        if not (home() / FILE).is_file() and (own or not cls.is_there()):
+    def to_find(cls, run: str, local_only: bool = False) -> Self:
+        """The record for reading, or only that of the rig, for a search. Does not make a record. Raises UnknownRun."""
+        if not (home() / FILE).is_file() and (local_only or not cls.is_there()):
             raise UnknownRun(f"no run {run!r}: there is no record yet in {home()}; run a procedure first")
-        return cls() if own else cls.to_read()
+        return cls() if local_only else cls.to_read()
 
     @staticmethod
     def is_there() -> bool:
@@ -149,36 +149,36 @@ class Record:
         with self._engine.begin() as to:
             return _new_run(to, values | {"constants": dict(constants), "source": source})
 
-    def keep(self, run: str, number: int, kept: Kept, state: Mapping[str, Any] | None) -> None:
+    def keep(self, run: str, number: int, recorded: Kept, state: Mapping[str, Any] | None) -> None:
         """Add pose, samples and the `state` of the simulated bench, in one transaction."""
         key = {"run": run, "number": number}
-        pose = {name: getattr(kept.pose, name) for name in POSE}
-        samples = {name: getattr(kept.samples, name) for name in ("rate_hz", "start_s")}
-        samples |= {"channels": list(kept.samples.channels), "codec": codec.CODEC}
-        samples |= {"samples": codec.encode(kept.samples.volts)}
-        measured = kept.dwell
+        pose = {name: getattr(recorded.pose, name) for name in POSE}
+        samples = {name: getattr(recorded.samples, name) for name in ("rate_hz", "start_s")}
+        samples |= {"channels": list(recorded.samples.channels), "codec": codec.CODEC}
+        samples |= {"samples": codec.encode(recorded.samples.volts)}
+        measured = recorded.dwell
         dwell = {"n": measured.n, "means": dict(measured.means), "stds": dict(measured.stds)}
         with self._engine.begin() as to:
-            pose |= {name: getattr(kept, name) for name in BESIDE}
+            pose |= {name: getattr(recorded, name) for name in BESIDE}
             for table, values in ((poses, pose), (blocks, samples), (dwells, dwell)):
                 to.execute(insert(table), with_checksum(table, key | values))
             if state is not None:
                 put_state(to, run, state)
             self._put_lines(to)
 
-    def keep_readings(self, run: str, read: Iterable[Reading], state: Mapping[str, Any] | None) -> None:
+    def keep_readings(self, run: str, new_readings: Iterable[Reading], state: Mapping[str, Any] | None) -> None:
         """Add readings and the `state` of the simulated bench, in one transaction. An existing name is replaced."""
         with self._engine.begin() as to:
-            for reading in read:
-                row = with_checksum(readings, {"run": run, "at": now(), **vars(reading)})
-                put(to, readings, row, ("run", "name"))
+            for reading in new_readings:
+                row = with_checksum(readings, {"run": run, "at": timestamp(), **vars(reading)})
+                insert_or_replace(to, readings, row, ("run", "name"))
             if state is not None:
                 put_state(to, run, state)
             self._put_lines(to)
 
-    def log(self, run: str, clock_s: float, who: str, what: str, text: str) -> None:
+    def log(self, run: str, clock_s: float, source: str, event: str, text: str) -> None:
         """Add a line to the log of a run. It is written with the next pose, or with MOST_LINES other lines."""
-        line = {"run": run, "at": now(), "clock_s": clock_s, "who": who, "what": what, "text": text}
+        line = {"run": run, "at": timestamp(), "clock_s": clock_s, "who": source, "what": event, "text": text}
         self._lines.append(line)
         if len(self._lines) >= MOST_LINES:
             with self._engine.begin() as to:
@@ -189,13 +189,13 @@ class Record:
 
         For a row of an imported table the event alone says it. Raises RecordError for an unknown pose.
         """
-        chosen = (poses.c.run == run) & (poses.c.number == number)
+        is_pose = (poses.c.run == run) & (poses.c.number == number)
         with self._engine.begin() as to:
-            known = to.execute(update(poses).where(chosen).values(excluded=reason)).rowcount
-            if not known and not 0 <= number < imported_rows(to, run):
+            updated = to.execute(update(poses).where(is_pose).values(excluded=reason)).rowcount
+            if not updated and not 0 <= number < imported_rows(to, run):
                 raise RecordError(f"run {run} has no pose {number}; `rig show {run} --poses` lists its poses")
             change = f"pose {number} {'included' if reason is None else 'excluded'}"
-            to.execute(insert(events), {"run": run, "at": now(), "what": change, "text": reason or "again"})
+            to.execute(insert(events), {"run": run, "at": timestamp(), "what": change, "text": reason or "again"})
 
     def keep_state(self, run: str, state: Mapping[str, Any]) -> None:
         """Store the state of the simulated bench before the first pose."""
@@ -206,8 +206,8 @@ class Record:
         self, run: str, state: str, message: str | None = None, results: Mapping[str, Any] | None = None
     ) -> None:
         """Set the state: running, complete, stopped or failed. The last three end the run."""
-        ended = None if state == "running" else now()
-        values = {"state": state, "message": message, "ended": ended, "results": dict(results or {})}
+        end_time = None if state == "running" else timestamp()
+        values = {"state": state, "message": message, "ended": end_time, "results": dict(results or {})}
         with self._engine.begin() as to:
             to.execute(update(runs).where(runs.c.run == run).values(values))
             self._put_lines(to)
@@ -217,10 +217,10 @@ class Record:
         with self._engine.begin() as to:
             to.execute(update(runs).where(runs.c.run == run).values(results=dict(results)))
 
-    def note(self, run: str, what: str, text: str) -> None:
+    def note(self, run: str, event: str, text: str) -> None:
         """Add an event to a run."""
         with self._engine.begin() as to:
-            to.execute(insert(events), {"run": run, "at": now(), "what": what, "text": text})
+            to.execute(insert(events), {"run": run, "at": timestamp(), "what": event, "text": text})
 
     def add_table(self, table: Table, settings: Mapping[str, Any] | None = None) -> str:
         """Add an imported table as a run, with the settings of the import. Returns its id."""
@@ -232,7 +232,7 @@ class Record:
             *({"name": name, "texts": list(column)} for name, column in table.labels.items()),
         ]
         with self._engine.begin() as to:
-            run = _new_run(to, values | {"ended": now()})
+            run = _new_run(to, values | {"ended": timestamp()})
             for position, cell in enumerate(cells):
                 row = with_checksum(columns, {**cell, "position": position})
                 to.execute(insert(columns), {**row, "run": run})
@@ -244,7 +244,7 @@ class Record:
         """Every readable run, newest first; `damaged_runs` has the others."""
         with self._reading() as at:
             rows = at.execute(select_runs().order_by(newest_first(at))).all()
-        return [self._seen(run_of(row)) for row in rows if not is_damaged(runs, row._mapping)]
+        return [self._with_true_state(run_of(row)) for row in rows if not is_damaged(runs, row._mapping)]
 
     def damaged_runs(self) -> list[str]:
         """A sentence for each run with a damaged entry, newest first."""
@@ -272,11 +272,11 @@ class Record:
         """
         with self._reading() as at:
             rows = at.execute(select_named(at, name)).all() or at.execute(select_beginning(name)).all()
-            known = at.execute(select(runs.c.procedure if name.startswith(f"{LAST} ") else runs.c.run)).scalars().all()
+            names = at.execute(select(runs.c.procedure if name.startswith(f"{LAST} ") else runs.c.run)).scalars().all()
         if len(rows) == 1:
             if is_damaged(runs, rows[0]._mapping):
                 raise RecordError(f"{self.where}: {damage_text(rows[0].run)}")
-            return self._seen(run_of(rows[0]))
+            return self._with_true_state(run_of(rows[0]))
         if rows:
             listed = ", ".join(sorted(row.run for row in rows)[:MOST_LISTED])
             raise UnknownRun(f"{len(rows)} runs in {self.where} begin with {name!r}: {listed}; write more of the id")
@@ -289,22 +289,24 @@ class Record:
                 f"{len(of_sensor)} runs in {self.where} are of the sensor {name!r}: {listed}"
                 f"{' ...' if of_sensor[MOST_LISTED:] else ''}; write an id, or '{LAST} {name}' for the newest one"
             )
-        newest = list(dict.fromkeys(known))[-MOST_SUGGESTED:]
-        sensors = list(dict.fromkeys(own for run in all_runs for own in run.sensors))[:MOST_SUGGESTED]
+        newest = list(dict.fromkeys(names))[-MOST_SUGGESTED:]
+        sensors = list(dict.fromkeys(name_of_sensor for run in all_runs for name_of_sensor in run.sensors))[
+            :MOST_SUGGESTED
+        ]
         raise UnknownRun(f"no run {name!r} in {self.where}.{did_you_mean(sensor, newest, sensors)}")
 
     def poses(self, run: str) -> list[Pose]:
         """The poses in order, without the excluded ones."""
-        chosen = (poses.c.run == run) & poses.c.excluded.is_(None)
-        query = select(poses).where(chosen).order_by(poses.c.number)
+        is_included = (poses.c.run == run) & poses.c.excluded.is_(None)
+        query = select(poses).where(is_included).order_by(poses.c.number)
         with self._reading() as at:
             required = has_checksums(at, run)
             return [pose_of(sound(row, poses, required=required)) for row in at.execute(query)]
 
     def excluded(self, run: str) -> dict[int, str]:
         """The reason of each excluded pose, or row of an imported table, by its number."""
-        chosen = (poses.c.run == run) & poses.c.excluded.is_not(None)
-        query = select(poses.c.number, poses.c.excluded).where(chosen).order_by(poses.c.number)
+        is_excluded = (poses.c.run == run) & poses.c.excluded.is_not(None)
+        query = select(poses.c.number, poses.c.excluded).where(is_excluded).order_by(poses.c.number)
         with self._reading() as at:
             if imported_rows(at, run):
                 return excluded_rows(self.events(run))
@@ -346,24 +348,28 @@ class Record:
                 ):
                     yield kept_of(sound(row, poses, blocks, required=required))
             for number in sorted(excluded):
-                raise lost(run, number)
+                raise lost_pose_error(run, number)
 
-    def dwells(self, run: str, after: int = -1) -> list[tuple[int, Dwell]]:
-        """Means and scatter of every pose with a number above `after`, without the excluded ones.
+    def dwells(self, run: str, after_number: int = -1) -> list[tuple[int, Dwell]]:
+        """Means and scatter of every pose with a number above `after_number`, without the excluded ones.
 
         For runs of an older program they are computed from the samples, which is slower.
         """
         match = (poses.c.run == dwells.c.run) & (poses.c.number == dwells.c.number)
         query = select(poses, dwells).join_from(poses, dwells, match, isouter=True)
-        chosen = (poses.c.run == run) & (poses.c.number > after) & poses.c.excluded.is_(None)
+        is_later = (poses.c.run == run) & (poses.c.number > after_number) & poses.c.excluded.is_(None)
         with self._reading() as at:
-            excluded = require_whole(at, run) if after < 0 else set()
+            excluded = require_whole(at, run) if after_number < 0 else set()
             required = has_checksums(at, run)
-            selected = at.execute(query.where(chosen).order_by(poses.c.number))
+            selected = at.execute(query.where(is_later).order_by(poses.c.number))
             rows = [sound(row, poses, dwells, required=required) for row in selected]
         for number in sorted(excluded - {row.number for row in rows}):
-            raise lost(run, number)
-        older = {kept.number: kept.dwell for kept in self.kept(run)} if any(row.n is None for row in rows) else {}
+            raise lost_pose_error(run, number)
+        older = (
+            {recorded.number: recorded.dwell for recorded in self.kept(run)}
+            if any(row.n is None for row in rows)
+            else {}
+        )
         return [(row.number, older.get(row.number) or dwell_of(row)) for row in rows]
 
     def state(self, run: str) -> dict[str, Any] | None:
@@ -377,12 +383,12 @@ class Record:
         with self._reading() as at:
             return [Event(*row) for row in at.execute(query.order_by(events.c.event))]
 
-    def lines(self, run: str, what: Sequence[str] = ()) -> list[Line]:
-        """The log of a run, in order; only the kinds in `what`, if there are any."""
+    def lines(self, run: str, events: Sequence[str] = ()) -> list[Line]:
+        """The log of a run, in order; only the kinds in `events`, if there are any."""
         columns = [log.c[name] for name in ("at", "clock_s", "who", "what", "text")]
-        chosen = (log.c.run == run) & (log.c.what.in_(what) if what else true())
+        is_wanted = (log.c.run == run) & (log.c.what.in_(events) if events else true())
         with self._reading() as at:
-            return [Line(*row) for row in at.execute(select(*columns).where(chosen).order_by(log.c.line))]
+            return [Line(*row) for row in at.execute(select(*columns).where(is_wanted).order_by(log.c.line))]
 
     def columns(self, run: str) -> tuple[dict[str, NDArray[np.float64]], dict[str, tuple[str, ...]]]:
         """The columns of an imported table: numbers, and texts, by name."""
@@ -410,20 +416,20 @@ class Record:
         if lines:
             to.execute(insert(log), lines)
 
-    def _seen(self, run: Run) -> Run:
+    def _with_true_state(self, run: Run) -> Run:
         """The run; in the state "stopped" if it is "running" without a process, because its process was killed."""
         if run.state != "running" or is_held(self.folder, run.run):
             return run
         return replace(run, state="stopped", message="its process was killed")
 
 
-def _opened(url: URL) -> tuple[str, Engine]:
-    from rig.record.lab import open_server, shown
+def _open_engine(url: URL) -> tuple[str, Engine]:
+    from rig.record.lab import masked_url, open_server
 
-    return shown(url), open_server(url)
+    return masked_url(url), open_server(url)
 
 
-def now() -> str:
+def timestamp() -> str:
     """ISO 8601, UTC; microseconds, so that no two runs of a record begin at the same time."""
     return datetime.now(UTC).isoformat(timespec="microseconds")
 
@@ -432,6 +438,6 @@ def _new_run(to: Connection, values: Mapping[str, Any]) -> str:
     """Add a run. Returns its id, which sorts by time: 20261121-093012-sweep-a1b."""
     while True:
         run = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-{values['procedure']}-{secrets.token_hex(2)[:3]}"
-        row = {"results": {}, "identities": {}, **values, "run": run, "created": now(), "uid": uuid.uuid4().hex}
+        row = {"results": {}, "identities": {}, **values, "run": run, "created": timestamp(), "uid": uuid.uuid4().hex}
         if is_new(to, runs, with_checksum(runs, row)):
             return run  # else a run of the same second has this id

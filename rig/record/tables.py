@@ -113,13 +113,13 @@ def constants(run: Run, sensor: str | None) -> dict[str, str | float]:
 
 def samples_table(run: Run, poses: Iterable[Kept]) -> Table:
     """Every sample of the run's kind with its time. Raises RecordError without samples."""
-    stretches = [kept for kept in poses if kept.pose.path.split(" ")[0] == run.kind]
+    stretches = [recorded for recorded in poses if recorded.pose.path.split(" ")[0] == run.kind]
     if not stretches:
         raise RecordError(f"run {run.run} has no samples of kind {run.kind} yet; `rig resume` continues it")
     names = stretches[0].samples.channels
     units = units_of(run, names)
-    volts = np.concatenate([kept.samples.volts for kept in stretches])
-    columns = {"t_s": np.concatenate([_times_s(kept) for kept in stretches])}
+    volts = np.concatenate([recorded.samples.volts for recorded in stretches])
+    columns = {"t_s": np.concatenate([_times_s(recorded) for recorded in stretches])}
     columns |= {
         column_of(name, units): volts[:, k]
         for k, name in enumerate(names)
@@ -134,21 +134,21 @@ def samples_table(run: Run, poses: Iterable[Kept]) -> Table:
 
 def _attitude(stretches: Sequence[Kept]) -> dict[str, Array]:
     """Stage angles and temperature, one value for each stretch; columns with an unknown value are omitted."""
-    lengths = [len(kept.samples.volts) for kept in stretches]
+    lengths = [len(recorded.samples.volts) for recorded in stretches]
     values: dict[str, list[float | None]] = {
-        "alpha_deg": [kept.pose.alpha_deg for kept in stretches],
-        "beta_deg": [kept.pose.beta_deg for kept in stretches],
-        "alpha_read_deg": [kept.alpha_read_deg for kept in stretches],
-        "beta_read_deg": [kept.beta_read_deg for kept in stretches],
-        "temperature_c": [kept.temperature_c for kept in stretches],
+        "alpha_deg": [recorded.pose.alpha_deg for recorded in stretches],
+        "beta_deg": [recorded.pose.beta_deg for recorded in stretches],
+        "alpha_read_deg": [recorded.alpha_read_deg for recorded in stretches],
+        "beta_read_deg": [recorded.beta_read_deg for recorded in stretches],
+        "temperature_c": [recorded.temperature_c for recorded in stretches],
     }
     return {name: np.repeat(np.array(v, dtype=float), lengths) for name, v in values.items() if None not in v}
 
 
-def _times_s(kept: Kept) -> Array:
+def _times_s(recorded: Kept) -> Array:
     """Times of the samples of a stretch on the run's clock, s."""
-    n, rate_hz = len(kept.samples.volts), kept.samples.rate_hz
-    return np.asarray(kept.t_s + (np.arange(n) - n / 2) / rate_hz)
+    n, rate_hz = len(recorded.samples.volts), recorded.samples.rate_hz
+    return np.asarray(recorded.t_s + (np.arange(n) - n / 2) / rate_hz)
 
 
 # Tables of poses: mean, standard deviation and number of the samples. The displacement sensor is omitted: at rest its
@@ -166,13 +166,13 @@ def poses_table(run: Run, poses: Iterable[Kept]) -> Table:
     blocks: list[Samples] = []
     stride = 1 + run.rows // MOST_BLOCKS
     units: Mapping[str, str] | None = None
-    for number, kept in enumerate(poses):
-        units = units_of(run, kept.samples.channels) if units is None else units
-        rows.append(_row(kept, units))
-        paths.append(kept.pose.path)
-        numbers.append(kept.number)
+    for number, recorded in enumerate(poses):
+        units = units_of(run, recorded.samples.channels) if units is None else units
+        rows.append(_row(recorded, units))
+        paths.append(recorded.pose.path)
+        numbers.append(recorded.number)
         if number % stride == 0:
-            blocks.append(kept.samples)
+            blocks.append(recorded.samples)
     if not rows:
         raise RecordError(f"run {run.run} has no pose yet; `rig resume` continues it")
     names = [name for name in rows[0] if all(name in row for row in rows)]
@@ -185,20 +185,20 @@ def poses_table(run: Run, poses: Iterable[Kept]) -> Table:
     return replace(table, numbers=np.array(numbers))
 
 
-def _row(kept: Kept, units: Mapping[str, str]) -> dict[str, float]:
+def _row(recorded: Kept, units: Mapping[str, str]) -> dict[str, float]:
     """The numbers of one pose by column."""
-    pose, samples = kept.pose, kept.samples
+    pose, samples = recorded.pose, recorded.samples
     row: dict[str, float] = {"alpha_deg": pose.alpha_deg, "beta_deg": pose.beta_deg, "direction": pose.direction}
-    row |= {"mount_deg": pose.mount_deg, "flip": pose.flip, "t_s": kept.t_s}
-    optional = {name: getattr(kept, name) for name in ("temperature_c", "alpha_read_deg", "beta_read_deg")}
+    row |= {"mount_deg": pose.mount_deg, "flip": pose.flip, "t_s": recorded.t_s}
+    optional = {name: getattr(recorded, name) for name in ("temperature_c", "alpha_read_deg", "beta_read_deg")}
     row |= {name: value for name, value in optional.items() if value is not None}
     means = samples.volts.mean(axis=0)
     names = [column_of(name, units) for name in samples.channels]
     row |= {name: float(m) for name, m in zip(names, means, strict=True) if name != f"{D63}_v"}
     if len(samples.volts) > 1:
         stds = samples.volts.std(axis=0, ddof=1)
-        named = zip(samples.channels, names, stds, strict=True)
-        row |= {std_column(name): float(s) for channel, name, s in named if channel in AXES}
+        columns = zip(samples.channels, names, stds, strict=True)
+        row |= {std_column(name): float(s) for channel, name, s in columns if channel in AXES}
     return row | {"n": len(samples.volts)}
 
 

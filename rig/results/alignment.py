@@ -21,9 +21,9 @@ def level_check(measured: Measured) -> dict[str, Result]:
     place = "base" if measured.run.settings.get("on") == "base" else "level"
     results = {}
     for axis in "xy":
-        front, back = readings[f"{place}-front-{axis}"], readings[f"{place}-back-{axis}"]
-        std = hypot(front.std, back.std) / 2 if front.std is not None and back.std is not None else None
-        tilt_deg, offset_deg = reversal(front.value, back.value)
+        front, reverse = readings[f"{place}-front-{axis}"], readings[f"{place}-back-{axis}"]
+        std = hypot(front.std, reverse.std) / 2 if front.std is not None and reverse.std is not None else None
+        tilt_deg, offset_deg = reversal(front.value, reverse.value)
         results[f"{place}-{axis}"] = Result(tilt_deg, "deg", std)
         results[f"{place}-offset-{axis}"] = Result(offset_deg, "deg", std)
     return results

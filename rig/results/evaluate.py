@@ -33,8 +33,8 @@ def judged(record: Record, run: Run) -> tuple[dict[str, Any], str | None]:
         results = evaluated(record, record.run(run.run))  # read again: the number of its rows bounds the memory
     except (CalibrationError, RecordError) as error:
         return {}, f"none: {error}"
-    known = {name: result for name, result in results.items() if isinstance(result, Result)}
-    return documents(known, Bench.model_validate(run.bench).result_limits), _missing(results)
+    determined = {name: result for name, result in results.items() if isinstance(result, Result)}
+    return documents(determined, Bench.model_validate(run.bench).result_limits), _missing(results)
 
 
 def _missing(results: Mapping[str, Result | Missing]) -> str | None:
@@ -43,7 +43,7 @@ def _missing(results: Mapping[str, Result | Missing]) -> str | None:
     for name, result in results.items():
         if isinstance(result, Missing):
             by_reason.setdefault(result.why, []).append(name)
-    return "; ".join(f"no {join_words(names, 'or')}: {why}" for why, names in by_reason.items()) or None
+    return "; ".join(f"no {join_words(names, 'or')}: {reason}" for reason, names in by_reason.items()) or None
 
 
 def evaluated(record: Record, run: Run) -> dict[str, Result | Missing]:

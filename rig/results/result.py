@@ -35,9 +35,9 @@ class Result:
     def verdict(self, limit: Limit) -> str:
         """pass, fail or marginal; a single number limits the magnitude."""
         low, high = (-limit, limit) if isinstance(limit, (int, float)) else limit
-        inside = min(self.value - low, high - self.value)
+        margin = min(self.value - low, high - self.value)
         guard = COVERAGE_FACTOR * (self.std or 0.0)
-        return "pass" if inside >= guard else "fail" if inside < -guard else "marginal"
+        return "pass" if margin >= guard else "fail" if margin < -guard else "marginal"
 
 
 @dataclass(frozen=True)
@@ -106,10 +106,10 @@ def documents(results: Mapping[str, Result], limits: Mapping[str, Limit]) -> dic
 # Parameters of a fitted model as results, for magnetometers and gyroscopes.
 
 
-def fitted(table: Table, model: str, *more: str) -> Fit:
-    """The fit of a shipped model with those of the effects `more` that suit the table. Raises as `fit`."""
+def fitted(table: Table, model: str, *effect_names: str) -> Fit:
+    """The fit of a shipped model with those of the effects `effect_names` that suit the table. Raises as `fit`."""
     effects, start = catalogue(), read_model(model)
-    for name in more:
+    for name in effect_names:
         if effects[name].excluded(table) is None:
             start = start.with_effect(effects[name])
     return fit(start, table)

@@ -27,8 +27,8 @@ def noise_floor(measured: Measured) -> dict[str, Result | Missing]:
     """
     upright: list[Kept] = []
     still: list[Kept] = []
-    for kept in measured.kept():
-        (still if kept.pose.path.startswith(STILL) else upright).append(kept)
+    for recorded in measured.kept():
+        (still if recorded.pose.path.startswith(STILL) else upright).append(recorded)
     if not still:
         raise DataError(f"run {measured.run.run} has no still record yet; `rig resume` continues it")
     first, results = still[0].samples, dict[str, Result | Missing]()
@@ -36,7 +36,7 @@ def noise_floor(measured: Measured) -> dict[str, Result | Missing]:
         if (channel := output_channel(axis, first.channels)) is None:
             continue
         k, unit = first.channels.index(channel), units_of(measured.run, [channel]).get(channel, "V")
-        value, std = noise_rms([kept.samples.volts[:, k] for kept in still])
+        value, std = noise_rms([recorded.samples.volts[:, k] for recorded in still])
         results[f"noise-rms-{axis}"] = Result(value, unit, std)
         results[f"noise-pp-{axis}"] = Result(PEAK_TO_PEAK * value, unit, PEAK_TO_PEAK * std)
         results[f"inclination-{axis}"] = _inclination(upright, axis, channel, value, std)
@@ -46,7 +46,7 @@ def noise_floor(measured: Measured) -> dict[str, Result | Missing]:
 def _inclination(upright: list[Kept], axis: str, channel: str, rms: float, std: float) -> Result | Missing:
     outputs = []
     for beta_deg in UPRIGHT_DEG[axis]:
-        at_pose = [kept.dwell.means[channel] for kept in upright if kept.pose.beta_deg == beta_deg]
+        at_pose = [recorded.dwell.means[channel] for recorded in upright if recorded.pose.beta_deg == beta_deg]
         if not at_pose:
             return Missing(f"there is no pose at alpha 90, beta {beta_deg:g} deg; `rig show RUN --poses` lists all")
         outputs.append(float(np.mean(at_pose)))

@@ -160,9 +160,9 @@ def _drift(course: Course, state: SteadyState, of: str) -> dict[str, Result]:
         "drift": Result(value / full_scale, unit, std / full_scale),
         "tolerance": Result(state.tolerance / full_scale, unit),
     }
-    named = {f"{course.quantity}-{name}-{course.axis}": result for name, result in results.items()}
+    results_by_name = {f"{course.quantity}-{name}-{course.axis}": result for name, result in results.items()}
     if state.terms:
         tau_s, tau_std = state.terms[0].tau_s
         name = "time-constant" if course.quantity == "bias" else "scale-time-constant"
-        named[f"{name}-{course.axis}"] = Result(tau_s / HOUR_S, "h", tau_std / HOUR_S)
-    return named
+        results_by_name[f"{name}-{course.axis}"] = Result(tau_s / HOUR_S, "h", tau_std / HOUR_S)
+    return results_by_name

@@ -55,10 +55,10 @@ def hand_positions(measured: Measured) -> dict[str, Result | Missing]:
     worst_g, parameter = largest_uncertainty_g(fit)
     target_g = float(measured.run.settings.get("target_g", math.inf))
     if worst_g > target_g:
-        why = (
+        reason = (
             f"{parameter} is known to {worst_g:.2g} g only, wanted {target_g:g} g; take more positions, or longer rests"
         )
-        return results | {"uncertainty": Missing(why)}
+        return results | {"uncertainty": Missing(reason)}
     return results | {"uncertainty": Result(worst_g, "g")}
 
 
@@ -139,7 +139,7 @@ def magnetometer_turn(measured: Measured) -> dict[str, Result | Missing]:
     The results of the ellipsoid are Missing if the directions cover too little of the sphere. Raises DataError without
     the turn about z.
     """
-    table, poses = measured.table(), [kept.pose for kept in measured.kept()]
+    table, poses = measured.table(), [recorded.pose for recorded in measured.kept()]
     if poses[0].up != "z":
         raise DataError(
             f"run {measured.name} has no pose of the turn about z: all are excluded; take them in again with rig "
@@ -147,8 +147,8 @@ def magnetometer_turn(measured: Measured) -> dict[str, Result | Missing]:
         )
     names, std = [p.path for p in poses], _std(table)
     extremes = iron_by_extremes(table.outputs, [p.up for p in poses], names, std)
-    why = magnetometer_coverage_warning(table)
-    ellipsoid = _all_missing(why) if why else _by_ellipsoid(table, poses)
+    reason = magnetometer_coverage_warning(table)
+    ellipsoid = _all_missing(reason) if reason else _by_ellipsoid(table, poses)
     level = [k for k, pose in enumerate(poses) if pose.path == poses[0].path]  # the turn about z, upward, is first
     attitudes = np.array([sensor_from_base(poses[k]) for k in level])
     azimuth = ellipsoid[ELEMENTS["D"]]
@@ -165,10 +165,10 @@ def _std(table: Table) -> float:
     return 0.0 if white is None else float(np.sqrt(np.mean(white**2)))
 
 
-def _all_missing(why: str) -> dict[str, Result | Missing]:
+def _all_missing(reason: str) -> dict[str, Result | Missing]:
     names = (*(f"hard-iron-{axis}" for axis in AXES), *(f"soft-iron-{pair}" for pair in SOFT), *ELEMENTS.values())
     names = (*names, "left-by-ellipsoid")
-    return {name: Missing(why) for name in names}
+    return {name: Missing(reason) for name in names}
 
 
 def _by_ellipsoid(table: Table, poses: list[Pose]) -> dict[str, Result | Missing]:
@@ -200,8 +200,8 @@ def _elements(fit: Fit, table: Table, poses: list[Pose]) -> dict[str, Result | M
 
 def _by_extremes(extremes: ExtremesEstimate, level: Elements, noise: float, unit: str) -> dict[str, Result | Missing]:
     results: dict[str, Result | Missing] = {}
-    for name, own in (("H", unit), ("D", "deg")):
-        results[f"{ELEMENTS[name]}-by-hand"] = Result(level.value[name], own, level.std[name])
+    for name, unit_of_element in (("H", unit), ("D", "deg")):
+        results[f"{ELEMENTS[name]}-by-hand"] = Result(level.value[name], unit_of_element, level.std[name])
     for k, axis in enumerate(AXES):
         value, std = float(extremes.hard_iron[k]), float(extremes.hard_iron_std[k])
         results[f"hard-iron-by-hand-{axis}"] = (

@@ -88,7 +88,7 @@ def sweep(measured: Measured) -> dict[str, Result]:
     """Trend of the outputs at the reference pose, an hour, with the standard error that its scatter gives."""
     if not measured.run.settings.get("reference_every"):
         return {}
-    visits = [kept.dwell for kept in measured.kept() if kept.pose.path == REFERENCE.path]
+    visits = [recorded.dwell for recorded in measured.kept() if recorded.pose.path == REFERENCE.path]
     if len(visits) < FEWEST_FOR_DRIFT:
         return {}
     hours = np.array([dwell.t_s for dwell in visits]) / HOUR_S

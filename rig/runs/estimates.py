@@ -54,10 +54,10 @@ class Value:
 
 def nearness(value: float, low: float, high: float) -> str:
     """ "" | near its limit | beyond its limit"""
-    inside = min(value - low, high - value)
-    if not inside >= 0:  # NaN is beyond as well
+    margin = min(value - low, high - value)
+    if not margin >= 0:  # NaN is beyond as well
         return "beyond its limit"
-    return "near its limit" if inside < NEAR * (high - low) else ""
+    return "near its limit" if margin < NEAR * (high - low) else ""
 
 
 # Estimates from the poses so far.
@@ -97,20 +97,22 @@ class RunningEstimates:
             for _, dwell in record.dwells(run) if self.law else ():
                 self._take(dwell)
 
-    def values(self, kept: Kept) -> list[Value]:
+    def values(self, recorded: Kept) -> list[Value]:
         """The estimates after one more pose."""
-        self._take(kept.dwell)
-        self.pose = kept.pose
+        self._take(recorded.dwell)
+        self.pose = recorded.pose
         return list(self._estimates())
 
-    def report(self, kept: Kept) -> str:
+    def report(self, recorded: Kept) -> str:
         """The estimates in lines, if this pose begins a new path; they do not include this pose."""
-        before = self.pose
-        ended = turn_words(before) if before is not None and before.path not in ("", kept.pose.path) else ""
-        estimates = list(self._estimates()) if ended else []
-        self.values(kept)
+        previous = self.pose
+        turn_text = (
+            turn_words(previous) if previous is not None and previous.path not in ("", recorded.pose.path) else ""
+        )
+        estimates = list(self._estimates()) if turn_text else []
+        self.values(recorded)
         lines = [f"  {value.name:<12} {value.shown}" for value in estimates]
-        return "\n".join([f"after {ended}", *lines]) if lines else ""
+        return "\n".join([f"after {turn_text}", *lines]) if lines else ""
 
     def _take(self, dwell: Dwell) -> None:
         for name, row, value in self.law.rows(dwell) if self.law else ():
@@ -119,12 +121,12 @@ class RunningEstimates:
     def _estimates(self) -> Iterator[Value]:
         for name, squares in self.known.items():
             estimate, (sensor, _, channel) = squares.estimate(), name.rpartition(".")
-            out = self.units.get(channel, "V")
+            output_unit = self.units.get(channel, "V")
             for parameter, (place, unit) in self.law.parameters(name).items() if self.law else ():
                 value, std = float(estimate.values[place]), float(estimate.scattered[place])
                 if np.isfinite(std):
-                    shown = f"{estimate_text(value, std)} {unit.replace('{out}', out)}"
-                    yield Value(f"{sensor} {parameter}".strip(), shown, "from the poses so far")
+                    value_text = f"{estimate_text(value, std)} {unit.replace('{out}', output_unit)}"
+                    yield Value(f"{sensor} {parameter}".strip(), value_text, "from the poses so far")
 
 
 def _loaded(outputs: Collection[str], load: Callable[[Pose], Array]) -> Callable[[Dwell], Iterator[Row]]:
@@ -195,16 +197,16 @@ class Follower:
             *_, forecast = [forecast, *filter_soak(measured.table(), forecast.oven_c)]
         return cls(measured.sensor, measured.constants, forecast)
 
-    def kept(self, kept: Kept, on_s: float) -> bool:
+    def kept(self, recorded: Kept, on_s: float) -> bool:
         """Take one more pose; `on_s` is the time of power-on. Returns whether the pose completes a reversal."""
-        dwell = of_sensor(kept, self.sensor).dwell
+        dwell = of_sensor(recorded, self.sensor).dwell
         if self.part and self.part[0].pose.path != dwell.pose.path:
-            self._end(kept.samples.rate_hz, on_s)
+            self._end(recorded.samples.rate_hz, on_s)
         self.part.append(dwell)
-        self.length_s += dwell.n / kept.samples.rate_hz
+        self.length_s += dwell.n / recorded.samples.rate_hz
         turned = dwell.pose.path.startswith(REVERSAL) and len(self.part) == WHOLE
         if turned or (dwell.pose.path.startswith(HOLD) and self.length_s >= STRETCH_S):
-            self._end(kept.samples.rate_hz, on_s)
+            self._end(recorded.samples.rate_hz, on_s)
         return turned
 
     def _end(self, rate_hz: float, on_s: float) -> None:
@@ -231,17 +233,17 @@ class SoakForecaster:
         self.run, self.on_s = run, None
         self.unit = str(begun.constants.get("unit", "V"))
 
-    def values(self, kept: Kept) -> list[Value]:
+    def values(self, recorded: Kept) -> list[Value]:
         """The forecast of each quantity, if this pose completes a reversal."""
-        forecasts = self.forecasts(kept)
+        forecasts = self.forecasts(recorded)
         return [Value(name, present(name, f, self.unit), outlook(name, f, self.unit)) for name, f in forecasts.items()]
 
-    def forecasts(self, kept: Kept) -> dict[str, Forecast]:
+    def forecasts(self, recorded: Kept) -> dict[str, Forecast]:
         """The forecast of each quantity by name, if this pose completes a reversal."""
         if self.on_s is None:
             with Record() as record:
                 self.on_s = Measured(record, record.run(self.run)).power_on_s()
-        turned = [follower.kept(kept, self.on_s) for follower in self.followers]
+        turned = [follower.kept(recorded, self.on_s) for follower in self.followers]
         if not any(turned):
             return {}
         return {
@@ -250,9 +252,9 @@ class SoakForecaster:
             for name, forecast in follower.forecast.forecasts().items()
         }
 
-    def report(self, kept: Kept) -> str:
+    def report(self, recorded: Kept) -> str:
         """The forecasts in lines; empty if this pose does not complete a reversal."""
-        return lines(forecasts, self.unit) if (forecasts := self.forecasts(kept)) else ""
+        return lines(forecasts, self.unit) if (forecasts := self.forecasts(recorded)) else ""
 
 
 def live_estimates(procedure: str) -> SoakForecaster | RunningEstimates:
@@ -269,7 +271,7 @@ def outlook(name: str, forecast: Forecast, of: str) -> str:
     """The final value and the time of the steady state, with bounds of 95 %."""
     if forecast.surprised:
         return "the drift does not look like a warm-up, so there is no forecast"
-    return f"{_final(forecast, _unit(name, of))}; {_when(forecast)}"
+    return f"{_final(forecast, _unit(name, of))}; {_time_to_steady(forecast)}"
 
 
 def _unit(name: str, of: str) -> str:
@@ -286,7 +288,7 @@ def _final(forecast: Forecast, unit: str) -> str:
     return f"final value not yet known: {final.low:.4f} to {final.high:.4f} {unit} (95 %)"
 
 
-def _when(forecast: Forecast) -> str:
+def _time_to_steady(forecast: Forecast) -> str:
     """The time until the steady state."""
     if forecast.steady:
         return "steady"

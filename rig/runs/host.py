@@ -63,7 +63,7 @@ class RunHost:
 
     def measured(self) -> Sequence[Dwell]:
         if self._dwells is None:
-            self._dwells = [kept.dwell for kept in self._measured.kept()]
+            self._dwells = [recorded.dwell for recorded in self._measured.kept()]
         return self._dwells
 
     def readings(self) -> Sequence[Reading]:
@@ -75,7 +75,7 @@ class RunHost:
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
         middle_s = samples.start_s + len(samples.volts) / samples.rate_hz / 2
         dials = self._rig.read_deg()
-        kept = Kept(
+        recorded = Kept(
             pose,
             samples,
             middle_s - self._zero_s,
@@ -85,12 +85,12 @@ class RunHost:
         )
         state = self._state()
         self._log("kept", f"pose {self._next}: {len(samples.volts)} samples{self._losses()}")
-        self._record.keep(self._run, self._next, kept, state)
+        self._record.keep(self._run, self._next, recorded, state)
         self._next += 1
         self._poses.append(pose)
         if self._dwells is not None:
-            self._dwells.append(of_sensor(kept, self._measured.sensor).dwell)
-        self._observer.kept(kept)
+            self._dwells.append(of_sensor(recorded, self._measured.sensor).dwell)
+        self._observer.kept(recorded)
 
     def keep_readings(self, *readings: Reading) -> None:
         for reading in readings:
@@ -101,9 +101,9 @@ class RunHost:
 
     def _losses(self) -> str:
         """What a digital sensor has lost, doubled or damaged since the last pose, in words."""
-        before, self._counted = self._counted, self._rig.tally()
-        nothing = (0.0, "")
-        new = {name: self._counted.get(name, nothing)[0] - before.get(name, nothing)[0] for name in LOSSES}
+        counted_before, self._counted = self._counted, self._rig.tally()
+        zero = (0.0, "")
+        new = {name: self._counted.get(name, zero)[0] - counted_before.get(name, zero)[0] for name in LOSSES}
         return "".join(f", {LOSSES[name]} {count:.0f}" for name, count in new.items() if count)
 
     def keep_tally(self) -> None:
@@ -117,8 +117,8 @@ class RunHost:
         self._record.keep_readings(self._run, readings, None)
         losses = {words: total[name] for name, words in LOSSES.items() if name in total}
         if any(losses.values()):
-            lost = ", ".join(f"{words} {count:.0f}" for words, count in losses.items())
-            self._record.note(self._run, SENSOR, f"of {total['samples']:.0f} samples: {lost}")
+            losses_text = ", ".join(f"{words} {count:.0f}" for words, count in losses.items())
+            self._record.note(self._run, SENSOR, f"of {total['samples']:.0f} samples: {losses_text}")
 
     def keep_state(self) -> None:
         """Record the state of the bench before the first measurement."""
@@ -145,8 +145,8 @@ class RunHost:
         follow(guidance, self._rig)
         self._observer.guide(guidance)
 
-    def _log(self, what: str, text: str) -> None:
-        self._record.log(self._run, self._rig.clock.now(), "run", what, text)
+    def _log(self, event: str, text: str) -> None:
+        self._record.log(self._run, self._rig.clock.now(), "run", event, text)
 
     def _state(self) -> dict[str, Any] | None:
         """The state to record with a pose. Raises the error of a stage that has left its position."""

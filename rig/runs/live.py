@@ -19,7 +19,7 @@ from calibrations.loop import discover
 from calibrations.model import Model
 from calibrations.table import Table
 from rig.bench import Bench
-from rig.planning.next_experiment import TOGETHER, Dispute, chosen, gives_poses, planned_experiment, possible
+from rig.planning.next_experiment import TOGETHER, Dispute, choose_experiment, gives_poses, planned_experiment, possible
 
 STANDARD = Experiment("sweep", {}, (), "the sweep with its default settings")
 FIRST = Experiment("sweep", {"step_deg": 45.0, "inclinations_deg": [90.0, 30.0, 150.0]}, (), "a short first sweep")
@@ -60,53 +60,53 @@ class Live:
 
     def measurements(self) -> Iterator[Measurement]:
         """The measurements in order. Raises the errors of `plan` and of `measure`."""
-        done: list[Measurement] = []
+        measurements: list[Measurement] = []
         following: Experiment | None = self.planned(FIRST)
         while following is not None:
             run, table = self.measure(following)
-            used_s = (done[-1].used_s if done else 0.0) + (following.duration_s or 0.0)
-            done.append(Measurement(following, run, discover(table, self.model, self.effects), used_s))
-            telling = self._telling(done)
-            following = None if stands(done) else self._following(telling, done)
-            discovered = replace(done[-1].found, next_experiment=telling)
-            done[-1] = replace(done[-1], found=discovered, following=following)
-            yield done[-1]
+            used_s = (measurements[-1].used_s if measurements else 0.0) + (following.duration_s or 0.0)
+            measurements.append(Measurement(following, run, discover(table, self.model, self.effects), used_s))
+            telling = self._telling(measurements)
+            following = None if stands(measurements) else self._following(telling, measurements)
+            discovered = replace(measurements[-1].found, next_experiment=telling)
+            measurements[-1] = replace(measurements[-1], found=discovered, following=following)
+            yield measurements[-1]
 
     def planned(self, experiment: Experiment) -> Experiment:
         """The experiment with its duration on the bench."""
         return planned_experiment(experiment, self.bench, self.bench_file)[0]
 
-    def _telling(self, done: Sequence[Measurement]) -> Experiment | None:
+    def _telling(self, measurements: Sequence[Measurement]) -> Experiment | None:
         """The experiment that separates the explanations, with or without time for it; None for one explanation."""
-        discovered = done[-1].found
+        discovered = measurements[-1].found
         if discovered.next_experiment is None:
             return None
         dispute = Dispute.of(discovered.end, discovered.next_experiment.separates, self.effects)
-        menu = _new((*ADDITIONS, *MENU), done)
-        return chosen(dispute, discovered.next_experiment, self.bench, self.bench_file, menu, (TOGETHER,))
+        menu = _new((*ADDITIONS, *MENU), measurements)
+        return choose_experiment(dispute, discovered.next_experiment, self.bench, self.bench_file, menu, (TOGETHER,))
 
-    def _following(self, telling: Experiment | None, done: Sequence[Measurement]) -> Experiment | None:
+    def _following(self, telling: Experiment | None, measurements: Sequence[Measurement]) -> Experiment | None:
         """The next experiment: `telling` if its poses fit the other data, else poses in between; None without time.
 
         A short sweep comes before a much longer experiment: the room may show the same as the oven.
         """
-        left_s = self.time_s - done[-1].used_s
-        between = next((self.planned(e) for e in possible(_new(BETWEEN, done), self.bench, left_s)), None)
+        left_s = self.time_s - measurements[-1].used_s
+        intermediate = next((self.planned(e) for e in possible(_new(BETWEEN, measurements), self.bench, left_s)), None)
         if telling is None or telling.duration_s is None or telling.duration_s > left_s:
-            return between
-        if between is not None and (between.duration_s or 0.0) < FEW * telling.duration_s:
-            return between
-        return telling if _new([telling], done) and gives_poses(telling, self.bench) else between
+            return intermediate
+        if intermediate is not None and (intermediate.duration_s or 0.0) < FEW * telling.duration_s:
+            return intermediate
+        return telling if _new([telling], measurements) and gives_poses(telling, self.bench) else intermediate
 
 
-def stands(done: Sequence[Measurement]) -> bool:
+def stands(measurements: Sequence[Measurement]) -> bool:
     """Whether the last data have confirmed the explanation of the data before, or one of its alternatives."""
-    if len(done) < 2 or done[-1].found.undecided:
+    if len(measurements) < 2 or measurements[-1].found.undecided:
         return False
-    before, now = done[-2].found, done[-1].found
-    known = {*before.causes, *(name for names in before.alternatives.values() for name in names)}
-    same = before.verdict in (now.verdict, "ambiguous") and _kind(before) == _kind(now)
-    return same and set(now.causes) <= known and len(now.causes) == len(before.causes)
+    previous, present = measurements[-2].found, measurements[-1].found
+    explanations = {*previous.causes, *(name for names in previous.alternatives.values() for name in names)}
+    is_confirmed = previous.verdict in (present.verdict, "ambiguous") and _kind(previous) == _kind(present)
+    return is_confirmed and set(present.causes) <= explanations and len(present.causes) == len(previous.causes)
 
 
 def _kind(discovered: Discovery[Fit]) -> list[str]:
@@ -114,7 +114,7 @@ def _kind(discovered: Discovery[Fit]) -> list[str]:
     return (discovered.residual_structure or "").split()[:2]
 
 
-def _new(experiments: Sequence[Experiment], done: Sequence[Measurement]) -> list[Experiment]:
+def _new(experiments: Sequence[Experiment], measurements: Sequence[Measurement]) -> list[Experiment]:
     """The experiments that were not run yet: a repetition gives no new information."""
-    known = [(m.experiment.procedure, m.experiment.settings) for m in done]
-    return [e for e in experiments if (e.procedure, e.settings) not in known]
+    measured_settings = [(m.experiment.procedure, m.experiment.settings) for m in measurements]
+    return [e for e in experiments if (e.procedure, e.settings) not in measured_settings]

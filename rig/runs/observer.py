@@ -56,10 +56,10 @@ class Observer:
     def guide(self, guidance: Guidance) -> None:
         """What a person with the sensor in the hand does next; a sound marks the position that was taken."""
 
-    def expect(self, total: int, done: int) -> None:
+    def expect(self, total: int, recorded_poses: int) -> None:
         """The number of poses of the run, and how many of them are recorded."""
 
-    def kept(self, kept: Kept) -> None:
+    def kept(self, recorded: Kept) -> None:
         """A pose is recorded."""
 
     def read(self, reading: Reading) -> None:
@@ -100,10 +100,10 @@ class Progress:
         """This process begins or continues the run."""
         return replace(self, total=0, first=0, done=0, began_s=now_s, kept_s=now_s)
 
-    def expect(self, total: int, done: int) -> Progress:
+    def expect(self, total: int, recorded_poses: int) -> Progress:
         """The number of poses of the procedure and of the record, for the whole run or for its next part."""
-        first = done if not self.total else self.first
-        return replace(self, total=max(total, len(self.at_s)), first=first, done=done)
+        first = recorded_poses if not self.total else self.first
+        return replace(self, total=max(total, len(self.at_s)), first=first, done=recorded_poses)
 
     def step(self, now_s: float) -> Progress:
         """One more pose is recorded."""
@@ -115,18 +115,18 @@ class Progress:
 
     def left_s(self, now_s: float) -> float | None:
         """Remaining time by the wall clock, s; None before the first pose."""
-        gone = self._work(self.done) - self._work(self.first)
-        if gone <= 0 or self.done == self.first:
+        work_done = self._work(self.done) - self._work(self.first)
+        if work_done <= 0 or self.done == self.first:
             return None
         end = self.end_s if self.at_s else float(self.total)
-        remaining_s = (end - self._work(self.done)) * (self.kept_s - self.began_s) / gone
+        remaining_s = (end - self._work(self.done)) * (self.kept_s - self.began_s) / work_done
         return max(0.0, remaining_s - (now_s - self.kept_s))
 
-    def _work(self, done: int) -> float:
-        """The work of `done` poses: seconds of the plan, or poses without a plan."""
+    def _work(self, recorded_poses: int) -> float:
+        """The work of `recorded_poses` poses: seconds of the plan, or poses without a plan."""
         if not self.at_s:
-            return float(done)
-        return self.at_s[done] if done < len(self.at_s) else self.end_s
+            return float(recorded_poses)
+        return self.at_s[recorded_poses] if recorded_poses < len(self.at_s) else self.end_s
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ class RunViewer(Observer):
         """Called after each change of the view during the run."""
 
     def planned(self, plan: Plan) -> None:
-        progress = replace(self.view.progress, at_s=tuple(held.start_s for held in plan.held), end_s=plan.duration_s)
+        progress = replace(self.view.progress, at_s=tuple(dwell.start_s for dwell in plan.held), end_s=plan.duration_s)
         self.view = replace(self.view, progress=progress)
 
     def begun(self, run: str) -> None:
@@ -196,20 +196,22 @@ class RunViewer(Observer):
     def guide(self, guidance: Guidance) -> None:
         self._change(now=guidance.text, guidance=guidance)
 
-    def expect(self, total: int, done: int) -> None:
-        self._change(progress=self.view.progress.expect(total, done))
+    def expect(self, total: int, recorded_poses: int) -> None:
+        self._change(progress=self.view.progress.expect(total, recorded_poses))
 
-    def kept(self, kept: Kept) -> None:
+    def kept(self, recorded: Kept) -> None:
         """Update the values with a new pose, and the usual scatter with the poses before it."""
-        kind = kept.pose.path.partition(" ")[0]
+        kind = recorded.pose.path.partition(" ")[0]
         usual = {}
-        for name, std in kept.dwell.stds.items():
+        for name, std in recorded.dwell.stds.items():
             earlier = self._scatter[name, kind]
             if earlier:
                 usual[name] = statistics.median(earlier)
             earlier.append(std)
-        estimates = self._estimates.values(kept) or self.view.estimates
-        self._change(kept=kept, usual=usual, estimates=estimates, progress=self.view.progress.step(time.monotonic()))
+        estimates = self._estimates.values(recorded) or self.view.estimates
+        self._change(
+            kept=recorded, usual=usual, estimates=estimates, progress=self.view.progress.step(time.monotonic())
+        )
 
     def read(self, reading: Reading) -> None:
         self._change(tilt={**self.view.tilt, reading.name: reading.value})
@@ -221,16 +223,18 @@ class RunViewer(Observer):
 
 def values(view: RunView) -> Iterator[Value]:
     """The live values: temperature, tilt, and each channel."""
-    kept = view.kept
-    if kept is not None and kept.temperature_c is not None:
-        yield Value("temperature", f"{kept.temperature_c:.1f} C", "", kept.temperature_c, view.limits.temperature_c)
+    recorded = view.kept
+    if recorded is not None and recorded.temperature_c is not None:
+        yield Value(
+            "temperature", f"{recorded.temperature_c:.1f} C", "", recorded.temperature_c, view.limits.temperature_c
+        )
     if (limit := view.limits.level_deg) is not None:
         for axis in "xy":
             if (tilt_deg := _tilt(view.tilt, axis)) is not None:
                 yield Value(f"level {axis}", f"{tilt_deg:.3f} deg", "", tilt_deg, (-limit, limit))
-    if kept is not None:
-        dwell, volts = kept.dwell, kept.samples.volts
-        for name, column in zip(kept.samples.channels, volts.T, strict=True):
+    if recorded is not None:
+        dwell, volts = recorded.dwell, recorded.samples.volts
+        for name, column in zip(recorded.samples.channels, volts.T, strict=True):
             farthest = float(column[np.argmax(np.abs(column))])
             yield _channel(name, dwell.means[name], dwell.stds[name], farthest, view)
     yield from view.estimates
@@ -248,7 +252,7 @@ def _channel(name: str, mean: float, std: float, farthest: float, view: RunView)
     return Value(name, f"{mean:.5f} {unit}", scatter, farthest, limits)
 
 
-def _tilt(read: Mapping[str, float], axis: str) -> float | None:
+def _tilt(readings: Mapping[str, float], axis: str) -> float | None:
     """The tilt of the table, if both readings of the level are there."""
-    front, back = (read.get(f"level-{side}-{axis}") for side in ("front", "back"))
-    return None if front is None or back is None else reversal(front, back)[0]
+    front, reversed_reading = (readings.get(f"level-{side}-{axis}") for side in ("front", "back"))
+    return None if front is None or reversed_reading is None else reversal(front, reversed_reading)[0]

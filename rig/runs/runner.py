@@ -49,13 +49,13 @@ def start(
     procedure: Procedure,
     settings: Mapping[str, Any],
     observer: Observer,
-    after: str | None = None,
+    after_run: str | None = None,
     trace: bool = False,
 ) -> Outcome:
     """Run `procedure` from the beginning. An error before its first move does not change the record.
 
     With `trace`, the log of the run has every message to and from instruments. A simulated bench begins in its initial
-    state, or in the state at the end of the run `after`.
+    state, or in the state at the end of the run `after_run`.
 
     Raises the errors of settings, plan and connection, and Declined. An error of the run itself is in the outcome.
     """
@@ -64,7 +64,7 @@ def start(
         observer.planned(planned)
         trail = Trace(record) if trace else None
         first = first_question(planned)
-        begun = _begun(record, bench, procedure, settings, observer, after, trail, first)
+        begun = _begun(record, bench, procedure, settings, observer, after_run, trail, first)
         return _after_decision(record, begun, observer, trace)
 
 
@@ -74,7 +74,7 @@ def _begun(
     procedure: Procedure,
     settings: Mapping[str, Any],
     observer: Observer,
-    after: str | None,
+    after_run: str | None,
     trace: Trace | None,
     first: Confirm | None,
 ) -> Outcome:
@@ -83,9 +83,9 @@ def _begun(
         faults = expired(bench, datetime.now(UTC).date())
         run = record.begin(
             procedure.name,
-            _plain(settings),
+            _as_json(settings),
             bench=bench.document(),
-            configuration=bench.configuration(procedure.name, _plain(settings)),
+            configuration=bench.configuration(procedure.name, _as_json(settings)),
             constants=bench.constants | ({EXPIRED: "; ".join(faults)} if faults else {}),
             source=bench.name,
             identities=identities,
@@ -95,9 +95,9 @@ def _begun(
             trace.begin(run)
         for fault in faults:
             record.note(run, EXPIRED, fault)
-        if after is not None:
-            leave_as(rig, record, after)
-        with _held(record, run):
+        if after_run is not None:
+            leave_as(rig, record, after_run)
+        with _lease_run(record, run):
             return _carry_out(record, rig, record.run(run), procedure, observer, first)
 
 
@@ -118,14 +118,14 @@ def _resumed(
         return Outcome(run)
     if bench is not None and bench.configuration(run.procedure, run.settings) != run.configuration:
         raise RunMismatch(f"run {run_id} began with another bench; resume it without --bench, or with the same file")
-    own = bench or Bench.model_validate(run.bench)  # the same, except for repaired faults
-    procedure = find(run.procedure, own.folders.procedures)
+    own_bench = bench or Bench.model_validate(run.bench)  # the same, except for repaired faults
+    procedure = find(run.procedure, own_bench.folders.procedures)
     trail = Trace(record) if trace else None
-    with stoppable(), _held(record, run_id), connected(own, trail) as rig:
+    with stoppable(), _lease_run(record, run_id), connected(own_bench, trail) as rig:
         if trail is not None:
             trail.begin(run_id)
         _same_instruments(run, rig)
-        return _carry_out(record, rig, run, procedure, observer, _unanswered(record, run, own, procedure))
+        return _carry_out(record, rig, run, procedure, observer, _unanswered(record, run, own_bench, procedure))
 
 
 def _unanswered(record: Record, run: Run, bench: Bench, procedure: Procedure) -> Confirm | None:
@@ -159,7 +159,7 @@ def _decision(outcome: Outcome, observer: Observer) -> Decision:
         return "end"
 
 
-def _held(record: Record, run: str) -> AbstractContextManager[None]:
+def _lease_run(record: Record, run: str) -> AbstractContextManager[None]:
     return lease(record.folder, run, f"run {run}")
 
 
@@ -168,16 +168,18 @@ def _carry_out(
 ) -> Outcome:
     """The run itself. At its end the stages are at rest, and the record has its state, whatever happens."""
 
-    def log(what: str, text: str) -> None:
-        record.log(run.run, rig.clock.now(), "run", what, text)
+    def log(event: str, text: str) -> None:
+        record.log(run.run, rig.clock.now(), "run", event, text)
 
     log("begun", f"{procedure.name} at pose {run.rows}")
     _note_program(record, run, procedure, log)
     record.set_state(run.run, "running")
     try:
         observer.begun(run.run)  # a person may end it from now on
-        own = _perform(record, rig, run, procedure, observer, first)
-        results, why = (documents(own, rig.bench.result_limits), None) if own else judged(record, run)
+        own_results = _perform(record, rig, run, procedure, observer, first)
+        results, reason = (
+            (documents(own_results, rig.bench.result_limits), None) if own_results else judged(record, run)
+        )
     except BaseException as failure:
         error = _error_of(failure, run)
         log("error", f"{type(error).__name__}: {error}")
@@ -190,8 +192,8 @@ def _carry_out(
         if isinstance(failure, Exception) and error is not failure:
             raise  # a defect of the program
         return _interrupted(record, run, error, complaints)
-    log("complete", why or f"{len(results)} results")
-    _complete(record, run.run, why and f"results: {why}", results)
+    log("complete", reason or f"{len(results)} results")
+    _complete(record, run.run, reason and f"results: {reason}", results)
     return Outcome(record.run(run.run))
 
 
@@ -199,18 +201,18 @@ def _note_program(record: Record, run: Run, procedure: Procedure, log: Callable[
     """Log the version of the program and the digest of the procedure. An event marks the begin of another one."""
     digest = hashlib.sha256(procedure.path.read_bytes()).hexdigest()[:16]
     present = f"{program()}, procedure {procedure.name} {digest}"
-    before = next((line.text for line in reversed(record.lines(run.run, (PROGRAM,)))), present)
+    previous = next((line.text for line in reversed(record.lines(run.run, (PROGRAM,)))), present)
     log(PROGRAM, present)
-    if present != before and run.rows:
-        record.note(run.run, CHANGED, f"from pose {run.rows}: {present}; before: {before}")
+    if present != previous and run.rows:
+        record.note(run.run, CHANGED, f"from pose {run.rows}: {present}; before: {previous}")
 
 
-def _complete(record: Record, run: str, why: str | None, results: Mapping[str, Any]) -> None:
+def _complete(record: Record, run: str, reason: str | None, results: Mapping[str, Any]) -> None:
     """End a complete run. Its message has the remarks on the record, also on the last transaction."""
     remarks = None
     while remarks != record.remarks:
         remarks = list(record.remarks)
-        record.set_state(run, "complete", "; ".join([*([why] if why else []), *remarks]) or None, results)
+        record.set_state(run, "complete", "; ".join([*([reason] if reason else []), *remarks]) or None, results)
 
 
 def _interrupted(record: Record, run: Run, error: Exception, complaints: Sequence[str]) -> Outcome:
@@ -284,6 +286,6 @@ def _state(error: Exception) -> str:
     return "stopped" if isinstance(error, (Stopped, SafetyLimit, Interlocked, NoAnswer, Declined)) else "failed"
 
 
-def _plain(settings: Mapping[str, Any]) -> dict[str, Any]:
+def _as_json(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Settings as in JSON, so that those of a resumed run have the same hash."""
     return {name: list(value) if isinstance(value, tuple) else value for name, value in settings.items()}

@@ -63,18 +63,18 @@ def stoppable() -> Iterator[None]:
 
     hook, sys.unraisablehook = sys.unraisablehook, lost
     ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # by nohup: a closed terminal must not stop the run
-    before = {
+    handlers = {
         signal_number: signal.signal(signal_number, stop)
         for signal_number in SIGNALS
         if not (ignored and signal_number == signal.SIGHUP)
     }
-    before[signal.SIGALRM] = signal.signal(signal.SIGALRM, again)
+    handlers[signal.SIGALRM] = signal.signal(signal.SIGALRM, again)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         sys.unraisablehook = hook
-        for signal_number, handler in before.items():
+        for signal_number, handler in handlers.items():
             signal.signal(signal_number, handler)
 
 
@@ -102,7 +102,7 @@ class Trace:
         self._early: list[tuple[float, str, str, str]] = []
 
     def __call__(self, clock_s: float, wire: str, direction: Literal["sent", "heard"], data: bytes) -> None:
-        line = (clock_s, wire, direction, shown(data))
+        line = (clock_s, wire, direction, message_text(data))
         if self._run:
             self._record.log(self._run, *line)
         else:
@@ -116,10 +116,10 @@ class Trace:
         self._early.clear()
 
 
-def shown(data: bytes) -> str:
+def message_text(data: bytes) -> str:
     """A message as text if it is printable, else in hexadecimal. A long message is cut."""
-    rest = f" ... {len(data)} bytes" if len(data) > SHOWN_BYTES else ""
+    length_text = f" ... {len(data)} bytes" if len(data) > SHOWN_BYTES else ""
     begin = data[:SHOWN_BYTES]
     text = begin.decode("ascii", "replace")
     readable = all(character.isprintable() or character in "\r\n" for character in text) and "\ufffd" not in text
-    return (repr(text) if readable else begin.hex(" ")) + rest
+    return (repr(text) if readable else begin.hex(" ")) + length_text

@@ -14,7 +14,7 @@ from calibrations.presentation.certificate.content import Certificate
 from calibrations.presentation.certificate.results import figures, require_reference
 from calibrations.table import Table
 from rig.bench import Bench
-from rig.services.issue import Asked, issue, limits
+from rig.services.issue import CertificateDetails, issue, limits
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ def certified(of: Certified, number: str = "", customer: str = "") -> Certificat
     fresh = bool(earlier.params) and earlier.provenance.get("data_sha256") != of.table.digest
     fitted = fit(of.model, of.table)
     figured = figures(fitted, earlier if fresh else None, limits(of.data, of.bench))
-    since = str(earlier.provenance.get("created", "of unknown date"))[:10]
-    details = Asked(number, customer, f"the model {name}, {since}" if fresh else "")
+    created = str(earlier.provenance.get("created", "of unknown date"))[:10]
+    details = CertificateDetails(number, customer, f"the model {name}, {created}" if fresh else "")
     return issue(of.data, fitted, figured, of.bench, details)
 
 
@@ -52,7 +52,7 @@ def failed_results(certificate: Certificate) -> list[str]:
     return [o.name for o in certificate.figures.outcomes if o.decision is not None and o.decision.statement == "fail"]
 
 
-def written(certificate: Certificate, form: str) -> str | bytes:
+def format_certificate(certificate: Certificate, form: str) -> str | bytes:
     """The certificate in the form .html, .pdf or .xml."""
     from calibrations.presentation.certificate.dcc import dcc
     from calibrations.presentation.certificate.pages import html, pdf

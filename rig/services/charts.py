@@ -34,7 +34,7 @@ from procedures.session import Dwell
 from rig.record import Record, Run
 from rig.record.measured import Measured
 from rig.services.history import Calibration, Quantity
-from rig.services.two_runs import DIFFERENT, Again, Pair
+from rig.services.two_runs import DIFFERENT, Pair, RepeatedPoses
 
 MOST = 1024  # parts: more than a screen has columns for
 
@@ -236,41 +236,41 @@ def _differences(pairs: Sequence[Pair]) -> Panel:
 
 def residuals(first: ChannelResidual, second: ChannelResidual, x: Column, other_x: Column) -> Chart:
     """Residuals of both, each fitted by itself, on shared axes; the grey band is the larger noise floor."""
-    looks: tuple[tuple[ChannelResidual, Column, str, Symbol, str], ...] = (
+    styles: tuple[tuple[ChannelResidual, Column, str, Symbol, str], ...] = (
         (first, x, MEASURED, "circle", "first"),
         (second, other_x, CANDIDATE, "diamond-open", "second"),
     )
     dots = [
-        Points(column.values[shown.c, shown.rows], shown.residual, colour=colour, symbol=symbol, size=8,
-               hover=[f"{name}: {text}" for text in shown.hover])
-        for shown, column, colour, symbol, name in looks
+        Points(column.values[channel.c, channel.rows], channel.residual, colour=colour, symbol=symbol, size=8,
+               hover=[f"{name}: {text}" for text in channel.hover])
+        for channel, column, colour, symbol, name in styles
     ]  # fmt: skip
     axis = Axis(x.labels[first.c], ticks="quarters" if x.name == "beta" else "")
     return single_chart(Panel((*floor_band(max(first.floor, second.floor)), *dots), axis, Axis(first.label)))
 
 
-def difference(first: ChannelResidual, again: Again) -> Chart:
+def difference(first: ChannelResidual, repeated: RepeatedPoses) -> Chart:
     """The second measurement less the first, at every pose that both have; the band is its noise floor."""
-    c, values = first.c, first.factor * again.difference[first.c]
+    c, values = first.c, first.factor * repeated.difference[first.c]
     hover = [f"{minus(f'{value:.4g}')} {first.unit}<br>{first.place(int(row))}"
-             for value, row in zip(values, again.first, strict=True)]  # fmt: skip
-    dots = Points(first.fit.table.column("beta_deg")[again.first], values, hover=hover)
+             for value, row in zip(values, repeated.first, strict=True)]  # fmt: skip
+    dots = Points(first.fit.table.column("beta_deg")[repeated.first], values, hover=hover)
     y = Axis(f"second − first, {first.fit.channels[c]} ({first.unit})")
-    series = (*floor_band(first.factor * float(again.floor[c])), dots)
+    series = (*floor_band(first.factor * float(repeated.floor[c])), dots)
     return single_chart(Panel(series, Axis("β (deg)", ticks="quarters"), y))
 
 
-def deviations(curves: Sequence[DeviationComparison], into: Sequence[Scaled]) -> Chart:
+def deviations(curves: Sequence[DeviationComparison], scaled: Sequence[Scaled]) -> Chart:
     """The Allan deviations of two still records, bars intervals of 95 %; lines are the model fitted to each."""
     series: list[Line | Points] = []
-    looks: tuple[tuple[str, str, Symbol, Dash], ...] = (
+    styles: tuple[tuple[str, str, Symbol, Dash], ...] = (
         ("first", MEASURED, "circle", "solid"),
         ("second", CANDIDATE, "diamond-open", "dash"),
     )
-    for curve, by, (name, colour, symbol, dash) in zip(curves, into, looks, strict=True):
+    for curve, by, (name, colour, symbol, dash) in zip(curves, scaled, styles, strict=True):
         model = Line(curve.tau_s, by.factor * curve.modelled, colour=colour, width=1.2, dash=dash)
         values, low, high = (by.factor * curve_values for curve_values in (curve.measured, curve.low, curve.high))
         dots = measured_points(curve.tau_s, values, low, high, by.unit, name)
         series += [model, replace(dots, colour=colour, symbol=symbol, size=8)]
-    y = Axis(f"Allan deviation ({into[0].unit})", log=True)
+    y = Axis(f"Allan deviation ({scaled[0].unit})", log=True)
     return single_chart(Panel(tuple(series), Axis(TIME, log=True), y, legend="upper right"))

@@ -39,9 +39,9 @@ def content_of(data: str, model: str | None) -> Content:
     with Record.to_find(name) as record:
         run = record.run(name)
         excluded = sorted(record.excluded(run.run).items())
-        read = [(reading.name, reading.value) for reading in record.readings(run.run)]
+        readings = [(reading.name, reading.value) for reading in record.readings(run.run)]
         count = record.next_number(run.run)
-    of_run = (run.run, run.uid, run.rows, count, excluded, read, dict(run.constants), sensor, of_model)
+    of_run = (run.run, run.uid, run.rows, count, excluded, readings, dict(run.constants), sensor, of_model)
     return Content(_key(*of_run), run.extent, run.state == "running")
 
 

@@ -42,19 +42,19 @@ def controlled(
     Raises RecordError where there is nothing to chart, UnknownRun where `since` is none of the check-standard runs.
     """
     checks = [run for run in reversed(list(runs)) if run.procedure == PROCEDURE and run.state == "complete"]
-    points = [point for run in _since(checks, since) for point in _points(run)]
-    known = list(dict.fromkeys(point.sensor for point in points))
-    if sensor is not None and sensor not in known:
-        raise RecordError(f"no check-standard run of the sensor {sensor!r}.{did_you_mean(sensor, known)}")
-    chosen = dict.fromkeys((p.sensor, p.quantity) for p in points if sensor in (None, p.sensor))
-    if not chosen:
+    points = [point for run in _from_run(checks, since) for point in _points(run)]
+    sensor_names = list(dict.fromkeys(point.sensor for point in points))
+    if sensor is not None and sensor not in sensor_names:
+        raise RecordError(f"no check-standard run of the sensor {sensor!r}.{did_you_mean(sensor, sensor_names)}")
+    keys = dict.fromkeys((p.sensor, p.quantity) for p in points if sensor in (None, p.sensor))
+    if not keys:
         raise RecordError("no check-standard run is complete yet; `rig run check-standard` makes one")
-    of = {key: [p for p in points if (p.sensor, p.quantity) == key] for key in chosen}
-    charted = {key: mine for key, mine in of.items() if len(mine) >= FEWEST_RUNS}
+    of = {key: [p for p in points if (p.sensor, p.quantity) == key] for key in keys}
+    charted = {key: own_points for key, own_points in of.items() if len(own_points) >= FEWEST_RUNS}
     if not charted:
-        names = ", ".join(dict.fromkeys(sensor for sensor, _ in chosen))
+        names = ", ".join(dict.fromkeys(sensor for sensor, _ in keys))
         raise RecordError(f"{names}: {FEWEST_RUNS} check-standard runs are needed for a chart; there is one")
-    return [_controlled(*key, mine, baseline) for key, mine in charted.items()]
+    return [_controlled(*key, own_points, baseline) for key, own_points in charted.items()]
 
 
 # In words, for the command and the page.
@@ -66,25 +66,25 @@ def worst(charts: Iterable[Controlled]) -> str:
     return next(verdict for verdict in (OUT, "in control", "baseline") if verdict in verdicts)
 
 
-def row(each: Controlled) -> tuple[str, ...]:
+def row(quantity: Controlled) -> tuple[str, ...]:
     """The cells below `HEAD`."""
-    chart = each.chart
-    last = concise(float(chart.values[-1]), chart.sigma, each.unit)
+    chart = quantity.chart
+    last = concise(float(chart.values[-1]), chart.sigma, quantity.unit)
     progress = f"{len(chart.values)} of {chart.judged}" if chart.verdict == "baseline" else str(len(chart.values))
-    factor, unit = prefixed(each.unit, chart.sigma)
-    centre, sigma = f"{chart.centre:.7g} {each.unit}", f"{factor * chart.sigma:.2g} {unit.replace('µ', 'u')}"
-    return each.sensor, each.quantity, progress, centre, sigma, last, chart.verdict
+    factor, unit = prefixed(quantity.unit, chart.sigma)
+    centre, sigma = f"{chart.centre:.7g} {quantity.unit}", f"{factor * chart.sigma:.2g} {unit.replace('µ', 'u')}"
+    return quantity.sensor, quantity.quantity, progress, centre, sigma, last, chart.verdict
 
 
-def signals(each: Controlled) -> list[str]:
+def signals(quantity: Controlled) -> list[str]:
     """A line for every run outside a limit."""
-    chart, name = each.chart, f"{each.sensor} {each.quantity}"
+    chart, name = quantity.chart, f"{quantity.sensor} {quantity.quantity}"
     jumps = [
-        f"{each.runs[k]}: {name} is {(chart.values[k] - chart.centre) / chart.sigma:+.1f} sigma from the centre"
+        f"{quantity.runs[k]}: {name} is {(chart.values[k] - chart.centre) / chart.sigma:+.1f} sigma from the centre"
         for k in chart.jumps
     ]
     first = chart.drifts[:1]
-    return jumps + [f"{each.runs[k]}: {name} has drifted: its weighted mean is outside the limit" for k in first]
+    return jumps + [f"{quantity.runs[k]}: {name} has drifted: its weighted mean is outside the limit" for k in first]
 
 
 @dataclass(frozen=True)
@@ -97,11 +97,11 @@ class _Point:
     result: Mapping[str, Any]
 
 
-def _since(checks: list[Run], since: str | None) -> list[Run]:
+def _from_run(checks: list[Run], first_run: str | None) -> list[Run]:
     names = [run.run for run in checks]
-    if since is not None and since not in names:
-        raise UnknownRun(f"no complete check-standard run {since!r}.{did_you_mean(since, names[-20:])}")
-    return checks if since is None else checks[names.index(since) :]
+    if first_run is not None and first_run not in names:
+        raise UnknownRun(f"no complete check-standard run {first_run!r}.{did_you_mean(first_run, names[-20:])}")
+    return checks if first_run is None else checks[names.index(first_run) :]
 
 
 def _points(run: Run) -> Iterator[_Point]:

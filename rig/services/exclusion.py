@@ -47,9 +47,9 @@ def numbered_run(data: str) -> str | None:
 
 def _evaluate_again(record: Record, run: Run) -> None:
     """The results of the poses that are left; what is missing, and why, where they do not determine all."""
-    results, why = judged(record, run)
-    if results or why:
+    results, reason = judged(record, run)
+    if results or reason:
         record.set_results(run.run, results)
-        record.note(run.run, RESULTS, why or "evaluated again")
+        record.note(run.run, RESULTS, reason or "evaluated again")
     elif run.results:
         record.note(run.run, RESULTS, "computed by the procedure during the run from all poses; not evaluated again")

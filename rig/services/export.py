@@ -60,7 +60,7 @@ def documents(run: Run, table: Table) -> Iterator[tuple[str, dict[str, Any]]]:
     """The run as event-model documents, (name, document). Their ids are derived from the id of the run."""
     start, descriptor = _uid(run.run, "start"), _uid(run.run, "descriptor")
     began = datetime.fromisoformat(run.created).timestamp()
-    ended = datetime.fromisoformat(run.ended).timestamp() if run.ended else began
+    end_s = datetime.fromisoformat(run.ended).timestamp() if run.ended else began
     yield (
         "start",
         {
@@ -89,16 +89,16 @@ def documents(run: Run, table: Table) -> Iterator[tuple[str, dict[str, Any]]]:
             },
         )
     status = {"complete": "success", "stopped": "abort", "running": "abort"}.get(run.state, "fail")
-    end = {"uid": _uid(run.run, "stop"), "run_start": start, "time": ended, "exit_status": status}
+    end = {"uid": _uid(run.run, "stop"), "run_start": start, "time": end_s, "exit_status": status}
     yield "stop", {**end, "reason": run.message or "", "num_events": {"primary": table.n}}
 
 
 def _key(name: str, run: Run, table: Table) -> dict[str, Any]:
     key: dict[str, Any] = {"source": run.source, "dtype": "number", "shape": []}
-    own = name in (*table.output_names, *table.std_names) and not name.endswith("_v")
-    unit = table.unit if own else UNITS.get(name.rpartition("_")[2])
+    is_output = name in (*table.output_names, *table.std_names) and not name.endswith("_v")
+    unit = table.unit if is_output else UNITS.get(name.rpartition("_")[2])
     return {**key, "units": unit} if unit else key
 
 
-def _uid(run: str, what: str) -> str:
-    return str(uuid5(NAMESPACE_URL, f"{run}/{what}"))
+def _uid(run: str, kind: str) -> str:
+    return str(uuid5(NAMESPACE_URL, f"{run}/{kind}"))

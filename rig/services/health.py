@@ -40,15 +40,15 @@ class Finding:
 
 def versions() -> dict[str, Any]:
     """Versions of the program, Python, the system, and each required package; None for a missing package."""
-    needed = [line for line in requires(PACKAGE) or () if "extra ==" not in line]
-    names = [match[0] for line in needed if (match := NAME.match(line))]
+    requirements = [line for line in requires(PACKAGE) or () if "extra ==" not in line]
+    names = [match[0] for line in requirements if (match := NAME.match(line))]
     return {
         PACKAGE: _version(PACKAGE),
         "python": sys.version,
         "system": platform.platform(),
         "sqlite": sqlite3.sqlite_version,
         "packages": {name: _version(name) for name in names},
-        "required": needed,
+        "required": requirements,
     }
 
 
@@ -123,12 +123,12 @@ def last_run(run: str | None = None) -> dict[str, Any] | None:
     from rig.record import Record
 
     with Record() as record:
-        chosen = record.run(run) if run else next((any_run for any_run in record.runs() if any_run.bench), None)
-        if chosen is None:
+        selected = record.run(run) if run else next((any_run for any_run in record.runs() if any_run.bench), None)
+        if selected is None:
             return None
-        lines = record.lines(chosen.run)[-MOST_LINES:]
-        events = record.events(chosen.run)
-    document = {**vars(chosen), "bench": without_secrets(chosen.bench)}
+        lines = record.lines(selected.run)[-MOST_LINES:]
+        events = record.events(selected.run)
+    document = {**vars(selected), "bench": without_secrets(selected.bench)}
     return {**document, "events": [vars(event) for event in events], "log": [vars(line) for line in lines]}
 
 

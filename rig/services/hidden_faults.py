@@ -41,7 +41,7 @@ AXES = ("x", "y")
 QUIET_S = 0.5  # between samples: without noise they are alike, and few are enough
 
 
-def _both(part: str, *names: str) -> tuple[str, ...]:
+def _paths_of_axes(part: str, *names: str) -> tuple[str, ...]:
     return tuple(f"sensor.{axis}.{part}.{name}" for axis in AXES for name in names)
 
 
@@ -56,16 +56,16 @@ MECHANISMS: Mapping[str, tuple[str, ...]] = {
     "gear play of the stages": ("stages.alpha.play_deg", "stages.beta.play_deg"),
     "wobble of the stages": ("stages.alpha.wobble_deg", "stages.beta.wobble_deg"),
     "worn worm gear": ("stages.alpha.worm_deg", "stages.beta.worm_deg"),
-    "unequal or uneven plates": _both(  # one reading: each of these changes what the others do
+    "unequal or uneven plates": _paths_of_axes(  # one reading: each of these changes what the others do
         "plates", "plate_mismatch_fraction", "overlap_loss_per_um2", "height_step_nm", "stray_fraction"
     ),
-    "charge in the oxide": _both("plates", "charging_pm"),
-    "springs harden": _both("springs", "hardening_per_um2"),
-    "load of the other axis": _both("springs", "foreshortening_per_um"),
-    "sag of the mass": _both("springs", "sag_foreshortening_per_um"),
-    "package bends as it warms": _both("springs", "stress_pm_per_k"),
-    "springs soften as they warm": _both("springs", "stiffening_ppm_per_k"),
-    "friction in the springs": _both("friction", "stiffness_fraction"),
+    "charge in the oxide": _paths_of_axes("plates", "charging_pm"),
+    "springs harden": _paths_of_axes("springs", "hardening_per_um2"),
+    "load of the other axis": _paths_of_axes("springs", "foreshortening_per_um"),
+    "sag of the mass": _paths_of_axes("springs", "sag_foreshortening_per_um"),
+    "package bends as it warms": _paths_of_axes("springs", "stress_pm_per_k"),
+    "springs soften as they warm": _paths_of_axes("springs", "stiffening_ppm_per_k"),
+    "friction in the springs": _paths_of_axes("friction", "stiffness_fraction"),
     "self-heating": ("heat.board_rise_k", "heat.package_rise_k"),
     "play between warmth and stress": ("heat.glue_play_k",),
     "supply voltage wanders": ("supply.wander_v",),
@@ -103,12 +103,12 @@ class Group:
     @property
     def hidden(self) -> float:
         """Size of all faults together."""
-        return _together(self.faults).size
+        return _sum_curves(self.faults).size
 
     @property
     def found(self) -> float | None:
         """Size of all effects together."""
-        return _together(self.effects).size if self.effects else None
+        return _sum_curves(self.effects).size if self.effects else None
 
 
 @dataclass(frozen=True)
@@ -177,11 +177,11 @@ def hidden_faults(bench: Bench, fitted: Fit, start: Fit) -> Faults:
     config = WorldConfig.from_mapping(bench.world)
     poses = _visited(config, bench.seed, fitted.table)
     faults = [_fault(name, settings, config, bench.seed, fitted.table, poses) for name, settings in MECHANISMS.items()]
-    known = {term.name for term in start.model.terms}
-    effects = [_effect(term.name, fitted, poses) for term in fitted.model.terms if term.name not in known]
+    start_effects = {term.name for term in start.model.terms}
+    effects = [_effect(term.name, fitted, poses) for term in fitted.model.terms if term.name not in start_effects]
     floor = float(rms(fitted.noise.floor))
-    hidden = [f for f in faults if f is not None and f.size > 0]
-    groups, extra = grouped(hidden, effects, floor)
+    present_faults = [f for f in faults if f is not None and f.size > 0]
+    groups, extra = grouped(present_faults, effects, floor)
     sized = tuple(replace(g, std=_uncertainty([e.name for e in g.effects], fitted, poses)) for g in groups)
     return Faults(sized, extra, floor, poses.unit)
 
@@ -197,9 +197,9 @@ def grouped(
         makers = made_by[fault.name]
         shared = [g for g in groups if any(e in makers for e in g.effects)]
         members = (*(f for g in shared for f in g.faults), fault)
-        joined = dict.fromkeys([e.name for g in shared for e in g.effects] + [e.name for e in makers])
+        shared_effects = dict.fromkeys([e.name for g in shared for e in g.effects] + [e.name for e in makers])
         groups = [g for g in groups if g not in shared]
-        groups.append(Group(members, tuple(e for e in of_catalogue if e.name in joined)))
+        groups.append(Group(members, tuple(e for e in of_catalogue if e.name in shared_effects)))
     judged = [part for group in groups for part in _judged(group, effects)]
     used = {e.name for group in judged for e in group.effects}
     ordered = tuple(sorted(judged, key=lambda g: -max(f.size for f in g.faults)))
@@ -208,16 +208,16 @@ def grouped(
 
 def _makers(fault: Curve, effects: Sequence[Curve], floor: float) -> list[Curve]:
     """The fewest effects whose values, if changed, make the curve of a fault; none where no effects do."""
-    chosen: list[Curve] = []
-    left, unseen = fault.size, MATERIAL * floor
-    while left > max(WHOLE * fault.size, unseen):
-        remaining = [e for e in effects if e not in chosen]
-        rests = [_remainder_rms(fault, [*chosen, e]) for e in remaining]
-        if min(rests, default=left) > ALIKE * left:
+    selected: list[Curve] = []
+    remaining_size, unseen = fault.size, MATERIAL * floor
+    while remaining_size > max(WHOLE * fault.size, unseen):
+        remaining = [e for e in effects if e not in selected]
+        rests = [_remainder_rms(fault, [*selected, e]) for e in remaining]
+        if min(rests, default=remaining_size) > ALIKE * remaining_size:
             break
-        left = min(rests)
-        chosen.append(remaining[int(np.argmin(rests))])
-    return chosen if left <= max(LEFT * fault.size, unseen) else []
+        remaining_size = min(rests)
+        selected.append(remaining[int(np.argmin(rests))])
+    return selected if remaining_size <= max(LEFT * fault.size, unseen) else []
 
 
 def _remainder_rms(fault: Curve, effects: Sequence[Curve]) -> float:
@@ -236,12 +236,12 @@ def _judged(group: Group, effects: Sequence[Curve]) -> list[Group]:
     of_place = [e for e in effects if e.span is None and place_of_effect(e.name) in places]
     extended = replace(group, effects=(*group.effects, *of_place))
     for candidate in (extended, group):
-        if candidate.effects and _alike(_together(candidate.faults), _together(candidate.effects)):
+        if candidate.effects and _alike(_sum_curves(candidate.faults), _sum_curves(candidate.effects)):
             return [candidate]
     return [Group((fault,)) for fault in group.faults]
 
 
-def _together(curves: Sequence[Curve]) -> Curve:
+def _sum_curves(curves: Sequence[Curve]) -> Curve:
     return Curve(", ".join(c.name for c in curves), np.sum([c.curve for c in curves], axis=0))
 
 
@@ -278,10 +278,10 @@ def _fault(
     changes = [(path, _value(ideal, path)) for path in settings]
     if all(_value(config, path) == value for path, value in changes):
         return None
-    without = config
+    faultless = config
     for path, value in changes:
-        without = without.changed(_nested(path, value))
-    return Curve(name, _free(poses, poses.outputs - _visited(without, seed, table).outputs))
+        faultless = faultless.changed(_nested(path, value))
+    return Curve(name, _free(poses, poses.outputs - _visited(faultless, seed, table).outputs))
 
 
 def _value(config: Any, path: str) -> float:
@@ -302,9 +302,9 @@ def _effect(name: str, fitted: Fit, poses: Table) -> Curve:
         return Curve(name, curve(fitted.theta))
     span = []
     for k in np.flatnonzero(fitted.problem.layout.of_effect(name)):
-        ahead = fitted.theta.copy()
-        ahead[k] += STEP * fitted.problem.layout.typical[k]
-        span.append(curve(ahead) - curve(fitted.theta))
+        theta = fitted.theta.copy()
+        theta[k] += STEP * fitted.problem.layout.typical[k]
+        span.append(curve(theta) - curve(fitted.theta))
     return Curve(name, curve(fitted.theta), np.stack(span, axis=2))
 
 
@@ -328,8 +328,8 @@ def _uncertainty(names: Sequence[str], fitted: Fit, poses: Table) -> float | Non
     std = np.sqrt(np.maximum(np.diag(cov), 0.0))
     size = rms(curve(fitted.theta).ravel())
     slope = np.zeros(len(fitted.theta))
-    own = np.any([fitted.problem.layout.of_effect(name) for name in names], axis=0)
-    for k in np.flatnonzero(own & np.isfinite(std) & (std > 0)):
+    own_columns = np.any([fitted.problem.layout.of_effect(name) for name in names], axis=0)
+    for k in np.flatnonzero(own_columns & np.isfinite(std) & (std > 0)):
         step = np.zeros_like(fitted.theta)
         step[k] = STEP_STD * std[k]
         slope[k] = (rms(curve(fitted.theta + step).ravel()) - size) / step[k]

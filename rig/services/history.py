@@ -161,9 +161,9 @@ def history(
     model: Model,
     limits: Mapping[str, Limit],
     baseline: int = BASELINE_RUNS,
-    tell: Callable[[str], None] = lambda _: None,
+    notify: Callable[[str], None] = lambda _: None,
 ) -> History:
-    """The history of `sensor` by `model`, see `judged`; `tell` receives the run that is calibrated.
+    """The history of `sensor` by `model`, see `judged`; `notify` receives the run that is calibrated.
 
     Raises RecordError where the record has no calibration of it, naming the nearest sensor.
     """
@@ -171,15 +171,15 @@ def history(
     passed_over: dict[str, str] = {}
     runs = _runs(record, sensor)
     for k, (data, run) in enumerate(runs, 1):
-        tell(f"Calibrating {data}, {k} of {len(runs)}")
+        notify(f"Calibrating {data}, {k} of {len(runs)}")
         try:
             calibrations.append(_calibration(record, data, run, model))
         except (CalibrationError, RecordError) as error:
             passed_over[data] = str(error)
     if not calibrations:
         raise _none(record, sensor, passed_over)
-    calibrations, others = _of_one_kind(calibrations)
-    passed_over |= others
+    calibrations, excluded = _of_one_kind(calibrations)
+    passed_over |= excluded
     return judged(History(sensor, model.name, tuple(calibrations), (), passed_over), limits, baseline)
 
 
@@ -187,11 +187,13 @@ def _of_one_kind(calibrations: list[Calibration]) -> tuple[list[Calibration], di
     """The calibrations by the most frequent procedure, of equal ones the last; the others with the reason."""
     kinds = [calibration.kind for calibration in calibrations]
     kind = max(reversed(kinds), key=kinds.count)
-    why = "a calibration by {}, and those of {} are shown: another choice of poses is not comparable"
-    others = {
-        calibration.data: why.format(calibration.kind, kind) for calibration in calibrations if calibration.kind != kind
+    reason = "a calibration by {}, and those of {} are shown: another choice of poses is not comparable"
+    excluded = {
+        calibration.data: reason.format(calibration.kind, kind)
+        for calibration in calibrations
+        if calibration.kind != kind
     }
-    return [calibration for calibration in calibrations if calibration.kind == kind], others
+    return [calibration for calibration in calibrations if calibration.kind == kind], excluded
 
 
 def latest(record: Record, sensor: str, model: Model) -> Calibration:
@@ -241,8 +243,8 @@ def _runs(record: Record, sensor: str) -> list[tuple[str, Run]]:
 
 def _none(record: Record, sensor: str, passed_over: Mapping[str, str]) -> RecordError:
     reasons = f" This model cannot use its runs: {next(iter(passed_over.values()))}" if passed_over else ""
-    known = sensors(record.runs())
-    nearest = "" if sensor in known else did_you_mean(sensor, known)
+    sensor_names = sensors(record.runs())
+    nearest = "" if sensor in sensor_names else did_you_mean(sensor, sensor_names)
     return RecordError(f"no calibration of the sensor {sensor!r} in the record.{reasons}{nearest}")
 
 
@@ -267,11 +269,13 @@ def _calibration(record: Record, data: str, run: Run, model: Model) -> Calibrati
 
 def date_of(run: Run) -> datetime:
     """When the sensor was as the run found it. Raises DataError for a constant `date` that is none."""
-    stated = run.constants.get("date")
+    stated_date = run.constants.get("date")
     try:
-        at = datetime.fromisoformat(str(stated)) if stated is not None else datetime.fromisoformat(run.created)
+        at = (
+            datetime.fromisoformat(str(stated_date)) if stated_date is not None else datetime.fromisoformat(run.created)
+        )
     except ValueError:
-        raise DataError(f"run {run.run}: its constant date is {stated!r}; write it as 2025-03-01") from None
+        raise DataError(f"run {run.run}: its constant date is {stated_date!r}; write it as 2025-03-01") from None
     return at if at.tzinfo else at.replace(hour=at.hour or 12, tzinfo=datetime.fromisoformat(run.created).tzinfo)
 
 
@@ -284,19 +288,19 @@ def when(run: Run) -> datetime:
 
 
 def _quantity(name: str, of: Sequence[Calibration], limit: Limit | None, baseline: int) -> Quantity:
-    mine = tuple(calibration for calibration in of if name in calibration.values)
-    values = [calibration.values[name] for calibration in mine]
+    determined = tuple(calibration for calibration in of if name in calibration.values)
+    values = [calibration.values[name] for calibration in determined]
     numbers, stds = [calibration.value for calibration in values], [calibration.std for calibration in values]
-    days = [calibration.at.timestamp() / 86400 for calibration in mine]
-    chart = control_chart(numbers, baseline, float(rms(np.array(stds)))) if len(mine) >= FEWEST_RUNS else None
-    no_drift = _no_drift(mine, float(np.ptp(days)))
+    days = [calibration.at.timestamp() / 86400 for calibration in determined]
+    chart = control_chart(numbers, baseline, float(rms(np.array(stds)))) if len(determined) >= FEWEST_RUNS else None
+    no_drift = _no_drift(determined, float(np.ptp(days)))
     line = None if no_drift else fit_stability(days, numbers, stds)
-    allowed = None
+    limits = None
     if limit is not None:
-        allowed = limit if isinstance(limit, tuple) else (numbers[-1] - limit, numbers[-1] + limit)
-    due = line.due_days(*allowed) if line is not None and allowed is not None else None
-    when = None if due is None else datetime.fromtimestamp(due * 86400, tz=mine[-1].at.tzinfo).date()
-    return Quantity(name, values[0].unit, mine, chart, line, allowed, when, no_drift)
+        limits = limit if isinstance(limit, tuple) else (numbers[-1] - limit, numbers[-1] + limit)
+    due = line.due_days(*limits) if line is not None and limits is not None else None
+    due_date = None if due is None else datetime.fromtimestamp(due * 86400, tz=determined[-1].at.tzinfo).date()
+    return Quantity(name, values[0].unit, determined, chart, line, limits, due_date, no_drift)
 
 
 def _no_drift(of: Sequence[Calibration], days: float) -> str:

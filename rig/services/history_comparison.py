@@ -32,21 +32,28 @@ class Compared:
         return all(agreement.agrees for _, agreement in self.rows.values())
 
 
-def compare_sensors(life: History, other: str, last: Calibration) -> Compared:
+def compare_sensors(life: History, other_sensor: str, last: Calibration) -> Compared:
     """The last calibration of a life beside that of another sensor. Raises DataError, see `compare`."""
-    mine = life.calibrations[-1]
-    return Compared(f"{life.sensor}, {mine.day}", f"{other}, {last.day}", compare(mine, last), (mine.data, last.data))
+    own_last = life.calibrations[-1]
+    return Compared(
+        f"{life.sensor}, {own_last.day}",
+        f"{other_sensor}, {last.day}",
+        compare(own_last, last),
+        (own_last.data, last.data),
+    )
 
 
-def compare_days(life: History, one: date, other: date) -> Compared:
+def compare_days(life: History, first_day: date, second_day: date) -> Compared:
     """The calibrations closest to two days. Raises DataError, see `compare`."""
-    a, b = (closest(life.calibrations, day)[0] for day in (one, other))
+    a, b = (closest(life.calibrations, day)[0] for day in (first_day, second_day))
     return Compared(a.day, b.day, compare(a, b), (a.data, b.data))
 
 
-def compare_rigs(of: Sequence[Calibration], one: str, other: str) -> Compared:
+def compare_rigs(of: Sequence[Calibration], first_rig: str, second_rig: str) -> Compared:
     """The means of all calibrations on two rigs. Raises RecordError for a rig that has none."""
-    return Compared(one, other, _compared(_means_on(one, of), _means_on(other, of), one, other))
+    return Compared(
+        first_rig, second_rig, _compared(_means_on(first_rig, of), _means_on(second_rig, of), first_rig, second_rig)
+    )
 
 
 def compare(a: Calibration, b: Calibration) -> dict[str, tuple[str, Agreement]]:
@@ -55,21 +62,23 @@ def compare(a: Calibration, b: Calibration) -> dict[str, tuple[str, Agreement]]:
 
 
 def _means_on(rig: str, of: Sequence[Calibration]) -> dict[str, Value]:
-    mine = [calibration for calibration in of if calibration.rig == rig]
-    if not mine:
+    on_rig = [calibration for calibration in of if calibration.rig == rig]
+    if not on_rig:
         raise RecordError(
             f"no calibration on the rig {rig!r}.{did_you_mean(rig, {calibration.rig for calibration in of})}"
         )
     return {
-        name: _mean([calibration.values[name] for calibration in mine if name in calibration.values])
-        for name in mine[-1].values
+        name: _mean([calibration.values[name] for calibration in on_rig if name in calibration.values])
+        for name in on_rig[-1].values
     }
 
 
-def _compared(a: Mapping[str, Value], b: Mapping[str, Value], one: str, other: str) -> dict[str, tuple[str, Agreement]]:
+def _compared(
+    a: Mapping[str, Value], b: Mapping[str, Value], first_name: str, second_name: str
+) -> dict[str, tuple[str, Agreement]]:
     shared = [name for name in a if name in b and a[name].unit == b[name].unit]
     if not shared:
-        raise DataError(f"{one} and {other} have no quantity in common; take a model that both determine")
+        raise DataError(f"{first_name} and {second_name} have no quantity in common; take a model that both determine")
     return {n: (a[n].unit, compare_values((a[n].value, a[n].std), (b[n].value, b[n].std))) for n in shared}
 
 

@@ -32,15 +32,15 @@ def next_due(life: History, limit_is_given: str) -> str:
     return "With this drift no calibration is due within ten years."
 
 
-def near(calibration: Calibration, age_days: float, on: date) -> str:
+def closest_text(calibration: Calibration, age_days: float, on: date) -> str:
     """The calibration closest to a day, and its distance in days."""
     side = "before" if age_days >= 0 else "after"
     return f"Closest to {on}: {calibration.data}, {calibration.day}, {abs(age_days):.0f} days {side}."
 
 
-def but_stale(why: str) -> str:
+def but_stale(reason: str) -> str:
     """The warning about a stale calibration."""
-    return f"This calibration is stale: {why}."
+    return f"This calibration is stale: {reason}."
 
 
 def significance(line: Stability) -> str:
@@ -56,18 +56,18 @@ def chart_verdict(q: Quantity) -> str:
     return q.chart.verdict + progress
 
 
-def agreements(of: Compared, written: Written) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Head and rows of a table of the shared quantities; `written` formats a number to a number of digits."""
+def agreements(of: Compared, format_number: Written) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Head and rows of a table of the shared quantities; `format_number` formats a number to a number of digits."""
     head = ("quantity", of.one, of.other, "difference", "U", "unit", "E_n", "")
-    return head, [_agreement(name, unit, agreement, written) for name, (unit, agreement) in of.rows.items()]
+    return head, [_agreement(name, unit, agreement, format_number) for name, (unit, agreement) in of.rows.items()]
 
 
-def _agreement(name: str, unit: str, agreement: Agreement, written: Written) -> tuple[str, ...]:
+def _agreement(name: str, unit: str, agreement: Agreement, format_number: Written) -> tuple[str, ...]:
     verdict = "agree" if agreement.agrees else "do not agree"
     values = (
-        written(agreement.a, 7),
-        written(agreement.b, 7),
-        written(agreement.difference, 2),
-        written(agreement.expanded, 2),
+        format_number(agreement.a, 7),
+        format_number(agreement.b, 7),
+        format_number(agreement.difference, 2),
+        format_number(agreement.expanded, 2),
     )
     return name, *values, unit, f"{agreement.e_n:.2f}", verdict

@@ -58,26 +58,31 @@ def opened(path: Path, topic: str | None = None, bad_lines: Policy = "few") -> S
     return replace(open_sheet(path, topic), skipped=SHARES[bad_lines])
 
 
-def asks(sheet: Sheet) -> bool:
+def needs_person(sheet: Sheet) -> bool:
     """Whether a person has to name columns or units before the file can be used. Raises DataError."""
-    return needs_mapping(sheet, None, ()) or time_doubt(sheet, _own(sheet)) is not None
+    return needs_mapping(sheet, None, ()) or time_doubt(sheet, _known_columns(sheet)) is not None
 
 
 def proposal(sheet: Sheet, kind: str | None = None) -> Proposal:
     """The proposed mapping of a sheet, as `kind` or as the likely one."""
-    mapping = _own(sheet)
+    mapping = _known_columns(sheet)
     kind = kind or _kind(sheet, mapping)
-    allowed = column_names(kind)
+    target_names = column_names(kind)
     proposed = propose_mapping(sheet, "poses" if kind == "still" else kind, mapping)
-    mappings = {m.theirs: m for m in proposed if m.name in allowed or m in mapping}
-    stated = [replace(m, unit=_stated(sheet, m.theirs)) if m.name == "t_s" else m for m in mappings.values()]
-    return Proposal(kind, {name: mappings.get(name) for name in sheet.header}, time_doubt(sheet, stated))
+    mappings = {m.theirs: m for m in proposed if m.name in target_names or m in mapping}
+    with_stated_unit = [
+        replace(m, unit=_header_unit(sheet, m.theirs)) if m.name == "t_s" else m for m in mappings.values()
+    ]
+    return Proposal(kind, {name: mappings.get(name) for name in sheet.header}, time_doubt(sheet, with_stated_unit))
 
 
 def units_for(name: str) -> list[str]:
     """The units that a column of this name may have in a file, its own unit first; none for a bare number."""
-    if own := column_unit(name):
-        return sorted((unit for unit, (into, _, _) in UNITS.items() if into == own), key=lambda unit: unit != own)
+    if target_unit := column_unit(name):
+        return sorted(
+            (unit for unit, (base_unit, _, _) in UNITS.items() if base_unit == target_unit),
+            key=lambda unit: unit != target_unit,
+        )
     return list(SENSED.get(name[:1], ())) if name[1:] in AXES else []
 
 
@@ -100,25 +105,25 @@ def stored(
     kind: str | None,
     columns: Sequence[ColumnMapping],
     constants: Mapping[str, Constant],
-    tell: Callable[[str], None],
+    notify: Callable[[str], None],
 ) -> tuple[str, Table]:
     """Store the sheet in the record: the name of the new run, and its table. Raises DataError, RecordError."""
     imported = import_sheet(sheet, kind, columns, constants)
     for remark in (*sheet.notes, *imported.notes):
-        tell(remark)
-    table = averaged(imported.table, tell)
+        notify(remark)
+    table = averaged(imported.table, notify)
     with Record.to_read() as record:
         return record.add_table(table, imported.settings), table
 
 
 def data_chart(table: Table) -> Chart:
     """The outputs of a table over the stage angle beta, the time, or the row."""
-    every = max(1, -(-table.n // MOST_DRAWN))
+    stride = max(1, -(-table.n // MOST_DRAWN))
     name = next((column for column in ("beta_deg", "t_s") if column in table), "")
     x = table.column(name) if name else np.arange(table.n, dtype=float)
     outputs = [column for column in table.output_names if column in table]
     dots = [
-        Points(x[::every], table.column(column)[::every], column, colour, size=4)
+        Points(x[::stride], table.column(column)[::stride], column, colour, size=4)
         for column, colour in zip(outputs, COLOURS, strict=False)
     ]
     label = f"{name.rpartition('_')[0]} ({column_unit(name)})" if name else "row"
@@ -126,24 +131,24 @@ def data_chart(table: Table) -> Chart:
     return single_chart(Panel(tuple(dots), Axis(label), Axis(f"outputs ({unit})"), legend="outside"))
 
 
-def _own(sheet: Sheet) -> list[ColumnMapping]:
+def _known_columns(sheet: Sheet) -> list[ColumnMapping]:
     """The columns that have our names already."""
-    named = zip(sheet.header, sheet.bare, sheet.units, strict=True)
-    return [ColumnMapping(bare, header, unit) for header, bare, unit in named if bare in NUMBERS]
+    columns = zip(sheet.header, sheet.bare, sheet.units, strict=True)
+    return [ColumnMapping(unitless, header, unit) for header, unitless, unit in columns if unitless in NUMBERS]
 
 
-def _kind(sheet: Sheet, own: Sequence[ColumnMapping]) -> str:
+def _kind(sheet: Sheet, own_columns: Sequence[ColumnMapping]) -> str:
     try:
-        return guess_kind([m.name for m in own])
+        return guess_kind([m.name for m in own_columns])
     except MissingColumn:
-        kind = likely_kind(sheet, own)
-    names = {m.name for m in propose_mapping(sheet, kind, own)}
+        kind = likely_kind(sheet, own_columns)
+    names = {m.name for m in propose_mapping(sheet, kind, own_columns)}
     return "still" if kind == "poses" and not {"alpha_deg", "beta_deg"} & names and "vx_v" in names else kind
 
 
-def _stated(sheet: Sheet, theirs: str) -> str:
+def _header_unit(sheet: Sheet, column: str) -> str:
     """The unit of a column in the file's header."""
-    return sheet.units[sheet.header.index(theirs)]
+    return sheet.units[sheet.header.index(column)]
 
 
 def _outputs(columns: Sequence[ColumnMapping]) -> bool:

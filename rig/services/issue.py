@@ -45,7 +45,7 @@ PLACES = ("alpha_deg", "beta_deg", "direction", "path")
 
 
 @dataclass(frozen=True)
-class Asked:
+class CertificateDetails:
     """What a person may say of a certificate: its number, who it is for, and what `before` was in use until now."""
 
     number: str = ""
@@ -53,7 +53,7 @@ class Asked:
     before: str = ""
 
 
-def issue(data: str, fitted: Fit, figures: Figures, bench: Bench | None, details: Asked) -> Certificate:
+def issue(data: str, fitted: Fit, figures: Figures, bench: Bench | None, details: CertificateDetails) -> Certificate:
     """The certificate of a fit to `data`, with the bench's laboratory (that of the run where None is given)."""
     measured = None if Path(data).is_file() else _measured(data)
     try:
@@ -75,14 +75,19 @@ def limits(data: str, bench: Bench | None) -> Mapping[str, float | tuple[float, 
 
 
 def _issued(
-    data: str, fitted: Fit, figures: Figures, stated_bench: Bench | None, details: Asked, measured: Measured | None
+    data: str,
+    fitted: Fit,
+    figures: Figures,
+    stated_bench: Bench | None,
+    details: CertificateDetails,
+    measured: Measured | None,
 ) -> Certificate:
     table, run = fitted.table, measured.run if measured is not None else None
     bench = stated_bench or (_bench(run) if run is not None and run.bench else None)
     lab = bench.laboratory if bench is not None else None
     text = dump_model(fitted.model)
     constant = {name: as_written(value) for name, value in table.constants.items()}
-    ended = (run.ended or run.created) if run is not None else datetime.now(UTC).isoformat(timespec="seconds")
+    end_time = (run.ended or run.created) if run is not None else datetime.now(UTC).isoformat(timespec="seconds")
     digest = hashlib.sha256(f"{table.digest}{hashlib.sha256(text.encode()).hexdigest()}".encode()).hexdigest()
     customer = details.customer or (lab.customer if lab is not None else "")
     return Certificate(
@@ -95,11 +100,11 @@ def _issued(
         serial=constant.get("serial", UNSTATED),
         manufacturer=constant.get("manufacturer", UNSTATED),
         rig=bench.name if bench is not None else "measured elsewhere",
-        instruments=tuple(_instruments(run, ended[:10])) if run is not None else (),
+        instruments=tuple(_instruments(run, end_time[:10])) if run is not None else (),
         procedure=run.procedure if run is not None else "data of a file",
         facts=_facts(run, table),
-        began=run.created if run is not None else ended,
-        ended=ended,
+        began=run.created if run is not None else end_time,
+        ended=end_time,
         gravity_m_s2=table.gravity_m_s2,
         conditions=tuple(_conditions(table)),
         before=details.before,
@@ -210,14 +215,14 @@ def _simulated(run: Run | None) -> list[str]:
     return [role for role, part in _bench(run).instruments.items() if part.simulated]
 
 
-def _remarks(run: Run | None, stated: bool) -> Iterator[str]:
+def _remarks(run: Run | None, is_stated: bool) -> Iterator[str]:
     if roles := _simulated(run):
         yield f"These instruments were simulated: {', '.join(roles)}. This document certifies no sensor."
     if run is not None and EXPIRED in run.constants:
         yield f"{run.constants[EXPIRED]}: measurements with it are not traceable."
     if run is not None and run.state != "complete":
         yield f"The run is {run.state}; the certificate covers the data that it has."
-    if not stated:
+    if not is_stated:
         yield "The bench file does not name the laboratory (key laboratory)."
 
 
@@ -225,7 +230,7 @@ def _samples(table: Table, measured: Measured | None) -> Iterator[Sample]:
     """Every row of the table, with the digest of its block of samples, or of its own numbers where there is none."""
     digests: dict[int, str] = {}
     if measured is not None and measured.run.bench:  # of the whole block, also where a batch shares it
-        digests = {kept.number: digest_of(kept.samples) for kept in measured.record.kept(measured.run.run)}
+        digests = {recorded.number: digest_of(recorded.samples) for recorded in measured.record.kept(measured.run.run)}
     numbers = table.numbered(np.arange(table.n))
     for i, number in enumerate(numbers.tolist()):
         values = np.array([column[i] for column in table.columns.values()])

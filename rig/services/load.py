@@ -49,26 +49,26 @@ class Loaded:
     effects: Mapping[str, Effect]
 
 
-def loaded(request: Request, tell: Tell) -> Loaded:
-    """Data, model (by default that of the kind of data) and effects; `tell` receives remarks for a person.
+def loaded(request: Request, notify: Tell) -> Loaded:
+    """Data, model (by default that of the kind of data) and effects; `notify` receives remarks for a person.
 
     The data are a still record if their kind is still, if they are an array, or if a noise model is named.
     Raises DataError, RecordError, ModelError, UnknownName.
     """
     effects = effects_of(request.bench_file)
-    chosen = read_model(request.model, effects) if request.model is not None else None
+    model = read_model(request.model, effects) if request.model is not None else None
     data = (
-        _still(request, chosen, tell) if is_noise(chosen) or is_still(request.data) else _rows(request, effects, tell)
+        _still(request, model, notify) if is_noise(model) or is_still(request.data) else _rows(request, effects, notify)
     )
-    if chosen is not None:
-        check_unit(chosen, data.unit, data.source)
-    return Loaded(data, chosen or read_model(data.default_model, effects), effects)
+    if model is not None:
+        check_unit(model, data.unit, data.source)
+    return Loaded(data, model or read_model(data.default_model, effects), effects)
 
 
-def loaded_table(request: Request, tell: Tell) -> tuple[Table, Model, Mapping[str, Effect]]:
+def loaded_table(request: Request, notify: Tell) -> tuple[Table, Model, Mapping[str, Effect]]:
     """As `loaded`, for questions that only a table of rows can answer."""
     effects = effects_of(request.bench_file)
-    rows = _rows(request, effects, tell)
+    rows = _rows(request, effects, notify)
     model = read_model(request.model or rows.default_model, effects)
     check_unit(model, rows.unit, rows.source)
     return rows.table, model, effects
@@ -79,44 +79,44 @@ def with_known_noise(table: Table, noise: str | None, effects: Mapping[str, Effe
     return table if noise is None else with_noise(table, read_model(noise, effects))
 
 
-def rows_of(request: Request, effects: Mapping[str, Effect], tell: Tell) -> Table:
+def rows_of(request: Request, effects: Mapping[str, Effect], notify: Tell) -> Table:
     """The table of a request, with remarks on its noise."""
     if request.channel or request.rate_hz:
         raise DataError(
             f"{request.data}: --channel and --rate are for still records only; this is not one (for samples at "
             "rest, give --model still)"
         )
-    table = with_known_noise(load(request.data, tell=tell), request.noise, effects)
+    table = with_known_noise(load(request.data, notify=notify), request.noise, effects)
     if table.type.stage_angles and not correlation_known(table):
-        tell(
+        notify(
             f"{table.source}: the correlation of the samples in a mean is unknown. The fit assumes independent "
             "samples, and adds any further scatter of the poses to the noise. Give the constants "
             "filter_corner_hz and sample_rate_hz."
         )
     remarks = (earth_rate_warning(table), table_noise.scatter_remark(table), doubt(table), *doubts(table))
-    for why in filter(None, remarks):
-        tell(f"{table.source}: {why}.")
+    for remark in filter(None, remarks):
+        notify(f"{table.source}: {remark}.")
     return table
 
 
-def _rows(request: Request, effects: Mapping[str, Effect], tell: Tell) -> Rows:
-    return Rows(rows_of(request, effects, tell))
+def _rows(request: Request, effects: Mapping[str, Effect], notify: Tell) -> Rows:
+    return Rows(rows_of(request, effects, notify))
 
 
-def _still(request: Request, chosen: Model | None, tell: Tell) -> Dataset[Any]:
+def _still(request: Request, model: Model | None, notify: Tell) -> Dataset[Any]:
     from calibrations.noise.dataset import StillRecord  # a table needs no noise engine
     from calibrations.noise.fit import noise_terms
 
     if request.noise is not None:
         raise ModelError("--noise is for poses and rates; for a still record, give --model")
-    if chosen is not None:
-        noise_terms(chosen)
-    return StillRecord(still_of(request, tell))
+    if model is not None:
+        noise_terms(model)
+    return StillRecord(still_of(request, notify))
 
 
 def still_of(
     request: Request,
-    tell: Tell,
+    notify: Tell,
     every_deviation: bool = False,
     keep: dict[str, list[NDArray[Any]]] | None = None,
 ) -> Still:
@@ -139,12 +139,12 @@ def still_of(
         axis: scale for axis, axis_stream in streams.items() if (scale := axis_stream.sensed) is not None
     }  # known when read
     channels = {axis_stream.channel for axis_stream in streams.values()}
-    if others := [name for name in first.others if name not in channels]:
-        tell(f"{still.source}: {', '.join(channels)}; --channel takes another: {', '.join(others)}.")
+    if other_names := [name for name in first.others if name not in channels]:
+        notify(f"{still.source}: {', '.join(channels)}; --channel takes another: {', '.join(other_names)}.")
     for text in repairs(first, still.n):
-        tell(text)
+        notify(text)
     if np.isfinite(first.corner_hz):
-        tell(
+        notify(
             f"The coefficients describe the noise before the {first.corner_hz:g} Hz low-pass of the output. "
             f"The fit uses frequencies below {first.corner_hz / 2:.3g} Hz."
         )
@@ -154,14 +154,14 @@ def still_of(
 def _samples(axis: str, stream: Stream, keep: dict[str, list[NDArray[Any]]] | None) -> Samples:
     from calibrations.noise.record import Samples
 
-    blocks = stream.blocks if keep is None else _kept(stream.blocks, keep.setdefault(axis, []))
+    blocks = stream.blocks if keep is None else _keep_blocks(stream.blocks, keep.setdefault(axis, []))
     hint = f" (--channel takes another: {', '.join(stream.others)})" if stream.others else ""
     return Samples(
         axis, blocks, stream.rate_hz, stream.unit, stream.corner_hz, stream.logged, f"{stream.channel}{hint}"
     )
 
 
-def _kept(blocks: Iterator[NDArray[Any]], keep: list[NDArray[Any]]) -> Iterator[NDArray[Any]]:
+def _keep_blocks(blocks: Iterator[NDArray[Any]], keep: list[NDArray[Any]]) -> Iterator[NDArray[Any]]:
     for block in blocks:
         keep.append(block)
         yield block
@@ -194,11 +194,11 @@ def is_noise(model: Model | None) -> bool:
         return False
     from calibrations.noise.signal import acts_on_record  # a table needs no noise engine
 
-    others = [t.name for t in model.terms if not (t.effect.is_noise or acts_on_record(t.effect))]
-    if others:
+    other_effects = [t.name for t in model.terms if not (t.effect.is_noise or acts_on_record(t.effect))]
+    if other_effects:
         raise ModelError(
             f"{model.name}: {', '.join(noise)} is a noise effect, and the model has other effects too: "
-            f"{', '.join(others)}; put them into separate models"
+            f"{', '.join(other_effects)}; put them into separate models"
         )
     return True
 
@@ -211,25 +211,25 @@ def _has_channels_alone(path: Path) -> bool:
 
 def channels_alone(beginning: str) -> bool:
     """Whether the text of a table has times or a rate, outputs of a sensor, and no column on how it was held."""
-    stated, names = _beginning(beginning.splitlines())
-    named = set(names)
-    timed = "t_s" in named or "sample_rate_hz" in stated
-    channels = named - set(BESIDE)
-    return timed and bool(channels) and channels <= CHANNELS and not any(triad <= named for triad in TRIADS)
+    constants, names = _beginning(beginning.splitlines())
+    columns = set(names)
+    timed = "t_s" in columns or "sample_rate_hz" in constants
+    channels = columns - set(BESIDE)
+    return timed and bool(channels) and channels <= CHANNELS and not any(triad <= columns for triad in TRIADS)
 
 
 def _beginning(lines: list[str]) -> tuple[set[str], list[str]]:
     """(constants above a table's header, names in the header)."""
-    above = list(takewhile(lambda line: line.startswith("#"), lines))
-    header = lines[len(above)] if len(lines) > len(above) else ""
+    comment_lines = list(takewhile(lambda line: line.startswith("#"), lines))
+    header = lines[len(comment_lines)] if len(lines) > len(comment_lines) else ""
     names = [name.strip().strip('"') for name in header.replace(";", ",").replace("\t", ",").split(",")]
-    return {line.lstrip("# ").partition(":")[0].strip() for line in above}, names
+    return {line.lstrip("# ").partition(":")[0].strip() for line in comment_lines}, names
 
 
 def check_unit(model: Model, unit: str, source: str) -> None:
     """Raises ModelError where the values of a model are for outputs in another unit: counts or mV, not V."""
-    ours, theirs = (UNITS.get(parse_unit(own), own) for own in (model.unit, unit))
-    if model.params and ours and ours != theirs:
+    model_unit, data_unit = (UNITS.get(parse_unit(unit_text), unit_text) for unit_text in (model.unit, unit))
+    if model.params and model_unit and model_unit != data_unit:
         raise ModelError(
             f"{model.name}: its values are for outputs in {model.unit}, and {source} is in {unit}; "
             "take a model that was fitted to data in this unit, or a shipped one (`rig models`)"

@@ -13,10 +13,10 @@ from rig.services.request import Request
 Answer = TypeVar("Answer", Diagnosis[Any], Discovery[Any])
 
 
-def planned(result: Answer, request: Request, effects: Mapping[str, Effect], tell: Callable[[str], None]) -> Answer:
+def planned(result: Answer, request: Request, effects: Mapping[str, Effect], notify: Callable[[str], None]) -> Answer:
     """The result with its next experiment as a command, if it has one.
 
-    A measurement on another bench than that of the data would not help: `tell` receives a remark about that.
+    A measurement on another bench than that of the data would not help: `notify` receives a remark about that.
     """
     if result.next_experiment is None:
         return result
@@ -25,7 +25,7 @@ def planned(result: Answer, request: Request, effects: Mapping[str, Effect], tel
 
     bench = read_bench(request.bench_file)
     if (source_bench := _bench_of(request.data)) not in (None, bench.name):
-        tell(
+        notify(
             f'{request.data} was measured on the bench "{source_bench}", but the next experiment is planned for '
             f'"{bench.name}"; give the file of that bench with --bench.'
         )

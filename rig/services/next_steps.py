@@ -190,8 +190,8 @@ def _steady_sentence(reached: bool, parts: Mapping[str, Any]) -> str:
         time = parts["time"]
         return f"Reached {time_text(time['value'], time['std'])} {time['unit']} after power-on."
     if "expected" in times:
-        between = f", {times['earliest']} to {times['latest']} (95 %)" if times["earliest"] != times["latest"] else ""
-        return f"Not reached. Forecast: {times['expected']} after power-on{between}."
+        interval = f", {times['earliest']} to {times['latest']} (95 %)" if times["earliest"] != times["latest"] else ""
+        return f"Not reached. Forecast: {times['expected']} after power-on{interval}."
     if "earliest" in times:
         return f"Not reached. Forecast: not before {times['earliest']} after power-on."
     return "Not reached. There is no forecast."

@@ -27,8 +27,10 @@ def savings(optimum: Optimal) -> Iterator[str]:
     """How much less time the rig needs."""
     yield f"{optimum.times_less:.1f} times less rig time for the same worst standard error ({_worst(optimum)})."
     yield f"{_times(optimum.times_less_for_all)} if no parameter may be less certain: {_longest(optimum)}."
-    if lost := [optimum.over.name(k) for k, known in enumerate(optimum.standard.told) if not known]:
-        yield f"The standard sweep cannot determine {', '.join(lost)}; the comparison ignores them."
+    if undetermined := [
+        optimum.over.name(k) for k, is_determined in enumerate(optimum.standard.told) if not is_determined
+    ]:
+        yield f"The standard sweep cannot determine {', '.join(undetermined)}; the comparison ignores them."
 
 
 def purpose(optimum: Optimal) -> Iterator[str]:
@@ -49,8 +51,10 @@ def _percent(ratio: float) -> str:
 
 
 def _worst(optimum: Optimal) -> str:
-    before, after = (optimum.over.name(optimum.worst(candidate)) for candidate in (optimum.standard, optimum.equal))
-    return before if before == after else f"{before} before, {after} now"
+    standard_worst, optimal_worst = (
+        optimum.over.name(optimum.worst(candidate)) for candidate in (optimum.standard, optimum.equal)
+    )
+    return standard_worst if standard_worst == optimal_worst else f"{standard_worst} before, {optimal_worst} now"
 
 
 def _times(ratio: float) -> str:

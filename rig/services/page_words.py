@@ -46,11 +46,11 @@ def page_step(line: str, data: str = "", procedure: str = "") -> PageStep:
     to: dict[str, str] = {}
 
     def opened(match: re.Match[str]) -> str:
-        named = match.groupdict()
-        if named.get("procedure") and named["command"] == RUN.lower():
-            to[f"Measure {named['procedure']}"] = f"/run?procedure={named['procedure']}"
-            return f"the procedure {named['procedure']}"
-        page = MODEL if "--poses" in (named.get("options") or "") else PAGES[named["command"]]
+        groups = match.groupdict()
+        if groups.get("procedure") and groups["command"] == RUN.lower():
+            to[f"Measure {groups['procedure']}"] = f"/run?procedure={groups['procedure']}"
+            return f"the procedure {groups['procedure']}"
+        page = MODEL if "--poses" in (groups.get("options") or "") else PAGES[groups["command"]]
         to[page] = address(page, data)
         return f"the page {page}"
 
@@ -61,8 +61,8 @@ def page_step(line: str, data: str = "", procedure: str = "") -> PageStep:
     text = BLOCK.sub(lambda match: f" ({opened(match)}).\n", text)
     for pattern in (QUOTED, BARE):
         text = pattern.sub(opened, text)
-    for pattern, plain in OPTION_WORDS:
-        text = pattern.sub(plain, text)
+    for pattern, words in OPTION_WORDS:
+        text = pattern.sub(words, text)
     return PageStep(text.rstrip("\n"), to)
 
 

@@ -46,18 +46,18 @@ def with_provenance(kind: Dataset[F], fitted: F, parent: Model) -> Model:
 
 
 def write_model(
-    kind: Dataset[F], fitted: F, parent: Model, out: Path | None, tell: Callable[[str], None]
+    kind: Dataset[F], fitted: F, parent: Model, out: Path | None, notify: Callable[[str], None]
 ) -> Path | None:
     """Write the fitted model with its provenance to `out`, completely or not at all. Returns the path.
 
-    None without `out`, and if an output does not respond: such a model cannot correct anything, and `tell` receives the
-    reason.
+    None without `out`, and if an output does not respond: such a model cannot correct anything, and `notify`
+    receives the reason.
     """
     if out is None:
         return None
     try:
         write_whole(out, dump_model(with_provenance(kind, fitted, parent)))
     except UnusableData as error:
-        tell(str(error))
+        notify(str(error))
         return None
     return out

@@ -86,31 +86,33 @@ def _facts(measured: Measured, date: str, program: str) -> Mapping[str, str]:
 Searched = Callable[[Mapping[str, "Effect"]], Mapping[str, "Effect"]]
 
 
-def reported(request: Request, tell: Callable[[str], None], searched: Searched, held: Loaded | None = None) -> Page:
+def reported(
+    request: Request, notify: Callable[[str], None], searched: Searched, question: Loaded | None = None
+) -> Page:
     """On a model, or on the night of a soak where none is named. Raises what `loaded` and `fit` raise, UnusableData.
 
-    `searched` makes the effects of the search, which tell its progress and may end it. `held`: data and model that are
-    in memory already, so that the page and its report show the same rows.
+    `searched` makes the effects of the search, which report its progress and may end it. `question`: data and model in
+    memory, so that the page and its report show the same rows.
     """
     night = night_of(request.data, today(), program()) if request.model is None and request.channel is None else None
-    return night or _on_a_model(request, held or loaded(request, tell), tell, searched)
+    return night or _on_a_model(request, question or loaded(request, notify), notify, searched)
 
 
-def _on_a_model(request: Request, question: Loaded, tell: Callable[[str], None], searched: Searched) -> Page:
-    beside = question.data.compare(question.model)
-    if (reason := beside.rejection) is not None and reason.verdict == Verdict.NO_RESPONSE:
+def _on_a_model(request: Request, question: Loaded, notify: Callable[[str], None], searched: Searched) -> Page:
+    comparison = question.data.compare(question.model)
+    if (reason := comparison.rejection) is not None and reason.verdict == Verdict.NO_RESPONSE:
         raise UnusableData(f"{question.data.source}: no report is written: {reason.verdict}: {reason.text}")
     discovery = question.data.discover(question.model, searched(question.effects))
-    discovery = planned(discovery, request, question.effects, tell)
+    discovery = planned(discovery, request, question.effects, notify)
     if question.data.form == "samples":
         from calibrations.presentation.charts.noise import still_album
         from calibrations.presentation.report.still import still_report
 
-        pictures = still_album(discovery.end, beside.fit)
-        return pictures, lambda: still_report(discovery, beside, today(), program(), pictures)
+        pictures = still_album(discovery.end, comparison.fit)
+        return pictures, lambda: still_report(discovery, comparison, today(), program(), pictures)
     from calibrations.presentation.charts.discovery import album
     from calibrations.presentation.report.report import report
 
     motion, results = of_run(request.data)
-    pictures = album(discovery, beside, motion)
-    return pictures, lambda: report(discovery, beside, today(), program(), pictures, motion, results)
+    pictures = album(discovery, comparison, motion)
+    return pictures, lambda: report(discovery, comparison, today(), program(), pictures, motion, results)

@@ -103,10 +103,10 @@ class ModelSession(Generic[F]):
 
         An effect that the data cannot have without it is left out as well, with a note.
         """
-        kept = [step.effect for step in self.steps if step.name != name]
+        remaining = [step.effect for step in self.steps if step.name != name]
         first = next((k for k, step in enumerate(self.steps) if step.name == name), len(self.steps))
         session = self._with(self.steps[:first])
-        for effect in kept[first:]:
+        for effect in remaining[first:]:
             try:
                 session = session.with_step(session.tried(effect))
             except CalibrationError as error:
@@ -125,15 +125,17 @@ class ModelSession(Generic[F]):
 
         The common beginning stays. An effect that the data cannot have is left out, with a note.
         """
-        same = next((k for k, pair in enumerate(zip(self.added, texts, strict=False)) if pair[0] != pair[1]), None)
-        common = min(len(self.steps), len(texts)) if same is None else same
+        first_difference = next(
+            (k for k, pair in enumerate(zip(self.added, texts, strict=False)) if pair[0] != pair[1]), None
+        )
+        common = min(len(self.steps), len(texts)) if first_difference is None else first_difference
         session = self if common == len(self.steps) else self._with(self.steps[:common])
         for text in texts[common:]:
             name, equals, expression = text.partition("=")
             try:
-                known = session.effects.get(name)
-                if known is not None and known.expression == expression:
-                    effect = known
+                known_effect = session.effects.get(name)
+                if known_effect is not None and known_effect.expression == expression:
+                    effect = known_effect
                 else:
                     effect = session.written(name, expression if equals else text)
                     session = session.among({**session.effects, effect.name: effect})
@@ -165,9 +167,9 @@ class ModelSession(Generic[F]):
         """The rest of the longest earlier search that the steps have followed; None where they left all of them."""
         for k in range(len(self.names), -1, -1):
             plan = self.plans.get(self.names[:k])
-            rest = self.names[k:]
-            if plan is not None and plan.names[: len(rest)] == rest:
-                return plan if not rest else self.data.followed(plan, len(rest), self.effects)
+            remaining = self.names[k:]
+            if plan is not None and plan.names[: len(remaining)] == remaining:
+                return plan if not remaining else self.data.followed(plan, len(remaining), self.effects)
         return None
 
     def _search(self) -> Findings[F]:
@@ -175,9 +177,9 @@ class ModelSession(Generic[F]):
             return self.data.search(self.model, self.effects)
         return self.data.search_on(self.end, self.start, self.effects)
 
-    def with_next(self, result: Diagnosis[F], tell: Callable[[str], None]) -> Diagnosis[F]:
-        """The diagnosis with its next experiment planned on the bench; `tell` is called if it is another bench."""
-        return planned(result, self.request, self.effects, tell)
+    def with_next(self, result: Diagnosis[F], notify: Callable[[str], None]) -> Diagnosis[F]:
+        """The diagnosis with its next experiment planned on the bench; `notify` is called if it is another bench."""
+        return planned(result, self.request, self.effects, notify)
 
 
 def model_session(request: Request) -> ModelSession[Any]:
@@ -187,9 +189,9 @@ def model_session(request: Request) -> ModelSession[Any]:
     with suppress(RecordError, OSError):  # `loaded` says better what is wrong
         content = content_of(request.data, request.model)  # before the data: a later row makes the session old
     question = loaded(request, notes.append)
-    kept, start = question.data.beginning(question.model)
+    prepared, start = question.data.beginning(question.model)
     return ModelSession(
-        request, question.model, question.data, kept, question.effects, tuple(notes), start, content=content
+        request, question.model, question.data, prepared, question.effects, tuple(notes), start, content=content
     )
 
 
@@ -199,9 +201,12 @@ def brought_up_to_date(old: ModelSession[Any]) -> ModelSession[Any]:
     Raises what `model_session` raises. An effect that the present data cannot have is left out, with a note.
     """
     new = model_session(old.request)
-    was, now = old.content.extent, new.content.extent
+    extent_before, extent_now = old.content.extent, new.content.extent
     notes = [
-        f"The data or the model have changed since this page was last open: {was or 'a file'}, now {now or 'new'}."
+        (
+            "The data or the model have changed since this page was last open: "
+            f"{extent_before or 'a file'}, now {extent_now or 'new'}."
+        )
     ]
     new = new.among({**old.effects, **new.effects}).with_added(old.added)
     return replace(new, notes=(*notes, *new.notes))

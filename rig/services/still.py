@@ -65,8 +65,8 @@ class Stream:
             return SENSED[self.unit]
         if scale := self.scale_per_g:
             return Sensed(1 / scale, "g")
-        stated = ((_number(self.constants.get(name)), unit) for name, unit in STATED.items())
-        return next((Sensed(1 / abs(scale), unit) for scale, unit in stated if scale), None)
+        scales = ((_number(self.constants.get(name)), unit) for name, unit in STATED.items())
+        return next((Sensed(1 / abs(scale), unit) for scale, unit in scales if scale), None)
 
     @property
     def scale_per_g(self) -> float | None:
@@ -106,24 +106,25 @@ def channel_of(channels: tuple[str, ...], channel: str | None, source: str) -> s
     """The channel asked for, or the first. Raises DataError."""
     if not channels:
         raise DataError(f"{source}: has no channel except the time; add a column with the sensor's output")
-    wanted = channel or channels[0]
-    name_there = next((name for name in (wanted, f"{wanted}_v") if name in channels), None)
+    channel_name = channel or channels[0]
+    name_there = next((name for name in (channel_name, f"{channel_name}_v") if name in channels), None)
     if name_there is None:
-        raise DataError(f'{source}: has no channel "{wanted}"{nearest(wanted, channels)}')
+        raise DataError(f'{source}: has no channel "{channel_name}"{nearest(channel_name, channels)}')
     return name_there
 
 
-def agreed(measured: float | None, stated: float, source: str) -> float:
+def agreed(measured: float | None, stated_hz: float, source: str) -> float:
     """The rate, Hz. Raises DataError where two disagree, or there is none."""
-    if measured is None and not stated > 0:
+    if measured is None and not stated_hz > 0:
         raise DataError(
             f"{source}: its sample rate is unknown; give --rate HZ, or a line `# sample_rate_hz: 100` above the header"
         )
     if measured is None:
-        return stated
-    if stated > 0 and abs(measured / stated - 1) > DISAGREE:
+        return stated_hz
+    if stated_hz > 0 and abs(measured / stated_hz - 1) > DISAGREE:
         raise DataError(
-            f"{source}: the stated rate is {stated:g} samples a second, the column t_s gives {measured:g}; correct one"
+            f"{source}: the stated rate is {stated_hz:g} samples a second, the column t_s gives {measured:g}; "
+            "correct one"
         )
     return measured
 
@@ -142,27 +143,28 @@ def of_table(table: Table, channel: str | None, rate_hz: float | None) -> Stream
     if table.kind != "still" or "alpha_deg" in table:
         kind = "poses" if table.kind == "still" else table.kind
         raise _no_record(f"{table.source}: a table of {kind}")
-    if "n" in table and (many := float(np.median(table.column("n")))) > 1:
-        raise _no_record(f"{table.source}: a row is the mean of {many:.0f} samples (column n), as in poses")
+    if "n" in table and (samples_per_row := float(np.median(table.column("n")))) > 1:
+        raise _no_record(f"{table.source}: a row is the mean of {samples_per_row:.0f} samples (column n), as in poses")
     channels = tuple(name for name in table.columns if name not in BESIDE)
-    chosen = channel_of(channels, channel, table.source)
-    stated = rate_hz or table.number("sample_rate_hz", 0.0)
+    channel_name = channel_of(channels, channel, table.source)
+    stated_hz = rate_hz or table.number("sample_rate_hz", 0.0)
     times = _times(table)
-    rate = agreed(times.rate_hz if times else None, stated, table.source)
-    unit = "V" if chosen.endswith("_v") else str(table.constants.get("unit", "count"))
+    rate = agreed(times.rate_hz if times else None, stated_hz, table.source)
+    unit = "V" if channel_name.endswith("_v") else str(table.constants.get("unit", "count"))
     corner_hz = table.number("filter_corner_hz", np.inf)
-    others = tuple(name for name in channels if name != chosen)
+    other_channels = tuple(name for name in channels if name != channel_name)
     samples = Stream(
-        table.source, chosen, rate, unit, iter([table.column(chosen)]), corner_hz, others, constants=table.constants,
-        logged={name: [table.column(name)] for name in _logged(table, chosen)},
+        table.source, channel_name, rate, unit, iter([table.column(channel_name)]), corner_hz, other_channels,
+        constants=table.constants,
+        logged={name: [table.column(name)] for name in _logged(table, channel_name)},
     )  # fmt: skip
     return replace(samples, closed=list(times.gaps), uneven_s=times.uneven_s) if times else samples
 
 
-def _no_record(what: str) -> DataError:
+def _no_record(subject: str) -> DataError:
     """What is no still record, and what to do."""
     return DataError(
-        f"{what}; a noise analysis needs single samples of a sensor at rest: give a still record, or `rig run "
+        f"{subject}; a noise analysis needs single samples of a sensor at rest: give a still record, or `rig run "
         "noise-floor`"
     )
 
@@ -170,8 +172,8 @@ def _no_record(what: str) -> DataError:
 def _logged(table: Table, channel: str) -> Iterator[str]:
     """Columns that an output may follow: temperature, supply, and what is no output of a sensor by its name."""
     for name in table.columns:
-        own = name not in BESIDE and AXIS.fullmatch(channel) is not None and AXIS.fullmatch(name) is None
-        if name in FOLLOWED or (own and name != channel):
+        is_channel = name not in BESIDE and AXIS.fullmatch(channel) is not None and AXIS.fullmatch(name) is None
+        if name in FOLLOWED or (is_channel and name != channel):
             yield name
 
 
@@ -199,10 +201,10 @@ def _times(table: Table) -> _Times | None:
         gaps = tuple((float(t_s[i]), float(step_s[i] - typical)) for i in far)
         _check_gaps(gaps, (table.n - 1) * typical, table.source)
         return _Times((table.n - 1 - len(far)) / float(np.sum(np.delete(step_s, far))), gaps)
-    lost = np.round(step_s / typical) - 1
-    if 0 < lost.sum() < table.n and np.all(np.abs(step_s / typical - 1 - lost) < WHOLE):
+    missing_steps = np.round(step_s / typical) - 1
+    if 0 < missing_steps.sum() < table.n and np.all(np.abs(step_s / typical - 1 - missing_steps) < WHOLE):
         raise DataError(
-            f"{table.source}: {lost.sum():.0f} single samples are missing, the first after row {far[0] + 2}; "
+            f"{table.source}: {missing_steps.sum():.0f} single samples are missing, the first after row {far[0] + 2}; "
             f"{EVEN}, or analyse {_longest(far, table.n)} alone"
         )
     off_s = float(np.max(np.abs(t_s - np.linspace(t_s[0], t_s[-1], table.n))))
@@ -239,73 +241,75 @@ UPRIGHT = 0.999  # g: a pose that is as good as along gravity
 
 
 def of_run(measured: Measured, channel: str | None, rate_hz: float | None) -> Stream:
-    first = next((kept for kept in measured.kept() if _is_still(kept)), None)
+    first = next((recorded for recorded in measured.kept() if _is_still(recorded)), None)
     if first is None:
         raise RecordError(f"run {measured.name} has no still record; `rig run noise-floor` or `rig run soak` makes one")
     names = first.samples.channels
-    chosen = channel_of(tuple(names), (channel or "").removesuffix("_v") or None, f"run {measured.name}")
+    channel_name = channel_of(tuple(names), (channel or "").removesuffix("_v") or None, f"run {measured.name}")
     rate = agreed(first.samples.rate_hz, rate_hz or 0.0, f"run {measured.name}")
     corner = float(measured.constants.get("filter_corner_hz", np.inf))
-    outputs = tuple(name for name in names if name in SENSOR and name != chosen)
-    unit = units_of(measured.run, [chosen]).get(chosen, "V")
-    samples = Stream(measured.name, chosen, rate, unit, iter(()), corner if chosen in SENSOR else np.inf, outputs)
+    outputs = tuple(name for name in names if name in SENSOR and name != channel_name)
+    unit = units_of(measured.run, [channel_name]).get(channel_name, "V")
+    samples = Stream(
+        measured.name, channel_name, rate, unit, iter(()), corner if channel_name in SENSOR else np.inf, outputs
+    )
     samples.blocks, samples.constants = _still_blocks(measured, samples), measured.constants
     return samples
 
 
-def _is_still(kept: Kept) -> bool:
-    return kept.pose.path.split(" ")[0] in (STILL, HOLD)
+def _is_still(recorded: Kept) -> bool:
+    return recorded.pose.path.split(" ")[0] in (STILL, HOLD)
 
 
-def _still_blocks(measured: Measured, into: Stream) -> Iterator[NDArray[Any]]:
-    """Blocks of the still record one after the other; what else is met on the way is noted in `into`."""
+def _still_blocks(measured: Measured, stream: Stream) -> Iterator[NDArray[Any]]:
+    """Blocks of the still record one after the other; what else is met on the way is noted in `stream`."""
     next_s = None
-    for kept in measured.kept():
-        samples = kept.samples
-        if into.channel not in samples.channels:
+    for recorded in measured.kept():
+        samples = recorded.samples
+        if stream.channel not in samples.channels:
             continue
-        volts = samples.volts[:, samples.channels.index(into.channel)]
-        if not _is_still(kept):
-            _note_upright(kept, volts, into)
+        volts = samples.volts[:, samples.channels.index(stream.channel)]
+        if not _is_still(recorded):
+            _note_upright(recorded, volts, stream)
             continue
-        if next_s is not None and abs(samples.start_s - next_s) > LATE / into.rate_hz:
-            into.closed.append((next_s, samples.start_s - next_s))
-        next_s = samples.start_s + len(volts) / into.rate_hz
-        if not into.logged:
-            into.coarse |= coarse(kept)
-        for name, values in _beside(kept):
-            into.logged.setdefault(name, []).extend(values)
+        if next_s is not None and abs(samples.start_s - next_s) > LATE / stream.rate_hz:
+            stream.closed.append((next_s, samples.start_s - next_s))
+        next_s = samples.start_s + len(volts) / stream.rate_hz
+        if not stream.logged:
+            stream.coarse |= coarse(recorded)
+        for name, values in _supply_and_temperature(recorded):
+            stream.logged.setdefault(name, []).extend(values)
         yield volts
 
 
-def _beside(kept: Kept) -> Iterator[tuple[str, list[Array]]]:
+def _supply_and_temperature(recorded: Kept) -> Iterator[tuple[str, list[Array]]]:
     """Temperature of a block, and supply, as means of a second each: in blocks that take no room."""
-    samples, n = kept.samples, len(kept.samples.volts)
+    samples, n = recorded.samples, len(recorded.samples.volts)
     temperature, supply = FOLLOWED
-    if kept.temperature_c is not None:
-        yield temperature, [np.broadcast_to(kept.temperature_c, n)]
+    if recorded.temperature_c is not None:
+        yield temperature, [np.broadcast_to(recorded.temperature_c, n)]
     if (channel := supply.removesuffix("_v")) in samples.channels:
         volts = samples.volts[:, samples.channels.index(channel)]
         pieces = np.array_split(volts, max(1, round(n / samples.rate_hz)))
         yield supply, [np.broadcast_to(piece.mean(), len(piece)) for piece in pieces]
 
 
-def coarse(kept: Kept) -> dict[str, float]:
+def coarse(recorded: Kept) -> dict[str, float]:
     """The steps of the supply's readings, where its noise does not smooth them in means."""
     channel = FOLLOWED[1].removesuffix("_v")
-    if channel not in kept.samples.channels:
+    if channel not in recorded.samples.channels:
         return {}
-    step = hidden_step(kept.samples.volts[:, kept.samples.channels.index(channel)])
+    step = hidden_step(recorded.samples.volts[:, recorded.samples.channels.index(channel)])
     return {} if step is None else {FOLLOWED[1]: step}
 
 
-def _note_upright(kept: Kept, volts: Array, into: Stream) -> None:
+def _note_upright(recorded: Kept, volts: Array, stream: Stream) -> None:
     """The mean output of the channel's axis along gravity."""
-    alpha, beta = np.radians(kept.pose.alpha_deg), np.radians(kept.pose.beta_deg)
-    along: Mapping[str, float] = {"x": np.sin(alpha) * np.cos(beta), "y": np.sin(alpha) * np.sin(beta)}
-    g = along.get(into.channel[-1], 0.0) if into.channel in SENSOR else 0.0
-    if abs(g) > UPRIGHT and kept.pose.flip == 0 and kept.pose.mount_deg == 0:
-        into.upright.setdefault(round(g), float(volts.mean()))
+    alpha, beta = np.radians(recorded.pose.alpha_deg), np.radians(recorded.pose.beta_deg)
+    gravity: Mapping[str, float] = {"x": np.sin(alpha) * np.cos(beta), "y": np.sin(alpha) * np.sin(beta)}
+    g = gravity.get(stream.channel[-1], 0.0) if stream.channel in SENSOR else 0.0
+    if abs(g) > UPRIGHT and recorded.pose.flip == 0 and recorded.pose.mount_deg == 0:
+        stream.upright.setdefault(round(g), float(volts.mean()))
 
 
 # The stream of DATA: a table, an array in a file, or a run.
@@ -330,16 +334,16 @@ def axes(record: Record | None, data: str, channel: str | None, rate_hz: float |
     source = _source(record, data, rate_hz)
     first = source(channel)
     names = (first.channel, *first.others)
-    named = next(filter(None, map(AXIS.fullmatch, names)), None)
-    if channel is not None or named is None:
+    name_parts = next(filter(None, map(AXIS.fullmatch, names)), None)
+    if channel is not None or name_parts is None:
         return {_axis(first.channel): first}
-    alike = [f"{named[1]}{axis}{named[3]}" for axis in AXES]
+    alike = [f"{name_parts[1]}{axis}{name_parts[3]}" for axis in AXES]
     return {_axis(name): source(name) for name in alike if name in names}
 
 
 def _axis(channel: str) -> str:
-    named = AXIS.fullmatch(channel)
-    return named[2] if named else AXES[0]
+    name_parts = AXIS.fullmatch(channel)
+    return name_parts[2] if name_parts else AXES[0]
 
 
 def _source(record: Record | None, data: str, rate_hz: float | None) -> Callable[[str | None], Stream]:

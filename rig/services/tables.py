@@ -27,46 +27,48 @@ FOLLOWED = ("temperature_c", "supply_v")  # columns that an output may follow
 BESIDE = ("t_s", *FOLLOWED, "n", "direction", "path")  # columns that are not channels
 
 
-def averaged(log: Table, tell: Callable[[str], None]) -> Table:
-    """The table; a raw log is averaged over its still intervals, with a remark to `tell`.
+def averaged(log: Table, notify: Callable[[str], None]) -> Table:
+    """The table; a raw log is averaged over its still intervals, with a remark to `notify`.
 
     Duplicate rows count once. Raises DataError without any still interval.
     """
     table = average_raw_log(log)
     if table is not log:
-        tell(f"{log.source} is a log of raw samples: the table has {_taken(table)}, from {log.n} samples.")
+        notify(f"{log.source} is a log of raw samples: the table has {_row_count_text(table)}, from {log.n} samples.")
     table, copies = drop_duplicate_rows(table)
     if copies is not None:
-        tell(copies)
-    return _included(table, tell)
+        notify(copies)
+    return _included(table, notify)
 
 
-def _taken(table: Table) -> str:
+def _row_count_text(table: Table) -> str:
     return table.type.taken.format(table.n)
 
 
-def _included(table: Table, tell: Callable[[str], None]) -> Table:
+def _included(table: Table, notify: Callable[[str], None]) -> Table:
     """The table without the rows that its column `excluded` marks; a run has `rig exclude` instead."""
-    out = table.optional(EXCLUDED, 0.0) != 0
-    if not out.any():
+    is_excluded = table.optional(EXCLUDED, 0.0) != 0
+    if not is_excluded.any():
         return table
-    tell(f"{table.source}: {np.count_nonzero(out)} of {table.n} rows are left out, as its column `{EXCLUDED}`.")
-    if out.all():
+    notify(
+        f"{table.source}: {np.count_nonzero(is_excluded)} of {table.n} rows are left out, as its column `{EXCLUDED}`."
+    )
+    if is_excluded.all():
         raise DataError(f"{table.source}: its column `{EXCLUDED}` leaves out every row; write 0 for the rows to use")
-    return table.rows(~out)
+    return table.rows(~is_excluded)
 
 
-def load(data: str, kind: str | None = None, tell: Callable[[str], None] = lambda _: None) -> Table:
-    """The table of `data`: a file, else a run, or several joined by AND. `tell` receives remarks.
+def load(data: str, kind: str | None = None, notify: Callable[[str], None] = lambda _: None) -> Table:
+    """The table of `data`: a file, else a run, or several joined by AND. `notify` receives remarks.
 
     Raises DataError naming file, line and column; UnknownRun naming the nearest run.
     """
     if len(names := names_of(data)) > 1:
-        return load_all(names, tell)
+        return load_all(names, notify)
     if Path(data).is_dir():
         raise DataError(f"{data}: this is a folder; give a file in it, or a run (`rig runs` lists them)")
     if Path(data).is_file():
-        return averaged(read_csv(Path(data), kind), tell)
+        return averaged(read_csv(Path(data), kind), notify)
     table = _of_run(data)
     if kind is not None and table.kind != kind:
         raise RecordError(f"run {data} is a table of {table.kind}, not of {kind}")
@@ -94,28 +96,32 @@ def names_of(data: str) -> list[str]:
     return [data] if Path(data).exists() else [name.strip() for name in data.split(AND)]
 
 
-def load_all(names: Sequence[str], tell: Callable[[str], None] = lambda _: None) -> Table:
+def load_all(names: Sequence[str], notify: Callable[[str], None] = lambda _: None) -> Table:
     """The tables that `names` name, joined. Raises what `load` and `join_tables` raise."""
-    tables = [load(name, tell=tell) for name in names]
+    tables = [load(name, notify=notify) for name in names]
     sources = [table.source for table in tables]
-    if twice := next((name for name, source in zip(names, sources, strict=True) if sources.count(source) > 1), None):
-        raise DataError(f"{twice} is given twice; give the same data once")
+    if duplicate := next(
+        (name for name, source in zip(names, sources, strict=True) if sources.count(source) > 1), None
+    ):
+        raise DataError(f"{duplicate} is given twice; give the same data once")
     if len(tables) == 1:
         return tables[0]
-    return joined_runs(tables, [_begun(name) for name in names], tell)
+    return joined_runs(tables, [_begun(name) for name in names], notify)
 
 
 def joined_runs(
-    tables: Sequence[Table], begun: Sequence[datetime | None], tell: Callable[[str], None] = lambda _: None
+    tables: Sequence[Table], begun: Sequence[datetime | None], notify: Callable[[str], None] = lambda _: None
 ) -> Table:
     """The tables of runs joined; times count from the beginning of the first, where all say when they were `begun`."""
     from calibrations.joined import clock_began_anew, join_tables  # a single table needs it not
 
-    known = [at for at in begun if at is not None]
-    if len(known) == len(tables):
-        tables = [_later(t, (at - known[0]).total_seconds()) for t, at in zip(tables, known, strict=True)]
+    start_times = [at for at in begun if at is not None]
+    if len(start_times) == len(tables):
+        tables = [_later(t, (at - start_times[0]).total_seconds()) for t, at in zip(tables, start_times, strict=True)]
     if clock_began_anew(tables):
-        tell("The time starts again in each of these; the analysis assumes that one followed directly after the other.")
+        notify(
+            "The time starts again in each of these; the analysis assumes that one followed directly after the other."
+        )
     return join_tables(tables)
 
 

@@ -61,25 +61,27 @@ class Pair:
 
 def results_of(first: Run, second: Run, sensors: tuple[str, str] = ("", "")) -> list[Pair]:
     """The results that both have; of a batch those of the sensors named."""
-    one, other = (_own(run.results, sensor) for run, sensor in zip((first, second), sensors, strict=True))
+    first_results, second_results = (
+        _results_of_sensor(run.results, sensor) for run, sensor in zip((first, second), sensors, strict=True)
+    )
     return [
         Pair(name, a["unit"], a["value"], b["value"], a["std"], b["std"])
-        for name, a in one.items()
-        if (b := other.get(name)) is not None and a["unit"] == b["unit"]
+        for name, a in first_results.items()
+        if (b := second_results.get(name)) is not None and a["unit"] == b["unit"]
     ]
 
 
 def parameters_of(first: FittedModel, second: FittedModel) -> list[Pair]:
     """The parameters of one model that was fitted to both."""
-    other = dict(_estimates(second))
+    second_parameters = dict(_estimates(second))
     return [
         Pair(name, a.unit, a.value, b.value, a.std, b.std)
         for name, a in _estimates(first)
-        if (b := other.get(name)) is not None and a.identified and b.identified
+        if (b := second_parameters.get(name)) is not None and a.identified and b.identified
     ]
 
 
-def _own(results: Mapping[str, Any], sensor: str) -> Mapping[str, Any]:
+def _results_of_sensor(results: Mapping[str, Any], sensor: str) -> Mapping[str, Any]:
     """Those of one sensor, without its name; those of all as they are."""
     if not sensor:
         return results
@@ -100,7 +102,7 @@ SAME_DECIMALS = 2  # of a degree: nearer, gravity along an axis differs by 0.2 m
 
 
 @dataclass(frozen=True)
-class Again:
+class RepeatedPoses:
     """What was measured at the same poses in two tables: rows (k,) of both, the visits of a pose in their order.
 
     `difference` is the second less the first, in the outputs' unit, of shape (channels, k); `floor` the white noise of
@@ -113,21 +115,21 @@ class Again:
     floor: Array
 
 
-def both(first: Request, second: Request, tell: Callable[[str], None]) -> tuple[Dataset[Any], Any, Any]:
+def fit_both(first: Request, second: Request, notify: Callable[[str], None]) -> tuple[Dataset[Any], Any, Any]:
     """(the data of the first, and one model fitted to both: that of the first request, or of its kind of data).
 
     Raises RecordError where they are of two kinds, and what `loaded` and `fit` raise.
     """
-    one, other = loaded(first, tell), loaded(second, tell)
-    if one.data.content != other.data.content:
+    first_loaded, second_loaded = loaded(first, notify), loaded(second, notify)
+    if first_loaded.data.content != second_loaded.data.content:
         raise RecordError(
-            f"{first.data} is of {one.data.content}, {second.data} of {other.data.content}: no model describes both; "
-            "choose two runs of one kind"
+            f"{first.data} is of {first_loaded.data.content}, {second.data} of {second_loaded.data.content}: "
+            "no model describes both; choose two runs of one kind"
         )
-    return one.data, one.data.fit(one.model), other.data.fit(one.model)
+    return first_loaded.data, first_loaded.data.fit(first_loaded.model), second_loaded.data.fit(first_loaded.model)
 
 
-def again(first: Fit, second: Fit) -> Again | None:
+def match_poses(first: Fit, second: Fit) -> RepeatedPoses | None:
     """The poses that both have; None where there are none, or the orientations are not known."""
     if not first.table.type.stage_angles or first.channels != second.channels:
         return None
@@ -135,9 +137,9 @@ def again(first: Fit, second: Fit) -> Again | None:
     rows = [(row, visits[visit]) for visit, row in _visits(first.table).items() if visit in visits]
     if not rows:
         return None
-    one, other = (np.array(side) for side in zip(*rows, strict=True))
-    difference = (second.table.outputs[other] - first.table.outputs[one]).T
-    return Again(one, other, difference, np.hypot(first.noise.floor, second.noise.floor))
+    first_rows, second_rows = (np.array(side) for side in zip(*rows, strict=True))
+    difference = (second.table.outputs[second_rows] - first.table.outputs[first_rows]).T
+    return RepeatedPoses(first_rows, second_rows, difference, np.hypot(first.noise.floor, second.noise.floor))
 
 
 def _visits(table: Table) -> dict[tuple[float, ...], int]:

@@ -136,9 +136,9 @@ def lab_read() -> str | None:
     """The name of the lab's record if the workbench reads it, else None."""
     if not (url := os.environ.get(RECORD)):
         return None
-    from rig.record.lab import lab_url, shown
+    from rig.record.lab import lab_url, masked_url
 
-    return shown(lab_url(url, RECORD))
+    return masked_url(lab_url(url, RECORD))
 
 
 def models(chosen: str = "", default: str = "by kind of data") -> dict[str, str]:

@@ -12,7 +12,7 @@ from playwright.sync_api import Page, expect
 from calibrations.model.file import read_model
 from rig.record import Record
 from rig.services.history import History, closest, history, stale
-from rig.services.history_words import but_stale, near, next_due, summary
+from rig.services.history_words import but_stale, closest_text, next_due, summary
 from rig.web.pages.history_results import LIMIT_IS_GIVEN
 from tests.browser.conftest import Workbench
 from tests.rig.lives import calibrated
@@ -136,7 +136,7 @@ def test_the_closest_to_a_day_and_whether_it_is_stale(workbench: Workbench, runs
     for on in ("2024-08-01", "2027-05-01"):
         day.fill(on)
         calibration, age_days = closest(found.calibrations, on := date.fromisoformat(on))
-        expect(page.get_by_text(near(calibration, age_days, on))).to_be_visible()
+        expect(page.get_by_text(closest_text(calibration, age_days, on))).to_be_visible()
         why = stale(found, calibration, age_days)
         expect(page.get_by_text("This calibration is stale")).to_have_text([but_stale(why)] if why else [])
     assert why is not None

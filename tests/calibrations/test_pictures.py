@@ -190,7 +190,9 @@ def test_an_effect_is_a_line_only_over_a_column_that_it_is_a_function_of() -> No
     step, table = warm().steps[0], warm().start.table
     found = charts.choices(warm().start)
     for name, wanted in (("temperature_c", Line), ("beta", Points)):
-        series = charts.residual(charts.ChannelResidual(warm().start, 0, False), found[name], found["alpha_deg"], step).series
+        series = charts.residual(
+            charts.ChannelResidual(warm().start, 0, False), found[name], found["alpha_deg"], step
+        ).series
         assert isinstance(series[-1], wanted)
     change = charts.change_of(step)[0]
     np.testing.assert_allclose(series[-1].y, 1e3 * change)  # type: ignore[union-attr] # a cross at the change of each row

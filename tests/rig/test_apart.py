@@ -23,7 +23,7 @@ from rig.record import Kept, Record
 from rig.runs.background import control, process
 from rig.runs.background import status as status_file
 from rig.runs.background.control import PublishingObserver
-from rig.runs.background.status import KEPT, Asked, Order, Seat, Status, file, folder, keys, lock, read, tidy
+from rig.runs.background.status import KEPT, OpenQuestion, Order, Seat, Status, file, folder, keys, lock, read, tidy
 from rig.runs.runner import Outcome, start
 from rig.web.pages.run_live import stop_words
 from tests.rig.rigging import POSES, SMALL
@@ -237,7 +237,7 @@ def test_a_run_of_a_terminal_is_stopped_from_elsewhere() -> None:
 
 
 def test_what_a_terminal_asks_is_answered_there() -> None:
-    asked = Asked("mounting", "Is it mounted?", "yes or no")
+    asked = OpenQuestion("mounting", "Is it mounted?", "yes or no")
     status = Status(KEY, 4711, "sweep", "a bench", phase="asking", asked=asked, seat="terminal")
     with pytest.raises(RigError, match="answer there"):
         control.answer(status, "yes")
@@ -252,7 +252,7 @@ def test_a_run_goes_on_where_nothing_can_be_told() -> None:
 def test_nobody_is_answered_who_does_not_ask() -> None:
     assert (control.latest(), keys()) == (None, [])
     status = Status(KEY, 4711, "sweep", "a bench")
-    status_of_one_who_asked = replace(status, asked=Asked("mounting", "Is it mounted?", "yes or no"))
+    status_of_one_who_asked = replace(status, asked=OpenQuestion("mounting", "Is it mounted?", "yes or no"))
     with pytest.raises(RigError, match="the run has no question"):
         control.answer(status, "yes")
     file(KEY, "answers").parent.mkdir(parents=True)

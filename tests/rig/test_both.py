@@ -15,7 +15,7 @@ from calibrations.table import Table
 from rig.errors import RecordError
 from rig.services.load import still_of
 from rig.services.request import Request
-from rig.services.two_runs import again, both
+from rig.services.two_runs import fit_both, match_poses
 
 ALPHA, BETA = (each.ravel() for each in np.meshgrid([30.0, 90.0, 150.0], np.arange(0.0, 360.0, 30.0)))
 
@@ -35,7 +35,7 @@ def fitted(rows: Sequence[int], offset_v: float = 0.0) -> Fit:
 
 def test_poses_that_both_have_are_paired_whatever_their_order() -> None:
     first, second = fitted(range(36)), fitted([*range(35, 9, -1)], 1e-3)
-    found = again(first, second)
+    found = match_poses(first, second)
     assert found is not None
     assert np.array_equal(first.table.column("beta_deg")[found.first], second.table.column("beta_deg")[found.second])
     assert found.difference.shape == (2, 26)
@@ -44,14 +44,14 @@ def test_poses_that_both_have_are_paired_whatever_their_order() -> None:
 
 
 def test_a_pose_visited_twice_is_paired_visit_by_visit() -> None:
-    found = again(fitted([*range(36), 0, 0]), fitted([*range(36), 0]))
+    found = match_poses(fitted([*range(36), 0, 0]), fitted([*range(36), 0]))
     assert found is not None
     assert len(found.first) == 37
     assert sorted(found.first[(found.first == 0) | (found.first >= 36)]) == [0, 36]
 
 
 def test_without_a_pose_in_common_there_is_nothing() -> None:
-    assert again(fitted(range(18)), fitted(range(18, 36))) is None
+    assert match_poses(fitted(range(18)), fitted(range(18, 36))) is None
 
 
 @pytest.mark.slow
@@ -61,7 +61,7 @@ def test_a_still_record_and_poses_have_no_model_in_common(tmp_path: Path) -> Non
     write_csv(Table.from_columns("still", rows, {"sample_rate_hz": 10.0}, "still"), still := tmp_path / "still.csv")
     asked = [Request(str(path)) for path in (poses, still)]
     with pytest.raises(RecordError, match=r"poses\.csv is of poses, .*still\.csv of still: no model"):
-        both(*asked, print)
+        fit_both(*asked, print)
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ ROWS = ["alpha_deg,beta_deg,vx_v,excluded", "90,0,3.5,0", "90,90,9.9,1", "90,180
 def test_rows_that_the_file_excludes_are_left_out_and_that_is_said(tmp_path: Path) -> None:
     file, said = tmp_path / "knocked.csv", []
     file.write_text("\n".join(ROWS))
-    table = load(str(file), tell=said.append)
+    table = load(str(file), notify=said.append)
     assert list(table.column("vx_v")) == [3.5, 1.5]
     assert said == [f"{file}: 1 of 3 rows are left out, as its column `excluded`."]
 

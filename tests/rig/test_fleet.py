@@ -16,7 +16,7 @@ from distributed import Client, LocalCluster
 from calibrations.importing.foreign import write_csv
 from calibrations.model.file import dump_model, read_model
 from rig.errors import RigError
-from rig.fleet.crew import FleetError, answered, crew
+from rig.fleet.crew import FleetError, crew, run_tasks
 from rig.fleet.discover import discover_fleet
 from rig.fleet.members import Member, fleet_of
 from rig.fleet.questions import Fleet
@@ -97,7 +97,7 @@ def test_the_rig_in_error_and_the_strange_sensor_are_found_and_bad_files_are_lis
 def test_what_the_record_knows_is_not_worked_out_again(
     discovered: Mapping[str, Any], folder: Path, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rig.fleet.questions.answered", lambda *_: pytest.fail("asked again"))
+    monkeypatch.setattr("rig.fleet.questions.run_tasks", lambda *_: pytest.fail("asked again"))
     members = [m for m in fleet_of([str(folder)]) if m.sensor not in ("BAD", "GONE")]
     with Record(home) as record:
         again = discover_fleet(Fleet(None, record, lambda *_: None), members, START)  # type: ignore[arg-type]
@@ -133,7 +133,7 @@ def test_answers_are_kept_as_they_come(cluster: LocalCluster, folder: Path, tmp_
         first, _ = next(stopped)
         stopped.close()
         left: list[list[Any]] = []
-        patch.setattr("rig.fleet.questions.answered", lambda _client, _work, chunks: left.extend(chunks) or [])
+        patch.setattr("rig.fleet.questions.run_tasks", lambda _client, _work, chunks: left.extend(chunks) or [])
         again = [member for member, _ in Fleet(client, record, lambda *_: None).ask(asked)]
     assert again == [first]
     assert sum(map(len, left)) == 2
@@ -149,7 +149,7 @@ def fragile(tasks: list[int]) -> list[int]:
 @pytest.mark.slow
 def test_a_worker_that_dies_loses_nothing_and_what_kills_it_is_told_alone() -> None:
     with crew(None, 1) as client:
-        found = list(answered(client, fragile, iter([[0, 1], [], [2, 3], [4]])))
+        found = list(run_tasks(client, fragile, iter([[0, 1], [], [2, 3], [4]])))
     assert sorted(task for chunk, _ in found for task in chunk) == [0, 1, 2, 3, 4]
     assert [chunk for chunk, said in found if said is None] == [[1]]
     assert all(said == chunk for chunk, said in found if said is not None)
@@ -175,7 +175,7 @@ def test_a_lost_scheduler_says_how_to_go_on() -> None:
         ) as lost,
         Client(lost.scheduler_address) as client,
     ):  # fmt: skip
-        going_on = answered(client, numbered, iter([[k] for k in range(50)]))
+        going_on = run_tasks(client, numbered, iter([[k] for k in range(50)]))
         next(going_on)
         lost.close()
         with pytest.raises(FleetError, match="run the same command again"):

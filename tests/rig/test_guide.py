@@ -20,7 +20,7 @@ from procedures.questions import Choice, Confirm, Mounting, Number
 from procedures.session import Limits, Pose, Reading
 from rig.bench import Bench, read_bench
 from rig.cli.terminal.guide import Guide
-from rig.cli.terminal.screen import WIDTH, before, gauge, screen
+from rig.cli.terminal.screen import WIDTH, gauge, screen, screen_before_run
 from rig.cli.terminal.watch import watching
 from rig.drawings import Attitude, page
 from rig.errors import Stopped
@@ -89,7 +89,7 @@ def planned(name: str = "sweep", bench: Bench | None = None) -> Plan:
 
 
 def test_before_a_run_one_screen_says_all_of_it() -> None:
-    text = shown(before(planned(), SWEEP, read_bench(), 2_000_000_000, TODAY))
+    text = shown(screen_before_run(planned(), SWEEP, read_bench(), 2_000_000_000, TODAY))
     for piece in (
         "Hold the sensor at a grid of stage angles, in both directions of beta.",
         "scale factor, bias, cross-axis effects, misalignment, hysteresis, stage errors.",
@@ -108,13 +108,13 @@ def test_before_a_run_one_screen_says_all_of_it() -> None:
 
 
 def test_a_disk_that_is_too_small_is_said() -> None:
-    assert "not enough space" in shown(before(planned(), SWEEP, read_bench(), 1000, TODAY))
+    assert "not enough space" in shown(screen_before_run(planned(), SWEEP, read_bench(), 1000, TODAY))
 
 
 def test_a_certificate_that_is_expired_is_said() -> None:
     document = read_bench().document()
     document["certificates"] = {"hand level": {"number": "L-7", "due": "2026-11-20"}}
-    text = shown(before(planned(), SWEEP, Bench.model_validate(document), 10**9, TODAY))
+    text = shown(screen_before_run(planned(), SWEEP, Bench.model_validate(document), 10**9, TODAY))
     assert "hand level's certificate L-7 expired on 2026-11-20" in text
 
 

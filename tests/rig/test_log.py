@@ -13,7 +13,7 @@ from drivers.transport.faults import Fault
 from rig.bench import read_bench
 from rig.record import Record
 from rig.runs.runner import resume, start
-from rig.runs.signals import SHOWN_BYTES, shown
+from rig.runs.signals import SHOWN_BYTES, message_text
 from tests.rig.misbehaving import afflicted
 from tests.rig.rigging import POSES, Onlooker, small_sweep
 
@@ -29,7 +29,7 @@ from tests.rig.rigging import POSES, Onlooker, small_sweep
     ],
 )
 def test_a_message_is_shown_as_text_where_it_is_some(data: bytes, text: str) -> None:
-    assert shown(data) == text
+    assert message_text(data) == text
 
 
 @pytest.mark.sockets

@@ -22,7 +22,7 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli import rig as commands
 from rig.cli.terminal.options import read_settings
-from rig.planning.next_experiment import Dispute, chosen, command_line, planned_experiment, proposed
+from rig.planning.next_experiment import Dispute, choose_experiment, command_line, planned_experiment, proposed
 from rig.planning.sweep_range import columns
 from rig.record import Record
 from rig.services.next_experiment import planned
@@ -97,8 +97,8 @@ def dispute(temperature: bool) -> Dispute:
 def test_nobody_knows_the_rooms_temperature_ahead() -> None:
     """Of what depends on temperature only experiments in the oven are foreseen, and they tell these two nothing."""
     told = Experiment("temperature-cycle", {}, (("a", "b"),), "by physics")
-    assert chosen(dispute(temperature=True), told, read_bench(None)).expected is None
-    assert chosen(dispute(temperature=False), told, read_bench(None)).expected is not None
+    assert choose_experiment(dispute(temperature=True), told, read_bench(None)).expected is None
+    assert choose_experiment(dispute(temperature=False), told, read_bench(None)).expected is not None
 
 
 def test_without_an_oven_nothing_is_planned_in_it_and_what_lacks_is_said(bench_file: Callable[..., Path]) -> None:
@@ -106,7 +106,7 @@ def test_without_an_oven_nothing_is_planned_in_it_and_what_lacks_is_said(bench_f
         role: part.model_dump(mode="json") for role, part in read_bench(None).instruments.items() if role != "oven"
     }
     bench = read_bench(bench_file({"instruments": parts}))
-    e = chosen(dispute(temperature=True), Experiment("soak", {"oven_c": 45.0}, (), "it is held"), bench)
+    e = choose_experiment(dispute(temperature=True), Experiment("soak", {"oven_c": 45.0}, (), "it is held"), bench)
     assert e.duration_s is None
     assert "it is held; but not on this bench: the bench has no oven" in e.why
 
@@ -116,7 +116,7 @@ def test_limits_of_a_stage_rule_experiments_out(bench_file: Callable[..., Path])
     parts["alpha"]["settings"]["limits_deg"] = [-95, 95]
     bench = read_bench(bench_file({"instruments": parts}))
     told = Experiment("sweep", {"face": "both"}, (("a", "b"),), "by physics")
-    assert "alpha: 150 deg is outside its limits" in chosen(dispute(temperature=False), told, bench).why
+    assert "alpha: 150 deg is outside its limits" in choose_experiment(dispute(temperature=False), told, bench).why
 
 
 def test_the_oven_warms_over_minutes_and_time_goes_on() -> None:

@@ -236,7 +236,7 @@ def test_means_and_scatter_come_without_the_samples() -> None:
         assert first == (0, next(record.kept(run)).dwell)
         assert last[0] == 2
         assert last[1].means == {"vx": 3.0, "vy": 1.5}
-        assert record.dwells(run, after=0) == [last]
+        assert record.dwells(run, after_number=0) == [last]
         with record._engine.begin() as connection:  # as a run of an older program
             connection.exec_driver_sql("DELETE FROM dwells WHERE number = 0")
         assert record.dwells(run) == [first, last]
@@ -271,5 +271,5 @@ def test_means_of_an_older_record_come_from_its_samples() -> None:
         with record.engine.begin() as to:
             to.exec_driver_sql("DELETE FROM dwells WHERE number > 0")  # an older program wrote none
         assert record.dwells(run) == present
-        assert [number for number, _ in record.dwells(run, after=1)] == [2]
+        assert [number for number, _ in record.dwells(run, after_number=1)] == [2]
         assert present[1][1].means == {"vx": 1.5, "vy": 2.0}

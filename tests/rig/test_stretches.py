@@ -13,7 +13,7 @@ from procedures.session import Pose
 from procedures.settings import parse
 from rig.bench import read_bench
 from rig.planning.plan import Plan, Stretch, plan, stretches, turn_words
-from rig.planning.planned import Held, Step
+from rig.planning.planned import PlannedDwell, Step
 from tests.rig.rigging import ON_STAGES
 
 Rig = Callable[..., Any]
@@ -69,16 +69,16 @@ def test_what_is_told_again_and_changes_nothing_is_no_step(oven_c: str, first: t
 
 def test_poses_that_are_counted_are_one_stretch() -> None:
     poses = [Pose(0, 0, 0, f"still {k}") for k in range(6)]
-    held = tuple(Held(float(k), pose) for k, pose in enumerate(poses))
+    held = tuple(PlannedDwell(float(k), pose) for k, pose in enumerate(poses))
     assert [s.words for s in stretches(of(held))] == ["alpha 0, beta 0 deg: 6 poses  still 0 to 5"]
 
 
 def test_how_the_sensor_is_mounted_is_said_where_it_is_not_as_usual() -> None:
-    (other,) = stretches(of((Held(0.0, Pose(0, 0, mount_deg=90.0, flip=1)),)))
+    (other,) = stretches(of((PlannedDwell(0.0, Pose(0, 0, mount_deg=90.0, flip=1)),)))
     assert other.words == "alpha 0, beta 0 deg: 1 pose  mounted face down, rotated by 90 deg"
 
 
-def of(held: tuple[Held, ...]) -> Plan:
+def of(held: tuple[PlannedDwell, ...]) -> Plan:
     return Plan("any", {}, (Step(0.0, 1.0, "wait 1 s"),), {}, (), held, 10.0, 0)
 
 

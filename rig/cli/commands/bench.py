@@ -57,24 +57,24 @@ def check_command(bench_file: Path | None, example: bool, example_hand: bool, re
     with nullcontext() if reset else working("testing the instruments"):  # a reset asks a person
         tests_by_role = checked(bench, _reset if reset else None)
     due = certificates(bench)
-    late = expired(bench, datetime.now(UTC).date())
+    expired_papers = expired(bench, datetime.now(UTC).date())
     if as_json:
         papers = {
             name: {"number": certificate.number, "due": certificate.due.isoformat()}
             for name, certificate in due.items()
         }
-        document = {"instruments": _check_document(tests_by_role), "certificates": papers, EXPIRED: late}
+        document = {"instruments": _check_document(tests_by_role), "certificates": papers, EXPIRED: expired_papers}
         emit({"schema": "rig.check/1", "bench": bench.name, **document})
     else:
         rows = [row for role, (identity, tests) in tests_by_role.items() for row in _check_rows(role, identity, tests)]
         click.echo(columns(("role", "instrument", "check", "result", "detail"), rows))
         for name, certificate in due.items():
             click.echo(f"{name}: certificate {certificate.number}, due {certificate.due}")
-        notes(f"{fault}; have it calibrated again" for fault in late)
+        notes(f"{fault}; have it calibrated again" for fault in expired_papers)
         notes(_network_remark(on_a_network(bench)))
     if not all(test.ok for _, tests in tests_by_role.values() for test in tests):
         return FAILED
-    return NOT_MET if late else 0
+    return NOT_MET if expired_papers else 0
 
 
 def _network_remark(roles: list[str]) -> list[str]:
@@ -131,7 +131,7 @@ def simulate_command(bench_file: Path | None, as_json: bool) -> None:
     """
     bench = read_bench(bench_file)
     with ExitStack() as stack:
-        ended = stack.enter_context(_signalled())
+        stop_signals = stack.enter_context(_signalled())
         clock = WallClock()
         servers = list(serve(bench, world_of(bench)).values())
         for server in servers:
@@ -139,7 +139,7 @@ def simulate_command(bench_file: Path | None, as_json: bool) -> None:
         addresses = _addresses(bench, servers)
         documents = {role: _address_document(bench, role, asdict(address)) for role, address in addresses.items()}
         _print_addresses(documents, as_json)
-        serve_forever(servers, lambda: bool(ended), clock)
+        serve_forever(servers, lambda: bool(stop_signals), clock)
 
 
 @contextmanager
@@ -150,11 +150,11 @@ def _signalled() -> Iterator[list[int]]:
     def end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
         received.append(number)
 
-    before = {caught: signal.signal(caught, end) for caught in (signal.SIGINT, signal.SIGTERM)}
+    handlers = {caught: signal.signal(caught, end) for caught in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield received
     finally:
-        for caught, handler in before.items():
+        for caught, handler in handlers.items():
             signal.signal(caught, handler)
 
 
@@ -185,10 +185,10 @@ def _print_addresses(instruments: dict[str, dict[str, object]], as_json: bool) -
         note("serving until Ctrl-C")
 
 
-def _svg(context: click.Context, parameter: click.Parameter, out: Path | None) -> Path | None:  # noqa: ARG001
-    if out is not None and out.suffix.lower() != ".svg":
-        raise click.BadParameter(f"{out}: a drawing is an SVG file; name it {out.with_suffix('.svg').name}")
-    return out
+def _svg(context: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:  # noqa: ARG001
+    if path is not None and path.suffix.lower() != ".svg":
+        raise click.BadParameter(f"{path}: a drawing is an SVG file; name it {path.with_suffix('.svg').name}")
+    return path
 
 
 def _finite(context: click.Context, parameter: click.Parameter, deg: float) -> float:  # noqa: ARG001

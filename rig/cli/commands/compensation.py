@@ -80,32 +80,32 @@ def compensate_command(
         compensation = invert_model(source_model, _range(source_model, reach, ranges), without, precision)
         origin = origin_of(model, name, dump_model(source_model))
         files = source_files(compensation, language, origin)
-        beside = None
+        residual = None
         if data is not None:
             from rig.services.tables import load
 
             progress.text = f"testing the compensation on {data}"
-            table = load(data, tell=note)
+            table = load(data, notify=note)
             check_unit(source_model, table.unit, table.source)
-            beside = compensated_residual(compensation, table)
+            residual = compensated_residual(compensation, table)
     make_folder(out)
     require_outputs(*(out / file for file in files))
     for file, text in files.items():
         write_whole(out / file, text)
-    if picture is not None and beside is not None:
+    if picture is not None and residual is not None:
         from calibrations.presentation.charts.motion import compensated
         from calibrations.presentation.static import save
 
-        save(compensated(beside), picture)
+        save(compensated(residual), picture)
     paths = [*(str(out / file) for file in files), *([str(picture)] if picture else [])]
     if as_json:
-        emit(summary(compensation, origin) | {"files": paths, "residual": beside.document() if beside else None})
+        emit(summary(compensation, origin) | {"files": paths, "residual": residual.document() if residual else None})
     else:
         click.echo(
             "\n".join(
                 [
                     *compensation_lines(compensation),
-                    *(beside.lines() if beside else []),
+                    *(residual.lines() if residual else []),
                     *(f"written: {path}" for path in paths),
                     *how_to_test(language, str(out), origin.name),
                 ]

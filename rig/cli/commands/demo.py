@@ -100,10 +100,10 @@ def _watch(progress: Progress) -> Observer:
     class Bar(Observer):
         total, done = 1, 0
 
-        def expect(self, total: int, done: int) -> None:
-            self.total, self.done = max(total, 1), done
+        def expect(self, total: int, recorded_poses: int) -> None:
+            self.total, self.done = max(total, 1), recorded_poses
 
-        def kept(self, kept: Kept) -> None:  # noqa: ARG002
+        def kept(self, recorded: Kept) -> None:  # noqa: ARG002
             self.done += 1
             progress.text = f"measuring, {self.done} of {self.total} poses"
             progress.share = MEASURING * self.done / self.total

@@ -85,8 +85,8 @@ def diagnose_command(request: Request, check: bool, as_json: bool) -> int:
         notes(warning(question.data.doubts(result.fit)))
     name = request.model or question.model.name
     if as_json:
-        own = own_effect(result.pattern, name, request)
-        emit(diagnosis_document(result, name) | {"own_effect": own})
+        own_effect_name = own_effect(result.pattern, name, request)
+        emit(diagnosis_document(result, name) | {"own_effect": own_effect_name})
         notes(warning([result.caution]))
     else:
         click.echo("\n".join([_diagnosis_text(result, name, request), *pattern_advice(result.pattern, name, request)]))
@@ -137,9 +137,9 @@ def add_command(request: Request, effect: str, name: str | None, out: Path, as_j
 
     with working("fitting both models") as progress:
         question = loaded(request, note)
-        added = _find_effect(effect, name, question)
-        effects = question.effects if effect.startswith("free:") else {**question.effects, added.name: added}
-        result = question.data.add(added, question.model, progress.searched(effects))
+        new_effect = _find_effect(effect, name, question)
+        effects = question.effects if effect.startswith("free:") else {**question.effects, new_effect.name: new_effect}
+        result = question.data.add(new_effect, question.model, progress.searched(effects))
         progress.text = "planning the next experiment"
         result = planned(result, request, question.effects)
     path = write_model(question.data, result.end, question.model, out, note)
@@ -148,11 +148,14 @@ def add_command(request: Request, effect: str, name: str | None, out: Path, as_j
         notes(warning([result.caution]))
     else:
         text = addition(result, request.data, out)
-        click.echo(f"{added.name} added to {question.model.name}\n\n{text}\n\n{parameters(result.end.model)}\n")
+        click.echo(f"{new_effect.name} added to {question.model.name}\n\n{text}\n\n{parameters(result.end.model)}\n")
         if path is not None:
             click.echo(f"written: {path}")
     if effect.endswith(".py"):
-        note(f"{out} refers to {added.name} but does not contain it: keep {effect} in the effects folder of the bench")
+        note(
+            f"{out} refers to {new_effect.name} but does not contain it: "
+            f"keep {effect} in the effects folder of the bench"
+        )
     return verdict_status(result.verdict)
 
 
@@ -254,20 +257,20 @@ class _Answer:
             "own_effect": own_effect(*self.own)
         }
 
-    def text(self, every: bool) -> str:
-        """For a terminal; of a still record only the short form, or with `every` all of it."""
+    def text(self, whole_text: bool) -> str:
+        """For a terminal; of a still record only the short form, or with `whole_text` all of it."""
         from rig.cli.terminal.words import discovery, parameters, pattern_advice, short_discovery
 
         data = self.discovery.findings.data
-        written = [f"written: {self.path}"] if self.path else []
-        if data.form == "samples" and not every:
-            return "\n".join([data.description, short_discovery(self.discovery), *written])
+        path_lines = [f"written: {self.path}"] if self.path else []
+        if data.form == "samples" and not whole_text:
+            return "\n".join([data.description, short_discovery(self.discovery), *path_lines])
         lines = "\n".join([discovery(self.discovery), *pattern_advice(*self.own)])
-        return "\n\n".join([data.description, lines, parameters(self.discovery.end.model), *written])
+        return "\n\n".join([data.description, lines, parameters(self.discovery.end.model), *path_lines])
 
 
 def _discover(
-    request: Request, several: tuple[str, ...], out: Path | None, without: tuple[str, ...], enough: str | None
+    request: Request, several: tuple[str, ...], out: Path | None, left_out: tuple[str, ...], enough: str | None
 ) -> _Answer:
     from rig.cli.terminal.words import planned
     from rig.services.load import loaded
@@ -279,8 +282,8 @@ def _discover(
         small = parse_enough(enough)
     with working("fitting the model") as progress:
         question = loaded(request, note)
-        data = question.data if len(several) == 1 else _together(several, request, question)
-        data = data.without(without)
+        data = question.data if len(several) == 1 else _join_data(several, request, question)
+        data = data.without(left_out)
         discovered = data.discover(question.model, progress.searched(question.effects), small)
         progress.text = "planning the next experiment"
         result = planned(discovered, request, question.effects)
@@ -293,7 +296,7 @@ def _discover(
     return _Answer(result, path, (result.pattern if len(several) == 1 else None, reached, request))
 
 
-def _together(several: tuple[str, ...], request: Request, question: Loaded) -> Dataset[Any]:
+def _join_data(several: tuple[str, ...], request: Request, question: Loaded) -> Dataset[Any]:
     """Several data sets as one table."""
     from calibrations.discovery.rows import Rows
     from rig.services.load import with_known_noise

@@ -81,16 +81,19 @@ def _recovered(folder: Path, as_json: bool) -> int:
     """Recover the record; print the copied and the lost rows."""
     from rig.record.recover import recover
 
-    done = recover(home() / "record.db", folder)
-    lost = [*(f"some rows of {table}" for table in done.damaged), *(f"the samples of {pose}" for pose in done.spoilt)]
-    lost += done.changed
+    recovery = recover(home() / "record.db", folder)
+    losses = [
+        *(f"some rows of {table}" for table in recovery.damaged),
+        *(f"the samples of {pose}" for pose in recovery.spoilt),
+    ]
+    losses += recovery.changed
     if as_json:
-        emit({"schema": "rig.recovered/1", "folder": str(folder), "rows": dict(done.rows), "lost": lost})
+        emit({"schema": "rig.recovered/1", "folder": str(folder), "rows": dict(recovery.rows), "lost": losses})
     else:
-        rows = ", ".join(f"{count} {table}" for table, count in done.rows.items() if count)
+        rows = ", ".join(f"{count} {table}" for table, count in recovery.rows.items() if count)
         click.echo(f"{folder}: {rows or 'nothing'}")
-        click.echo(f"lost: {'; '.join(lost) or 'nothing'}. RIG_HOME={folder} uses this record.")
-    return int(bool(lost))
+        click.echo(f"lost: {'; '.join(losses) or 'nothing'}. RIG_HOME={folder} uses this record.")
+    return int(bool(losses))
 
 
 SHELLS = ("bash", "zsh", "fish")

@@ -164,8 +164,8 @@ def _rows(matrices: CalibrationMatrices) -> Iterator[tuple[str, ...]]:
 
 
 def _estimate(value: float, std: float) -> str:
-    known = None if np.isnan(std) else float(std)
-    return concise(float(value), known)
+    uncertainty = None if np.isnan(std) else float(std)
+    return concise(float(value), uncertainty)
 
 
 def _nullable(std: Array) -> Any:

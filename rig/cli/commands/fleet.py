@@ -83,16 +83,16 @@ def discover(request: Request) -> None:
     from rig.fleet.documents import population_document, population_page
     from rig.fleet.worker import Question, effects_of, own_files
 
-    own, model = own_files(request.bench_file), request.model
-    start = Question("look", dump_model(read_model(model, effects_of(own))), own=own)
+    effect_files, model = own_files(request.bench_file), request.model
+    start = Question("look", dump_model(read_model(model, effects_of(effect_files))), own=effect_files)
     with _fleet(request) as (fleet, members):
         result = discover_fleet(fleet, members, start)
-    written = write_guide(result, start, request.out) if request.out is not None else []
-    _write_report(request, written, lambda: population_page(result, model))
+    paths = write_guide(result, start, request.out) if request.out is not None else []
+    _write_report(request, paths, lambda: population_page(result, model))
     if request.as_json:
-        emit(population_document(result, model) | {"written": [str(path) for path in written]})
+        emit(population_document(result, model) | {"written": [str(path) for path in paths]})
     else:
-        click.echo("\n".join([*population(result, model), *(f"written: {path}" for path in written)]))
+        click.echo("\n".join([*population(result, model), *(f"written: {path}" for path in paths)]))
 
 
 @fleet_command.command("calibrate")
@@ -103,25 +103,25 @@ def calibrate(request: Request) -> None:
     from rig.fleet.documents import calibration_document, calibration_page
     from rig.fleet.worker import own_files
 
-    own, model = own_files(request.bench_file), request.model
+    effect_files, model = own_files(request.bench_file), request.model
     with _fleet(request) as (fleet, members):
-        result = calibrate_fleet(fleet, members, read_guide(model, {member.batch for member in members}, own))
-    written = write_models(result, request.out) if request.out is not None else []
-    _write_report(request, written, lambda: calibration_page(result, model))
+        result = calibrate_fleet(fleet, members, read_guide(model, {member.batch for member in members}, effect_files))
+    model_paths = write_models(result, request.out) if request.out is not None else []
+    _write_report(request, model_paths, lambda: calibration_page(result, model))
     if request.as_json:
-        emit(calibration_document(result, model) | {"written": [str(path) for path in written]})
+        emit(calibration_document(result, model) | {"written": [str(path) for path in model_paths]})
     else:
-        paths = [f"written: {len(written)} files, such as {written[-1]}"] if written else []
+        paths = [f"written: {len(model_paths)} files, such as {model_paths[-1]}"] if model_paths else []
         click.echo("\n".join([*calibration(result), *paths]))
 
 
-def _write_report(request: Request, written: list[Path], page: Callable[[], str]) -> None:
-    """Write the `page` if --report is given, and add it to the `written` files."""
+def _write_report(request: Request, paths: list[Path], page: Callable[[], str]) -> None:
+    """Write the `page` if --report is given, and add it to the `paths` files."""
     from rig.files import write_whole
 
     if request.report is not None:
         write_whole(request.report, page())
-        written.append(request.report)
+        paths.append(request.report)
 
 
 @contextmanager
@@ -146,11 +146,11 @@ class _Steps:
     def __init__(self) -> None:
         self._printed = (0, 0)
 
-    def __call__(self, done: int, of: int) -> None:
-        step = (of, 10 * done // of)
+    def __call__(self, count: int, of: int) -> None:
+        step = (of, 10 * count // of)
         if step != self._printed:
             self._printed = step
-            note(f"{done} of {of} sensors analysed")
+            note(f"{count} of {of} sensors analysed")
 
 
 # Results in words.
@@ -209,16 +209,16 @@ def _persons(sensors: list[SensorVerdict]) -> Iterator[str]:
         return
     yield ""
     order = sorted(sensors, key=lambda s: (VERDICTS.index(s.verdict), len(s.own)), reverse=True)
-    more = f"; the first {MOST_SENSORS}" if len(order) > MOST_SENSORS else ""
-    yield f"{len(order)} sensors need a decision by a person{more}:"
-    rows = [(s.sensor, s.batch or "-", s.rig or "-", s.verdict, why(s)) for s in order[:MOST_SENSORS]]
+    rest_text = f"; the first {MOST_SENSORS}" if len(order) > MOST_SENSORS else ""
+    yield f"{len(order)} sensors need a decision by a person{rest_text}:"
+    rows = [(s.sensor, s.batch or "-", s.rig or "-", s.verdict, reason_of(s)) for s in order[:MOST_SENSORS]]
     yield columns(("sensor", "batch", "rig", "verdict", "why"), rows)
 
 
-def why(sensor: SensorVerdict) -> str:
+def reason_of(sensor: SensorVerdict) -> str:
     """The reason why a sensor needs a person."""
-    named = [_with_rivals(name, sensor.rivals.get(name, ())) for name in (sensor.own or sensor.effects)]
-    return "; ".join(filter(None, (", ".join(named), sensor.remark))) or "-"
+    effect_texts = [_with_rivals(name, sensor.rivals.get(name, ())) for name in (sensor.own or sensor.effects)]
+    return "; ".join(filter(None, (", ".join(effect_texts), sensor.remark))) or "-"
 
 
 def calibration(result: Calibration) -> Iterator[str]:
@@ -237,12 +237,13 @@ def _batch(batch: Calibrated) -> Iterator[str]:
         batch.names, batch.pooled.parameters, batch.pooled.scale, _gains(batch), strict=True
     ):
         mean = concise(parameter.mean * size, parameter.mean_std * size, unit)
-        outliers = [m.sensor for m, apart in zip(batch.members, parameter.apart, strict=True) if apart]
+        outliers = [m.sensor for m, is_outlier in zip(batch.members, parameter.apart, strict=True) if is_outlier]
         spread = f"{parameter.spread * size:.2g} {unit}"
-        rows.append((effect, name, axis or "-", mean, spread, f"{gain:.2f}", _named(outliers)))
+        rows.append((effect, name, axis or "-", mean, spread, f"{gain:.2f}", _sensor_list(outliers)))
     yield columns(("effect", "parameter", "axis", "mean", "spread", "std / alone", "outliers"), rows)
     if unlike_model:
-        yield f"This model does not describe: {_named(unlike_model)}; `rig fleet discover` finds their missing effects."
+        names = _sensor_list(unlike_model)
+        yield f"This model does not describe: {names}; `rig fleet discover` finds their missing effects."
 
 
 def _gains(batch: Calibrated) -> list[float]:
@@ -251,6 +252,6 @@ def _gains(batch: Calibrated) -> list[float]:
     return list(map(float, np.median(batch.pooled.stds / batch.pooled.alone, axis=0)))
 
 
-def _named(sensors: list[str]) -> str:
+def _sensor_list(sensors: list[str]) -> str:
     text = ", ".join(sensors[:5])
     return f"{text} and {len(sensors) - 5} more" if len(sensors) > 5 else text or "-"

@@ -20,7 +20,15 @@ from rig.record import Record
 from rig.services.control import HEAD, OUT, Controlled, controlled, row, signals, worst
 from rig.services.history import Calibration, History, Quantity, changes, closest, history, latest, limits_of, stale
 from rig.services.history_comparison import Compared, compare_days, compare_rigs, compare_sensors
-from rig.services.history_words import agreements, but_stale, chart_verdict, near, next_due, significance, summary
+from rig.services.history_words import (
+    agreements,
+    but_stale,
+    chart_verdict,
+    closest_text,
+    next_due,
+    significance,
+    summary,
+)
 
 Near = tuple[Calibration, float] | None  # the calibration closest to a day, and its age on that day in days
 
@@ -81,36 +89,40 @@ def history_command(
     from calibrations.model.file import read_model
     from rig.services.request import effects_of
 
-    read = read_model(model, effects_of(bench_file))
+    model_read = read_model(model, effects_of(bench_file))
     limits = changes(changes_given)
     with working("fitting the calibrations"), Record.to_read() as record:
-        life = _only(history(record, sensor, read, limits_of(bench_file) | limits, baseline), chosen, limits)
-        last = latest(record, beside, read) if beside is not None else None
+        life = _select_quantities(
+            history(record, sensor, model_read, limits_of(bench_file) | limits, baseline), chosen, limits
+        )
+        last = latest(record, beside, model_read) if beside is not None else None
     compared = [] if beside is None or last is None else [compare_sensors(life, beside, last)]
     compared += [compare_days(life, *(day.date() for day in between))] if between else []
     compared += [compare_rigs(life.calibrations, *rigs)] if rigs else []
     compared = [_of_chosen(comparison, life) for comparison in compared]
     day = on.date() if on is not None else None
     calibration = closest(life.calibrations, day) if day is not None else None
-    why = stale(life, *calibration) if calibration is not None else None
-    written = _draw(life, folder, form) if folder is not None else []
+    staleness = stale(life, *calibration) if calibration is not None else None
+    paths = _draw(life, folder, form) if folder is not None else []
     if as_json:
-        emit(document(life, calibration, why, compared))
+        emit(document(life, calibration, staleness, compared))
     else:
-        text = [*lines(life), *near_lines(calibration, day, why), *compared_lines(compared)]
-        click.echo("\n".join([*text, *(f"written: {path}" for path in written)]))
-    return int(why is not None or not all(comparison.agree for comparison in compared))
+        text = [*lines(life), *near_lines(calibration, day, staleness), *compared_lines(compared)]
+        click.echo("\n".join([*text, *(f"written: {path}" for path in paths)]))
+    return int(staleness is not None or not all(comparison.agree for comparison in compared))
 
 
-def _only(life: History, chosen: Sequence[str], limited: Iterable[str]) -> History:
+def _select_quantities(life: History, names: Sequence[str], limited: Iterable[str]) -> History:
     """The history of the chosen quantities. Raises UsageError for an unknown quantity."""
     from drivers.errors import did_you_mean
 
-    known = [q.name for q in life.quantities]
-    for name in (*chosen, *limited):
-        if name not in known:
-            raise click.UsageError(f"the model {life.model} has no quantity {name!r}.{did_you_mean(name, known)}")
-    quantities = tuple(q for q in life.quantities if not chosen or q.name in chosen)
+    quantity_names = [q.name for q in life.quantities]
+    for name in (*names, *limited):
+        if name not in quantity_names:
+            raise click.UsageError(
+                f"the model {life.model} has no quantity {name!r}.{did_you_mean(name, quantity_names)}"
+            )
+    quantities = tuple(q for q in life.quantities if not names or q.name in names)
     return replace(life, quantities=quantities)
 
 
@@ -148,8 +160,8 @@ def lines(life: History) -> Iterator[str]:
     yield next_due(life, "--limit bias-x=0.005")
     yield from (f"{calibration.data}: {calibration.expired}." for calibration in of if calibration.expired)
     yield from life.warnings
-    for data, why in life.passed_over.items():
-        note(f"Not used: {data}: {why}")
+    for data, reason in life.passed_over.items():
+        note(f"Not used: {data}: {reason}")
 
 
 def _row(calibration: Calibration, quantities: Sequence[Quantity]) -> tuple[str, ...]:
@@ -161,20 +173,20 @@ def _row(calibration: Calibration, quantities: Sequence[Quantity]) -> tuple[str,
 def _stability(q: Quantity) -> tuple[str, ...]:
     line, verdict = q.line, chart_verdict(q) or "-"
     if line is None:
-        return q.name, "-", "-", verdict, _allowed(q), "-"
+        return q.name, "-", "-", verdict, _limits_text(q), "-"
     drift = f"{concise_in_prefix(YEAR_DAYS * line.slope, YEAR_DAYS * line.slope_std, q.unit)}{significance(line)}"
-    return q.name, drift, f"{line.scatter:.2g} {q.unit}", verdict, _allowed(q), str(q.due or "-")
+    return q.name, drift, f"{line.scatter:.2g} {q.unit}", verdict, _limits_text(q), str(q.due or "-")
 
 
-def _allowed(q: Quantity) -> str:
+def _limits_text(q: Quantity) -> str:
     return "-" if q.allowed is None else f"{q.allowed[0]:.6g} .. {q.allowed[1]:.6g}"
 
 
-def near_lines(closest: Near, on: date | None, why: str | None) -> Iterator[str]:
+def near_lines(closest: Near, on: date | None, staleness: str | None) -> Iterator[str]:
     if closest is not None and on is not None:
-        yield near(*closest, on)
-    if why is not None:
-        yield but_stale(why)
+        yield closest_text(*closest, on)
+    if staleness is not None:
+        yield but_stale(staleness)
 
 
 def compared_lines(compared: Sequence[Compared]) -> Iterator[str]:
@@ -183,7 +195,7 @@ def compared_lines(compared: Sequence[Compared]) -> Iterator[str]:
         yield columns(*agreements(comparison, lambda value, digits: f"{value:.{digits}g}"))
 
 
-def document(life: History, closest: Near, why: str | None, compared: Sequence[Compared]) -> dict[str, Any]:
+def document(life: History, closest: Near, staleness: str | None, compared: Sequence[Compared]) -> dict[str, Any]:
     return {
         "schema": "rig.history/1",
         "sensor": life.sensor,
@@ -197,7 +209,7 @@ def document(life: History, closest: Near, why: str | None, compared: Sequence[C
         "quantities": [_of_quantity(q) for q in life.quantities],
         "passed_over": dict(life.passed_over),
         "warnings": list(life.warnings),
-        "closest": None if closest is None else {"data": closest[0].data, "age_days": closest[1], "stale": why},
+        "closest": None if closest is None else {"data": closest[0].data, "age_days": closest[1], "stale": staleness},
         "compared": [
             {"one": c.one, "other": c.other, "quantities": _agreements(c.rows)} for c in compared
         ],
@@ -247,7 +259,7 @@ def control_command(
     """
     with Record.to_read() as record:
         quantities = controlled(record.runs(), sensor, baseline, since)
-    written = _draw_charts(quantities, folder, form) if folder else []
+    paths = _draw_charts(quantities, folder, form) if folder else []
     if as_json:
         emit(
             {
@@ -259,7 +271,7 @@ def control_command(
     else:
         click.echo(columns(HEAD, map(row, quantities)))
         lines = [line for quantity in quantities for line in signals(quantity)]
-        click.echo("\n".join([*lines, *(f"written: {path}" for path in written), worst(quantities)]))
+        click.echo("\n".join([*lines, *(f"written: {path}" for path in paths), worst(quantities)]))
     return int(worst(quantities) == OUT)
 
 
@@ -291,11 +303,11 @@ def _draw_charts(quantities: list[Controlled], folder: Path, form: str) -> list[
 
     figures = {}
     for sensor in dict.fromkeys(quantity.sensor for quantity in quantities):
-        mine = [quantity for quantity in quantities if quantity.sensor == sensor]
+        of_sensor = [quantity for quantity in quantities if quantity.sensor == sensor]
         name = "".join(letter if letter.isalnum() else "-" for letter in sensor)
         charts, units = (
-            {quantity.quantity: quantity.chart for quantity in mine},
-            {quantity.quantity: quantity.unit for quantity in mine},
+            {quantity.quantity: quantity.chart for quantity in of_sensor},
+            {quantity.quantity: quantity.unit for quantity in of_sensor},
         )
         figures[f"control-{name}"] = control_charts(charts, units)
     return save_all(figures, folder, form)

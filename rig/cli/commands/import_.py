@@ -128,44 +128,44 @@ def ask_mapping(
     names = "; ".join(" ".join(filter(None, (of, *names))) for of, names in COLUMN_NAMES[kind].items())
     note(f"\nColumn names: {names}\nEnter accepts the proposal in brackets, {LEAVE} skips the column. Or type a name,")
     note("with a unit if it differs (vx_v:mV), or only a unit (mV).\n")
-    whole = _columns(sheet, kind, mapped)
-    while lacking := missing_columns(kind, sheet, whole):
+    mapping = _columns(sheet, kind, mapped)
+    while lacking := missing_columns(kind, sheet, mapping):
         note(f"\nA table of {kind} also needs {', '.join(lacking)}. Again:\n")
-        whole = _columns(sheet, kind, mapped)
-    note(f"\nTo repeat this import without questions:\n    {repeating_command(sheet, kind, whole, constants)}\n")
-    return kind, whole
+        mapping = _columns(sheet, kind, mapped)
+    note(f"\nTo repeat this import without questions:\n    {repeating_command(sheet, kind, mapping, constants)}\n")
+    return kind, mapping
 
 
 def _columns(sheet: Sheet, kind: str, mapped: Sequence[ColumnMapping]) -> list[ColumnMapping]:
     """Ask for the name of each unknown column."""
-    whole = list(mapped)
+    mapping = list(mapped)
     proposals = {m.theirs: m for m in propose_mapping(sheet, kind, mapped)}
-    open_ones = [t for t, bare in zip(sheet.header, sheet.bare, strict=True) if bare not in NUMBERS]
-    for theirs in open_ones:
-        if theirs not in {m.theirs for m in mapped} and (m := _column(sheet, theirs, proposals.get(theirs), whole)):
-            whole.append(m)
-    return whole
+    open_ones = [t for t, unitless in zip(sheet.header, sheet.bare, strict=True) if unitless not in NUMBERS]
+    for column in open_ones:
+        if column not in {m.theirs for m in mapped} and (m := _column(sheet, column, proposals.get(column), mapping)):
+            mapping.append(m)
+    return mapping
 
 
 def _column(
-    sheet: Sheet, theirs: str, proposal: ColumnMapping | None, before: Sequence[ColumnMapping]
+    sheet: Sheet, column: str, proposal: ColumnMapping | None, mapped: Sequence[ColumnMapping]
 ) -> ColumnMapping | None:
     """Ask for the name of one column until the answer is valid."""
-    values = sample_values(sheet, theirs)
-    shown = (
-        f"{values.min():g} .. {values.max():g}" if len(values) else f'"{sheet.sample[0][sheet.header.index(theirs)]}"'
+    values = sample_values(sheet, column)
+    range_text = (
+        f"{values.min():g} .. {values.max():g}" if len(values) else f'"{sheet.sample[0][sheet.header.index(column)]}"'
     )
     default = proposal.text.partition("=")[0] + (f":{proposal.unit}" if proposal.unit else "") if proposal else LEAVE
     while True:
-        answer = str(click.prompt(f"  {theirs:16} {shown:24}", default=default, err=True)).strip()
+        answer = str(click.prompt(f"  {column:16} {range_text:24}", default=default, err=True)).strip()
         try:
-            return _parse_answer(answer, theirs, proposal, before, sheet.name)
+            return _parse_answer(answer, column, proposal, mapped, sheet.name)
         except DataError as error:
             note(f"    {error}")
 
 
 def _parse_answer(
-    answer: str, theirs: str, proposal: ColumnMapping | None, before: Sequence[ColumnMapping], source: str
+    answer: str, column: str, proposal: ColumnMapping | None, mapped: Sequence[ColumnMapping], source: str
 ) -> ColumnMapping | None:
     """The column for an answer, None if it is skipped. Raises DataError."""
     if answer == LEAVE:
@@ -175,8 +175,8 @@ def _parse_answer(
     name, colon, unit = answer.partition(":")
     if name not in NUMBERS | {PATH}:
         raise DataError(f'"{name}" is not a column name{nearest(name, column_names())}')
-    if name in {m.name for m in before}:
+    if name in {m.name for m in mapped}:
         raise DataError(f"{name} is already the name of another column")
     if colon and not parse_unit(unit):
         raise DataError(f'"{unit}" is not a known unit')
-    return check_unit(ColumnMapping(name, theirs, parse_unit(unit)), source)
+    return check_unit(ColumnMapping(name, column, parse_unit(unit)), source)

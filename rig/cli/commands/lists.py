@@ -46,7 +46,7 @@ def effects_command(effect: str | None, bench_file: Path | None, as_json: bool) 
     from calibrations.effects import Effect
     from rig.services.request import effects_of
 
-    known = effects_of(bench_file)
+    effects_by_name = effects_of(bench_file)
 
     def document(e: Effect) -> dict[str, object]:
         return {
@@ -65,11 +65,11 @@ def effects_command(effect: str | None, bench_file: Path | None, as_json: bool) 
             "source": e.source,
         }
 
-    listed = list(known.values())
+    listed = list(effects_by_name.values())
     if effect:
         from calibrations.free_forms.requested import resolve_effect  # slow to import; the list needs no free form
 
-        listed = [resolve_effect(effect, known)]
+        listed = [resolve_effect(effect, effects_by_name)]
     if as_json:
         emit({"schema": "rig.effects/1", "effects": [document(e) for e in listed]})
     elif effect:
@@ -79,8 +79,8 @@ def effects_command(effect: str | None, bench_file: Path | None, as_json: bool) 
         formula = e.formula.replace("{out}", "V").replace("\n", "\n    ")  # as docs/effects does for an output in V
         click.echo(f"{e.name}: {e.summary}\n\n    {formula}\n")
         parts = (("Symptom", e.symptom), ("Excited by", e.excited_by), ("Confused with", e.confused_with))
-        more = (("At run time", known_at_run_time(e)), ("Source", e.source))
-        click.echo("\n".join(f"{title}: {text}" for title, text in (*parts, *more) if text))
+        further_parts = (("At run time", known_at_run_time(e)), ("Source", e.source))
+        click.echo("\n".join(f"{title}: {text}" for title, text in (*parts, *further_parts) if text))
     else:
         click.echo(columns(("effect", "acts on", "description"), [(e.name, e.acts_on, e.summary) for e in listed]))
 

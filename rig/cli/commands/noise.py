@@ -64,8 +64,8 @@ def noise_command(
         from calibrations.presentation.static import save_all
 
         with working("drawing the pictures"):
-            written = save_all({picture.name: picture.chart for picture in noise_album(analysis)}, folder, form)
-        notes(f"written: {path}" for path in written)
+            paths = save_all({picture.name: picture.chart for picture in noise_album(analysis)}, folder, form)
+        notes(f"written: {path}" for path in paths)
 
 
 def _record(data: str, channel: str | None, rate_hz: float | None, tau_s: tuple[float, ...]) -> Still:
@@ -83,8 +83,8 @@ def _record(data: str, channel: str | None, rate_hz: float | None, tau_s: tuple[
     if blocks is None:
         return still
     curves = {}
-    for axis, kept in blocks.items():
-        values = np.concatenate([np.asarray(block, dtype=float) for block in kept])
+    for axis, axis_blocks in blocks.items():
+        values = np.concatenate([np.asarray(block, dtype=float) for block in axis_blocks])
         curves[axis] = {**still.deviations[axis], OVERLAPPING: curve_at(values, still.rate_hz, tau_s, still.source)}
     return replace(still, deviations=curves)
 
@@ -92,6 +92,6 @@ def _record(data: str, channel: str | None, rate_hz: float | None, tau_s: tuple[
 def rounded_times(tau_s: Iterable[float], analysis: NoiseAnalysis) -> Iterable[str]:
     """Which of the given averaging times are not whole numbers of samples."""
     taken_s = next(iter(analysis.channels.values())).allan.tau_s.tolist()
-    for stated, used in zip(tau_s, taken_s, strict=False):
-        if not np.isclose(stated, used):
-            yield f"An averaging time of {stated:g} s is not a whole number of samples: {used:g} s is used."
+    for requested_s, used in zip(tau_s, taken_s, strict=False):
+        if not np.isclose(requested_s, used):
+            yield f"An averaging time of {requested_s:g} s is not a whole number of samples: {used:g} s is used."

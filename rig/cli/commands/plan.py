@@ -41,8 +41,8 @@ def _limits_as_bad_input() -> Iterator[None]:
     """Report a limit that would stop a run as bad input, because a plan moves nothing."""
     try:
         yield
-    except (LimitError, SafetyLimit) as refused:
-        raise BeyondLimits(str(refused)) from None
+    except (LimitError, SafetyLimit) as error:
+        raise BeyondLimits(str(error)) from None
 
 
 @click.command("plan", cls=ProcedureCommand, context_settings=PASS_ON)
@@ -95,8 +95,8 @@ def plan_command(
     if as_json:
         emit(_document(planned))
         return
-    whole = moves or len(planned.steps) <= FEW_STEPS
-    click.echo("\n".join([*(_steps(planned) if whole else _summary(planned)), "", *_end(planned)]))
+    shows_moves = moves or len(planned.steps) <= FEW_STEPS
+    click.echo("\n".join([*(_steps(planned) if shows_moves else _summary(planned)), "", *_end(planned)]))
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def _optimal(bench: Bench, procedure: Procedure, settings: Mapping[str, Any], op
 def _write_poses(out: Path, planned: Plan) -> None:
     from rig.files import write_whole
 
-    write_whole(out, "\n".join([*format_poses(held.pose for held in planned.held), ""]))
+    write_whole(out, "\n".join([*format_poses(dwell.pose for dwell in planned.held), ""]))
 
 
 def _steps(planned: Plan) -> list[str]:
@@ -151,8 +151,8 @@ def _summary(planned: Plan) -> list[str]:
 
 
 def _lines(stretch: Stretch) -> list[str]:
-    before = [f"{'':>9}  {', '.join(stretch.also)}, then"] if stretch.also else []
-    return [*before, f"{duration(stretch.start_s):>9}  {stretch.words}"]
+    earlier_steps = [f"{'':>9}  {', '.join(stretch.also)}, then"] if stretch.also else []
+    return [*earlier_steps, f"{duration(stretch.start_s):>9}  {stretch.words}"]
 
 
 def _end(planned: Plan) -> list[str]:

@@ -14,11 +14,11 @@ from rig.cli.terminal.output import bench_option, emit, json_option, note
 from rig.errors import RecordError
 from rig.files import LAB
 from rig.record import Record
-from rig.record.lab import READER, WRITER, lab_url, prepare, shown
+from rig.record.lab import READER, WRITER, lab_url, masked_url, prepare
 from rig.record.push import Pushed, push_all, unsent, verify
 
 
-def _given(context: click.Context, _: click.Parameter, url: str | None) -> str | None:
+def _check_url(context: click.Context, _: click.Parameter, url: str | None) -> str | None:
     if url is not None and context.get_parameter_source("given") is ParameterSource.COMMANDLINE:
         require_no_password(url, LAB)
     return url
@@ -27,7 +27,12 @@ def _given(context: click.Context, _: click.Parameter, url: str | None) -> str |
 @click.command("push")
 @click.argument("named", metavar="[RUNS]...", nargs=-1)
 @click.option(
-    "--to", "given", envvar=LAB, callback=_given, metavar="URL", help=f"postgresql://USER@HOST/DATABASE; else {LAB}."
+    "--to",
+    "given",
+    envvar=LAB,
+    callback=_check_url,
+    metavar="URL",
+    help=f"postgresql://USER@HOST/DATABASE; else {LAB}.",
 )
 @click.option(
     "--prepare", "prepares", is_flag=True, help="Create the record and its roles, as the owner of the database."
@@ -66,27 +71,29 @@ def _lab(url: str | None, bench_file: Path | None) -> URL:
     return lab_url(url)
 
 
-def _push(url: URL, named: tuple[str, ...], as_json: bool) -> int:
-    done: list[Pushed] = []
-    refused: list[RecordError] = []
-    with Record() as own, Record(url) as lab:
-        waiting = unsent(own, lab, named)
-        for number, pushed in enumerate(push_all(own, lab, waiting), 1):
+def _push(url: URL, run_names: tuple[str, ...], as_json: bool) -> int:
+    pushed_runs: list[Pushed] = []
+    refusals: list[RecordError] = []
+    with Record() as local, Record(url) as lab:
+        waiting = unsent(local, lab, run_names)
+        for number, pushed in enumerate(push_all(local, lab, waiting), 1):
             if isinstance(pushed, RecordError):
-                refused.append(pushed)
+                refusals.append(pushed)
             else:
-                done.append(pushed)
+                pushed_runs.append(pushed)
             note(f"{number} of {len(waiting)}: {pushed if isinstance(pushed, RecordError) else _description(pushed)}")
-    if refused and len(waiting) == 1:
-        raise refused[0]
+    if refusals and len(waiting) == 1:
+        raise refusals[0]
     if as_json:
-        emit({"schema": "rig.push/1", "to": shown(url), "runs": [vars(pushed) for pushed in done]})
+        emit({"schema": "rig.push/1", "to": masked_url(url), "runs": [vars(pushed) for pushed in pushed_runs]})
     else:
-        count = f", {len(refused)} refused" if refused else ""
+        count = f", {len(refusals)} refused" if refusals else ""
         click.echo(
-            f"{len(done)} runs pushed to {shown(url)}{count}" if waiting else f"{shown(url)} has all finished runs"
+            f"{len(pushed_runs)} runs pushed to {masked_url(url)}{count}"
+            if waiting
+            else f"{masked_url(url)} has all finished runs"
         )
-    return int(bool(refused))
+    return int(bool(refusals))
 
 
 def _description(pushed: Pushed) -> str:
@@ -94,12 +101,12 @@ def _description(pushed: Pushed) -> str:
 
 
 def _prepare(url: URL, as_json: bool) -> None:
-    before = prepare(url)
+    schema_before = prepare(url)
     if as_json:
-        emit({"schema": "rig.prepared/1", "to": shown(url), "before": before})
+        emit({"schema": "rig.prepared/1", "to": masked_url(url), "before": schema_before})
         return
-    how = f"the record, schema {before}, is up to date" if before else "created the record"
-    click.echo(f"{shown(url)}: {how}. Give each rig and each reader its own role:")
+    state = f"the record, schema {schema_before}, is up to date" if schema_before else "created the record"
+    click.echo(f"{masked_url(url)}: {state}. Give each rig and each reader its own role:")
     click.echo(f"  CREATE ROLE rig7 LOGIN PASSWORD '...' IN ROLE {WRITER};   -- pushes, reads")
     click.echo(f"  CREATE ROLE anna LOGIN PASSWORD '...' IN ROLE {READER};   -- reads")
 
@@ -108,7 +115,7 @@ def _verify(url: URL, as_json: bool) -> int:
     with Record(url) as lab:
         verified = verify(lab)
     if as_json:
-        emit({"schema": "rig.verified/1", "record": shown(url), **vars(verified)})
+        emit({"schema": "rig.verified/1", "record": masked_url(url), **vars(verified)})
     else:
         click.echo(f"{len(verified.sound)} runs unchanged, {len(verified.on_their_way)} incomplete")
         for run in verified.changed:

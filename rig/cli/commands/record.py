@@ -36,25 +36,26 @@ def show_command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
     from rig.services.history import lives  # loads the fit
 
     with working(f"reading {run}"), Record.to_find(run) as record:
-        shown = record.run(run)
-        run = shown.run
+        run_row = record.run(run)
+        run = run_row.run
         left_out = record.excluded(run)
         turns = [Event(line.at, line.what, line.text) for line in record.lines(run, TURNS)]
         events = sorted([*record.events(run), *turns], key=lambda event: event.at)
-        ranges = _ranges(record, shown)
-        listed = _poses(record, shown) if poses else None
+        ranges = _ranges(record, run_row)
+        listed = _poses(record, run_row) if poses else None
         lines = record.lines(run) if wants_log else []
-        known = lives(shown, record.runs())
+        run_counts = lives(run_row, record.runs())
     if as_json:
-        more = ({"kept": listed} if poses else {}) | ({"log": [vars(line) for line in lines]} if wants_log else {})
-        emit(_run_document(shown, events, ranges) | more)
+        details = ({"kept": listed} if poses else {}) | ({"log": [vars(line) for line in lines]} if wants_log else {})
+        emit(_run_document(run_row, events, ranges) | details)
     else:
-        after = [*results_table(shown.results), *next_steps(shown, left_out)]
-        after += [
-            f"The record has {count} runs of the sensor {name}: rig history {name}" for name, count in known.items()
+        result_lines = [*results_table(run_row.results), *next_steps(run_row, left_out)]
+        result_lines += [
+            f"The record has {count} runs of the sensor {name}: rig history {name}"
+            for name, count in run_counts.items()
         ]
-        history = [_event(event, shown.message) for event in events]
-        parts = (_head(shown), after, _columns(ranges), history, _listed(listed or []), _logged(lines))
+        history = [_event(event, run_row.message) for event in events]
+        parts = (_head(run_row), result_lines, _columns(ranges), history, _listed(listed or []), _logged(lines))
         click.echo("\n\n".join("\n".join(part) for part in parts if part))
 
 
@@ -88,31 +89,32 @@ def _poses(record: Record, run: Run) -> list[dict[str, Any]]:
 def _measured(record: Record, run: Run) -> Iterator[dict[str, Any]]:
     """Every measured pose as JSON."""
     units: Mapping[str, str] | None = None
-    for number, kept in enumerate(record.kept(run.run)):
-        units = units_of(run, kept.samples.channels) if units is None else units
-        yield _pose(number, kept, units)
+    for number, recorded in enumerate(record.kept(run.run)):
+        units = units_of(run, recorded.samples.channels) if units is None else units
+        yield _pose(number, recorded, units)
 
 
-def _pose(number: int, kept: Kept, units: Mapping[str, str]) -> dict[str, Any]:
+def _pose(number: int, recorded: Kept, units: Mapping[str, str]) -> dict[str, Any]:
     """One pose as JSON: means in V, and those of channels in other `units`."""
     names = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip", "up", "rate_deg_s")
-    angles = {name: getattr(kept.pose, name) for name in names}
-    about = {"t_s": kept.t_s, "temperature_c": kept.temperature_c, "excluded": kept.excluded}
-    means = kept.dwell.means
+    angles = {name: getattr(recorded.pose, name) for name in names}
+    circumstances = {"t_s": recorded.t_s, "temperature_c": recorded.temperature_c, "excluded": recorded.excluded}
+    means = recorded.dwell.means
     values: dict[str, Any] = {"means_v": {name: v for name, v in means.items() if name not in units}}
     if units:
         values |= {"means": {name: means[name] for name in units if name in means}, "units": dict(units)}
     return {
-        "pose": number, "path": kept.pose.path, **angles, **about, **values, "sha256": digest_of(kept.samples)
+        "pose": number, "path": recorded.pose.path, **angles, **circumstances, **values,
+        "sha256": digest_of(recorded.samples),
     }  # fmt: skip
 
 
 def _head(run: Run) -> list[str]:
-    ended = f"{run.state} {run.ended[:19].replace('T', ' ')} UTC" if run.ended else run.state
-    head = [f"{run.run}: {run.procedure}, {ended}, {run.extent}, a table of {run.kind}", f"from {run.source}"]
-    why = [run.message] if run.message else []
-    why += [f"Remark: {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
-    return [*head, *why, *_settings(run.settings)]
+    state = f"{run.state} {run.ended[:19].replace('T', ' ')} UTC" if run.ended else run.state
+    head = [f"{run.run}: {run.procedure}, {state}, {run.extent}, a table of {run.kind}", f"from {run.source}"]
+    remarks = [run.message] if run.message else []
+    remarks += [f"Remark: {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
+    return [*head, *remarks, *_settings(run.settings)]
 
 
 def _settings(settings: Mapping[str, Any]) -> Iterator[str]:
@@ -165,8 +167,8 @@ def _listed(poses: Sequence[Mapping[str, Any]]) -> list[str]:
         )
         for pose, mean in zip(poses, means, strict=True)
     ]
-    named = [f"{name} {units.get(name, 'V')}" for name in channels]
-    head = ("pose", "alpha", "beta", "path", "t", *named, "C", "excluded because")
+    channel_heads = [f"{name} {units.get(name, 'V')}" for name in channels]
+    head = ("pose", "alpha", "beta", "path", "t", *channel_heads, "C", "excluded because")
     return columns(head, rows).splitlines()
 
 
@@ -222,20 +224,22 @@ def exclude_command(run: str, pose: int, reason: str | None, include: bool, as_j
     from rig.services.next_steps import results_table
 
     with Record.to_find(run) as record:
-        changed = exclude(record, run, [pose], None if include else reason)
-        run = changed.run
+        exclusion = exclude(record, run, [pose], None if include else reason)
+        run = exclusion.run
         remarks = [event.text for event in record.events(run) if event.what == RESULTS]
     if as_json:
         excluded = None if include else reason
-        emit({"schema": "rig.exclude/1", "run": run, "pose": pose, "excluded": excluded, "results": changed.results})
+        emit({"schema": "rig.exclude/1", "run": run, "pose": pose, "excluded": excluded, "results": exclusion.results})
         return
     state = "included again" if include else f"excluded: {reason}"
-    after = (
-        [f"results: {remarks[-1]}", *results_table(changed.results)] if changed.state == "complete" and remarks else []
+    next_lines = (
+        [f"results: {remarks[-1]}", *results_table(exclusion.results)]
+        if exclusion.state == "complete" and remarks
+        else []
     )
-    if changed.state != "complete" and not include:
-        after = [f"Next: rig resume {run} measures it again"]
-    click.echo("\n".join([f"{run}: pose {pose} {state}", *after]))
+    if exclusion.state != "complete" and not include:
+        next_lines = [f"Next: rig resume {run} measures it again"]
+    click.echo("\n".join([f"{run}: pose {pose} {state}", *next_lines]))
 
 
 @click.command("export")

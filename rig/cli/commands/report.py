@@ -52,11 +52,11 @@ def report_command(request: Request, out: Path | None, folder: Path | None, form
         progress.text = "drawing the pictures"
         if out is not None:
             write_whole(out, page())
-        written = save_all({picture.name: picture.chart for picture in pictures}, folder, form) if folder else []
+        paths = save_all({picture.name: picture.chart for picture in pictures}, folder, form) if folder else []
     if as_json:
-        emit({"schema": "rig.report/1", "out": str(out) if out else None, "pictures": [str(p) for p in written]})
+        emit({"schema": "rig.report/1", "out": str(out) if out else None, "pictures": [str(p) for p in paths]})
     else:
-        for path in [*([out] if out else []), *written]:
+        for path in [*([out] if out else []), *paths]:
             click.echo(f"written: {path}")
 
 
@@ -137,9 +137,9 @@ def _paths(out: Path) -> list[Path]:
 def _write_certificate(path: Path, certificate: Certificate) -> None:
     """Write one format of the certificate."""
     from rig.files import write_whole
-    from rig.services.certify import written
+    from rig.services.certify import format_certificate
 
-    write_whole(path, written(certificate, path.suffix))
+    write_whole(path, format_certificate(certificate, path.suffix))
 
 
 def _certificate_lines(certificate: Certificate) -> list[str]:

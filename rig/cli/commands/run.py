@@ -66,13 +66,15 @@ def resume_command(
     With --bench, the run continues only if that bench file has not changed.
     """
     bench = read_bench(bench_file) if bench_file else None
-    with Record.to_find(run, own=True) as record:
+    with Record.to_find(run, local_only=True) as record:
         interrupted = record.run(run)
         if interrupted.state == "complete":
             return print_end(record, Outcome(interrupted), as_json)
-        own = Bench.model_validate(interrupted.bench)
-        with watching(find(interrupted.procedure, own.folders.procedures), own, unattended, answers) as observer:
+        run_bench = Bench.model_validate(interrupted.bench)
+        with watching(
+            find(interrupted.procedure, run_bench.folders.procedures), run_bench, unattended, answers
+        ) as observer:
             outcome = resume(record, interrupted.run, observer, bench, trace)
         notes(f"program changed {event.text}" for event in record.events(interrupted.run) if event.what == CHANGED)
-        push_after(record, outcome.run, (bench or own).lab, note)
+        push_after(record, outcome.run, (bench or run_bench).lab, note)
         return print_end(record, outcome, as_json)

@@ -64,9 +64,9 @@ def _failed(error: Exception) -> int:
 
 def status_of(error: BaseException) -> int:
     """The exit status of an error."""
-    own = getattr(error, "exit_status", None)
-    if isinstance(own, int):
-        return own
+    exit_status = getattr(error, "exit_status", None)
+    if isinstance(exit_status, int):
+        return exit_status
     for kind in type(error).__mro__:
         if (status := STATUS.get(f"{kind.__module__}.{kind.__qualname__}")) is not None:
             return status

@@ -19,7 +19,7 @@ from procedures.errors import BadAnswer, Declined, NoAnswer
 from procedures.questions import Choice, Question
 from procedures.session import Guidance, Reading
 from rig.bench import Bench
-from rig.cli.terminal.screen import before, drawn, screen
+from rig.cli.terminal.screen import screen, screen_before_run, sketch_with_legend
 from rig.drawings import Attitude, drawing_of, page
 from rig.files import free_bytes, home, write_whole
 from rig.planning.plan import Plan
@@ -58,7 +58,9 @@ class Guide(RunViewer):
     def planned(self, plan: Plan) -> None:
         """Show the plan on one screen; raises Declined if the person cancels it."""
         super().planned(plan)
-        self._console.print(before(plan, self._procedure, self._bench, free_bytes(home()), datetime.now(UTC).date()))
+        self._console.print(
+            screen_before_run(plan, self._procedure, self._bench, free_bytes(home()), datetime.now(UTC).date())
+        )
         if plan.reach:  # without stages there is no mounting
             self._draw(mounting(plan), "mounting")
         if self.ask(BEGIN, "go") == "cancel":
@@ -70,9 +72,9 @@ class Guide(RunViewer):
 
     def guide(self, guidance: Guidance) -> None:
         """Show the next orientation. A sound and a tick mark a position that was taken: the person looks elsewhere."""
-        before = self.view.guidance
+        previous = self.view.guidance
         super().guide(guidance)
-        if before is not None and len(guidance.taken) > len(before.taken):
+        if previous is not None and len(guidance.taken) > len(previous.taken):
             self._console.bell()
             self._console.print(f"✓ position {len(guidance.taken)} taken", style="green", highlight=False)
         self._console.print(guidance.text, style="bold", highlight=False)
@@ -85,7 +87,7 @@ class Guide(RunViewer):
         """Ask until the answer is valid; the answer of a simulated bench is the proposal."""
         if question.name in self._answers:
             return self._answers[question.name]
-        with self._hidden():
+        with self._hide_screen():
             if (attitude := drawing_of(question)) is not None:
                 self._draw(attitude, question.name)
             return self._prompt(question, instead)
@@ -103,12 +105,12 @@ class Guide(RunViewer):
             return "end"
 
     @contextmanager
-    def _hidden(self) -> Iterator[None]:
+    def _hide_screen(self) -> Iterator[None]:
         """Hide the live screen during a question."""
-        shown = self._live.is_started
+        was_live = self._live.is_started
         self._live.stop()
         yield
-        if shown:
+        if was_live:
             self._live.start()
 
     def _prompt(self, question: Question, instead: str | None) -> str:
@@ -120,8 +122,8 @@ class Guide(RunViewer):
                 raise NoAnswer(f'the terminal was closed at the question "{question.text}"; resume the run') from None
             try:
                 return question.checked(typed)
-            except BadAnswer as refused:
-                self._console.print(str(refused), style="yellow", highlight=False)
+            except BadAnswer as error:
+                self._console.print(str(error), style="yellow", highlight=False)
 
     def _draw(self, attitude: Attitude, name: str) -> None:
         """Show the mounting of the sensor if it has changed; write the complete drawing to a file."""
@@ -130,16 +132,16 @@ class Guide(RunViewer):
         folder = home() / "drawings"
         folder.mkdir(parents=True, exist_ok=True)
         write_whole(file := folder / f"{name}.svg", page(attitude))
-        self._console.print(drawn(attitude, file))
+        self._console.print(sketch_with_legend(attitude, file))
         self._drawn = attitude
 
     def _screen(self) -> RenderableType:
         return screen(self.view, time.monotonic())
 
 
-def _choices(kept: Kept | None, outcome: Outcome) -> Text:
+def _choices(recorded: Kept | None, outcome: Outcome) -> Text:
     """The meaning of each answer."""
-    last = "" if kept is None else f" (alpha {kept.pose.alpha_deg:g}, beta {kept.pose.beta_deg:g} deg)"
+    last = "" if recorded is None else f" (alpha {recorded.pose.alpha_deg:g}, beta {recorded.pose.beta_deg:g} deg)"
     return Text(
         "  resume  continues with the interrupted pose\n"
         f"  repeat  also repeats the last recorded pose{last}; the record keeps the first one, excluded\n"

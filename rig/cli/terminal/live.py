@@ -51,14 +51,14 @@ class Experiments:
             self._advise(outcome.run.run)
             raise outcome.error
         self.runs.append(outcome.run.run)
-        return outcome.run.run, self._all()
+        return outcome.run.run, self._joined_table()
 
     def stopped(self) -> None:
         """Print the runs so far, after a stop between two runs."""
         if self.runs:
             note(f"The record has the measurements. Next: rig discover {' '.join(self.runs)}")
 
-    def _all(self) -> Table:
+    def _joined_table(self) -> Table:
         measured = [Measured(self.record, self.record.run(run), self.bench.first_sensor) for run in self.runs]
         return joined_runs([m.part("poses") for m in measured], [begun(self.record, run) for run in self.runs])
 
@@ -89,44 +89,46 @@ def discover_live(
             raise click.UsageError(
                 f"--time {minutes:g}: the first measurement takes {first_s / 60:.1f} minutes; give more time"
             )
-        done: list[Measurement] = []
+        measurements: list[Measurement] = []
         try:
             for measurement in live.measurements():
-                done.append(measurement)
-                note(progress(done, live.time_s))
+                measurements.append(measurement)
+                note(progress(measurements, live.time_s))
         except KeyboardInterrupt:
             experiments.stopped()
             raise
-    discovered = done[-1].found
+    discovered = measurements[-1].found
     path = write_model(discovered.findings.data, discovered.end, start_model, out, note)
     if as_json:
-        emit(document(done, standard_s, path))
+        emit(document(measurements, standard_s, path))
         notes(warning([discovered.caution]))
     else:
-        click.echo(_end(done, live, standard_s, path))
+        click.echo(_end(measurements, live, standard_s, path))
     return verdict_status(discovered.verdict, check)
 
 
-def progress(done: list[Measurement], time_s: float) -> str:
+def progress(measurements: list[Measurement], time_s: float) -> str:
     """After a measurement: the verdict, the next experiment with its reason, the remaining time."""
-    now = done[-1]
-    lines = [f"{now.run}: {now.found.end.table.n} poses in {duration(now.used_s)} so far. {now.found.judgement.text}"]
-    if now.following is not None:
-        e, remaining = now.following, duration(time_s - now.used_s)
+    last = measurements[-1]
+    lines = [
+        f"{last.run}: {last.found.end.table.n} poses in {duration(last.used_s)} so far. {last.found.judgement.text}"
+    ]
+    if last.following is not None:
+        e, remaining = last.following, duration(time_s - last.used_s)
         lines.append(f"Next, {duration(e.duration_s or 0.0)} of the remaining {remaining}: {e.command}\n    {e.why}")
     return "\n".join(lines)
 
 
-def ending(done: list[Measurement], time_s: float) -> str:
+def ending(measurements: list[Measurement], time_s: float) -> str:
     """The reason for the end."""
-    if stands(done):
+    if stands(measurements):
         return "The last measurement did not change the result."
-    if done[-1].found.next_experiment is not None:
+    if measurements[-1].found.next_experiment is not None:
         return "The open question needs more time than remains, or another bench."
     return f"The time is over ({duration(time_s)}), or no experiment would help."
 
 
-def document(done: list[Measurement], standard_s: float, out: Path | None) -> dict[str, Any]:
+def document(measurements: list[Measurement], standard_s: float, out: Path | None) -> dict[str, Any]:
     """The document `rig.discovery/1`, with the experiments."""
     experiments = [
         {
@@ -138,23 +140,23 @@ def document(done: list[Measurement], standard_s: float, out: Path | None) -> di
             "verdict": m.found.verdict,
             "causes": list(m.found.causes),
         }
-        for m in done
+        for m in measurements
     ]
-    times = {"rig_time_s": done[-1].used_s, "standard_rig_time_s": standard_s, "stands": stands(done)}
-    runs = {"runs": [m.run for m in done], "experiments": experiments}
-    return discovery_document(done[-1].found, str(out) if out else None) | runs | times
+    times = {"rig_time_s": measurements[-1].used_s, "standard_rig_time_s": standard_s, "stands": stands(measurements)}
+    runs = {"runs": [m.run for m in measurements], "experiments": experiments}
+    return discovery_document(measurements[-1].found, str(out) if out else None) | runs | times
 
 
-def _end(done: list[Measurement], live: Live, standard_s: float, out: Path | None) -> str:
+def _end(measurements: list[Measurement], live: Live, standard_s: float, out: Path | None) -> str:
     """Verdict, causes, model, and the rig time compared with that of the standard sweep."""
-    discovered, used_s = done[-1].found, done[-1].used_s
-    data = f"{discovered.end.table.n} poses of {join_words(m.run for m in done)}"
+    discovered, used_s = measurements[-1].found, measurements[-1].used_s
+    data = f"{discovered.end.table.n} poses of {join_words(m.run for m in measurements)}"
     time = f"Rig time {duration(used_s)}; the standard sweep takes {duration(standard_s)}."
-    again = f"To repeat the analysis: rig discover {' '.join(m.run for m in done)}"
+    command_text = f"To repeat the analysis: rig discover {' '.join(m.run for m in measurements)}"
     parts = [
         data,
         discovery(discovered),
         parameters(discovered.end.model),
-        f"{ending(done, live.time_s)} {time}\n{again}",
+        f"{ending(measurements, live.time_s)} {time}\n{command_text}",
     ]
     return "\n\n".join([*parts, *([f"written: {out}"] if out else [])])

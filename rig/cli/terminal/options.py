@@ -33,7 +33,7 @@ def with_record(command: click.Command) -> click.Command:
     return command
 
 
-def _chosen(context: click.Context, _: click.Parameter, url: str | None) -> None:
+def _set_environment(context: click.Context, _: click.Parameter, url: str | None) -> None:
     """Set the environment variable for the duration of the command, also for processes that it starts."""
     if url is not None:
         require_no_password(url, RECORD)
@@ -53,18 +53,18 @@ def require_no_password(url: str, instead: str) -> None:
 
 @contextmanager
 def _environment(url: str) -> Iterator[None]:
-    before = os.environ.get(RECORD)
+    previous = os.environ.get(RECORD)
     os.environ[RECORD] = url
     try:
         yield
     finally:
         os.environ.pop(RECORD)
-        if before is not None:
-            os.environ[RECORD] = before
+        if previous is not None:
+            os.environ[RECORD] = previous
 
 
 OPTION = click.Option(
-    ["--record"], metavar="URL", expose_value=False, callback=_chosen, is_eager=True,
+    ["--record"], metavar="URL", expose_value=False, callback=_set_environment, is_eager=True,
     help=f"Read from the lab's record, postgresql://USER@HOST/DATABASE. Default: {RECORD}, else the rig's record.",
 )  # fmt: skip
 
@@ -83,25 +83,25 @@ def settings_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
 PASS_ON = {"ignore_unknown_options": True}  # for commands whose procedure has its own options
 
 
-def read_settings(given: Sequence[str], pairs: Sequence[str], defaults: Mapping[str, Any]) -> dict[str, str]:
+def read_settings(words: Sequence[str], pairs: Sequence[str], defaults: Mapping[str, Any]) -> dict[str, str]:
     """Settings by name, as text; a switch without a value means yes.
 
     Raises UsageError for words other than `--name value`.
     """
     settings = dict(_pair(pair) for pair in pairs)
-    rest = list(given)
-    while rest:
-        word = rest.pop(0)
+    remaining = list(words)
+    while remaining:
+        word = remaining.pop(0)
         if not word.startswith("--"):
             raise click.UsageError(f"{word!r} is not expected here; a setting is --name value")
         name, equals, value = word.removeprefix("--").partition("=")
         key = name.replace("-", "_")
-        if not equals and isinstance(defaults.get(key), bool) and (not rest or rest[0].startswith("--")):
+        if not equals and isinstance(defaults.get(key), bool) and (not remaining or remaining[0].startswith("--")):
             value = "yes"
         elif not equals:
-            if not rest:
+            if not remaining:
                 raise click.UsageError(f"--{name} needs a value")
-            value = rest.pop(0)
+            value = remaining.pop(0)
         settings[key] = value
     return settings
 
@@ -135,7 +135,7 @@ def request_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """
 
     @wraps(function)
-    def inside(
+    def wrapped(
         data: str | tuple[str, ...],
         model: str | None,
         bench_file: Path | None,
@@ -149,8 +149,8 @@ def request_options(function: Callable[..., Any]) -> Callable[..., Any]:
         return function(request=Request(first, model, bench_file, noise, channel, rate_hz), **several, **others)
 
     for option in reversed(OPTIONS):
-        inside = option(inside)
-    return inside
+        wrapped = option(wrapped)
+    return wrapped
 
 
 def input_range(text: str) -> tuple[str, tuple[float, float]]:

@@ -35,8 +35,8 @@ class Progress:
         text = self.text if isinstance(self.text, str) else self.text()
         if self.share is None:
             return f"{text}: {seconds}"
-        full = round(WIDTH * min(max(self.share, 0.0), 1.0))
-        return f"[{'#' * full}{'.' * (WIDTH - full)}] {100 * self.share:3.0f} %  {text}, {seconds}"
+        filled = round(WIDTH * min(max(self.share, 0.0), 1.0))
+        return f"[{'#' * filled}{'.' * (WIDTH - filled)}] {100 * self.share:3.0f} %  {text}, {seconds}"
 
     def searched(self, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
         """The effects for a search, whose progress is shown from now on."""
@@ -50,13 +50,13 @@ class Progress:
 @contextmanager
 def working(text: str, share: float | None = None) -> Iterator[Progress]:
     """Show the progress of the block after its first second, every second. Shorter work shows nothing."""
-    shown, stream, ended = Progress(text, share), sys.stderr, threading.Event()
-    thread = threading.Thread(target=_show, args=(shown, stream, stream.isatty(), ended), daemon=True)
+    progress, stream, stop_event = Progress(text, share), sys.stderr, threading.Event()
+    thread = threading.Thread(target=_show, args=(progress, stream, stream.isatty(), stop_event), daemon=True)
     thread.start()
     try:
-        yield shown
+        yield progress
     finally:
-        ended.set()
+        stop_event.set()
         thread.join()
         erase()
 
@@ -72,9 +72,9 @@ def erase() -> None:
 _DRAWN = threading.Event()  # a line of progress is on the terminal
 
 
-def _show(shown: Progress, stream: TextIO, terminal: bool, ended: threading.Event) -> None:
-    while not ended.wait(EVERY_S):
-        stream.write(f"{ERASE}{shown.line()}" if terminal else f"{shown.line()}\n")
+def _show(progress: Progress, stream: TextIO, terminal: bool, stop_event: threading.Event) -> None:
+    while not stop_event.wait(EVERY_S):
+        stream.write(f"{ERASE}{progress.line()}" if terminal else f"{progress.line()}\n")
         stream.flush()
         if terminal:
             _DRAWN.set()

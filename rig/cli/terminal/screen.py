@@ -94,7 +94,7 @@ FACTS = re.compile(r"^(Excites|Blind to)\s+(.*(?:\n\s+.*)*)", re.MULTILINE)
 MOST_STRETCHES = 6
 
 
-def before(plan: Plan, procedure: Procedure, bench: Bench, free_bytes: int, today: date) -> RenderableType:
+def screen_before_run(plan: Plan, procedure: Procedure, bench: Bench, free_bytes: int, today: date) -> RenderableType:
     """The screen before a run; `free_bytes` is the free space on the disk of the record."""
     facts = Table.grid(padding=(0, 2))
     for name, text in _facts(plan, procedure, bench, free_bytes):
@@ -112,7 +112,7 @@ def _facts(plan: Plan, procedure: Procedure, bench: Bench, free_bytes: int) -> I
         yield match[1], " ".join(match[2].split())
     time = " of simulated time, which passes faster" if bench.simulated else ""
     yield "Takes", f"{duration(plan.duration_s)}{time}, {plan.poses} poses"
-    yield "Does", "\n".join(_does(plan))
+    yield "Does", "\n".join(_action_lines(plan))
     for role, ((low, high), (least, most)) in plan.reach.items():
         yield f"Turns {role}", f"from {low:g} to {high:g} deg; the limits are {least:g} to {most:g} deg"
     yield "Stops", "; ".join(stops(bench))
@@ -122,14 +122,14 @@ def _facts(plan: Plan, procedure: Procedure, bench: Bench, free_bytes: int) -> I
     yield "Stores", f"{size(plan.bytes)} on the disk; {size(free_bytes)} are free{space}"
 
 
-def _does(plan: Plan) -> list[str]:
+def _action_lines(plan: Plan) -> list[str]:
     lines = [stretch.words for stretch in stretches(plan)]
     if len(lines) > MOST_STRETCHES:
         lines[MOST_STRETCHES - 1 :] = [f"and {len(lines) - MOST_STRETCHES + 1} more: rig plan {plan.procedure}"]
     return lines or ["records readings and no pose"]
 
 
-def drawn(attitude: Attitude, file: Path) -> RenderableType:
+def sketch_with_legend(attitude: Attitude, file: Path) -> RenderableType:
     """The sketch with its legend; `file` is the complete drawing."""
     grid = Table.grid(padding=(0, 3))
     legend = f"\n{attitude.words}\n\nTable at alpha 0, from above:\nx, y  axes of the sensor\no     pin 1\n\n{file}"

@@ -47,11 +47,14 @@ def procedure_text(procedure: Procedure) -> str:
 
 def settings_lines(procedure: Procedure) -> Iterator[str]:
     """For each setting the option with its default, then unit, allowed values and meaning."""
-    few = choices(procedure)
+    choices_by_name = choices(procedure)
     for name, default in procedure.defaults.items():
-        yield f"  --{name.replace('_', '-')} {written(default)}".rstrip()
+        yield f"  --{name.replace('_', '-')} {default_text(default)}".rstrip()
         unit = next((UNITS[end] for end in UNITS if name.endswith(f"_{end}")), "")
-        parts = [f"In {unit}." if unit else "", f"One of: {', '.join(few[name])}." if name in few else ""]
+        parts = [
+            f"In {unit}." if unit else "",
+            f"One of: {', '.join(choices_by_name[name])}." if name in choices_by_name else "",
+        ]
         text = " ".join(filter(None, [*parts, meaning(procedure, name)]))
         if text:
             yield click.wrap_text(text, WIDTH, "        ", "        ")
@@ -61,11 +64,13 @@ def meaning(procedure: Procedure, name: str) -> str:
     """The sentences of the procedure's docstring that name the setting; else what it means in every procedure."""
     doc = " ".join(inspect.cleandoc(procedure.function.__doc__ or "").split())
     sentences = re.split(r"(?<=[.:])\s+(?=[A-Z`])", doc)
-    own = " ".join(sentence for sentence in sentences if re.search(rf"`{name}[`=]", sentence)).replace("`", "")
-    return own or SHARED.get(name, "")
+    own_sentences = " ".join(sentence for sentence in sentences if re.search(rf"`{name}[`=]", sentence)).replace(
+        "`", ""
+    )
+    return own_sentences or SHARED.get(name, "")
 
 
-def written(value: Any) -> str:
+def default_text(value: Any) -> str:
     """The text of a default on the command line."""
     if isinstance(value, tuple):
         return ",".join(f"{part:g}" for part in value)

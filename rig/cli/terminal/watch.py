@@ -45,11 +45,11 @@ class Quiet(Observer):
     def guide(self, guidance: Guidance) -> None:
         note(guidance.text)
 
-    def expect(self, total: int, done: int) -> None:
-        note(f"{total - done} of {total} poses remain")
+    def expect(self, total: int, recorded_poses: int) -> None:
+        note(f"{total - recorded_poses} of {total} poses remain")
 
-    def kept(self, kept: Kept) -> None:
-        if self._estimates and (report := self._estimates.report(kept)):
+    def kept(self, recorded: Kept) -> None:
+        if self._estimates and (report := self._estimates.report(recorded)):
             note(report)
 
     def ask(self, question: Question, instead: str | None) -> str:
@@ -59,15 +59,15 @@ class Quiet(Observer):
 @contextmanager
 def watching(procedure: Procedure, bench: Bench, unattended: bool, answers: Path | None) -> Iterator[Observer]:
     """The observer of a run: a person in a terminal, or nobody for an unattended run; pages observe in parallel."""
-    known = _answers(answers)
+    given_answers = _answers(answers)
     if unattended or not (sys.stdin.isatty() and sys.stderr.isatty()):
-        with PublishingObserver(Quiet(known, procedure.name), procedure.name, bench, "nobody") as observer:
+        with PublishingObserver(Quiet(given_answers, procedure.name), procedure.name, bench, "nobody") as observer:
             yield observer
         return
     from rig.cli.terminal.guide import Guide  # only a terminal needs rich
 
     with (
-        Guide(procedure, bench, known) as guide,
+        Guide(procedure, bench, given_answers) as guide,
         PublishingObserver(guide, procedure.name, bench, "terminal") as observer,
     ):
         yield observer
@@ -88,8 +88,10 @@ def print_end(record: Record, outcome: Outcome, as_json: bool) -> int:
         emit({**head, "poses": run.rows, "results": run.results, EXPIRED: run.constants.get(EXPIRED)})
     else:
         mark = [f"Remark: {run.constants[EXPIRED]}."] if EXPIRED in run.constants else []
-        after = next_steps(run, record.excluded(run.run))
-        click.echo("\n".join([f"{run.run}: {run.state}, {run.extent}", *results_table(run.results), *mark, *after]))
+        step_lines = next_steps(run, record.excluded(run.run))
+        click.echo(
+            "\n".join([f"{run.run}: {run.state}, {run.extent}", *results_table(run.results), *mark, *step_lines])
+        )
     if outcome.error is not None:
         notes(outcome.moving)
         raise outcome.error

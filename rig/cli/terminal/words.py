@@ -91,8 +91,8 @@ def experiment(e: Experiment, data: str) -> list[str]:
     """The next experiment: reason, command, duration, expected result."""
     lines = [f"{'To separate them' if e.separates else 'Next experiment'}: {e.why}."]
     if e.command:
-        takes = [duration(e.duration_s)] if e.duration_s else []
-        lines += [f"    {e.command}", f"    {', '.join([*takes, _brings(e.expected, data)])}"]
+        duration_words = [duration(e.duration_s)] if e.duration_s else []
+        lines += [f"    {e.command}", f"    {', '.join([*duration_words, _brings(e.expected, data)])}"]
     return lines
 
 
@@ -102,9 +102,11 @@ def _brings(expected: Expected | None, data: str) -> str:
         return "its result cannot be predicted"
     from calibrations.design.expected import pairs_separated
 
-    alone = expected.probability_alone >= CERTAIN_PROBABILITY
-    value = expected.alone if alone else expected.together
-    source = "from its own data" if alone else f"from all data: rig discover {data.replace(' + ', ' ')} NEW-RUN"
+    suffices_alone = expected.probability_alone >= CERTAIN_PROBABILITY
+    value = expected.alone if suffices_alone else expected.together
+    source = (
+        "from its own data" if suffices_alone else f"from all data: rig discover {data.replace(' + ', ' ')} NEW-RUN"
+    )
     chance = min(100 * pairs_separated(value), 99.9)
     return (
         f"separation {math.sqrt(value):.3g} standard deviations, correct with a probability of {chance:.3g} %, {source}"

@@ -89,13 +89,13 @@ class PublishingObserver(Observer):
         self._observer.guide(guidance)
         self._publish(self._writer.guide, guidance)
 
-    def expect(self, total: int, done: int) -> None:
-        self._observer.expect(total, done)
-        self._publish(self._writer.expect, total, done)
+    def expect(self, total: int, recorded_poses: int) -> None:
+        self._observer.expect(total, recorded_poses)
+        self._publish(self._writer.expect, total, recorded_poses)
 
-    def kept(self, kept: Kept) -> None:
-        self._observer.kept(kept)
-        self._publish(self._writer.kept, kept)
+    def kept(self, recorded: Kept) -> None:
+        self._observer.kept(recorded)
+        self._publish(self._writer.kept, recorded)
 
     def read(self, reading: Reading) -> None:
         self._observer.read(reading)
@@ -156,8 +156,8 @@ def go_on(run: str, procedure: str, bench_file: Path | None, attended: bool) -> 
 def _begin(order: Order) -> str:
     file(order.key, "log").parent.mkdir(parents=True, exist_ok=True)
     with lease(home(), STARTING, "the start of a run"):
-        if (other := latest()) is not None and other.phase != "ended":
-            raise Busy(f"{other.procedure} is in progress since {begun(other)}; stop it, or wait until it ends")
+        if (current := latest()) is not None and current.phase != "ended":
+            raise Busy(f"{current.procedure} is in progress since {begun(current)}; stop it, or wait until it ends")
         bench = order.bench().name
         tidy()
         os.mkfifo(file(order.key, "answers"))

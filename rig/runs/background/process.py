@@ -51,22 +51,22 @@ class Attendant(StatusWriter):
         """Wait at rest for the decision of a person. A second wish for a pause changes nothing."""
         by_a_person = isinstance(outcome.error, Stopped)
         self.publish(error="" if by_a_person else str(outcome.error), moving=outcome.moving)
-        before = signal.signal(PAUSE, signal.SIG_IGN)
+        handler = signal.signal(PAUSE, signal.SIG_IGN)
         decision = cast(Decision, self._answer(WISHES, "resume", "paused"))
-        signal.signal(PAUSE, before)  # after another signal the caller restores all of them
+        signal.signal(PAUSE, handler)  # after another signal the caller restores all of them
         return decision
 
     def _answer(self, question: Question, proposed: str, phase: str) -> str:
         """Ask until the question accepts the answer."""
         question_shown = open_question(question, proposed)
-        with _pipe(self._order.key) as heard:  # open before the status shows the question
+        with _pipe(self._order.key) as receive:  # open before the status shows the question
             while True:
                 self.publish(phase=phase, asked=question_shown)
-                message = heard()
+                message = receive()
                 try:
                     checked = question.checked(message["text"]) if message.get("name") == question.name else None
-                except BadAnswer as refused:
-                    question_shown = replace(question_shown, refused=str(refused))
+                except BadAnswer as error:
+                    question_shown = replace(question_shown, refused=str(error))
                     continue
                 if checked is not None:
                     self.publish(phase="running", asked=None)

@@ -87,7 +87,7 @@ Seat = Literal["page", "terminal", "nobody"]
 
 
 @dataclass(frozen=True)
-class Asked:
+class OpenQuestion:
     """A question to a person. `proposed`: answer of the simulated technician. `refused`: fault of the last answer.
 
     `attitude`: the mounting, for a question about it; keywords of `rig.drawings.Attitude`.
@@ -121,7 +121,7 @@ class Status:
     total: int = 0
     left: str = ""
     values: Sequence[Mapping[str, Any]] = ()
-    asked: Asked | None = None
+    asked: OpenQuestion | None = None
     error: str = ""
     moving: Sequence[str] = ()
     state: str = ""
@@ -153,7 +153,7 @@ def _published(key: str) -> Status | None:
     except FileNotFoundError:
         return None
     question = document.pop("asked")
-    return Status(**document, asked=Asked(**question) if question else None)
+    return Status(**document, asked=OpenQuestion(**question) if question else None)
 
 
 def _killed(status: Status) -> Status:
@@ -163,7 +163,7 @@ def _killed(status: Status) -> Status:
     if not status.run:
         return status
     with suppress(RigError, OSError):
-        with Record.to_find(status.run, own=True) as record:
+        with Record.to_find(status.run, local_only=True) as record:
             run = record.run(status.run)
         if run.state == "complete":
             status = replace(status, state=run.state, error="")
@@ -172,9 +172,9 @@ def _killed(status: Status) -> Status:
     return status
 
 
-def _stored(run: Run, done: int, total: int) -> int:
+def _stored(run: Run, counted: int, total: int) -> int:
     """The poses of a run that has ended. A signal can come before a stored one is counted."""
-    return max(run.rows, done) if total else 0
+    return max(run.rows, counted) if total else 0
 
 
 def _is_starting(status: Status) -> bool:
@@ -257,8 +257,8 @@ class StatusWriter(RunViewer):
 
     def ended(self, run: Run, error: str, **changes: Any) -> None:
         """Write the last status, with the poses of the record."""
-        done = _stored(run, self.view.progress.done, self.view.progress.total)
-        self.view = replace(self.view, progress=replace(self.view.progress, done=done))
+        recorded_poses = _stored(run, self.view.progress.done, self.view.progress.total)
+        self.view = replace(self.view, progress=replace(self.view.progress, done=recorded_poses))
         self.publish(phase="ended", state=run.state, asked=None, error=error, **changes)
 
     def begun(self, run: str) -> None:
@@ -271,10 +271,10 @@ class StatusWriter(RunViewer):
             self.publish()
 
 
-def open_question(question: Question, proposed: str) -> Asked:
+def open_question(question: Question, proposed: str) -> OpenQuestion:
     """A question in the form of the status."""
-    drawn = drawing_of(question)
+    drawing = drawing_of(question)
     yes_or_no = ("yes", "no") if isinstance(question, Confirm) else ()
     choices = question.choices if isinstance(question, Choice) else yes_or_no
-    attitude = asdict(drawn) if drawn else None
-    return Asked(question.name, question.text, question.accepts, choices, proposed, attitude=attitude)
+    attitude = asdict(drawing) if drawing else None
+    return OpenQuestion(question.name, question.text, question.accepts, choices, proposed, attitude=attitude)

@@ -22,7 +22,7 @@ from rig.record import Record
 from rig.services.charts import deviations, difference, differences, residuals
 from rig.services.request import Request
 from rig.services.search import Cancelled
-from rig.services.two_runs import Pair, again, both, parameters_of, results_of
+from rig.services.two_runs import Pair, fit_both, match_poses, parameters_of, results_of
 from rig.web.calculations import Visit
 from rig.web.desk import Desk, models
 from rig.web.frame import Key, frame
@@ -87,7 +87,7 @@ class Pictures:
 
 def _of_rows(first: Fit, second: Fit) -> Comparison:
     """Residuals, and the difference of the measurements at common poses."""
-    shared = again(first, second)
+    shared = match_poses(first, second)
     columns, second_choices = choices(first), choices(second)
     x, _ = first_choices([name for name in columns if name in second_choices], first.table)
 
@@ -142,7 +142,7 @@ def register(desk: Desk) -> None:
                 notes: list[str] = []
                 one, other = (Request(data, model or None, desk.bench_file) for data in (first, second))
                 try:
-                    data, *found = await visit.work(both, one, other, notes.append)
+                    data, *found = await visit.work(fit_both, one, other, notes.append)
                 except Cancelled:
                     fitted.clear()
                     with state("The comparison was cancelled"):

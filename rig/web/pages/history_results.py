@@ -21,7 +21,15 @@ from rig.services.charts import life_of
 from rig.services.control import OUT
 from rig.services.history import Calibration, History, Quantity, changes, closest, stale
 from rig.services.history_comparison import Compared, compare_days, compare_rigs, compare_sensors
-from rig.services.history_words import agreements, but_stale, chart_verdict, near, next_due, significance, summary
+from rig.services.history_words import (
+    agreements,
+    but_stale,
+    chart_verdict,
+    closest_text,
+    next_due,
+    significance,
+    summary,
+)
 from rig.services.provenance import today
 from rig.web.calculations import off_loop
 from rig.web.parts import Link, box, div, failed, for_page, table, words
@@ -307,7 +315,7 @@ class ClosestBox:
         calibration, age_days = closest(history.calibrations, self.day)
         why = stale(history, calibration, age_days)
         with self.text_box:
-            words(near(calibration, age_days, self.day), "small")
+            words(closest_text(calibration, age_days, self.day), "small")
             if why is not None:
                 with box("note"):
                     words(for_page(but_stale(why)), "small")

@@ -79,7 +79,7 @@ class CertificateDialog(Asking):
     def made(self) -> tuple[bytes | str, str, list[str]]:
         """The certificate of the present model."""
         from rig.bench import read_bench
-        from rig.services.certify import Certified, certificate_head, certified, failed_results, written
+        from rig.services.certify import Certified, certificate_head, certified, failed_results, format_certificate
 
         session, form = self.session, str(self.form.value)
         of = Certified(
@@ -95,7 +95,7 @@ class CertificateDialog(Asking):
         failed = failed_results(document)
         lines = [certificate_head(document), *document.figures.remarks, *document.remarks]
         lines += [f"Beyond its limit: {name}" for name in failed]
-        return written(document, form), f"{document.number}{form}", lines
+        return format_certificate(document, form), f"{document.number}{form}", lines
 
 
 class CompensationDialog(Asking):

@@ -15,7 +15,7 @@ from nicegui import ui
 
 from rig.drawings import Attitude, page, strip
 from rig.runs.background import control
-from rig.runs.background.status import NOT_BEGUN, Asked, Status
+from rig.runs.background.status import NOT_BEGUN, OpenQuestion, Status
 from rig.runs.signals import STOPPED_BY
 from rig.web.calculations import off_loop
 from rig.web.frame import control_run
@@ -176,7 +176,7 @@ class Live:
             elif status.error:
                 failed("Reason for the end", RESUME.sub("Resume", status.error))
 
-    def _ask(self, question: Asked | None, here: bool) -> None:
+    def _ask(self, question: OpenQuestion | None, here: bool) -> None:
         self.question.clear()
         if question is None:
             return
@@ -192,7 +192,7 @@ class Live:
             else:
                 words("Answer this question in the terminal of the run.", "quiet")
 
-    def _answers(self, question: Asked) -> None:
+    def _answers(self, question: OpenQuestion) -> None:
         """A button for each choice, or a field."""
         with div("row-of"):
             for choice in question.choices:
