@@ -28,7 +28,7 @@ from calibrations.presentation.charts.discovery import (
     brief,
     effect_chart,
     levels,
-    tested_steps,
+    notable_steps,
     waterfall,
 )
 from calibrations.presentation.charts.noise import ratio
@@ -315,7 +315,7 @@ def test_only_the_greatest_falls_are_drawn() -> None:
     (step,) = warm().steps
     idle = [Step(f"e{k}", step.after, step.after) for k in range(MOST_CURVES)]
     findings = replace(warm().findings, steps=(*idle[:2], step, *idle[2:]))
-    shown = tested_steps(Discovery.of(findings))
+    shown = notable_steps(Discovery.of(findings))
     assert step in shown
 
 

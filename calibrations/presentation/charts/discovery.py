@@ -150,7 +150,7 @@ def steps_album(discovery: Discovery[Fit]) -> list[Picture]:
     )
     return [
         Picture("waterfall", "Error by model", fall, waterfall(levels(discovery))),
-        *(_curve(step, discovery) for step in tested_steps(discovery)),
+        *(_curve(step, discovery) for step in notable_steps(discovery)),
         *place_pictures(discovery),
     ]
 
@@ -165,7 +165,7 @@ def _evaluated(motion: MotionResult) -> Picture:
     return Picture("evaluation", "Both models and the displacement sensor", caption, evaluation(motion))
 
 
-def tested_steps(discovery: Discovery[Fit]) -> tuple[Step[Fit], ...]:
+def notable_steps(discovery: Discovery[Fit]) -> tuple[Step[Fit], ...]:
     """The effects that reduced the error most, in the order added; where none was kept, the best that was tried."""
     if not discovery.steps:
         return discovery.findings.tried[:1]
