@@ -28,17 +28,19 @@ class ModelState:
     @property
     def address(self) -> str:
         """The address, without what is empty. No added effect at all is an empty `add`."""
-        added = list(self.added) or [""] if self.added is not None else []
+        added_effects = list(self.added) or [""] if self.added is not None else []
         fields = [("data", self.data), ("model", self.model), ("select", ranges(self.selected)), ("noise", self.noise)]
-        query = urlencode([*((name, value) for name, value in fields if value), *(("add", text) for text in added)])
+        query = urlencode(
+            [*((name, value) for name, value in fields if value), *(("add", text) for text in added_effects)]
+        )
         return f"/?{query}" if query else "/"
 
 
 def parse_state(query: QueryParams) -> ModelState:
     """The state of an address. A selection that cannot be read is none."""
-    added = tuple(text for text in query.getlist("add") if text) if "add" in query else None
+    added_effects = tuple(text for text in query.getlist("add") if text) if "add" in query else None
     selected = numbers(query.get("select", ""))
-    return ModelState(query.get("data", ""), query.get("model", ""), added, selected, query.get("noise", ""))
+    return ModelState(query.get("data", ""), query.get("model", ""), added_effects, selected, query.get("noise", ""))
 
 
 def ranges(selected: Sequence[int]) -> str:

@@ -121,6 +121,6 @@ def _settled(future: Future[R], work: Callable[[], R]) -> None:
                 future.set_exception(error)
             else:
                 future.set_result(result)
-    except Cancelled as late:  # it came after the end of the work
+    except Cancelled as cancellation:  # it came after the end of the work
         if not future.done():
-            future.set_exception(late)
+            future.set_exception(cancellation)

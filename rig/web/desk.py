@@ -39,11 +39,13 @@ class Desk:
     sessions: OrderedDict[tuple[str, str, str], ModelSession[Any]] = field(default_factory=OrderedDict)
     reports: OrderedDict[str, str] = field(default_factory=OrderedDict)
 
-    def open(self, data: str, model: str, added: Sequence[str] | None = None, noise: str = "") -> ModelSession[Any]:
+    def open(
+        self, data: str, model: str, added_effects: Sequence[str] | None = None, noise: str = ""
+    ) -> ModelSession[Any]:
         """The open session if its data and model are still the same, else a new one with the same added effects.
 
-        `model` "" is the default model, `noise` "" the noise of the data's own samples. `added`: exactly these effects;
-        None for those of the open session, or of the one that an earlier server kept. Raises the errors of
+        `model` "" is the default model, `noise` "" the noise of the data's own samples. `added_effects`: exactly these;
+        None for those of the open session, or of the one that an earlier server stored. Raises the errors of
         `model_session`.
         """
         from rig.services.content import content_of
@@ -53,12 +55,12 @@ class Desk:
         session = self.sessions.get((data, model, noise))
         if session is None:
             session = model_session(Request(data, model or None, self.bench_file, noise or None))
-            if added is None:
+            if added_effects is None:
                 session = session.with_added(kept_effects(data, model, noise))
         elif session.content.key != content_of(data, model or None).key:
             session = brought_up_to_date(session)
-        if added is not None:
-            session = session.with_added(added)
+        if added_effects is not None:
+            session = session.with_added(added_effects)
         self.keep(data, model, session, noise)
         return session
 
@@ -96,18 +98,18 @@ class Desk:
 
 def kept_effects(data: str, model: str, noise: str = "") -> list[str]:
     """The added effects of an earlier server's session; empty without one."""
-    return _kept().get(_name(data, model, noise), [])
+    return _stored_effects().get(_name(data, model, noise), [])
 
 
-def keep_effects(data: str, model: str, added: Sequence[str], noise: str = "") -> None:
+def keep_effects(data: str, model: str, added_effects: Sequence[str], noise: str = "") -> None:
     """Store the added effects of a session. Where this is not possible, a restart forgets them."""
-    names = _kept()
+    names = _stored_effects()
     name = _name(data, model, noise)
-    if names.get(name, []) == list(added):
+    if names.get(name, []) == list(added_effects):
         return
     names.pop(name, None)
-    if added:
-        names[name] = list(added)
+    if added_effects:
+        names[name] = list(added_effects)
     with suppress(OSError):
         write_whole(home() / SESSIONS, json.dumps(dict(list(names.items())[-MOST_KEPT:]), indent=1))
 
@@ -116,7 +118,7 @@ def _name(data: str, model: str, noise: str) -> str:
     return f"{data} {model} noise={noise}" if noise else f"{data} {model}"
 
 
-def _kept() -> dict[str, list[str]]:
+def _stored_effects() -> dict[str, list[str]]:
     try:
         document = json.loads((home() / SESSIONS).read_text(encoding="utf-8"))
         return {str(name): [str(text) for text in texts] for name, texts in document.items()}
@@ -141,12 +143,12 @@ def lab_read() -> str | None:
     return masked_url(lab_url(url, RECORD))
 
 
-def models(chosen: str = "", default: str = "by kind of data") -> dict[str, str]:
+def models(selected: str = "", default: str = "by kind of data") -> dict[str, str]:
     """The available models by name or file, with their labels; "" is the default model."""
     from calibrations.model.file import shipped_names
 
     labels = {"": default, **{name: name for name in shipped_names()}, **saved_models()}
-    return labels if chosen in labels else {**labels, chosen: chosen}
+    return labels if selected in labels else {**labels, selected: selected}
 
 
 def noise_models() -> dict[str, str]:

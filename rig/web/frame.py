@@ -66,24 +66,24 @@ class Strip:
             title = TITLE if self.title else ""
         else:
             share = f"{100 * status.done // status.total} % " if status.total else ""
-            asks = "❗ " if status.phase in ("asking", "paused") else ""
-            title = f"{asks}{share}{status.procedure} {PHASES[status.phase]}"
+            attention = "❗ " if status.phase in ("asking", "paused") else ""
+            title = f"{attention}{share}{status.procedure} {PHASES[status.phase]}"
         if title != self.title:
             self.title = title
             ui.page_title(title)
 
 
-def news(before: Status | None, now: Status) -> tuple[str, str] | None:
+def news(previous: Status | None, present: Status) -> tuple[str, str] | None:
     """What a notification says: the run asks, is paused, or has ended since the last look; None for no news."""
-    same = before is not None and before.key == now.key
-    if before is not None and same and before.phase == now.phase and before.asked == now.asked:
+    same_run = previous is not None and previous.key == present.key
+    if previous is not None and same_run and previous.phase == present.phase and previous.asked == present.asked:
         return None
-    if now.phase == "asking" and now.asked is not None:
-        return f"{now.procedure} asks you", now.asked.text
-    if now.phase == "paused":
-        return f"{now.procedure} is paused", now.error or "Continue it or stop it on the page Run."
-    if now.phase == "ended" and same:
-        return f"{now.procedure}: {now.state or 'ended'}", f"{now.run} {now.error}".strip()
+    if present.phase == "asking" and present.asked is not None:
+        return f"{present.procedure} asks you", present.asked.text
+    if present.phase == "paused":
+        return f"{present.procedure} is paused", present.error or "Continue it or stop it on the page Run."
+    if present.phase == "ended" and same_run:
+        return f"{present.procedure}: {present.state or 'ended'}", f"{present.run} {present.error}".strip()
     return None
 
 
@@ -121,19 +121,21 @@ def _bell() -> None:
         ui.tooltip("Notify me when a run asks or ends")
 
     def answered(event: GenericEventArguments) -> None:
-        said = str(event.args)
-        ui.notify(ANSWERS.get(said, ANSWERS["default"]), type="positive" if said == "granted" else "warning")
+        permission = str(event.args)
+        ui.notify(
+            ANSWERS.get(permission, ANSWERS["default"]), type="positive" if permission == "granted" else "warning"
+        )
 
     button.on("click", answered, js_handler=ASK)
 
 
-def control_run(how: Callable[[Status], None]) -> None:
+def control_run(action: Callable[[Status], None]) -> None:
     """Apply an action to the present run; show a message if it is not possible."""
     status = control.latest()
     if status is None:
         return
     try:
-        how(status)
+        action(status)
     except RigError as error:
         ui.notify(message(error), type="warning")
 
@@ -167,7 +169,7 @@ def static_files() -> None:
 
 
 @contextmanager
-def frame(desk: Desk, here: str) -> Iterator[dict[str, Key]]:
+def frame(desk: Desk, path: str) -> Iterator[dict[str, Key]]:
     """The head of a page; the body adds content and keys."""
     keys = {
         str(k): Key(f"go to {title}", partial(ui.navigate.to, to)) for k, (to, title) in enumerate(PAGES.items(), 1)
@@ -179,7 +181,7 @@ def frame(desk: Desk, here: str) -> Iterator[dict[str, Key]]:
             ui.label(TITLE)
         with ui.element("nav").classes("ways"):
             for to, title in PAGES.items():
-                ui.link(title, to).classes("here" if to == here else "")
+                ui.link(title, to).classes("here" if to == path else "")
         if (lab := lab_read()) is not None:
             ui.label(f"record: {lab}").classes("quiet small")
         ui.element("div").classes("space")
@@ -236,9 +238,9 @@ def _keys(keys: Mapping[str, Key]) -> None:
         if event.key.name == "?":
             listed()
         elif (key := keys.get(event.key.name)) is not None:
-            done = key.act()
-            if done is not None:
-                await done
+            pending = key.act()
+            if pending is not None:
+                await pending
 
     ui.keyboard(on_key=pressed, ignore=["input", "select", "textarea"])
     ui.keyboard(on_key=anywhere, ignore=[])

@@ -88,8 +88,8 @@ class Guard:
 
 def names(host: str, port: int) -> frozenset[str]:
     """The host names of a server at `host` and `port`."""
-    own: Iterable[str] = ("127.0.0.1", "localhost") if host in ("127.0.0.1", "localhost") else (host,)
-    return frozenset(f"{name}:{port}" for name in own)
+    host_names: Iterable[str] = ("127.0.0.1", "localhost") if host in ("127.0.0.1", "localhost") else (host,)
+    return frozenset(f"{name}:{port}" for name in host_names)
 
 
 def _cookies(headers: Mapping[str, str]) -> Mapping[str, str]:
@@ -107,12 +107,12 @@ def _with_headers(send: Send) -> Send:
     return sending
 
 
-async def _refuse(scope: Scope, send: Send, status: int, why: str) -> None:
+async def _refuse(scope: Scope, send: Send, status: int, reason: str) -> None:
     if scope["type"] == "websocket":
-        await send({"type": "websocket.close", "code": 1008, "reason": why[:100]})
+        await send({"type": "websocket.close", "code": 1008, "reason": reason[:100]})
         return
     if scope["path"] == "/favicon.ico":  # a browser asks for it by itself, and would log a refusal as an error
-        status, why = 204, ""
+        status, reason = 204, ""
     headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"cache-control", b"no-store"), *HEADERS]
     await send({"type": "http.response.start", "status": status, "headers": headers})
-    await send({"type": "http.response.body", "body": why.encode()})
+    await send({"type": "http.response.body", "body": reason.encode()})

@@ -54,12 +54,12 @@ def words(text: str, classes: str = "") -> ui.label:
 
 
 @contextmanager
-def state(title: str, why: str = "", kind: str = "") -> Iterator[None]:
+def state(title: str, advice: str = "", kind: str = "") -> Iterator[None]:
     """A box for missing content that says what to do; the body adds buttons."""
     with box(f"state {kind}").props("role=status"):
         words(title, "title")
-        if why:
-            words(why, "why quiet")
+        if advice:
+            words(advice, "why quiet")
         with div("row-of"):
             yield
 
@@ -71,9 +71,9 @@ def waiting(text: str) -> ui.label:
         return words(text, "quiet")
 
 
-def failed(title: str, why: str | Exception, data: str = "", to: Mapping[str, str] | None = None) -> None:
+def failed(title: str, reason: str | Exception, data: str = "", to: Mapping[str, str] | None = None) -> None:
     """An error message. `data`: the run or file that it is about; `to`: addresses of more buttons by their labels."""
-    step = page_step(why if isinstance(why, str) else raw_message(why), data)
+    step = page_step(reason if isinstance(reason, str) else raw_message(reason), data)
     with box("error").props("role=alert"):
         words(title, "title")
         words(for_page(step.text), "why quiet").style("white-space: pre-wrap")

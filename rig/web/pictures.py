@@ -50,8 +50,8 @@ def downloads(plot: Callable[[], ui.plotly | None], name: str) -> None:
 async def _download(plot: Callable[[], ui.plotly | None], name: str, form: str) -> None:
     from calibrations.presentation import static
 
-    drawn = plot()
-    chart = _CHARTS.get(drawn) if drawn is not None else None
+    picture = plot()
+    chart = _CHARTS.get(picture) if picture is not None else None
     if chart is None:
         ui.notify("This picture is not drawn yet.", type="warning")
         return

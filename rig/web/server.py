@@ -115,9 +115,9 @@ def _ignored_signals() -> Iterator[None]:
 
     def ignore(number: int, frame: FrameType | None) -> None: ...
 
-    before = {number: signal.signal(number, ignore) for number in (signal.SIGINT, signal.SIGTERM)}
+    handlers = {number: signal.signal(number, ignore) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
-        for number, handler in before.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)

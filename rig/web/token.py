@@ -22,15 +22,15 @@ def kept_token(new: bool = False) -> str:
     Where it cannot be kept, for example on a full disk, it is for this start only.
     """
     path = home() / NAME
-    if not new and (kept := _read(path)) is not None:
-        return kept
+    if not new and (stored := _read_token(path)) is not None:
+        return stored
     token = secrets.token_urlsafe(BYTES)
     with suppress(OSError):
         _write(path, token)
     return token
 
 
-def _read(path: Path) -> str | None:
+def _read_token(path: Path) -> str | None:
     """The token in a file that only its owner can read, else None."""
     try:
         text = path.read_text(encoding="ascii").strip()

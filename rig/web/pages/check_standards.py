@@ -12,7 +12,7 @@ from rig.errors import RecordError
 from rig.record import Run
 from rig.services.control import HEAD, OUT, PROCEDURE, controlled, row, signals, worst
 from rig.services.history import when
-from rig.web.pages.history_results import CLICKED, bare
+from rig.web.pages.history_results import CLICKED, untitled
 from rig.web.parts import box, div, failed, for_page, table, wide_table, words
 from rig.web.pictures import downloads, draw, empty_plot
 
@@ -63,7 +63,7 @@ class CheckStandards:
     def draw(self) -> None:
         """Draw the charts of the chosen quantity."""
         for title, panel in self._panels().items():
-            draw(self.plots[title], bare(panel), f"{title} {self.chosen.value}")
+            draw(self.plots[title], untitled(panel), f"{title} {self.chosen.value}")
 
     def _panels(self) -> dict[str, Panel]:
         standard = self.standards[int(self.chosen.value or 0)]

@@ -92,9 +92,9 @@ def _of_rows(first: Fit, second: Fit) -> Comparison:
     x, _ = first_choices([name for name in columns if name in second_choices], first.table)
 
     def draw(c: int, in_sensed: bool) -> Sequence[Chart]:
-        one, other = ChannelResidual(first, c, in_sensed), ChannelResidual(second, c, in_sensed)
-        made = [residuals(one, other, columns[x], second_choices[x])]
-        return made if shared is None else [*made, difference(one, shared)]
+        first_channel, second_channel = ChannelResidual(first, c, in_sensed), ChannelResidual(second, c, in_sensed)
+        charts = [residuals(first_channel, second_channel, columns[x], second_choices[x])]
+        return charts if shared is None else [*charts, difference(first_channel, shared)]
 
     titles = [RESIDUALS] if shared is None else [RESIDUALS, DIFFERENCE]
     axes = [name for name in first.channels if name in second.channels]
@@ -109,8 +109,8 @@ def _of_noise(first: NoiseFit, second: NoiseFit) -> Comparison:
 
     def draw(c: int, in_sensed: bool) -> Sequence[Chart]:
         axis = axes[c]
-        into = (scaled(first.still, axis, in_sensed), scaled(second.still, axis, in_sensed))
-        return [deviations([by_axis[axis] for by_axis in curves], into)]
+        units = (scaled(first.still, axis, in_sensed), scaled(second.still, axis, in_sensed))
+        return [deviations([by_axis[axis] for by_axis in curves], units)]
 
     return Comparison(axes, offered, [ALLAN], draw)
 
@@ -140,9 +140,11 @@ def register(desk: Desk) -> None:
                     waiting("Fitting one model to both")
                     ui.button("Cancel", icon="close", on_click=visit.cancel).props("dense flat")
                 notes: list[str] = []
-                one, other = (Request(data, model or None, desk.bench_file) for data in (first, second))
+                first_request, second_request = (
+                    Request(data, model or None, desk.bench_file) for data in (first, second)
+                )
                 try:
-                    data, *found = await visit.work(fit_both, one, other, notes.append)
+                    data, *fits = await visit.work(fit_both, first_request, second_request, notes.append)
                 except Cancelled:
                     fitted.clear()
                     with state("The comparison was cancelled"):
@@ -153,8 +155,8 @@ def register(desk: Desk) -> None:
                     failed("Cannot fit one model to both", error)
                     return
                 fitted.clear()
-                _parameters(found[0].model.name, parameters_of(*found))
-                pictures = Pictures(PICTURES[data.form](*found))
+                _parameters(fits[0].model.name, parameters_of(*fits))
+                pictures = Pictures(PICTURES[data.form](*fits))
                 for note in dict.fromkeys(notes):
                     noted(note)
             keys["x"] = Key("next axis", pictures.next_axis)
@@ -166,9 +168,9 @@ def register(desk: Desk) -> None:
 def _head(first: str, second: str, model: str) -> None:
     """The two runs, the model, and a button that swaps the runs."""
 
-    def to(one: str, other: str, by: str) -> None:
-        given = {"first": one, "second": other, **({"model": by} if by else {})}
-        ui.navigate.to(f"/compare?{urlencode(given)}")
+    def to(first_data: str, second_data: str, by: str) -> None:
+        query = {"first": first_data, "second": second_data, **({"model": by} if by else {})}
+        ui.navigate.to(f"/compare?{urlencode(query)}")
 
     with box("row-of chosen"):
         with div("grow"):
@@ -188,8 +190,8 @@ def _results(first: str, second: str) -> None:
     names = [data.partition("/") for data in (first, second)]
     try:
         with Record.to_find(names[0][0]) as record:
-            one, other = (record.run(run) for run, _, _ in names)
-        pairs = results_of(one, other, (names[0][2], names[1][2]))
+            first_run, second_run = (record.run(run) for run, _, _ in names)
+        pairs = results_of(first_run, second_run, (names[0][2], names[1][2]))
     except Exception as error:
         failed("Cannot compare the results", error)
         return

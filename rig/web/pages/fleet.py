@@ -43,8 +43,8 @@ class FleetPage:
         self.done = ""
         with box("chosen"):
             self.source = ui.input("Folder or index; empty: the record", value=source).classes("data").props("dense")
-            known = {name: label for name, label in models(model).items() if name}
-            self.model = ui.select(known, label="Model", value=model).props("dense options-dense")
+            model_labels = {name: label for name, label in models(model).items() if name}
+            self.model = ui.select(model_labels, label="Model", value=model).props("dense options-dense")
             self.buttons = [
                 ui.button("Find missing effects", icon="search", on_click=partial(self.show, discovered)),
                 ui.button("Calibrate", icon="straighten", on_click=partial(self.show, calibrated)),
@@ -66,7 +66,7 @@ class FleetPage:
         self.done = ""
         try:
             source, model = str(self.source.value or "").strip(), str(self.model.value)
-            text = await off_loop(analyse, [source] if source else [], model, self.desk.bench_file, self._tell)
+            text = await off_loop(analyse, [source] if source else [], model, self.desk.bench_file, self._show_progress)
         except Cancelled:
             return
         except Exception as error:
@@ -83,9 +83,9 @@ class FleetPage:
                 )
             ui.html(framed("Report on the fleet", text), sanitize=False)
 
-    def _tell(self, done: int, of: int) -> None:
+    def _show_progress(self, count: int, of: int) -> None:
         self.visit.check()
-        self.done = f"{done} of {of} sensors analysed"
+        self.done = f"{count} of {of} sensors analysed"
 
     def _end(self, timer: ui.timer) -> None:
         timer.cancel()
@@ -94,18 +94,20 @@ class FleetPage:
             button.enable()
 
 
-def discovered(sources: list[str], model: str, bench_file: Any, tell: Tell) -> str:
+def discovered(sources: list[str], model: str, bench_file: Any, notify: Tell) -> str:
     """The report of `rig fleet discover`."""
     from rig.fleet.discover import discover_fleet
     from rig.fleet.documents import population_page
     from rig.fleet.worker import Question, effects_of, own_files
 
-    own = own_files(bench_file)
-    start = Question("look", dump_model(read_model(model, effects_of(own))), own=own)
-    return _asked(sources, tell, lambda fleet, members: population_page(discover_fleet(fleet, members, start), model))
+    effect_files = own_files(bench_file)
+    start = Question("look", dump_model(read_model(model, effects_of(effect_files))), own=effect_files)
+    return _fleet_page(
+        sources, notify, lambda fleet, members: population_page(discover_fleet(fleet, members, start), model)
+    )
 
 
-def calibrated(sources: list[str], model: str, bench_file: Any, tell: Tell) -> str:
+def calibrated(sources: list[str], model: str, bench_file: Any, notify: Tell) -> str:
     """The report of `rig fleet calibrate`."""
     from rig.fleet.calibrate import calibrate_fleet, read_guide
     from rig.fleet.documents import calibration_page
@@ -115,14 +117,14 @@ def calibrated(sources: list[str], model: str, bench_file: Any, tell: Tell) -> s
         guide = read_guide(model, {member.batch for member in members}, own_files(bench_file))
         return calibration_page(calibrate_fleet(fleet, members, guide), model)
 
-    return _asked(sources, tell, page)
+    return _fleet_page(sources, notify, page)
 
 
-def _asked(sources: list[str], tell: Tell, page: Callable[[Any, list[Member]], str]) -> str:
+def _fleet_page(sources: list[str], notify: Tell, page: Callable[[Any, list[Member]], str]) -> str:
     """The page that the workers' answers make. Raises RigError, FleetError."""
     from rig.fleet.crew import crew
     from rig.fleet.questions import Fleet
 
     members = fleet_of(sources)
     with Record() as record, crew(None, None) as client:
-        return page(Fleet(client, record, tell), members)
+        return page(Fleet(client, record, notify), members)

@@ -57,9 +57,9 @@ NONE = (
 )
 
 
-def listed(known: Mapping[str, list[Run]]) -> None:
+def sensor_table(runs_by_sensor: Mapping[str, list[Run]]) -> None:
     """A table of the sensors, with links to their histories."""
-    if not known:
+    if not runs_by_sensor:
         with state("No sensor has a calibration yet", NONE):
             ui.button("Measure", icon="play_arrow", on_click=lambda: ui.navigate.to("/run?procedure=sweep"))
         return
@@ -72,7 +72,7 @@ def listed(known: Mapping[str, list[Run]]) -> None:
             words("Sensors", "title grow")
             ui.button("Fleet", icon="grid_view", on_click=lambda: ui.navigate.to("/fleet")).props("outline dense")
         search = ui.input("Search: serial number or name").props("dense clearable")
-        rows = [_row(sensor, runs) for sensor, runs in known.items()]
+        rows = [_row(sensor, runs) for sensor, runs in runs_by_sensor.items()]
         table = ui.table(rows=rows, columns=COLUMNS, row_key="sensor", pagination=PAGE).props(
             "flat dense rows-per-page-label='Sensors per page'"
         )
@@ -101,16 +101,16 @@ def register(desk: Desk) -> None:
     def page(request: Request) -> None:
         with frame(desk, "/history") as keys:
             try:
-                found = runs()
-                wanted, known = parse_request(request.query_params), calibrating(found)
+                all_runs = runs()
+                history_request, runs_by_sensor = parse_request(request.query_params), calibrating(all_runs)
             except Exception as error:
                 failed("Cannot show this page", error)
                 return
-            if not wanted.sensor:
-                listed(known)
-                CheckStandards(found)
+            if not history_request.sensor:
+                sensor_table(runs_by_sensor)
+                CheckStandards(all_runs)
                 return
-            HistoryPage(desk, wanted, list(known), keys)
+            HistoryPage(desk, history_request, list(runs_by_sensor), keys)
 
 
 class HistoryPage:
@@ -178,14 +178,14 @@ class HistoryPage:
         self.show()
 
     def _read(self) -> History:
-        def tell(text: str) -> None:
+        def notify(text: str) -> None:
             self.visit.check()
             self.under_way = text
 
         self.limits = limits_of(self.desk.bench_file)
         model = read_model(self.request.model, effects_of(self.desk.bench_file))
         with Record.to_read() as record:
-            return history(record, self.request.sensor, model, self.limits, self.request.baseline, tell)
+            return history(record, self.request.sensor, model, self.limits, self.request.baseline, notify)
 
     def _last_of(self, sensor: str) -> Calibration:
         """The last calibration of another sensor."""
@@ -204,8 +204,8 @@ class HistoryPage:
             self.tables = div("stack")
             if history.passed_over:
                 with ui.expansion(f"{len(history.passed_over)} runs not used").props("dense").classes("box"):
-                    for data, why in history.passed_over.items():
-                        words(f"{data}: {why}", "small")
+                    for data, reason in history.passed_over.items():
+                        words(f"{data}: {reason}", "small")
         self.keys["q"] = Key("next quantity", self._next_quantity)
         self.keys["d"] = Key("calibration closest to a day", self.closest.focus)
 
@@ -240,7 +240,7 @@ class HistoryPage:
         self.limit.label = f"Largest change of {q.name} ({q.unit})"
         self.limit.set_value(self.request.limits.get(q.name))
 
-    def _now(self, request: HistoryRequest) -> None:
+    def _apply(self, request: HistoryRequest) -> None:
         """Apply a changed request to the same calibrations."""
         if request != self.request and self.found is not None:
             self.request = request
@@ -249,20 +249,20 @@ class HistoryPage:
 
     def _other_quantity(self) -> None:
         if self.quantity.value:
-            self._now(replace(self.request, quantity=self.quantity.value))
+            self._apply(replace(self.request, quantity=self.quantity.value))
 
     def _other_limit(self) -> None:
-        others = {name: each for name, each in self.request.limits.items() if name != self.request.quantity}
-        own = {self.request.quantity: float(self.limit.value)} if self.limit.value else {}
-        self._now(replace(self.request, limits=others | own))
+        other_limits = {name: limit for name, limit in self.request.limits.items() if name != self.request.quantity}
+        own_limit = {self.request.quantity: float(self.limit.value)} if self.limit.value else {}
+        self._apply(replace(self.request, limits=other_limits | own_limit))
 
     def _other_baseline(self) -> None:
         if self.baseline.value and self.baseline.value >= FEWEST_RUNS:
-            self._now(replace(self.request, baseline=int(self.baseline.value)))
+            self._apply(replace(self.request, baseline=int(self.baseline.value)))
 
     def _other_day(self) -> None:
         if (day := self.closest.day) is not None:
-            self._now(replace(self.request, at=day))
+            self._apply(replace(self.request, at=day))
 
     def _next_quantity(self) -> None:
         names = list(self.quantity.options)

@@ -131,8 +131,8 @@ class CompareBox:
         self.result.clear()
         with self.fields:
             if self.kind.value == DAYS:
-                named = (("One day", of[0]), ("Another", of[-1]))
-                self.two = [ui.date_input(name, value=each.day).props("dense") for name, each in named]
+                choices = (("One day", of[0]), ("Another", of[-1]))
+                self.two = [ui.date_input(name, value=calibration.day).props("dense") for name, calibration in choices]
             elif self.kind.value == SENSOR:
                 self.two = [_select("Sensor", self.others, 0)]
             else:
@@ -162,7 +162,7 @@ class CompareBox:
 
 def _show(compared: Compared, model: str) -> None:
     """Show a comparison in numbers; two runs have a link to the compare page."""
-    differing = [name for name, (_, each) in compared.rows.items() if not each.agrees]
+    differing = [name for name, (_, agreement) in compared.rows.items() if not agreement.agrees]
     with div("row-of"):
         words("do not agree" if differing else "agree", f"chip {'bad' if differing else 'good'}")
         words(", ".join(differing) or "in every quantity", "small grow")
@@ -219,15 +219,15 @@ class HistoryPictures:
 
     def show(self, q: Quantity) -> None:
         """Draw all pictures again."""
-        draw(self.life, bare(life(life_of(q))), f"life {q.name}")
+        draw(self.life, untitled(life(life_of(q))), f"life {q.name}")
         self.text_box.set_text(_legend(q))
         self.few.set_visibility(q.chart is None)
         for place in self.boxes:
             place.set_visibility(q.chart is not None)
         if q.chart is not None:
-            days, keys = [each.day for each in q.of], [each.data for each in q.of]
+            days, keys = [calibration.day for calibration in q.of], [calibration.data for calibration in q.of]
             for title, panel in control_panels(q.name, q.chart, q.unit, days, keys).items():
-                draw(self.charts[title], bare(panel), f"{title} {q.name}")
+                draw(self.charts[title], untitled(panel), f"{title} {q.name}")
 
     def _plot(self, title: str) -> ui.plotly:
         plot = empty_plot(title)
@@ -238,7 +238,7 @@ class HistoryPictures:
         ui.navigate.to(model_of(str(event.args), self.model))
 
 
-def bare(panel: Panel) -> Chart:
+def untitled(panel: Panel) -> Chart:
     """The panel without its title, which the page shows above the picture."""
     return single_chart(replace(panel, title="", remark=""))
 
@@ -262,12 +262,14 @@ LIMIT_IS_GIVEN = "the largest change, in the field above"
 
 def summary_of(history: History, q: Quantity) -> None:
     """The date of the next calibration, quantities out of control, and numbers of the shown quantity."""
-    out = [
+    out_of_control = [
         quantity.name for quantity in history.quantities if quantity.chart is not None and quantity.chart.verdict == OUT
     ]
     overdue = history.due is not None and str(history.due) < today()
-    good = history.due is not None and not out and not overdue
-    with box(f"verdict {'bad' if out or overdue else 'good' if good else ''}").props("role=status aria-live=polite"):
+    is_good = history.due is not None and not out_of_control and not overdue
+    with box(f"verdict {'bad' if out_of_control or overdue else 'good' if is_good else ''}").props(
+        "role=status aria-live=polite"
+    ):
         with div("grow standing"):
             with div("row-of"):
                 words(for_page(next_due(history, LIMIT_IS_GIVEN)), "headline")
@@ -276,23 +278,23 @@ def summary_of(history: History, q: Quantity) -> None:
             words(for_page(f"{summary(history)}."), "quiet small")
             for warning in history.warnings:
                 words(for_page(warning), "fault")
-            if out:
-                words(f"{OUT.capitalize()}: {', '.join(out)}.", "small")
+            if out_of_control:
+                words(f"{OUT.capitalize()}: {', '.join(out_of_control)}.", "small")
         with div("row-of numbers"):
-            for what, value in (("drift a year", _drift(q)), ("control charts", chart_verdict(q) or "—")):
+            for title, value in (("drift a year", _drift(q)), ("control charts", chart_verdict(q) or "—")):
                 with div("figure"):
                     words(value, "value")
-                    words(f"{what}, {q.name}", "quiet small")
+                    words(f"{title}, {q.name}", "quiet small")
 
 
 class ClosestBox:
     """The calibration closest to a day, with a warning if it is stale."""
 
-    def __init__(self, request: HistoryRequest, changed: Callable[[], None]) -> None:
+    def __init__(self, request: HistoryRequest, on_change: Callable[[], None]) -> None:
         self.model = request.model
         with box("stack"):
             words("Closest to a day", "title")
-            self.input = ui.date_input("Day", value=str(request.at), on_change=changed).props("dense debounce=300")
+            self.input = ui.date_input("Day", value=str(request.at), on_change=on_change).props("dense debounce=300")
             self.text_box = div("stack").props("role=status")
 
     @property
@@ -313,12 +315,12 @@ class ClosestBox:
         if self.day is None:
             return
         calibration, age_days = closest(history.calibrations, self.day)
-        why = stale(history, calibration, age_days)
+        staleness = stale(history, calibration, age_days)
         with self.text_box:
             words(closest_text(calibration, age_days, self.day), "small")
-            if why is not None:
+            if staleness is not None:
                 with box("note"):
-                    words(for_page(but_stale(why)), "small")
+                    words(for_page(but_stale(staleness)), "small")
             ui.link("Open its model", model_of(calibration.data, self.model)).classes("small")
 
 
@@ -343,10 +345,10 @@ def calibrations_table(history: History, model: str) -> None:
 
 def _row(q: Quantity) -> tuple[str, ...]:
     spelt = unit(q.unit)
-    allowed = "—" if q.allowed is None else minus(f"{q.allowed[0]:.6g} to {q.allowed[1]:.6g} {spelt}")
+    limits_text = "—" if q.allowed is None else minus(f"{q.allowed[0]:.6g} to {q.allowed[1]:.6g} {spelt}")
     scatter = "—" if q.line is None else f"{rounded(q.line.scatter, 2)} {spelt}"
     last = estimate_in_prefix(q.last.value, q.last.std, q.unit)
-    return q.name, last, _drift(q), scatter, chart_verdict(q) or "—", allowed, str(q.due or "—")
+    return q.name, last, _drift(q), scatter, chart_verdict(q) or "—", limits_text, str(q.due or "—")
 
 
 def _drift(q: Quantity) -> str:
@@ -358,11 +360,11 @@ def _drift(q: Quantity) -> str:
 
 def _calibration(calibration: Calibration, history: History, model: str) -> tuple[str | Link, ...]:
     values = (calibration.values.get(q.name) for q in history.quantities)
-    shown = ("—" if value is None else estimate_text(value.value, value.std) for value in values)
+    value_texts = ("—" if value is None else estimate_text(value.value, value.std) for value in values)
     return (
         calibration.day,
         Link(calibration.data, model_of(calibration.data, model)),
         calibration.rig,
-        *shown,
+        *value_texts,
         calibration.expired or "",
     )

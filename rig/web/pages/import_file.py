@@ -112,8 +112,8 @@ def given_name(draft: Path, path: Path) -> Path:
     return draft.replace(place)
 
 
-def upload(done: Callable[[Path], Awaitable[None]]) -> None:
-    """A field that takes a file from this computer; `done` receives its path on the server."""
+def upload(on_upload: Callable[[Path], Awaitable[None]]) -> None:
+    """A field that takes a file from this computer; `on_upload` receives its path on the server."""
 
     async def received(event: events.UploadEventArguments) -> None:
         folder, name = home() / FILES, Path(event.file.name).name
@@ -128,7 +128,7 @@ def upload(done: Callable[[Path], Awaitable[None]]) -> None:
             text = f"{name}: cannot be stored: {(error.strerror or str(error)).lower()}"
             ui.notify(text, type="negative", multi_line=True, timeout=0, close_button="Close")
             return
-        await done(path)
+        await on_upload(path)
 
     def rejected() -> None:
         text = (
@@ -147,24 +147,24 @@ def upload(done: Callable[[Path], Awaitable[None]]) -> None:
 class Column:
     """One column of the file: what it is, and its unit. A unit that a person chooses is a stated one."""
 
-    def __init__(self, theirs: str, shown: str, page: ImportPage) -> None:
-        self.theirs, self.page = theirs, page
+    def __init__(self, file_column: str, sample_text: str, page: ImportPage) -> None:
+        self.theirs, self.page = file_column, page
         self.stated = ""
         with ui.element("tr"):
             with ui.element("td"):
-                words(theirs)
+                words(file_column)
             with ui.element("td"):
-                words(shown, "number small")
+                words(sample_text, "number small")
             with ui.element("td"):
                 self.name = ui.select({UNUSED: "other"}, value=UNUSED, on_change=self._renamed)
             with ui.element("td"):
-                self.unit = ui.select([], on_change=self._chosen)
+                self.unit = ui.select([], on_change=self._update_preview)
         for field, label in ((self.name, "meaning"), (self.unit, "unit")):
-            field.props(f'dense options-dense aria-label="{label} of {theirs}"')
+            field.props(f'dense options-dense aria-label="{label} of {file_column}"')
 
-    def offer(self, names: list[str], proposed: ColumnMapping | None, stated: str) -> None:
+    def offer(self, names: list[str], proposed: ColumnMapping | None, stated_unit: str) -> None:
         """Offer the names of a kind of table, and select the proposal."""
-        self.stated = stated
+        self.stated = stated_unit
         self.name.set_options({UNUSED: "other", **{name: name for name in names}})
         self.name.set_value(proposed.name if proposed is not None and proposed.name in names else UNUSED)
         self._offer_units(proposed.unit if proposed is not None else "")
@@ -173,8 +173,8 @@ class Column:
         name = str(self.name.value or "")
         offered = units_for(name)
         options = {unit: unit for unit in offered} if column_unit(name) else {"": "as it is", **{u: u for u in offered}}
-        shown = unit or column_unit(name)
-        self.unit.set_options({**options, shown: shown or "as it is"}, value=shown)
+        default_unit = unit or column_unit(name)
+        self.unit.set_options({**options, default_unit: default_unit or "as it is"}, value=default_unit)
         self.unit.set_visibility(bool(offered))
 
     def _renamed(self) -> None:
@@ -182,7 +182,7 @@ class Column:
         self._offer_units("")
         self.page.look()
 
-    def _chosen(self) -> None:
+    def _update_preview(self) -> None:
         self.page.look()
 
     def state(self, unit: str) -> None:
@@ -196,8 +196,8 @@ class Column:
         name, unit = str(self.name.value or ""), str(self.unit.value or "")
         if name == UNUSED:
             return None
-        own = unit == column_unit(name) and not self.stated
-        return ColumnMapping(name, self.theirs, "" if own else unit)
+        is_default = unit == column_unit(name) and not self.stated
+        return ColumnMapping(name, self.theirs, "" if is_default else unit)
 
 
 class ImportPage:
@@ -228,7 +228,7 @@ class ImportPage:
                         for head in ("column of the file", "values", "meaning", "unit"):
                             with ui.element("th"):
                                 words(head)
-                    self.columns = {name: Column(name, _shown(sheet, name), self) for name in sheet.header}
+                    self.columns = {name: Column(name, _sample_text(sheet, name), self) for name in sheet.header}
                 self._constants()
             with div("stack"):
                 with box("picture"):
@@ -259,8 +259,8 @@ class ImportPage:
         proposed = proposal(self.sheet, kind)
         self.quiet = True
         for name, column in self.columns.items():
-            stated = self.sheet.units[self.sheet.header.index(name)]
-            column.offer(column_names(kind), proposed.columns[name], stated)
+            stated_unit = self.sheet.units[self.sheet.header.index(name)]
+            column.offer(column_names(kind), proposed.columns[name], stated_unit)
         for name, field in self.fields.items():
             field.set_visibility(kind in OF_KIND.get(name, KINDS))
         self.quiet = False
@@ -268,10 +268,10 @@ class ImportPage:
         self.asked = proposed.doubt is not None
         self.button.set_enabled(not self.asked)
         if proposed.doubt is not None:
-            self._ask(*proposed.doubt)
+            self._ask_unit(*proposed.doubt)
         self.look()
 
-    def _ask(self, doubt: str, fits: str) -> None:
+    def _ask_unit(self, doubt: str, fits: str) -> None:
         """Ask for the unit of the time; nothing is imported before the answer."""
         clock = next(column for column in self.columns.values() if column.name.value == "t_s")
         with self.question, box("question stack").props("role=group aria-label='Unit of the time'"):
@@ -307,32 +307,32 @@ class ImportPage:
 
     async def _preview(self) -> None:
         self.turn += 1
-        turn, kind, chosen = self.turn, str(self.kind.value), self.mappings
-        names = [m.name for m in chosen]
-        if twice := next((name for name in names if names.count(name) > 1), ""):
-            self._say("", f'Two columns have the meaning {twice}. Choose another one, or "other".')
+        turn, kind, mappings = self.turn, str(self.kind.value), self.mappings
+        names = [m.name for m in mappings]
+        if duplicate := next((name for name in names if names.count(name) > 1), ""):
+            self._show_fault("", f'Two columns have the meaning {duplicate}. Choose another one, or "other".')
             return
-        if lacks := lacking(self.sheet, kind, chosen):
-            self._say("", f"Still needed: {', '.join(lacks)}. Choose the columns that hold them.")
+        if lacks := lacking(self.sheet, kind, mappings):
+            self._show_fault("", f"Still needed: {', '.join(lacks)}. Choose the columns that hold them.")
             return
         try:
-            shown = await off_loop(preview, self.sheet, kind, chosen, self.constants)
+            preview_table = await off_loop(preview, self.sheet, kind, mappings, self.constants)
         except Exception as error:
             if turn == self.turn:
-                self._say("This cannot be imported yet", error)
+                self._show_fault("This cannot be imported yet", error)
             return
         if turn == self.turn:
-            self._show(shown)
+            self._show(preview_table)
 
-    def _say(self, title: str, why: str | Exception) -> None:
+    def _show_fault(self, title: str, reason: str | Exception) -> None:
         self.button.disable()
         self.fault.clear()
         self.result.clear()
         with self.fault:
-            if isinstance(why, str):
-                noted(why)
+            if isinstance(reason, str):
+                noted(reason)
             else:
-                failed(title, message(why))
+                failed(title, message(reason))
 
     def _show(self, preview_of: Preview) -> None:
         """The picture and the table's first values; the import is possible."""
@@ -353,17 +353,17 @@ class ImportPage:
         self.button.disable()
         self.button.props("loading")
         try:
-            kind, chosen = str(self.kind.value), self.mappings
-            run, _ = await off_loop(stored, self.sheet, kind, chosen, self.constants, lambda _: None)
+            kind, mappings = str(self.kind.value), self.mappings
+            run, _ = await off_loop(stored, self.sheet, kind, mappings, self.constants, lambda _: None)
         except Exception as error:
             self.button.props(remove="loading")
             self.button.enable()
-            self._say("The file was not imported", error)
+            self._show_fault("The file was not imported", error)
             return
         ui.navigate.to(f"/?{urlencode({'data': run})}")
 
 
-def _shown(sheet: Sheet, name: str) -> str:
+def _sample_text(sheet: Sheet, name: str) -> str:
     """The first values of a column and their range, or its first words."""
     values = sample_values(sheet, name)
     if not len(values):

@@ -76,7 +76,7 @@ class Workbench:
             self.body = div("stack")
         with self.body:
             if not self.data:
-                _nothing()
+                _empty_page()
                 return
             self.newer = div("")
             self.notes = div("stack")
@@ -100,7 +100,7 @@ class Workbench:
                     else NoisePictures()
                 )
                 self.parameters = ParametersBox(self)
-            self.missing = Missing(self, own=rows)
+            self.missing = Missing(self, allows_own=rows)
         self.keys["a"] = Key("add the shown effect", self.missing.add_shown)
         self.keys["u"] = Key("undo the last effect", self.undo)
         self.keys["x"] = Key("next axis", self.pictures.next_axis)
@@ -115,7 +115,7 @@ class Workbench:
 
     def _exclude_dialog(self) -> Callable[[Sequence[int]], None] | None:
         """The dialog that excludes selected poses; None for a file and for samples."""
-        return partial(run_record.ask, self.data, done=self.afresh) if numbered_run(self.data) else None
+        return partial(run_record.ask, self.data, on_done=self.afresh) if numbered_run(self.data) else None
 
     def afresh(self) -> None:
         """Read the changed data again."""
@@ -183,10 +183,18 @@ class Workbench:
         with self.places, box("row-of places").props('role=group aria-label="Where the model fails"'):
             words("Fails at", "k")
             for place in compared.fails:
-                where, _, what = for_page(place.text).partition(": ")
-                at = f"{where}, {place.axis}: {rounded(place.excess, 2)} ×" if rows else f"{where}, {place.axis}"
+                place_text, _, description = for_page(place.text).partition(": ")
+                at = (
+                    f"{place_text}, {place.axis}: {rounded(place.excess, 2)} ×"
+                    if rows
+                    else f"{place_text}, {place.axis}"
+                )
                 with ui.button(at, on_click=partial(self._show_place, place)).props("outline dense"):
-                    ui.tooltip(f"{what}. Click to select these {compared.fit.measured.type.rows}" if rows else what)
+                    ui.tooltip(
+                        f"{description}. Click to select these {compared.fit.measured.type.rows}"
+                        if rows
+                        else description
+                    )
 
     def _show_place(self, place: Place) -> None:
         self.pictures.show_place(place)
@@ -195,25 +203,25 @@ class Workbench:
         """Say that the run grows, or that data or model have changed, with a button that updates the analysis."""
         if self.session is None:
             return
-        held = self.session.content
+        analysed = self.session.content
         try:
             present = await off_loop(content_of, self.data, self.model or None)
         except Exception:  # the record is busy, or the file is being written: look again later
             return
-        changed = present.key != held.key
-        if (state := (changed, present)) == self.seen:
+        is_changed = present.key != analysed.key
+        if (state := (is_changed, present)) == self.seen:
             return
         self.seen = state
         self.newer.clear()
-        if not changed and not present.growing:
+        if not is_changed and not present.growing:
             return
-        have = f"{present.extent} by now; " if changed and present.extent else ""
-        what = f"{self.data} is still running" if present.growing else f"{self.data} or the model has changed"
+        extent_text = f"{present.extent} by now; " if is_changed and present.extent else ""
+        subject = f"{self.data} is still running" if present.growing else f"{self.data} or the model has changed"
         with self.newer, box("note row-of").props("role=status"):
-            words(f"{what}: {have}this page analyses {held.extent or 'the earlier content'}.", "grow")
-            if changed:
-                again = partial(self.go, self.data, self.model, self.noise)
-                ui.button("Update", icon="refresh", on_click=again).props("dense")
+            words(f"{subject}: {extent_text}this page analyses {analysed.extent or 'the earlier content'}.", "grow")
+            if is_changed:
+                reopen = partial(self.go, self.data, self.model, self.noise)
+                ui.button("Update", icon="refresh", on_click=reopen).props("dense")
 
     async def show(self, session: ModelSession[Any]) -> None:
         """Show pictures and error of the present model, then its missing effects."""
@@ -326,10 +334,10 @@ class Workbench:
             await self.show(self.session.undone())
 
 
-def _nothing() -> None:
+def _empty_page() -> None:
     """The page of an empty record."""
-    why = "Measure on the rig (simulated, until a bench file names your instruments), or open a table of your own."
-    with state("There are no measurements yet", why):
+    advice = "Measure on the rig (simulated, until a bench file names your instruments), or open a table of your own."
+    with state("There are no measurements yet", advice):
         ui.button("Measure", icon="play_arrow", on_click=lambda: ui.navigate.to("/run?procedure=sweep"))
         ui.button("Open a file", icon="upload_file", on_click=lambda: ui.navigate.to("/import")).props("outline")
 

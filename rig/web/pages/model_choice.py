@@ -67,14 +67,14 @@ class Choice:
     def _noise(self) -> None:
         """The menu of noise models, once a model of a still record is saved."""
         page = self.page
-        if not (known := noise_models()) and not page.noise:
+        if not (saved_noise := noise_models()) and not page.noise:
             return
         with ui.button(icon="graphic_eq").props("flat dense aria-label='Noise of the sensor'") as button:
             if page.noise:
                 button.props("color=positive")
             ui.tooltip(f"Noise of the sensor: {Path(page.noise).stem or 'from the samples of the data'}")
             with ui.menu():
-                for path, label in {"": "from the samples of the data", **known}.items():
+                for path, label in {"": "from the samples of the data", **saved_noise}.items():
                     ui.menu_item(label, on_click=lambda path=path: self._open(page.data, page.model, path))
 
     def opened(self, session: ModelSession[Any]) -> None:
@@ -119,19 +119,19 @@ class Choice:
             name = ui.input("Name", value="complete").props("autofocus").classes("grow")
             if self.page.session is not None:
                 words(f"Fitted to {self.page.session.data.description}.", "small")
-            where = words(f"Folder: {home() / MODELS}", "quiet small")
+            folder_text = words(f"Folder: {home() / MODELS}", "quiet small")
 
             def save() -> None:
                 path = _file_of(str(name.value))
                 if path.exists() and button.text == "Save":
-                    where.set_text(f"{path.name} exists already. Replace it, or choose another name.")
+                    folder_text.set_text(f"{path.name} exists already. Replace it, or choose another name.")
                     button.set_text("Replace")
                     return
                 try:
                     self._write(path)
                 except (RigError, CalibrationError, OSError) as error:
-                    where.set_text(f"{message(error)}. Download keeps the model on this computer.")
-                    where.classes(replace="fault")
+                    folder_text.set_text(f"{message(error)}. Download keeps the model on this computer.")
+                    folder_text.classes(replace="fault")
                     return
                 dialog.close()
                 self.model.set_options({**self.model.options, **saved_models()})  # type: ignore[dict-item]
@@ -167,18 +167,18 @@ class Choice:
         from rig.services.search import Cancelled
 
         page, session = self.page, self.page.session
-        held = Loaded(session.data, session.model, session.effects) if session is not None else None
+        question = Loaded(session.data, session.model, session.effects) if session is not None else None
         hint = ui.notification("Making the report", spinner=True, timeout=None)
         try:
             notes: list[str] = []
-            _, made = await off_loop(
+            _, page_text = await off_loop(
                 reported,
                 Request(page.data, page.model or None, page.desk.bench_file, page.noise or None),
                 notes.append,
                 self.visit.searched,
-                held,
+                question,
             )
-            text = await off_loop(made)
+            text = await off_loop(page_text)
             ui.download.content(text, f"{Path(page.data).stem}-{session.model.name if session else 'model'}.html")
         except Cancelled:
             return
@@ -190,8 +190,8 @@ class Choice:
 
 def _file_of(name: str) -> Path:
     """The file of a saved model with this name."""
-    plain = "".join(c if c.isalnum() or c in "-_." else "-" for c in name.strip()).strip(".") or "model"
-    return home() / MODELS / f"{plain}.yaml"
+    safe_name = "".join(c if c.isalnum() or c in "-_." else "-" for c in name.strip()).strip(".") or "model"
+    return home() / MODELS / f"{safe_name}.yaml"
 
 
 def _runs() -> dict[str, str]:

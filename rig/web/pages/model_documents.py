@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 class Asking:
     """A dialog with questions, a button that makes a document, and the answer or the error below it."""
 
-    def __init__(self, title: str, about: str) -> None:
+    def __init__(self, title: str, explanation: str) -> None:
         with named_dialog(title) as self.dialog, ui.card().style("min-width: min(560px, 92vw)"):
             words(title, "title")
-            words(about, "quiet small")
+            words(explanation, "quiet small")
             self.fields = div("settings").style("width: 100%")
             self.below = div("stack")
             self.answer = div("stack")
@@ -136,8 +136,8 @@ class CompensationDialog(Asking):
 
     def _inputs(self) -> dict[str, tuple[float, float]]:
         """The inputs that the model's own effects need, with their usual ranges."""
-        needed = {name for term in self.model.terms for name in term.effect.needs}
-        return {name: ends for name, ends in self.default.beside.items() if name in needed}
+        required = {name for term in self.model.terms for name in term.effect.needs}
+        return {name: ends for name, ends in self.default.beside.items() if name in required}
 
     def _range(self) -> Range:
         """The range of the proof. Raises RigError for ends that are not in order."""
@@ -160,16 +160,18 @@ class CompensationDialog(Asking):
         from rig.services.compensation import compensation_lines, how_to_test, origin_of, source_files
 
         language = str(self.language.value)
-        made = invert_model(self.model, self._range(), list(self.without.value or ()), str(self.precision.value))
+        compensation = invert_model(
+            self.model, self._range(), list(self.without.value or ()), str(self.precision.value)
+        )
         origin = origin_of(self.model.name, str(self.name.value or "").strip() or None, dump_model(self.model))
-        files = source_files(made, language, origin)
+        files = source_files(compensation, language, origin)
         packed = io.BytesIO()
         with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
             for name, text in files.items():
                 archive.writestr(f"{origin.name}/{name}", text)
         lines = [
             f"Files: {', '.join(files)}",
-            *compensation_lines(made),
+            *compensation_lines(compensation),
             *how_to_test(language, origin.name, origin.name),
         ]
         return packed.getvalue(), f"{origin.name}.zip", lines

@@ -46,7 +46,7 @@ PROGRESS_S = 0.15
 class Missing:
     """The candidates, with buttons to add them."""
 
-    def __init__(self, page: Workbench, own: bool) -> None:
+    def __init__(self, page: Workbench, allows_own: bool) -> None:
         self.page = page
         self.looked_at: Candidate | None = None
         self.tried: dict[str, Step[Any]] = {}
@@ -55,8 +55,8 @@ class Missing:
             self.added = div("row-of added")
             self.steps = div("")
             self.cards = div("stack")
-            self.own = Own(page)
-        self.own.box.set_visibility(own)
+            self.own = OwnEffect(page)
+        self.own.box.set_visibility(allows_own)
 
     @property
     def unit(self) -> str:
@@ -119,11 +119,11 @@ class Missing:
             words("The search was cancelled.", "quiet")
             ui.button("Search for missing effects", icon="search", on_click=self.page.again).props("dense outline")
 
-    def fail(self, why: str) -> None:
+    def fail(self, reason: str) -> None:
         """The search ended in an error."""
         self.cards.clear()
         with self.cards:
-            failed("The search for effects failed", why)
+            failed("The search for effects failed", reason)
 
     async def show(self, result: Diagnosis[Any]) -> None:
         """Show the candidates, best first, and the curve of the best if an effect is missing."""
@@ -142,25 +142,29 @@ class Missing:
                 ui.button(title, icon="auto_fix_high", on_click=self.page.discover).props("dense outline")
             cards = [Card(self, c, result, missing and not k) for k, c in enumerate(result.candidates[:FIRST])]
             if len(result.candidates) > FIRST:
-                self._others(result)
-            below = div("stack")
+                self._show_further(result)
+            candidate_box = div("stack")
         if missing and cards:
             cards[0].open()
             await self.look_at(cards[0].c)
         if result.next_experiment is not None:
-            with below:
+            with candidate_box:
                 await self._next(result)
 
     def _nothing_to_add(self, result: Diagnosis[Any]) -> None:
-        good = result.verdict is Verdict.ADEQUATE
-        with box("verdict good" if good else "verdict doubt"):
-            above = " Write your own effect above." if self.own.box.visible and result.residual_structure else ""
-            words("Save the model, or see the candidates below." if good else f"No effect to add.{above} Candidates:")
+        is_adequate = result.verdict is Verdict.ADEQUATE
+        with box("verdict good" if is_adequate else "verdict doubt"):
+            hint = " Write your own effect above." if self.own.box.visible and result.residual_structure else ""
+            words(
+                "Save the model, or see the candidates below."
+                if is_adequate
+                else f"No effect to add.{hint} Candidates:"
+            )
 
-    def _others(self, result: Diagnosis[Any]) -> None:
-        rest = result.candidates[FIRST:]
-        with ui.expansion(f"{len(rest)} more, less likely").props("dense"):
-            for c in rest:
+    def _show_further(self, result: Diagnosis[Any]) -> None:
+        further = result.candidates[FIRST:]
+        with ui.expansion(f"{len(further)} more, less likely").props("dense"):
+            for c in further:
                 Card(self, c, result, best=False)
 
     async def _next(self, result: Diagnosis[Any]) -> None:
@@ -273,8 +277,8 @@ class Card:
 
 def chances(c: Candidate) -> str:
     """The probability of a candidate, and the p-value of its gain."""
-    beyond = "" if c.p_value < SIGNIFICANT else ", not significant"
-    return f"{share(c.probability)}; p = {probability(c.p_value)}{beyond}"
+    remark = "" if c.p_value < SIGNIFICANT else ", not significant"
+    return f"{share(c.probability)}; p = {probability(c.p_value)}{remark}"
 
 
 def share(probability: float) -> str:
@@ -295,7 +299,7 @@ HELP = (
 )
 
 
-class Own:
+class OwnEffect:
     """Field, preview and errors of an expression."""
 
     def __init__(self, page: Workbench) -> None:
@@ -359,9 +363,9 @@ class Own:
 
     def _preview(self, step: Step[Any], unseen: float) -> None:
         self.step = step
-        before, after = step.before.pooled_excess, step.after.pooled_excess
+        error_before, error_after = step.before.pooled_excess, step.after.pooled_excess
         self.fall.set_text(
-            f"error {rounded(before)} → {rounded(after)} × the noise floor; held-out error "
+            f"error {rounded(error_before)} → {rounded(error_after)} × the noise floor; held-out error "
             f"{rounded(step.held_out_before)} → {rounded(unseen)} ×"
         )
         self.page.pictures.consider(step)

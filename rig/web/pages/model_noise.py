@@ -95,18 +95,18 @@ class NoisePictures:
         c, still = int(self.axis.value or 0), self.compared.fit.still
         channel = self.compared.fit.channels[c]
         curve = compared_deviations(self.compared.fit)[channel.channel.axis]
-        into = scaled(still, channel.channel.axis, bool(self.unit.value))
+        units = scaled(still, channel.channel.axis, bool(self.unit.value))
         models = [ModelCurve(channel, "model")]
         if self.step is not None:
             models.append(candidate(self.step.after.channels[c], self.step.name))
         panels = {
-            "allan": allan(curve, into, models),
-            "spectrum": spectrum(channel, into, models),
+            "allan": allan(curve, units, models),
+            "spectrum": spectrum(channel, units, models),
             "ratio": ratio(curve),
-            "record": record(channel.channel, into),
+            "record": record(channel.channel, units),
         }
         for name, panel in panels.items():
-            draw(self.plots[name], single_chart(panel), f"{name} {channel.channel.axis} {into.unit}")
+            draw(self.plots[name], single_chart(panel), f"{name} {channel.channel.axis} {units.unit}")
         draw(self.plots["waterfall"], steps_chart(self.session.start, self.session.steps), "waterfall", False)
 
     def next_axis(self) -> None:

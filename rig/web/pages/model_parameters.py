@@ -58,8 +58,8 @@ class ParametersBox:
         """Show the parameters of the session's model; the change is that by the last effect."""
         self.turn += 1
         turn = self.turn
-        before = session.steps[-1].before.model if session.steps else None
-        self.rows = await off_loop(parameter_rows, session.end.model, before)
+        earlier_model = session.steps[-1].before.model if session.steps else None
+        self.rows = await off_loop(parameter_rows, session.end.model, earlier_model)
         if turn != self.turn:
             return
         rows = session.data.form == "rows"
@@ -67,7 +67,7 @@ class ParametersBox:
             button.set_enabled(usable)
         self.values.clear()
         with self.values:
-            _values(self.rows, changed=bool(session.steps))
+            _values(self.rows, has_changes=bool(session.steps))
         self.noise.clear()
         self.pairs.clear()
         try:
@@ -93,8 +93,8 @@ class ParametersBox:
                 words(f"Noise coefficients of {axis}, by all processes that the search found", "title")
                 head, rows = coefficient_table(noise, still.sensed.get(axis))
                 with wide_table():
-                    table(("", *head), [(SYMBOLS.get(row[0], ""), *map(_written, row)) for row in rows])
-                words(_written(density(noise, still.sensed.get(axis))), "quiet small")
+                    table(("", *head), [(SYMBOLS.get(row[0], ""), *map(_page_text, row)) for row in rows])
+                words(_page_text(density(noise, still.sensed.get(axis))), "quiet small")
 
     async def copy(self) -> None:
         """Copy the table for a spreadsheet."""
@@ -130,9 +130,9 @@ class ParametersBox:
 SYMBOLS = {"white-noise": "N", "flicker-noise": "B", "rate-random-walk": "K", "quantisation-noise": "Q"}
 
 
-def _values(rows: list[ParameterRow], changed: bool) -> None:
+def _values(rows: list[ParameterRow], has_changes: bool) -> None:
     """The table; without a change its column is left out."""
-    head = HEAD if changed else HEAD[:-1]
+    head = HEAD if has_changes else HEAD[:-1]
     with ui.element("table").classes("plain-table"):
         with ui.element("tr"):
             for name in head:
@@ -148,15 +148,15 @@ def _values(rows: list[ParameterRow], changed: bool) -> None:
 
 def _cell(row: ParameterRow, name: str, text: str) -> None:
     """One cell: the meaning under the pointer, the reason below a value that is not identified."""
-    shown = words(text, "chip doubt" if row.why and name == "value" else "number")
+    cell = words(text, "chip doubt" if row.why and name == "value" else "number")
     if name == "parameter" and row.doc:
-        with shown:
+        with cell:
             ui.tooltip(row.doc)
     if row.why and name == "value":
         words(f"because {for_page(row.why)}", "quiet small why-not")
 
 
-def _written(text: str) -> str:
+def _page_text(text: str) -> str:
     """A coefficient of the terminal with the signs of the page: µV/√Hz."""
     return re.sub(r"\bu(?=[Vg]\b)", "µ", unit(for_page(text)))
 

@@ -76,8 +76,8 @@ class Pictures:
                 button.set_visibility(False)
 
     def _column(self, label: str) -> ui.select:
-        picked = ui.select({}, label=label, on_change=self.draw).style("min-width: 150px")
-        return picked.props("dense options-dense stack-label")  # a label that floats up late covers the value
+        selector = ui.select({}, label=label, on_change=self.draw).style("min-width: 150px")
+        return selector.props("dense options-dense stack-label")  # a label that floats up late covers the value
 
     def _picture(self, name: str) -> None:
         with box("picture"):
@@ -120,10 +120,10 @@ class Pictures:
         value = min(self.c, len(channels) - 1)
         if max(map(len, channels)) > LONG and isinstance(self.axis, ui.toggle):
             with self.axis.parent_slot.parent:  # type: ignore[union-attr] # it has a place
-                chosen = ui.select({0: ""}, value=0, label="output", on_change=self.draw).props("dense options-dense")
-            chosen.move(target_index=0)
+                selector = ui.select({0: ""}, value=0, label="output", on_change=self.draw).props("dense options-dense")
+            selector.move(target_index=0)
             self.axis.delete()
-            self.axis = chosen
+            self.axis = selector
         self.axis.set_options(dict(enumerate(channels)), value=value)
         self.axis.set_visibility(len(channels) > 1)
 
@@ -133,18 +133,18 @@ class Pictures:
             return
         self.step = step
         self.columns.pop(FOLLOWED, None)
-        same: str | None = None
+        same_column: str | None = None
         if step is not None and look:
             column = most_telling(step)
-            same = next((name for name in self.columns if name == column.name), None)
-            if same is None:
+            same_column = next((name for name in self.columns if name == column.name), None)
+            if same_column is None:
                 self.columns[FOLLOWED] = column
         if step is not None:
             self.considered.set_text(step.name)
         self.considered.set_visibility(step is not None)
         value = self.x.value if self.x.value in self.columns else next(iter(self.columns))
         if step is not None and look:
-            value = same or FOLLOWED
+            value = same_column or FOLLOWED
         session, self.session = self.session, None  # draw once
         self.x.set_options({name: column.labels[self.c] for name, column in self.columns.items()}, value=value)
         self.session = session
@@ -165,38 +165,38 @@ class Pictures:
         """Draw all pictures again."""
         if self.fit is None or self.session is None or self.x.value not in self.columns:
             return
-        session, shown, colour = (
+        session, channel, colour = (
             self.session,
             self.shown,
             self.columns.get(self.colour.value or "", self.columns[self.x.value]),
         )
-        moving = shown.fit.table.type.moving  # samples are drawn, not rows
-        plain = self.columns[self.x.value if self.x.value != FOLLOWED else next(iter(self.columns))]
+        is_motion = channel.fit.table.type.moving  # samples are drawn, not rows
+        abscissa = self.columns[self.x.value if self.x.value != FOLLOWED else next(iter(self.columns))]
         panels = {
-            "measurement": motion.measurement(shown) if moving else measurement(shown, plain, colour),
-            "residual": residual(shown, self.columns[self.x.value], colour, self.step),
-            "failure": motion.failure(shown) if moving else failure(shown),
+            "measurement": motion.measurement(channel) if is_motion else measurement(channel, abscissa, colour),
+            "residual": residual(channel, self.columns[self.x.value], colour, self.step),
+            "failure": motion.failure(channel) if is_motion else failure(channel),
         }
-        self._legends(shown, plain)
+        self._legends(channel, abscissa)
         for name, panel in panels.items():
-            linked = not moving or name == "residual"
+            linked = not is_motion or name == "residual"
             keep = f"{panel.x.label} {panel.y.label}"
-            drawn = figure(single_chart(replace(panel, title="", second=None)), keep, "select" if linked else "zoom")
+            picture = figure(single_chart(replace(panel, title="", second=None)), keep, "select" if linked else "zoom")
             if linked and self.selected:
-                drawn["data"][_dots(drawn)]["selectedpoints"] = self.selected
+                picture["data"][_dots(picture)]["selectedpoints"] = self.selected
             remember(self.plots[name], single_chart(panel))
-            redraw(self.plots[name], drawn)
+            redraw(self.plots[name], picture)
         draw(self.plots["waterfall"], waterfall(levels(session)), "waterfall", False)
-        self._tell(shown)
+        self._show_hint(channel)
 
-    def _legends(self, shown: ChannelResidual, plain: Column) -> None:
+    def _legends(self, channel: ChannelResidual, abscissa: Column) -> None:
         """Say what marks, lines and bands mean."""
-        kind = shown.fit.table.type
-        sides = "; filled clockwise, open anticlockwise" if np.any(shown.side) else ""
-        model = "line" if plain.name == "beta" or kind.magnitude or kind.moving else "+"
+        kind = channel.fit.table.type
+        sides = "; filled clockwise, open anticlockwise" if np.any(channel.side) else ""
+        model = "line" if abscissa.name == "beta" or kind.magnitude or kind.moving else "+"
         effect = ""
         if self.step is not None:
-            line = is_function(self.step, self.columns[self.x.value], shown.c)
+            line = is_function(self.step, self.columns[self.x.value], channel.c)
             effect = f"; orange {'line' if line else '+'}: explained by {self.step.name}"
         self.legends["measurement"].set_text(f"●: measured; {model}: model{sides}")
         self.legends["residual"].set_text(f"grey band: ± noise floor{sides}{effect}")
@@ -244,15 +244,15 @@ class Pictures:
             plot.run_plot_method("restyle", {"selectedpoints": [self.selected or None]}, [number])
             if not self.selected:
                 plot.run_plot_method("relayout", {"selections": []})
-        self._tell(self.shown)
+        self._show_hint(self.shown)
         self.selects()
 
-    def _tell(self, shown: ChannelResidual) -> None:
+    def _show_hint(self, channel: ChannelResidual) -> None:
         """Show the selection, a remark on thinned points, or a hint."""
         self.clear.set_visibility(bool(self.selected))
         self.leave.set_visibility(bool(self.selected) and self.leave_out is not None)
-        hint = f"Drag a box in a picture to select {shown.fit.table.type.rows} in all pictures."
-        self.hint.set_text(shown.summary(self.selected) if self.selected else shown.thinned or hint)
+        hint = f"Drag a box in a picture to select {channel.fit.table.type.rows} in all pictures."
+        self.hint.set_text(channel.summary(self.selected) if self.selected else channel.thinned or hint)
 
 
 def _dots(figure: dict[str, Any]) -> Any:

@@ -54,9 +54,9 @@ class VerdictBox:
         self.described = _failing(compared)
         self._show(self.described)
 
-    def wait(self, what: str) -> None:
+    def wait(self, activity: str) -> None:
         """Show that the verdict is not known yet."""
-        self.headline.set_text(f"{what} ...")
+        self.headline.set_text(f"{activity} ...")
         self.box.classes(remove="good bad doubt")
 
     def found(self, result: Diagnosis[Any]) -> None:
@@ -85,6 +85,6 @@ class VerdictBox:
 
 def _failing(compared: Comparison[Any]) -> str:
     """The model and the data; the places where it fails have a row of their own."""
-    what = f"{compared.fit.model.name} on {compared.data.description}."
-    text = what if compared.fails else f"{what} No place fails."
+    subject = f"{compared.fit.model.name} on {compared.data.description}."
+    text = subject if compared.fails else f"{subject} No place fails."
     return " ".join(filter(None, (text, compared.data.note)))

@@ -37,15 +37,15 @@ def register(desk: Desk) -> None:
     def page() -> None:
         with frame(desk, "/record"):
             try:
-                found = runs()
+                all_runs = runs()
             except Exception as error:
                 failed("The record cannot be read", error)
                 return
-            if found:
-                Runs(found)
+            if all_runs:
+                Runs(all_runs)
             else:
-                why = "It stores every run of the rig with all samples, and your own files that you import."
-                with state("The record is empty", why):
+                advice = "It stores every run of the rig with all samples, and your own files that you import."
+                with state("The record is empty", advice):
                     ui.button("Measure", icon="play_arrow", on_click=lambda: ui.navigate.to("/run"))
                     ui.button("Import a file", icon="upload_file", on_click=partial(ui.navigate.to, "/import")).props(
                         "outline"
@@ -65,8 +65,8 @@ class Runs:
                 )
                 self.together = ui.button("One model", icon="insights", on_click=self._model).props("outline")
                 self.compare = ui.button("Compare", icon="compare_arrows", on_click=self._compare)
-            known = calibrating(listed)
-            rows = [row for run in listed for row in _rows(run, known)]
+            runs_by_sensor = calibrating(listed)
+            rows = [row for run in listed for row in _rows(run, runs_by_sensor)]
             self.table = ui.table(
                 rows=rows, columns=COLUMNS, row_key="name", selection="multiple", pagination=PAGE,
                 on_select=self._marked,
@@ -103,22 +103,22 @@ class Runs:
 
 def _rows(run: Run, calibrated: Container[str]) -> list[dict[str, str]]:
     """A row for a run, or for each sensor of a batch; a calibrated sensor has a link to its history."""
-    about = {"procedure": run.procedure, "state": run.state, "extent": run.extent, "source": run.source}
-    about["created"] = run.created[:19].replace("T", " ")
+    run_cells = {"procedure": run.procedure, "state": run.state, "extent": run.extent, "source": run.source}
+    run_cells["created"] = run.created[:19].replace("T", " ")
     of = {member: sensor for sensor, member in members(run).items()}
     names = list(run.bench.get("sensors", {})) or [""]
     return [
         {
             "name": f"{run.run}/{name}" if name else run.run,
-            "sensor": _named(run.bench["sensors"][name] if name else run.constants),
+            "sensor": _sensor_name(run.bench["sensors"][name] if name else run.constants),
             "to": HistoryRequest(of[name]).address if of.get(name) in calibrated else "",
-            **about,
+            **run_cells,
         }
         for name in names
     ]
 
 
-def _named(of: object) -> str:
+def _sensor_name(of: object) -> str:
     """Name and serial number of a sensor, if known."""
-    known = dict(of) if isinstance(of, dict) else {}
-    return " ".join(str(known[key]) for key in ("sensor", "name", "serial") if known.get(key))
+    entries = dict(of) if isinstance(of, dict) else {}
+    return " ".join(str(entries[key]) for key in ("sensor", "name", "serial") if entries.get(key))

@@ -111,7 +111,8 @@ class Instruments:
             self.rows = div("")
             with self.rows:
                 table(
-                    ("role", "instrument", "at"), [(r, i.driver, _where(i.url)) for r, i in bench.instruments.items()]
+                    ("role", "instrument", "at"),
+                    [(r, i.driver, _url_text(i.url)) for r, i in bench.instruments.items()],
                 )
             ui.button("Check the instruments", icon="fact_check", on_click=self.check).props("outline dense")
 
@@ -137,7 +138,7 @@ class Instruments:
             table(("role", "check", "detail"), rows)
 
 
-def _where(url: str) -> str:
+def _url_text(url: str) -> str:
     return "simulated" if url.startswith("simulated") else url
 
 
@@ -151,11 +152,11 @@ class Planning:
         self.turn, self.address = 0, ""
         self.planned: Plan | None = None
         names = {name: f"{name}: {summary(path)}" for name, path in paths(bench.folders.procedures).items()}
-        chosen = settings.get("procedure", DEFAULT_PROCEDURE)
+        selected = settings.get("procedure", DEFAULT_PROCEDURE)
         with box():
             words("Measure", "title")
-            self.name = ui.select(names, label="Procedure", value=chosen if chosen in names else DEFAULT_PROCEDURE)
-            self.name.props("dense options-dense").on_value_change(self._chosen).style("width: 100%")
+            self.name = ui.select(names, label="Procedure", value=selected if selected in names else DEFAULT_PROCEDURE)
+            self.name.props("dense options-dense").on_value_change(self._show_settings).style("width: 100%")
             self.about = words("", "quiet small")
             self.fields = div("settings")
             with ui.expansion("What the settings mean").props("dense") as self.meant:
@@ -172,14 +173,14 @@ class Planning:
         with box() as self.plan_box:
             words("Plan", "title")
             self.plan = div("stack")
-        self._chosen()
+        self._show_settings()
 
     @property
     def procedure(self) -> Procedure:
         """The selected procedure."""
         return find(str(self.name.value), self.bench.folders.procedures)
 
-    def _chosen(self) -> None:
+    def _show_settings(self) -> None:
         """Show the settings of the selected procedure."""
         procedure = self.procedure
         self.about.set_text(" ".join(procedure.doc.partition("\n\n")[2].split("Source")[0].split()))
@@ -187,11 +188,11 @@ class Planning:
         self.meant.set_visibility(bool(procedure.defaults))
         self.optimal.set_visibility(procedure.name == "sweep")
         self.fields.clear()
-        few = choices(procedure)
+        choices_by_name = choices(procedure)
         self.inputs: dict[str, Any] = {}
         with self.fields:
             for name, default in procedure.defaults.items():
-                field = _field(name, self.given.get(name, setting_text(default)), few.get(name, ()))
+                field = _field(name, self.given.get(name, setting_text(default)), choices_by_name.get(name, ()))
                 self.inputs[name] = field.on_value_change(self.replan)
         ui.timer(0.0, self.replan, once=True)
 
@@ -282,10 +283,10 @@ def _show(planned: Plan, bench: Bench) -> None:
             table(("at", "what"), lines[MOST_STRETCHES:])
 
 
-def _field(name: str, value: str, few: Sequence[str]) -> ui.select | ui.input:
+def _field(name: str, value: str, options: Sequence[str]) -> ui.select | ui.input:
     """One setting: a list if it has only a few possible values."""
-    if value in few:
-        return ui.select(list(few), label=setting_label(name), value=value).props("dense options-dense")
+    if value in options:
+        return ui.select(list(options), label=setting_label(name), value=value).props("dense options-dense")
     return ui.input(setting_label(name), value=value).props("dense debounce=300")
 
 

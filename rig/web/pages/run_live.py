@@ -82,9 +82,9 @@ class Live:
         self.again = ui.button("Resume", icon="play_arrow", on_click=self.go_on).props("outline dense")
         self.see = ui.button("Open the model", icon="insights", on_click=self._see).props("dense")
 
-    def decide(self, what: str) -> None:
+    def decide(self, decision: str) -> None:
         """Send a decision or an answer to the run."""
-        control_run(lambda status: control.answer(status, what))
+        control_run(lambda status: control.answer(status, decision))
 
     def pause_run(self) -> None:
         """Pause a running run. No key continues it: a key must not move anything."""
@@ -125,12 +125,12 @@ class Live:
         if status is None:
             return
         if status != self.status:
-            before, self.status = self.status, status
-            self._show(status, before)
+            previous, self.status = self.status, status
+            self._show(status, previous)
         if self.present:
             await self.over_time.follow(status.run)
 
-    def _show(self, status: Status, before: Status | None) -> None:
+    def _show(self, status: Status, previous: Status | None) -> None:
         word, look = PHASES.get(status.phase, (status.state or "ended", ENDS.get(status.state, "plain")))
         active = status.phase != "ended"
         self.present = self.present or active
@@ -153,11 +153,15 @@ class Live:
         self.see.set_visibility(status.state == "complete")
         self.see.set_text("Open the model" if status.done else "Open the results")
         self.again.set_visibility(not active and status.state in ("stopped", "failed") and bool(status.run))
-        if before is None or (before.error, before.moving, before.phase) != (status.error, status.moving, status.phase):
+        if previous is None or (previous.error, previous.moving, previous.phase) != (
+            status.error,
+            status.moving,
+            status.phase,
+        ):
             self._alarm(status)
-        if before is None or before.asked != status.asked:
-            self._ask(status.asked if status.phase == "asking" else None, status.seat == "page")
-        if before is None or before.values != status.values:
+        if previous is None or previous.asked != status.asked:
+            self._show_question(status.asked if status.phase == "asking" else None, status.seat == "page")
+        if previous is None or previous.values != status.values:
             self._values(status)
 
     def _links(self, status: Status) -> None:
@@ -169,14 +173,14 @@ class Live:
         with self.alarm:
             if status.moving:
                 failed("Not at rest", "\n".join(status.moving))
-            if stopped := stop_words(status):
-                words(stopped, "quiet")
+            if stop_text := stop_words(status):
+                words(stop_text, "quiet")
             elif status.phase == "paused" and status.error:
                 failed("Reason for the pause", RESUME.sub("Continue", status.error))
             elif status.error:
                 failed("Reason for the end", RESUME.sub("Resume", status.error))
 
-    def _ask(self, question: OpenQuestion | None, here: bool) -> None:
+    def _show_question(self, question: OpenQuestion | None, can_answer: bool) -> None:
         self.question.clear()
         if question is None:
             return
@@ -184,10 +188,10 @@ class Live:
             words(question.text, "title")
             if question.attitude is not None:
                 with div("attitude"):
-                    ui.html(_drawn(question.attitude), sanitize=False)
+                    ui.html(_drawing(question.attitude), sanitize=False)
             if question.refused:
                 words(question.refused, "fault")
-            if here:
+            if can_answer:
                 self._answers(question)
             else:
                 words("Answer this question in the terminal of the run.", "quiet")
@@ -210,13 +214,13 @@ class Live:
                 if value["limits"] is not None:
                     _tile(value)
         self.values.clear()
-        rest = [value for value in status.values if value["limits"] is None]
+        small_values = [value for value in status.values if value["limits"] is None]
         with self.values:
-            table((), [(value["name"], for_page(value["shown"]), for_page(value["remark"])) for value in rest])
+            table((), [(value["name"], for_page(value["shown"]), for_page(value["remark"])) for value in small_values])
         self.attitude.clear()
         if status.attitude:
             with self.attitude:
-                ui.html(_drawn(status.attitude), sanitize=False)
+                ui.html(_drawing(status.attitude), sanitize=False)
 
 
 def _tile(value: Mapping[str, Any]) -> None:
@@ -252,5 +256,5 @@ def _limits(value: Mapping[str, Any]) -> str:
     return for_page(f"{low:g} to {high:g} {value['shown'].rpartition(' ')[2]}")
 
 
-def _drawn(attitude: Mapping[str, Any]) -> str:
+def _drawing(attitude: Mapping[str, Any]) -> str:
     return strip(Attitude(**attitude))

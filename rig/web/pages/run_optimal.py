@@ -39,8 +39,8 @@ class OptimalDialog:
                 "quiet small",
             )
             with div("row-of"):
-                known = {name: label for name, label in models("linear").items() if name}
-                self.model = ui.select(known, label="Model", value="linear").props("dense options-dense")
+                model_labels = {name: label for name, label in models("linear").items() if name}
+                self.model = ui.select(model_labels, label="Model", value="linear").props("dense options-dense")
                 self.poses = ui.number("Poses (empty: a quarter)", min=1, max=60, precision=0).props("dense")
                 self.criterion = ui.select(CRITERIA, label="Smallest", value="I").props("dense options-dense")
                 for field in (self.model, self.poses, self.criterion):
@@ -92,7 +92,7 @@ class OptimalDialog:
     async def _used(self, choice: Optimal) -> None:
         """Write the poses into a file, and hand over the settings of a run with them."""
         try:
-            path = await off_loop(_written, choice)
+            path = await off_loop(_write_file, choice)
         except OSError as error:  # for example a full disk
             with self.place:
                 failed("The poses cannot be stored", error)
@@ -109,10 +109,10 @@ class OptimalDialog:
         self.dialog.delete()
 
 
-def _written(choice: Optimal) -> str:
+def _write_file(choice: Optimal) -> str:
     """The file with the chosen poses."""
     folder = home() / FILES
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"poses-{choice.over.fit.model.name}-{choice.equal.plan.poses}.csv"
-    write_whole(path, "\n".join([*format_poses(held.pose for held in choice.equal.plan.held), ""]))
+    write_whole(path, "\n".join([*format_poses(dwell.pose for dwell in choice.equal.plan.held), ""]))
     return str(path)

@@ -58,22 +58,25 @@ def left_out(data: str) -> dict[int, str]:
         return record.excluded(run)
 
 
-def ask(data: str, numbers: Sequence[int], done: Callable[[], None]) -> None:
-    """Ask for a reason, exclude the poses, and call `done`."""
-    named = join_words([str(number) for number in numbers[:MOST_NAMED]])
-    more = f" and {len(numbers) - MOST_NAMED} more" if len(numbers) > MOST_NAMED else ""
+def ask(data: str, numbers: Sequence[int], on_done: Callable[[], None]) -> None:
+    """Ask for a reason, exclude the poses, and call `on_done`."""
+    pose_list = join_words([str(number) for number in numbers[:MOST_NAMED]])
+    rest_text = f" and {len(numbers) - MOST_NAMED} more" if len(numbers) > MOST_NAMED else ""
     with named_dialog("Exclude poses") as dialog, ui.card().style("min-width: 420px"):
-        words(f"Exclude pose {named}{more}" if len(numbers) == 1 else f"Exclude poses {named}{more}", "title")
+        words(
+            f"Exclude pose {pose_list}{rest_text}" if len(numbers) == 1 else f"Exclude poses {pose_list}{rest_text}",
+            "title",
+        )
         words("The record keeps the poses and the reason; you can include them again.", "quiet small")
         reason = ui.input("Reason").props("autofocus").classes("grow")
-        wrong = words("", "fault")
+        fault_line = words("", "fault")
 
         async def leave() -> None:
-            if why := str(reason.value or "").strip():
+            if reason_text := str(reason.value or "").strip():
                 dialog.close()
-                await change(data, numbers, why, done)
+                await change(data, numbers, reason_text, on_done)
             else:
-                wrong.set_text("Give a reason; later readers of the record need it.")
+                fault_line.set_text("Give a reason; later readers of the record need it.")
 
         reason.on("keydown.enter", leave)
         with div("row-of"):
@@ -82,23 +85,23 @@ def ask(data: str, numbers: Sequence[int], done: Callable[[], None]) -> None:
     dialog.open()
 
 
-def listed(data: str, done: Callable[[], None]) -> None:
+def listed(data: str, on_done: Callable[[], None]) -> None:
     """The excluded poses with their reasons, each with a button to include it again."""
-    for number, why in left_out(data).items():
+    for number, reason in left_out(data).items():
         with div("row-of"):
-            words(f"pose {number}: {why}", "small grow")
-            again = partial(change, data, [number], None, done)
-            ui.button("Include again", icon="undo", on_click=again).props("dense flat")
+            words(f"pose {number}: {reason}", "small grow")
+            include = partial(change, data, [number], None, on_done)
+            ui.button("Include again", icon="undo", on_click=include).props("dense flat")
 
 
-async def change(data: str, numbers: Sequence[int], reason: str | None, done: Callable[[], None]) -> None:
+async def change(data: str, numbers: Sequence[int], reason: str | None, on_done: Callable[[], None]) -> None:
     """Exclude poses, or include them again."""
     try:
         await off_loop(_change, data, numbers, reason)
     except Exception as error:
         ui.notify(message(error), type="negative", multi_line=True)
         return
-    done()
+    on_done()
 
 
 def _change(data: str, numbers: Sequence[int], reason: str | None) -> None:
@@ -140,7 +143,7 @@ class OverTime:
             self.head.set_visibility(False)
         if not run:
             return
-        new, time, units = await off_loop(_new, run, self.last)
+        new, time, units = await off_loop(_new_dwells, run, self.last)
         if not new or run != self.run:
             return
         self.time, self.units = time, units
@@ -184,10 +187,10 @@ class OverTime:
         return self.plot
 
 
-def _new(run: str, after: int) -> tuple[list[tuple[int, Any]], RunTime, dict[str, str]]:
+def _new_dwells(run: str, after_number: int) -> tuple[list[tuple[int, Any]], RunTime, dict[str, str]]:
     """New dwells with their numbers, the time axis, and the units of channels that are not in V."""
     with Record.to_read() as record:
-        dwells = record.dwells(run, after)
+        dwells = record.dwells(run, after_number)
         if not dwells:
             return dwells, RunTime(), {}
         begun = record.run(run)
@@ -209,19 +212,19 @@ def register(desk: Desk) -> None:
         with frame(desk, "/record"):
             try:
                 with Record.to_find(run) as record:
-                    found, excluded = record.run(run), record.excluded(run)
-                    known = lives(found, record.runs())
+                    recorded_run, excluded = record.run(run), record.excluded(run)
+                    run_counts = lives(recorded_run, record.runs())
             except Exception as error:
                 failed("There is no such run", error)
                 ui.link("All runs", "/record")
                 return
-            OneRun(desk, found, excluded, known)
+            OneRun(desk, recorded_run, excluded, run_counts)
 
 
 class OneRun:
     """The page of one run."""
 
-    def __init__(self, desk: Desk, run: Run, excluded: dict[int, str], known: Mapping[str, int]) -> None:
+    def __init__(self, desk: Desk, run: Run, excluded: dict[int, str], run_counts: Mapping[str, int]) -> None:
         self.desk, self.run, self.visit = desk, run, Visit()
         self._head()
         headline = div("")
@@ -231,7 +234,7 @@ class OneRun:
                 _results(run)
                 for step in page_steps(run, excluded):
                     step_row(step, "quiet small")
-                for sensor, count in known.items():
+                for sensor, count in run_counts.items():
                     ui.link(f"{count} runs of the sensor {sensor}: history", HistoryRequest(sensor).address).classes(
                         "small"
                     )
@@ -249,7 +252,7 @@ class OneRun:
         with box("stack"):
             words("Settings", "title")
             with div("two three"):
-                for part in _made(run):
+                for part in _circumstances(run):
                     facts({name: value[:SHOWN] for name, value in part.items() if value})
 
     def _over_time(self) -> None:
@@ -335,8 +338,8 @@ class OneRun:
 
 def _results(run: Run) -> None:
     if not run.results:
-        where = "The results are in the report below." if run.rows else "There are no results."
-        words(where if run.state == "complete" else "The run is not complete.", "quiet")
+        results_text = "The results are in the report below." if run.rows else "There are no results."
+        words(results_text if run.state == "complete" else "The run is not complete.", "quiet")
         return
     with ui.element("table").classes("plain-table results"):
         for row in result_rows(run.results):
@@ -351,15 +354,15 @@ def _results(run: Run) -> None:
                     words(meaning(row.name))
 
 
-def _made(run: Run) -> tuple[dict[str, str], ...]:
+def _circumstances(run: Run) -> tuple[dict[str, str], ...]:
     """The run and its settings, the instruments, the constants of sensor and rig."""
     identities = {
         role: " ".join(str(part) for part in identity.values() if part) for role, identity in run.identities.items()
     }
-    why = {"message": run.message} if run.message else {}
+    message = {"message": run.message} if run.message else {}
     settings = {setting_label(name): setting_text(value) for name, value in run.settings.items()}
-    known = {setting_label(name): setting_text(value) for name, value in run.constants.items()}
-    return {"procedure": run.procedure, "bench or file": run.source, **why, **settings}, identities, known
+    constants = {setting_label(name): setting_text(value) for name, value in run.constants.items()}
+    return {"procedure": run.procedure, "bench or file": run.source, **message, **settings}, identities, constants
 
 
 def _event(event: Event) -> tuple[str, str, str]:
