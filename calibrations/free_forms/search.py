@@ -193,12 +193,8 @@ def _descent(
             reshaped_values = coefficients(g, sizes)
             reshaped_state = state_at(data, model_effects, reshaped_values, reshaped)
             if _misfit(reshaped_state, white) < _misfit(moved_state, white):
-                components, values, moved_state, variances = (
-                    reshaped,
-                    reshaped_values,
-                    reshaped_state,
-                    dict(sizes.variances),
-                )
+                components, values, moved_state = reshaped, reshaped_values, reshaped_state
+                variances = dict(sizes.variances)
         change = float(np.sqrt(np.mean(((moved_state.predicted - state.predicted) / white) ** 2)))
         state = moved_state
         if _misfit(moved_state, white) > 1.5 * g.squares / g.rows + 10.0:  # components against each other: no step
