@@ -141,7 +141,7 @@ def _summary(result: Discovery[F]) -> list[Document]:
 
 
 def _in_doubt(result: Diagnosis[F] | Discovery[F]) -> Document:
-    """What both answers say of everything that is not decided."""
+    """The fields on undecided matters, which both documents have."""
     return {
         "alternatives": {name: list(names) for name, names in result.alternatives.items()},
         "reason": result.reason,

@@ -43,7 +43,7 @@ class TooFewRows(DataError):
 
 
 class UnusableData(DataError):
-    """Outputs that cannot be those of the sensor as it is stated to be mounted: no result is handed over."""
+    """Outputs that contradict the stated mounting of the sensor: there is no result."""
 
 
 class ModelError(CalibrationError):

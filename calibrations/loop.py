@@ -50,7 +50,7 @@ def compare(data: Table, model: Model) -> Comparison[Fit]: ...
 def compare(data: Still, model: Model) -> Comparison[NoiseFit]: ...
 @one_thread
 def compare(data: Table | Still, model: Model) -> Comparison[Any]:
-    """The model as it is, or fitted first where it has no values yet. Raises what `fit` raises."""
+    """The model, fitted first if it has no values yet. Raises the errors of `fit`."""
     return dataset(data).compare(model, catalogue())
 
 
@@ -60,7 +60,7 @@ def diagnose(data: Table, model: Model, effects: Effects | None = None) -> Diagn
 def diagnose(data: Still, model: Model, effects: Effects | None = None) -> Diagnosis[NoiseFit]: ...
 @one_thread
 def diagnose(data: Table | Still, model: Model, effects: Effects | None = None) -> Diagnosis[Any]:
-    """What `model` misses on the data. Raises what `fit` raises."""
+    """The effects that `model` misses on the data. Raises the errors of `fit`."""
     return dataset(data).diagnose(model, catalogue() if effects is None else effects)
 
 

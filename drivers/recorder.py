@@ -135,7 +135,7 @@ class Recorder(Generic[Settings]):
         return _join(blocks), value
 
     def acquire_watched(self, duration_s: float, watch: Callable[[], object], every_s: float) -> Samples:
-        """The same as `acquire`; `watch` is called about every `every_s`, and at the end. What it raises ends it."""
+        """The same as `acquire`; `watch` is called about every `every_s`, and at the end. Its error ends the record."""
         blocks = []
         with contextlib.closing(self.stream(duration_s, every_s)) as stream:
             for block in stream:

@@ -90,7 +90,7 @@ def _suffices(course: HandCourse, target_g: float, most: int) -> bool:
 
 
 def _guidance(course: HandCourse, target_g: float, is_complete: bool = False) -> Guidance:
-    """What the person does next, in words, and what the drawing shows."""
+    """The next action of the person, in words, and the drawing."""
     worst_g, parameter = course.uncertainty_g
     progress = f"{parameter} is known to {1e3 * worst_g:.2g} mg, wanted {1e3 * target_g:g} mg" if parameter else ""
     if is_complete:

@@ -50,7 +50,7 @@ class Ellipse:
         return float(self.least / self.greatest * missed / np.sqrt(6))
 
     def angle_std_deg(self, noise: float) -> float:
-        """That of the major axis's angle, from the steps, and from the `noise` of one radius; 52: any angle."""
+        """Uncertainty of the major axis's angle, from the steps and from the `noise` of one radius; 52: any angle."""
         difference = max(self.greatest - self.least, 1e-12 * self.greatest)
         return float(min(np.hypot(360 / self.n / np.sqrt(12), np.degrees(noise / (2 * difference))), 180 / np.sqrt(12)))
 
@@ -184,7 +184,7 @@ def iron_by_extremes(outputs: Array, edges: Sequence[str], turns: Sequence[str],
 
 
 def _hidden_iron_std(outputs: Array, upright: int, round_z: Ellipse) -> float:
-    """Standard uncertainty by what iron lets of the upright field into the level axes of a turn, (n, 3)."""
+    """Standard uncertainty by the vertical field that soft iron brings into the level axes of a turn, (n, 3)."""
     return float(HIDDEN_IRON * round_z.flattening * abs(outputs[:, upright].mean()))
 
 

@@ -163,7 +163,7 @@ def memory_at(table: Table, a: Array, forward: Forward) -> dict[str, Array]:
 
 
 def _memories_by_row(table: Table, a: Array, steps: Sequence[Step]) -> Iterator[list[Array]]:
-    """What is remembered before each row, (3,) for every slot."""
+    """The memory before each row, (3,) for every slot."""
     stored = [[np.zeros((1, 3))] * effect.memory for effect, _ in steps]
     paths = turning_points(table) if "alpha_deg" in table else np.empty((table.n, 0, 3))
     for i in range(table.n):
@@ -175,7 +175,7 @@ def _memories_by_row(table: Table, a: Array, steps: Sequence[Step]) -> Iterator[
 
 
 def _next_memories(steps: Sequence[Step], force: Array, row: Table, memories: list[list[Array]]) -> list[list[Array]]:
-    """What each effect remembers after one sample more, of the specific `force`, (3,)."""
+    """The memory of each effect after one more sample of the specific `force`, (3,)."""
     return [
         list(effect.follow(force[None], row, p, slots)[1])
         for (effect, p), slots in zip(steps, memories, strict=True)
@@ -252,7 +252,7 @@ class _Trial:
 
 
 def restore_axis_by_gravity(program: Program, inputs: Mapping[str, Array], side: Array) -> dict[str, Array]:
-    """What the program finds where only gravity acts and z is not measured: |a| = 1, z on the `side` +1 or -1.
+    """The result of the program where only gravity acts and z is not measured: |a| = 1, z on the `side` +1 or -1.
 
     Source  Ang (5)-(7), with the model in place of the linear estimate. Fixed passes, as the written sources do.
     """

@@ -259,7 +259,7 @@ def _parameters(compensation: Compensation) -> Iterator[str]:
 
 
 def _correlations(compensation: Compensation) -> Correlations | None:
-    """Those of the parameters, where the model has them."""
+    """The correlations of the parameters, if the model has them."""
     correlations = compensation.model.correlations
     return correlations.only(compensation.model.params) if correlations is not None else None
 

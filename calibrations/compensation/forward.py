@@ -212,7 +212,7 @@ def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str,
 
 
 def _response(effect: Effect, a: Any, table: Any, p: Values) -> Traced:
-    """What an effect adds to the outputs, shape (1, 3)."""
+    """Contribution of an effect to the outputs, shape (1, 3)."""
     if effect.expression:
         return trace_expression(effect, a, table, p)
     if isinstance(effect, FreeForm):

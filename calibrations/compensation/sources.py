@@ -81,7 +81,7 @@ def _templates(
 
 
 def _values(compensation: Compensation, origin: Origin, checks: ReferenceVectors) -> dict[str, Any]:
-    """What the templates of all languages need."""
+    """The variables of the templates of all languages."""
     vectors = zip(map(tuple, checks.inputs.tolist()), map(tuple, checks.expected.tolist()), strict=True)
     return {
         "name": origin.name,

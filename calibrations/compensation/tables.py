@@ -98,7 +98,7 @@ def spline_table(basis: Spline, coefficients: Array) -> CubicTable:
 
 
 def trace_free_form(effect: FreeForm, a: Traced, v: Traced, table: RunTime, p: Values) -> Traced:
-    """What the free form adds to the outputs, shape (1, 3), for forces a and outputs v before it, (1, 3) each.
+    """Contribution of the free form to the outputs, (1, 3), for forces a and outputs v before it, (1, 3) each.
 
     Raises NotTraced for a form that no product can follow.
     """
@@ -140,7 +140,7 @@ def _part(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, k: i
 
 
 def _driver(form: Form, a: Sequence[Node], v: Node, table: RunTime, k: int) -> Node:
-    """What drives a function of axis k."""
+    """The driver of a function of axis k."""
     if form.driver in ("own", "cross", "out-of-plane"):
         return a[{"own": k, "cross": CROSS[k], "out-of-plane": (2, 2, 1)[k]}[form.driver]]
     if form.driver == "output":

@@ -200,7 +200,7 @@ AS_NUMPY: Mapping[str, Callable[..., Any]] = {
 
 
 def trace_expression(effect: Effect, a: Traced, table: RunTime, p: Values) -> Traced:
-    """What the effect adds to the outputs, shape (1, 3). Raises NotTraced for a variable that no product has."""
+    """Contribution of the effect to the outputs, (1, 3). Raises NotTraced for a variable unknown at run time."""
     expression = parse(effect.expression)
     columns = {word: table.column(COLUMNS.get(word, word))[0] for word in expression.names if word not in {*FORCES, *p}}
     forces = {name: a[0, k] for k, name in enumerate(FORCES)}

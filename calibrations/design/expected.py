@@ -36,7 +36,7 @@ ROUNDS, CLOSE_GAIN = 12, 1e-2  # steps, and the change of lambda, relative or at
 
 @dataclass(frozen=True)
 class Expected:
-    """What an experiment will bring: lambda of its own data, and of all data together.
+    """The expected result of an experiment: lambda of its own data, and of all data together.
 
     `visible` is lambda of its own data between an explanation and nothing missing: what does not show is not named.
     """
@@ -172,7 +172,7 @@ def _sensed(
 
 
 def _values(layout: Layout) -> Array:
-    """The model's own values; of a parameter without one what it starts from, and its typical size where that is 0."""
+    """The model's values; for a parameter without one its start, or its typical size where the start is 0."""
     start = layout.starts()[0]
     free = layout.known() is None
     unset = [free and (s.term, s.parameter.name, s.axis) not in layout.from_data for s in layout.slots]

@@ -30,7 +30,7 @@ STAY_POWERED = 0.0  # s without power: the sensor stays on, and its warm-up goes
 
 @dataclass(frozen=True)
 class Experiment:
-    """A procedure with settings, what it separates, and why it can.
+    """A procedure with settings, the effects that it separates, and the reason.
 
     For a known bench also the command line, the duration, and the expected separation if its data can be predicted.
     """

@@ -90,7 +90,7 @@ LEAST_GAIN = 1e-9  # of the gain that the present pose has: less is rounding
 
 
 class Criterion(Protocol):
-    """What makes one design better than another. Covariances are those of scaled parameters, (p, p)."""
+    """The criterion of a design. Covariances are of scaled parameters, (p, p)."""
 
     def gain(self, covariance: Array, rows: Array) -> Array:
         """How much better each of `rows` (candidates, axes, p) would make a design; to be greatest."""

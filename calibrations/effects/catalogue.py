@@ -60,7 +60,7 @@ def find(name: str, effects: Mapping[str, Effect]) -> Effect:
 
 
 def with_own(user_effects: Iterable[Effect | type[Effect] | str | Path]) -> Mapping[str, Effect]:
-    """The catalogue, and effects of a user's own beside it. Raises ModelError as `load_effect` does."""
+    """The catalogue and the user's effects. Raises ModelError as `load_effect` does."""
     if isinstance(user_effects, (str, Path, Effect, type)):
         user_effects = (user_effects,)
     by_name = {effect.name: effect for effect in map(load_effect, user_effects)}

@@ -54,7 +54,7 @@ KNOWN = {*COLUMNS, *FORCES, *NUMBERS} - OF_THE_MEAN  # without a table at hand
 
 @dataclass(frozen=True)
 class Operation:
-    """What is done to its arguments, `least` to `most` of them, elementwise."""
+    """An elementwise operation on `least` to `most` arguments."""
 
     name: str
     apply: Callable[..., Array]
@@ -91,7 +91,7 @@ Node = Number | Name | Apply
 
 @dataclass(frozen=True)
 class Expression:
-    """What is added, and to what. Made by `parse`."""
+    """The expression and its target. Made by `parse`."""
 
     text: str
     target: str
@@ -107,12 +107,12 @@ class Expression:
         return columns
 
     def fault(self, at: int, message: str) -> ExpressionError:
-        """What is wrong at column `at`, shown in the text."""
+        """The error at column `at`, marked in the text."""
         return fault(self.text, at, message)
 
 
 def fault(text: str, at: int, message: str) -> ExpressionError:
-    """What is wrong at column `at` of `text`, with a mark below it."""
+    """The error at column `at` of `text`, with a mark below it."""
     at = min(max(at, 0), len(text))
     return ExpressionError(f"column {at + 1}: {message}\n    {text}\n    {' ' * at}^")
 
@@ -153,7 +153,7 @@ def may_be_column(name: str) -> bool:
 
 
 def variables(names: Iterable[str], table: Table) -> dict[str, Array]:
-    """Those of the names that are columns of the table or short names of one, shape (n,); not the forces."""
+    """The values of the names that are columns of the table, or short names of columns, shape (n,); not the forces."""
     values: dict[str, Array] = {}
     for name in names:
         if name in FORCES:
@@ -180,7 +180,7 @@ def _walked(node: Node, values: Mapping[str, Array]) -> Array | float:
 
 
 def _statement(text: str) -> tuple[str, ast.expr]:
-    """What is added to, and the expression."""
+    """The target, and the expression."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

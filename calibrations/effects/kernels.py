@@ -66,7 +66,7 @@ def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array, begun: Arra
 
 @njit(cache=True, nogil=True)
 def play(values: Array, width: float) -> Array:
-    """What follows `values` (n,) behind a play of `width` to either side, rows in order of time, shape (n,)."""
+    """The output of a play of `width` to either side for `values` (n,), rows in order of time, shape (n,)."""
     follower = values[0]
     lagging = np.empty_like(values)
     for i in range(len(values)):

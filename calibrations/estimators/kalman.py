@@ -20,7 +20,7 @@ from calibrations.table import Array
 
 @dataclass(frozen=True)
 class Belief:
-    """What is known of the unknowns: mean (..., n), covariance (..., n, n); of one filter, or of many side by side."""
+    """The state of the filter: mean (..., n), covariance (..., n, n); for one filter, or for many at once."""
 
     mean: Array
     covariance: Array

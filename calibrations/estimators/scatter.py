@@ -81,7 +81,7 @@ def _level_share(power: Array, frequency: Array, weight: Array) -> tuple[Array, 
 
 @dataclass(frozen=True, eq=False)
 class _Spectrum:
-    """A level's spectrum (k,) with scatter beside it, at their likeliest ratio."""
+    """The spectrum of a level (k,) and of scatter, at their likeliest ratio."""
 
     level: Array
     log_ratio: float  # of the variance of the scatter to that of the level's steps

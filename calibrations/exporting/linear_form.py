@@ -125,7 +125,7 @@ def error_of(form: LinearForm, outputs: Outputs) -> tuple[float, float]:
 
 
 def losses(form: LinearForm, outputs: Outputs) -> Iterator[Loss]:
-    """What the form cannot hold, largest first: the part of each effect that no values of the form describe."""
+    """The losses of the form, largest first: the part of each effect that no values of the form describe."""
     simulated = outputs.simulated
     powers = _powers(outputs, form.degree, form.t0)
     result = []

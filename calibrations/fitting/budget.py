@@ -147,7 +147,7 @@ def _of_type_b(fit: Fit, G: Array, c: Contribution) -> tuple[Line, float]:
 
 
 def input_effects(fit: Fit, G: Array, c: Contribution) -> Array:
-    """What each error of an input, shared by its rows, does to each parameter, shape (errors, p)."""
+    """Change of each parameter by each error of an input, which its rows share, shape (errors, p)."""
     number = c.shared(fit.table)
     by_error = np.zeros((int(number.max()) + 1, len(G)))
     np.add.at(by_error, number, np.einsum("pcn,cn->np", G, _errors_of_rows(fit, c)))
@@ -163,7 +163,7 @@ def _errors_of_rows(fit: Fit, c: Contribution) -> Array:
 
 
 def _remaining_square(row_errors: Array, jacobian: Array, by_error: Array, number: NDArray[np.intp]) -> float:
-    """Sum of squares of what errors (channels, n) leave of themselves when the parameters follow them by `by_error`.
+    """Residual sum of squares by errors (channels, n), after the parameters have changed by `by_error`.
 
     One error for each `number`; the jacobian (channels, n, p) takes `by_error` (numbers, p) back to the rows.
     """

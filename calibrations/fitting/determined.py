@@ -76,7 +76,7 @@ def _unchecked(fit: Fit, lone: NDArray[np.bool_]) -> str:
 
 
 def lets_go(smaller: Fit, larger: Fit) -> bool:
-    """Whether a parameter that `smaller` knew is known no longer: of positions only, whose orientation is not known.
+    """Whether a parameter that `smaller` determines is undetermined in `larger`: for positions of unknown orientation.
 
     Effects that bend the output enough make one magnitude of anything: of a sphere without end, and of no other sense.
     """

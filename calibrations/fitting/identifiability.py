@@ -35,7 +35,7 @@ def gain(jacobian: Array, typical: Array) -> Array:
 
 
 def _directions(jacobian: Array, typical: Array) -> tuple[Array, Array, Array]:
-    """What the data determine, as (rows, k) and (p, k) whose product is the gain, and what they do not, (p - k, p)."""
+    """The determined directions, as (rows, k) and (p, k) whose product is the gain, and the others, (p - k, p)."""
     scaled = jacobian * typical
     norm = np.linalg.norm(scaled, axis=0)
     norm = np.where(norm > ROUNDING * norm.max(), norm, 1.0)

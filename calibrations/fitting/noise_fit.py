@@ -138,7 +138,7 @@ def estimate(start: Noise, residual: Array, jacobian: Array, smooth: Array) -> N
 
 
 def rounding_of(jacobian: Array) -> Array:
-    """What may be left of each channel by rounding alone, shape (channels,); 0 without parameters."""
+    """Residual of each channel by rounding alone, shape (channels,); 0 without parameters."""
     if not jacobian.size:
         return np.zeros(len(jacobian))
     return np.asarray(EXACT * rms(jacobian.swapaxes(1, 2)).max(axis=1))
@@ -210,7 +210,7 @@ class NoiseSearch:
 
     @cached_property
     def beside(self) -> tuple[Array, tuple[int, ...]]:
-        """Orthonormal columns (channels, n, rank) for what each group adds beside the smooth columns and the first.
+        """Orthonormal columns (channels, n, rank) of each group, orthogonal to the smooth columns and the first group.
 
         Also the number of the group that each comes from.
         """

@@ -119,11 +119,11 @@ class Problem:
         return error.T
 
     def sensed(self, theta: Array) -> Array:
-        """What the samples sense along the sensing axes, (samples, 3)."""
+        """The specific force or rate of the samples along the sensing axes, (samples, 3)."""
         return force(self.samples, self.layout.steps(theta))
 
     def of_output(self, theta: Array, changes: Array) -> Array:  # noqa: ARG002
-        """What changes of the response, (samples, axes, m), make of the residual, to first order, (channels, n, m)."""
+        """Changes of the residual, (channels, n, m), by changes of the response, (samples, axes, m), to first order."""
         return np.stack([self._reduced(-change) for change in np.moveaxis(changes, 2, 0)], axis=2)
 
     @property
@@ -180,7 +180,7 @@ class Problem:
         return LinearisedChain(self.samples, steps)
 
     def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:
-        """What the residual changes by, as a function of (entry changed, its value ahead, its value behind)."""
+        """Change of the residual, as a function of (entry, its upper value, its lower value)."""
         steps = self.layout.steps(theta)
         even = [i for i, (effect, _) in enumerate(steps) if stairs or not effect.rounds]
         by_all, beside_stairs = (
@@ -253,7 +253,7 @@ class PositionProblem(Problem):
 
     @property
     def unit(self) -> str:
-        """That of what is sensed."""
+        """The unit of the sensed quantity."""
         return self.table.input_unit
 
     def residual_by(self, steps: Sequence[Step]) -> Array:
@@ -322,7 +322,7 @@ class FieldProblem(PositionProblem):
 
 @dataclass(frozen=True)
 class MotionProblem(Problem):
-    """What stretches of a record hold of its motion."""
+    """The motion of a record, as its stretches represent it."""
 
     table: Stretches
 
@@ -348,7 +348,7 @@ class MotionProblem(Problem):
 
     @cached_property
     def white(self) -> Array | None:
-        """From the density beside each line."""
+        """From the spectral density near each line."""
         return self.table.white
 
     @property

@@ -66,7 +66,7 @@ def with_sizes(model: Model, smaller: Fit) -> Model:
 
 
 def effects_beyond_base(fit: Fit) -> ModelEffects:
-    """What the model's effects beyond bias, scale factor and geometry contribute."""
+    """Contribution of the effects other than bias, scale factor and geometry."""
     problem = fit.problem
     names = [term.name for term in fit.model.terms if term.name not in BASE]
     shape = fit.residual.shape

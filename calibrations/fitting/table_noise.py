@@ -50,7 +50,7 @@ def with_noise(table: Table, model: Model) -> Table:
 
 
 def slow_processes(model: Model, axis: str, table: Table) -> Processes:
-    """Those of one axis on the times of a table."""
+    """The processes of one axis at the times of a table."""
     if not any(e.axis == axis for e in model.params.values()):
         raise ModelError(f"{model.name}: the noise model has no values for the axis {axis}, which {table.source} has")
     gaps_s = np.diff(np.sort(table.time_s))
@@ -82,7 +82,7 @@ def scatter(table: Table) -> Array | None:
 
 
 def scatter_remark(table: Table) -> str | None:
-    """What is taken for the noise of a table that does not say it, in words; None where it does, or is not asked."""
+    """The assumption on the noise of a table that does not state it, in words; None where it does, or needs none."""
     form = table.type.widest_form
     if not form or white_std(table) is not None:
         return None

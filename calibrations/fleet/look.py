@@ -60,7 +60,7 @@ class Group:
 
 @dataclass(frozen=True)
 class SearchGroups:
-    """All that is searched together on one design. `trials`: to how many independent tests the search amounts."""
+    """The groups of columns of a search on one design. `trials`: the number of independent tests."""
 
     all: tuple[Group, ...]
     trials: float
@@ -96,7 +96,7 @@ class SharedDesigns:
 
 
 def _cached(cache: dict[Key, V], key: Key, make: Callable[[], V]) -> V:
-    """What was made for a key, or is now; where there are MOST of them all are forgotten, so that memory stays flat."""
+    """The value for a key, made once. The cache is cleared at MOST values, so that memory stays bounded."""
     value = cache.get(key)
     if value is None:
         value = make()
@@ -111,7 +111,7 @@ def _screened_effects(fit: Fit, effects: Mapping[str, Effect]) -> tuple[Effect, 
 
 
 def _key(table: Table, required: tuple[str, ...]) -> Key:
-    """What columns at rows in order of time are a function of."""
+    """The variables that determine columns at rows in order of time."""
     design = ANGLES if table.type.stage_angles else table.columns
     names = [name for name in dict.fromkeys((*design, *required)) if name in table]
     return tuple(part for name in names for part in (name, table.column(name).tobytes()))
@@ -275,7 +275,7 @@ def _weighed(
 
 
 def statistics_of(grams: list[Array], scores: list[Array]) -> tuple[Array, Array]:
-    """What the sum of squares falls by with each group of columns, and its rank, from Gram matrices and scores."""
+    """Reduction of the sum of squares by each group of columns, and its rank, from Gram matrices and scores."""
     wide = max(map(len, scores))
     padded, sides = np.zeros((len(grams), wide, wide)), np.zeros((len(grams), wide))
     for k, (gram, score) in enumerate(zip(grams, scores, strict=True)):

@@ -61,7 +61,7 @@ DETERMINED = 1e-8  # share of an information matrix: less is not known
 
 @dataclass(frozen=True)
 class Measured:
-    """A sensor's part: where it was measured, of which batch, and what it shows of the stage."""
+    """A sensor's contribution: its rig, its batch, and its information on the stage."""
 
     batch: str
     rig: str
@@ -88,7 +88,7 @@ class RigError:
 
 @dataclass(frozen=True)
 class _Found:
-    """What one effect would be on every rig, and by how much it would take off the sums of squares of all sensors."""
+    """The values of one effect on every rig, and the reduction of the sums of squares of all sensors."""
 
     errors: tuple[RigError, ...] = ()
     fall: float = 0.0

@@ -147,7 +147,7 @@ class FreeForm(Effect):
         return total
 
     def _kept_columns(self, table: Table, force: Array) -> list[Array]:
-        """Columns of each axis. Those of the last force are kept: a jacobian asks for them once a parameter."""
+        """Columns of each axis. Those of the last force stay in memory, since a jacobian needs them often."""
         if self._last is None or not self._has_columns(table, force):
             self._last = (table, force, [self._columns(table, force, k) for k in range(len(table.axes))])
         return self._last[2]

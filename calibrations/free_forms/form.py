@@ -127,7 +127,7 @@ class Form:
         return np.asarray(self.columns(table, force, response, k) @ coefficients)
 
     def drive(self, table: Table, force: Array, response: Array, k: int) -> Array:
-        """What drives the function of axis k, shape (n,)."""
+        """The driver of the function of axis k, shape (n,)."""
         if self.driver == "own":
             return force[:, k]
         if self.driver == "cross":
@@ -164,7 +164,7 @@ def _of_table(form: Form, table: Table, k: int) -> Array:
 
 @lru_cache(maxsize=32)
 def _lagging(table: Table, basis: Play, lead_s: float) -> Array:
-    """What the temperature is ahead of itself behind plays of these widths, over the widths, shape (n, widths)."""
+    """Temperature less its value behind plays of these widths, over the widths, shape (n, widths)."""
     temperature = leading_temperature(table, lead_s)
     return np.column_stack([(temperature - play(temperature, width)) / width for width in basis.widths])
 
@@ -181,7 +181,7 @@ def _hysteretic(table: Table, basis: Preisach, approach_deg: float) -> Array:
 
 @lru_cache(maxsize=32)
 def _slipping(table: Table, basis: Play, approach_deg: float, pressed: bool) -> Array:
-    """Forces of the slip elements over their widths, and what is left of their first state, shape (3, n, columns)."""
+    """Forces of the slip elements over their widths, and the decay of their first state, shape (3, n, columns)."""
     widths = np.array(basis.widths)
     driver = specific_force(nominal_pose(table))
     path, even = turning_forces(table, approach_deg), np.ones_like(driver)

@@ -135,7 +135,7 @@ def _with_substitutes(result: SearchResult, acting: Sequence[ActingPlace]) -> li
 
 
 def _cost_without(result: SearchResult, names: Sequence[str]) -> float:
-    """What the fit loses without some components, of twice the log-likelihood."""
+    """Loss of twice the log-likelihood without some components."""
     return _sizes_without(result, names).deviance - result.sizes.deviance
 
 
@@ -147,13 +147,13 @@ def _sizes_without(result: SearchResult, names: Sequence[str]) -> Sizes:
 
 
 def _reading_errors(result: SearchResult, sizes: Mapping[str, float]) -> float:
-    """What the errors of noisy columns leave of the places that they drive, rms over the noise."""
+    """Residual by the errors of noisy columns at the places that they drive, rms over the noise."""
     driven = {result.component(name).place: result.component(name).error for name in result.active}
     return float(np.sqrt(sum((error * sizes[place]) ** 2 for place, error in driven.items())))
 
 
 def _part(result: SearchResult, name: str, b: int) -> Array:
-    """What one component adds to the output over the noise, (channels * n,)."""
+    """Contribution of one component to the output over the noise, (channels * n,)."""
     block = result.gram.blocks[name]
     return np.asarray(result.columns[:, b + block.start : b + block.stop] @ result.sizes.of(result.gram, name))
 
@@ -257,7 +257,7 @@ def _followed(
 def _residual_at_best(
     result: SearchResult, comp: Component, curve: Array, Q: Array, companions: Sequence[Array] = ()
 ) -> tuple[float, Component]:
-    """What a component leaves of a curve, sum of squares, at the shape that leaves least, and in that shape."""
+    """Residual sum of squares of a curve after a component in its best shape, and the component in that shape."""
 
     def squares(shape: tuple[float, ...]) -> float:
         shaped = comp.reshaped(shape) if comp.reshaped is not None else comp
@@ -333,7 +333,7 @@ def _residual_squares(columns: Sequence[Array], y: Array) -> float:
 
 
 def _rivals(result: SearchResult, names: Sequence[str], larger: set[str]) -> tuple[float, tuple[str, ...]]:
-    """What the place gains, and causes at other places that would do in its stead.
+    """The gain of the place, and causes at other places that explain it as well.
 
     Of one component those that gain nearly as much. At a `larger` place that acts, also a form that gains most of it:
     the form of a mechanism is never quite that of the catalogue.

@@ -49,7 +49,7 @@ class Reading:
 
     @property
     def price(self) -> float:
-        """What a component must gain more if this reading drives it."""
+        """The additional gain that a component needs if this reading drives it."""
         return SMOOTH * self.is_level
 
     @property

@@ -1,4 +1,4 @@
-"""What the search reads of a table of poses: angles, time, logged columns, outputs and their white noise."""
+"""Data of a table of poses for the search: angles, time, logged columns, outputs and their white noise."""
 
 from __future__ import annotations
 

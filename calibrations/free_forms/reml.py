@@ -105,7 +105,7 @@ def eliminated(G: Array, blocks: Mapping[str, slice], scales: Mapping[str, float
 
 
 def beside_base(X: Array, g: Gram, b: int) -> tuple[Array, dict[str, float]]:
-    """Columns and scales such that what the base leaves of each component has unit rms."""
+    """Columns and scales such that the part of each component orthogonal to the base has unit rms."""
     X, scales = X.copy(), dict(g.scales)
     for name, block in g.blocks.items():
         columns = X[:, b + block.start : b + block.stop]

@@ -88,7 +88,7 @@ def resolve_effect(name: str, effects: Mapping[str, Effect]) -> Effect:
 
 
 def shortage(place: str, table: Table) -> str | None:
-    """What data would be needed for a free form at `place`, in words that follow its name; None where they suffice."""
+    """The data that a free form at `place` still needs, in words that follow its name; None where the data suffice."""
     fewest, rows = table.type.fewest_for_form, table.type.rows
     if table.n < fewest:
         return f"needs {fewest} {rows} or more, and the data has {table.n}; measure more {rows}"

@@ -46,7 +46,7 @@ SAW_VISIBLE = 2.0  # steps' frequency times the noise of a sample: beyond, nothi
 
 @dataclass(frozen=True)
 class Stairs:
-    """Height of a step, where a code stands, and the noise of a sample, in the output's unit."""
+    """Height of a step, offset of a code, and the noise of a sample, in the output's unit."""
 
     step: float
     offset: float

@@ -122,7 +122,7 @@ class Structure:
         return tuple(causes)
 
     def others(self, place: ActingPlace | None) -> Array:
-        """What all places but one add to the output through the chain, (channels, n), in its unit; None: all places."""
+        """Contribution of all places but one to the output, (channels, n), in its unit; None: of all places."""
         result = self.result
         coefficients = {name: result.values.of[name] for name in (place.components if place else ())}
         state = state_at(
@@ -291,7 +291,7 @@ def _searched(
 
 
 def _in_larger_noise(result: SearchResult, model_effects: ModelEffects) -> tuple[SearchResult, float]:
-    """The search in noise as large as what it left, where that is likelier, and the factor on the noise; else 1.
+    """The search with noise as large as its residual, if that is likelier, and the factor on the noise; else 1.
 
     Scatter that nothing explains makes every component significant that follows it a little.
     """

@@ -32,7 +32,7 @@ class BadLines:
     first: str = ""  # the message about the first one
 
     def add(self, line: int, reason: str, message: str, lines: int = 1) -> None:
-        """One more, which takes up so many lines. Raises DataError with `message` where none is skipped."""
+        """Count one more damaged line. Raises DataError with `message` if no lines may be skipped."""
         if not self.share:
             raise DataError(message)
         self.first = self.first or message

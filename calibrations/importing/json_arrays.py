@@ -25,7 +25,7 @@ JSON_FORM = 'give arrays of equal length, {"mag": [[1, 2, 3], ...]}, or [{"mx": 
 
 
 def json_as_lines(source: Source) -> Source:
-    """The JSON document of `source` as comma-separated lines; another text as it is. Raises DataError."""
+    """The JSON document of `source` as comma-separated lines; another text unchanged. Raises DataError."""
     with source.lines() as lines:
         text = "".join(_bounded(lines, source.name))
     try:

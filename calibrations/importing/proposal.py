@@ -400,7 +400,7 @@ def _suggestion(laid: Sheet, attempt: Attempt) -> str:
 
 
 def _placeholders(attempt: Attempt, free: Sequence[str]) -> list[str]:
-    """What a person has to fill in."""
+    """The entries that a person has to fill in."""
     if attempt.lacking:
         return [f"your column's name for {PLACEHOLDER}: {', '.join(free)}"]
     return [f"{EXAMPLES[name][1]} for {PLACEHOLDER} in {name}" for name in attempt.unknown]

@@ -190,7 +190,7 @@ def is_number(cell: str) -> bool:
 
 
 def number_or_text(cell: str) -> Constant:
-    """The cell as a number, or else as it is."""
+    """The cell as a number, or else as text."""
     try:
         return parse_number(cell)
     except ValueError:

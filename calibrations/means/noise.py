@@ -75,7 +75,7 @@ class Noise:
 
     @property
     def known_slow(self) -> Array:
-        """That of the slow noise known beforehand, about its mean over these rows."""
+        """Standard deviation of the known slow noise about its mean over these rows."""
         return np.array(
             [_about_mean(channel_processes, float(np.sum(self.gap_s))) for channel_processes in self.given]
             or [0.0] * len(self.ratio)

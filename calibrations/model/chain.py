@@ -70,7 +70,7 @@ def respond(a: Array, table: Table, steps: Sequence[Step]) -> Array:
 
 
 def effect_contributions(a: Array, table: Table, steps: Sequence[Step]) -> list[Array]:
-    """What each effect adds to the output of all three axes, shape (n, 3) each; zeros, (1, 3), where nothing.
+    """Contribution of each effect to the output of all three axes, shape (n, 3) each; zeros, (1, 3), for none.
 
     A drift of the sensitivity multiplies all that the sensor makes of the force, also what its nonlinearity adds.
     """
@@ -89,7 +89,7 @@ def scaled(a: Array, response: Array, steps: Sequence[Step]) -> Array:
 
 
 def converted(parts: Sequence[Array], n: int, table: Table, steps: Sequence[Step]) -> Array:
-    """The sum of the parts as it is read out, shape (n, 3)."""
+    """The output after converter and filter for the sum of the parts, shape (n, 3)."""
     v = np.zeros((n, 3))
     for part in parts:
         v += part
@@ -209,7 +209,7 @@ class LinearisedChain:
         return self._drift if effect.of_force and self._scales else np.ones((1, 3))
 
     def _contribution(self, effect: Effect, values: Values) -> Array:
-        """What one effect adds, beside the others."""
+        """Contribution of one effect, with the others in the model."""
         part = effect.transduction(self._force_of(effect), self.table, values)
         return np.asarray(part * self._drift_of(effect))
 
@@ -230,7 +230,7 @@ class LinearisedChain:
         return converted(parts, self.table.n, self.table, steps)[:, : len(self.table.axes)]
 
     def change(self, term: int, upper: Values, lower: Values) -> Array:
-        """Output with the values `upper` of one effect less that with `lower`, to first order, shape (n, axes).
+        """Output with the `upper` values of one effect less the output with the `lower` ones, first order, (n, axes).
 
         Values before the transduction change the force. The output follows by d output / d force, found once for all.
         """
@@ -298,7 +298,7 @@ class LinearisedChain:
         return np.stack([(total(a + h * e) - total(a - h * e)) / (2 * h) for e in np.eye(3)], axis=2)
 
     def _read_out(self, change: Array) -> Array:
-        """What a small change of the sum of all parts, (n, 3), changes of the output, shape (n, axes)."""
+        """Change of the output, shape (n, axes), by a small change of the sum of all parts, (n, 3)."""
         axes, n = len(self.table.axes), self.table.n
         if self.table.type.moving or any(effect.rounds for effect, _ in self.steps):
             plus, minus = (converted([self._total + s * change / 2], n, self.table, self.steps) for s in (1.0, -1.0))

@@ -31,7 +31,7 @@ class Correlations:
 
     @classmethod
     def of(cls, names: Sequence[str], matrix: Array) -> Correlations:
-        """Those of a symmetric matrix, shape (p, p)."""
+        """Correlations from a symmetric matrix, shape (p, p)."""
         rows = [tuple(round(float(r), DIGITS) + 0.0 for r in row[:i]) for i, row in enumerate(matrix)]
         return cls(tuple(names), tuple(rows))
 
@@ -44,7 +44,7 @@ class Correlations:
         return full
 
     def only(self, keys: Container[str]) -> Correlations | None:
-        """Those of `keys`; None where there are fewer than two."""
+        """The correlations of `keys`; None for fewer than two."""
         at = [i for i, name in enumerate(self.names) if name in keys]
         if len(at) < 2:
             return None

@@ -185,7 +185,7 @@ class Model(ReportedResult):
         return shared.value if shared is not None and not shared.axis else default
 
     def estimates(self, effect: str) -> tuple[Estimate, ...]:
-        """Those of one effect; () where the model does not have it, or no values yet."""
+        """The estimates of one effect; () if the model does not have it, or has no values yet."""
         return next((term.estimates for term in self.terms if term.name == effect), ())
 
     def report(self) -> str:

@@ -30,7 +30,7 @@ class Slot:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where each parameter of `model` stands in the vector, for the axes of a table."""
+    """The index of each parameter of `model` in the vector, for the axes of a table."""
 
     model: Model
     axes: tuple[str, ...]

@@ -169,7 +169,7 @@ class Smoothed:
     noise_std: float
 
     def response(self, f: Array, rate_hz: float) -> Complex:
-        """What the smoother does to a sine, away from the ends: no phase, 1 / (1 + r / q (2 sin(pi f / rate))^6)."""
+        """Response of the smoother to a sine away from the ends: no phase, 1 / (1 + r / q (2 sin(pi f / rate))^6)."""
         return np.asarray(1 / (1 + self.ratio * (2 * np.sin(np.pi * f / rate_hz)) ** (2 * ORDER)), dtype=complex)
 
     def corner_hz(self, rate_hz: float) -> float:
@@ -261,7 +261,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Bias:
-    """What a filter does by itself to a sine of one frequency, and where it may be used.
+    """The bias of a filter for a sine of one frequency, and the band in which it may be used.
 
     `amplitude` relative, `phase_rad` of the acceleration that it gives; `band_hz`: up to here its amplitude is within
     1 %, or between these where it was corrected at one frequency; `edge_s`: not to be used so near the ends.
@@ -301,7 +301,7 @@ def reference_acceleration(t_s: Array, displacement_m: Array, rate_hz: float) ->
 
 
 def line_prominence(line: Sine) -> float:
-    """What a line's acceleration grows with."""
+    """The factor of a line's acceleration."""
     return line.frequency_hz**2 * line.amplitude
 
 

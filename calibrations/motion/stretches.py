@@ -27,7 +27,7 @@ INLYING_MEAN = 0.934  # of an exponential distribution below LEAST_LINE medians
 
 @dataclass(frozen=True)
 class Line:
-    """What one line makes of the output, amplitude 1, and its derivative; shape (samples,) each."""
+    """The output by one line of amplitude 1, and its derivative; shape (samples,) each."""
 
     name: str
     at_hz: float
@@ -38,7 +38,7 @@ class Line:
 def residual_lines(
     samples: Table, references: Sequence[Reference], expected: Array, length_s: float
 ) -> tuple[Line, ...]:
-    """The lines that a stretch of this length resolves, strongest first, and what they leave of the motion."""
+    """The lines that a stretch of this length resolves, strongest first, and the residual motion."""
     lines: list[Line] = []
     residual = expected.copy()
     for f in _frequencies(references, length_s):
@@ -139,7 +139,7 @@ class Stretches(Table):
 
     @property
     def digest(self) -> str:
-        """That of the record itself."""
+        """The value of the record itself."""
         return self.raw_digest
 
     def parts(self, v: Array) -> Array:

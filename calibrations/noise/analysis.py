@@ -91,7 +91,7 @@ class ChannelNoise:
 
     @property
     def allan(self) -> Curve:
-        """The overlapping Allan deviation of the record as it is."""
+        """The overlapping Allan deviation of the record without any correction."""
         return self.deviations[OVERLAPPING]
 
     @property
@@ -147,7 +147,7 @@ class ChannelNoise:
         return [estimate for estimate in self.search.end.model.estimates(effect.name) if estimate.axis == self.axis]
 
     def _companions(self, effect: Effect) -> list[Effect]:
-        """The other processes of the fit, and those that may be present beside any."""
+        """The other processes of the fit, and those that may be present in addition."""
         slow = [self.search.effects[name] for name in SLOW if name in self.search.effects]
         processes = (*self.fit.effects, *(process for process in slow if process not in self.fit.effects))
         return [process for process in processes if process is not effect]
@@ -234,7 +234,7 @@ def _channels(record: Still, search: Search) -> dict[str, ChannelNoise]:
 
 
 def _below_step(hidden_noise: HiddenNoise, name: str, unit: str) -> Coefficient:
-    """What is known of a process where the noise is below one step of the converter."""
+    """The bound on a process if the noise is below one step of the converter."""
     upper = hidden_noise.white_below if name == "white-noise" else np.inf
     return Coefficient(0.0, upper / INTERVAL_STDS, unit, upper)
 

@@ -26,7 +26,7 @@ from calibrations.noise.signal import PLACE, TEMPERATURE, SignalSearch, search_s
 
 @dataclass(frozen=True)
 class Calibration:
-    """What the temperature does to a record: the search for it, and the search for noise `after` it is taken off."""
+    """Effects of temperature on a record: their search, and the search for noise `after` they are removed."""
 
     start: NoiseFit
     signal: SignalSearch
@@ -72,14 +72,14 @@ class Calibration:
 
     @property
     def separations(self) -> Mapping[str, Experiment]:
-        """By cause in doubt, the experiment that separates it from what it may be."""
+        """By cause in doubt, the experiment that separates it from its rivals."""
         pattern_in_doubt = next((pattern for pattern in self.patterns if pattern.rivals), None)
         experiment = experiment_for_pattern(pattern_in_doubt, self.start.still.length_s) if pattern_in_doubt else None
         return {self.signal.causes[0]: experiment} if experiment and self.alternatives else {}
 
 
 def calibrated(search_before: Search, start: NoiseFit, effects: Mapping[str, Effect]) -> Calibration | None:
-    """What the temperature does to the record of `search_before`; None where it does nothing beyond the model."""
+    """Effects of temperature on the record of `search_before`; None if there are none beyond the model."""
     model_terms = signal_terms(start.model)
     warm = tuple(
         pattern for pattern in search_before.patterns if pattern.kind == FOLLOWS and pattern.cause == TEMPERATURE
@@ -101,7 +101,7 @@ def calibrated(search_before: Search, start: NoiseFit, effects: Mapping[str, Eff
 def _without_costly_curves(
     signal: SignalSearch, model: Model, still: Still, effects: Mapping[str, Effect]
 ) -> SignalSearch:
-    """Without a curve beside the causes that gains no more likelihood than its coefficients cost (Schwarz)."""
+    """The signal without a curve whose gain in likelihood is below the cost of its coefficients (Schwarz)."""
     for name in signal.names:
         if name in signal.causes:
             continue
@@ -120,7 +120,7 @@ def _worth(signal: SignalSearch, model: Model, still: Still) -> float:
 
 
 def with_terms(model: Model, terms: tuple[Term, ...]) -> Model:
-    """The model with these terms as they are, in place of its own of the same names, or behind them."""
+    """The model with these terms, which replace its terms of the same names or follow the others."""
     by_name = {term.name: term for term in terms}
     new = [term for term in terms if term.name not in model.effects]
     replaced = tuple(by_name.get(term.name, term) for term in model.terms)

@@ -111,7 +111,7 @@ class DeviationComparison:
 
 
 def compare_deviations(fit: ChannelFit, curve: Curve) -> DeviationComparison:
-    """The measured curve beside the model's. A variance is distributed as chi-square over its degrees of freedom."""
+    """The measured curve and that of the model. A variance is distributed as chi-square over its degrees of freedom."""
     judged = curve.tau_s >= (FILTER_PERIODS / fit.channel.corner_hz if np.isfinite(fit.channel.corner_hz) else 0.0)
     tau_s, measured, edf = curve.tau_s[judged], curve.deviation[judged], curve.edf[judged]
     modelled = deviation(fit, tau_s)

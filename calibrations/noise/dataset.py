@@ -103,7 +103,7 @@ class StillRecord(Dataset[NoiseFit]):
         return places(fit)
 
     def search(self, model: Model, effects: Mapping[str, Effect]) -> NoiseFindings:
-        """What the temperature does, then lines, disturbances and every mixture of processes."""
+        """Effects of temperature, then lines, disturbances and every mixture of processes."""
         return self._searched(self.fit(model), effects)
 
     def search_on(self, start: NoiseFit, origin: NoiseFit, effects: Mapping[str, Effect]) -> NoiseFindings:
@@ -172,7 +172,7 @@ class StillRecord(Dataset[NoiseFit]):
         return result
 
     def addition(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> NoiseFindings:
-        """One process, with what the record cannot separate from it, and what is missing beside it."""
+        """One process, with the processes that the record cannot separate from it, and further missing ones."""
         base = self.fit(model)
         step = self.step(effect, base)
         first = search(base.still, base.model, effects)
@@ -259,7 +259,7 @@ class StillRecord(Dataset[NoiseFit]):
         return []
 
     def cautions(self, fit: NoiseFit) -> list[str]:  # noqa: ARG002
-        """What a person should check in the record."""
+        """The points that a person should check in the record."""
         return record_doubts(self.still.channels)
 
 

@@ -307,7 +307,7 @@ def next_of(search: Search, doubts: Mapping[str, tuple[str, ...]], structure: st
 
 
 def record_doubts(channels: tuple[Channel, ...]) -> list[str]:
-    """What a person should check in a record whatever its model: odd samples that matter, and a level that jumps."""
+    """Points to check in a record with any model: odd samples that matter, and a level that jumps."""
     advice = "use a part of the record without it, or measure again (`rig noise` shows where)"
     odd = [
         f"{oddity.text} ({channel.axis}): {advice}"

@@ -336,7 +336,7 @@ def _unit_columns(at: ChannelFit, effects: Sequence[Effect], shapes: Mapping[str
 
 
 def _best_shape(at: ChannelFit, effect: Effect, grid: Array, shapes: Mapping[str, Values]) -> Values:
-    """The most likely shape of one effect beside the others, near the best of a grid (g,)."""
+    """The most likely shape of one effect, with the others held, near the best of a grid (g,)."""
     name = effect.parameters[1].name
     companions = [e for e in at.effects if e is not effect]
     G = np.column_stack([_unit_columns(at, companions, shapes), at.seen]) if companions else at.seen[:, None].copy()

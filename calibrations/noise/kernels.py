@@ -27,7 +27,7 @@ Counts = NDArray[np.int64]
 
 
 class Tree(NamedTuple):
-    """What is kept of all samples seen: of fixed size."""
+    """The summary of all samples so far, of fixed size."""
 
     sums: Array  # (LEVELS, ROOM) bins that are still needed
     phases: Array  # (LEVELS, ROOM)
@@ -74,7 +74,7 @@ def absorb(tree: Tree, samples: Array, offset: float, third: bool) -> None:
 
 @njit(cache=True, nogil=True)
 def finish(tree: Tree, third: bool) -> None:
-    """Measure what is left in the buffers; samples that fill no bin of a level are not used there."""
+    """Measure the rest of the buffers; samples that fill no bin of a level are not used there."""
     for level in range(LEVELS - 1):
         _hand_up(tree, level, third)
 

@@ -133,7 +133,7 @@ class ChannelFit:
 
     @cached_property
     def seen(self) -> Array:
-        """Density; no band is quite without power."""
+        """Measured density; no band is without power."""
         density = np.concatenate([part.density for part in self.parts])
         return np.asarray(np.maximum(density, LEAST_DENSITY * density.max()))
 
@@ -148,7 +148,7 @@ class ChannelFit:
         return np.concatenate([part.frequency_hz for part in self.parts])
 
     def part_of(self, effect: Effect, values: Values | None = None) -> Array:
-        """What is expected of one effect."""
+        """The expected density of one effect."""
         return effect_spectrum(effect, self.parts, self.values[effect.name] if values is None else values)
 
     @cached_property

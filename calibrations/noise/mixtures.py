@@ -50,7 +50,7 @@ def least_gain(of_chance: float, tubes: tuple[float, ...]) -> float:
 
 
 def tube(fit: ChannelFit, effect: Effect) -> float:
-    """L / (2 pi) of an effect's shapes beside the effects of a fit; 0 for one that has no shape to be searched for."""
+    """L / (2 pi) of an effect's shapes, given the effects of a fit; 0 for an effect without a shape."""
     if len(effect.parameters) < 2:
         return 0.0
     strength, shape = (p.name for p in effect.parameters[:2])

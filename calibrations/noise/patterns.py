@@ -281,7 +281,7 @@ def _further(channel: Channel, by: _Ordinates, unit: str, removed_patterns: Iter
 
 
 def refitted(patterns: tuple[Pattern, ...], fit: ChannelFit, channel: Channel) -> tuple[Pattern, ...]:
-    """The patterns of one channel with amounts fitted together to its whole record, beside a fit's effects."""
+    """The patterns of one channel, their sizes fitted together to its whole record with a fit's effects."""
     by = _Ordinates.of(replace(fit, channel=channel))
     forms = np.column_stack([by.coefficients(pattern.form) for pattern in patterns]) / np.sqrt(by.variance)[:, None]
     size, *_ = np.linalg.lstsq(forms, by.seen / np.sqrt(by.variance), rcond=None)

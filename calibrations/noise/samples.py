@@ -303,7 +303,7 @@ class Oddity:
 
 
 def hidden_in(oddities_of_channel: Iterable[Oddity]) -> HiddenNoise | None:
-    """The noise below a converter's step; None where none is."""
+    """The noise below a converter's step; None if the noise is above it."""
     return next((oddity.hidden for oddity in oddities_of_channel if oddity.hidden is not None), None)
 
 

@@ -41,7 +41,7 @@ from calibrations.noise.telegraph import Telegraph, telegraph_of
 
 @dataclass(frozen=True)
 class Search:
-    """What a model lacks: lines and patterns, removed from `still`, and mixtures of processes in the rest."""
+    """The missing parts of a model: lines and patterns, removed from `still`, and mixtures of processes."""
 
     still: Still
     model: Model

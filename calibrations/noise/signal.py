@@ -51,7 +51,7 @@ def without_signal(still: Still, terms: tuple[Term, ...]) -> Still:
 
 
 def _contribution(terms: tuple[Term, ...], channel: Channel, source: str) -> Array:
-    """What terms add to the means of a channel, less its mean, shape (m,). Raises DataError."""
+    """Contribution of terms to the means of a channel, less its mean, shape (m,). Raises DataError."""
     if not terms:
         return np.zeros(len(channel.means))
     names = AXES[: AXES.index(channel.axis) + 1]
@@ -166,7 +166,7 @@ class SignalSearch:
 def search_signal(
     still: Still, effects: Mapping[str, Effect], lag_s: float, model_terms: tuple[Term, ...] = ()
 ) -> SignalSearch:
-    """What the temperature does to outputs beyond the terms of the model, by the search at one orientation.
+    """Effects of temperature on outputs beyond the terms of the model, by the search at one orientation.
 
     Beside slow noise that search may see nothing: then a straight line, with the lag that was found beside that noise.
     """
@@ -189,7 +189,7 @@ def search_signal(
 
 
 def fit_signal(model: Model, still: Still, effects: Mapping[str, Effect]) -> Model:
-    """The model with its signal terms estimated from the record; noise as it is."""
+    """The model with its signal terms estimated from the record; the noise is unchanged."""
     terms = signal_terms(model)
     if not terms:
         return model

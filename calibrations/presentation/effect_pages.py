@@ -98,7 +98,7 @@ def _alternative(effect: Effect) -> str:
 
 
 def _caption(effect: Effect) -> str:
-    """What the picture shows, and of how large an effect."""
+    """The caption of the picture, with the size of the effect."""
     if effect.is_noise:
         return _caption_of_noise(effect)
     incomplete = {"bias": "a model without a bias", "scale-factor": "a model without a scale factor"}

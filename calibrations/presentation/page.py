@@ -26,7 +26,7 @@ def pictures_html(pictures: Sequence[Picture]) -> str:
 
 @cache
 def templates() -> Environment:
-    """The templates of this package. HTML and XML escape what they are given."""
+    """The templates of this package. HTML and XML escape their variables."""
     environment = Environment(
         loader=PackageLoader("calibrations.presentation"),
         autoescape=True,

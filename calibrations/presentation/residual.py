@@ -53,7 +53,7 @@ def specific_force(fit: Fit) -> Array:
 
 
 def columns(fit: Fit) -> list[Column]:
-    """What the residual is drawn against: angle or specific force, time, temperature, as far as measured."""
+    """The abscissas of the residual: angle or specific force, time, temperature, as far as measured."""
     table, n = fit.table, len(fit.channels)
     first: list[Column] = []
     if table.type.drawn_over:
@@ -65,7 +65,7 @@ def columns(fit: Fit) -> list[Column]:
 
 
 def _sensed(fit: Fit, letter: str) -> list[Column]:
-    """What is sensed along each axis, named by a letter and the axis."""
+    """The sensed quantity along each axis, named by a letter and the axis."""
     axis_label, n = fit.table.type.sensed_along, len(fit.channels)
     return [_column(letter + k, axis_label.format(k), a, n) for k, a in zip(AXES, specific_force(fit).T, strict=True)]
 
@@ -206,7 +206,7 @@ class ChannelResidual:
 
     @cached_property
     def unit(self) -> str:
-        """What the residual is drawn in."""
+        """The unit of the residual."""
         return milli_unit(self.fit) if self.in_g else residual_unit(self.fit)
 
     @cached_property
@@ -281,7 +281,7 @@ def _place(table: Table, row: int) -> Iterator[str]:
 
 
 def residual_units(fit: Fit) -> dict[bool, str]:
-    """What a residual can be given in: False the output's unit, True that of what is sensed."""
+    """The units of a residual: False the output's, True that of the sensed quantity."""
     sensed = fit.table.input_unit
     return {True: sensed} if fit.table.type.magnitude else {False: fit.table.unit, True: sensed}
 

@@ -23,7 +23,7 @@ Handler = Callable[[Sequence[str], float], str | None]
 
 
 class World(Protocol):
-    """What a controller knows of physics."""
+    """The interface of a controller to the simulated physics."""
 
     def advance(self, t_s: float) -> None: ...
 
@@ -31,7 +31,7 @@ class World(Protocol):
         """Let the carriage follow a command from now on; when it will have settled, in s."""
 
     def positioner_um(self, axis: str, times_s: ArrayLike) -> Floats:
-        """What the position sensor shows, from the present command's start on; no time passes."""
+        """The reading of the position sensor, from the start of the present command on; no time passes."""
 
 
 class Axes:

@@ -55,7 +55,7 @@ class Recorder:
         }
 
     def state(self) -> dict[str, Any]:
-        """The settings. What was recorded is lost with a restart, as with the power."""
+        """The settings. A restart loses the recording, as a loss of power does."""
         return {"what": dict(self._what), "triggers": dict(self._triggers), "rate": self._rate}
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -263,7 +263,7 @@ class Waves:
             self._recorder.trigger(now_s, e727.WITH_THE_WAVE, e727.WITH_A_MOTION, e727.WITH_THE_NEXT_COMMAND)
 
     def _selected_wave(self, generator: str, now_s: float) -> Command:
-        """What a generator would play. Refused without a table, without servo, outside the travel."""
+        """The wave of a generator. Refused without a table, without servo, outside the travel."""
         sine = self._tables.get(str(self._selected[generator]))
         if sine is None:
             raise Refusal(e727.NO_WAVE)

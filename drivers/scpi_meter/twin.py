@@ -35,7 +35,7 @@ LIST = re.compile(r"\(@([\d,]+)\)")
 
 
 class World(Protocol):
-    """What a converter knows of physics."""
+    """The interface of a converter to the simulated physics."""
 
     def advance(self, t_s: float) -> None: ...
 
@@ -134,7 +134,7 @@ class Scanner(Twin):
         return _numbers_text([self._memory.popleft() for _ in range(count)])
 
     def _scans(self, start_s: float, interval_s: float, n: int, now_s: float) -> NDArray[np.float64]:
-        """Volts of `n` scans as they are shown, shape (n, inputs)."""
+        """Displayed volts of `n` scans, shape (n, inputs)."""
         volts = np.zeros((n, len(self._numbers)))
         if wired := [k for k, number in enumerate(self._numbers) if number in self._wiring]:
             if not interval_s:

@@ -180,7 +180,7 @@ class Circuit:
             raise self._not_ours(f"{len(data)} bytes", device, error) from error
 
     def _decode(self, take: Callable[[Any], Any], answer: Any, device: str) -> Any:
-        """What `take` finds in a message; caproto unpacks it only now. Raises BadFrame."""
+        """The result of `take` for a message, which caproto unpacks only now. Raises BadFrame."""
         try:
             return take(answer)
         except Exception as error:

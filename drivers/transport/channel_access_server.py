@@ -23,7 +23,7 @@ SUCCESS = 1
 
 @dataclass(frozen=True)
 class Field:
-    """What a field holds. `stamp_s` is the simulated clock's time at which its record was processed."""
+    """The value of a field. `stamp_s` is the simulated clock's time at which its record was processed."""
 
     value: float
     stamp_s: float
@@ -77,7 +77,7 @@ class Session:
         self._numbers = itertools.count(1)
 
     def answers(self, data: bytes, now_s: float) -> bytes:
-        """What the server says to these bytes of its client. Raises ValueError for what is not Channel Access."""
+        """The server's reply to these bytes of its client. Raises ValueError for bytes that are not Channel Access."""
         try:
             commands, _ = self._circuit.recv(data)
             sent = bytearray()

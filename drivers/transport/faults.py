@@ -67,7 +67,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class Kind:
-    """A fault that can be asked for: what it does, its usual size, what that is a size of, and the least size."""
+    """A fault that a bench can have: its description, its usual size and its meaning, and the least size."""
 
     doc: str
     size: float = 0.0
@@ -93,7 +93,7 @@ class Strike(NamedTuple):
 
 
 class Faults:
-    """The faults of one instrument, and what they have to remember."""
+    """The faults of one instrument, and their state."""
 
     def __init__(self, faults: Iterable[Fault] = (), kinds: Mapping[str, Kind] | None = None) -> None:
         """`kinds` are all that it can have. Raises KeyError for another one."""
@@ -134,7 +134,7 @@ class Faults:
         return self._held.setdefault(name, value)
 
     def state(self) -> dict[str, Any]:
-        """What a resumed run needs, JSON-able."""
+        """The state that a resumed run needs, JSON-able."""
         return {"asked": self._asked, "struck": list(self._struck), "held": dict(self._held)}
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -266,7 +266,7 @@ EFFECTS: dict[str, tuple[Kind, Effect]] = {
 
 
 def disturb(sent: Message, faults: Faults, wire: Wire) -> list[Message]:
-    """What becomes of a message."""
+    """The message after the faults of this moment."""
     messages = [sent]
     for name, (_, effect) in EFFECTS.items() if faults else ():
         if (size := faults.size(name, sent.due_s)) is not None:
@@ -275,7 +275,7 @@ def disturb(sent: Message, faults: Faults, wire: Wire) -> list[Message]:
 
 
 def _effect(effect: Effect, message: Message, size: float, wire: Wire) -> list[Message]:
-    """What becomes of one message; of an end, nothing else."""
+    """One message after one fault; the end of a connection is unchanged."""
     return [message] if message.data == END else effect(message, size, wire)
 
 

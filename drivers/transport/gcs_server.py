@@ -23,7 +23,7 @@ class Refusal(Exception):
 
 
 class Device(Protocol):
-    """What answers."""
+    """The function that answers a command."""
 
     def answer(self, command: str, now_s: float) -> str | None:
         """The answer to a line, or to a command of one byte; None where there is none."""

@@ -48,7 +48,7 @@ class Port(Protocol):
     def fileno(self) -> int: ...
 
     def read(self) -> bytes:
-        """What is there now, at least one byte; empty at the end."""
+        """The bytes that have arrived, at least one; empty at the end."""
 
     def write(self, data: bytes) -> int:
         """Send all of `data`; the number of bytes that are on their way to somebody."""
@@ -92,7 +92,7 @@ class Link:
             self._tap(self.clock.now(), self._names, "sent", data)
 
     def read(self, timeout_s: float) -> bytes:
-        """What arrives first, or nothing when `timeout_s` is over. Raises LinkRefused at the end."""
+        """The next bytes that arrive, or none within `timeout_s`. Raises LinkRefused at the end of the connection."""
         line = self._connected()
         if not self.clock.wait_readable(line, timeout_s):
             return b""
@@ -243,7 +243,7 @@ class DatagramPort:
         return self._socket.fileno()
 
     def read(self) -> bytes:
-        """All that waits, in one piece."""
+        """All waiting datagrams, joined."""
         data = []
         try:
             while True:

@@ -31,7 +31,7 @@ class Refusal(Exception):
 
 
 class Device(Protocol):
-    """A unit's registers. Raises Refusal for what it does not have."""
+    """A unit's registers. Raises Refusal for a register that it does not have."""
 
     faults: Faults
     functions: frozenset[int]  # the Modbus functions it knows: no other is asked of it

@@ -254,7 +254,7 @@ class Port:
         return disturb(sent, self._faults_of(sent.data), self.wire)
 
     def _faults_of(self, message: bytes) -> Faults:
-        """Those of the unit that a message is to or from; on a wire of one instrument, its own."""
+        """The faults of the unit that a message is to or from; on a wire of one instrument, of that instrument."""
         unit = self.wire.unit_of(message) if self._faults and message else None
         if unit is None:
             return next(iter(self._faults.values()), NO_FAULTS)

@@ -60,7 +60,7 @@ class Batch:
         return max(world.move_positioner(axis, command) for world in self._worlds.values())
 
     def positioner_um(self, axis: str, times_s: ArrayLike | None = None) -> Floats:
-        """What the position sensor of `axis` shows."""
+        """The reading of the position sensor of `axis`."""
         return self._first.positioner_um(axis, times_s)
 
     def mount_sensor(self, mount_deg: float = 0.0, flip: int = 0, up: str = "z") -> None:
@@ -83,11 +83,11 @@ class Batch:
             world.oven_set(set_point_c, running)
 
     def thermometer_c(self) -> float:
-        """What the thermocouple, on the first sensor, shows."""
+        """The reading of the thermocouple, which is on the first sensor."""
         return self._first.thermometer_c()
 
     def level_deg(self) -> tuple[float, float]:
-        """What a level on the turntable shows."""
+        """The reading of a level on the turntable."""
         return self._first.level_deg()
 
     def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> Floats:
@@ -106,7 +106,7 @@ class Batch:
         return volts
 
     def state(self) -> dict[str, Any]:
-        """All that the worlds remember, as JSON."""
+        """The state of the worlds, as JSON."""
         return {name: world.state() for name, world in self._worlds.items()}
 
     def restore(self, state: Mapping[str, Any]) -> None:

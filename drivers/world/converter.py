@@ -24,7 +24,7 @@ class Converter:
 
 @kernel
 def bowed_v(converter: Converter, volts: float) -> float:
-    """What the converter's characteristic makes of `volts`: a parabola through both ends of the range."""
+    """`volts` after the converter's characteristic: a parabola through both ends of the range."""
     if converter.bow_v == 0:
         return volts
     ratio = volts / converter.range_v

@@ -59,7 +59,7 @@ FOOT_SHARE, PEAK_SHARE = 0.02, 0.95  # of the highest reading: only what is betw
 
 
 def measured(probe: FibreProbe, random: np.random.Generator) -> tuple[Floats, Floats]:
-    """Gaps in um and volts, as they are written down."""
+    """Gaps in um and volts, rounded as in the certificate."""
     gaps = GAPS_UM + WANDER_UM * random.standard_normal(len(GAPS_UM))
     numbers = record(probe)
     volts = np.array([seen_v(numbers, gap) for gap in gaps])

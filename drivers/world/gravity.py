@@ -110,7 +110,7 @@ def inclination_deg(up: Floats, alpha_rad: float, beta_rad: float) -> tuple[floa
 
 
 def shown_deg(level: Level, inclined_deg: tuple[float, float], seed: int, t_ns: int) -> tuple[float, float]:
-    """What the level makes of it. Its noise hangs on seed and time alone, so looking at it disturbs nothing."""
+    """The reading of the level. Its noise depends on seed and time only, so a reading disturbs nothing."""
     noise = level.noise_deg * np.random.default_rng([seed, 3, t_ns]).standard_normal(2)
     x, y = inclined_deg
     return float(x + level.offset_x_deg + noise[0]), float(y + level.offset_y_deg + noise[1])

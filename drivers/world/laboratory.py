@@ -53,7 +53,7 @@ def dipole_ut(x_mm: float, y_mm: float, z_mm: float, mx: float, my: float, mz: f
 
 @kernel
 def near_magnet_ut(magnet: Magnet) -> tuple[float, float, float]:
-    """What a magnet adds to the field."""
+    """The field of a magnet."""
     moment = magnet.moment_x_ma_m2, magnet.moment_y_ma_m2, magnet.moment_z_ma_m2
     return dipole_ut(magnet.x_mm, magnet.y_mm, magnet.z_mm, moment[0], moment[1], moment[2])
 

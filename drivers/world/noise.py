@@ -56,7 +56,7 @@ class Noises:
 
 
 def zeros(*shape: int) -> Callable[[], Any]:
-    """What makes an array of zeros."""
+    """The default factory of an array of zeros."""
     return lambda: np.zeros(shape)
 
 
@@ -117,7 +117,7 @@ def tick(x: Fluctuation, y: Fluctuation, noise: Noises, t_s: float, step_s: floa
 
 @kernel
 def release(state: Fluctuation, noise: Noise, step_s: float, random: Generator) -> None:
-    """Let slow traps catch and release."""
+    """Advance the slow traps by one step."""
     for k in range(len(FLICKER_S)):
         rms, release_s = trap_v(noise, FLICKER_S[k]), FLICKER_S[k]
         state.flicker_v[k] = wandered(state.flicker_v[k], rms, release_s, step_s, random.standard_normal())
@@ -125,7 +125,7 @@ def release(state: Fluctuation, noise: Noise, step_s: float, random: Generator) 
 
 @kernel
 def stray(state: Fluctuation, noise: Noise, step_s: float, random: Generator) -> None:
-    """Let the walk walk and the wander wander."""
+    """Advance the random walk and the wander by one step."""
     state.walk_v += noise.walk_v_per_sqrt_h * math.sqrt(step_s / HOUR_S) * random.standard_normal()
     if ticked_v(noise) != 0:
         state.wander_v = wandered(state.wander_v, noise.wander_v, noise.wander_s, step_s, random.standard_normal())
@@ -133,13 +133,13 @@ def stray(state: Fluctuation, noise: Noise, step_s: float, random: Generator) ->
 
 @kernel
 def settle(state: Fluctuation, noise: Noise, t_s: float) -> None:
-    """Add up what is slow at `t_s`."""
+    """Add up the slow noise at `t_s`."""
     state.slow_v = state.flicker_v.sum() + state.walk_v + state.wander_v + noise.ramp_v_per_h * t_s / HOUR_S
 
 
 @kernel
 def remember(state: Fluctuation, noise: Noise, gap_ns: int) -> None:
-    """Work out what the filter keeps over `gap_ns`, unless that was asked last."""
+    """Compute the decay of the filter over `gap_ns`, unless it is known from the last call."""
     if gap_ns != state.kept_ns:
         state.kept_ns = gap_ns
         state.kept = math.exp(-1e-9 * gap_ns / filter_s(noise))
@@ -148,7 +148,7 @@ def remember(state: Fluctuation, noise: Noise, gap_ns: int) -> None:
 
 @kernel
 def charge(state: Fluctuation, noise: Noise, volts: float, t_ns: int) -> None:
-    """Let the capacitor follow the `volts` and the slow noise that have stood at its input until `t_ns`."""
+    """Charge the capacitor until `t_ns` by `volts` and the slow noise at its input."""
     gap_ns = t_ns - state.filtered_ns
     if gap_ns > 0:
         remember(state, noise, gap_ns)
@@ -159,7 +159,7 @@ def charge(state: Fluctuation, noise: Noise, volts: float, t_ns: int) -> None:
 
 @kernel
 def output_v(state: Fluctuation, noise: Noise, volts: float, t_ns: int, normal: float) -> float:
-    """What the capacitor holds at `t_ns`, noise included, where `volts` have stood in front of the filter."""
+    """Voltage of the capacitor at `t_ns`, noise included, after `volts` at the input of the filter."""
     charge(state, noise, volts, t_ns)
     gap_ns = t_ns - state.white_ns
     if gap_ns > 0:

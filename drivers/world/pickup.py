@@ -120,7 +120,7 @@ def hum_v(noise: Noise, t_ns: int) -> float:
 
 @kernel
 def shaken_v(state: Pickup, noise: Noise, shaking: Floor, t_ns: int) -> float:
-    """What the floor's shaking does at the output."""
+    """Effect of the floor's shaking on the output."""
     if state.shaken_v == 0:
         return 0.0
     lag = passed(shaking, filter_s(noise))[1]
@@ -129,7 +129,7 @@ def shaken_v(state: Pickup, noise: Noise, shaking: Floor, t_ns: int) -> float:
 
 @kernel
 def pulsed_v(state: Pickup, noise: Noise, volts: float, gap_ns: int) -> float:
-    """`volts` in whole pulses since the last sample, `gap_ns` ago; as they are where there are none."""
+    """`volts` in whole pulses since the last sample, `gap_ns` ago; unchanged without pulses."""
     if noise.pulse_v_s == 0 or gap_ns <= 0:
         return volts
     state.left_v_s += 1e-9 * gap_ns * volts

@@ -47,7 +47,7 @@ class Positioner:
 
 @dataclass(frozen=True)
 class Command:
-    """What the controller asks for from `start_s` to `end_s`; then the place that it has reached.
+    """The commanded position from `start_s` to `end_s`, then the position reached.
 
     at_um + rate_um_s t + amplitude_um sin(2 pi frequency_hz t + phase_rad), with t from `start_s` on.
     """
@@ -94,7 +94,7 @@ def following(positioner: Positioner, pieces: Floats, command: Command) -> tuple
 
 
 def _settled(positioner: Positioner, command: Command) -> tuple[float, ...]:
-    """What the loop follows a command with, once its beginning is forgotten: later, weaker, turned in phase."""
+    """The settled response of the loop to a command: delayed, weaker, shifted in phase."""
     natural, driven = 2 * math.pi * positioner.servo_hz, 2 * math.pi * command.frequency_hz
     answer = natural**2 / complex(natural**2 - driven**2, 2 * positioner.damping_fraction * natural * driven)
     late_s = 2 * positioner.damping_fraction / natural
@@ -149,7 +149,7 @@ def places_um(positioner: Positioner, pieces: Floats, times_s: Floats) -> Floats
 
 
 def read_um(positioner: Positioner, pieces: Floats, times_s: ArrayLike, salt: int) -> Floats:
-    """What the position sensor shows at `times_s`: the place, and noise that depends on time and `salt` alone."""
+    """Reading of the position sensor at `times_s`: the position, and noise that depends on time and `salt` only."""
     times = np.atleast_1d(np.asarray(times_s, dtype=np.float64))
     noise = normal_at(np.rint(1e9 * times).astype(np.int64), salt)
     position_um: Floats = places_um(positioner, pieces, times) + 1e-3 * positioner.noise_nm * noise

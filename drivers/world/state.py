@@ -19,7 +19,7 @@ JSON = dict[str, "JSON"] | list["JSON"] | str | float | int | bool | None
 
 
 def zeros(*shape: int, dtype: type = float) -> Callable[[], Any]:
-    """What makes an array of zeros."""
+    """The default factory of an array of zeros."""
     return lambda: np.zeros(shape, dtype)
 
 

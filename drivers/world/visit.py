@@ -61,7 +61,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class Plan:
-    """What the rig does at each of n poses."""
+    """The state of the rig at each of n poses."""
 
     motions: Floats  # (n, 2, pieces, 4) of alpha and beta, see stage
     rest_ns: Ints  # (n, 2) when each stage is at rest

@@ -73,7 +73,7 @@ class World:
         return rest_s
 
     def positioner_um(self, axis: str, times_s: ArrayLike | None = None) -> Floats:
-        """What the position sensor of `axis` shows, now or at `times_s` within its present motion; no time passes."""
+        """Reading of the position sensor of `axis`, now or at `times_s` within its present motion; no time passes."""
         number, times = (
             _place(axis, positioner.AXES, "axis of the positioner"),
             self.now_s if times_s is None else times_s,
@@ -109,15 +109,15 @@ class World:
         self._world.warmth.oven_running = int(running)
 
     def thermometer_c(self) -> float:
-        """What the thermocouple on the sensor's package shows now."""
+        """The present reading of the thermocouple on the sensor's package."""
         return float(self._world.warmth.thermocouple_c)
 
     def die_c(self) -> float:
-        """What a thermometer on the sensor's chip shows now."""
+        """The present reading of a thermometer on the sensor's chip."""
         return float(heat.die_c(self._world.warmth))
 
     def level_deg(self) -> tuple[float, float]:
-        """What a level on the turntable shows now: elevation of the positive ends of its x and y axis, deg."""
+        """The present reading of a level on the turntable: elevation of the positive ends of its x and y axis, deg."""
         angles_rad = mechanics.true_angles_rad(self._world, self._numbers.stages)
         inclined_deg = gravity.inclination_deg(self._world.up, *angles_rad)
         return gravity.shown_deg(self.config.level, inclined_deg, self._seed, int(self._world.now_ns))
@@ -182,7 +182,7 @@ class World:
         return vars(visited) | measured | {"t_s": middle_s - 1e-9 * self._world.powered_ns}
 
     def state(self) -> dict[str, state.JSON]:
-        """All that the world remembers, as JSON: restored, it continues sample for sample."""
+        """The state of the world, as JSON: restored, it continues sample for sample."""
         generators: Any = [g.bit_generator.state for g in (self._slow, self._fast, self._room)]
         return {"world": state.to_json(self._world), "generators": generators}
 

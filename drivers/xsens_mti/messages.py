@@ -41,7 +41,7 @@ ERRORS = {3: "invalid period", 4: "invalid message", 30: "timer overflow", 32: "
 
 
 class Xbus:
-    """What a message of XBus is."""
+    """The kind of an XBus message."""
 
     starts = re.compile(b"\xfa")
     head = 6

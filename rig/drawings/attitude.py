@@ -44,7 +44,7 @@ class Attitude:
 
     @property
     def specific_force_g(self) -> tuple[float, float, float]:
-        """What a still sensor feels along x, y, z: the upward direction in its own frame."""
+        """Specific force of a still sensor along x, y, z: the upward direction in its own frame."""
         x, y, z = (float(value) + 0.0 for value in self.sensor[:, 2].round(12))
         return x, y, z
 

@@ -34,7 +34,7 @@ def _side_by_side(attitude: Attitude) -> Iterator[str]:
 
 
 def _marks(attitude: Attitude) -> str:
-    """What the marks on the sensor mean."""
+    """The meaning of the marks on the sensor."""
     side = "face down: the package is below its board" if attitude.flip else "face up"
     between = "; grey: nano-positioner and fibre" if attitude.shaken else ""
     return f"yellow: pin 1; {side}{between}"

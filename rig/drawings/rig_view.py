@@ -120,7 +120,7 @@ def rig_view(attitude: Attitude, centre: tuple[float, float], scale: float) -> I
 
 
 def _stand() -> list[Solid]:
-    """What does not move: base plate, column, drive of alpha behind."""
+    """The fixed parts: base plate, column, drive of alpha behind."""
     return [
         box((-1.15, -0.95, -1.42), (1.15, 1.6, -1.3), LAB, LIGHT_METAL),
         box((-0.42, 1.0, -1.3), (0.42, 1.45, 0.1), LAB, ALUMINIUM),
@@ -130,14 +130,14 @@ def _stand() -> list[Solid]:
 
 
 def _bracket(attitude: Attitude, faces_us: bool) -> list[Solid]:
-    """What alpha tilts: the angle that carries beta, seen from the side that looks this way."""
+    """The bracket that alpha tilts and that carries beta, seen from the visible side."""
     back_plate = box((-0.42, 0.74, -0.74), (0.42, 0.86, 0.42), attitude.tilted, ALUMINIUM)
     floor = box((-0.42, -0.5, -0.74), (0.42, 0.74, -0.62), attitude.tilted, ALUMINIUM)
     return [back_plate, floor] if faces_us else [back_plate]
 
 
 def _stack(attitude: Attitude) -> list[Solid]:
-    """What lies on the bracket, from the floor up: drive of beta, its table, what is between, the sensor."""
+    """The parts on the bracket, from the floor up: drive of beta, its table, the parts between, the sensor."""
     frame, plate, case = _on_table(attitude), BOARD_HALF, PACKAGE_HALF
     foot = foot_of(attitude)
     board_bottom, thin, package = (
@@ -174,7 +174,7 @@ def _on_table(attitude: Attitude) -> Vectors:
 
 
 def _screws(attitude: Attitude, camera: Camera) -> Iterator[str]:
-    """Those of the board, at its corners."""
+    """The marks of the board, at its corners."""
     high, place = foot_of(attitude) + (0.17 if attitude.flip else 0.05), 0.82 * BOARD_HALF
     corners = np.array([[x, y, high] for x in (-place, place) for y in (-place, place)])
     for at in camera.project(corners @ _on_table(attitude)):

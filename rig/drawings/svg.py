@@ -81,7 +81,7 @@ def on_circle(centre: Point, radius: float, deg: float) -> tuple[float, float]:
 
 
 def turned(centre: Point, deg: float, content: Iterable[str]) -> str:
-    """What is drawn about the origin, turned anticlockwise by `deg` about `centre`."""
+    """A drawing about the origin, turned anticlockwise by `deg` about `centre`."""
     return element(
         "g", "".join(content), transform=f"translate({centre[0]:.2f} {centre[1]:.2f}) rotate({0.0 - deg:.4f})"
     )

@@ -127,7 +127,7 @@ class Rig:
         clock.restore(state["clock_s"])
 
     def tally(self) -> dict[str, tuple[float, str]]:
-        """What a digital sensor's driver has counted since the connection, by name: a value with its unit."""
+        """The counters of a digital sensor's driver since the connection, by name: a value with its unit."""
         adc = self.drivers.get("adc")
         return getattr(adc, "tally", dict)()
 

@@ -48,7 +48,7 @@ def _dwell_s(settings: Mapping[str, Any], path: str) -> float:
 
 
 def _temperature_c(planned: Plan, last_c: float, since_s: Array) -> Array:
-    """The sensor's temperature, from what it was last on its way to what the oven is set to (of first order)."""
+    """The sensor's temperature, which approaches the setting of the oven (first order)."""
     now_c, at_s, course = last_c, 0.0, []
     for dwell, t_s in zip(planned.held, since_s, strict=True):
         now_c += (_oven_c(planned.settings, dwell.pose.path) - now_c) * -np.expm1(-(t_s - at_s) / OVEN_S)
@@ -99,7 +99,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class Range:
-    """That of the sweep with `settings` on a bench, for `model`."""
+    """The range of the sweep with `settings` on a bench, for `model`."""
 
     bench: Bench
     sweep: Procedure

@@ -100,7 +100,7 @@ class RunHost:
             self._observer.read(reading)
 
     def _losses(self) -> str:
-        """What a digital sensor has lost, doubled or damaged since the last pose, in words."""
+        """Samples that a digital sensor has lost, doubled or damaged since the last pose, in words."""
         counted_before, self._counted = self._counted, self._rig.tally()
         zero = (0.0, "")
         new = {name: self._counted.get(name, zero)[0] - counted_before.get(name, zero)[0] for name in LOSSES}

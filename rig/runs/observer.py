@@ -54,7 +54,7 @@ class Observer:
         """The present step, in words."""
 
     def guide(self, guidance: Guidance) -> None:
-        """What a person with the sensor in the hand does next; a sound marks the position that was taken."""
+        """The next action of a person with the sensor in the hand; a sound marks a taken position."""
 
     def expect(self, total: int, recorded_poses: int) -> None:
         """The number of poses of the run, and how many of them are recorded."""

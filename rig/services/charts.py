@@ -41,7 +41,7 @@ MOST = 1024  # parts: more than a screen has columns for
 
 @dataclass
 class Part:
-    """Some dwells that follow each other: `n` of them, the sums of what they are the mean of, and extremes by name."""
+    """Successive dwells: their number `n`, the sums of their values, and extremes by name."""
 
     n: int = 0
     t_s: float = 0.0
@@ -91,7 +91,7 @@ class Course:
 
     @property
     def names(self) -> list[str]:
-        """What was measured."""
+        """The measured values."""
         return list(self.parts[0].sums) if self.parts else []
 
     def line(self, name: str) -> tuple[list[float], list[float], list[float], list[float]]:

@@ -16,7 +16,7 @@ RESULTS = "results"  # the event that says how they were made anew
 
 
 def exclude(record: Record, name: str, numbers: Sequence[int], reason: str | None) -> Run:
-    """Leave poses out, with a reason; None takes them in again. The run as it is then.
+    """Exclude poses with a reason; None includes them again. Returns the run afterwards.
 
     Results of a complete run are evaluated again. Raises UnknownRun, RecordError for a pose that is not there or a
     sample of an imported record, Busy while a process works on the run.

@@ -138,7 +138,7 @@ class Faults:
         return "\n".join(lines)
 
     def document(self) -> list[dict[str, Any]]:
-        """The rows for JSON: one for each fault, with what its group was found as."""
+        """The rows for JSON: one for each fault, with the effects of its group."""
         return [
             {
                 "fault": fault.name,
@@ -309,7 +309,7 @@ def _effect(name: str, fitted: Fit, poses: Table) -> Curve:
 
 
 def _contribution(names: Sequence[str], fitted: Fit, poses: Table) -> Callable[[Array], Array]:
-    """What effects add to the outputs, (n, channels), as a function of the values of all parameters."""
+    """Contribution of effects to the outputs, (n, channels), as a function of the values of all parameters."""
     layout = fitted.problem.layout
 
     def curve(theta: Array) -> Array:

@@ -280,7 +280,7 @@ def date_of(run: Run) -> datetime:
 
 
 def when(run: Run) -> datetime:
-    """Its date; a run whose date is none is passed over later, which says so."""
+    """The date of a run. A run with an invalid date is passed over later, with a message."""
     try:
         return date_of(run)
     except DataError:

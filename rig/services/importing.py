@@ -34,7 +34,7 @@ SENSED = {"a": ("g", "mg", "m/s2", "counts"), "m": ("uT", "counts"), "g": ("deg/
 
 @dataclass(frozen=True)
 class Proposal:
-    """What a file may be. `columns`: for each of the file's columns the proposal, None for one that is not used."""
+    """The proposal for a file. `columns`: the mapping of each column of the file, None for an unused column."""
 
     kind: str
     columns: Mapping[str, ColumnMapping | None]

@@ -64,7 +64,7 @@ def issue(data: str, fitted: Fit, figures: Figures, bench: Bench | None, details
 
 
 def limits(data: str, bench: Bench | None) -> Mapping[str, float | tuple[float, float]]:
-    """What the results are judged by: the limits of the bench that is given, else of the run's own."""
+    """The limits for the results: those of the given bench, else of the run's bench."""
     if bench is not None:
         return bench.result_limits
     measured = None if Path(data).is_file() else _measured(data)
@@ -175,7 +175,7 @@ def _setting_text(value: object) -> str:
 
 
 def _reference(table: Table) -> str:
-    """What the sensor was compared with."""
+    """The instruments that the sensor was compared with."""
     if table.type.field:
         return "the local magnetic field, constant in place and time; its strength is not known"
     if table.type.turning:

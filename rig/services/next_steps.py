@@ -49,7 +49,7 @@ LONGER = 4  # times as long halves a statistical uncertainty
 
 
 def next_steps(run: Run, excluded: Mapping[int, str]) -> list[str]:
-    """What to do after a run: for each verdict that is not a pass, and with the measured data."""
+    """The next steps after a run: for each verdict that is not a pass, and with the measured data."""
     return [*_left_out(excluded), *_failed(run), *_marginal(run), *_unjudged(run.results), *_commands(run)]
 
 
@@ -92,7 +92,7 @@ def _unjudged(results: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _commands(run: Run) -> Iterator[str]:
-    """What is usually called next."""
+    """The usual next command."""
     if run.state != "complete":
         yield f"Next: rig resume {run.run}"
     elif run.procedure == "check-standard":

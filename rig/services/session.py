@@ -52,7 +52,7 @@ class ModelSession(Generic[F]):
 
     @property
     def end(self) -> F:
-        """The fit of the model as it is now."""
+        """The fit of the present model."""
         return self.steps[-1].after if self.steps else self.start
 
     @property
@@ -95,7 +95,7 @@ class ModelSession(Generic[F]):
         return self._with((*self.steps, step))
 
     def undone(self) -> ModelSession[F]:
-        """One step back; the beginning stays as it is."""
+        """The session without its last step; the first state has none."""
         return self._with(self.steps[:-1])
 
     def removed(self, name: str) -> ModelSession[F]:
@@ -158,7 +158,7 @@ class ModelSession(Generic[F]):
         return self.kept.compare(self.end.model if self.steps else self.model)
 
     def diagnosed(self) -> Diagnosis[F]:
-        """What the present model misses."""
+        """The effects that the present model misses."""
         findings = self._plan() or self._search()
         self.plans[self.names] = findings
         return Diagnosis.of(findings)

@@ -41,7 +41,7 @@ STATED = {"output_per_g": "g", "output_per_deg_s": "deg/s", "output_per_field": 
 
 @dataclass
 class Stream:
-    """Samples of one channel, in blocks that are read once. What was seen on the way is known when they are read."""
+    """Samples of one channel, in blocks that are read once. The other values are complete after the last block."""
 
     source: str
     channel: str
@@ -98,7 +98,7 @@ def repairs(samples: Stream, n: int) -> Iterable[str]:
 
 
 def _number(constant: str | float | None) -> float:
-    """A scale factor as stated; 0 where none is."""
+    """The stated scale factor; 0 if there is none."""
     return constant if isinstance(constant, float) and np.isfinite(constant) else 0.0
 
 
@@ -162,7 +162,7 @@ def of_table(table: Table, channel: str | None, rate_hz: float | None) -> Stream
 
 
 def _no_record(subject: str) -> DataError:
-    """What is no still record, and what to do."""
+    """The error for data that are no still record."""
     return DataError(
         f"{subject}; a noise analysis needs single samples of a sensor at rest: give a still record, or `rig run "
         "noise-floor`"
@@ -179,7 +179,7 @@ def _logged(table: Table, channel: str) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class _Times:
-    """What a column of times says: the rate, the gaps in it, and by how much an even row of times is off, s."""
+    """Result of a column of times: the rate, its gaps, and the largest deviation from even times, s."""
 
     rate_hz: float
     gaps: tuple[tuple[float, float], ...] = ()
@@ -347,7 +347,7 @@ def _axis(channel: str) -> str:
 
 
 def _source(record: Record | None, data: str, rate_hz: float | None) -> Callable[[str | None], Stream]:
-    """What gives the stream of a channel; a table is read once for all of them."""
+    """The function that gives the stream of a channel; a table is read once for all channels."""
     path = Path(data)
     if path.suffix == ".npy":
         if not path.is_file():

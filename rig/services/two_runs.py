@@ -82,7 +82,7 @@ def parameters_of(first: FittedModel, second: FittedModel) -> list[Pair]:
 
 
 def _results_of_sensor(results: Mapping[str, Any], sensor: str) -> Mapping[str, Any]:
-    """Those of one sensor, without its name; those of all as they are."""
+    """The results of one sensor, without its name; for all sensors unchanged."""
     if not sensor:
         return results
     return {name.rpartition("/")[2]: result for name, result in results.items() if name.startswith(f"{sensor}/")}
@@ -103,7 +103,7 @@ SAME_DECIMALS = 2  # of a degree: nearer, gravity along an axis differs by 0.2 m
 
 @dataclass(frozen=True)
 class RepeatedPoses:
-    """What was measured at the same poses in two tables: rows (k,) of both, the visits of a pose in their order.
+    """Measurements at the same poses in two tables: rows (k,) of both, the visits of a pose in their order.
 
     `difference` is the second less the first, in the outputs' unit, of shape (channels, k); `floor` the white noise of
     such a difference, per channel.

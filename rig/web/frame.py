@@ -74,7 +74,7 @@ class Strip:
 
 
 def news(previous: Status | None, present: Status) -> tuple[str, str] | None:
-    """What a notification says: the run asks, is paused, or has ended since the last look; None for no news."""
+    """The text of a notification: the run asks, is paused, or has ended since the last status; None for no news."""
     same_run = previous is not None and previous.key == present.key
     if previous is not None and same_run and previous.phase == present.phase and previous.asked == present.asked:
         return None

@@ -79,6 +79,6 @@ def _wanders(table: Table) -> bool:
 
 
 def _residual_square(columns: Array, outputs: Array) -> Array:
-    """Sum of squares of each output beside `columns`."""
+    """Residual sum of squares of each output after a fit of `columns`."""
     residual = outputs - columns @ np.linalg.lstsq(columns, outputs, rcond=1e-9)[0]
     return np.asarray(np.sum(residual**2, axis=0))

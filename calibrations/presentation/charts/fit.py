@@ -294,7 +294,7 @@ EQUAL = 0.02  # columns closer than this are equal: the simpler cause is drawn
 
 
 def change_of(step: Step[Fit]) -> Array:
-    """What adding the effect takes off the residual, the other parameters refitted, shape (channels, n)."""
+    """Reduction of the residual by the effect, the other parameters refitted, shape (channels, n)."""
     return step.before.residual - step.after.residual
 
 

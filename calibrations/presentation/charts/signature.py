@@ -63,7 +63,7 @@ def _part_panel(part: Part, *, legend: bool) -> Panel:
 
 
 def signature(effect: Effect) -> list[Part]:
-    """What the linear model leaves of the effect, axis by axis."""
+    """Residual of the linear model by the effect, axis by axis."""
     if effect.first_kind.field:
         return [of_field(effect)]
     if effect.first_kind.turning:
@@ -211,7 +211,7 @@ def shown_values(effect: Effect, table: Table) -> Values:
 
 
 def shown_value(p: Parameter, effect: Effect) -> Array:
-    """What a sensor may typically show, of shape (3,) if per axis."""
+    """A typical value, of shape (3,) if per axis."""
     typical = p.typical if p.starts == (0.0,) else p.starts[-1]
     values = SHOWN.get(effect.name, {})
     across = np.ones(3) if p.name in values else ACROSS
@@ -225,7 +225,7 @@ RATES_DEG_S = np.linspace(-100.0, 100.0, 21)
 
 
 def of_field(effect: Effect) -> Part:
-    """What a magnetometer without error leaves of the field's magnitude, in parts per thousand, over full turns."""
+    """Residual of the field's magnitude by the effect, parts per thousand, over full turns of a magnetometer."""
     strength = catalogue()["field-strength"]
     table = _turned_in_a_field()
     steps: list[Step] = [] if effect.name == strength.name else [(strength, Values(total=np.asarray(1.0)))]
@@ -237,7 +237,7 @@ def of_field(effect: Effect) -> Part:
 
 
 def of_rates(effect: Effect) -> list[Part]:
-    """What a gyroscope without error leaves of each output, in deg/s, over the rate of turns about each edge."""
+    """Residual of each output by the effect, deg/s, over the rate of turns of a gyroscope about each edge."""
     ideal = catalogue()["gyro-scale-factor"]
     table = _turned_at_rates()
     rate = rate_deg_s(table)

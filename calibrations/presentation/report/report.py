@@ -79,7 +79,7 @@ def _of_floor(fit: Fit, held_out: float) -> str:
 
 
 def next_words(e: Experiment) -> str:
-    """What to run next, which effects it separates, and why."""
+    """The next experiment, the effects that it separates, and the reason."""
     pairs = [f"{a} from {join_words([y for x, y in e.separates if x == a], 'or')}" for a in dict(e.separates)]
     settings = ", ".join(f"{name} = {value}" for name, value in e.settings.items())
     return f"To separate {join_words(pairs)}, run {e.procedure}{f' with {settings}' if settings else ''}: {e.why}."

@@ -27,7 +27,7 @@ class View(ABC, Generic[F]):
 
     @abstractmethod
     def facts(self, candidate: Candidate, diagnosis: Diagnosis[F]) -> dict[str, str]:
-        """What a candidate does to the error, by name."""
+        """The effect of a candidate on the error, by name."""
 
     @abstractmethod
     def error_table(self, fit: F) -> Cells:
@@ -47,7 +47,7 @@ class View(ABC, Generic[F]):
 
     @abstractmethod
     def fit_chart(self, fit: F) -> Chart:
-        """A fit beside its data."""
+        """A chart of a fit and its data."""
 
     @abstractmethod
     def steps_chart(self, discovery: Discovery[F]) -> Chart:
@@ -55,7 +55,7 @@ class View(ABC, Generic[F]):
 
     @abstractmethod
     def fit_album(self, fit: F) -> list[Picture]:
-        """The pictures of a fit beside its data, with captions."""
+        """The pictures of a fit and its data, with captions."""
 
     @abstractmethod
     def steps_album(self, discovery: Discovery[F]) -> list[Picture]:

@@ -49,7 +49,7 @@ class StillView(View[NoiseFit]):
         }
 
     def error_table(self, fit: NoiseFit) -> Cells:
-        """Mismatch of the spectrum and of the Allan deviation, beside those by chance."""
+        """Mismatch of the spectrum and of the Allan deviation, with the mismatch by chance."""
         rows = []
         curves = compared_deviations(fit)
         for channel in fit.channels:

@@ -23,7 +23,7 @@ ERASE = "\r\x1b[K"
 
 @dataclass
 class Progress:
-    """What is being done, and how much of it is done (0 to 1; None: not known). Assign to both at any time."""
+    """The present work, and the share of it that is done (0 to 1; None: not known). Assign to both at any time."""
 
     text: str | Callable[[], str]
     share: float | None = None

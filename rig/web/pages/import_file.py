@@ -145,7 +145,7 @@ def upload(on_upload: Callable[[Path], Awaitable[None]]) -> None:
 
 
 class Column:
-    """One column of the file: what it is, and its unit. A unit that a person chooses is a stated one."""
+    """One column of the file: its meaning and its unit. A unit that a person selects counts as stated."""
 
     def __init__(self, file_column: str, sample_text: str, page: ImportPage) -> None:
         self.theirs, self.page = file_column, page

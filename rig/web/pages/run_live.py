@@ -240,7 +240,7 @@ def _tile(value: Mapping[str, Any]) -> None:
 
 
 def stop_words(status: Status) -> str:
-    """What to say of a run that a person stopped, which is no error; "" for another run."""
+    """The words for a run that a person stopped, which is no error; "" for another run."""
     if status.state != "stopped":
         return ""
     if not status.run and status.error.endswith(NOT_BEGUN):
