@@ -18,10 +18,10 @@ from calibrations.free_forms.reml import (
     beside_base,
     coefficients,
     estimate,
-    fit_without,
     gain_beside,
     gram,
     whitened,
+    without,
 )
 from calibrations.free_forms.selection import ENTER, SPILL, pools_of, prices, select
 from calibrations.free_forms.stairs import find_saw
@@ -177,14 +177,14 @@ def _descent(
         slow = SLOW_FIRST if number < len(COARSE) else SLOW_MOST
         most |= {} if flicker else dict.fromkeys(noise, (slow * floor) ** 2)
         limit = caution * (max(ENTER, COARSE[number] * g.squares) if number < len(COARSE) else ENTER)
-        previous_names = set(variances)
+        before = set(variances)
         previous = values, dict(variances), state
         sizes = estimate(g, variances, most)
         pools = pools_of(components, catalogue_first and number < len(COARSE))
         sizes, steps = select(g, sizes, components, pools, most, limit, number >= len(COARSE))
         path += steps
         variances = dict(sizes.variances)
-        values, moved_state = _damped(data, model_effects, previous[0], coefficients(g, sizes), components, white)
+        values, moved = _damped(data, model_effects, previous[0], coefficients(g, sizes), components, white)
         reshaped = _refined(components, g, sizes, X, b, state, scales, white)
         if reshaped is not None:
             X, blocks, scales = whitened(state, model_effects, previous[0], reshaped, scales, white)
@@ -192,12 +192,11 @@ def _descent(
             sizes = estimate(g, variances, most)
             reshaped_values = coefficients(g, sizes)
             reshaped_state = state_at(data, model_effects, reshaped_values, reshaped)
-            if _misfit(reshaped_state, white) < _misfit(moved_state, white):
-                components, values, moved_state = reshaped, reshaped_values, reshaped_state
-                variances = dict(sizes.variances)
-        change = float(np.sqrt(np.mean(((moved_state.predicted - state.predicted) / white) ** 2)))
-        state = moved_state
-        if _misfit(moved_state, white) > 1.5 * g.squares / g.rows + 10.0:  # components against each other: no step
+            if _misfit(reshaped_state, white) < _misfit(moved, white):
+                components, values, moved, variances = reshaped, reshaped_values, reshaped_state, dict(sizes.variances)
+        change = float(np.sqrt(np.mean(((moved.predicted - state.predicted) / white) ** 2)))
+        state = moved
+        if _misfit(moved, white) > 1.5 * g.squares / g.rows + 10.0:  # components against each other: no step
             values, variances, state = previous
             saws = {c.name for c in components if c.cause == "quantisation"} & set(sizes.variances)
             rejected += [c.shape[0] for c in components if c.name in saws]
@@ -211,7 +210,7 @@ def _descent(
             if extra is not None:
                 components = [*components, extra]
                 continue
-        if number >= len(COARSE) and set(variances) == previous_names and change < 0.03:
+        if number >= len(COARSE) and set(variances) == before and change < 0.03:
             break
     X, blocks, scales = whitened(state, model_effects, values, components, scales, white)
     g = gram(X, blocks, scales, b)
@@ -224,20 +223,20 @@ def _descent(
 def _damped(
     data: PoseData,
     model_effects: ModelEffects,
-    start: Coefficients,
-    target: Coefficients,
+    before: Coefficients,
+    after: Coefficients,
     components: Sequence[Component],
     white: Array,
 ) -> tuple[Coefficients, State]:
-    """The step from `start` to `target`, halved as long as half of it leaves less."""
-    state = state_at(data, model_effects, target, components)
+    """The step from `before` to `after`, halved as long as half of it leaves less."""
+    state = state_at(data, model_effects, after, components)
     for _ in range(HALVINGS):
-        half = _midpoint(start, target)
+        half = _between(before, after)
         half_state = state_at(data, model_effects, half, components)
         if _misfit(half_state, white) >= _misfit(state, white):
             break
-        target, state = half, half_state
-    return target, state
+        after, state = half, half_state
+    return after, state
 
 
 def _misfit(state: State, white: Array) -> float:
@@ -245,12 +244,12 @@ def _misfit(state: State, white: Array) -> float:
     return float(np.mean(((state.data.outputs - state.predicted) / white) ** 2))
 
 
-def _midpoint(start: Coefficients, end: Coefficients) -> Coefficients:
+def _between(before: Coefficients, after: Coefficients) -> Coefficients:
     """Halfway; a component that only one of them has, begins or ends at zero."""
-    names = {**start.of, **end.of}
-    zero = np.zeros(1)
-    of = {name: (start.of.get(name, zero) + end.of.get(name, zero)) / 2 for name in names}
-    return Coefficients((start.base + end.base) / 2, of)
+    names = {**before.of, **after.of}
+    nothing = np.zeros(1)
+    of = {name: (before.of.get(name, nothing) + after.of.get(name, nothing)) / 2 for name in names}
+    return Coefficients((before.base + after.base) / 2, of)
 
 
 def _refined(
@@ -264,12 +263,12 @@ def _refined(
     white: Array,
 ) -> list[Component] | None:
     """The active components at their likeliest shapes, the others held; None: no change."""
-    reshaped_components = list(components)
-    reshaped_any = False
+    changed = list(components)
+    moved = False
     for i, comp in enumerate(components):
         if comp.name not in sizes.variances or comp.reshaped is None:
             continue
-        gain = gain_beside(g, fit_without(g, sizes, comp.name), X, b)
+        gain = gain_beside(g, without(g, sizes, comp.name), X, b)
 
         def gained(shape: tuple[float, ...], comp: Component = comp, gain: Callable[[Array], float] = gain) -> float:
             assert comp.reshaped is not None  # noqa: S101 checked above
@@ -278,9 +277,9 @@ def _refined(
 
         best = climb(gained, comp.shape, comp.step)
         if best != comp.shape:
-            reshaped_components[i] = comp.reshaped(best)
-            reshaped_any = True
-    return reshaped_components if reshaped_any else None
+            changed[i] = comp.reshaped(best)
+            moved = True
+    return changed if moved else None
 
 
 def climb(
