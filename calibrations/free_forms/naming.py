@@ -10,7 +10,7 @@ from scipy.stats import chi2, kurtosis
 
 from calibrations.free_forms.chain import base_size
 from calibrations.free_forms.components import Component
-from calibrations.free_forms.reml import Sizes, fit_without, gains
+from calibrations.free_forms.reml import Sizes, gains, without
 from calibrations.free_forms.search import SearchResult, climb
 from calibrations.table import Array
 
@@ -142,7 +142,7 @@ def _cost_without(result: SearchResult, names: Sequence[str]) -> float:
 def _sizes_without(result: SearchResult, names: Sequence[str]) -> Sizes:
     sizes = result.sizes
     for name in names:
-        sizes = fit_without(result.gram, sizes, name)
+        sizes = without(result.gram, sizes, name)
     return sizes
 
 

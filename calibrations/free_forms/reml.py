@@ -340,7 +340,7 @@ def loss(g: Gram, fit: Sizes, name: str) -> float:
     return quadratic + logdet - len(u) * float(np.log(fit.variances[name]))
 
 
-def fit_without(g: Gram, fit: Sizes, name: str) -> Sizes:
+def without(g: Gram, fit: Sizes, name: str) -> Sizes:
     """The fit without one active component, the other variances held."""
     part = _part(g, fit, name)
     remaining = np.r_[0 : part.start, part.stop : len(fit.coefficients)]

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 import numpy as np
 
 from calibrations.free_forms.components import Component
-from calibrations.free_forms.reml import Gram, Sizes, estimate, fit_without, gains, loss
+from calibrations.free_forms.reml import Gram, Sizes, estimate, gains, loss, without
 
 ENTER = 16.0  # gain in -2 log restricted likelihood for one component more: 1 % of clean sensors (`chance`)
 LEAVE = 12.0
@@ -168,7 +168,7 @@ def _exchanged(
     for name in [n for n in sizes.variances if not by_name[n].noise]:
         if name not in sizes.variances:
             continue
-        reduced = fit_without(g, sizes, name)
+        reduced = without(g, sizes, name)
         acting = acting_places(reduced.variances, by_name)
         component_price = price(by_name[name], acting)
         replacement = estimate(g, reduced.variances, most, 12, sizes.deviance + component_price + LEAVE)
