@@ -297,6 +297,16 @@ def _result(problem: Problem, theta: Array, noise: Noise) -> Fit:
 
 def _wider(cautious: Fit) -> Array:
     """Factors on the standard uncertainties."""
+    by_noise = _wider_by_noise(cautious)
+    if not any(term.name.startswith(PREFIX) for term in cautious.model.terms):
+        return by_noise
+    from calibrations.fitting.time_curves import widening_by_curves  # few models have a free form
+
+    return by_noise * widening_by_curves(cautious, by_noise)
+
+
+def _wider_by_noise(cautious: Fit) -> Array:
+    """Factors by the slow noise that the rows allow, or by their number."""
     if not cautious.problem.averages:
         return _by_few_rows(cautious)
     layout = cautious.problem.layout

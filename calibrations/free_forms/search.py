@@ -32,7 +32,8 @@ ROUNDS = 7
 LARGEST = 4.0  # of the mean square of the first misfit: more is two components against each other
 HALVINGS = 6  # of a step that overshoots
 NOISE_ALONE, FEW_COMPONENTS = 1.04, 3  # residual over noise and components of a search that needs no second beginning
-MOST_MISFIT = 1.5  # residual over noise: a larger residual contains effects that the search did not find
+# residual over noise between which flicker may be what is left: below there is no need of it, above are unfound effects
+LEAST_MISFIT, MOST_MISFIT = 1.2, 2.0
 SLOW_MOST = 0.5  # slow noise, in noise floors, at most (rms)
 SLOW_FIRST = 0.15  # the same while the first components are found: it would take up part of them
 
@@ -119,7 +120,8 @@ def search(
 
     best = _likeliest(data, white, model_effects, general, flicker=False)
     limit = (SLOW_MOST * float(np.sqrt(np.mean(white**2)))) ** 2
-    if not noise_known or model_effects.columns.shape[2] or best.ratio > MOST_MISFIT or not is_flicker(best, limit):
+    asked = noise_known and not model_effects.columns.shape[2] and LEAST_MISFIT < best.ratio < MOST_MISFIT
+    if not asked or not is_flicker(best, limit):
         return best
     return min(best, _likeliest(data, white, model_effects, general, flicker=True), key=lambda end: end.criterion)
 
