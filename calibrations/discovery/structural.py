@@ -31,7 +31,7 @@ from calibrations.discovery.findings import Step
 from calibrations.discovery.search import first_order_cost
 from calibrations.discovery.significance import chance
 from calibrations.effects import Effect
-from calibrations.fitting.fit import Fit, fit, refit
+from calibrations.fitting.fit import Fit, fit, refit, with_least_white
 from calibrations.fitting.problem import Problem
 from calibrations.fitting.requested_forms import effects_beyond_base
 from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
@@ -45,6 +45,7 @@ from calibrations.table import Array
 
 STAIRS = "quantisation"
 AS_SEARCHED = 1.1  # times the error of a search that follows noise: a fit of less leaves nothing to a new search
+IDLE = 0.99  # of the error before: a free form that leaves more is tried without
 NEARLY = 1.5  # noise floors: with a larger error, the stairs are wrong
 
 
@@ -90,6 +91,7 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     base = _freed(start, basic, effects)
     from_stairs, remaining_share = _fit_before_stairs(base, effects)
     remarks: tuple[str, ...] = ()
+    stated_white = start.problem.white
     if from_stairs is not None and (from_stairs.end.held_out_excess <= MATERIAL or remaining_share < MOST_UNEXPLAINED):
         best = from_stairs
     else:
@@ -113,13 +115,36 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     accepted_additions, fits = fit_gradually(base, selected, end)
     if fits[-1].pooled_excess < NO_WORSE * end.pooled_excess:
         selected, end = accepted_additions, fits[-1]
-        forms = [a for a in selected if a.effect.name.startswith(PREFIX)]
     else:
         fits = [base, *fitted(base, end, selected)]
+    selected, fits = _without_idle_forms(selected, fits)
+    if remarks and stated_white is not None:
+        fits[-1] = with_least_white(fits[-1], stated_white)
+    end = fits[-1]
+    forms = [a for a in selected if a.effect.name.startswith(PREFIX)]
     steps = _steps(start, needed_effects, base, effects)
     steps += [Step(a.effect.name, *pair) for a, pair in zip(selected, pairwise(fits), strict=True)]
     ranked = _first(start, steps, candidates(start, effects))
     return StructuralSearch(start, tuple(steps), places, ranked, causes_alone(end, forms), remarks)
+
+
+def _without_idle_forms(selected: list[Addition], fits: list[Fit]) -> tuple[list[Addition], list[Fit]]:
+    """The additions and fits without free forms that lower neither the error of the fit nor that on unseen rows.
+
+    Slow noise describes their part as well.
+    """
+    base, end = fits[0], fits[-1]
+    needed = [
+        addition
+        for addition, (before, after) in zip(selected, pairwise(fits), strict=True)
+        if not addition.effect.name.startswith(PREFIX) or after.pooled_excess < IDLE * before.pooled_excess
+    ]
+    if len(needed) == len(selected) or not needed:
+        return selected, fits
+    without = fit_together(base, needed)
+    if without.held_out_excess > NO_WORSE * end.held_out_excess:
+        return selected, fits
+    return needed, [base, *fitted(base, without, needed)]
 
 
 @dataclass(frozen=True)

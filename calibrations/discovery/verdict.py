@@ -221,8 +221,10 @@ def _details(j: Judgement) -> Iterator[str]:
         yield _remaining_error(j)
     elif j.left is not None and not j.spoilt:
         yield f"Remaining with them: {j.left}."
-    if j.refinements:
+    if j.refinements and (j.added or j.missing or j.unknown):
         yield f"To describe the exact form of these effects, the model also has {join_words(j.refinements)}."
+    elif j.refinements:
+        yield f"The model also has {join_words(j.refinements)}, which noise may explain as well."
     for name in (*j.missing, *j.added):
         if rivals := j.alternatives.get(name):
             yield f"This data cannot separate {name} from {join_words(rivals, 'or')}."

@@ -95,7 +95,9 @@ def _smoothed(logged: Array) -> tuple[Array, float, float]:
     line = np.polyval(np.polyfit(rows, logged, 1), rows)
     readings = 1 + int(np.count_nonzero(np.diff(logged)))
     smooth = without_scatter(logged - line, readings)
-    return np.asarray(line + smooth.values), smooth.error, smooth.change_error
+    values = line + smooth.values
+    of_line = float(np.std(logged - values)) / np.sqrt(len(logged))  # rms: scatter alone has a slope as well
+    return np.asarray(values), float(np.hypot(smooth.error, of_line)), smooth.change_error
 
 
 def sensor_temperature_c(table: Table, lead_s: float) -> Array:

@@ -289,10 +289,23 @@ def _free(problem: Problem, jacobian: Array) -> Array:
 def _result(problem: Problem, theta: Array, noise: Noise) -> Fit:
     residual, jacobian = problem.residual(theta), problem.jacobian(theta)
     model = replace(problem.layout.model, unit=problem.table.unit)
-    result = Fit(model, problem, theta, noise, residual, jacobian)
+    return _with_uncertainties(Fit(model, problem, theta, noise, residual, jacobian))
+
+
+def _with_uncertainties(result: Fit) -> Fit:
     cautious = cautiously(result)
-    known = estimates(model, problem.layout, theta, cautious.information, _wider(cautious))
-    return replace(result, model=known, all_noise=cautious.noise)
+    model = estimates(result.model, result.problem.layout, result.theta, cautious.information, _wider(cautious))
+    return replace(result, model=model, all_noise=cautious.noise)
+
+
+def with_least_white(result: Fit, white: Array) -> Fit:
+    """The fit with standard uncertainties that allow for slow noise above a smaller `white` (channels, n).
+
+    White noise that was raised to the size of the residual contains slow noise, which makes parameters less certain.
+    """
+    noise = replace(result.noise, white=np.minimum(white, result.noise.white), scatter=0 * result.noise.scatter)
+    uncertain = _with_uncertainties(replace(result, noise=noise, all_noise=None))
+    return replace(uncertain, noise=result.noise)
 
 
 def _wider(cautious: Fit) -> Array:

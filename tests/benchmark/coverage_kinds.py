@@ -149,6 +149,11 @@ def bent_in_flicker(seed: int) -> Table:
     return _swept(seed, 1.7, _bent)[0]
 
 
+def ramp_in_flicker(seed: int) -> Table:
+    """A sensor that drifts in a straight line, in flicker of 0.7 times the white noise."""
+    return _swept(seed, 0.7, CAUSES[2])[0]
+
+
 def discovered(seed: int, times: float) -> Made:
     """A sensor with no hidden cause, a bent one and a drifting one, in turn, by the model that a discovery chose."""
     table, exact = _swept(seed, times, CAUSES[seed % len(CAUSES)])

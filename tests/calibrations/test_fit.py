@@ -9,7 +9,7 @@ import pytest
 
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import ModelError, TooFewRows
-from calibrations.fitting.fit import evaluate, fit
+from calibrations.fitting.fit import evaluate, fit, refit
 from calibrations.model.file import read_model
 from calibrations.model.parameters import Layout
 from calibrations.table import Table
@@ -73,6 +73,20 @@ def test_rmse_excess_and_provenance_of_values() -> None:
     np.testing.assert_allclose(found.excess, found.rmse / found.noise.floor)
     assert found.model.unit == "V"
     assert [e.unit for e in found.model.terms[2].estimates] == ["V/g^2", "V/g^2"]
+
+
+def test_a_fit_does_not_depend_on_the_fits_before_it() -> None:
+    """The noise of a model without the effect is larger, and would be where the next fit begins."""
+    data = table(3, missing=0.003, slow_v=0.7 * synthetic.NOISE_V)
+    together = fit(MODEL.with_effect(catalogue()["quadratic-nonlinearity"]), data)
+    present = fit(read_model("linear"), data)
+    for name in ("quadratic-nonlinearity", "z-axis-bias"):
+        present = refit(present, present.model.with_effect(catalogue()[name]))
+    assert present.noise.taus_s == together.noise.taus_s
+    np.testing.assert_array_equal(present.noise.ratio, together.noise.ratio)
+    for key, estimate in together.params.items():
+        assert present.params[key].value == pytest.approx(estimate.value, abs=1e-3 * estimate.std)
+        assert present.params[key].std == pytest.approx(estimate.std, rel=1e-3)
 
 
 def test_order_of_rows_does_not_matter() -> None:

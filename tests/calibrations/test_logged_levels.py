@@ -7,7 +7,7 @@ import pytest
 
 from calibrations.discovery.results import Discovery
 from calibrations.effects.catalogue import catalogue
-from calibrations.effects.logged import level, reading_error
+from calibrations.effects.logged import level, level_is_known, reading_error
 from calibrations.estimators.scatter import without_scatter
 from calibrations.fitting.fit import Fit
 from calibrations.loop import dataset
@@ -90,6 +90,17 @@ def test_peaks_of_a_standard_deviation_do_not_spoil_its_level_in_quiet_rows() ->
         stated.append(reading_error(table, "vx_std_v", 2) ** 2)
     assert np.sqrt(np.mean(quiet_off)) < 0.1
     assert 0.9 < np.sqrt(np.mean(stated) / np.mean(off)) < 1.8
+
+
+def test_standard_deviations_that_only_scatter_have_no_level() -> None:
+    """Scatter alone has a slope over the record, which would follow any drift; 40 records."""
+    known = 0
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        stds = {f"v{axis}_std_v": 1e-3 * random.normal(1, 1 / np.sqrt(2 * SAMPLES), rows()) for axis in "xy"}
+        table = sweep(np.zeros((rows(), 2)), stds)
+        known += all(level_is_known(table, name, 2) for name in table.std_names)
+    assert known <= 2
 
 
 def test_vibration_of_a_noisy_estimate_has_one_name_and_its_whole_size() -> None:

@@ -55,6 +55,12 @@ def test_effects_that_complete_a_model_are_not_called_missing_from_it(clean: Dia
     assert Judgement(model="linear", missing=("a",)).rest == ""
 
 
+def test_an_effect_that_noise_may_explain_as_well_is_no_form_of_a_cause() -> None:
+    text = Judgement(model="linear", refinements=("bias-drift",)).text
+    assert "The model also has bias-drift, which noise may explain as well." in text
+    assert "exact form" not in text
+
+
 @pytest.mark.parametrize(
     ("facts", "verdict"),
     [

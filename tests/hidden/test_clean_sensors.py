@@ -7,7 +7,7 @@ import pytest
 
 from calibrations.loop import discover
 from calibrations.model.file import read_model
-from tests.benchmark.coverage_kinds import bent_in_flicker
+from tests.benchmark.coverage_kinds import bent_in_flicker, ramp_in_flicker
 from tests.benchmark.discovery.cases import measured
 from tests.benchmark.discovery.layouts import LAYOUTS
 from tests.benchmark.discovery.rig import Run
@@ -37,3 +37,17 @@ def test_of_a_sensor_without_a_cause_nothing_is_missing(slow: float) -> None:
 def test_strong_flicker_is_no_drift(seed: int) -> None:
     found = discover(bent_in_flicker(seed), read_model("linear"))
     assert set(found.causes) == {"quadratic-nonlinearity", "cross-axis-bias"}
+
+
+@pytest.mark.parametrize("seed", first_fast((7, 16, 19, 25), 1))
+def test_beside_strong_flicker_no_free_form_stays_in_the_model(seed: int) -> None:
+    found = discover(bent_in_flicker(seed), read_model("linear"))
+    assert {step.name for step in found.findings.steps} == {"quadratic-nonlinearity", "cross-axis-bias"}
+
+
+@pytest.mark.parametrize("seed", first_fast((23, 11, 20, 26), 1))
+def test_a_straight_drift_in_flicker_has_no_free_form_beside_it(seed: int) -> None:
+    """Of 23, the level of standard deviations that only scatter was a straight line too."""
+    found = discover(ramp_in_flicker(seed), read_model("linear"))
+    assert [step.name for step in found.findings.steps] == ["bias-drift"]
+    assert found.causes == ("bias-drift",)
