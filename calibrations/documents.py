@@ -156,9 +156,9 @@ def _in_doubt(result: Diagnosis[F] | Discovery[F]) -> Document:
 
 def places_document(result: Diagnosis[F] | Discovery[F]) -> list[Document]:
     """The places of the signal chain that act, the largest first; none where the search has no places."""
-    acting, data = result.findings.places, result.findings.data
-    total = sum(place.rms**2 for place in acting) or 1.0
-    if not acting:
+    acting_places, data = result.findings.places, result.findings.data
+    total = sum(place.rms**2 for place in acting_places) or 1.0
+    if not acting_places:
         return []
     from calibrations.discovery.curves import place_curves  # few results have places
 
@@ -177,7 +177,7 @@ def places_document(result: Diagnosis[F] | Discovery[F]) -> list[Document]:
             "inseparable_from": list(place.inseparable_from),
             **_curve_fields(curves.get(place.name), bool(place.causes)),
         }
-        for place in acting
+        for place in acting_places
     ]
 
 
@@ -185,16 +185,16 @@ def _curve_fields(curve: PlaceCurve | None, explained: bool) -> Document:
     """The curve of a place, its symmetry, and an expression where its form is unknown; null where there is none."""
     if curve is None:
         return {"symmetry": None, "expression": None, "curve": None}
-    at = curve.at[curve.largest]  # one grid for all axes
+    grid = curve.at[curve.largest]  # one grid for all axes
 
     def on_grid(values: Mapping[str, Array]) -> Document:
-        return {axis: np.interp(at, curve.at[axis], samples).tolist() for axis, samples in values.items()}
+        return {axis: np.interp(grid, curve.at[axis], samples).tolist() for axis, samples in values.items()}
 
     document = {
         "driver": curve.driver,
         "driver_unit": curve.driver_unit,
         "unit": curve.unit,
-        "at": at.tolist(),
+        "at": grid.tolist(),
         "value": on_grid(curve.value),
         "std": on_grid(curve.std),
     }

@@ -155,7 +155,7 @@ class SimulatedClock:
         window before something is read. Of a connection that has ended nothing is to come. False if the kernel has
         dropped all of it, which is counted no longer.
         """
-        begun = growth_s = time.monotonic()
+        begin_s = growth_s = time.monotonic()
         pending = 0
         while count > 0 and (now_pending := _pending(wire.fileno())) < (count if count <= wire.chunk else 1):
             time.sleep(0)
@@ -163,7 +163,7 @@ class SimulatedClock:
                 pending, growth_s = now_pending, time.monotonic()
             if pending and not wire.lossy and time.monotonic() - growth_s > FULL_S:
                 return True
-            waited_s = time.monotonic() - begun
+            waited_s = time.monotonic() - begin_s
             if waited_s > DROPPED_S and wire.lossy:
                 self._bases[wire] = self._bases[wire][0], self._bases[wire][1] + count
                 return False

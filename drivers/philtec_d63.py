@@ -115,5 +115,5 @@ def _require_curve(subject: str, points: tuple[tuple[float, float], ...], *, ris
     is_wrong = ~((steps[:, 0] > 0) & (steps[:, 1] * (1 if rising else -1) > 0))  # NaN is wrong as well
     if is_wrong.any():
         k = int(np.flatnonzero(is_wrong)[0])
-        goes = "rise" if rising else "fall"
-        raise ValueError(f"{subject}: from {points[k]} to {points[k + 1]} the gap must grow and the output {goes}")
+        direction = "rise" if rising else "fall"
+        raise ValueError(f"{subject}: from {points[k]} to {points[k + 1]} the gap must grow and the output {direction}")

@@ -84,8 +84,8 @@ def _describe_holder(path: Path) -> str:
     locks = Path(str(holder.get("runs", path.parent.parent))) / FOLDER
     holders = [_holder(lock_path) for lock_path in sorted(locks.glob("*.lock")) if lock_path != path]
     runs = [str(o["what"]) for o in holders if o.get("pid") == holder["pid"] and str(o["what"]).startswith("run ")]
-    at = f", with {runs[-1]}" if runs else ""
-    return f"another process ({holder['pid']}, since {holder['since']}{at})"
+    run_text = f", with {runs[-1]}" if runs else ""
+    return f"another process ({holder['pid']}, since {holder['since']}{run_text})"
 
 
 def _holder(path: Path) -> dict[str, Any]:

@@ -140,8 +140,8 @@ class Series:
         column_sets = np.array([[0, *(1 + i for i in s)] for s in sets])
         columns = np.column_stack([np.ones(len(self.t_s)), np.exp(-self.t_s[:, None] / taus), self.values])
         scores = np.array([self._deviances(columns, point, column_sets) for point in points])
-        best, at = np.unravel_index(int(np.argmin(scores)), scores.shape)
-        return tuple(float(taus[i]) for i in sets[at]), points[best]
+        best, best_set = np.unravel_index(int(np.argmin(scores)), scores.shape)
+        return tuple(float(taus[i]) for i in sets[best_set]), points[best]
 
     def _deviances(self, columns: Array, point: Point, column_sets: NDArray[np.intp]) -> Array:
         """-2 log likelihood of each choice of columns, shape (choices,); the last column is the values."""

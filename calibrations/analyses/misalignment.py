@@ -116,8 +116,8 @@ def estimate_directions(table: Table) -> dict[str, Direction]:
     complete = [rows for rows in rounds if rows.sum() == ROUND_ROWS + ROUND_ROWS // 3]
     if not complete:
         raise DataError(f"{table.source}: no round of the search is complete yet; resume the run")
-    alike = [rows for rows in complete if np.array_equal(pose[rows], pose[complete[-1]])]
-    brackets = [_bracket(table, axis, alike) for axis in AXIS_DEG]
+    same_poses = [rows for rows in complete if np.array_equal(pose[rows], pose[complete[-1]])]
+    brackets = [_bracket(table, axis, same_poses) for axis in AXIS_DEG]
     white = _is_white(brackets)
     return {b.axis: _direction(b, b.noise() if white else b.slow_noise()) for b in brackets}
 

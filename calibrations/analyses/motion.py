@@ -206,11 +206,11 @@ def _rmse(groups: list[list[Array]]) -> float:
     return float(rms(np.concatenate(groups[0])))
 
 
-def _jackknife(groups: list[list[Array]], of: Callable[[list[list[Array]]], float]) -> tuple[float, float]:
+def _jackknife(groups: list[list[Array]], statistic: Callable[[list[list[Array]]], float]) -> tuple[float, float]:
     """A statistic of groups of blocks, and its standard uncertainty from leaving each block out (Efron)."""
     count = len(groups[0])
-    estimates = np.array([of([blocks[:k] + blocks[k + 1 :] for blocks in groups]) for k in range(count)])
-    return of(groups), float(np.sqrt((count - 1) * np.var(estimates)))
+    estimates = np.array([statistic([blocks[:k] + blocks[k + 1 :] for blocks in groups]) for k in range(count)])
+    return statistic(groups), float(np.sqrt((count - 1) * np.var(estimates)))
 
 
 def _noise_limit(
@@ -290,7 +290,7 @@ def _in_plane(sweep: Table) -> Table:
 
 def _mean(sweep: Table, axis: str, beta_deg: float) -> float:
     """Mean output of an axis at alpha = 90 deg and this beta."""
-    at: Array = (sweep.column("alpha_deg") == 90) & (np.mod(sweep.column("beta_deg"), 360) == beta_deg)
-    if not at.any():
+    is_at_pose: Array = (sweep.column("alpha_deg") == 90) & (np.mod(sweep.column("beta_deg"), 360) == beta_deg)
+    if not is_at_pose.any():
         raise DataError(f"{sweep.source}: no pose at alpha = 90, beta = {beta_deg:g} deg, which axis {axis} needs")
-    return float(sweep.output(axis)[at].mean())
+    return float(sweep.output(axis)[is_at_pose].mean())

@@ -121,26 +121,29 @@ class SteadyState:
         Its standard error is that of the exponentials, and of the noise that sets the tolerance. Where nothing drifts
         it is the record's start, at the latest: rectangular since power-on.
         """
-        at = np.log(self.tolerance)
-        value = self._last_beyond(self.parameters, at)
+        ln_tolerance = np.log(self.tolerance)
+        value = self._last_beyond(self.parameters, ln_tolerance)
         too_few = not self.terms and self.freedom + 1 < FEWEST_STEADY_VALUES
         if self.wanders or too_few or value > self.span_s[1]:
             return None
         if value == self.span_s[0]:
             return value, value / np.sqrt(12.0)
         nudges = RELATIVE_STEP * np.diag(np.where(self.parameters == 0, 1.0, np.abs(self.parameters)))
-        by = np.array(
+        derivatives = np.array(
             [
-                (self._last_beyond(self.parameters + d, at) - self._last_beyond(self.parameters - d, at))
+                (
+                    self._last_beyond(self.parameters + d, ln_tolerance)
+                    - self._last_beyond(self.parameters - d, ln_tolerance)
+                )
                 / (2 * d.sum())
                 for d in nudges
             ]
         )
         by_noise = (
-            self._last_beyond(self.parameters, at + RELATIVE_STEP)
-            - self._last_beyond(self.parameters, at - RELATIVE_STEP)
+            self._last_beyond(self.parameters, ln_tolerance + RELATIVE_STEP)
+            - self._last_beyond(self.parameters, ln_tolerance - RELATIVE_STEP)
         ) / (2 * RELATIVE_STEP)
-        return value, float(np.sqrt(by @ self.covariance @ by + by_noise**2 / (2 * self.freedom)))
+        return value, float(np.sqrt(derivatives @ self.covariance @ derivatives + by_noise**2 / (2 * self.freedom)))
 
     def at(self, t_s: Array) -> Array:
         """The fitted value at times since power-on, shape (n,)."""
@@ -148,8 +151,8 @@ class SteadyState:
 
     def std_at(self, t_s: Array) -> Array:
         """Its standard error, shape (n,)."""
-        by = model_derivatives(self.parameters, t_s - self.span_s[0])
-        return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", by, self.covariance, by)))
+        derivatives = model_derivatives(self.parameters, t_s - self.span_s[0])
+        return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", derivatives, self.covariance, derivatives)))
 
     def _last_beyond(self, p: Array, ln_tolerance: float) -> float:
         """The last time at which the remaining drift exceeds the tolerance, else the start of the record."""

@@ -84,17 +84,17 @@ def learn_noise(windows: Sequence[Array], rate_hz: float) -> NoiseAtRest | None:
     most = 3.0 * blocks * (len(windows[0]) // blocks - 1), 3.0 * (blocks - 1)
     freedom = tuple(_freedom(v / s, m) for v, s, m in ((shakes, shake, most[0]), (sways, sway, most[1])))
     noise = NoiseAtRest(shake, sway, creep, (freedom[0], freedom[1]), len(windows), rate_hz)
-    alike = all(_window_ratio(w, noise, FALSE_ALARM / len(windows))[0] <= 1 for w in windows)
-    return noise if alike and _creep_ratio(means, noise, FALSE_ALARM) <= 1 else None
+    are_consistent = all(_window_ratio(w, noise, FALSE_ALARM / len(windows))[0] <= 1 for w in windows)
+    return noise if are_consistent and _creep_ratio(means, noise, FALSE_ALARM) <= 1 else None
 
 
 def judge_window(windows: Sequence[Array], noise: NoiseAtRest) -> Stillness:
     """The test of the last of successive `windows`, each (n, 3); creep is that of all together."""
     share = FALSE_ALARM / len(TESTS)
-    ratio, by = _window_ratio(windows[-1], noise, share)
+    ratio, cause = _window_ratio(windows[-1], noise, share)
     creep = _creep_ratio(np.array([w.mean(axis=0) for w in windows]), noise, share) if len(windows) > 1 else 0.0
     spread = float(np.sqrt(np.mean(sum(_variances(windows[-1], noise.rate_hz)) / (noise.shake + noise.sway))))
-    return Stillness(creep, "creep", spread) if creep > ratio else Stillness(ratio, by, spread)
+    return Stillness(creep, "creep", spread) if creep > ratio else Stillness(ratio, cause, spread)
 
 
 def _window_ratio(window: Array, noise: NoiseAtRest, alarm: float) -> tuple[float, str]:

@@ -51,14 +51,14 @@ def estimate_tumbles(table: Table, axis: str) -> list[Tumble]:
     A tumble with a missing pose is not used: hysteresis cancels only if each position was reached from both sides.
     """
     paths = np.array(table.labels.get("path", ()))
-    begun = {name: np.flatnonzero(paths == name) for name in dict.fromkeys(paths.tolist()) if " " in name}
-    if not begun:
+    rows_by_name = {name: np.flatnonzero(paths == name) for name in dict.fromkeys(paths.tolist()) if " " in name}
+    if not rows_by_name:
         raise DataError(f"{table.source}: no tumble is complete yet; resume the run")
-    missing = {name: _missing(table, rows) for name, rows in begun.items()}
+    missing = {name: _missing(table, rows) for name, rows in rows_by_name.items()}
     if all(missing.values()):
         name, missing_words = next(iter(missing.items()))
         raise DataError(f"{table.source}: no tumble is complete: {name!r} lacks {missing_words}; measure it again")
-    return [_tumble(table, axis, name, rows) for name, rows in begun.items() if not missing[name]]
+    return [_tumble(table, axis, name, rows) for name, rows in rows_by_name.items() if not missing[name]]
 
 
 def _missing(table: Table, rows: Rows) -> str:

@@ -90,18 +90,18 @@ def point_interval(values: Array) -> Interval:
 
 
 def evaluate_interval(
-    roots: Iterable[Node], ranges: Mapping[str, Interval], by: tuple[str, ...]
+    roots: Iterable[Node], ranges: Mapping[str, Interval], variables: tuple[str, ...]
 ) -> list[tuple[Interval, Interval]]:
-    """Each root's values, shape (boxes,), and its slopes by the variables `by`, shape (len(by), boxes)."""
+    """Each root's values, shape (boxes,), and its slopes by the variables `variables`, shape (len(by), boxes)."""
     roots = list(roots)
     n = np.shape(next(iter(ranges.values())).low)
     values: dict[Node, tuple[Interval, Interval]] = {}
     for node in sort_nodes(roots):
         if node.operation == "given":
-            unit_slope = np.array([float(name == node.name) for name in by]).reshape(-1, *(1 for _ in n))
-            values[node] = ranges[node.name], point_interval(np.broadcast_to(unit_slope, (len(by), *n)).copy())
+            unit_slope = np.array([float(name == node.name) for name in variables]).reshape(-1, *(1 for _ in n))
+            values[node] = ranges[node.name], point_interval(np.broadcast_to(unit_slope, (len(variables), *n)).copy())
         elif node.constant:
-            values[node] = point_interval(np.full(n, node.value)), point_interval(np.zeros((len(by), *n)))
+            values[node] = point_interval(np.full(n, node.value)), point_interval(np.zeros((len(variables), *n)))
         elif node.table is not None:
             values[node] = _tabulated(node.table, values[node.inner[0]])
         else:
@@ -164,9 +164,9 @@ def _outward(low: Array, high: Array) -> Interval:
     return Interval(_next(_next(low, -np.inf), -np.inf), _next(_next(high, np.inf), np.inf))
 
 
-def _next(value: Array, to: float) -> Array:
+def _next(value: Array, towards: float) -> Array:
     """The next number; an exact 0 stays 0, so that a product with 0 is 0."""
-    return np.where(value == 0, value, np.nextafter(value, to))
+    return np.where(value == 0, value, np.nextafter(value, towards))
 
 
 def _squared(x: Interval) -> Interval:
@@ -293,9 +293,9 @@ def _slopes_in_the_middle(
     outputs: Sequence[Node], sought: tuple[str, ...], inputs: Mapping[str, tuple[float, float]]
 ) -> Array:
     """d output / d a at 0 g, shape (axes, axes)."""
-    at = {name: point_interval(np.zeros(1)) for name in sought}
-    at |= {name: _middle(ends) for name, ends in inputs.items()}
-    results = evaluate_interval(outputs, at, sought)
+    point = {name: point_interval(np.zeros(1)) for name in sought}
+    point |= {name: _middle(ends) for name, ends in inputs.items()}
+    results = evaluate_interval(outputs, point, sought)
     with np.errstate(invalid="ignore"):  # of a jump at 0: no number
         return np.array([(d.low[:, 0] + d.high[:, 0]) / 2 for _, d in results])
 

@@ -64,10 +64,10 @@ def result_uncertainty(
     inputs = {name: span for name, span in spans.items() if name not in FORCES}
     covered = {name: _found_in(name, span, model) for name, span in inputs.items()}
     far = reach * a / np.abs(a).max(axis=1, keepdims=True)
-    stds = np.concatenate([_stds(model, forward, table, a, at) for at in _corners(covered)])
-    at, largest = _largest(lambda place: _stds(model, forward, table, far, place), inputs)
+    stds = np.concatenate([_stds(model, forward, table, a, point) for point in _corners(covered)])
+    point, largest = _largest(lambda place: _stds(model, forward, table, far, place), inputs)
     rms = float(np.sqrt(np.mean(stds**2, axis=0)).max())
-    return Uncertainty(covered, rms, float(stds.max()), max(largest, float(stds.max())), at)
+    return Uncertainty(covered, rms, float(stds.max()), max(largest, float(stds.max())), point)
 
 
 def _found_in(name: str, stated_span: Span, model: Model) -> Span:
@@ -75,8 +75,8 @@ def _found_in(name: str, stated_span: Span, model: Model) -> Span:
 
     The range that the data covered, by the model file, or its reference; the whole range if neither is known.
     """
-    at = {key: value for term in model.terms for key, value in term.constants.items()}
-    reference = at.get(REFERENCES.get(name, ""))
+    constants = {key: value for term in model.terms for key, value in term.constants.items()}
+    reference = constants.get(REFERENCES.get(name, ""))
     low, high = model.covered.get(name, stated_span if reference is None else (reference, reference))
     return float(np.clip(low, *stated_span)), float(np.clip(high, *stated_span))
 
@@ -101,18 +101,18 @@ def _largest(stds: Stds, spans: Mapping[str, Span]) -> tuple[Inputs, float]:
     return best, most(best)
 
 
-def _stds(model: Model, forward: Forward, table: Table, a: Array, at: Inputs) -> Array:
+def _stds(model: Model, forward: Forward, table: Table, a: Array, inputs: Inputs) -> Array:
     """Standard uncertainties (n, axes) of what is sensed: u^2 = d^T R d, with d = J^-1 dG/dp u(p) and J = dG/da.
 
     R are the correlations of the parameters, 1 on the diagonal and 0 elsewhere where the model has none.
     """
     constant_table = replace(
-        table, columns={**table.columns, **{name: np.full(table.n, value) for name, value in at.items()}}
+        table, columns={**table.columns, **{name: np.full(table.n, value) for name, value in inputs.items()}}
     )
     k = ["xyz".index(axis) for axis in forward.axes]
 
-    def output(of: Model, force: Array) -> Array:
-        steps = steps_of(of)
+    def output(perturbed: Model, force: Array) -> Array:
+        steps = steps_of(perturbed)
         return respond(sensed(force, constant_table, steps), constant_table, steps)[:, k]
 
     h = 1e-5
@@ -136,9 +136,9 @@ def _perturbed_models(model: Model) -> Sequence[tuple[Model, Model]]:
     ]
 
 
-def _with(model: Model, i: int, j: int, by: float) -> Model:
+def _with(model: Model, i: int, j: int, change: float) -> Model:
     term: Term = model.terms[i]
-    estimate: Estimate = replace(term.estimates[j], value=term.estimates[j].value + by)
+    estimate: Estimate = replace(term.estimates[j], value=term.estimates[j].value + change)
     estimates = (*term.estimates[:j], estimate, *term.estimates[j + 1 :])
     return replace(model, terms=(*model.terms[:i], replace(term, estimates=estimates), *model.terms[i + 1 :]))
 
@@ -270,12 +270,12 @@ def _sweep(model: Model, spans: Mapping[str, Span]) -> Table:
     beta = np.tile(np.concatenate([up, up[::-1]]), len(INCLINATIONS_DEG))
     n = len(alpha)
     wave = np.sin(np.linspace(0, 4 * np.pi, n))
-    at = {name: value for term in model.terms for name, value in term.constants.items()}
+    constants = {name: value for term in model.terms for name, value in term.constants.items()}
     columns = {
         "alpha_deg": alpha,
         "beta_deg": beta,
         "direction": np.tile(np.repeat([1.0, -1.0], len(up)), len(INCLINATIONS_DEG)),
-        "t_s": at.get("middle_s", 0.0) + 7.0 * (np.arange(n) - n / 2) + 3.5 * n * ("middle_s" not in at),
+        "t_s": constants.get("middle_s", 0.0) + 7.0 * (np.arange(n) - n / 2) + 3.5 * n * ("middle_s" not in constants),
         "vx_v": np.zeros(n),
     }
     columns |= {

@@ -296,24 +296,24 @@ def make_vectors(compensation: Compensation, count: int = COUNT) -> ReferenceVec
     )
     unit = scipy.stats.qmc.Sobol(len(ranges), scramble=False).random(count)
     low, high = np.array(list(ranges.values())).T
-    at = dict(zip(ranges, (low + unit * (high - low)).T, strict=True))
-    outputs = [np.broadcast_to(v, count) for v in _in_a_row(compensation, at, count)]
-    at |= {f"v{axis}": v for axis, v in zip(compensation.forward.axes, outputs, strict=True)}
-    inputs = np.column_stack([at[name] for name in compensation.program.inputs])
-    expected = np.column_stack([at[name] for name in compensation.forward.sought])
+    inputs_by_name = dict(zip(ranges, (low + unit * (high - low)).T, strict=True))
+    outputs = [np.broadcast_to(v, count) for v in _in_a_row(compensation, inputs_by_name, count)]
+    inputs_by_name |= {f"v{axis}": v for axis, v in zip(compensation.forward.axes, outputs, strict=True)}
+    inputs = np.column_stack([inputs_by_name[name] for name in compensation.program.inputs])
+    expected = np.column_stack([inputs_by_name[name] for name in compensation.forward.sought])
     return ReferenceVectors(inputs, expected, TOLERANCE[compensation.precision] * compensation.range.reach)
 
 
-def _in_a_row(compensation: Compensation, at: Mapping[str, Array], count: int) -> list[Array]:
+def _in_a_row(compensation: Compensation, inputs: Mapping[str, Array], count: int) -> list[Array]:
     """The model's outputs for successive samples, shape (count,) each."""
     forward = compensation.forward
     if not forward.memory:
-        return evaluate_nodes(forward.outputs, at)
+        return evaluate_nodes(forward.outputs, inputs)
     remembered: dict[str, Array] = dict.fromkeys(forward.memory, np.zeros(()))
     rows = []
     for i in range(count):
         values = evaluate_nodes(
-            (*forward.outputs, *forward.memory.values()), {k: v[i] for k, v in at.items()} | remembered
+            (*forward.outputs, *forward.memory.values()), {k: v[i] for k, v in inputs.items()} | remembered
         )
         rows.append(values[: len(forward.outputs)])
         remembered = dict(zip(forward.memory, values[len(forward.outputs) :], strict=True))

@@ -57,8 +57,12 @@ class Range:
     @staticmethod
     def for_model(model: Model, reach: float | None = None, **beside: tuple[float, float]) -> Range:
         """The default range for the model's kind of sensor, with the given `reach` and ranges by input name."""
-        at = {name: value for term in model.terms for name, value in term.constants.items()}
-        supply = {"supply_v": (0.95 * at["reference_v"], 1.05 * at["reference_v"])} if "reference_v" in at else {}
+        constants = {name: value for term in model.terms for name, value in term.constants.items()}
+        supply = (
+            {"supply_v": (0.95 * constants["reference_v"], 1.05 * constants["reference_v"])}
+            if "reference_v" in constants
+            else {}
+        )
         return Range(reach or DEFAULT_REACH[input_unit(model)], DEFAULT_INPUTS | supply | beside)
 
     def of(self, inputs: Collection[str]) -> dict[str, tuple[float, float]]:

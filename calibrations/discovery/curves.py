@@ -100,15 +100,15 @@ def place_curve(end: Fit, place: str) -> PlaceCurve | None:
     value, std = _contribution(end, names, base)
     effect_names = [name for name in names if not name.startswith(PREFIX)]
     explained = _contribution(end, effect_names, base)[0] if effect_names else np.zeros(value.shape)
-    at, values, bands, parts = {}, {}, {}, {}
+    abscissas, values, bands, parts = {}, {}, {}, {}
     for axis, (rows, x, weight) in groups.items():
         averaged = _averaged(x, weight, value[rows].ravel(), std[rows].ravel(), explained[rows].ravel())
-        at[axis], values[axis], bands[axis], parts[axis] = averaged
-    if not at:
+        abscissas[axis], values[axis], bands[axis], parts[axis] = averaged
+    if not abscissas:
         return None
     unit = {"": end.problem.unit, "force": f"{end.problem.unit}/g", "angle": "deg"}[factor]
     driver_unit = driver_unit.replace("{out}", end.problem.unit)
-    return PlaceCurve(place, driver, driver_unit, unit, at, values, bands, parts)
+    return PlaceCurve(place, driver, driver_unit, unit, abscissas, values, bands, parts)
 
 
 def _logged(place: str, table: Table) -> tuple[str, str, str] | None:
@@ -162,8 +162,8 @@ def _by_angle(end: Fit, place: str) -> Array:
     name = f"{place.removeprefix('stage-angle-')}_deg"
     steps = end.problem.layout.steps(end.theta)
 
-    def shifted(by: float) -> Array:
-        columns = {**end.table.columns, name: end.table.column(name) + by}
+    def shifted(change: float) -> Array:
+        columns = {**end.table.columns, name: end.table.column(name) + change}
         return forward(_with(end.table, columns), steps)
 
     return np.asarray((shifted(STEP_RAD) - shifted(-STEP_RAD)).T / (2 * STEP_RAD))
@@ -184,13 +184,13 @@ def _averaged(x: Array, weight: Array, value: Array, std: Array, explained: Arra
     squares = np.bincount(part, weight**2)
     occupied = np.flatnonzero(squares > 1e-6 * squares.max())
     rows = np.bincount(part)
-    at = (np.bincount(part, x) / np.maximum(rows, 1))[occupied]
+    abscissas = (np.bincount(part, x) / np.maximum(rows, 1))[occupied]
 
     def mean(values: Array) -> Array:
         return np.asarray((np.bincount(part, weight * values) / np.where(squares > 0, squares, 1.0))[occupied])
 
     band = np.sqrt(np.bincount(part, (weight * std) ** 2 * rows[part]) / np.where(squares > 0, squares, 1.0) ** 2)
-    return at, mean(value), band[occupied], mean(explained)
+    return abscissas, mean(value), band[occupied], mean(explained)
 
 
 def _symmetry(driver: str, x: Array, value: Array) -> str:

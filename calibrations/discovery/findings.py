@@ -203,9 +203,9 @@ class Findings(Generic[F]):
     @cached_property
     def given(self) -> Judgement:
         """The judgement on the given model; on the model before the added effects if no further effect is missing."""
-        judged = self.origin if self.added and not self._missing else self.start
+        fit = self.origin if self.added and not self._missing else self.start
         return Judgement(
-            model=judged.model.name, missing=self._missing, added=self.added, undetermined=self.undetermined[0],
+            model=fit.model.name, missing=self._missing, added=self.added, undetermined=self.undetermined[0],
             closest=self._closest, provisional=not self.settled, **self._common,
         )  # fmt: skip
 

@@ -179,10 +179,10 @@ def _steps(table: Table, rows: Array) -> list[Pattern]:
 
 def _step(table: Table, k: int) -> Pattern:
     """0 before row k, 1 from it on."""
-    at = (table.time_s[k - 1] + table.time_s[k]) / 2
+    position = (table.time_s[k - 1] + table.time_s[k]) / 2
     has_time = "t_s" in table
-    text = f"step at t = {at:.0f} s" if has_time else f"step at row {at:.0f}"
-    expression = f"a*step(t - {at:.7g})" if has_time else ""
+    text = f"step at t = {position:.0f} s" if has_time else f"step at row {position:.0f}"
+    expression = f"a*step(t - {position:.7g})" if has_time else ""
     return Pattern(text, np.where(np.arange(table.n) >= k, 1.0, 0.0)[:, None], expression, slow=True)
 
 
@@ -211,9 +211,9 @@ def _levels(levelled: Callable[[int], Pattern], places: Array) -> list[Pattern]:
 
 def _level(values: Array, levels: Array, words: tuple[str, str, str], k: int) -> Pattern:
     """0 below a level of a column, 1 above it."""
-    (word, unit, short), at = words, (levels[k - 1] + levels[k]) / 2
-    expression = f"a*step({short} - {at:.7g})" if short else ""
-    return Pattern(f"step at {word} = {at:.4g}{unit}", (values >= at)[:, None] * 1.0, expression)
+    (word, unit, short), position = words, (levels[k - 1] + levels[k]) / 2
+    expression = f"a*step({short} - {position:.7g})" if short else ""
+    return Pattern(f"step at {word} = {position:.4g}{unit}", (values >= position)[:, None] * 1.0, expression)
 
 
 def _in_parts(table: Table, channels: tuple[str, ...]) -> Iterator[Pattern]:

@@ -84,12 +84,23 @@ def summary_lines(discovery: Discovery[Fit]) -> list[Line]:
         change = rms(in_milli_rows(step.after.residual - step.before.residual, end))
         p = chance(*first_order_cost(end, step.name))
         effects = () if step.name.startswith(PREFIX) else (step.name,)
-        at = place_of_effect(step.name) or "-"
-        lines.append((at, effects, float(np.sqrt(np.mean(change**2))), 1 - p, tuple(alternatives.get(step.name, ()))))
+        place_name = place_of_effect(step.name) or "-"
+        lines.append(
+            (place_name, effects, float(np.sqrt(np.mean(change**2))), 1 - p, tuple(alternatives.get(step.name, ())))
+        )
     total = sum(size**2 for _, _, size, _, _ in lines) or 1.0
     summary = [
-        Line(at, e, size, unit, size**2 / total, certainty, rivals, bool(e) and f"{PREFIX}{at}" in added_effects)
-        for at, e, size, certainty, rivals in lines
+        Line(
+            place_name,
+            e,
+            size,
+            unit,
+            size**2 / total,
+            certainty,
+            rivals,
+            bool(e) and f"{PREFIX}{place_name}" in added_effects,
+        )
+        for place_name, e, size, certainty, rivals in lines
     ]
     return sorted(summary, key=lambda line: -line.size)
 

@@ -106,15 +106,15 @@ class Expression:
                 columns.setdefault(node.name, node.at)
         return columns
 
-    def fault(self, at: int, message: str) -> ExpressionError:
-        """The error at column `at`, marked in the text."""
-        return fault(self.text, at, message)
+    def fault(self, column: int, message: str) -> ExpressionError:
+        """The error at a column, marked in the text."""
+        return fault(self.text, column, message)
 
 
-def fault(text: str, at: int, message: str) -> ExpressionError:
-    """The error at column `at` of `text`, with a mark below it."""
-    at = min(max(at, 0), len(text))
-    return ExpressionError(f"column {at + 1}: {message}\n    {text}\n    {' ' * at}^")
+def fault(text: str, column: int, message: str) -> ExpressionError:
+    """The error at a column of `text`, with a mark below it."""
+    column = min(max(column, 0), len(text))
+    return ExpressionError(f"column {column + 1}: {message}\n    {text}\n    {' ' * column}^")
 
 
 def parse(text: str) -> Expression:

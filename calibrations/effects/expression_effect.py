@@ -47,18 +47,20 @@ def effect_for(name: str, text: str, table: Table) -> Effect:
     """
     expression = parse(text)
     column_names = {*COLUMNS, *FORCES, *(column for column in table.columns if column not in MEASURED)}
-    for word, at in expression.names.items():
+    for word, column_number in expression.names.items():
         similar = difflib.get_close_matches(word, column_names | {*FUNCTIONS}, n=1, cutoff=MISSPELT)
         if similar and word not in column_names and len(word) > 3 and not word.startswith(similar[0]):
             raise expression.fault(
-                at, f'"{word}" is no column; did you mean "{similar[0]}"? Name a parameter otherwise'
+                column_number, f'"{word}" is no column; did you mean "{similar[0]}"? Name a parameter otherwise'
             )
     effect = own_effect(name, expression.text, tuple(w for w in expression.names if w in table and may_be_column(w)))
     for column in effect.needs:
         if column not in table:
             word = next((short for short, full_name in COLUMNS.items() if full_name == column), column)
-            at = expression.names.get(word, 0)
-            raise expression.fault(at, f"needs the column {column}; {table.source} has: {', '.join(table.columns)}")
+            column_number = expression.names.get(word, 0)
+            raise expression.fault(
+                column_number, f"needs the column {column}; {table.source} has: {', '.join(table.columns)}"
+            )
     if reason := effect.lacks(table):
         raise expression.fault(0, f"{reason}; {table.source} has: {', '.join(table.output_names)}")
     return effect
@@ -120,11 +122,11 @@ class _FromExpression(Effect):
         """Names the innermost part that is no number, and the first row where."""
         parts = [n for n in nodes(self._expression.root) if not np.isfinite(evaluate(n, values)).all()]
         row = int(np.argmax(~np.isfinite(np.atleast_2d(evaluate(parts[-1], values))).all(axis=-1)))
-        at = ", ".join(f"{p.name} = {np.ravel(values[p.name])[0]:.4g}" for p in self.parameters)
+        values_text = ", ".join(f"{p.name} = {np.ravel(values[p.name])[0]:.4g}" for p in self.parameters)
         return self._expression.fault(
             getattr(parts[-1], "at", 0),
-            f"{self.name} is no number on row {row + 1}, with {at}; keep divisors away from 0, and above 0 what log, "
-            "sqrt or a broken power is taken of",
+            f"{self.name} is no number on row {row + 1}, with {values_text}; keep divisors away from 0, and above 0 "
+            "what log, sqrt or a broken power is taken of",
         )
 
 
@@ -174,11 +176,11 @@ def _required_columns(expression: Expression, parameters: tuple[str, ...]) -> tu
 
 def _check(expression: Expression, parameters: tuple[str, ...]) -> None:
     """Raise ExpressionError for an expression that is not an effect."""
-    for word, at in expression.names.items():
+    for word, column in expression.names.items():
         if word in MEASURED:
-            raise expression.fault(at, f"{word} is what is measured; write the effect in ax, ay, az instead")
+            raise expression.fault(column, f"{word} is what is measured; write the effect in ax, ay, az instead")
         if _on_angle(expression) and word in FORCES:
-            raise expression.fault(at, f"{word} follows from the stage angles; write this in alpha and beta")
+            raise expression.fault(column, f"{word} follows from the stage angles; write this in alpha and beta")
     if not parameters:
         raise ExpressionError(
             f"{expression.text}: there is nothing to be fitted; all of its names are columns. Multiply it by "

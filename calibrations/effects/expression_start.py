@@ -171,10 +171,10 @@ def _combinations(grids: list[Array]) -> list[tuple[float, ...]]:
     return [tuple(map(float, values)) for values in zip(*choices, strict=True)]
 
 
-def _spacing(grid: Array, at: float) -> float:
+def _spacing(grid: Array, value: float) -> float:
     """Distance to the farther neighbour on the grid."""
-    k = int(np.searchsorted(grid, at))
-    return float(np.max(np.abs(grid[max(k - 1, 0) : k + 2] - at))) or 1.0
+    k = int(np.searchsorted(grid, value))
+    return float(np.max(np.abs(grid[max(k - 1, 0) : k + 2] - value))) or 1.0
 
 
 def trials(root: Node, name: str, values: Mapping[str, Array]) -> Array:

@@ -12,15 +12,15 @@ from calibrations.table import Array
 
 
 @njit(cache=True, nogil=True)
-def _move(forces: Array, previous: float, present: float, limits: Array, pressed: float) -> None:
+def _move(forces: Array, previous: float, present: float, limits: Array, limit_factor: float) -> None:
     """Move all elements from the force `previous` to `present`, each as far as its limit."""
     for e in range(len(limits)):
-        limit = limits[e] * pressed
+        limit = limits[e] * limit_factor
         forces[e] = min(limit, max(-limit, forces[e] + present - previous))
 
 
 @njit(cache=True, nogil=True)
-def slip_elements(a: Array, on_the_way: Array, pressed: Array, limits: Array, begun: Array) -> Array:
+def slip_elements(a: Array, on_the_way: Array, limit_factors: Array, limits: Array, first_shares: Array) -> Array:
     """Force held by elements of equal stiffness that stick and slip, at each row, shape (n, elements, 3), g.
 
     a            (n, 3) specific force, g
@@ -32,30 +32,30 @@ def slip_elements(a: Array, on_the_way: Array, pressed: Array, limits: Array, be
     n, axes = a.shape
     state = np.zeros((n, len(limits), axes))
     for k in range(axes):
-        forces = begun[k] * limits
+        forces = first_shares[k] * limits
         previous = 0.0
         for i in range(n):
             for j in range(on_the_way.shape[1] + 1):
                 present = on_the_way[i, j, k] if j < on_the_way.shape[1] else a[i, k]
-                _move(forces, previous, present, limits, pressed[i, k])
+                _move(forces, previous, present, limits, limit_factors[i, k])
                 previous = present
             state[i, :, k] = forces
     return state
 
 
 @njit(cache=True, nogil=True)
-def slip(a: Array, on_the_way: Array, pressed: Array, limits: Array, begun: Array) -> Array:
+def slip(a: Array, on_the_way: Array, limit_factors: Array, limits: Array, first_shares: Array) -> Array:
     """Force held by all elements of `slip_elements`, shape (n, 3), 1 where all slip."""
     n, axes = a.shape
     total = limits.sum()
     shares = np.empty((n, axes))
     for k in range(axes):
-        forces = begun[k] * limits
+        forces = first_shares[k] * limits
         previous = 0.0
         for i in range(n):
             for j in range(on_the_way.shape[1] + 1):
                 present = on_the_way[i, j, k] if j < on_the_way.shape[1] else a[i, k]
-                _move(forces, previous, present, limits, pressed[i, k])
+                _move(forces, previous, present, limits, limit_factors[i, k])
                 previous = present
             total_force = forces[0]
             for e in range(1, len(limits)):

@@ -106,10 +106,10 @@ def simulate(
     inputs = [name for name in variable_names(forward.outputs) if name not in FORCES]
     ranges = {name: _span(model, name, spans or {}) for name in inputs}
     a, other_inputs = _grid(reach, ranges)
-    at = {**dict(zip(FORCES, a.T, strict=True)), **other_inputs}
-    outputs = _outputs(model, remembering, at, len(a))
+    input_values = {**dict(zip(FORCES, a.T, strict=True)), **other_inputs}
+    outputs = _outputs(model, remembering, input_values, len(a))
     inverted = [f.effect for f in forward.fates if f.how == INVERTED]
-    parts = {name: outputs - _outputs(model, (*remembering, name), at, len(a)) for name in inverted}
+    parts = {name: outputs - _outputs(model, (*remembering, name), input_values, len(a)) for name in inverted}
     loss_list = []
     for fate in compensation.forward.fates:
         if fate.how == LEFT_OUT:
@@ -155,6 +155,6 @@ def _levels(name: str, span: tuple[float, float]) -> Sequence[float]:
     return [span[0]] if span[0] == span[1] else np.linspace(*span, count).tolist()
 
 
-def _outputs(model: Model, left_out: Sequence[str], at: Mapping[str, Array], n: int) -> Array:
+def _outputs(model: Model, left_out: Sequence[str], inputs: Mapping[str, Array], n: int) -> Array:
     forward = trace_model(model, left_out)
-    return np.column_stack([np.broadcast_to(v, n) for v in evaluate_nodes(forward.outputs, at)])
+    return np.column_stack([np.broadcast_to(v, n) for v in evaluate_nodes(forward.outputs, inputs)])

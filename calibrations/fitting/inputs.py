@@ -72,7 +72,7 @@ def column_derivative(name: str, step: float) -> Derivative:
     """With respect to a column of the table, by central differences."""
 
     def derivative(problem: Problem, theta: Array) -> Array:
-        forward, backward = (_shifted(problem, name, by).residual(theta) for by in (step, -step))
+        forward, backward = (_shifted(problem, name, change).residual(theta) for change in (step, -step))
         return (forward - backward) / (2 * step)
 
     return derivative
@@ -83,7 +83,9 @@ def step_derivative(effect: Effect, step: float) -> Derivative:
 
     def derivative(problem: Problem, theta: Array) -> Array:
         steps = problem.layout.steps(theta)
-        forward, backward = (problem.residual_by([*steps, (effect, Values(by=np.asarray(by)))]) for by in (step, -step))
+        forward, backward = (
+            problem.residual_by([*steps, (effect, Values(by=np.asarray(change)))]) for change in (step, -step)
+        )
         return (forward - backward) / (2 * step)
 
     return derivative
@@ -153,8 +155,8 @@ def _common(source: str, unit: str, derivative: Derivative) -> Contribution:
     return Contribution(source, unit, None, derivative, one_error)
 
 
-def _shifted(problem: Problem, name: str, by: float | Array) -> Problem:
-    columns = {**problem.table.columns, name: problem.table.column(name) + by}
+def _shifted(problem: Problem, name: str, change: float | Array) -> Problem:
+    columns = {**problem.table.columns, name: problem.table.column(name) + change}
     return replace(problem, table=replace(problem.table, columns=MappingProxyType(columns)))
 
 

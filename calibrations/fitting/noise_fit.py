@@ -322,8 +322,8 @@ def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[Point], k: int,
     """Gram matrices over the grid; the first `k` columns are set aside (Schur complement)."""
     w = float(rms(fast))
     by_point = [processes(ratio * w, taus, known_noise) for ratio, taus in grid]
-    counts = np.array([len(of) for of in by_point])
-    padded = np.array([(*of, *((0.0, 1.0),) * (counts.max() - len(of))) for of in by_point])
+    counts = np.array([len(point) for point in by_point])
+    padded = np.array([(*point, *((0.0, 1.0),) * (counts.max() - len(point))) for point in by_point])
     gram, logdet = products(np.ascontiguousarray(columns), gap_s, fast, padded[..., 0], padded[..., 1], counts)
     if not k:
         return Grams(gram, logdet, np.zeros(len(grid)))

@@ -166,10 +166,10 @@ class Problem:
         columns = self._chain_at([steps[i] for i in even]).columns
         by_index: dict[int, Array] = {}
         for k, slot in enumerate(layout.slots):
-            if slot.term in even and (of := columns.get(even.index(slot.term))) is not None:
+            if slot.term in even and (effect_columns := columns.get(even.index(slot.term))) is not None:
                 axes = [self.table.axes.index(slot.axis)] if slot.axis else slice(None)
-                by_index[k] = np.zeros_like(of[slot.parameter.name])
-                by_index[k][:, axes] = of[slot.parameter.name][:, axes]
+                by_index[k] = np.zeros_like(effect_columns[slot.parameter.name])
+                by_index[k][:, axes] = effect_columns[slot.parameter.name][:, axes]
         if not by_index:
             return {}
         output_columns = self.of_output(theta, np.stack(list(by_index.values()), axis=2))

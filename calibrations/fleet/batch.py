@@ -63,11 +63,11 @@ def find_batch_effects(looks: Sequence[Screening], of_stage: Container[str] = ()
     for look in looks:
         for score in look.scores:
             scores_by_effect[score.effect, score.start, len(score.score)].append((score, look.rows))
-    tests = [of for of in scores_by_effect.values() if len(of) >= max(FEWEST_SENSORS, len(looks) / 2)]
-    judged = [_judged(of, 2 * len(tests), of[0][0].effect not in of_stage) for of in tests]
-    judged = sorted((effect for effect in judged if effect.p_value < SIGNIFICANT), key=lambda e: e.gain, reverse=True)
+    tests = [scores for scores in scores_by_effect.values() if len(scores) >= max(FEWEST_SENSORS, len(looks) / 2)]
+    tested = [_judged(scores, 2 * len(tests), scores[0][0].effect not in of_stage) for scores in tests]
+    tested = sorted((effect for effect in tested if effect.p_value < SIGNIFICANT), key=lambda e: e.gain, reverse=True)
     best: dict[str, BatchEffect] = {}
-    for effect in judged:
+    for effect in tested:
         best.setdefault(effect.effect, effect)
     return [_with_rivals(effect, list(best.values())) for effect in best.values()]
 
@@ -77,13 +77,15 @@ def _with_rivals(effect: BatchEffect, candidates: list[BatchEffect]) -> BatchEff
     return replace(effect, rivals=rivals)
 
 
-def _judged(of: list[tuple[Score, int]], tests: int, may_differ: bool) -> BatchEffect:
-    scores = [score for score, _ in of]
+def _judged(scores_and_rows: list[tuple[Score, int]], tests: int, may_differ: bool) -> BatchEffect:
+    scores = [score for score, _ in scores_and_rows]
     statistics, ranks = np.array([s.statistic for s in scores]), np.array([s.rank for s in scores])
-    price = float(np.median(ranks)) * float(np.median(np.log([rows for _, rows in of])))
+    price = float(np.median(ranks)) * float(np.median(np.log([rows for _, rows in scores_and_rows])))
     options = [(True, *_common(scores, int(np.median(ranks))))]
     if may_differ:
-        options.append((False, _sensor_chance(statistics, ranks), len(of) * (float(np.median(statistics)) - price)))
+        options.append(
+            (False, _sensor_chance(statistics, ranks), len(scores_and_rows) * (float(np.median(statistics)) - price))
+        )
     significant = [option for option in options if option[1] * tests < SIGNIFICANT]
     common, p_value, gain = max(significant or options, key=lambda option: option[2])
     return BatchEffect(
@@ -92,7 +94,7 @@ def _judged(of: list[tuple[Score, int]], tests: int, may_differ: bool) -> BatchE
         p_value=min(1.0, tests * p_value),
         gain=gain,
         sensors=int(np.sum([s.p_value * tests / 2 < SIGNIFICANT for s in scores])),
-        of=len(of),
+        of=len(scores_and_rows),
     )
 
 
@@ -186,7 +188,7 @@ class Population:
 
 def batch_verdict(batch: str, effects: tuple[BatchEffect, ...], sensors: tuple[SensorVerdict, ...]) -> BatchVerdict:
     """The summary of a batch from its sensors'."""
-    judged = [sensor for sensor in sensors if sensor.verdict != "failed"]
-    counts = Counter(name for sensor in judged for name in sensor.effects)
-    shares = {name: count / len(judged) for name, count in counts.most_common()}
+    analysed = [sensor for sensor in sensors if sensor.verdict != "failed"]
+    counts = Counter(name for sensor in analysed for name in sensor.effects)
+    shares = {name: count / len(analysed) for name, count in counts.most_common()}
     return BatchVerdict(batch, len(sensors), effects, shares)

@@ -305,10 +305,10 @@ def _beside_slow_noise(fit: Fit, groups: SearchGroups, columns: list[Array], ran
     ]
     scaled = [columns[k] / np.maximum(np.sqrt(np.sum(columns[k] ** 2, axis=(0, 1))), 1e-300) for k in tested]
     smooth = fit.problem.smooth
-    worth = np.array(gains(fit.noise, fit.residual, fit.jacobian, scaled, smooth)) if tested else np.zeros(0)
+    gained = np.array(gains(fit.noise, fit.residual, fit.jacobian, scaled, smooth)) if tested else np.zeros(0)
     rows, rank = fit.residual.size, ranks[tested]
     free = np.maximum(rows - fit.jacobian.shape[2] - rank - smooth.shape[1] * len(fit.channels), 1)
-    p_values[tested] = fdtrc(rank, free, np.expm1(np.minimum(worth / rows, 500.0)) * free / rank)
+    p_values[tested] = fdtrc(rank, free, np.expm1(np.minimum(gained / rows, 500.0)) * free / rank)
     return p_values
 
 
@@ -325,12 +325,12 @@ def _stage(groups: SearchGroups, effects: Mapping[str, Effect], gram: Array, pro
     """The effects on the pose that are not in the model, from their first start."""
     names: list[tuple[str, str, str]] = []
     places: list[int] = []
-    at = 0
+    start = 0
     for group in groups.all:
         if _of_stage(group, effects):
             names += [(group.effect, p.name, p.unit) for p in effects[group.effect].parameters]
-            places += range(at, at + group.columns.shape[2])
-        at += group.columns.shape[2]
+            places += range(start, start + group.columns.shape[2])
+        start += group.columns.shape[2]
     return StageScore(tuple(names), projections[places], gram[np.ix_(places, places)])
 
 

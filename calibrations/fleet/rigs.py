@@ -107,7 +107,9 @@ def find_rig_errors(fleet: Sequence[Measured]) -> list[RigError]:
     errors: list[RigError] = []
     while effects and fleet:
         results = {effect: _effect(fleet, names, effect, corrections) for effect in effects}
-        significant = [e for e, of in results.items() if of.p_value * len(effects) < SIGNIFICANT and of.fall > 0]
+        significant = [
+            e for e, result in results.items() if result.p_value * len(effects) < SIGNIFICANT and result.fall > 0
+        ]
         if not significant:
             break
         best = max(significant, key=lambda effect: results[effect].fall)
@@ -156,8 +158,10 @@ def _effect(
         return _Found()
     y, v = np.array(values), np.array(variances)
     errors_of_parameters = [_parameter(sensors, y[:, j], v[:, j], names[k]) for j, k in enumerate(own_rows)]
-    least = min(len(own_rows) * min((e.p_value for of in errors_of_parameters for e in of), default=1.0), 1.0)
-    errors = tuple(replace(error, p_value=least) for of in errors_of_parameters for error in of)
+    least = min(
+        len(own_rows) * min((e.p_value for rig_errors in errors_of_parameters for e in rig_errors), default=1.0), 1.0
+    )
+    errors = tuple(replace(error, p_value=least) for rig_errors in errors_of_parameters for error in rig_errors)
     off = {rig: np.zeros(len(own_rows)) for rig in corrections}
     for error in errors:
         if error.beyond:
@@ -171,9 +175,9 @@ def _effect(
 
 def _parameter(sensors: Sequence[Measured], y: Array, v: Array, name: tuple[str, str, str]) -> list[RigError]:
     """One parameter of every rig; nothing where the rigs cannot be compared."""
-    alike = ~_far(sensors, y, v)
-    sensors = [measured for measured, is_alike in zip(sensors, alike, strict=True) if is_alike]
-    y, v = y[alike], v[alike]
+    is_consistent = ~_far(sensors, y, v)
+    sensors = [measured for measured, is_alike in zip(sensors, is_consistent, strict=True) if is_alike]
+    y, v = y[is_consistent], v[is_consistent]
     batches, rigs = sorted({measured.batch for measured in sensors}), sorted({measured.rig for measured in sensors})
     of_batch = np.array([[measured.batch == batch for batch in batches] for measured in sensors], dtype=float)
     design = np.hstack(

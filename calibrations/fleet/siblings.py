@@ -122,14 +122,14 @@ class Siblings:
 
 def fit_siblings(y: Array, v: Array) -> Siblings:
     """The posterior of values `y` with variances `v`, (n,), those that are unlike all others set apart."""
-    unlike = _suspects(y, v)
-    if unlike.any():
-        alike = _posterior(y, v, unlike)
-        variance = alike.variance + alike.mean_std**2 + v
-        off = np.abs(y - alike.mean) / np.sqrt(variance)
-        freedom = max(int(np.sum(~unlike)) - 1, 1)
-        unlike &= 2 * stdtr(freedom, -off) * len(y) < FALSE_OUTLIER
-    return _posterior(y, v, unlike)
+    is_unlike = _suspects(y, v)
+    if is_unlike.any():
+        siblings = _posterior(y, v, is_unlike)
+        variance = siblings.variance + siblings.mean_std**2 + v
+        off = np.abs(y - siblings.mean) / np.sqrt(variance)
+        freedom = max(int(np.sum(~is_unlike)) - 1, 1)
+        is_unlike &= 2 * stdtr(freedom, -off) * len(y) < FALSE_OUTLIER
+    return _posterior(y, v, is_unlike)
 
 
 def _suspects(y: Array, v: Array) -> NDArray[np.bool_]:
@@ -140,19 +140,19 @@ def _suspects(y: Array, v: Array) -> NDArray[np.bool_]:
     return suspects if int(np.sum(~suspects)) >= FEWEST_SIBLINGS else np.zeros(len(y), dtype=bool)
 
 
-def _posterior(y: Array, v: Array, unlike: NDArray[np.bool_]) -> Siblings:
-    usual, noise = y[~unlike], v[~unlike]
+def _posterior(y: Array, v: Array, is_unlike: NDArray[np.bool_]) -> Siblings:
+    usual, noise = y[~is_unlike], v[~is_unlike]
     if len(usual) < FEWEST_SIBLINGS:
-        return Siblings(y, v, unlike, np.zeros(1), np.ones(1))
-    at = (np.arange(GRID) + 0.5) / GRID
+        return Siblings(y, v, is_unlike, np.zeros(1), np.ones(1))
+    grid = (np.arange(GRID) + 0.5) / GRID
     scale = float(np.std(usual)) + np.sqrt(float(np.median(noise))) / 4
-    tau = scale * at / (1 - at)
+    tau = scale * grid / (1 - grid)
     mu, variance = _means(usual, noise, tau)
     total = noise + tau[:, None] ** 2
     log = -0.5 * np.sum(np.log(total) + (usual - mu[:, None]) ** 2 / total, axis=1) + 0.5 * np.log(variance)
-    log -= 2 * np.log1p(-at)  # the grid's spacing, which makes the density flat in tau
+    log -= 2 * np.log1p(-grid)  # the grid's spacing, which makes the density flat in tau
     weight = np.exp(log - log.max())
-    return Siblings(y, v, unlike, tau, weight / weight.sum())
+    return Siblings(y, v, is_unlike, tau, weight / weight.sum())
 
 
 def _means(y: Array, v: Array, tau: Array) -> tuple[Array, Array]:

@@ -58,9 +58,11 @@ class Spline:
 
     def _weights(self, x: Array) -> tuple[NDArray[np.intp], Array]:
         """Numbers and values of the four B-splines that are not 0 at x (n,), shape (n, 4) each."""
-        at = np.clip((x - self.low) * (self.intervals / (self.high - self.low)), 0.0, self.intervals * (1 - 1e-12))
-        first = at.astype(np.intp)
-        t = at - first
+        knot_units = np.clip(
+            (x - self.low) * (self.intervals / (self.high - self.low)), 0.0, self.intervals * (1 - 1e-12)
+        )
+        first = knot_units.astype(np.intp)
+        t = knot_units - first
         s = 1 - t
         weights = np.stack([s**3, 4 - 3 * t * t * (2 - t), 4 - 3 * s * s * (2 - s), t**3], axis=1) / 6
         return first[:, None] + np.arange(DEGREE + 1), weights
@@ -73,8 +75,8 @@ def _turned(low: float, high: float, intervals: int, order: int) -> tuple[Array,
     knots = low + step * np.arange(-DEGREE, intervals + DEGREE + 1)
     splines = len(knots) - DEGREE - 1
     nodes, weights = np.polynomial.legendre.leggauss(4)
-    at = (low + step * (np.arange(intervals)[:, None] + (nodes + 1) / 2)).ravel()
-    derivative = scipy.interpolate.BSpline(knots, np.eye(splines), DEGREE).derivative(order)(at) * step**order
+    nodes_at = (low + step * (np.arange(intervals)[:, None] + (nodes + 1) / 2)).ravel()
+    derivative = scipy.interpolate.BSpline(knots, np.eye(splines), DEGREE).derivative(order)(nodes_at) * step**order
     penalty = derivative.T @ (np.tile(weights / 2, intervals)[:, None] * derivative)
     values, vectors = np.linalg.eigh(penalty)
     penalised = values > NULL * values[-1]

@@ -76,8 +76,8 @@ class Component:
     def jacobian(self, state: State) -> Array:
         """d output / d coefficients, (channels, n, m)."""
         if self.angle is not None:
-            by = state.by_alpha if self.stage == "alpha" else state.by_beta
-            return np.asarray((by * state.gain)[:, :, None] * self.angle[None])
+            by_angle = state.by_alpha if self.stage == "alpha" else state.by_beta
+            return np.asarray((by_angle * state.gain)[:, :, None] * self.angle[None])
         assert self.columns is not None  # noqa: S101 every other component has columns
         return self.columns(state) if self.stage == "output" else self.columns(state) * state.gain[:, :, None]
 
@@ -91,10 +91,10 @@ def per_axis(basis: Basis) -> Columns:
     def columns(state: State) -> Array:
         blocks = [basis(state, k) for k in range(state.data.channels)]
         matrices = np.zeros((len(blocks), state.data.n, sum(b.shape[1] for b in blocks)))
-        at = 0
+        start = 0
         for k, block in enumerate(blocks):
-            matrices[k, :, at : at + block.shape[1]] = block
-            at += block.shape[1]
+            matrices[k, :, start : start + block.shape[1]] = block
+            start += block.shape[1]
         return matrices
 
     return columns

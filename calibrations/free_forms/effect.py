@@ -136,10 +136,10 @@ class FreeForm(Effect):
 
     def _summed(self, table: Table, force: Array, response: Array, k: int, coefficients: Array) -> Array:
         """The sum of all columns for axis k with these coefficients, shape (n,)."""
-        total, at = np.zeros(len(force)), 0
+        total, start = np.zeros(len(force)), 0
         for i, form in enumerate(self.forms):
-            form_coefficients = coefficients[at : at + form.count(k)]
-            at += len(form_coefficients)
+            form_coefficients = coefficients[start : start + form.count(k)]
+            start += len(form_coefficients)
             if form.of_table:
                 total += self._columns_of(i, table, force, k) @ form_coefficients
             else:

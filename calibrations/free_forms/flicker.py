@@ -35,20 +35,22 @@ def is_flicker(result: SearchResult, limit: float) -> bool:
     data, floor = result.data, float(np.sqrt(np.mean(result.white**2)))
     noise = slow_noise(data, all_frequencies=True)
     columns, blocks = [result.columns[:, :-1]], {n: b for n, b in result.gram.blocks.items() if n not in _noise(result)}
-    at = len(result.gram.with_data)
+    start = len(result.gram.with_data)
     for component in noise:
         extra_columns = component.jacobian(result.state) / result.white[:, :, None]
-        blocks[component.name] = slice(at, at + extra_columns.shape[2])
-        at += extra_columns.shape[2]
+        blocks[component.name] = slice(start, start + extra_columns.shape[2])
+        start += extra_columns.shape[2]
         columns.append(extra_columns.reshape(-1, extra_columns.shape[2]))
     scales = dict(result.gram.scales) | {component.name: 1.0 for component in noise}
     base = result.columns.shape[1] - 1 - len(result.gram.with_data)
     g = gram(np.hstack([*columns, result.columns[:, -1:]]), blocks, scales, base)
     begin = {component.name: (BEGIN * floor) ** 2 for component in noise}
-    acting = {name: v for name, v in result.sizes.variances.items() if name not in begin}
-    drift = {LINE: acting.get(LINE, 1.0)} if LINE in blocks else {}
-    other_variances: Mapping[str, float] = {n: v for n, v in acting.items() if n not in following} | drift | begin
-    limited = estimate(g, acting | begin, dict.fromkeys(begin, limit))
+    acting_variances = {name: v for name, v in result.sizes.variances.items() if name not in begin}
+    drift = {LINE: acting_variances.get(LINE, 1.0)} if LINE in blocks else {}
+    other_variances: Mapping[str, float] = (
+        {n: v for n, v in acting_variances.items() if n not in following} | drift | begin
+    )
+    limited = estimate(g, acting_variances | begin, dict.fromkeys(begin, limit))
     return estimate(g, other_variances, dict.fromkeys(other_variances, ANY)).deviance < limited.deviance - LIKELIER
 
 

@@ -109,8 +109,10 @@ class Form:
             columns = np.asarray(_hysteretic(table, basis, self.approach_deg)[k])
         elif isinstance(basis, Play):
             lagging = _lagging(table, basis, self.lead_s) if self.driver == "temperature" else None
-            pressed = self.factor == "pressed"
-            columns = np.asarray(_slipping(table, basis, self.approach_deg, pressed)[k]) if lagging is None else lagging
+            is_pressed = self.factor == "pressed"
+            columns = (
+                np.asarray(_slipping(table, basis, self.approach_deg, is_pressed)[k]) if lagging is None else lagging
+            )
         elif self.driver in MODELLED:
             columns = basis(self.drive(table, force, response, k))[:, :count]
         else:
@@ -180,12 +182,12 @@ def _hysteretic(table: Table, basis: Preisach, approach_deg: float) -> Array:
 
 
 @lru_cache(maxsize=32)
-def _slipping(table: Table, basis: Play, approach_deg: float, pressed: bool) -> Array:
+def _slipping(table: Table, basis: Play, approach_deg: float, is_pressed: bool) -> Array:
     """Forces of the slip elements over their widths, and the decay of their first state, shape (3, n, columns)."""
     widths = np.array(basis.widths)
     driver = specific_force(nominal_pose(table))
     path, even = turning_forces(table, approach_deg), np.ones_like(driver)
-    by_load = even + np.abs(other_in_plane(driver)) if pressed else even
+    by_load = even + np.abs(other_in_plane(driver)) if is_pressed else even
     forces = slip_elements(driver, path, by_load, widths, np.zeros(3))
     columns = np.moveaxis(forces, 2, 0) / widths
     if basis.memory:

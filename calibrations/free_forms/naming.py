@@ -103,8 +103,8 @@ def places(result: SearchResult) -> list[ActingPlace]:
         material = own_size >= least_own and sizes[place] >= max(LEAST_SIZE, least)
         curve = curves[place].reshape(result.white.shape) * result.white
         constants = followed[0].constants if followed else ()
-        acting = tuple(names), causes, share, material, gain, alternatives, curve, constants
-        acting_places.append(ActingPlace(place, sizes[place], own_size, largest, *acting))
+        details = tuple(names), causes, share, material, gain, alternatives, curve, constants
+        acting_places.append(ActingPlace(place, sizes[place], own_size, largest, *details))
     return _with_substitutes(result, sorted(acting_places, key=lambda p: -p.size))
 
 
@@ -118,9 +118,9 @@ def _excess(result: SearchResult) -> float:
     return float(np.sqrt(max(result.ratio**2 - 1, 0.0)))
 
 
-def _with_substitutes(result: SearchResult, acting: Sequence[ActingPlace]) -> list[ActingPlace]:
+def _with_substitutes(result: SearchResult, acting_places: Sequence[ActingPlace]) -> list[ActingPlace]:
     """The places. If two explain most of each other, the larger one counts, and the smaller one is its alternative."""
-    places_kept = list(acting)
+    places_kept = list(acting_places)
     for i, place in enumerate(places_kept):
         if (place.material and place.own >= LEAST_SIZE) or place.size < max(LEAST_SIZE, LEAST_SHARE * place.largest):
             continue
@@ -176,23 +176,25 @@ def _name_effects(
             forms.setdefault(comp.cause, []).append(comp)
     columns = {cause: _columns(result, comps, names, Q, b) for cause, comps in forms.items()}
     total = float(curve @ curve) or 1.0
-    acting = dict.fromkeys(result.component(name).cause for name in names)
+    acting_causes = dict.fromkeys(result.component(name).cause for name in names)
     if all(result.component(name).form is None for name in names):
-        needed_causes, share = _necessary({cause: columns[cause][0] for cause in acting}, curve, total)
+        needed_causes, share = _necessary({cause: columns[cause][0] for cause in acting_causes}, curve, total)
         return _one_name(result, names, needed_causes, curve, Q), share
     columns_by_cause: dict[str, Array] = {}
     share = 0.0
     walks = {result.component(name).cause for name in names if "/walk-" in name}
-    first = [cause for cause in acting if cause and cause not in walks] if walks else []  # a walk follows anything
+    first = (
+        [cause for cause in acting_causes if cause and cause not in walks] if walks else []
+    )  # a walk follows anything
     while True:
-        at_limit = len(set(columns_by_cause) - acting.keys()) >= MOST_FORMS
+        at_limit = len(set(columns_by_cause) - acting_causes.keys()) >= MOST_FORMS
         trials: dict[str, tuple[float, Array]] = {}
         for cause in first or columns:
-            if cause in columns_by_cause or (at_limit and cause not in acting):
+            if cause in columns_by_cause or (at_limit and cause not in acting_causes):
                 continue
             chosen_columns = list(columns_by_cause.values())
             options = columns[cause]
-            if cause not in acting:
+            if cause not in acting_causes:
                 options = [*options, *_at_best_shapes(result, forms[cause], curve, chosen_columns, Q)]
             squares, X = min(
                 ((_residual_squares([*chosen_columns, X], curve), X) for X in options), key=lambda option: option[0]
@@ -321,8 +323,8 @@ def _columns(result: SearchResult, comps: Sequence[Component], names: Sequence[s
         block = result.gram.blocks[comp.name]
         X = result.columns[:, b + block.start : b + block.stop]
         parts.append(X - Q @ (Q.T @ X))
-    acting = [X for comp, X in zip(comps, parts, strict=True) if comp.name in names]
-    return [np.hstack(acting)] if acting else parts
+    acting_parts = [X for comp, X in zip(comps, parts, strict=True) if comp.name in names]
+    return [np.hstack(acting_parts)] if acting_parts else parts
 
 
 def _residual_squares(columns: Sequence[Array], y: Array) -> float:
@@ -340,14 +342,16 @@ def _rivals(result: SearchResult, names: Sequence[str], larger: set[str]) -> tup
     """
     reduced = _sizes_without(result, names)
     cost = reduced.deviance - result.sizes.deviance
-    acting = [result.component(name) for name in names]
-    inactive = [c for c in result.components if c.name not in result.sizes.variances and c.place != acting[0].place]
+    acting_components = [result.component(name) for name in names]
+    inactive = [
+        c for c in result.components if c.name not in result.sizes.variances and c.place != acting_components[0].place
+    ]
     gained = gains(result.gram, reduced, [c.name for c in inactive])
-    limit = cost - acting[0].price - CLOSE if len(names) == 1 else np.inf
+    limit = cost - acting_components[0].price - CLOSE if len(names) == 1 else np.inf
     most = MOSTLY * cost
     close = {
         c.cause or c.place
         for c in inactive
         if gained[c.name][0] - c.price > (min(limit, most) if c.place in larger and not c.general else limit)
     }
-    return cost, tuple(sorted(close - {component.cause for component in acting}))
+    return cost, tuple(sorted(close - {component.cause for component in acting_components}))

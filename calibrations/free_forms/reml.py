@@ -67,7 +67,7 @@ def whitened(
     data = state.data
     base = base_jacobian(state, model_effects)
     target = data.outputs - state.predicted + base @ values.base
-    blocks, at, parts, column_scales = {}, 0, [base], dict(scales)
+    blocks, start, parts, column_scales = {}, 0, [base], dict(scales)
     for comp in components:
         J = comp.jacobian(state)
         if comp.name not in column_scales:
@@ -76,8 +76,8 @@ def whitened(
         if comp.name in values.of and not comp.noise:
             target = target + J @ (values.of[comp.name] * column_scales[comp.name])
         parts.append(J)
-        blocks[comp.name] = slice(at, at + J.shape[2])
-        at += J.shape[2]
+        blocks[comp.name] = slice(start, start + J.shape[2])
+        start += J.shape[2]
     X = np.concatenate([*parts, target[:, :, None]], axis=2)
     X /= white[:, :, None]
     return X.reshape(-1, X.shape[2]), blocks, column_scales
@@ -127,12 +127,12 @@ class Sizes:
 
     def of(self, g: Gram, name: str) -> Array:
         """Coefficients of one active component (of normalised columns)."""
-        at = 0
+        start = 0
         for component in self.variances:
             m = g.blocks[component].stop - g.blocks[component].start
             if component == name:
-                return self.coefficients[at : at + m]
-            at += m
+                return self.coefficients[start : start + m]
+            start += m
         raise KeyError(name)
 
     def shrinkage(self, g: Gram, name: str) -> float:
@@ -233,11 +233,11 @@ def estimate(
     products = _Products.of(g, list(present))
     fit = products.solved(present)
     for _ in range(rounds):
-        updated, at, largest_change = {}, 0, 0.0
+        updated, start, largest_change = {}, 0, 0.0
         shrunk = fit.shrunk
         for (name, v), m in zip(present.items(), products.widths, strict=True):
-            part = slice(at, at + m)
-            at += m
+            part = slice(start, start + m)
+            start += m
             free = m - float(np.sum(shrunk[part]))
             size = float(fit.coefficients[part] @ fit.coefficients[part])
             factor = np.clip(size / max(v * free, 1e-300), 0.05, 20.0) ** 1.4
@@ -269,11 +269,11 @@ def gains(g: Gram, fit: Sizes, names: Sequence[str]) -> dict[str, tuple[float, f
     solved = fit.inverse @ cross
     side = g.with_data[inactive] - cross.T @ fit.coefficients
     by_width: dict[int, list[tuple[str, slice]]] = {}
-    at = 0
+    start = 0
     for name in names:
         m = g.blocks[name].stop - g.blocks[name].start
-        by_width.setdefault(m, []).append((name, slice(at, at + m)))
-        at += m
+        by_width.setdefault(m, []).append((name, slice(start, start + m)))
+        start += m
     answer: dict[str, tuple[float, float]] = {}
     for members in by_width.values():  # matrices of one size are decomposed together
         blocks = [(g.blocks[name], part) for name, part in members]
@@ -321,12 +321,12 @@ def gain_beside(g: Gram, fit: Sizes, X: Array, b: int) -> Callable[[Array], floa
 
 
 def _part(g: Gram, fit: Sizes, name: str) -> slice:
-    at = 0
+    start = 0
     for component in fit.variances:
         m = g.blocks[component].stop - g.blocks[component].start
         if component == name:
-            return slice(at, at + m)
-        at += m
+            return slice(start, start + m)
+        start += m
     raise KeyError(name)
 
 

@@ -22,20 +22,20 @@ def acting_places(names: Iterable[str], by_name: Mapping[str, Component]) -> set
     return {by_name[name].place for name in names if name in by_name}
 
 
-def price(component: Component, acting: Collection[str]) -> float:
+def price(component: Component, acting_at: Collection[str]) -> float:
     """Least gain of a component beyond ENTER, given the acting places; it is smaller at one of these.
 
     A general component, which can follow almost anything, does not count as another form of the same mechanism.
     """
-    return component.price - (SAME_PLACE if component.place in acting and not component.general else 0.0)
+    return component.price - (SAME_PLACE if component.place in acting_at and not component.general else 0.0)
 
 
 def prices(components: Iterable[Component]) -> float:
     """Sum of the prices of components, each given those before it."""
-    total, acting = 0.0, set[str]()
+    total, acting_at = 0.0, set[str]()
     for component in components:
-        total += price(component, acting)
-        acting.add(component.place)
+        total += price(component, acting_at)
+        acting_at.add(component.place)
     return total
 
 
@@ -93,11 +93,11 @@ def select(
 
 def _cancels(g: Gram, sizes: Sizes) -> bool:
     """Whether a component is far larger than the signal, so that another one cancels it."""
-    at = 0
+    start = 0
     for name in sizes.variances:
         block = g.blocks[name]
-        u = sizes.coefficients[at : at + block.stop - block.start]
-        at += len(u)
+        u = sizes.coefficients[start : start + block.stop - block.start]
+        start += len(u)
         if float(u @ g.products[block, block] @ u) > CANCELS * g.squares:
             return True
     return False
@@ -129,13 +129,13 @@ def _best(
     names = [n for n, c in by_name.items() if n not in sizes.variances and c.family not in families and n in g.blocks]
     known_gains = {} if stale is None else stale
     names.sort(key=lambda n: -known_gains.get(n, np.inf))
-    acting = acting_places(sizes.variances, by_name)
+    acting_at = acting_places(sizes.variances, by_name)
     best: tuple[str, float, float] | None = None
     for part in [names[k : k + 6] for k in range(0, len(names), 6)] if known_gains else [names]:
         if not part or (best is not None and best[1] > known_gains.get(part[0], np.inf)):
             break
         for n, (gained, variance) in gains(g, sizes, part).items():
-            known_gains[n] = gained - price(by_name[n], acting)
+            known_gains[n] = gained - price(by_name[n], acting_at)
             if best is None or known_gains[n] > best[1]:
                 best = n, known_gains[n], variance
     return best
@@ -169,8 +169,8 @@ def _exchanged(
         if name not in sizes.variances:
             continue
         reduced = without(g, sizes, name)
-        acting = acting_places(reduced.variances, by_name)
-        component_price = price(by_name[name], acting)
+        acting_at = acting_places(reduced.variances, by_name)
+        component_price = price(by_name[name], acting_at)
         replacement = estimate(g, reduced.variances, most, 12, sizes.deviance + component_price + LEAVE)
         if replacement.deviance - sizes.deviance - component_price <= LEAVE:  # the others take its part
             steps.append(f"-{name}")
@@ -183,7 +183,7 @@ def _exchanged(
         exchanged = estimate(g, {**reduced.variances, best[0]: best[2]}, most, 12)
         if _cancels(g, exchanged):
             continue
-        improvement = sizes.deviance + component_price - exchanged.deviance - price(by_name[best[0]], acting)
+        improvement = sizes.deviance + component_price - exchanged.deviance - price(by_name[best[0]], acting_at)
         if improvement > 1.0:
             steps.append(f"{name}>{best[0]}")
             sizes = exchanged

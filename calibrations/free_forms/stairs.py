@@ -76,10 +76,10 @@ def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
     if excess[best] < max(GATHERED, BY_CHANCE * float(np.sqrt(np.log(len(f)) / len(values)))):
         return None
     fine = f[best] + np.linspace(-1, 1, 81) / (POINTS * span)
-    at = float(fine[int(np.argmax(_gathered(values, fine)))])
+    frequency = float(fine[int(np.argmax(_gathered(values, fine)))])
     middle = float(values.mean())
-    phase = float(np.angle(np.mean(np.exp(2j * np.pi * at * (values - middle)))))
-    step, offset = _with_every_code(values, 1 / at, middle + phase / (2 * np.pi * at))
+    phase = float(np.angle(np.mean(np.exp(2j * np.pi * frequency * (values - middle)))))
+    step, offset = _with_every_code(values, 1 / frequency, middle + phase / (2 * np.pi * frequency))
     width = max(3 * float(np.sqrt(np.mean(white**2))), 0.01 * step)
     step, offset = _sharpened(values, step, offset, middle, width)
     return Stairs(step, offset, noise or _sample_noise(table.outputs.T, white, step, offset))
@@ -116,14 +116,14 @@ def _with_every_code(values: Array, step: float, offset: float) -> tuple[float, 
 def _sharpened(values: Array, step: float, offset: float, middle: float, width: float) -> tuple[float, float]:
     """Step and offset near those given at which most outputs lie within `width` of a code: on a tread."""
     spread, best = float(np.ptp(values)), (-np.inf, step, offset)
-    for at in 1 / step + np.linspace(-0.5, 0.5, 41) / spread:
-        cycles = (values - middle) * at
+    for frequency in 1 / step + np.linspace(-0.5, 0.5, 41) / spread:
+        cycles = (values - middle) * frequency
         for shift in np.linspace(-0.25, 0.25, 101):
-            phase = (offset - middle) * at + shift
+            phase = (offset - middle) * frequency + shift
             deviation = cycles - phase
-            deviation = (deviation - np.round(deviation)) / at
+            deviation = (deviation - np.round(deviation)) / frequency
             score = float(np.sum(np.exp(-0.5 * (deviation / width) ** 2)))
-            best = max(best, (score, 1 / at, middle + phase / at))
+            best = max(best, (score, 1 / frequency, middle + phase / frequency))
     return best[1], best[2]
 
 
@@ -196,10 +196,10 @@ def find_saw(
     frequencies = step * np.arange(int(np.ceil(3 / span / step)), int(highest / step))
     if not len(frequencies):
         return None
-    at = state.response.ravel()
+    response = state.response.ravel()
     values = (residual / white**2).ravel()
     weights = (1 / white**2).ravel()
-    power = _spectrum(at, values, step, int(highest / step))[-len(frequencies) :] * 2 / np.sum(weights)
+    power = _spectrum(response, values, step, int(highest / step))[-len(frequencies) :] * 2 / np.sum(weights)
     amplitude = np.sqrt(2 * power / np.sum(weights))
     power[amplitude < LEAST_OF_SAW * _fundamental(frequencies, noise)] = 0.0  # no saw: a step has a height
     for f in rejected:
@@ -211,7 +211,7 @@ def find_saw(
     if power[best] < price + enter:
         return None
     fine = frequencies[best] + np.linspace(-1, 1, 41) / (SAW_POINTS * span)
-    power = np.abs(np.exp(-2j * np.pi * np.outer(fine, at)) @ values) ** 2
+    power = np.abs(np.exp(-2j * np.pi * np.outer(fine, response)) @ values) ** 2
     return sawtooth(float(fine[int(np.argmax(power))]), 3, price, 0.05 / span)
 
 
@@ -221,10 +221,10 @@ def _fundamental(frequencies: NDArray[np.floating], noise: float) -> Array:
     return np.asarray(step / np.pi * np.exp(-2 * (np.pi * noise / step) ** 2))
 
 
-def _spectrum(at: Array, values: Array, step: float, count: int) -> Array:
+def _spectrum(positions: Array, values: Array, step: float, count: int) -> Array:
     """|sum of values exp(-2 pi i f at)|^2 at f = 0, step, .. (count,), by a fine histogram and a fast transform."""
     bins = 1 << int(np.ceil(np.log2(8 * count)))
-    place = (at - at.min()) * step * bins
+    place = (positions - positions.min()) * step * bins
     lower = np.floor(place).astype(int)
     share = place - lower
     grid = np.bincount(lower % bins, values * (1 - share), bins) + np.bincount((lower + 1) % bins, values * share, bins)

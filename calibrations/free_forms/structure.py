@@ -132,8 +132,8 @@ class Structure:
 
     def refinements(self, place: ActingPlace) -> tuple[str, ...]:
         """Catalogue effects that act at a place, without a free form of theirs, and are not its causes."""
-        acting = [self.result.component(name) for name in place.components]
-        return tuple(c.cause for c in acting if c.cause and c.form is None and c.cause not in place.causes)
+        acting_components = [self.result.component(name) for name in place.components]
+        return tuple(c.cause for c in acting_components if c.cause and c.form is None and c.cause not in place.causes)
 
     def constants(self, cause: str) -> dict[str, float]:
         """Constants by which a catalogue effect is the function that was found."""
@@ -161,9 +161,9 @@ class Structure:
     @property
     def free_forms(self) -> tuple[tuple[Form, ...], ...]:
         """The free forms of each place, the largest place first; last linear parts of places without a curve."""
-        acting = {place.name for place in self.places}
+        acting_places = {place.name for place in self.places}
         curves = [self.forms(place) for place in self.places]
-        return tuple(filter(None, [*curves, *(self._line(name) for name in LINEAR if name not in acting)]))
+        return tuple(filter(None, [*curves, *(self._line(name) for name in LINEAR if name not in acting_places)]))
 
     def _line(self, place: str) -> tuple[Form, ...]:
         """The linear part of what acts over another axis, where geometry alone does not bear it."""
@@ -194,15 +194,15 @@ def with_size(form: Form, size: float, mean_squares: Array, channels: int) -> Fo
     added     mean square of what each column adds, in noise floors, the axes one after another
     channels  axes that have a function of their own; 1 where one is for all
     """
-    at = 0
+    start = 0
     sizes, counts = [], []
     for k in range(channels):
         count = form.count(k)
-        tail_squares = np.cumsum(mean_squares[at : at + count][::-1])[::-1]  # from each column on
+        tail_squares = np.cumsum(mean_squares[start : start + count][::-1])[::-1]  # from each column on
         is_indivisible = form.basis(k).kind in ("clips", "play", "preisach", "products", "ramp")
         sizes.append(size if count else 0.0)
         counts.append(count if is_indivisible else max(min(count, 1), int(np.sum(tail_squares > KEPT**2))))
-        at += count
+        start += count
     return replace(form, sizes=tuple(sizes), kept=tuple(counts))
 
 
@@ -254,16 +254,18 @@ def find_structure(
         result, source = _searched(data, white, model_effects, source)
     white = result.white
     result, factor = _in_larger_noise(result, model_effects)
-    acting = places(result)
-    shape = geometry(result, _curves(acting), effects)
-    scaled_places = [replace(p, size=p.size * factor, own=p.own * factor, largest=p.largest * factor) for p in acting]
+    acting_places = places(result)
+    shape = geometry(result, _curves(acting_places), effects)
+    scaled_places = [
+        replace(p, size=p.size * factor, own=p.own * factor, largest=p.largest * factor) for p in acting_places
+    ]
     return Structure(result, tuple(scaled_places), shape, white, source)
 
 
-def _curves(acting: Sequence[ActingPlace]) -> dict[str, Array]:
+def _curves(acting_places: Sequence[ActingPlace]) -> dict[str, Array]:
     """The curve of each place that acts, and of each place at which an inseparable effect may act in its stead."""
-    curves = {place.name: place.curve for place in acting}
-    for place in acting:
+    curves = {place.name: place.curve for place in acting_places}
+    for place in acting_places:
         for alternative_place in filter(None, map(place_of_effect, place.inseparable_from)):
             curves.setdefault(alternative_place, place.curve)
     return curves

@@ -49,8 +49,10 @@ class ErrorTable:
         angles, errors, _ = self._nodes
         reversals = np.flatnonzero(np.diff(angles + errors) <= 0)
         if reversals.size:
-            at = angles[reversals[0]] % TURN_DEG
-            raise DataError(f"with this error table the stage turns backwards after {at:g} deg; are its errors in deg?")
+            angle_deg = angles[reversals[0]] % TURN_DEG
+            raise DataError(
+                f"with this error table the stage turns backwards after {angle_deg:g} deg; are its errors in deg?"
+            )
 
     @cached_property
     def _nodes(self) -> tuple[Array, Array, Array]:
@@ -69,25 +71,25 @@ class ErrorTable:
         """
         angles_set = np.atleast_1d(np.asarray(set_deg, dtype=np.float64))
         angles, errors, stds = self._nodes
-        at = self._joined(angles_set % TURN_DEG, angles_set)
-        true = scipy.interpolate.PchipInterpolator(angles, angles + errors)(at)
-        return angles_set + true - at, np.interp(at, angles, stds)
+        angles_in_table = self._joined(angles_set % TURN_DEG, angles_set)
+        true = scipy.interpolate.PchipInterpolator(angles, angles + errors)(angles_in_table)
+        return angles_set + true - angles_in_table, np.interp(angles_in_table, angles, stds)
 
-    def _joined(self, at: Array, stated_angles: Array) -> Array:
-        """`at`, moved to the nearest point at the edge of a gap. Raises DataError inside a gap."""
+    def _joined(self, angles_in_turn: Array, stated_angles: Array) -> Array:
+        """`angles_in_turn`, moved to the nearest point at the edge of a gap. Raises DataError inside a gap."""
         angles = self._nodes[0]
-        k = np.searchsorted(angles, at, side="right") - 1
+        k = np.searchsorted(angles, angles_in_turn, side="right") - 1
         lower, upper = angles[k], angles[k + 1]
-        nearest = np.where(at - lower <= upper - at, lower, upper)
+        nearest = np.where(angles_in_turn - lower <= upper - angles_in_turn, lower, upper)
         is_covered = upper - lower <= LONGEST_GAP_DEG
-        uncovered = np.flatnonzero(~is_covered & (np.abs(at - nearest) > POINT_REACH_DEG))
+        uncovered = np.flatnonzero(~is_covered & (np.abs(angles_in_turn - nearest) > POINT_REACH_DEG))
         if uncovered.size:
             first = uncovered[0]
             raise DataError(
                 f"at {stated_angles[first]:g} deg the stage's error table has no point between {lower[first]:g} and "
                 f"{upper[first]:g} deg; measure there, or choose angles within the table"
             )
-        return np.where(is_covered, at, nearest)
+        return np.where(is_covered, angles_in_turn, nearest)
 
 
 def read_error_table(path: Path) -> tuple[Point, ...]:

@@ -40,7 +40,7 @@ def bag_topics(path: Path) -> list[Topic]:
         with _open(anyreader, path) as reader:
             names = list(dict.fromkeys(connection.topic for connection in reader.connections))
             by_name = {name: [c for c in reader.connections if c.topic == name] for name in names}
-            return [_topic(anyreader, path, name, of) for name, of in by_name.items()]
+            return [_topic(anyreader, path, name, connections) for name, connections in by_name.items()]
     except anyreader.AnyReaderError as error:
         raise _bag_error(path, error) from None
 
@@ -90,7 +90,7 @@ def _cells(anyreader: Any, path: Path, name: str, kind: str) -> Cells:
     Raises DataError for a message without its definition, a cut bag, and messages of several sensors.
     """
     stamps, values = array("q"), [array("d") for _ in VECTORS[kind]]
-    absent, frames = set[int](), set[str]()
+    unmeasured, frames = set[int](), set[str]()
     try:
         with _open(anyreader, path) as reader:
             connections = [c for c in reader.connections if c.topic == name]
@@ -103,7 +103,7 @@ def _cells(anyreader: Any, path: Path, name: str, kind: str) -> Cells:
                     vector = getattr(message, member)
                     values[k].extend((vector.x, vector.y, vector.z))
                     if getattr(message, covariance)[0] == -1:
-                        absent.add(k)
+                        unmeasured.add(k)
     except (anyreader.AnyReaderError, KeyError, AttributeError) as error:
         raise _bag_error(path, error) from None
     if len(frames) > 1:
@@ -114,6 +114,6 @@ def _cells(anyreader: Any, path: Path, name: str, kind: str) -> Cells:
     times = np.frombuffer(stamps, dtype=np.int64)
     cells: dict[str, Array] = {TIME: np.asarray((times - times[:1]) * 1e-9, dtype=np.float64)}
     for k, (_, columns, _) in enumerate(VECTORS[kind]):
-        if k not in absent:
+        if k not in unmeasured:
             cells |= dict(zip(columns, np.frombuffer(values[k]).reshape(-1, 3).T.copy(), strict=True))
     return cells

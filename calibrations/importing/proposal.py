@@ -90,7 +90,7 @@ STD_COLUMNS = {"poses": "v{axis}_std_v", "positions": "a{axis}_std", "rates": "g
 def column_names(kind: str | None = None) -> list[str]:
     """The names of columns that a file may have: of one kind of table, or of all."""
     lists = COLUMN_NAMES.values() if kind is None else [COLUMN_NAMES[kind]]
-    return list(dict.fromkeys(name for of in lists for names in of.values() for name in names))
+    return list(dict.fromkeys(name for names_by_kind in lists for names in names_by_kind.values() for name in names))
 
 
 def propose_mapping(laid: Sheet, kind: str | None = None, mapped: Sequence[ColumnMapping] = ()) -> list[ColumnMapping]:

@@ -132,8 +132,10 @@ class Noise:
         """(channels, n, k), multiplied by the transpose of the matrix by which `whiten` multiplies each channel."""
         return np.stack(
             [
-                whiten_transposed(np.ascontiguousarray(of), self.gap_s, self.fast[c], *_arrays(self._processes(c)))
-                for c, of in enumerate(columns)
+                whiten_transposed(
+                    np.ascontiguousarray(channel_columns), self.gap_s, self.fast[c], *_arrays(self._processes(c))
+                )
+                for c, channel_columns in enumerate(columns)
             ]
         )
 

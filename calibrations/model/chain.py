@@ -255,8 +255,10 @@ class LinearisedChain:
         pose, by_angle, by_up = self._pose, self._by_angle, self._by_up
         pose_changed = true_pose(self.table, steps)
         static = self._static + by_up @ (pose_changed.up - pose.up)
-        for change, by in zip((pose_changed.alpha - pose.alpha, pose_changed.beta - pose.beta), by_angle, strict=True):
-            static = static + change[:, None] * by
+        for change, derivative in zip(
+            (pose_changed.alpha - pose.alpha, pose_changed.beta - pose.beta), by_angle, strict=True
+        ):
+            static = static + change[:, None] * derivative
         return sensed(static, self.table, steps)
 
     @cached_property

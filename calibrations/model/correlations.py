@@ -45,19 +45,19 @@ class Correlations:
 
     def only(self, keys: Container[str]) -> Correlations | None:
         """The correlations of `keys`; None for fewer than two."""
-        at = [i for i, name in enumerate(self.names) if name in keys]
-        if len(at) < 2:
+        indices = [i for i, name in enumerate(self.names) if name in keys]
+        if len(indices) < 2:
             return None
-        names = [self.names[i] for i in at]
-        return Correlations.of(names, self.matrix[np.ix_(at, at)])
+        names = [self.names[i] for i in indices]
+        return Correlations.of(names, self.matrix[np.ix_(indices, indices)])
 
     def among(self, keys: Sequence[str]) -> Array:
         """The matrix for `keys`, in their order; 0 where nothing is known."""
         place = {name: i for i, name in enumerate(self.names)}
         present = [k for k, key in enumerate(keys) if key in place]
-        at = [place[keys[k]] for k in present]
+        indices = [place[keys[k]] for k in present]
         matrix = np.eye(len(keys))
-        matrix[np.ix_(present, present)] = self.matrix[np.ix_(at, at)]
+        matrix[np.ix_(present, present)] = self.matrix[np.ix_(indices, indices)]
         return matrix
 
 

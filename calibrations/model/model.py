@@ -96,10 +96,10 @@ class Parameters(Mapping[str, Estimate]):
         full_key = self._whole.get(key, key)
         if full_key in self._by_key:
             return self._by_key[full_key]
-        begun = [full_name for full_name in self._by_key if full_name.startswith(f"{key}.")]
-        if len(begun) == 1:
-            return self._by_key[begun[0]]
-        hint = f"; it has {', '.join(begun)}" if begun else nearest(key, self._by_key)
+        matching = [full_name for full_name in self._by_key if full_name.startswith(f"{key}.")]
+        if len(matching) == 1:
+            return self._by_key[matching[0]]
+        hint = f"; it has {', '.join(matching)}" if matching else nearest(key, self._by_key)
         raise UnknownParameter(f'the model has no parameter "{key}"{hint}' if self._by_key else NOT_FITTED.format(key))
 
     def __iter__(self) -> Iterator[str]:

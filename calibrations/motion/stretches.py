@@ -245,8 +245,8 @@ def _cuts(samples: Table, length_s: float) -> Iterator[tuple[int, int]]:
     for record in find_records(samples):
         edge = EDGE_S * record.rate_hz
         count = int((record.end - record.first - 2 * edge) / (length_s * record.rate_hz) + 1e-6)
-        at = record.first + np.round(edge + np.arange(count + 1) * length_s * record.rate_hz).astype(int)
-        yield from zip(at[:-1].tolist(), at[1:].tolist(), strict=True)
+        edges = record.first + np.round(edge + np.arange(count + 1) * length_s * record.rate_hz).astype(int)
+        yield from zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
 
 
 def _weights(lines: Sequence[Line], cuts: list[tuple[int, int]], n: int) -> csr_array:

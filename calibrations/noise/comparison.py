@@ -56,8 +56,8 @@ def quadrature(m: float, rate_hz: float, corner_hz: float) -> tuple[Bands, Array
     sine = np.sin(np.pi * f / rate_hz)
     power = np.where(cycles < MANY_CYCLES, np.sin(np.pi * cycles) ** 4, MEAN)
     none = np.zeros(len(f))
-    at = Bands(f, none, none, Sampling(rate_hz), none, corner_hz)
-    return at, 2 * width * rate_hz / m * 2 * power / (m * sine) ** 2
+    bands = Bands(f, none, none, Sampling(rate_hz), none, corner_hz)
+    return bands, 2 * width * rate_hz / m * 2 * power / (m * sine) ** 2
 
 
 def line_variance(turns: float, m: Array) -> Array:
@@ -112,12 +112,12 @@ class DeviationComparison:
 
 def compare_deviations(fit: ChannelFit, curve: Curve) -> DeviationComparison:
     """The measured curve and that of the model. A variance is distributed as chi-square over its degrees of freedom."""
-    judged = curve.tau_s >= (FILTER_PERIODS / fit.channel.corner_hz if np.isfinite(fit.channel.corner_hz) else 0.0)
-    tau_s, measured, edf = curve.tau_s[judged], curve.deviation[judged], curve.edf[judged]
+    is_tested = curve.tau_s >= (FILTER_PERIODS / fit.channel.corner_hz if np.isfinite(fit.channel.corner_hz) else 0.0)
+    tau_s, measured, edf = curve.tau_s[is_tested], curve.deviation[is_tested], curve.edf[is_tested]
     modelled = deviation(fit, tau_s)
     scaled = edf * (measured / modelled) ** 2
     chance = np.minimum(1.0, 2 * np.minimum(chdtr(edf, scaled), chdtrc(edf, scaled)))
-    return DeviationComparison(tau_s, measured, curve.low[judged], curve.high[judged], modelled, edf, chance)
+    return DeviationComparison(tau_s, measured, curve.low[is_tested], curve.high[is_tested], modelled, edf, chance)
 
 
 def compared_deviations(fit: NoiseFit) -> dict[str, DeviationComparison]:
@@ -141,7 +141,9 @@ def variance_parts(fit: ChannelFit, tau_s: Array) -> dict[str, Array]:
     rate_hz, steps = fit.channel.rate_hz, steps_of(tau_s, fit.channel.rate_hz)
     quadratures = [quadrature(m, rate_hz, fit.channel.corner_hz) for m in steps]
     parts = {
-        effect.name: np.array([w @ effect_spectrum(effect, (at,), fit.values[effect.name]) for at, w in quadratures])
+        effect.name: np.array(
+            [w @ effect_spectrum(effect, (bands,), fit.values[effect.name]) for bands, w in quadratures]
+        )
         for effect in fit.effects
     }
     for line in fit.lines:

@@ -131,7 +131,7 @@ class StillRecord(Dataset[NoiseFit]):
         names = () if missing.still.hidden else tuple(missing.gains)
         doubts = alternatives(missing, names) | (calibration.alternatives if calibration else {})
         of_noise = {name: rivals for name, rivals in doubts.items() if name in names}
-        spoilt = structure is not None and (missing.still.hidden or disturbed(missing))
+        is_spoilt = structure is not None and (missing.still.hidden or disturbed(missing))
         result = NoiseFindings(
             data=self,
             start=start,
@@ -145,7 +145,7 @@ class StillRecord(Dataset[NoiseFit]):
             causes=(*(calibration.signal.causes if calibration else ()), *names),
             alternatives=doubts,
             left=structure,
-            spoilt=spoilt,
+            spoilt=is_spoilt,
             reason=reason_of(missing, doubts, structure),
             disturbances=tuple(
                 disturbance_document(disturbance)
@@ -155,7 +155,7 @@ class StillRecord(Dataset[NoiseFit]):
                 )
             ),
             separations=calibration.separations if calibration else {},
-            further=next_of(missing, {} if spoilt else of_noise, structure),
+            further=next_of(missing, {} if is_spoilt else of_noise, structure),
             remarks=(
                 *(calibration.signal.lags if calibration else ()),
                 *(
@@ -167,7 +167,7 @@ class StillRecord(Dataset[NoiseFit]):
             ),
             search=missing,
         )
-        if names and not (signal or spoilt) and result.given.verdict is Verdict.UNEXPLAINED:
+        if names and not (signal or is_spoilt) and result.given.verdict is Verdict.UNEXPLAINED:
             return result.without_steps()
         return result
 

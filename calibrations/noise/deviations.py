@@ -321,9 +321,9 @@ def _noise_type_at(values: Array, m: int) -> int:
 
 def minimum_s(curve: Curve) -> float | None:
     """The averaging time, s, of the lowest deviation, where some longer one is higher by more than chance."""
-    at = int(np.argmin(curve.deviation))
-    longer = curve.tau_s > curve.tau_s[at]
-    ratio = (curve.deviation[longer] / curve.deviation[at]) ** 2
-    chance = fdtrc(curve.edf[longer], curve.edf[at], ratio)
+    lowest = int(np.argmin(curve.deviation))
+    longer = curve.tau_s > curve.tau_s[lowest]
+    ratio = (curve.deviation[longer] / curve.deviation[lowest]) ** 2
+    chance = fdtrc(curve.edf[longer], curve.edf[lowest], ratio)
     pairs = len(curve.tau_s) * (len(curve.tau_s) - 1) / 2
-    return float(curve.tau_s[at]) if np.any(pairs * chance < FALSE_MINIMUM) else None
+    return float(curve.tau_s[lowest]) if np.any(pairs * chance < FALSE_MINIMUM) else None

@@ -183,8 +183,10 @@ def separating_record(search: Search, names: tuple[str, ...]) -> Experiment | No
     pairs = tuple((name, rival) for rival in rivals)
     lengths = [k * search.still.length_s for k in LONGER if k * search.still.length_s <= LONGEST_RECORD_S]
     lengths = lengths or [2 * search.still.length_s]
-    foreseen = [(length_s, _information(search, name, rivals, length_s)) for length_s in lengths]
-    choice = next((option for option in foreseen if pairs_separated(option[1]) >= CERTAIN_PROBABILITY), foreseen[-1])
+    predictions = [(length_s, _information(search, name, rivals, length_s)) for length_s in lengths]
+    choice = next(
+        (option for option in predictions if pairs_separated(option[1]) >= CERTAIN_PROBABILITY), predictions[-1]
+    )
     return Experiment(
         PROCEDURE,
         {"duration_s": _round_up_to_tens(choice[0])},

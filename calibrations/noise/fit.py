@@ -302,15 +302,15 @@ def fit_effects(start: ChannelFit, effects: Sequence[Effect]) -> ChannelFit:
     return start.fits[names]
 
 
-def _fit_effects(at: ChannelFit, effects: Sequence[Effect]) -> ChannelFit:
+def _fit_effects(channel_fit: ChannelFit, effects: Sequence[Effect]) -> ChannelFit:
     bent = [effect for effect in effects if len(effect.parameters) > 1]
-    grids = {effect.name: shape_grid(effect, effect.parameters[1].name, at.channel) for effect in bent}
+    grids = {effect.name: shape_grid(effect, effect.parameters[1].name, channel_fit.channel) for effect in bent}
     shapes: dict[str, Values] = {effect.name: {} for effect in effects}
     shapes |= {effect.name: {effect.parameters[1].name: float(np.median(grids[effect.name]))} for effect in bent}
     for _ in range(ROUNDS if len(bent) > 1 else 1):
         for effect in bent:
-            shapes[effect.name] = _best_shape(at, effect, grids[effect.name], shapes)
-    return replace(at, values=_best_strengths(at, shapes))
+            shapes[effect.name] = _best_shape(channel_fit, effect, grids[effect.name], shapes)
+    return replace(channel_fit, values=_best_strengths(channel_fit, shapes))
 
 
 def shape_grid(effect: Effect, name: str, channel: Channel) -> Array:
@@ -321,37 +321,46 @@ def shape_grid(effect: Effect, name: str, channel: Channel) -> Array:
     return np.asarray(guess(channel))
 
 
-def _best_strengths(at: ChannelFit, shapes: Mapping[str, Values]) -> dict[str, Values]:
+def _best_strengths(channel_fit: ChannelFit, shapes: Mapping[str, Values]) -> dict[str, Values]:
     """Values of all effects with the most likely strengths for given shapes."""
-    power, _ = maximise(_unit_columns(at, at.effects, shapes), at.seen, at.freedom, np.zeros(len(at.seen)))
+    power, _ = maximise(
+        _unit_columns(channel_fit, channel_fit.effects, shapes),
+        channel_fit.seen,
+        channel_fit.freedom,
+        np.zeros(len(channel_fit.seen)),
+    )
     return {
         effect.name: {effect.parameters[0].name: float(np.sqrt(v)), **shapes[effect.name]}
-        for effect, v in zip(at.effects, power, strict=True)
+        for effect, v in zip(channel_fit.effects, power, strict=True)
     }
 
 
-def _unit_columns(at: ChannelFit, effects: Sequence[Effect], shapes: Mapping[str, Values]) -> Array:
+def _unit_columns(channel_fit: ChannelFit, effects: Sequence[Effect], shapes: Mapping[str, Values]) -> Array:
     """Spectra of effects for a strength of 1, shape (b, effects)."""
-    return np.column_stack([unit_spectrum(effect, at.parts, shapes[effect.name]) for effect in effects])
+    return np.column_stack([unit_spectrum(effect, channel_fit.parts, shapes[effect.name]) for effect in effects])
 
 
-def _best_shape(at: ChannelFit, effect: Effect, grid: Array, shapes: Mapping[str, Values]) -> Values:
+def _best_shape(channel_fit: ChannelFit, effect: Effect, grid: Array, shapes: Mapping[str, Values]) -> Values:
     """The most likely shape of one effect, with the others held, near the best of a grid (g,)."""
     name = effect.parameters[1].name
-    companions = [e for e in at.effects if e is not effect]
-    G = np.column_stack([_unit_columns(at, companions, shapes), at.seen]) if companions else at.seen[:, None].copy()
-    spectra = np.array([unit_spectrum(effect, at.parts, {name: value}) for value in grid.tolist()])
-    thetas, values = profile(G, spectra, at.seen, at.freedom)
+    companions = [e for e in channel_fit.effects if e is not effect]
+    G = (
+        np.column_stack([_unit_columns(channel_fit, companions, shapes), channel_fit.seen])
+        if companions
+        else channel_fit.seen[:, None].copy()
+    )
+    spectra = np.array([unit_spectrum(effect, channel_fit.parts, {name: value}) for value in grid.tolist()])
+    thetas, values = profile(G, spectra, channel_fit.seen, channel_fit.freedom)
     best = int(np.argmax(values))
     logs = np.log(grid)
     ends = logs[max(0, best - 1)], logs[min(len(logs) - 1, best + 1)]
     if ends[0] == ends[1]:
         return {name: float(np.exp(ends[0]))}
-    none = np.zeros(len(at.seen))
+    none = np.zeros(len(channel_fit.seen))
 
     def loss(log_value: float) -> float:
-        G[:, -1] = unit_spectrum(effect, at.parts, {name: float(np.exp(log_value))})
-        return -float(maximise_from(thetas[best].copy(), G, at.seen, at.freedom, none)[1])
+        G[:, -1] = unit_spectrum(effect, channel_fit.parts, {name: float(np.exp(log_value))})
+        return -float(maximise_from(thetas[best].copy(), G, channel_fit.seen, channel_fit.freedom, none)[1])
 
     optimum = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": 0.02})
     return {name: float(np.exp(optimum.x))}

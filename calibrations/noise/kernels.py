@@ -193,7 +193,7 @@ def third_order(x: Array, k: int, first: int) -> float:
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
-def _add_moments(z: Array, old: int, to: Array) -> None:
+def _add_moments(z: Array, old: int, moments: Array) -> None:
     """Sums over the bins from `old` on and their differences w, with their neighbours before."""
     a = b = c = d = e = 0.0
     new = z[old:]
@@ -209,7 +209,7 @@ def _add_moments(z: Array, old: int, to: Array) -> None:
     current, preceding, earlier = z[start:], z[start - 1 : -1], z[start - 2 : -2]
     for i in range(len(current)):
         e += (current[i] - preceding[i]) * (preceding[i] - earlier[i])
-    to += np.array((a, b, c, d, e))
+    moments += np.array((a, b, c, d, e))
 
 
 @njit(cache=True, nogil=True)

@@ -164,8 +164,8 @@ class ChannelFit:
 
     def level(self, frequency_hz: Array) -> Array:
         """The model's density of the means, read off between the bands."""
-        at, level = self.parts[0].frequency_hz, self.expected[: len(self.parts[0].density)]
-        return np.asarray(np.exp(np.interp(np.log(frequency_hz), np.log(at), np.log(level))))
+        band_hz, level = self.parts[0].frequency_hz, self.expected[: len(self.parts[0].density)]
+        return np.asarray(np.exp(np.interp(np.log(frequency_hz), np.log(band_hz), np.log(level))))
 
     @cached_property
     def log_likelihood(self) -> float:

@@ -153,13 +153,13 @@ class _Ordinates:
         return amplitude, weight**-0.5, amplitude**2 * weight
 
 
-def _step(channel: Channel, by: _Ordinates, unit: str) -> Pattern:
+def _step(channel: Channel, ordinates: _Ordinates, unit: str) -> Pattern:
     """The step with the greatest gain, over all places."""
-    n, k = by.n, len(by.seen)
+    n, k = ordinates.n, len(ordinates.seen)
     per_step = _per_step(n, k)
     gain_terms, power = np.zeros(n - 1), np.zeros(n + 1)
-    gain_terms[: min(k, n - 1)] = (by.seen * per_step / by.variance)[: n - 1]
-    power[1 : k + 1] = per_step**2 / by.variance
+    gain_terms[: min(k, n - 1)] = (ordinates.seen * per_step / ordinates.variance)[: n - 1]
+    power[1 : k + 1] = per_step**2 / ordinates.variance
     top = dst(gain_terms, type=1) / 2
     turned = dct(power, type=1) + power[0]
     turned[::2] += power[-1]
@@ -168,15 +168,15 @@ def _step(channel: Channel, by: _Ordinates, unit: str) -> Pattern:
     bottom = (power.sum() - np.concatenate([up, up[::-1][1 - n % 2 :]])) / 2
     gain = np.where(bottom > 0, top**2 / np.maximum(bottom, np.finfo(float).tiny), 0.0)
     gain[: EDGE - 1] = gain[n - EDGE :] = 0.0
-    at = int(np.argmax(gain))
-    text = f"a step of {{}} {unit} of {channel.axis} at t = {(at + 1) * channel.sampling.interval_s:.6g} s"
+    row = int(np.argmax(gain))
+    text = f"a step of {{}} {unit} of {channel.axis} at t = {(row + 1) * channel.sampling.interval_s:.6g} s"
     price = PATTERN_AMPLITUDE + 2 * float(np.log(n))
-    size, std = float(top[at] / bottom[at]), float(bottom[at] ** -0.5)
-    return Pattern(STEP, channel.axis, text, partial(_step_form, n, at), size, std, float(gain[at]), price)
+    size, std = float(top[row] / bottom[row]), float(bottom[row] ** -0.5)
+    return Pattern(STEP, channel.axis, text, partial(_step_form, n, row), size, std, float(gain[row]), price)
 
 
-def _step_form(n: int, at: int) -> Array:
-    return np.asarray(np.arange(n) > at, dtype=float)
+def _step_form(n: int, row: int) -> Array:
+    return np.asarray(np.arange(n) > row, dtype=float)
 
 
 @lru_cache(maxsize=2)
@@ -185,10 +185,12 @@ def _per_step(n: int, k: int) -> Array:
     return np.asarray(-np.sqrt(2 / n) / (2 * np.sin(np.pi * np.arange(1, k + 1) / (2 * n))))
 
 
-def _courses(channel: Channel, by: _Ordinates, unit: str) -> Iterator[Pattern]:
+def _courses(channel: Channel, ordinates: _Ordinates, unit: str) -> Iterator[Pattern]:
     """A straight drift, and the settling with the greatest gain."""
-    n, axis = by.n, channel.axis
-    tops, bottoms = matched_sums(_course_coefficients(n, len(by.seen)), by.seen / by.variance, 1 / by.variance)
+    n, axis = ordinates.n, channel.axis
+    tops, bottoms = matched_sums(
+        _course_coefficients(n, len(ordinates.seen)), ordinates.seen / ordinates.variance, 1 / ordinates.variance
+    )
     sizes, stds, gains = (values.tolist() for values in (tops / bottoms, bottoms**-0.5, tops**2 / bottoms))
     hours = channel.sampling.interval_s / 3600
     yield Pattern(
@@ -228,7 +230,9 @@ def _course_coefficients(n: int, k: int) -> Array:
     return np.asarray(coefficients / np.sqrt(2 * n))
 
 
-def _followed(channel: Channel, by: _Ordinates, unit: str, removed_patterns: Iterable[Pattern]) -> Iterator[Pattern]:
+def _followed(
+    channel: Channel, ordinates: _Ordinates, unit: str, removed_patterns: Iterable[Pattern]
+) -> Iterator[Pattern]:
     """Outputs that follow a column, as read or without its scatter, at once or with a lag; each column once."""
     price = PATTERN_AMPLITUDE + 2 * float(np.log(len(LAGS) * max(1, len(channel.logged))))
     removed_causes = {pattern.cause for pattern in removed_patterns if pattern.axis == channel.axis}
@@ -236,12 +240,14 @@ def _followed(channel: Channel, by: _Ordinates, unit: str, removed_patterns: Ite
         if name in removed_causes:
             continue
         for values, doubt in ((column.read, 0.0), (column.level, column.doubt)):
-            share = _best_lag(values, by)
+            share = _best_lag(values, ordinates)
             lag_words = f", with a lag of {share * channel.length_s:.2g} s" if share else ""
             text = f"{channel.axis} follows {name} by {{}} {unit}/{PER.get(name, name)}{lag_words}"
             make = partial(_lagged, values, share)
             lag_s = share * channel.length_s
-            yield Pattern(FOLLOWS, channel.axis, text, make, *by.matched(make()), price, name, doubt, lag_s=lag_s)
+            yield Pattern(
+                FOLLOWS, channel.axis, text, make, *ordinates.matched(make()), price, name, doubt, lag_s=lag_s
+            )
 
 
 def _lagged(values: Array, share: float) -> Array:
@@ -249,11 +255,11 @@ def _lagged(values: Array, share: float) -> Array:
     return values if share == 0 else np.asarray(first_order_lag(values, share * len(values)))
 
 
-def _best_lag(values: Array, by: _Ordinates) -> float:
+def _best_lag(values: Array, ordinates: _Ordinates) -> float:
     """The lag with the greatest gain: the best of LAGS, refined; 0 where the data cannot separate it from none."""
 
     def loss(share: float) -> float:
-        return -by.matched(_lagged(values, share))[2]
+        return -ordinates.matched(_lagged(values, share))[2]
 
     losses = [loss(share) for share in LAGS]
     best = int(np.argmin(losses))
@@ -264,7 +270,9 @@ def _best_lag(values: Array, by: _Ordinates) -> float:
     return float(optimum.x if optimum.fun < losses[best] else LAGS[best])
 
 
-def _further(channel: Channel, by: _Ordinates, unit: str, removed_patterns: Iterable[Pattern]) -> Iterator[Pattern]:
+def _further(
+    channel: Channel, ordinates: _Ordinates, unit: str, removed_patterns: Iterable[Pattern]
+) -> Iterator[Pattern]:
     """Curvature and branches of an output that follows a column, with the lag that was found: its square and cube, and
     a hysteresis, which depends on the direction in which the column changes."""
     price = PATTERN_AMPLITUDE + 2 * float(np.log(len(POWERS) + len(PLAYS)))
@@ -277,14 +285,17 @@ def _further(channel: Channel, by: _Ordinates, unit: str, removed_patterns: Iter
         forms += [(branch, play(line.form, share * span)) for share in PLAYS]
         for words, form in forms:
             make, text = partial(np.asarray, form), f"{channel.axis} follows {words}"
-            yield Pattern(FOLLOWS, channel.axis, text, make, *by.matched(form), price, line.cause, further=True)
+            yield Pattern(FOLLOWS, channel.axis, text, make, *ordinates.matched(form), price, line.cause, further=True)
 
 
 def refitted(patterns: tuple[Pattern, ...], fit: ChannelFit, channel: Channel) -> tuple[Pattern, ...]:
     """The patterns of one channel, their sizes fitted together to its whole record with a fit's effects."""
-    by = _Ordinates.of(replace(fit, channel=channel))
-    forms = np.column_stack([by.coefficients(pattern.form) for pattern in patterns]) / np.sqrt(by.variance)[:, None]
-    size, *_ = np.linalg.lstsq(forms, by.seen / np.sqrt(by.variance), rcond=None)
+    ordinates = _Ordinates.of(replace(fit, channel=channel))
+    forms = (
+        np.column_stack([ordinates.coefficients(pattern.form) for pattern in patterns])
+        / np.sqrt(ordinates.variance)[:, None]
+    )
+    size, *_ = np.linalg.lstsq(forms, ordinates.seen / np.sqrt(ordinates.variance), rcond=None)
     std = np.sqrt(np.diag(np.linalg.pinv(forms.T @ forms)))
     std = np.hypot(std, [pattern.doubt * a for pattern, a in zip(patterns, size, strict=True)])
     return tuple(replace(p, size=float(a), std=float(s)) for p, a, s in zip(patterns, size, std, strict=True))

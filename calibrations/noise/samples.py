@@ -63,13 +63,13 @@ class HiddenNoise:
     @property
     def text(self) -> str:
         """The description in words, with the remedy."""
-        at = f"{self.levels} values" if self.all else "values"
+        values_text = f"{self.levels} values" if self.all else "values"
         slow = "" if self.all else "; slow noise is larger, and its coefficients are given"
         fast = "" if self.all else ", from sample to sample,"
         return (
-            f"the noise{fast} is below the converter's step: the samples have {at} {self.step:.4g} apart, so that "
-            f"its level is not known{slow}. Amplify the output, choose a smaller range or a finer converter, or add "
-            "noise of half a step or more (dither)"
+            f"the noise{fast} is below the converter's step: the samples have {values_text} {self.step:.4g} apart, so "
+            f"that its level is not known{slow}. Amplify the output, choose a smaller range or a finer converter, or "
+            "add noise of half a step or more (dither)"
         )
 
     def hides(self, process: str) -> bool:
@@ -116,8 +116,8 @@ def _reaching(curve: Curve, rate_hz: float, corner_hz: float) -> float:
     soon = float(np.max(variance[curve.tau_s <= SOON / rate_hz]))
     if not np.isfinite(corner_hz):
         return soon
-    at = min(int(np.searchsorted(curve.tau_s, FILTER_PERIODS / corner_hz)), len(variance) - 1)
-    return max(soon, float(variance[at] * curve.tau_s[at]) * min(rate_hz, np.pi * corner_hz))
+    index = min(int(np.searchsorted(curve.tau_s, FILTER_PERIODS / corner_hz)), len(variance) - 1)
+    return max(soon, float(variance[index] * curve.tau_s[index]) * min(rate_hz, np.pi * corner_hz))
 
 
 PART = 4096  # samples whose scale is common
@@ -185,16 +185,16 @@ class Outliers:
             self._values = min(low, float(middle[wild].min())), max(high, float(middle[wild].max()))
         self._judged += len(middle)
 
-    def _note(self, at: NDArray[np.intp], off: Array) -> None:
+    def _note(self, indices: NDArray[np.intp], off: Array) -> None:
         previous, worst = self._wild, int(np.argmax(off))
         deviations = float(off[worst]) / self._scale
         wildest = (
-            (int(at[worst]), deviations)
+            (int(indices[worst]), deviations)
             if deviations > previous.deviations
             else (previous.wildest, previous.deviations)
         )
-        first = previous.first if previous.count else int(at[0])
-        self._wild = Wild(previous.count + len(at), first, *wildest, previous.power + float(np.sum(off**2)))
+        first = previous.first if previous.count else int(indices[0])
+        self._wild = Wild(previous.count + len(indices), first, *wildest, previous.power + float(np.sum(off**2)))
 
 
 def _median(part: Array, start: int) -> Array:

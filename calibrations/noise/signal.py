@@ -140,13 +140,17 @@ class SignalSearch:
 
     def without(self, name: str, effects: Mapping[str, Effect], still: Still) -> SignalSearch:
         """The same without one effect; the others are fitted again."""
-        at = self.names.index(name)
+        position = self.names.index(name)
         remaining = [tuple(term for term in terms if term.name != name) for terms in self.steps]
         fit = fit_rows(_biased(_relabelled(remaining[-1], still.axes, AXES), effects), self.table)
         remaining[-1] = _terms(fit, {term.name for term in remaining[-1]}, still)
         return replace(
             self,
-            steps=tuple(terms for k, terms in enumerate(remaining) if k != (at if at < len(remaining) - 1 else at - 1)),
+            steps=tuple(
+                terms
+                for k, terms in enumerate(remaining)
+                if k != (position if position < len(remaining) - 1 else position - 1)
+            ),
         )
 
     @property

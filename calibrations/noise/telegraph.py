@@ -81,12 +81,12 @@ def _needless(fit: ChannelFit) -> bool:
 
 def _telegraph(fit: ChannelFit, values: Array, path: Path) -> Telegraph:
     channel, (low, high) = fit.channel, _levels(values, path)
-    goes, upper = np.flatnonzero(np.diff(path)), int(path.sum())
-    stays = [np.count_nonzero(path[np.append(goes, -1)] == level) for level in (0, 1)]
+    jumps, upper = np.flatnonzero(np.diff(path)), int(path.sum())
+    dwells = [np.count_nonzero(path[np.append(jumps, -1)] == level) for level in (0, 1)]
     step_s = channel.sampling.interval_s
     return Telegraph(
-        channel.axis, channel.unit, float(high - low), len(goes),
-        float(upper * step_s / stays[1]), float((len(path) - upper) * step_s / stays[0]),
+        channel.axis, channel.unit, float(high - low), len(jumps),
+        float(upper * step_s / dwells[1]), float((len(path) - upper) * step_s / dwells[0]),
     )  # fmt: skip
 
 
@@ -113,8 +113,8 @@ def _path_price(path: Path) -> float:
 
 def _path_deviance(values: Array, path: Path) -> float:
     """Twice the negative log-likelihood of values about a path in white noise, but for a constant."""
-    low, high = at = _levels(values, path)
-    return float(len(values) * np.log(np.var(values - at[path]) + (LEAST * (high - low)) ** 2))
+    low, high = levels = _levels(values, path)
+    return float(len(values) * np.log(np.var(values - levels[path]) + (LEAST * (high - low)) ** 2))
 
 
 @njit(cache=True, nogil=True)
@@ -134,7 +134,7 @@ def two_means(means: Array) -> tuple[float, float]:
 
 
 @njit(cache=True, nogil=True)
-def likeliest_path(values: Array, low: float, high: float, spread: float, goes: float) -> Path:
+def likeliest_path(values: Array, low: float, high: float, spread: float, jump_share: float) -> Path:
     """Path and levels in turn, shape (n,); empty where it jumps less than FEWEST_JUMPS times.
 
     spread  standard deviation of the noise beside the levels
@@ -144,7 +144,7 @@ def likeliest_path(values: Array, low: float, high: float, spread: float, goes: 
     path, origins = np.zeros(n, dtype=np.int64), np.empty(n, dtype=np.int8)
     for _ in range(ROUNDS):
         path_changes = viterbi(
-            values, (low + high) / 2, (high - low) / spread**2, np.log(goes / (1 - goes)), origins, path
+            values, (low + high) / 2, (high - low) / spread**2, np.log(jump_share / (1 - jump_share)), origins, path
         )
         times, upper, total, upper_total = 0, 0, 0.0, 0.0
         for i in range(n):
@@ -156,7 +156,7 @@ def likeliest_path(values: Array, low: float, high: float, spread: float, goes: 
             return path[:0]
         if not path_changes:
             break
-        low, high, goes = (total - upper_total) / (n - upper), upper_total / upper, times / n
+        low, high, jump_share = (total - upper_total) / (n - upper), upper_total / upper, times / n
         square = 0.0
         for i in range(n):
             square += (values[i] - low - path[i] * (high - low)) ** 2
@@ -165,7 +165,9 @@ def likeliest_path(values: Array, low: float, high: float, spread: float, goes: 
 
 
 @njit(cache=True, nogil=True)
-def viterbi(values: Array, middle: float, slope: float, goes: float, origins: NDArray[np.int8], path: Path) -> bool:
+def viterbi(
+    values: Array, middle: float, slope: float, jump_log_odds: float, origins: NDArray[np.int8], path: Path
+) -> bool:
     """Write the likeliest path of 0 and 1 to `path` (n,), and return whether it changes.
 
     slope   a value's distance from the middle, times this, is the logarithm of how much more likely the upper level is
@@ -177,8 +179,8 @@ def viterbi(values: Array, middle: float, slope: float, goes: float, origins: ND
     n = len(values)
     log_odds = (values[0] - middle) * slope
     for i in range(1, n):
-        origins[i] = (log_odds > -goes) - (log_odds < goes)
-        log_odds = min(max(log_odds, goes), -goes) + (values[i] - middle) * slope
+        origins[i] = (log_odds > -jump_log_odds) - (log_odds < jump_log_odds)
+        log_odds = min(max(log_odds, jump_log_odds), -jump_log_odds) + (values[i] - middle) * slope
     level, path_changes = 1 if log_odds > 0 else 0, False
     for i in range(n - 1, -1, -1):
         path_changes |= path[i] != level

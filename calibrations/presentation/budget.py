@@ -76,14 +76,14 @@ def budget_section(fit: Fit) -> Section | None:
     rows, lines = [], dict[str, list[tuple[str, ...]]]()
     for k, effect, e in _identified_estimates(fit):
         label, combined, expanded = f"{e.name} {e.axis}".strip(), float(budget.combined[k]), float(budget.expanded[k])
-        factor, of = in_prefix(expanded, None, e.unit)
+        factor, prefixed_unit = in_prefix(expanded, None, e.unit)
         largest = max(sources(budget, k), key=lambda source: source.contribution)
         rows.append((
             effect, label, rounded(factor * combined, 2), freedom_text(budget.freedom[k]), f"{budget.coverage[k]:.2f}",
-            rounded(factor * expanded, 2), unit(of), largest.name,
+            rounded(factor * expanded, 2), unit(prefixed_unit), largest.name,
         ))  # fmt: skip
         for number, source in enumerate(sources(budget, k)):
-            name = "" if number else f"{label}, {unit(of)}"
+            name = "" if number else f"{label}, {unit(prefixed_unit)}"
             lines.setdefault(effect, []).append((name, *source.cells(combined, factor)))
     missing = [Remark(f"Not given and not included: {', '.join(budget.not_given)}.")] if budget.not_given else []
     parts = (

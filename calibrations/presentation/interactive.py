@@ -265,9 +265,9 @@ def _span(s: c.Span, panel: c.Panel) -> Parts:
 @_series.register
 def _rule(s: c.Rule, panel: c.Panel) -> Parts:
     across: c.Along = "x" if s.along == "y" else "y"
-    at = _list(np.array([s.at]), panel.x if s.along == "x" else None)[0]
+    position = _list(np.array([s.at]), panel.x if s.along == "x" else None)[0]
     look = {"color": _visible(s.colour), "width": s.width, "dash": s.dash}
-    shape = {"type": "line", "layer": "below", "line": look, f"{s.along}0": at, f"{s.along}1": at}
+    shape = {"type": "line", "layer": "below", "line": look, f"{s.along}0": position, f"{s.along}1": position}
     return [], [shape | _across(across) | {f"{s.along}ref": s.along}], []
 
 

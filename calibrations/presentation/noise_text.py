@@ -72,11 +72,11 @@ def _disturbances(analysis: NoiseAnalysis) -> Iterable[str]:
         return
     yield "With these disturbances in the record, the fit would give:"
     for axis, noise in analysis.uncleaned.items():
-        spoilt = {
+        changed_coefficients = {
             name for disturbance in removable if disturbance.axis == axis for name in analysis.spoils(disturbance)
         }
         for name, coefficient in noise.coefficients.items():
-            if name in spoilt:
+            if name in changed_coefficients:
                 text = _coefficient_text(coefficient, 1.0, noise.unit, noise.unit)
                 yield f"  {axis}: {name} {text}{_detail(coefficient)}"
     yield ""

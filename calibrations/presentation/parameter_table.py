@@ -97,11 +97,11 @@ def _row(effect: str, e: Estimate, change: str, doc: str) -> ParameterRow:
     name = e.name.replace("_", " ")
     if not e.identified:
         return ParameterRow(effect, name, e.axis, NOT_IDENTIFIED, "", "", change, e.why or "the data do not tell", doc)
-    factor, of = _scale(e)
+    factor, prefixed_unit = _scale(e)
     if not e.std:
-        return ParameterRow(effect, name, e.axis, minus(f"{e.value * factor:.6g}"), "–", of, change, "", doc)
+        return ParameterRow(effect, name, e.axis, minus(f"{e.value * factor:.6g}"), "–", prefixed_unit, change, "", doc)
     value = value_text(e.value * factor, e.std * factor)
-    return ParameterRow(effect, name, e.axis, value, rounded(e.std * factor, 2), of, change, "", doc)
+    return ParameterRow(effect, name, e.axis, value, rounded(e.std * factor, 2), prefixed_unit, change, "", doc)
 
 
 def _scale(e: Estimate) -> tuple[float, str]:
@@ -116,12 +116,12 @@ def _change(e: Estimate, earlier: Estimate | None) -> str:
         return "now identified" if e.identified else "was identified"
     if not e.identified:
         return SAME
-    by, std = e.value - earlier.value, earlier.std or e.std or 0.0
-    if abs(by) <= LEAST_CHANGE * std:
+    difference, std = e.value - earlier.value, earlier.std or e.std or 0.0
+    if abs(difference) <= LEAST_CHANGE * std:
         return SAME
-    factor, of = prefixed(unit(e.unit), abs(by))
-    ratio = f" ({rounded(abs(by) / std, 2)} × its uncertainty)" if std else ""
-    return f"{'+' if by > 0 else ''}{minus(rounded(by * factor, 2))} {of}".rstrip() + ratio
+    factor, prefixed_unit = prefixed(unit(e.unit), abs(difference))
+    ratio = f" ({rounded(abs(difference) / std, 2)} × its uncertainty)" if std else ""
+    return f"{'+' if difference > 0 else ''}{minus(rounded(difference * factor, 2))} {prefixed_unit}".rstrip() + ratio
 
 
 def _matrices(fit: FittedModel) -> Iterator[tuple[list[str], Array]]:

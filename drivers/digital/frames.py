@@ -48,9 +48,9 @@ class Found:
     def parts(self, frame_numbers: Ints, first: int, count: Ints, size: int) -> Bytes:
         """From byte `first`, `count` bytes of each chosen frame, with zeros up to `size`: shape (n, size)."""
         rows = np.zeros((len(frame_numbers), size), dtype=np.uint8)
-        for n, of in groups(count):
+        for n, group in groups(count):
             used = min(n, size)
-            rows[of, :used] = self.data[self.starts[frame_numbers[of], None] + first + np.arange(used)]
+            rows[group, :used] = self.data[self.starts[frame_numbers[group], None] + first + np.arange(used)]
         return rows
 
 
@@ -85,9 +85,9 @@ class Frames:
         array = np.frombuffer(text, dtype=np.uint8)
         self.unread += len(data)
         frames: list[tuple[Ints, ...]] = []
-        at, is_complete = 0, False
+        start, is_complete = 0, False
         while not is_complete:
-            starts, lengths, gaps, end, gap = self._walk(text, array, at)
+            starts, lengths, gaps, end, gap = self._walk(text, array, start)
             verdicts = self._judged(array, starts, lengths)
             n = self._accepted(gaps, verdicts)
             frames.append((starts[:n], lengths[:n], verdicts[:n]))
@@ -98,38 +98,38 @@ class Frames:
                 follows = not gaps[n + 1] if n + 1 < len(starts) else starts[n] + lengths[n] == len(text)
                 self.misfits += int(follows)
                 self._inside = self._inside and not self._missed(True)
-                at = int(starts[n]) + 1
+                start = int(starts[n]) + 1
         starts, lengths, verdicts = (np.concatenate(column) for column in zip(*frames, strict=True))
         if len(good_frames := np.flatnonzero(verdicts == GOOD)):
             self.unread = len(text) - int(starts[good_frames[-1]] + lengths[good_frames[-1]])
         return Found(array, starts, lengths, verdicts == GOOD)
 
-    def _walk(self, text: bytes, array: Bytes, at: int) -> tuple[Ints, Ints, NDArray[np.bool_], int, bool]:
-        """Begin and length of each whole frame from `at` on, and whether bytes were skipped before it.
+    def _walk(self, text: bytes, array: Bytes, start: int) -> tuple[Ints, Ints, NDArray[np.bool_], int, bool]:
+        """Begin and length of each whole frame from `start` on, and whether bytes were skipped before it.
 
         And the end of them all, and whether bytes were skipped before it.
         """
         starts, lengths, gaps, gap = [_NONE], [_NONE], [_NONE.astype(bool)], False
-        while match := self.framing.starts.search(text, at):
-            gap, at = gap or match.start() > at, match.start()
-            length = self.framing.length(text, at)
+        while match := self.framing.starts.search(text, start):
+            gap, start = gap or match.start() > start, match.start()
+            length = self.framing.length(text, start)
             if length == 0:
-                gap, at = True, at + 1
+                gap, start = True, start + 1
                 continue
-            if length is None or not (n := _alike(array[at:], length, self.framing.head)):
+            if length is None or not (n := _alike(array[start:], length, self.framing.head)):
                 break
-            starts.append(at + length * np.arange(n))
+            starts.append(start + length * np.arange(n))
             lengths.append(np.full(n, length))
             gaps.append(np.arange(n) < int(gap))
-            gap, at = False, at + n * length
+            gap, start = False, start + n * length
         if not match:
-            gap, at = gap or at < len(text), len(text)
-        return np.concatenate(starts), np.concatenate(lengths), np.concatenate(gaps), at, gap
+            gap, start = gap or start < len(text), len(text)
+        return np.concatenate(starts), np.concatenate(lengths), np.concatenate(gaps), start, gap
 
     def _judged(self, array: Bytes, starts: Ints, lengths: Ints) -> Ints:
         verdicts = np.zeros(len(starts), dtype=np.int64)
-        for length, of in groups(lengths):
-            verdicts[of] = self.framing.judge(array[starts[of, None] + np.arange(length)])
+        for length, group in groups(lengths):
+            verdicts[group] = self.framing.judge(array[starts[group, None] + np.arange(length)])
         return verdicts
 
     def _accepted(self, gaps: NDArray[np.bool_], verdicts: Ints) -> int:

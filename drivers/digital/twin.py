@@ -240,6 +240,6 @@ def serve_sensors(
 def factors(settings: DigitalSettings) -> Floats:
     """The factor from g, deg/s, uT or V to the unit of each output, shape (outputs,)."""
     force, rate, field = settings.kinds
-    of = dict.fromkeys(VOLTAGES, 1.0) | dict.fromkeys(FORCES, FORCE[force])
-    of |= dict.fromkeys(RATES, RATE[rate]) | dict.fromkeys(FIELDS, FIELD[field])
-    return np.array([of[name] for name in settings.wired])
+    by_output = dict.fromkeys(VOLTAGES, 1.0) | dict.fromkeys(FORCES, FORCE[force])
+    by_output |= dict.fromkeys(RATES, RATE[rate]) | dict.fromkeys(FIELDS, FIELD[field])
+    return np.array([by_output[name] for name in settings.wired])

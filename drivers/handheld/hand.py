@@ -65,8 +65,8 @@ class Script:
         self._hand, self._random = hand, random
         self._wanted = up
         self._table = _perturbed(np.array([0.0, 0.0, 1.0]), hand.table_deg, random)
-        at = _as_tuple(self._on_table(up))
-        self.segments = [Segment(0.0, math.inf, at, at)]
+        direction = _as_tuple(self._on_table(up))
+        self.segments = [Segment(0.0, math.inf, direction, direction)]
 
     def turn_to(self, up: Floats, now_s: float) -> None:
         """Begin to turn the sensor until `up` (3,) is upward, after the reaction time."""

@@ -100,6 +100,6 @@ def noise_v(
     fresh = triad.noise_v * math.sqrt(1 - decay**2) * random.standard_normal((n, 3))
     white, _ = lfilter([1.0], [1.0, -decay], fresh, axis=0, zi=decay * memory[None, :])
     step_s = n * interval_s
-    stays = math.exp(-step_s / triad.wander_s)
-    wander_after = stays * wander + triad.wander_v * math.sqrt(1 - stays**2) * random.standard_normal(3)
+    wander_decay = math.exp(-step_s / triad.wander_s)
+    wander_after = wander_decay * wander + triad.wander_v * math.sqrt(1 - wander_decay**2) * random.standard_normal(3)
     return np.asarray(white + np.linspace(wander, wander_after, n)), np.asarray(white[-1]), wander_after

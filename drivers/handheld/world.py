@@ -77,8 +77,10 @@ class HandheldWorld(World):
         triad_v = self._triad_v(np.asarray(start_s + interval_s * np.arange(n), dtype=np.float64), interval_s)
         volts[:, triad_places] = triad_v[:, [INPUTS.index(inputs[k]) for k in triad_places]]
         if other_places:
-            at = other_places if places is None else [places[k] for k in other_places]
-            volts[:, other_places] = super().adc_volts([inputs[k] for k in other_places], start_s, interval_s, n, at)
+            positions = other_places if places is None else [places[k] for k in other_places]
+            volts[:, other_places] = super().adc_volts(
+                [inputs[k] for k in other_places], start_s, interval_s, n, positions
+            )
         else:
             self.advance(start_s + interval_s * (n - 1))
         return volts

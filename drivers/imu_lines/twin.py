@@ -39,15 +39,15 @@ class Talker(DigitalTwin):
 
     def _spoilt(self, message: bytes, now_s: float) -> bytes:
         """With another baud rate, some bytes still look like an end of line."""
-        spoilt = super()._spoilt(message, now_s)
-        return spoilt if spoilt.endswith(b"\n") or not spoilt else spoilt[:-1] + b"\n"
+        garbled = super()._spoilt(message, now_s)
+        return garbled if garbled.endswith(b"\n") or not garbled else garbled[:-1] + b"\n"
 
 
 def decimals(settings: Settings) -> dict[str, int]:
     """The decimals of each output in the line."""
     force, rate, field = (DECIMALS[unit] for unit in settings.kinds)
-    of = dict.fromkeys(VOLTAGES, VOLTAGE) | dict.fromkeys(FORCES, force)
-    return of | dict.fromkeys(RATES, rate) | dict.fromkeys(FIELDS, field)
+    by_output = dict.fromkeys(VOLTAGES, VOLTAGE) | dict.fromkeys(FORCES, force)
+    return by_output | dict.fromkeys(RATES, rate) | dict.fromkeys(FIELDS, field)
 
 
 def line_of(values: Mapping[str, float], settings: Settings) -> bytes:

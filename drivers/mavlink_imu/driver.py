@@ -102,8 +102,8 @@ class SampleDecoder(FrameDecoder):
     def take(self, data: bytes) -> Batch:
         messages = self.stream.take(data)
         heads = mav.heads(messages)
-        for number, of in groups(heads.number):
-            self.seen[mav.MESSAGES[number].name if number in mav.MESSAGES else f"{number}"] += len(heads.number[of])
+        for number, group in groups(heads.number):
+            self.seen[mav.MESSAGES[number].name if number in mav.MESSAGES else f"{number}"] += len(heads.number[group])
         own_frames = np.flatnonzero((heads.system == self._target[0]) & (heads.component == self._target[1]))
         samples = own_frames[messages.known[own_frames] & (heads.number[own_frames] == self._message.number)]
         gaps = self._numbers.gaps(heads.sequence[own_frames], np.searchsorted(own_frames, samples))
@@ -243,10 +243,10 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
     def _require_complete(self, reception: Reception, decoder: SampleDecoder) -> None:
         super()._require_complete(reception, decoder)
         if self.settings.message == "HIGHRES_IMU" and (
-            absent := [name for name in self.settings.channels if not decoder.updated & UPDATED[name]]
+            missing := [name for name in self.settings.channels if not decoder.updated & UPDATED[name]]
         ):
             raise SensorFault(
-                f"{self.name}: the autopilot sends no {', '.join(absent)} (fields_updated is {decoder.updated:#x})",
+                f"{self.name}: the autopilot sends no {', '.join(missing)} (fields_updated is {decoder.updated:#x})",
                 "Remove these outputs from the sensor's settings, or choose another message or `imu`",
             )
 

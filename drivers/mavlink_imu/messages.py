@@ -134,11 +134,11 @@ class Mavlink:
     def judge(self, frames: Bytes) -> Ints:
         verdicts = np.full(len(frames), UNKNOWN, dtype=np.int64)
         signed = (frames[:, 0] == V2) & (frames[:, 2] == SIGNED)
-        for kind, of in groups(2 * _numbers(frames) + signed):
+        for kind, group in groups(2 * _numbers(frames) + signed):
             if (message := MESSAGES.get(kind >> 1)) is not None:
-                rows = frames[of, : frames.shape[1] - SIGNATURE * (kind & 1)]
+                rows = frames[group, : frames.shape[1] - SIGNATURE * (kind & 1)]
                 sent_checksums = rows[:, -2] + 256 * rows[:, -1].astype(np.uint16)
-                verdicts[of] = np.where(sent_checksums == checksum(rows[:, 1:-2], message.extra), GOOD, BAD)
+                verdicts[group] = np.where(sent_checksums == checksum(rows[:, 1:-2], message.extra), GOOD, BAD)
         return verdicts
 
 
@@ -167,12 +167,12 @@ def heads(frames: Found) -> Heads:
     return Heads(version, sequence, system, component, _numbers(text), payload, text[:, 1])
 
 
-def contents(frames: Found, of: Heads, message: Message, frame_numbers: Ints) -> NDArray[np.void]:
+def contents(frames: Found, frame_heads: Heads, message: Message, frame_numbers: Ints) -> NDArray[np.void]:
     """The fields of the chosen frames of `message`, shape (n,); fields that a frame lacks are 0."""
     parts = np.zeros((len(frame_numbers), message.dtype.itemsize), dtype=np.uint8)
-    for place, of_place in groups(of.payload[frame_numbers]):
+    for place, of_place in groups(frame_heads.payload[frame_numbers]):
         parts[of_place] = frames.parts(
-            frame_numbers[of_place], place, of.size[frame_numbers[of_place]], message.dtype.itemsize
+            frame_numbers[of_place], place, frame_heads.size[frame_numbers[of_place]], message.dtype.itemsize
         )
     return parts.view(message.dtype)[:, 0]
 
@@ -188,8 +188,8 @@ def frames(
         ends = np.argmax(payload[:, ::-1] != 0, axis=1)
         sizes = np.where(payload.any(axis=1), payload.shape[1] - ends, 1)
     messages: list[bytes] = [b""] * len(payload)
-    for size, of in groups(sizes):
-        rows = np.arange(len(payload))[of]
+    for size, group in groups(sizes):
+        rows = np.arange(len(payload))[group]
         head = [version, size, *([] if version == V1 else [0, 0]), 0, system, component]
         head += [(message.number >> shift) & 0xFF for shift in ((0,) if version == V1 else (0, 8, 16))]
         frame = np.empty((len(rows), len(head) + size + 2), dtype=np.uint8)

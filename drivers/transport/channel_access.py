@@ -80,10 +80,10 @@ class Circuit:
 
             def complete(_command: object) -> bool:
                 states = {name: channel.states[self._ca.CLIENT] for name, channel in channels.items()}
-                if absent := [name for name, state in states.items() if state is self._ca.FAILED]:
-                    others_text = f", and {len(absent) - 1} more are not there" if absent[1:] else ""
+                if missing_names := [name for name, state in states.items() if state is self._ca.FAILED]:
+                    others_text = f", and {len(missing_names) - 1} more are not there" if missing_names[1:] else ""
                     raise LinkRefused(
-                        f"{device}: the server {self.link.url} has no {absent[0]}{others_text}", ELSEWHERE
+                        f"{device}: the server {self.link.url} has no {missing_names[0]}{others_text}", ELSEWHERE
                     )
                 return all(state is self._ca.CONNECTED for state in states.values())
 

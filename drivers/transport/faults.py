@@ -120,8 +120,8 @@ class Faults:
     def once(self, name: str, now_s: float) -> Strike | None:
         """A fault that has begun and is not reported yet."""
         for k, (fault, size) in enumerate(self._faults):
-            begun = k not in self._struck and fault.has_begun(now_s, self._asked)
-            if fault.what == name and begun and fault.happens(self._asked):
+            is_new = k not in self._struck and fault.has_begun(now_s, self._asked)
+            if fault.what == name and is_new and fault.happens(self._asked):
                 self._struck.append(k)
                 return Strike(size, now_s if fault.after else fault.at_s)
         return None

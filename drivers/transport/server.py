@@ -129,10 +129,10 @@ class Datagrams(Connection):
     """A UDP socket: its client is at `to`, or is the last who sent something."""
 
     def __init__(
-        self, udp_socket: socket.socket, to: tuple[str, int] | None, leaving: Callable[[Message], Iterable[Message]]
+        self, udp_socket: socket.socket, peer: tuple[str, int] | None, leaving: Callable[[Message], Iterable[Message]]
     ) -> None:
-        super().__init__(udp_socket.fileno(), datagram_key(to[1]) if to else "", udp_socket.close, leaving)
-        self._socket, self._fixed, self._client = udp_socket, to, to
+        super().__init__(udp_socket.fileno(), datagram_key(peer[1]) if peer else "", udp_socket.close, leaving)
+        self._socket, self._fixed, self._client = udp_socket, peer, peer
         self._earlier: dict[str, tuple[int, int]] = {}  # clients before this one
 
     def read(self, now_s: float, patience_s: float) -> bool:  # noqa: ARG002 - a datagram is whole

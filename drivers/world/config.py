@@ -152,9 +152,11 @@ def _value(present: Any, value: Any, path: str) -> Any:
 def _noises(present: Noises, value: Mapping[str, Any], path: str) -> Noises:
     """A setting that names no output holds for both."""
     common = {name: settings for name, settings in value.items() if name not in ("x", "y")}
-    alike = Noises(changed_settings(present.x, common, f"{path}."), changed_settings(present.y, common, f"{path}."))
+    both_outputs = Noises(
+        changed_settings(present.x, common, f"{path}."), changed_settings(present.y, common, f"{path}.")
+    )
     return changed_settings(
-        alike, {name: settings for name, settings in value.items() if name not in common}, f"{path}."
+        both_outputs, {name: settings for name, settings in value.items() if name not in common}, f"{path}."
     )
 
 

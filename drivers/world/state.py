@@ -88,7 +88,10 @@ def from_json(values: dict[str, Any]) -> State:
 def _as_json(part: Any, like: Any) -> dict[str, Any]:
     """`part` is a record with the names of the dataclass `like`."""
     pairs = [(f.name, getattr(part, f.name), getattr(like, f.name)) for f in fields(like)]
-    return {name: _as_json(value, of) if is_dataclass(of) else np.asarray(value).tolist() for name, value, of in pairs}
+    return {
+        name: _as_json(value, field_type) if is_dataclass(field_type) else np.asarray(value).tolist()
+        for name, value, field_type in pairs
+    }
 
 
 def _fill(part: Any, values: Any, like: Any) -> None:

@@ -85,12 +85,12 @@ def path_direction(beta_deg: Floats) -> Ints:
     return np.where(sense == 0, np.append(sense[1:], 0), sense)
 
 
-def plan(visited: Poses, timing: Timing, package: Package, now_s: float, motors_deg: tuple[float, float]) -> Plan:
+def plan(poses: Poses, timing: Timing, package: Package, now_s: float, motors_deg: tuple[float, float]) -> Plan:
     """The visit of all poses from `now_s` on, with the motors at `motors_deg` (alpha, beta)."""
     moves = [at_rest(angle) for angle in motors_deg]
     tables = [motion(move) for move in moves]
     motions, rests, dwells = [], [], []
-    for target in zip(visited.alpha_deg.tolist(), visited.beta_deg.tolist(), strict=True):
+    for target in zip(poses.alpha_deg.tolist(), poses.beta_deg.tolist(), strict=True):
         for axis, angle in enumerate(target):
             present_deg = moves[axis].target_deg
             if angle != present_deg:
@@ -103,7 +103,7 @@ def plan(visited: Poses, timing: Timing, package: Package, now_s: float, motors_
         rests.append([move.end_s for move in moves])
         dwells.append([start_s, now_s])
     mount = cache(lambda mount_deg, flip: mounting(package, mount_deg, flip))
-    mounts = np.array(list(map(mount, visited.mount_deg, visited.flip)))
+    mounts = np.array(list(map(mount, poses.mount_deg, poses.flip)))
     return Plan(np.array(motions), _nanoseconds(rests), _nanoseconds(dwells), mounts)
 
 

@@ -149,9 +149,9 @@ class World:
 
         Outputs: those of `trims`. Raises as `adc_volts`.
         """
-        of = digital.trims(outputs, self.trims)
-        volts = self.adc_volts([trim.analog for trim in of], start_s, interval_s, n, [0] * len(of))
-        return digital.trimmed(volts, of)
+        trims = digital.trims(outputs, self.trims)
+        volts = self.adc_volts([trim.analog for trim in trims], start_s, interval_s, n, [0] * len(trims))
+        return digital.trimmed(volts, trims)
 
     def dwell_mean(
         self,
@@ -171,15 +171,15 @@ class World:
         noise of sensor and converter, not the wander of room and supply. The world is at the end of the
         last dwell afterwards.
         """
-        visited, pace = visit.poses(alpha_deg, beta_deg, direction, mount_deg, flip), visit.Timing(**timing)
+        poses, pace = visit.poses(alpha_deg, beta_deg, direction, mount_deg, flip), visit.Timing(**timing)
         motors = self.motor_angle_deg("alpha"), self.motor_angle_deg("beta")
-        plan = visit.plan(visited, pace, self.config.sensor.package, self.now_s, motors)
+        plan = visit.plan(poses, pace, self.config.sensor.package, self.now_s, motors)
         motions = plan.motions, plan.rest_ns, plan.dwell_ns, plan.mounts
         means = visit.visit(self._world, self._numbers, *motions, self._room, self._slow)
         middle_s = 1e-9 * plan.dwell_ns.mean(axis=1)
         random = None if noise_free else self._fast
         measured = visit.columns(means, middle_s, self.config, pace, random)
-        return vars(visited) | measured | {"t_s": middle_s - 1e-9 * self._world.powered_ns}
+        return vars(poses) | measured | {"t_s": middle_s - 1e-9 * self._world.powered_ns}
 
     def state(self) -> dict[str, state.JSON]:
         """The state of the world, as JSON: restored, it continues sample for sample."""

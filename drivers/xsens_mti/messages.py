@@ -105,13 +105,13 @@ class Packet:
 
 def layout(row: bytes) -> list[Packet] | None:
     """The packets of a whole MTData2 message; None where they do not fill its data."""
-    at, end = 6 if row[3] == 0xFF else 4, len(row) - 1
+    start, end = 6 if row[3] == 0xFF else 4, len(row) - 1
     packets = []
-    while at + 3 <= end:
-        number, size = row[at] << 8 | row[at + 1], row[at + 2]
-        packets.append(Packet(number, at + 3, size))
-        at += 3 + size
-    return packets if at == end else None
+    while start + 3 <= end:
+        number, size = row[start] << 8 | row[start + 1], row[start + 2]
+        packets.append(Packet(number, start + 3, size))
+        start += 3 + size
+    return packets if start == end else None
 
 
 def alike(rows: Bytes, packets: Sequence[Packet]) -> NDArray[np.bool_]:
@@ -163,8 +163,8 @@ def of_one_layout(frames: Found) -> Iterator[tuple[Ints, Bytes, list[Packet]]]:
     Messages whose packets do not fill them are left out.
     """
     data = np.flatnonzero(frames.heads(3)[:, 2] == DATA)
-    for length, of in groups(frames.lengths[data]):
-        remaining = data[of]
+    for length, group in groups(frames.lengths[data]):
+        remaining = data[group]
         while len(remaining):
             rows = frames.data[frames.starts[remaining, None] + np.arange(length)]
             packets = layout(rows[0].tobytes())

@@ -110,10 +110,10 @@ class MotionTracker(FramedTwin):
         columns.append((xbus.STATUS, status.astype(">u4")))
         temperature = np.full(len(ticks), self._world.die_c(), dtype=">f4")
         packets = [b""] * len(ticks)
-        for of, extra in ((~warm, []), (warm, [(xbus.TEMPERATURE, temperature)])):
-            if of.any():
-                messages = xbus.data_messages([(kind, column[of]) for kind, column in (*extra, *columns)])
-                for place, data in zip(np.flatnonzero(of).tolist(), messages, strict=True):
+        for group, extra in ((~warm, []), (warm, [(xbus.TEMPERATURE, temperature)])):
+            if group.any():
+                messages = xbus.data_messages([(kind, column[group]) for kind, column in (*extra, *columns)])
+                for place, data in zip(np.flatnonzero(group).tolist(), messages, strict=True):
                     packets[place] = data
         return packets
 

@@ -49,13 +49,13 @@ def _line_points(a: tuple[float, float], b: tuple[float, float]) -> list[tuple[f
     return [(a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])) for t in steps]
 
 
-def _place(at: tuple[float, float]) -> tuple[int, int]:
+def _place(point: tuple[float, float]) -> tuple[int, int]:
     """(column, row) of a dot."""
-    return round(COLUMNS - 0.5 + at[0]), round(2 * ROWS - 0.5 - at[1])
+    return round(COLUMNS - 0.5 + point[0]), round(2 * ROWS - 0.5 - point[1])
 
 
-def _character(at: tuple[float, float]) -> tuple[int, int]:
-    column, row = _place(at)
+def _character(point: tuple[float, float]) -> tuple[int, int]:
+    column, row = _place(point)
     return column // 2, row // 4
 
 

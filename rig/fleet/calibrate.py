@@ -84,20 +84,22 @@ def calibrate_fleet(fleet: Fleet, members: Sequence[Member], guide: Guide) -> Ca
     for member in members:
         if member in screenings:
             groups[member.batch, screenings[member].names].append(member)
-    batches = (_batch(batch, names, of, screenings, guide) for (batch, names), of in groups.items())
+    batches = (
+        _batch(batch, names, batch_members, screenings, guide) for (batch, names), batch_members in groups.items()
+    )
     return Calibration(tuple(batches), faults)
 
 
 def _batch(
-    batch: str, names: Names, of: list[Member], screenings: Mapping[Member, Screening], guide: Guide
+    batch: str, names: Names, members: list[Member], screenings: Mapping[Member, Screening], guide: Guide
 ) -> Calibrated:
-    batch_screenings = tuple(screenings[member] for member in of)
+    batch_screenings = tuple(screenings[member] for member in members)
     pooled = pool_siblings(
         np.array([look.theta for look in batch_screenings]),
         np.array([look.information for look in batch_screenings]),
         np.median([look.typical for look in batch_screenings], axis=0),
     )
-    return Calibrated(batch, names, tuple(of), batch_screenings, pooled, guide.question(of[0]))
+    return Calibrated(batch, names, tuple(members), batch_screenings, pooled, guide.question(members[0]))
 
 
 def models(calibrated: Calibrated) -> dict[str, Model]:
@@ -142,7 +144,9 @@ def write_guide(population: Population, start: Question, folder: Path) -> list[P
     make_folder(folder)
     texts = {f"{safe(batch.batch)}.yaml": _guide_model(start, batch) for batch in population.batches}
     rigs = {error.rig: errors_of(population.rigs, error.rig) for error in population.rigs}
-    texts[RIGS] = json.dumps({"schema": SCHEMA, "rigs": {rig: of for rig, of in rigs.items() if of}}, indent=1) + "\n"
+    texts[RIGS] = (
+        json.dumps({"schema": SCHEMA, "rigs": {rig: errors for rig, errors in rigs.items() if errors}}, indent=1) + "\n"
+    )
     for name, text in texts.items():
         write_whole(folder / name, text)
     return [folder / name for name in texts]

@@ -94,11 +94,11 @@ def errors_of(errors: Iterable[RigError], rig: str) -> StageErrors:
 
 def _rigs(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
     """The state with the errors of the rigs, if there are several rigs."""
-    if len({member.rig for of in batches.values() for member in of}) < 2:
+    if len({member.rig for members in batches.values() for member in members}) < 2:
         return stand
     faults = dict(stand.faults)
     stages = {member: look.stage for member, look in _screen_members(fleet, stand, batches, faults) if look}
-    measured = [Measured(m.batch, m.rig, stages[m]) for of in batches.values() for m in of if m in stages]
+    measured = [Measured(m.batch, m.rig, stages[m]) for members in batches.values() for m in members if m in stages]
     return replace(stand, faults=faults, errors=tuple(find_rig_errors(measured)))
 
 
@@ -106,7 +106,7 @@ def _screen_members(
     fleet: Fleet, stand: Stand, batches: Batches, faults: dict[Member, str]
 ) -> Iterator[tuple[Member, Screening | None]]:
     """Every sensor with its screening, batch by batch; without one, the reason is added to `faults`."""
-    questions = [(m, stand.question("look", m)) for of in batches.values() for m in of if m not in faults]
+    questions = [(m, stand.question("look", m)) for members in batches.values() for m in members if m not in faults]
     for member, answer in fleet.ask(questions):
         if "fault" in answer:
             faults[member] = answer["fault"]
@@ -128,7 +128,7 @@ def _judged(fleet: Fleet, stand: Stand, batches: Batches) -> tuple[Stand, dict[s
     """The state with the screened sensors, and the missing effects of each batch, found after its last sensor."""
     stage = {name for name, effect in effects_of(stand.start.own).items() if "pose" in effect.places}
     faults, screened = dict(stand.faults), dict(stand.seen)
-    waiting = {batch: sum(m not in faults for m in of) for batch, of in batches.items()}
+    waiting = {batch: sum(m not in faults for m in members) for batch, members in batches.items()}
     screenings: dict[str, dict[Member, Screening]] = defaultdict(dict)
     missing = {}
     for member, look in _screen_members(fleet, stand, batches, faults):
@@ -178,7 +178,7 @@ def _test_jointly(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Memb
 
 def _diagnosed(fleet: Fleet, stand: Stand, batches: Batches) -> dict[Member, Any]:
     """The diagnoses of the sensors that differ from their batch."""
-    usual = {batch: [stand.seen[m].excess for m in of if m in stand.seen] for batch, of in batches.items()}
+    usual = {batch: [stand.seen[m].excess for m in members if m in stand.seen] for batch, members in batches.items()}
     outliers = [
         m for m, screened in stand.seen.items() if m not in stand.faults and stands_out(screened, usual[m.batch])
     ]
@@ -205,12 +205,12 @@ def _population(stand: Stand, diagnosed: Mapping[Member, Any], members: Sequence
 
 
 def _verdict(member: Member, stand: Stand, diagnosis: Any | None) -> SensorVerdict:
-    of = (member.sensor, member.batch, member.rig, member.data)
+    identity = (member.sensor, member.batch, member.rig, member.data)
     shared = stand.effects.get(member.batch, ())
     names, rivals = tuple(e.effect for e in shared), {e.effect: e.rivals for e in shared if e.rivals}
     fault = stand.faults.get(member) or (diagnosis or {}).get("fault")
     if fault:
-        return SensorVerdict(*of, "failed", remark=fault)
+        return SensorVerdict(*identity, "failed", remark=fault)
     facts = diagnosis or {"effects": (), "rivals": {}, "excess": stand.seen[member].excess}
     own_effects = tuple(facts["effects"])
     rivals |= {name: tuple(alternatives) for name, alternatives in facts["rivals"].items()}
@@ -223,5 +223,5 @@ def _verdict(member: Member, stand: Stand, diagnosis: Any | None) -> SensorVerdi
     remark = "; ".join(filter(None, (facts.get("left"), facts.get("caution")))) or None
     scope = FULL_SEARCH if diagnosis else WITH_BATCH
     return SensorVerdict(
-        *of, decide(judgement).value, judgement.missing, own_effects, facts["excess"], scope, rivals, remark
+        *identity, decide(judgement).value, judgement.missing, own_effects, facts["excess"], scope, rivals, remark
     )

@@ -45,7 +45,7 @@ def population_document(population: Population, model: str) -> Document:
                 **vars(batch),
                 "effects": list(batch.effects),
                 "own": list(batch.own),
-                "rivals": {name: list(of) for name, of in batch.rivals.items()},
+                "rivals": {name: list(rival_names) for name, rival_names in batch.rivals.items()},
                 "needs_a_person": batch.needs_a_person,
             }
             for batch in population.sensors

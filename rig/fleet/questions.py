@@ -54,18 +54,18 @@ def _program() -> str:
 def keep(record: Record, answered_rows: Iterable[tuple[str, str, str, Mapping[str, Any]]]) -> None:
     """Store rows (key, sensor, data, answer) in one transaction; rows that exist do not change."""
     rows = [{"key": k, "sensor": s, "data": d, "at": timestamp(), "answer": dict(a)} for k, s, d, a in answered_rows]
-    with record.engine.begin() as to:
+    with record.engine.begin() as connection:
         if rows:
-            to.execute(insert_or(to, answers).on_conflict_do_nothing(), rows)
+            connection.execute(insert_or(connection, answers).on_conflict_do_nothing(), rows)
 
 
 def kept(record: Record, keys: Sequence[str]) -> dict[str, Any]:
     """The stored answers, by key."""
     stored: dict[str, Any] = {}
-    with record.engine.connect() as at:
+    with record.engine.connect() as connection:
         for first in range(0, len(keys), MOST):
             query = select(answers.c.key, answers.c.answer).where(answers.c.key.in_(keys[first : first + MOST]))
-            stored |= {row.key: row.answer for row in at.execute(query)}
+            stored |= {row.key: row.answer for row in connection.execute(query)}
     return stored
 
 

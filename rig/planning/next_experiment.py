@@ -114,20 +114,20 @@ def choose_experiment(
     bench: Bench,
     bench_file: Path | None = None,
     menu: Sequence[Experiment] = MENU,
-    judged: Sequence[str] = (ALONE, TOGETHER),
+    criteria: Sequence[str] = (ALONE, TOGETHER),
 ) -> Experiment:
     """The next experiment for a dispute; one that the bench cannot do only if there is no other.
 
-    `by_physics` is the experiment if no candidate of the menu helps; its text then says what the bench lacks. `judged`:
-    whether the new data are analysed alone or with the present data, in order of preference.
+    `by_physics` is the experiment if no candidate of the menu helps; its text then says what the bench lacks.
+    `criteria`: whether the new data are analysed alone or with the present data, in order of preference.
     """
     predicted = []
     for e, planned in sorted(_plans(menu, bench, bench_file), key=lambda pair: pair[0].duration_s or 0.0):
         if (prediction := _predicted(dispute, e, planned)) is not None:
             predicted.append(prediction)
-            if _certain(prediction, judged[0]) and len(prediction.separates) == len(dispute.rivals):
+            if _certain(prediction, criteria[0]) and len(prediction.separates) == len(dispute.rivals):
                 break  # no longer experiment can be better
-    return best_of(predicted, judged) or as_proposed(by_physics, bench, bench_file)
+    return best_of(predicted, criteria) or as_proposed(by_physics, bench, bench_file)
 
 
 def _plans(menu: Sequence[Experiment], bench: Bench, bench_file: Path | None) -> Iterator[tuple[Experiment, Plan]]:
@@ -137,9 +137,9 @@ def _plans(menu: Sequence[Experiment], bench: Bench, bench_file: Path | None) ->
             yield planned_experiment(e, bench, bench_file)
 
 
-def best_of(experiments: Sequence[Experiment], judged: Sequence[str]) -> Experiment | None:
+def best_of(experiments: Sequence[Experiment], criteria: Sequence[str]) -> Experiment | None:
     """The shortest experiment that certainly separates most pairs; else that with most information per minute."""
-    for probability in judged:
+    for probability in criteria:
         enough = [e for e in experiments if _certain(e, probability)]
         if enough:
             return min(enough, key=lambda e: (-len(e.separates), e.duration_s or 0.0))

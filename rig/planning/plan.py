@@ -56,9 +56,9 @@ class RecordedTwin:
             return lambda *outputs: RecordedTwin(count(*outputs), act(*outputs))
 
         def both(*arguments: Any, **keywords: Any) -> Any:
-            counted = count(*arguments, **keywords)
-            if isgenerator(counted):
-                deque(counted, maxlen=0)  # run it to its end
+            planned = count(*arguments, **keywords)
+            if isgenerator(planned):
+                deque(planned, maxlen=0)  # run it to its end
             return act(*arguments, **keywords)
 
         return both
@@ -281,9 +281,9 @@ def _path_words(poses: Sequence[Pose]) -> Iterator[str]:
     """The path, the rates, and an unusual mounting of the sensor."""
     numbers = [match[1] for pose in (poses[0], poses[-1]) if (match := COUNTER.search(pose.path))]
     path = WAY_ROUND.sub("", COUNTER.sub("", poses[0].path))
-    counted = [*dict.fromkeys(numbers)]
+    distinct = [*dict.fromkeys(numbers)]
     if path:
-        yield f"{path} {' to '.join(counted)}".rstrip()
+        yield f"{path} {' to '.join(distinct)}".rstrip()
     if rates := sorted({abs(pose.rate_deg_s) for pose in poses} - {0.0}):
         yield f"at {', '.join(f'{rate:g}' for rate in rates)} deg/s in both directions"
     if poses[0].mount_deg or poses[0].flip:

@@ -34,35 +34,35 @@ GIVEN = (events.c.event, log.c.line)  # numbers given by the database
 MADE = ("run", "procedure", "created", "configuration", "source", "identities")  # set at the begin of a run
 
 
-def digest(at: Connection, run: str) -> str:
+def digest(connection: Connection, run: str) -> str:
     """SHA-256 of the content of `run`."""
-    sha = hashlib.sha256(_line(run_row(at, run)))
+    sha = hashlib.sha256(_line(run_row(connection, run)))
     for table in ORDER:
         sha.update(table.name.encode())
-        for row in at.execute(rows_of(table, run, counted=True)):
+        for row in connection.execute(rows_of(table, run, counted=True)):
             sha.update(_line(row))
     return sha.hexdigest()
 
 
-def head(at: Connection, run: str) -> str:
+def head(connection: Connection, run: str) -> str:
     """SHA-256 of the parts of a complete run that can change. An event stands for an excluded pose."""
-    sha = hashlib.sha256(_line(run_row(at, run)))
-    sha.update(_line(at.execute(rows_of(events, run)).all()))
+    sha = hashlib.sha256(_line(run_row(connection, run)))
+    sha.update(_line(connection.execute(rows_of(events, run)).all()))
     return sha.hexdigest()
 
 
-def run_row(at: Connection, run: str) -> Row[Any]:
+def run_row(connection: Connection, run: str) -> Row[Any]:
     """The row of the run, without its names and its checksum. Raises UnknownRun."""
     columns = [column for column in runs.c if column not in (runs.c.run, runs.c.uid, runs.c.checksum)]
-    row = at.execute(select(*columns).where(runs.c.run == run)).one_or_none()
+    row = connection.execute(select(*columns).where(runs.c.run == run)).one_or_none()
     if row is None:
         raise UnknownRun(f"no run {run!r}")
     return row
 
 
-def uid_of(at: Connection, run: str) -> str:
+def uid_of(connection: Connection, run: str) -> str:
     """The identifier of a run in every record. For a run of an older program it is derived from its begin."""
-    row = at.execute(select(runs).where(runs.c.run == run)).one()._mapping
+    row = connection.execute(select(runs).where(runs.c.run == run)).one()._mapping
     return row["uid"] or hashlib.sha256(_line([row[name] for name in MADE])).hexdigest()[:32]
 
 
@@ -82,10 +82,10 @@ def rows_of(table: Table, run: str, counted: bool = False) -> Select[Any]:
     return query.execution_options(yield_per=32)
 
 
-def count(at: Connection, run: str) -> dict[Table, int]:
+def count(connection: Connection, run: str) -> dict[Table, int]:
     """The number of rows of a run in each table."""
     counts = [select(func.count()).where(table.c.run == run).scalar_subquery() for table in ORDER]
-    return dict(zip(ORDER, at.execute(select(*counts)).one(), strict=True))
+    return dict(zip(ORDER, connection.execute(select(*counts)).one(), strict=True))
 
 
 def _line(row: object) -> bytes:

@@ -155,17 +155,17 @@ def _raise_record_error(context: ExceptionContext, path: Path) -> None:
 
 
 def _make_tables(engine: Engine, path: Path) -> None:
-    with engine.begin() as to:
-        if _version(to, path) < SCHEMA:
-            to.exec_driver_sql("BEGIN IMMEDIATE")  # of two processes at a new file only one makes the tables
-            version = _version(to, path)
-            upgrade(to, version)
-            to.execute(text(f"PRAGMA user_version = {SCHEMA:d}"))
+    with engine.begin() as connection:
+        if _version(connection, path) < SCHEMA:
+            connection.exec_driver_sql("BEGIN IMMEDIATE")  # of two processes at a new file only one makes the tables
+            version = _version(connection, path)
+            upgrade(connection, version)
+            connection.execute(text(f"PRAGMA user_version = {SCHEMA:d}"))
 
 
-def _version(to: Connection, path: Path) -> int:
+def _version(connection: Connection, path: Path) -> int:
     """Schema of the tables; 0 without tables. Raises RecordError for tables of a newer program."""
-    version = int(to.execute(text("PRAGMA user_version")).scalar_one())
+    version = int(connection.execute(text("PRAGMA user_version")).scalar_one())
     if version > SCHEMA:
         raise RecordError(
             f"{path}: the record is of a newer version of this program (schema {version}, this one knows {SCHEMA}); "

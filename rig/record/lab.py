@@ -131,14 +131,14 @@ def _is_here(url: URL) -> bool:
 def open_server(url: URL) -> Engine:
     """The engine of a record with the tables of this program. Raises LabAway, RecordError."""
     engine = connected(url)
-    with engine.connect() as at:
-        require_current(version(at), masked_url(url))
+    with engine.connect() as connection:
+        require_current(version(connection), masked_url(url))
     return engine
 
 
-def version(at: Connection) -> int:
+def version(connection: Connection) -> int:
     """The schema of the tables; 0 without tables."""
-    comment = at.execute(text("SELECT obj_description(to_regclass('runs'), 'pg_class')")).scalar_one()
+    comment = connection.execute(text("SELECT obj_description(to_regclass('runs'), 'pg_class')")).scalar_one()
     return int(comment.removeprefix("schema ")) if comment else 0
 
 
@@ -195,23 +195,23 @@ def prepare(url: URL) -> int:
     """
     engine = connected(url)
     try:
-        with engine.begin() as to:
-            to.execute(text(f"SELECT pg_advisory_xact_lock({ONE_AT_A_TIME})"))
-            schema_before = version(to)
+        with engine.begin() as connection:
+            connection.execute(text(f"SELECT pg_advisory_xact_lock({ONE_AT_A_TIME})"))
+            schema_before = version(connection)
             if schema_before > SCHEMA:
                 require_current(schema_before, masked_url(url))
-            upgrade(to, schema_before)
-            to.execute(text(f"COMMENT ON TABLE runs IS 'schema {SCHEMA:d}'"))
-            _grant(to)
+            upgrade(connection, schema_before)
+            connection.execute(text(f"COMMENT ON TABLE runs IS 'schema {SCHEMA:d}'"))
+            _grant(connection)
     finally:
         engine.dispose()
     return schema_before
 
 
-def _grant(to: Connection) -> None:
-    tables = ", ".join(to.dialect.identifier_preparer.format_table(table) for table in metadata.sorted_tables)
+def _grant(connection: Connection) -> None:
+    tables = ", ".join(connection.dialect.identifier_preparer.format_table(table) for table in metadata.sorted_tables)
     for role, may in MAY.items():
-        if not to.execute(text("SELECT 1 FROM pg_roles WHERE rolname = :role"), {"role": role}).scalar():
-            to.execute(text(f"CREATE ROLE {role} NOLOGIN"))
-        to.execute(text(f"GRANT {may} ON {tables} TO {role}"))
-    to.execute(text(f"GRANT USAGE ON SEQUENCE events_event_seq, log_line_seq TO {WRITER}"))
+        if not connection.execute(text("SELECT 1 FROM pg_roles WHERE rolname = :role"), {"role": role}).scalar():
+            connection.execute(text(f"CREATE ROLE {role} NOLOGIN"))
+        connection.execute(text(f"GRANT {may} ON {tables} TO {role}"))
+    connection.execute(text(f"GRANT USAGE ON SEQUENCE events_event_seq, log_line_seq TO {WRITER}"))

@@ -74,9 +74,9 @@ def sensor_from_base(pose: Pose) -> Array:
 
 def specific_force_g(pose: Pose) -> Array:
     """Specific force in the sensor's frame, g, shape (3,). In a turn it is the mean, along the table's normal."""
-    felt = sensor_from_base(pose)[:, 2]
+    force = sensor_from_base(pose)[:, 2]
     normal = sensor_from_table(pose)[:, 2]
-    return np.round(normal * (normal @ felt) if pose.rate_deg_s else felt, 12) + 0.0
+    return np.round(normal * (normal @ force) if pose.rate_deg_s else force, 12) + 0.0
 
 
 def _table(run: Run, recorded: Sequence[Kept], outputs: Sequence[str], extra_columns: Mapping[str, Array]) -> Table:

@@ -76,10 +76,10 @@ def unsent(local: Record, lab: Record, run_names: Sequence[str] = ()) -> list[st
     for run in finished:
         _require_finished(local, run)
     finished = finished or [run.run for run in reversed(local.runs()) if run.state == FINISHED]
-    with local.engine.connect() as at:
-        heads = {run: (uid_of(at, run), head(at, run)) for run in finished}
-    with lab.engine.connect() as at:
-        lab_heads = {row.uid: row.head for row in at.execute(select(arrivals.c.uid, arrivals.c.head))}
+    with local.engine.connect() as source:
+        heads = {run: (uid_of(source, run), head(source, run)) for run in finished}
+    with lab.engine.connect() as source:
+        lab_heads = {row.uid: row.head for row in source.execute(select(arrivals.c.uid, arrivals.c.head))}
     return [run for run, (uid, local_head) in heads.items() if lab_heads.get(uid) != local_head]
 
 
@@ -100,13 +100,16 @@ def push(local: Record, lab: Record, run: str) -> Pushed:
     Raises RecordError if the copy in the lab was changed there. The copy stays unchanged.
     """
     _require_finished(local, run)
-    with local.engine.connect() as at:
-        row = {**run_row(at, run)._mapping, "checksum": at.scalar(select(runs.c.checksum).where(runs.c.run == run))}
-        parcel = _Parcel(run, uid_of(at, run), row, head(at, run), digest(at, run))
+    with local.engine.connect() as source:
+        row = {
+            **run_row(source, run)._mapping,
+            "checksum": source.scalar(select(runs.c.checksum).where(runs.c.run == run)),
+        }
+        parcel = _Parcel(run, uid_of(source, run), row, head(source, run), digest(source, run))
         pushed = None
         while pushed is None:
-            with lab.engine.begin() as to:
-                pushed = _step(at, to, parcel)
+            with lab.engine.begin() as target:
+                pushed = _step(source, target, parcel)
     return pushed
 
 
@@ -115,48 +118,48 @@ def _require_finished(local: Record, run: str) -> None:
         raise RecordError(f"run {run} is {state}, and only complete runs are pushed; `rig resume {run}` continues it")
 
 
-def _step(at: Connection, to: Connection, parcel: _Parcel) -> Pushed | None:
-    """Push the next batch from the rig's record `at` to the lab's `to`. Returns None if there are more."""
-    name, arrived = _arrival(to, parcel)
+def _step(source: Connection, target: Connection, parcel: _Parcel) -> Pushed | None:
+    """Push the next batch from the rig's record `source` to the lab's `target`. Returns None if there are more."""
+    name, arrived = _arrival(target, parcel)
     if arrived == parcel.head:
         return Pushed(parcel.run, name, "there", parcel.digest)
-    if not _filled(at, to, parcel.run, name):
+    if not _filled(source, target, parcel.run, name):
         return None
-    _seal(at, to, parcel, name)
+    _seal(source, target, parcel, name)
     return Pushed(parcel.run, name, "pushed", parcel.digest)
 
 
-def _arrival(to: Connection, parcel: _Parcel) -> tuple[str, str | None]:
+def _arrival(target: Connection, parcel: _Parcel) -> tuple[str, str | None]:
     """The name of the run in the lab, and its head there; locked until the end of the transaction."""
     arrival_query = select(arrivals.c.run, arrivals.c.head).where(arrivals.c.uid == parcel.uid).with_for_update()
     for name in (parcel.run, f"{parcel.run}-{parcel.uid[:8]}"):  # the second if a run of another rig has the first
-        if (row := to.execute(arrival_query).one_or_none()) is not None:
+        if (row := target.execute(arrival_query).one_or_none()) is not None:
             return row.run, row.head
         values = {**parcel.row, "run": name, "uid": parcel.uid}
-        if is_new(to, runs, values):
-            to.execute(insert(arrivals), {"uid": parcel.uid, "run": name, "at": timestamp()})
+        if is_new(target, runs, values):
+            target.execute(insert(arrivals), {"uid": parcel.uid, "run": name, "at": timestamp()})
             return name, None
     raise RecordError(f"run {parcel.run}: the lab has two other runs with this name; ask the owner of the lab's record")
 
 
-def _filled(at: Connection, to: Connection, run: str, name: str) -> bool:
+def _filled(source: Connection, target: Connection, run: str, name: str) -> bool:
     """Add a batch of rows. Returns whether all rows are in the lab."""
     remaining = MOST_BYTES
-    for table, present in count(to, name).items():
-        rows, size = _next(at, table, run, present, remaining)
+    for table, present in count(target, name).items():
+        rows, size = _next(source, table, run, present, remaining)
         if rows:
-            to.execute(insert(table), [{**row, "run": name} for row in rows])
+            target.execute(insert(table), [{**row, "run": name} for row in rows])
         remaining -= size
         if remaining <= 0:
             return False
     return True
 
 
-def _next(at: Connection, table: Table, run: str, present: int, most: int) -> tuple[list[Mapping[str, Any]], int]:
+def _next(source: Connection, table: Table, run: str, present: int, most: int) -> tuple[list[Mapping[str, Any]], int]:
     """Rows of a run after the first `present`, up to about `most` bytes; and their size in bytes."""
     rows: list[Mapping[str, Any]] = []
     size = 0
-    with at.execute(rows_of(table, run).offset(present)) as result:
+    with source.execute(rows_of(table, run).offset(present)) as result:
         for row in result.mappings():
             rows.append(dict(row))
             size += ROW_BYTES + sum(len(value) for value in row.values() if isinstance(value, str | bytes))
@@ -165,21 +168,21 @@ def _next(at: Connection, table: Table, run: str, present: int, most: int) -> tu
     return rows, size
 
 
-def _seal(at: Connection, to: Connection, parcel: _Parcel, name: str) -> None:
+def _seal(source: Connection, target: Connection, parcel: _Parcel, name: str) -> None:
     """Update the parts that can change, compare the digests, and make the run visible."""
-    to.execute(update(runs).where(runs.c.run == name).values(dict(parcel.row)))
+    target.execute(update(runs).where(runs.c.run == name).values(dict(parcel.row)))
     excluded = poses.c.excluded.is_not(None)
-    to.execute(update(poses).where(poses.c.run == name, excluded).values(excluded=None))
-    for row in at.execute(select(poses.c.number, poses.c.excluded).where(poses.c.run == parcel.run, excluded)):
+    target.execute(update(poses).where(poses.c.run == name, excluded).values(excluded=None))
+    for row in source.execute(select(poses.c.number, poses.c.excluded).where(poses.c.run == parcel.run, excluded)):
         is_pose = (poses.c.run == name) & (poses.c.number == row.number)
-        to.execute(update(poses).where(is_pose).values(excluded=row.excluded))
-    if digest(to, name) != parcel.digest:
+        target.execute(update(poses).where(is_pose).values(excluded=row.excluded))
+    if digest(target, name) != parcel.digest:
         raise RecordError(
             f"run {parcel.run}: the copy in the lab is different from the run of this rig, so nothing was replaced; if "
             "the run has just changed here, push it again; else the copy was changed in the lab"
         )
     sealed = {"head": parcel.head, "digest": parcel.digest, "at": timestamp()}
-    to.execute(update(arrivals).where(arrivals.c.uid == parcel.uid).values(sealed))
+    target.execute(update(arrivals).where(arrivals.c.uid == parcel.uid).values(sealed))
 
 
 @dataclass(frozen=True)
@@ -193,9 +196,9 @@ class Verified:
 
 def verify(lab: Record) -> Verified:
     """Compute the digest of every pushed run again, and compare it with the digest at its arrival. Raises LabAway."""
-    with lab.engine.connect() as at:
-        rows = at.execute(select(arrivals.c.run, arrivals.c.digest).order_by(arrivals.c.run)).all()
-        is_sound_by_run = {row.run: digest(at, row.run) == row.digest for row in rows if row.digest is not None}
+    with lab.engine.connect() as source:
+        rows = source.execute(select(arrivals.c.run, arrivals.c.digest).order_by(arrivals.c.run)).all()
+        is_sound_by_run = {row.run: digest(source, row.run) == row.digest for row in rows if row.digest is not None}
     sound, changed_runs = (
         tuple(run for run, is_sound in is_sound_by_run.items() if is_sound is state) for state in (True, False)
     )

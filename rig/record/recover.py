@@ -51,15 +51,15 @@ def recover(source: Path, folder: Path) -> Recovered:
     if target.exists():
         raise RecordError(f"{target}: this record exists already; give a folder without a record")
     folder.mkdir(parents=True, exist_ok=True)
-    begun, padded = folder / "recovery.db", folder / "padded.db"
-    for file in (begun, padded):
+    unfinished, padded = folder / "recovery.db", folder / "padded.db"
+    for file in (unfinished, padded):
         for leftover in folder.glob(f"{file.name}*"):
             leftover.unlink()  # of an attempt that failed
     try:
-        recovered = _recovered(_completed_copy(source, padded), begun)
-        begun.rename(target)
+        recovered = _recovered(_completed_copy(source, padded), unfinished)
+        unfinished.rename(target)
     finally:
-        for leftover in (*folder.glob(f"{begun.name}*"), *folder.glob(f"{padded.name}*")):
+        for leftover in (*folder.glob(f"{unfinished.name}*"), *folder.glob(f"{padded.name}*")):
             leftover.unlink()
     return recovered
 
@@ -77,14 +77,14 @@ def _recovered(source: Path, target: Path) -> Recovered:
                 damaged.append(table.name)
         new.commit()
         replaced_runs = tuple(_checked(target))
-        spoilt = tuple(_spoilt(new))
+        damaged_samples = tuple(_spoilt(new))
         for name, other_table in (("poses", "blocks"), ("blocks", "poses"), ("dwells", "poses")):
             match = f"{other_table}.run = {name}.run AND {other_table}.number = {name}.number"
             new.execute(f"DELETE FROM {name} WHERE NOT EXISTS (SELECT 1 FROM {other_table} WHERE {match})")  # noqa: S608
         new.commit()
         new.execute("PRAGMA journal_mode = DELETE")  # all is in one file, which gets its name now
         new.close()
-    return Recovered(rows, tuple(damaged), spoilt, replaced_runs)
+    return Recovered(rows, tuple(damaged), damaged_samples, replaced_runs)
 
 
 _HEADER = struct.Struct(">16x H 10x I")  # of SQLite's file: bytes of a page, number of pages
@@ -117,27 +117,27 @@ def _checked(target: Path) -> Iterator[str]:
     """Remove rows that changed on the disk, and make a new entry for runs without a sound one. Yields the losses."""
     engine = open_file(target)
     try:
-        with engine.begin() as to:
-            checked = set(to.execute(select(runs.c.run).where(runs.c.checksum.is_not(None))).scalars())
+        with engine.begin() as connection:
+            checked = set(connection.execute(select(runs.c.run).where(runs.c.checksum.is_not(None))).scalars())
             for table in (table for table in COVERED if table is not runs):
                 place = "name" if "name" in table.c else "number"
                 key = (table.c.run, table.c[place])
-                rows = to.execute(select(table))
+                rows = connection.execute(select(table))
                 wrong_rows = [
                     (row.run, getattr(row, place))
                     for row in rows
                     if is_damaged(table, row._mapping, row.run in checked)
                 ]
                 for run, number in wrong_rows:
-                    to.execute(delete(table).where(key[0] == run, key[1] == number))
+                    connection.execute(delete(table).where(key[0] == run, key[1] == number))
                     yield f"run {run}, {table.name}: {number}"
-            yield from _mend_runs(to)
+            yield from _mend_runs(connection)
     finally:
         engine.dispose()
 
 
-def _mend_runs(to: Connection) -> Iterator[str]:
-    for row in to.execute(select(runs)).all():
+def _mend_runs(connection: Connection) -> Iterator[str]:
+    for row in connection.execute(select(runs)).all():
         if is_damaged(runs, row._mapping):
             values: dict[str, Any] = {name: value for name, value in row._mapping.items() if value is DAMAGED}
             lost_values = ", ".join(values) or "one value; check its settings, constants and bench"
@@ -148,13 +148,15 @@ def _mend_runs(to: Connection) -> Iterator[str]:
                 "message": message,
                 "checksum": None,
             }
-            to.execute(update(runs).where(runs.c.run == row.run).values(mended))
+            connection.execute(update(runs).where(runs.c.run == row.run).values(mended))
             yield f"run {row.run}: {lost_values}"
     numbers = union(*[select(table.c.run) for table in (poses, blocks, readings)]).subquery()
-    for run in to.execute(select(numbers.c.run).where(numbers.c.run.not_in(select(runs.c.run)))).scalars().all():
+    for run in (
+        connection.execute(select(numbers.c.run).where(numbers.c.run.not_in(select(runs.c.run)))).scalars().all()
+    ):
         documents: dict[str, Any] = {name: {} for name in ("settings", "bench", "identities", "constants", "results")}
         procedure = (*run.split("-"), "", "", "unknown")[2] or "unknown"
-        to.execute(insert(runs), {
+        connection.execute(insert(runs), {
             "run": run, "kind": "poses", "procedure": procedure, "state": "failed", "configuration": "", "created": "",
             "source": "a damaged record", "message": "recovered from a damaged record without the entry of this run",
             **documents})  # fmt: skip

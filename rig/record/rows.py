@@ -43,13 +43,13 @@ def select_runs() -> Select[Any]:
     return select(runs, func.coalesce(imported.scalar_subquery(), pose_count).label("rows")).where(~on_its_way)
 
 
-def select_named(at: Connection, name: str) -> Select[Any]:
+def select_named(connection: Connection, name: str) -> Select[Any]:
     """The run of this id; the newest one for `last`, or the newest of a procedure for `last PROCEDURE`."""
     last, _, procedure = name.partition(" ")
     if last != LAST:
         return select_runs().where(runs.c.run == name)
     query = select_runs().where(runs.c.procedure == procedure) if procedure else select_runs()
-    return query.order_by(newest_first(at)).limit(1)
+    return query.order_by(newest_first(connection)).limit(1)
 
 
 def select_beginning(name: str) -> Select[Any]:
@@ -70,10 +70,10 @@ def run_of(row: Row[Any]) -> Run:
     return Run(**{name: value for name, value in row._mapping.items() if name != "checksum"})
 
 
-def imported_rows(at: Connection, run: str) -> int:
+def imported_rows(connection: Connection, run: str) -> int:
     """The number of rows of an imported table; 0 for a measured run."""
     length = func.max(func.length(columns.c.numbers, type_=Integer) // 8)
-    return at.execute(select(length).where(columns.c.run == run)).scalar_one() or 0
+    return connection.execute(select(length).where(columns.c.run == run)).scalar_one() or 0
 
 
 def excluded_rows(events: Iterable[Event]) -> dict[int, str]:
@@ -93,9 +93,9 @@ def pose_of(row: Row[Any]) -> Pose:
     return Pose(**{name: row._mapping[poses.c[name]] for name in POSE})
 
 
-def has_checksums(at: Connection, run: str) -> bool:
+def has_checksums(connection: Connection, run: str) -> bool:
     """Whether every row of a run has a checksum: the entry of the run has one."""
-    return at.execute(select(runs.c.checksum).where(runs.c.run == run)).scalar_one_or_none() is not None
+    return connection.execute(select(runs.c.checksum).where(runs.c.run == run)).scalar_one_or_none() is not None
 
 
 def sound(row: Row[Any], *tables: SqlTable, required: bool) -> Row[Any]:
@@ -117,15 +117,17 @@ def place_text(row: Row[Any], table: SqlTable) -> str:
     return f"run {row.run},{place}: its values changed on the disk ({table.name})"
 
 
-def require_whole(at: Connection, run: str) -> set[int]:
+def require_whole(connection: Connection, run: str) -> set[int]:
     """The numbers of the poses without the excluded ones.
 
     Raises RecordError if a pose has no samples, if samples have no pose, or if a number occurs twice. A bit that
     changed in an index of SQLite hides rows, and no checksum of a row shows it; each table has its own index.
     """
-    for number in _incomplete(at, run):
+    for number in _incomplete(connection, run):
         raise lost_pose_error(run, number)
-    return set(at.execute(select(poses.c.number).where(poses.c.run == run, poses.c.excluded.is_(None))).scalars())
+    return set(
+        connection.execute(select(poses.c.number).where(poses.c.run == run, poses.c.excluded.is_(None))).scalars()
+    )
 
 
 def lost_pose_error(run: str, number: int) -> RecordError:
@@ -133,13 +135,13 @@ def lost_pose_error(run: str, number: int) -> RecordError:
     return RecordError(f"{_lost_text(run, number)}; {RECOVER}")
 
 
-def lost_rows(at: Connection) -> list[str]:
+def lost_rows(connection: Connection) -> list[str]:
     """A phrase for each incomplete pose of all runs."""
-    run_ids = at.execute(select(runs.c.run)).scalars().all()
-    return [_lost_text(run, number) for run in run_ids for number in _incomplete(at, run)]
+    run_ids = connection.execute(select(runs.c.run)).scalars().all()
+    return [_lost_text(run, number) for run in run_ids for number in _incomplete(connection, run)]
 
 
-def _incomplete(at: Connection, run: str) -> list[int]:
+def _incomplete(connection: Connection, run: str) -> list[int]:
     """The numbers of poses that are not exactly once in both tables, without the excluded ones. One statement, so that
     a run in progress is seen at one instant.
     """
@@ -148,7 +150,7 @@ def _incomplete(at: Connection, run: str) -> list[int]:
         for k, table in enumerate((poses, blocks))
     ]
     places: tuple[list[int], list[int]] = ([], [])
-    for place, number in at.execute(union_all(*parts)):
+    for place, number in connection.execute(union_all(*parts)):
         places[place].append(number)
     expected, sampled = map(Counter, places)
     inconsistent = {
@@ -156,7 +158,9 @@ def _incomplete(at: Connection, run: str) -> list[int]:
     }
     if not inconsistent:
         return []
-    excluded = at.execute(select(poses.c.number).where(poses.c.run == run, poses.c.excluded.is_not(None))).scalars()
+    excluded = connection.execute(
+        select(poses.c.number).where(poses.c.run == run, poses.c.excluded.is_not(None))
+    ).scalars()
     return sorted(inconsistent - set(excluded))
 
 
@@ -164,13 +168,13 @@ def _lost_text(run: str, number: int) -> str:
     return f"run {run}, pose {number}: a part of it is lost on the disk"
 
 
-def require_rows(at: Connection, table: SqlTable, run: str) -> None:
+def require_rows(connection: Connection, table: SqlTable, run: str) -> None:
     """Raises RecordError if the index of SQLite hides a row of a run in a small table."""
     by_index = select(func.count()).where(table.c.run == run).scalar_subquery()
     unindexed = cast(list(table.c)[2], String)  # is not in the index, so that this count reads the rows themselves
     by_table = select(func.count(unindexed)).where(table.c.run.concat("") == run).scalar_subquery()
-    indexed, counted = at.execute(select(by_index, by_table)).one()
-    if indexed != counted:
+    indexed, table_count = connection.execute(select(by_index, by_table)).one()
+    if indexed != table_count:
         raise RecordError(f"run {run}: a row of its {table.name} is lost on the disk; {RECOVER}")
 
 
@@ -198,11 +202,13 @@ def kept_of(row: Row[Any]) -> Kept:
     return Kept(pose, block, excluded=row.excluded, number=row.number, **{name: row._mapping[name] for name in BESIDE})
 
 
-def put_state(to: Connection, run: str, state: Mapping[str, Any]) -> None:
+def put_state(connection: Connection, run: str, state: Mapping[str, Any]) -> None:
     """Insert or replace the state of the simulated bench of a run."""
-    insert_or_replace(to, states, {"run": run, "state": dict(state)}, ("run",))
+    insert_or_replace(connection, states, {"run": run, "state": dict(state)}, ("run",))
 
 
-def insert_or_replace(to: Connection, table: SqlTable, values: Mapping[str, Any], key: Sequence[str]) -> None:
+def insert_or_replace(connection: Connection, table: SqlTable, values: Mapping[str, Any], key: Sequence[str]) -> None:
     """Insert a row, or replace the one of the same key."""
-    to.execute(insert_or(to, table).values(values).on_conflict_do_update(index_elements=list(key), set_=dict(values)))
+    connection.execute(
+        insert_or(connection, table).values(values).on_conflict_do_update(index_elements=list(key), set_=dict(values))
+    )

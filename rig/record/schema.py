@@ -76,22 +76,22 @@ class Document(TypeDecorator[Any]):
         return decoded
 
 
-def is_new(to: Connection, table: Table, values: Mapping[str, Any]) -> bool:
+def is_new(connection: Connection, table: Table, values: Mapping[str, Any]) -> bool:
     """Insert a row unless its key exists. Returns whether it was inserted."""
-    statement = insert_or(to, table).values(values).on_conflict_do_nothing()
-    return bool(to.execute(statement, execution_options={"preserve_rowcount": True}).rowcount)
+    statement = insert_or(connection, table).values(values).on_conflict_do_nothing()
+    return bool(connection.execute(statement, execution_options={"preserve_rowcount": True}).rowcount)
 
 
-def insert_or(to: Connection, table: Table) -> sqlite.Insert | postgresql.Insert:
+def insert_or(connection: Connection, table: Table) -> sqlite.Insert | postgresql.Insert:
     """An insert with a clause for an existing key."""
     from sqlalchemy.dialects import postgresql, sqlite  # slow to import, and nothing that only reads needs them
 
-    return postgresql.insert(table) if to.dialect.name == SERVER else sqlite.insert(table)
+    return postgresql.insert(table) if connection.dialect.name == SERVER else sqlite.insert(table)
 
 
-def newest_first(at: Connection) -> TextClause:
+def newest_first(connection: Connection) -> TextClause:
     """The order of runs: by their begin in this record; with many rigs, by their clocks."""
-    return text("runs.created DESC, runs.run DESC" if at.dialect.name == SERVER else "runs.rowid DESC")
+    return text("runs.created DESC, runs.run DESC" if connection.dialect.name == SERVER else "runs.rowid DESC")
 
 
 def give_sha256(connection: sqlite3.Connection) -> None:
@@ -250,13 +250,13 @@ answers = Table(  # about one sensor of a fleet, so that the same question is no
 )
 
 
-def upgrade(to: Connection, version: int) -> None:
+def upgrade(connection: Connection, version: int) -> None:
     """Make missing tables, and change those of the older `version`; 0 is a database without tables."""
-    older = set(inspect(to).get_table_names())
-    metadata.create_all(to)
+    older = set(inspect(connection).get_table_names())
+    metadata.create_all(connection)
     for statement in (migration for old in range(version or SCHEMA, SCHEMA) for migration in MIGRATIONS[old]):
         if statement.split()[2] in older:  # ALTER TABLE name; a new table has every column
-            to.execute(text(statement))
+            connection.execute(text(statement))
 
 
 # Statements from each version to the next, see `upgrade`.

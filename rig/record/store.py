@@ -146,8 +146,8 @@ class Record:
         """Add a run of `procedure` in the state "running", for a table of `kind`. Returns its id."""
         values = {"kind": kind, "procedure": procedure, "state": "running", "settings": dict(settings)}
         values |= {"bench": dict(bench), "identities": dict(identities), "configuration": configuration}
-        with self._engine.begin() as to:
-            return _new_run(to, values | {"constants": dict(constants), "source": source})
+        with self._engine.begin() as connection:
+            return _new_run(connection, values | {"constants": dict(constants), "source": source})
 
     def keep(self, run: str, number: int, recorded: Kept, state: Mapping[str, Any] | None) -> None:
         """Add pose, samples and the `state` of the simulated bench, in one transaction."""
@@ -158,31 +158,31 @@ class Record:
         samples |= {"samples": codec.encode(recorded.samples.volts)}
         measured = recorded.dwell
         dwell = {"n": measured.n, "means": dict(measured.means), "stds": dict(measured.stds)}
-        with self._engine.begin() as to:
+        with self._engine.begin() as connection:
             pose |= {name: getattr(recorded, name) for name in BESIDE}
             for table, values in ((poses, pose), (blocks, samples), (dwells, dwell)):
-                to.execute(insert(table), with_checksum(table, key | values))
+                connection.execute(insert(table), with_checksum(table, key | values))
             if state is not None:
-                put_state(to, run, state)
-            self._put_lines(to)
+                put_state(connection, run, state)
+            self._put_lines(connection)
 
     def keep_readings(self, run: str, new_readings: Iterable[Reading], state: Mapping[str, Any] | None) -> None:
         """Add readings and the `state` of the simulated bench, in one transaction. An existing name is replaced."""
-        with self._engine.begin() as to:
+        with self._engine.begin() as connection:
             for reading in new_readings:
                 row = with_checksum(readings, {"run": run, "at": timestamp(), **vars(reading)})
-                insert_or_replace(to, readings, row, ("run", "name"))
+                insert_or_replace(connection, readings, row, ("run", "name"))
             if state is not None:
-                put_state(to, run, state)
-            self._put_lines(to)
+                put_state(connection, run, state)
+            self._put_lines(connection)
 
     def log(self, run: str, clock_s: float, source: str, event: str, text: str) -> None:
         """Add a line to the log of a run. It is written with the next pose, or with MOST_LINES other lines."""
         line = {"run": run, "at": timestamp(), "clock_s": clock_s, "who": source, "what": event, "text": text}
         self._lines.append(line)
         if len(self._lines) >= MOST_LINES:
-            with self._engine.begin() as to:
-                self._put_lines(to)
+            with self._engine.begin() as connection:
+                self._put_lines(connection)
 
     def exclude(self, run: str, number: int, reason: str | None) -> None:
         """Exclude a pose from every analysis, with a reason that stays as an event; None includes it again.
@@ -190,17 +190,19 @@ class Record:
         For a row of an imported table the event alone says it. Raises RecordError for an unknown pose.
         """
         is_pose = (poses.c.run == run) & (poses.c.number == number)
-        with self._engine.begin() as to:
-            updated = to.execute(update(poses).where(is_pose).values(excluded=reason)).rowcount
-            if not updated and not 0 <= number < imported_rows(to, run):
+        with self._engine.begin() as connection:
+            updated = connection.execute(update(poses).where(is_pose).values(excluded=reason)).rowcount
+            if not updated and not 0 <= number < imported_rows(connection, run):
                 raise RecordError(f"run {run} has no pose {number}; `rig show {run} --poses` lists its poses")
             change = f"pose {number} {'included' if reason is None else 'excluded'}"
-            to.execute(insert(events), {"run": run, "at": timestamp(), "what": change, "text": reason or "again"})
+            connection.execute(
+                insert(events), {"run": run, "at": timestamp(), "what": change, "text": reason or "again"}
+            )
 
     def keep_state(self, run: str, state: Mapping[str, Any]) -> None:
         """Store the state of the simulated bench before the first pose."""
-        with self._engine.begin() as to:
-            put_state(to, run, state)
+        with self._engine.begin() as connection:
+            put_state(connection, run, state)
 
     def set_state(
         self, run: str, state: str, message: str | None = None, results: Mapping[str, Any] | None = None
@@ -208,19 +210,19 @@ class Record:
         """Set the state: running, complete, stopped or failed. The last three end the run."""
         end_time = None if state == "running" else timestamp()
         values = {"state": state, "message": message, "ended": end_time, "results": dict(results or {})}
-        with self._engine.begin() as to:
-            to.execute(update(runs).where(runs.c.run == run).values(values))
-            self._put_lines(to)
+        with self._engine.begin() as connection:
+            connection.execute(update(runs).where(runs.c.run == run).values(values))
+            self._put_lines(connection)
 
     def set_results(self, run: str, results: Mapping[str, Any]) -> None:
         """Replace the results of a run after its end."""
-        with self._engine.begin() as to:
-            to.execute(update(runs).where(runs.c.run == run).values(results=dict(results)))
+        with self._engine.begin() as connection:
+            connection.execute(update(runs).where(runs.c.run == run).values(results=dict(results)))
 
     def note(self, run: str, event: str, text: str) -> None:
         """Add an event to a run."""
-        with self._engine.begin() as to:
-            to.execute(insert(events), {"run": run, "at": timestamp(), "what": event, "text": text})
+        with self._engine.begin() as connection:
+            connection.execute(insert(events), {"run": run, "at": timestamp(), "what": event, "text": text})
 
     def add_table(self, table: Table, settings: Mapping[str, Any] | None = None) -> str:
         """Add an imported table as a run, with the settings of the import. Returns its id."""
@@ -231,34 +233,34 @@ class Record:
             *({"name": name, "numbers": column.astype("<f8").tobytes()} for name, column in table.columns.items()),
             *({"name": name, "texts": list(column)} for name, column in table.labels.items()),
         ]
-        with self._engine.begin() as to:
-            run = _new_run(to, values | {"ended": timestamp()})
+        with self._engine.begin() as connection:
+            run = _new_run(connection, values | {"ended": timestamp()})
             for position, cell in enumerate(cells):
                 row = with_checksum(columns, {**cell, "position": position})
-                to.execute(insert(columns), {**row, "run": run})
+                connection.execute(insert(columns), {**row, "run": run})
         return run
 
     # reading
 
     def runs(self) -> list[Run]:
         """Every readable run, newest first; `damaged_runs` has the others."""
-        with self._reading() as at:
-            rows = at.execute(select_runs().order_by(newest_first(at))).all()
+        with self._reading() as connection:
+            rows = connection.execute(select_runs().order_by(newest_first(connection))).all()
         return [self._with_true_state(run_of(row)) for row in rows if not is_damaged(runs, row._mapping)]
 
     def damaged_runs(self) -> list[str]:
         """A sentence for each run with a damaged entry, newest first."""
-        with self._reading() as at:
-            rows = at.execute(select_runs().order_by(newest_first(at))).all()
+        with self._reading() as connection:
+            rows = connection.execute(select_runs().order_by(newest_first(connection))).all()
         return [damage_text(row.run) for row in rows if is_damaged(runs, row._mapping)]
 
     def damaged_rows(self) -> list[str]:
         """A phrase for each row of a run, except its entry, that changed on the disk or is lost."""
-        with self._reading() as at:
-            phrases = lost_rows(at)
-            checked = set(at.execute(select(runs.c.run).where(runs.c.checksum.is_not(None))).scalars())
+        with self._reading() as connection:
+            phrases = lost_rows(connection)
+            checked = set(connection.execute(select(runs.c.run).where(runs.c.checksum.is_not(None))).scalars())
             for table in (poses, blocks, dwells, readings, columns):
-                rows = at.execution_options(yield_per=32).execute(select(table))
+                rows = connection.execution_options(yield_per=32).execute(select(table))
                 phrases += [
                     place_text(row, table) for row in rows if is_damaged(table, row._mapping, row.run in checked)
                 ]
@@ -270,9 +272,16 @@ class Record:
         `last` is the newest run; `last PROCEDURE`, `last SENSOR` and `last PROCEDURE SENSOR` the newest of these.
         Raises UnknownRun with a suggestion; RecordError if the entry of the run is damaged.
         """
-        with self._reading() as at:
-            rows = at.execute(select_named(at, name)).all() or at.execute(select_beginning(name)).all()
-            names = at.execute(select(runs.c.procedure if name.startswith(f"{LAST} ") else runs.c.run)).scalars().all()
+        with self._reading() as connection:
+            rows = (
+                connection.execute(select_named(connection, name)).all()
+                or connection.execute(select_beginning(name)).all()
+            )
+            names = (
+                connection.execute(select(runs.c.procedure if name.startswith(f"{LAST} ") else runs.c.run))
+                .scalars()
+                .all()
+            )
         if len(rows) == 1:
             if is_damaged(runs, rows[0]._mapping):
                 raise RecordError(f"{self.where}: {damage_text(rows[0].run)}")
@@ -299,48 +308,50 @@ class Record:
         """The poses in order, without the excluded ones."""
         is_included = (poses.c.run == run) & poses.c.excluded.is_(None)
         query = select(poses).where(is_included).order_by(poses.c.number)
-        with self._reading() as at:
-            required = has_checksums(at, run)
-            return [pose_of(sound(row, poses, required=required)) for row in at.execute(query)]
+        with self._reading() as connection:
+            required = has_checksums(connection, run)
+            return [pose_of(sound(row, poses, required=required)) for row in connection.execute(query)]
 
     def excluded(self, run: str) -> dict[int, str]:
         """The reason of each excluded pose, or row of an imported table, by its number."""
         is_excluded = (poses.c.run == run) & poses.c.excluded.is_not(None)
         query = select(poses.c.number, poses.c.excluded).where(is_excluded).order_by(poses.c.number)
-        with self._reading() as at:
-            if imported_rows(at, run):
+        with self._reading() as connection:
+            if imported_rows(connection, run):
                 return excluded_rows(self.events(run))
-            return {row.number: row.excluded for row in at.execute(query)}
+            return {row.number: row.excluded for row in connection.execute(query)}
 
     def next_number(self, run: str) -> int:
         """The number of the next pose. Excluded poses count."""
-        with self._reading() as at:
-            highest = at.execute(select(func.max(poses.c.number)).where(poses.c.run == run)).scalar_one()
+        with self._reading() as connection:
+            highest = connection.execute(select(func.max(poses.c.number)).where(poses.c.run == run)).scalar_one()
         return 0 if highest is None else int(highest) + 1
 
     def last_t_s(self, run: str) -> float | None:
         """The time of the last pose; None before the first."""
-        with self._reading() as at:
-            last: float | None = at.execute(select(func.max(poses.c.t_s)).where(poses.c.run == run)).scalar_one()
+        with self._reading() as connection:
+            last: float | None = connection.execute(
+                select(func.max(poses.c.t_s)).where(poses.c.run == run)
+            ).scalar_one()
         return last
 
     def readings(self, run: str) -> list[Reading]:
         """The run's readings, in the order of their names."""
         query = select(readings).where(readings.c.run == run).order_by(readings.c.name)
-        with self._reading() as at:
-            require_rows(at, readings, run)
-            required = has_checksums(at, run)
-            rows = [sound(row, readings, required=required) for row in at.execute(query)]
+        with self._reading() as connection:
+            require_rows(connection, readings, run)
+            required = has_checksums(connection, run)
+            rows = [sound(row, readings, required=required) for row in connection.execute(query)]
         return [Reading(row.name, row.value, row.unit, row.std) for row in rows]
 
     def kept(self, run: str) -> Iterator[Kept]:
         """Every pose with its samples, in order, with the excluded ones. Only a few are in memory at a time."""
         match = (poses.c.run == blocks.c.run) & (poses.c.number == blocks.c.number)
         query = select(poses, blocks).join_from(poses, blocks, match).where(poses.c.run == run)
-        with self._reading() as at:
-            excluded = require_whole(at, run)
-            required = has_checksums(at, run)
-            options = at.execution_options(yield_per=32)
+        with self._reading() as connection:
+            excluded = require_whole(connection, run)
+            required = has_checksums(connection, run)
+            options = connection.execution_options(yield_per=32)
             for row in options.execute(query.order_by(poses.c.number)):
                 excluded.discard(row.number)
                 if row.excluded is None or not any(
@@ -358,10 +369,10 @@ class Record:
         match = (poses.c.run == dwells.c.run) & (poses.c.number == dwells.c.number)
         query = select(poses, dwells).join_from(poses, dwells, match, isouter=True)
         is_later = (poses.c.run == run) & (poses.c.number > after_number) & poses.c.excluded.is_(None)
-        with self._reading() as at:
-            excluded = require_whole(at, run) if after_number < 0 else set()
-            required = has_checksums(at, run)
-            selected = at.execute(query.where(is_later).order_by(poses.c.number))
+        with self._reading() as connection:
+            excluded = require_whole(connection, run) if after_number < 0 else set()
+            required = has_checksums(connection, run)
+            selected = connection.execute(query.where(is_later).order_by(poses.c.number))
             rows = [sound(row, poses, dwells, required=required) for row in selected]
         for number in sorted(excluded - {row.number for row in rows}):
             raise lost_pose_error(run, number)
@@ -374,29 +385,29 @@ class Record:
 
     def state(self, run: str) -> dict[str, Any] | None:
         """The state of the simulated bench after the last pose; None on a real bench."""
-        with self._reading() as at:
-            return at.execute(select(states.c.state).where(states.c.run == run)).scalar_one_or_none()
+        with self._reading() as connection:
+            return connection.execute(select(states.c.state).where(states.c.run == run)).scalar_one_or_none()
 
     def events(self, run: str) -> list[Event]:
         """The events of a run, in order."""
         query = select(events.c.at, events.c.what, events.c.text).where(events.c.run == run)
-        with self._reading() as at:
-            return [Event(*row) for row in at.execute(query.order_by(events.c.event))]
+        with self._reading() as connection:
+            return [Event(*row) for row in connection.execute(query.order_by(events.c.event))]
 
     def lines(self, run: str, events: Sequence[str] = ()) -> list[Line]:
         """The log of a run, in order; only the kinds in `events`, if there are any."""
         columns = [log.c[name] for name in ("at", "clock_s", "who", "what", "text")]
         is_wanted = (log.c.run == run) & (log.c.what.in_(events) if events else true())
-        with self._reading() as at:
-            return [Line(*row) for row in at.execute(select(*columns).where(is_wanted).order_by(log.c.line))]
+        with self._reading() as connection:
+            return [Line(*row) for row in connection.execute(select(*columns).where(is_wanted).order_by(log.c.line))]
 
     def columns(self, run: str) -> tuple[dict[str, NDArray[np.float64]], dict[str, tuple[str, ...]]]:
         """The columns of an imported table: numbers, and texts, by name."""
         query = select(columns).where(columns.c.run == run).order_by(columns.c.position)
-        with self._reading() as at:
-            require_rows(at, columns, run)
-            required = has_checksums(at, run)
-            rows = [sound(row, columns, required=required) for row in at.execute(query)]
+        with self._reading() as connection:
+            require_rows(connection, columns, run)
+            required = has_checksums(connection, run)
+            rows = [sound(row, columns, required=required) for row in connection.execute(query)]
         numbers = {row.name: np.frombuffer(row.numbers, "<f8") for row in rows if row.numbers is not None}
         return numbers, {row.name: tuple(row.texts) for row in rows if row.numbers is None}
 
@@ -404,17 +415,17 @@ class Record:
     def _reading(self) -> Iterator[Connection]:
         """A connection for reading. An impossible value is a RecordError."""
         try:
-            with self._engine.connect() as at:
-                yield at
+            with self._engine.connect() as connection:
+                yield connection
         except (ValueError, TypeError, LookupError, OverflowError, DatabaseError) as error:
             reason = f"{type(error).__name__}: {error}".partition("\n")[0]
             raise RecordError(f"{self.where}: the record is damaged; {RECOVER} ({reason})") from None
 
-    def _put_lines(self, to: Connection) -> None:
+    def _put_lines(self, connection: Connection) -> None:
         """Write the lines of the log. After a failure they are dropped."""
         lines, self._lines = self._lines, []
         if lines:
-            to.execute(insert(log), lines)
+            connection.execute(insert(log), lines)
 
     def _with_true_state(self, run: Run) -> Run:
         """The run; in the state "stopped" if it is "running" without a process, because its process was killed."""
@@ -434,10 +445,10 @@ def timestamp() -> str:
     return datetime.now(UTC).isoformat(timespec="microseconds")
 
 
-def _new_run(to: Connection, values: Mapping[str, Any]) -> str:
+def _new_run(connection: Connection, values: Mapping[str, Any]) -> str:
     """Add a run. Returns its id, which sorts by time: 20261121-093012-sweep-a1b."""
     while True:
         run = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-{values['procedure']}-{secrets.token_hex(2)[:3]}"
         row = {"results": {}, "identities": {}, **values, "run": run, "created": timestamp(), "uid": uuid.uuid4().hex}
-        if is_new(to, runs, with_checksum(runs, row)):
+        if is_new(connection, runs, with_checksum(runs, row)):
             return run  # else a run of the same second has this id

@@ -211,7 +211,7 @@ def inflations(blocks: Sequence[Samples], axes: Sequence[str] = AXES) -> dict[st
     """Ratio of the noise of a mean to that of independent samples, from the blocks with the length of the first."""
     first = blocks[0]
     places = [k for k, name in enumerate(first.channels) if name in axes]
-    alike = np.stack([b.volts[:, places] for b in blocks if b.volts.shape == first.volts.shape])
+    equal_blocks = np.stack([b.volts[:, places] for b in blocks if b.volts.shape == first.volts.shape])
     names = [f"noise_inflation_{first.channels[k][1:]}" for k in places]
-    factors = zip(names, *measured_inflation(alike), strict=True)
+    factors = zip(names, *measured_inflation(equal_blocks), strict=True)
     return {name: float(factor) for name, factor, std in factors if std < SURE * factor}

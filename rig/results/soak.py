@@ -140,21 +140,21 @@ def _steady(soak: Soak, forecasts: Mapping[str, ForecastHistory], axis: str) -> 
     return results | {f"steady-state-{name}{end}": Result(s / HOUR_S, "h") for name, s in times.items()}
 
 
-def _foreseen(forecasts: Mapping[str, ForecastHistory], of: str) -> dict[str, Result]:
+def _foreseen(forecasts: Mapping[str, ForecastHistory], output_unit: str) -> dict[str, Result]:
     """The final values at the end of the soak, and the times from which they were known."""
     results: dict[str, Result] = {}
     for name, course in forecasts.items():
         quantity, _, axis = name.partition("-")
         if course.known_s is not None:
             final = course.last.final
-            unit = of if quantity == "bias" else f"{of}/g"
+            unit = output_unit if quantity == "bias" else f"{output_unit}/g"
             results[f"{quantity}-final-{axis}"] = Result(final.value, unit, final.half / COVERAGE_FACTOR)
             results[f"{quantity}-foreseen-{axis}"] = Result(course.known_s / HOUR_S, "h")
     return results
 
 
-def _drift(course: Course, state: SteadyState, of: str) -> dict[str, Result]:
-    unit, full_scale = (of, 1.0) if course.quantity == "bias" else ("", abs(state.final[0]))
+def _drift(course: Course, state: SteadyState, output_unit: str) -> dict[str, Result]:
+    unit, full_scale = (output_unit, 1.0) if course.quantity == "bias" else ("", abs(state.final[0]))
     value, std = state.drift
     results = {
         "drift": Result(value / full_scale, unit, std / full_scale),

@@ -91,9 +91,9 @@ class RunningEstimates:
     def begun(self, run: str) -> None:
         """The run begins or continues: take the poses in the record."""
         with Record() as record:
-            begun = record.run(run)
-            self.law, self.known = LAWS.get(begun.kind), {}
-            self.units = units_of(begun, self.law.channels) if self.law and begun.bench else {}
+            run_row = record.run(run)
+            self.law, self.known = LAWS.get(run_row.kind), {}
+            self.units = units_of(run_row, self.law.channels) if self.law and run_row.bench else {}
             for _, dwell in record.dwells(run) if self.law else ():
                 self._take(dwell)
 
@@ -227,11 +227,11 @@ class SoakForecaster:
     def begun(self, run: str) -> None:
         """The run begins or continues: take the poses in the record."""
         with Record() as record:
-            begun = record.run(run)
-            sensors = [Measured(record, begun, name) for name in sensors_of(begun)] or [Measured(record, begun)]
+            run_row = record.run(run)
+            sensors = [Measured(record, run_row, name) for name in sensors_of(run_row)] or [Measured(record, run_row)]
             self.followers = [Follower.of(sensor) for sensor in sensors]
         self.run, self.on_s = run, None
-        self.unit = str(begun.constants.get("unit", "V"))
+        self.unit = str(run_row.constants.get("unit", "V"))
 
     def values(self, recorded: Kept) -> list[Value]:
         """The forecast of each quantity, if this pose completes a reversal."""
@@ -262,21 +262,21 @@ def live_estimates(procedure: str) -> SoakForecaster | RunningEstimates:
     return SoakForecaster() if procedure == "soak" else RunningEstimates()
 
 
-def present(name: str, forecast: Forecast, of: str) -> str:
-    """The present value with its unit: 2.49928 V. `of` is the unit of the outputs."""
-    return f"{forecast.present.value:.5f} {_unit(name, of)}"
+def present(name: str, forecast: Forecast, output_unit: str) -> str:
+    """The present value with its unit: 2.49928 V. `output_unit` is the unit of the outputs."""
+    return f"{forecast.present.value:.5f} {_unit(name, output_unit)}"
 
 
-def outlook(name: str, forecast: Forecast, of: str) -> str:
+def outlook(name: str, forecast: Forecast, output_unit: str) -> str:
     """The final value and the time of the steady state, with bounds of 95 %."""
     if forecast.surprised:
         return "the drift does not look like a warm-up, so there is no forecast"
-    return f"{_final(forecast, _unit(name, of))}; {_time_to_steady(forecast)}"
+    return f"{_final(forecast, _unit(name, output_unit))}; {_time_to_steady(forecast)}"
 
 
-def _unit(name: str, of: str) -> str:
+def _unit(name: str, output_unit: str) -> str:
     """The unit of a bias or a scale factor."""
-    return f"{of}/g" if "scale" in name else of
+    return f"{output_unit}/g" if "scale" in name else output_unit
 
 
 def _final(forecast: Forecast, unit: str) -> str:
@@ -303,9 +303,11 @@ def _span(seconds: float) -> str:
     return f"{rounded(seconds / HOUR_S, 2)} h" if seconds >= HOUR_S else f"{seconds / 60:.0f} min"
 
 
-def lines(forecasts: Mapping[str, Forecast], of: str) -> str:
-    """The forecasts of all quantities in lines, with the time since power-on; `of` is the unit of the outputs."""
+def lines(forecasts: Mapping[str, Forecast], output_unit: str) -> str:
+    """The forecasts of all quantities in lines, with the time since power-on."""
     hours = max(forecast.t_s for forecast in forecasts.values()) / HOUR_S
-    texts = {name: f"{present(name, f, of)} now; {outlook(name, f, of)}" for name, f in forecasts.items()}
+    texts = {
+        name: f"{present(name, f, output_unit)} now; {outlook(name, f, output_unit)}" for name, f in forecasts.items()
+    }
     words = [f"  {name:<9} {text}" for name, text in texts.items()]
     return "\n".join([f"{rounded(hours)} h after power-on", *words])

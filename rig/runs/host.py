@@ -111,8 +111,8 @@ class RunHost:
         tally = self._rig.tally()
         if not tally:
             return
-        counted = [name for name, (_, unit) in tally.items() if not unit]
-        total = {name: tally[name][0] + self._before.get(name, 0.0) for name in counted}
+        counters = [name for name, (_, unit) in tally.items() if not unit]
+        total = {name: tally[name][0] + self._before.get(name, 0.0) for name in counters}
         readings = [Reading(name, total.get(name, value), unit) for name, (value, unit) in tally.items()]
         self._record.keep_readings(self._run, readings, None)
         losses = {words: total[name] for name, words in LOSSES.items() if name in total}

@@ -64,8 +64,8 @@ def start(
         observer.planned(planned)
         trail = Trace(record) if trace else None
         first = first_question(planned)
-        begun = _begun(record, bench, procedure, settings, observer, after_run, trail, first)
-        return _after_decision(record, begun, observer, trace)
+        started_run = _begun(record, bench, procedure, settings, observer, after_run, trail, first)
+        return _after_decision(record, started_run, observer, trace)
 
 
 def _begun(
@@ -228,8 +228,8 @@ def _error_of(failure: BaseException, run: Run) -> Exception:
     if isinstance(failure, (DriverError, ProcedureError, RigError)):
         return failure
     if isinstance(failure, KeyboardInterrupt):
-        by = str(failure) or "SIGINT"
-        return Stopped(f"{who_stopped(by)}; `rig resume {run.run}` continues the run", by)
+        signal_name = str(failure) or "SIGINT"
+        return Stopped(f"{who_stopped(signal_name)}; `rig resume {run.run}` continues the run", signal_name)
     return RuntimeError(f"{type(failure).__name__}: {failure}")
 
 

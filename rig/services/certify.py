@@ -33,18 +33,18 @@ class Certified:
     before: str | None = None
 
 
-def certified(of: Certified, number: str = "", customer: str = "") -> Certificate:
+def certified(subject: Certified, number: str = "", customer: str = "") -> Certificate:
     """The certificate. Raises ModelError for data without a reference; UnusableData, UnknownName, RecordError."""
-    require_reference(of.table.source, of.table.kind)
-    earlier, name = of.model, of.name
-    if of.before is not None:
-        earlier, name = read_model(of.before, of.effects), Path(of.before).name
-    fresh = bool(earlier.params) and earlier.provenance.get("data_sha256") != of.table.digest
-    fitted = fit(of.model, of.table)
-    figured = figures(fitted, earlier if fresh else None, limits(of.data, of.bench))
+    require_reference(subject.table.source, subject.table.kind)
+    earlier, name = subject.model, subject.name
+    if subject.before is not None:
+        earlier, name = read_model(subject.before, subject.effects), Path(subject.before).name
+    fresh = bool(earlier.params) and earlier.provenance.get("data_sha256") != subject.table.digest
+    fitted = fit(subject.model, subject.table)
+    figured = figures(fitted, earlier if fresh else None, limits(subject.data, subject.bench))
     created = str(earlier.provenance.get("created", "of unknown date"))[:10]
     details = CertificateDetails(number, customer, f"the model {name}, {created}" if fresh else "")
-    return issue(of.data, fitted, figured, of.bench, details)
+    return issue(subject.data, fitted, figured, subject.bench, details)
 
 
 def failed_results(certificate: Certificate) -> list[str]:

@@ -132,13 +132,13 @@ class RunTime:
     @classmethod
     def of(cls, record: Record, run: Run) -> RunTime:
         """Power-on of a run that switches the sensor, else the first pose."""
-        begun = datetime.fromisoformat(run.created)
+        start_time = datetime.fromisoformat(run.created)
         on_s = Measured(record, run, next(iter(run.bench.get("sensors", {})), None)).power_on_s() if run.rows else 0.0
         first = next(record.kept(run.run), None)
         first_s = first.t_s if first is not None else 0.0
         if on_s or run.procedure == "soak":
-            return cls(on_s, " since power-on", begun, first_s)
-        return cls(first_s, begun=begun, first_s=first_s)
+            return cls(on_s, " since power-on", start_time, first_s)
+        return cls(first_s, begun=start_time, first_s=first_s)
 
     def clock(self, t_s: float) -> str:
         """The time of day, UTC, for the pointer."""
@@ -155,13 +155,13 @@ def course_chart(course: Course, name: str, time: RunTime = RunTime(), units: Ma
     run_s, mean, low, high = course.line(name)
     t_s = [at_s - time.zero_s for at_s in run_s]
     size, unit_s = in_time(t_s[-1] - t_s[0] if t_s else 0.0)
-    at, colour = np.array(t_s) / size, CANDIDATE if name == "temperature" else MEASURED
-    band = (Band(at, np.array(low), np.array(high), colour=colour, opacity=0.2),) if course.each > 1 else ()
+    times, colour = np.array(t_s) / size, CANDIDATE if name == "temperature" else MEASURED
+    band = (Band(times, np.array(low), np.array(high), colour=colour, opacity=0.2),) if course.each > 1 else ()
     hover = f"%{{y:.6g}} at %{{x:.4g}} {unit_s}<br>%{{text}}"
     clock = [time.clock(at_s) for at_s in run_s]
-    line = Line(at, np.array(mean), colour=colour, hover=hover, markers=len(at) < FEW, texts=clock)
-    of = "°C" if name == "temperature" else units.get(name.removeprefix("rms "), "V")
-    return single_chart(Panel((*band, line), Axis(f"time{time.since} ({unit_s})"), Axis(f"{name} ({of})")))
+    line = Line(times, np.array(mean), colour=colour, hover=hover, markers=len(times) < FEW, texts=clock)
+    quantity_unit = "°C" if name == "temperature" else units.get(name.removeprefix("rms "), "V")
+    return single_chart(Panel((*band, line), Axis(f"time{time.since} ({unit_s})"), Axis(f"{name} ({quantity_unit})")))
 
 
 # A sensor's life
@@ -267,10 +267,10 @@ def deviations(curves: Sequence[DeviationComparison], scaled: Sequence[Scaled]) 
         ("first", MEASURED, "circle", "solid"),
         ("second", CANDIDATE, "diamond-open", "dash"),
     )
-    for curve, by, (name, colour, symbol, dash) in zip(curves, scaled, styles, strict=True):
-        model = Line(curve.tau_s, by.factor * curve.modelled, colour=colour, width=1.2, dash=dash)
-        values, low, high = (by.factor * curve_values for curve_values in (curve.measured, curve.low, curve.high))
-        dots = measured_points(curve.tau_s, values, low, high, by.unit, name)
+    for curve, scale, (name, colour, symbol, dash) in zip(curves, scaled, styles, strict=True):
+        model = Line(curve.tau_s, scale.factor * curve.modelled, colour=colour, width=1.2, dash=dash)
+        values, low, high = (scale.factor * curve_values for curve_values in (curve.measured, curve.low, curve.high))
+        dots = measured_points(curve.tau_s, values, low, high, scale.unit, name)
         series += [model, replace(dots, colour=colour, symbol=symbol, size=8)]
     y = Axis(f"Allan deviation ({scaled[0].unit})", log=True)
     return single_chart(Panel(tuple(series), Axis(TIME, log=True), y, legend="upper right"))

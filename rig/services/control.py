@@ -49,8 +49,8 @@ def controlled(
     keys = dict.fromkeys((p.sensor, p.quantity) for p in points if sensor in (None, p.sensor))
     if not keys:
         raise RecordError("no check-standard run is complete yet; `rig run check-standard` makes one")
-    of = {key: [p for p in points if (p.sensor, p.quantity) == key] for key in keys}
-    charted = {key: own_points for key, own_points in of.items() if len(own_points) >= FEWEST_RUNS}
+    points_by_key = {key: [p for p in points if (p.sensor, p.quantity) == key] for key in keys}
+    charted = {key: own_points for key, own_points in points_by_key.items() if len(own_points) >= FEWEST_RUNS}
     if not charted:
         names = ", ".join(dict.fromkeys(sensor for sensor, _ in keys))
         raise RecordError(f"{names}: {FEWEST_RUNS} check-standard runs are needed for a chart; there is one")

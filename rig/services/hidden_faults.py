@@ -200,9 +200,9 @@ def grouped(
         shared_effects = dict.fromkeys([e.name for g in shared for e in g.effects] + [e.name for e in makers])
         groups = [g for g in groups if g not in shared]
         groups.append(Group(members, tuple(e for e in of_catalogue if e.name in shared_effects)))
-    judged = [part for group in groups for part in _judged(group, effects)]
-    used = {e.name for group in judged for e in group.effects}
-    ordered = tuple(sorted(judged, key=lambda g: -max(f.size for f in g.faults)))
+    confirmed = [part for group in groups for part in _judged(group, effects)]
+    used = {e.name for group in confirmed for e in group.effects}
+    ordered = tuple(sorted(confirmed, key=lambda g: -max(f.size for f in g.faults)))
     return ordered, tuple(e for e in effects if e.name not in used)
 
 
@@ -257,7 +257,7 @@ def _correlation(a: Curve, b: Curve) -> float:
 
 def _visited(config: WorldConfig, seed: int, table: Table) -> Table:
     """The poses of a table, visited without noise."""
-    visited = World(config, seed).dwell_mean(
+    columns_visited = World(config, seed).dwell_mean(
         table.column("alpha_deg"),
         table.column("beta_deg"),
         direction=table.optional("direction", 1.0),
@@ -266,7 +266,7 @@ def _visited(config: WorldConfig, seed: int, table: Table) -> Table:
         noise_free=True,
         interval_s=QUIET_S,
     )
-    columns = {name: np.asarray(values, float) for name, values in visited.items() if name in table}
+    columns = {name: np.asarray(values, float) for name, values in columns_visited.items() if name in table}
     return Table.from_columns(table.kind, columns, table.constants, table.source)
 
 

@@ -58,8 +58,8 @@ def calibrating(runs: Iterable[Run]) -> dict[str, list[Run]]:
 
 def lives(run: Run, runs: Iterable[Run]) -> dict[str, int]:
     """How many calibrating runs there are of each sensor of `run`, where more than one."""
-    of = calibrating(runs)
-    counts = {sensor: len(of.get(sensor, ())) for sensor in members(run)}
+    runs_by_sensor = calibrating(runs)
+    counts = {sensor: len(runs_by_sensor.get(sensor, ())) for sensor in members(run)}
     return {sensor: count for sensor, count in counts.items() if count > 1}
 
 
@@ -210,17 +210,17 @@ def latest(record: Record, sensor: str, model: Model) -> Calibration:
 def judged(life: History, limits: Mapping[str, Limit], baseline: int = BASELINE_RUNS) -> History:
     """The same calibrations by other limits, and charts of another baseline. `limits` by result's name: a number is the
     greatest change since the last calibration, a pair the lowest and highest value."""
-    of = life.calibrations
-    names = dict.fromkeys(name for calibration in of for name in calibration.values)
-    return replace(life, quantities=tuple(_quantity(name, of, limits.get(name), baseline) for name in names))
+    calibrations = life.calibrations
+    names = dict.fromkeys(name for calibration in calibrations for name in calibration.values)
+    return replace(life, quantities=tuple(_quantity(name, calibrations, limits.get(name), baseline) for name in names))
 
 
-def closest(of: Sequence[Calibration], on: date) -> tuple[Calibration, float]:
+def closest(calibrations: Sequence[Calibration], on: date) -> tuple[Calibration, float]:
     """The calibration closest to a day, and by how many days it is older than that day; below 0: later."""
-    noon = datetime(on.year, on.month, on.day, 12, tzinfo=of[0].at.tzinfo)
-    days = [(noon - calibration.at) / timedelta(days=1) for calibration in of]
+    noon = datetime(on.year, on.month, on.day, 12, tzinfo=calibrations[0].at.tzinfo)
+    days = [(noon - calibration.at) / timedelta(days=1) for calibration in calibrations]
     best = int(np.argmin(np.abs(days)))
-    return of[best], days[best]
+    return calibrations[best], days[best]
 
 
 def stale(life: History, calibration: Calibration, age_days: float) -> str | None:
@@ -237,8 +237,10 @@ def stale(life: History, calibration: Calibration, age_days: float) -> str | Non
 def _runs(record: Record, sensor: str) -> list[tuple[str, Run]]:
     """The complete runs of a sensor in the order of time, each with its name as data, such as `RUN/a1`."""
     complete = sorted((run for run in record.runs() if run.state == "complete"), key=when)
-    of = [(members(run).get(sensor), run) for run in complete]
-    return [(f"{run.run}/{member}" if member else run.run, run) for member, run in of if member is not None]
+    members_and_runs = [(members(run).get(sensor), run) for run in complete]
+    return [
+        (f"{run.run}/{member}" if member else run.run, run) for member, run in members_and_runs if member is not None
+    ]
 
 
 def _none(record: Record, sensor: str, passed_over: Mapping[str, str]) -> RecordError:
@@ -251,7 +253,7 @@ def _none(record: Record, sensor: str, passed_over: Mapping[str, str]) -> Record
 def _calibration(record: Record, data: str, run: Run, model: Model) -> Calibration:
     """Raises CalibrationError where the run does not determine the model."""
     check_kind(run.kind, data)  # a night at rest is gigabytes of samples
-    at = date_of(run)
+    date = date_of(run)
     table = Measured.named(record, data).table()
     fitted = fit(model, table)
     values = {
@@ -264,19 +266,23 @@ def _calibration(record: Record, data: str, run: Run, model: Model) -> Calibrati
         raise DataError(f"{table.source}: does not determine every parameter of {model.name}")
     expired = str(run.constants[EXPIRED]) if EXPIRED in run.constants else None
     rig = str(run.bench.get("name", "")) or "elsewhere"
-    return Calibration(data, at, rig, values, expired, run.procedure, fitted.pooled_excess)
+    return Calibration(data, date, rig, values, expired, run.procedure, fitted.pooled_excess)
 
 
 def date_of(run: Run) -> datetime:
     """When the sensor was as the run found it. Raises DataError for a constant `date` that is none."""
     stated_date = run.constants.get("date")
     try:
-        at = (
+        moment = (
             datetime.fromisoformat(str(stated_date)) if stated_date is not None else datetime.fromisoformat(run.created)
         )
     except ValueError:
         raise DataError(f"run {run.run}: its constant date is {stated_date!r}; write it as 2025-03-01") from None
-    return at if at.tzinfo else at.replace(hour=at.hour or 12, tzinfo=datetime.fromisoformat(run.created).tzinfo)
+    return (
+        moment
+        if moment.tzinfo
+        else moment.replace(hour=moment.hour or 12, tzinfo=datetime.fromisoformat(run.created).tzinfo)
+    )
 
 
 def when(run: Run) -> datetime:
@@ -287,8 +293,8 @@ def when(run: Run) -> datetime:
         return datetime.fromisoformat(run.created)
 
 
-def _quantity(name: str, of: Sequence[Calibration], limit: Limit | None, baseline: int) -> Quantity:
-    determined = tuple(calibration for calibration in of if name in calibration.values)
+def _quantity(name: str, calibrations: Sequence[Calibration], limit: Limit | None, baseline: int) -> Quantity:
+    determined = tuple(calibration for calibration in calibrations if name in calibration.values)
     values = [calibration.values[name] for calibration in determined]
     numbers, stds = [calibration.value for calibration in values], [calibration.std for calibration in values]
     days = [calibration.at.timestamp() / 86400 for calibration in determined]
@@ -303,13 +309,13 @@ def _quantity(name: str, of: Sequence[Calibration], limit: Limit | None, baselin
     return Quantity(name, values[0].unit, determined, chart, line, limits, due_date, no_drift)
 
 
-def _no_drift(of: Sequence[Calibration], days: float) -> str:
+def _no_drift(calibrations: Sequence[Calibration], days: float) -> str:
     """Why these calibrations have no drift; "" where they have one."""
-    if len(of) < FEWEST_FOR_DRIFT:
+    if len(calibrations) < FEWEST_FOR_DRIFT:
         return f"A drift needs {FEWEST_FOR_DRIFT} calibrations at different times."
     if days < SHORTEST_FOR_DRIFT_DAYS:
         return f"A drift needs calibrations over {SHORTEST_FOR_DRIFT_DAYS:.0f} days; these are of {days:.2g} days."
-    if not all(calibration.complete for calibration in of):
+    if not all(calibration.complete for calibration in calibrations):
         return "A drift needs a complete model."
     return ""
 

@@ -49,10 +49,12 @@ def compare_days(life: History, first_day: date, second_day: date) -> Compared:
     return Compared(a.day, b.day, compare(a, b), (a.data, b.data))
 
 
-def compare_rigs(of: Sequence[Calibration], first_rig: str, second_rig: str) -> Compared:
+def compare_rigs(calibrations: Sequence[Calibration], first_rig: str, second_rig: str) -> Compared:
     """The means of all calibrations on two rigs. Raises RecordError for a rig that has none."""
     return Compared(
-        first_rig, second_rig, _compared(_means_on(first_rig, of), _means_on(second_rig, of), first_rig, second_rig)
+        first_rig,
+        second_rig,
+        _compared(_means_on(first_rig, calibrations), _means_on(second_rig, calibrations), first_rig, second_rig),
     )
 
 
@@ -61,11 +63,11 @@ def compare(a: Calibration, b: Calibration) -> dict[str, tuple[str, Agreement]]:
     return _compared(a.values, b.values, a.data, b.data)
 
 
-def _means_on(rig: str, of: Sequence[Calibration]) -> dict[str, Value]:
-    on_rig = [calibration for calibration in of if calibration.rig == rig]
+def _means_on(rig: str, calibrations: Sequence[Calibration]) -> dict[str, Value]:
+    on_rig = [calibration for calibration in calibrations if calibration.rig == rig]
     if not on_rig:
         raise RecordError(
-            f"no calibration on the rig {rig!r}.{did_you_mean(rig, {calibration.rig for calibration in of})}"
+            f"no calibration on the rig {rig!r}.{did_you_mean(rig, {calibration.rig for calibration in calibrations})}"
         )
     return {
         name: _mean([calibration.values[name] for calibration in on_rig if name in calibration.values])

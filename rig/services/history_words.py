@@ -14,10 +14,11 @@ Written = Callable[[float, int], str]
 
 def summary(life: History) -> str:
     """Number, period and model of the calibrations."""
-    of = life.calibrations
-    if len(of) == 1:
-        return f"{life.sensor}: one calibration, {of[0].day}, model {life.model}"
-    return f"{life.sensor}: {len(of)} calibrations from {of[0].day} to {of[-1].day}, model {life.model}"
+    calibrations = life.calibrations
+    if len(calibrations) == 1:
+        return f"{life.sensor}: one calibration, {calibrations[0].day}, model {life.model}"
+    period = f"from {calibrations[0].day} to {calibrations[-1].day}"
+    return f"{life.sensor}: {len(calibrations)} calibrations {period}, model {life.model}"
 
 
 def next_due(life: History, limit_is_given: str) -> str:
@@ -56,10 +57,10 @@ def chart_verdict(q: Quantity) -> str:
     return q.chart.verdict + progress
 
 
-def agreements(of: Compared, format_number: Written) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def agreements(compared: Compared, format_number: Written) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Head and rows of a table of the shared quantities; `format_number` formats a number to a number of digits."""
-    head = ("quantity", of.one, of.other, "difference", "U", "unit", "E_n", "")
-    return head, [_agreement(name, unit, agreement, format_number) for name, (unit, agreement) in of.rows.items()]
+    head = ("quantity", compared.one, compared.other, "difference", "U", "unit", "E_n", "")
+    return head, [_agreement(name, unit, agreement, format_number) for name, (unit, agreement) in compared.rows.items()]
 
 
 def _agreement(name: str, unit: str, agreement: Agreement, format_number: Written) -> tuple[str, ...]:

@@ -146,8 +146,8 @@ class ResultRow:
 
 def _value_on_page(name: str, result: Mapping[str, Any]) -> str:
     if (digits := _digits(name, result)) is not None:
-        value, _, of = _in_digits(result, digits).partition(" ")
-        return f"{value} {unit(of)}".rstrip()
+        value, _, unit_text = _in_digits(result, digits).partition(" ")
+        return f"{value} {unit(unit_text)}".rstrip()
     return estimate_in_prefix(result["value"], result["std"], result["unit"])
 
 
@@ -171,7 +171,11 @@ def result_rows(
                 for end in ("time", *FORECAST)
                 if (part := f"{sensor}steady-state-{end}{axis}") in results
             }
-            listed |= {f"{sensor}steady-state-{end}{axis}" for end, of in parts.items() if of["limit"] is None}
+            listed |= {
+                f"{sensor}steady-state-{end}{axis}"
+                for end, result_document in parts.items()
+                if result_document["limit"] is None
+            }
             value = _steady_sentence(bool(r["value"]), parts)
             rows.append(ResultRow(name, value, "must be reached" if limit else "", verdict))
         elif name.rpartition("/")[2] == "gap" and not r["value"]:
@@ -211,5 +215,5 @@ def _digits(name: str, result: Mapping[str, Any]) -> int | None:
 
 
 def _in_digits(result: Mapping[str, Any], digits: int) -> str:
-    factor, of = in_prefix(result["value"], None, result["unit"])
-    return f"{rounded(result['value'] * factor, digits)} {of}".rstrip()
+    factor, prefixed_unit = in_prefix(result["value"], None, result["unit"])
+    return f"{rounded(result['value'] * factor, digits)} {prefixed_unit}".rstrip()

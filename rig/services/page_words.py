@@ -43,27 +43,27 @@ class PageStep:
 
 def page_step(line: str, data: str = "", procedure: str = "") -> PageStep:
     """A message for a page. `data` is the run or file that it is about, `procedure` that of the run."""
-    to: dict[str, str] = {}
+    addresses: dict[str, str] = {}
 
     def opened(match: re.Match[str]) -> str:
         groups = match.groupdict()
         if groups.get("procedure") and groups["command"] == RUN.lower():
-            to[f"Measure {groups['procedure']}"] = f"/run?procedure={groups['procedure']}"
+            addresses[f"Measure {groups['procedure']}"] = f"/run?procedure={groups['procedure']}"
             return f"the procedure {groups['procedure']}"
         page = MODEL if "--poses" in (groups.get("options") or "") else PAGES[groups["command"]]
-        to[page] = address(page, data)
+        addresses[page] = address(page, data)
         return f"the page {page}"
 
     if longer := LONGER.search(line):
         settings = {"procedure": procedure, longer[1].replace("-", "_"): longer[2]}
-        to["Measure longer"] = f"/run?{urlencode(settings)}"
+        addresses["Measure longer"] = f"/run?{urlencode(settings)}"
     text = LONGER.sub("", line)
     text = BLOCK.sub(lambda match: f" ({opened(match)}).\n", text)
     for pattern in (QUOTED, BARE):
         text = pattern.sub(opened, text)
     for pattern, words in OPTION_WORDS:
         text = pattern.sub(words, text)
-    return PageStep(text.rstrip("\n"), to)
+    return PageStep(text.rstrip("\n"), addresses)
 
 
 def address(page: str, data: str) -> str:

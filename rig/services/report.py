@@ -57,9 +57,9 @@ def night_of(data: str, date: str, program: str) -> Page | None:
         from rig.results.soak import foreseen_of, night
 
         measured = Measured.named(record, data)
-        result, foreseen = night(measured), foreseen_of(measured)
-    pictures, facts = soak_album(result, foreseen), _facts(measured, date, program)
-    return pictures, lambda: soak_report(result, measured.run.results, facts, pictures, foreseen)
+        result, forecasts = night(measured), foreseen_of(measured)
+    pictures, facts = soak_album(result, forecasts), _facts(measured, date, program)
+    return pictures, lambda: soak_report(result, measured.run.results, facts, pictures, forecasts)
 
 
 def _facts(measured: Measured, date: str, program: str) -> Mapping[str, str]:

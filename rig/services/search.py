@@ -33,8 +33,8 @@ class Counted(Mapping[str, Effect]):
 
     def __iter__(self) -> Iterator[str]:
         self.round += 1
-        for at, name in enumerate(self._effects):
-            self.at, self.now = at, name
+        for number, name in enumerate(self._effects):
+            self.at, self.now = number, name
             yield name
         self.at = len(self)
 

@@ -337,8 +337,8 @@ def axes(record: Record | None, data: str, channel: str | None, rate_hz: float |
     name_parts = next(filter(None, map(AXIS.fullmatch, names)), None)
     if channel is not None or name_parts is None:
         return {_axis(first.channel): first}
-    alike = [f"{name_parts[1]}{axis}{name_parts[3]}" for axis in AXES]
-    return {_axis(name): source(name) for name in alike if name in names}
+    axis_names = [f"{name_parts[1]}{axis}{name_parts[3]}" for axis in AXES]
+    return {_axis(name): source(name) for name in axis_names if name in names}
 
 
 def _axis(channel: str) -> str:

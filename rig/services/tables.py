@@ -110,14 +110,16 @@ def load_all(names: Sequence[str], notify: Callable[[str], None] = lambda _: Non
 
 
 def joined_runs(
-    tables: Sequence[Table], begun: Sequence[datetime | None], notify: Callable[[str], None] = lambda _: None
+    tables: Sequence[Table], starts: Sequence[datetime | None], notify: Callable[[str], None] = lambda _: None
 ) -> Table:
-    """The tables of runs joined; times count from the beginning of the first, where all say when they were `begun`."""
+    """The tables of runs joined; times count from the beginning of the first, where all say when they were `starts`."""
     from calibrations.joined import clock_began_anew, join_tables  # a single table needs it not
 
-    start_times = [at for at in begun if at is not None]
+    start_times = [start for start in starts if start is not None]
     if len(start_times) == len(tables):
-        tables = [_later(t, (at - start_times[0]).total_seconds()) for t, at in zip(tables, start_times, strict=True)]
+        tables = [
+            _later(t, (start - start_times[0]).total_seconds()) for t, start in zip(tables, start_times, strict=True)
+        ]
     if clock_began_anew(tables):
         notify(
             "The time starts again in each of these; the analysis assumes that one followed directly after the other."

@@ -172,7 +172,8 @@ def static_files() -> None:
 def frame(desk: Desk, path: str) -> Iterator[dict[str, Key]]:
     """The head of a page; the body adds content and keys."""
     keys = {
-        str(k): Key(f"go to {title}", partial(ui.navigate.to, to)) for k, (to, title) in enumerate(PAGES.items(), 1)
+        str(k): Key(f"go to {title}", partial(ui.navigate.to, page_path))
+        for k, (page_path, title) in enumerate(PAGES.items(), 1)
     }
     ui.add_head_html(f'<link rel="stylesheet" href="/static/workbench.css">{TELL}{RESIZED}')
     ui.colors(primary="#0067a3", negative="#b3261e")
@@ -180,8 +181,8 @@ def frame(desk: Desk, path: str) -> Iterator[dict[str, Key]]:
         with ui.element("h1").classes("name"):
             ui.label(TITLE)
         with ui.element("nav").classes("ways"):
-            for to, title in PAGES.items():
-                ui.link(title, to).classes("here" if to == path else "")
+            for page_path, title in PAGES.items():
+                ui.link(title, page_path).classes("here" if page_path == path else "")
         if (lab := lab_read()) is not None:
             ui.label(f"record: {lab}").classes("quiet small")
         ui.element("div").classes("space")

@@ -71,13 +71,13 @@ def waiting(text: str) -> ui.label:
         return words(text, "quiet")
 
 
-def failed(title: str, reason: str | Exception, data: str = "", to: Mapping[str, str] | None = None) -> None:
-    """An error message. `data`: the run or file that it is about; `to`: addresses of more buttons by their labels."""
+def failed(title: str, reason: str | Exception, data: str = "", addresses: Mapping[str, str] | None = None) -> None:
+    """An error message. `data`: the run or file that it is about; `addresses`: further buttons by their labels."""
     step = page_step(reason if isinstance(reason, str) else raw_message(reason), data)
     with box("error").props("role=alert"):
         words(title, "title")
         words(for_page(step.text), "why quiet").style("white-space: pre-wrap")
-        buttons({**step.to, **(to or {})})
+        buttons({**step.to, **(addresses or {})})
 
 
 def noted(text: str, data: str = "") -> None:
@@ -93,9 +93,9 @@ def step_row(step: PageStep, classes: str = "") -> None:
         buttons(step.to)
 
 
-def buttons(to: Mapping[str, str]) -> None:
+def buttons(addresses: Mapping[str, str]) -> None:
     """Buttons that open addresses, by their labels."""
-    for label, address in to.items():
+    for label, address in addresses.items():
         ui.button(label, on_click=partial(ui.navigate.to, address)).props("outline dense")
 
 

@@ -55,9 +55,9 @@ class Hysteresis(Effect):
 
     def follow(self, a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[Array, list[Array]]:
         """`before` and after: the specific force at which each element would be at rest, g."""
-        limits, pressed = _limits(p), _pressed(a, p)
+        limits, limit_factor = _limits(p), _pressed(a, p)
         forces = [
-            np.minimum(limit * pressed, np.maximum(-limit * pressed, a - rest_point))
+            np.minimum(limit * limit_factor, np.maximum(-limit * limit_factor, a - rest_point))
             for limit, rest_point in zip(limits, before, strict=True)
         ]
         return sum(forces[1:], forces[0]) * (p.height / np.sum(limits)), [a - force for force in forces]

@@ -106,8 +106,8 @@ def _sawtooth(table: Table) -> tuple[float, float, float]:
     return 1 / f, float(offset), float(np.median(table.optional(table.std_names[0], 0.0))) / 2
 
 
-def _transform(values: Array, at: Array, frequencies: Array) -> NDArray[np.complex128]:
+def _transform(values: Array, positions: Array, frequencies: Array) -> NDArray[np.complex128]:
     """Sum of values exp(-2 pi i f at) at evenly spaced frequencies: a block's first one, and steps from there."""
-    steps = np.exp(-2j * np.pi * np.outer(frequencies[:TOGETHER] - frequencies[0], at))
-    firsts = np.exp(-2j * np.pi * np.outer(frequencies[::TOGETHER], at))
+    steps = np.exp(-2j * np.pi * np.outer(frequencies[:TOGETHER] - frequencies[0], positions))
+    firsts = np.exp(-2j * np.pi * np.outer(frequencies[::TOGETHER], positions))
     return np.asarray(((firsts * values) @ steps.T).ravel()[: len(frequencies)])

@@ -165,7 +165,7 @@ def _values(model: Model) -> dict[tuple[str, str, str], tuple[float, float | Non
 
 def _outcome(
     k: int,
-    of: Term,
+    model_term: Term,
     e: Estimate,
     budget: Budget,
     trial: Array,
@@ -180,13 +180,13 @@ def _outcome(
     reason = _why_further(k, coverage, std, float(trial.std()), budget) if judgement == CONSERVATIVE else ""
     if judgement == WIDENED:
         coverage = max(coverage, (e.value - low) / std, (high - e.value) / std)
-    limit = limits.get(parameter_name := name(of.effect, e.name, e.axis))
+    limit = limits.get(parameter_name := name(model_term.effect, e.name, e.axis))
     order = np.argsort(-weights)
     numbers = fit.table.numbered(np.arange(fit.table.n))
     return Outcome(
         name=parameter_name,
-        term=term(of.effect, next(p for p in of.effect.parameters if p.name == e.name)),
-        effect=of.name,
+        term=term(model_term.effect, next(p for p in model_term.effect.parameters if p.name == e.name)),
+        effect=model_term.name,
         parameter=e.name,
         axis=e.axis,
         unit=e.unit,
@@ -196,7 +196,7 @@ def _outcome(
         freedom=float(budget.freedom[k]),
         sources=sources(budget, k),
         simulated=Simulated(float(trial.std()), low, high, judgement, reason),
-        found=earlier.get((of.name, e.name, e.axis)),
+        found=earlier.get((model_term.name, e.name, e.axis)),
         decision=None if limit is None else decide(e.value, std, coverage * std, limit),
         weights=tuple((int(numbers[i]), float(weights[i])) for i in order),
     )
@@ -227,9 +227,9 @@ def _errors(fit: Fit, earlier_model: Model | None) -> Iterator[Error]:
         yield Error(channel, milli_unit(fit), as_found, _size(fit, c, fit))
 
 
-def _size(of: Fit, c: int, unit_of: Fit) -> tuple[float, float]:
-    sizes = np.zeros((len(of.channels), 2))
-    sizes[c] = rms(of.residual[c]), np.abs(of.residual[c]).max()
+def _size(errors_of: Fit, c: int, unit_of: Fit) -> tuple[float, float]:
+    sizes = np.zeros((len(errors_of.channels), 2))
+    sizes[c] = rms(errors_of.residual[c]), np.abs(errors_of.residual[c]).max()
     return float(in_milli(sizes[:, 0], unit_of)[c]), float(in_milli(sizes[:, 1], unit_of)[c])
 
 

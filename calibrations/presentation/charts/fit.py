@@ -97,8 +97,8 @@ def residual_chart(fit: Fit) -> Chart:
         tuple(residual(ChannelResidual(fit, c, False), x, colour, second=x is across[-1]) for x in across)
         for c in drawn_channels(fit, fit.residual)
     )
-    alike = bool(np.ptp(colour.values) == 0)  # a motion has one inclination
-    bar = None if alike or any(colour is x for x in across) else scale_of(colour, 0)
+    has_one_colour = bool(np.ptp(colour.values) == 0)  # a motion has one inclination
+    bar = None if has_one_colour or any(colour is x for x in across) else scale_of(colour, 0)
     return Chart(rows, row_height(fit), share_x=True, share_y=True, bar=bar)
 
 
@@ -185,7 +185,9 @@ def failure(channel: ChannelResidual) -> Panel:
     circles: tuple[Line, ...] = ()
     if fit.table.type.magnitude:
         turn = np.linspace(0, 2 * np.pi, 121)
-        circles = tuple(Line(np.cos(turn) + at, np.sin(turn), colour=QUIET, width=0.8) for at in (0.0, HALF_SPHERES))
+        circles = tuple(
+            Line(np.cos(turn) + offset, np.sin(turn), colour=QUIET, width=0.8) for offset in (0.0, HALF_SPHERES)
+        )
     title = "" if fit.table.type.magnitude else f"axis {fit.channels[c]}"
     return Panel((*circles, dots), *axes, title, equal=fit.table.type.magnitude)
 
@@ -237,15 +239,15 @@ def _outputs(channel: ChannelResidual) -> tuple[Array, Array, str]:
 
 def _stretches(channel: ChannelResidual, x: Array, model: Array) -> tuple[Array, Array]:
     """The model over x, one stretch for each inclination and direction of turning, with gaps between."""
-    table, at, values = channel.fit.table, [], []
+    table, abscissas, values = channel.fit.table, [], []
     groups = np.stack([table.optional("alpha_deg", 0.0), table.optional("direction", 0.0)])[:, channel.rows]
     _, group = np.unique(groups, axis=1, return_inverse=True)
     for k in range(int(group.max(initial=-1)) + 1):
         rows = channel.rows[group.ravel() == k]
         order = rows[np.argsort(x[rows], kind="stable")]
-        at += [*x[order], np.nan]
+        abscissas += [*x[order], np.nan]
         values += [*model[order], np.nan]
-    return np.array(at), np.array(values)
+    return np.array(abscissas), np.array(values)
 
 
 def _explained(step: Step[Fit], x: Column, channel: ChannelResidual) -> Iterator[Line | Points]:
@@ -256,9 +258,9 @@ def _explained(step: Step[Fit], x: Column, channel: ChannelResidual) -> Iterator
         yield Points(x.values[channel.c, rows], channel.factor * change[rows], colour=CANDIDATE, symbol="cross", size=5,
                      hover=hover)  # fmt: skip
         return
-    for side, at, values in curves(step, x, channel.c):
+    for side, abscissas, values in curves(step, x, channel.c):
         turning = {1: " clockwise", -1: " anticlockwise"}.get(int(side), "")
-        yield Line(at, channel.factor * values, colour=CANDIDATE, width=3, dash="solid" if side >= 0 else "dash",
+        yield Line(abscissas, channel.factor * values, colour=CANDIDATE, width=3, dash="solid" if side >= 0 else "dash",
                    halo=True, hover=f"explained by {step.name}{turning}")  # fmt: skip
 
 
@@ -334,9 +336,9 @@ def curves(step: Step[Fit], column: Column, c: int) -> Iterator[tuple[float, Arr
     count = np.bincount(part)
     x, y, side = (np.bincount(part, values) / count for values in (column.values[c], change, sides))
     for s in np.unique(side):
-        at = np.flatnonzero(side == s)
-        at = at[np.argsort(x[at], kind="stable")]
-        yield float(s), x[at], y[at]
+        rows = np.flatnonzero(side == s)
+        rows = rows[np.argsort(x[rows], kind="stable")]
+        yield float(s), x[rows], y[rows]
 
 
 def is_function(step: Step[Fit], column: Column, c: int) -> bool:
@@ -348,9 +350,9 @@ def is_function(step: Step[Fit], column: Column, c: int) -> bool:
         return True
     change, sides, x = change_of(step)[c], _sides(step), column.values[c]
     missed = np.zeros(len(change))
-    for side, at, values in curves(step, column, c):
+    for side, abscissas, values in curves(step, column, c):
         rows = sides == side
-        missed[rows] = change[rows] - np.interp(x[rows], at, values)
+        missed[rows] = change[rows] - np.interp(x[rows], abscissas, values)
     limit = max(MISSED * float(rms(change)), float(step.before.noise.floor[c]))
     return float(rms(missed)) <= limit
 

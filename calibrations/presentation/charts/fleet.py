@@ -46,16 +46,19 @@ def shares(population: Population) -> Chart:
 def rigs(errors: Sequence[RigError]) -> Chart:
     """Every rig's errors about the median of the rigs, with expanded uncertainties."""
     names = list(dict.fromkeys((e.effect, e.parameter, e.unit) for e in errors))
-    of = list(dict.fromkeys(e.rig for e in errors))
+    rig_names = list(dict.fromkeys(e.rig for e in errors))
     panels = []
     for effect, parameter, unit in names:
         rig_errors = [e for e in errors if (e.effect, e.parameter, e.unit) == (effect, parameter, unit)]
-        place, value = np.array([float(of.index(e.rig)) for e in rig_errors]), np.array([e.value for e in rig_errors])
+        place, value = (
+            np.array([float(rig_names.index(e.rig)) for e in rig_errors]),
+            np.array([e.value for e in rig_errors]),
+        )
         colours = [VERMILION if e.beyond else BLUE for e in rig_errors]
         dots = Points(value, place, colour=colours, reach=np.array([2 * e.std for e in rig_errors]))
-        y = Axis(low=-0.5, high=len(of) - 0.5, names=tuple(of), reverse=True)
+        y = Axis(low=-0.5, high=len(rig_names) - 0.5, names=tuple(rig_names), reverse=True)
         panels.append(Panel((Rule(0.0, "x", width=0.7), dots), Axis(), y, f"{effect}, {parameter} in {unit}"))
-    return stacked(panels, max(0.16 * len(of), 0.9) + 0.4, share_x=False)
+    return stacked(panels, max(0.16 * len(rig_names), 0.9) + 0.4, share_x=False)
 
 
 @dataclass(frozen=True)
@@ -72,11 +75,16 @@ class Spread:
 
 def spreads(quantities: Mapping[str, Sequence[Spread]]) -> Chart:
     """A panel for each quantity, in which every batch has its place."""
-    batches = list(dict.fromkeys(spread.batch for of in quantities.values() for spread in of))
+    batches = list(dict.fromkeys(spread.batch for batch_spreads in quantities.values() for spread in batch_spreads))
     x = Axis(low=-0.6, high=len(batches) - 0.4, names=tuple(batch or "no batch" for batch in batches))
     panels = [
-        Panel(tuple(part for spread in of for part in _spread(batches.index(spread.batch), spread)), x, Axis(), name)
-        for name, of in quantities.items()
+        Panel(
+            tuple(part for spread in batch_spreads for part in _spread(batches.index(spread.batch), spread)),
+            x,
+            Axis(),
+            name,
+        )
+        for name, batch_spreads in quantities.items()
     ]
     return stacked(panels, 1.7)
 

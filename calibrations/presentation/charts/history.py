@@ -119,7 +119,7 @@ def control_charts(charts: Mapping[str, ControlChart], units: Mapping[str, str])
 
 
 def control_panels(
-    name: str, chart: ControlChart, of: str, hover: Sequence[str] = (), keys: Sequence[str] | None = None
+    name: str, chart: ControlChart, unit_name: str, hover: Sequence[str] = (), keys: Sequence[str] | None = None
 ) -> dict[str, Panel]:
     """The three charts of one quantity by title; values are differences from the centre.
 
@@ -127,7 +127,7 @@ def control_panels(
     """
     reach, limit = np.full(len(chart.values), chart.reach), np.full(len(chart.ranges), chart.range_limit)
     slow, judged_from, change = chart.ewma_reach, chart.judged, f"{name} − centre"
-    centre = f"centre {chart.centre:.6g} {unit(of)}".rstrip()
+    centre = f"centre {chart.centre:.6g} {unit(unit_name)}".rstrip()
     parts = {
         INDIVIDUALS: (1, chart.values - chart.centre, -reach, reach, chart.jumps, judged_from, change, centre),
         EWMA: (1, chart.ewma - chart.centre, -slow, slow, chart.drifts, judged_from, change, chart.verdict),
@@ -135,12 +135,12 @@ def control_panels(
     }
     x = Axis("calibration", low=0.5, high=len(chart.values) + 0.5, ticks="integers")
     panels = {}
-    for title, (first, values, low, high, signals, judged, label, remark) in parts.items():
-        factor, spelt = prefixed(unit(of), float(np.abs([values, high]).max()))
+    for title, (first, values, low, high, signals, baseline_end, label, remark) in parts.items():
+        factor, spelt = prefixed(unit(unit_name), float(np.abs([values, high]).max()))
         numbers = np.arange(first, first + len(values), dtype=float)
         point_keys = None if keys is None else keys[first - 1 :]
         texts = [f"{text}: {rounded(v)} {spelt}" for text, v in zip(hover[first - 1 :], factor * values, strict=False)]
-        dots = _control_points(numbers, factor * values, signals, judged, texts, point_keys)
+        dots = _control_points(numbers, factor * values, signals, baseline_end, texts, point_keys)
         band = Band(numbers, factor * low, factor * high, steps=True)
         series = (band, Rule(0.0, width=0.7), Line(numbers, factor * values, colour=MEASURED, width=1), dots)
         panels[title] = Panel(series, x, Axis(labelled(label, spelt)), title, remark)
@@ -148,12 +148,12 @@ def control_panels(
 
 
 def _control_points(
-    x: Array, y: Array, signals: Collection[int], judged: int, hover: Sequence[str], keys: Sequence[str] | None
+    x: Array, y: Array, signals: Collection[int], baseline_end: int, hover: Sequence[str], keys: Sequence[str] | None
 ) -> Points:
     """Signals differ by form and colour."""
     symbols: list[Symbol] = []
     for k in range(len(x)):
-        baseline = k < judged
+        baseline = k < baseline_end
         if k in signals:
             symbols.append("diamond-open" if baseline else "diamond")
         else:

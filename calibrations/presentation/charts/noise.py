@@ -97,8 +97,8 @@ def scaled(still: Still, axis: str, in_sensed: bool) -> Scaled:
 def units(still: Still) -> dict[bool, str]:
     """Units that all of its axes can be drawn in: False the output's, True that of what is sensed."""
     names = {sensed.unit for sensed in still.sensed.values()}
-    alike = set(still.sensed) == set(still.axes) and len(names) == 1
-    return {False: still.unit} | ({True: names.pop()} if alike else {})
+    has_one_unit = set(still.sensed) == set(still.axes) and len(names) == 1
+    return {False: still.unit} | ({True: names.pop()} if has_one_unit else {})
 
 
 # One channel with noise models
@@ -111,22 +111,25 @@ def allan(
 
     `raw` is the curve of the record before non-noise signals were removed.
     """
-    by = scaled.factor
+    factor = scaled.factor
     values = curve.deviation if isinstance(curve, Curve) else curve.measured
     series: list[Line | Points] = []
     if raw is not None:
-        series.append(Points(raw.tau_s, by * raw.deviation, "measured", QUIET, "circle-open", 5))
-    dots = measured_points(curve.tau_s, by * values, by * curve.low, by * curve.high, scaled.unit,
+        series.append(Points(raw.tau_s, factor * raw.deviation, "measured", QUIET, "circle-open", 5))
+    dots = measured_points(curve.tau_s, factor * values, factor * curve.low, factor * curve.high, scaled.unit,
                            "measured" if raw is None else f"measured, {LESS}")  # fmt: skip
     first = models[0].fit
     rate_hz = first.channel.rate_hz
     tau_s = whole_steps(1 / rate_hz, float(curve.tau_s[-1]), rate_hz)
     if len(first.effects) + len(first.lines) > 1:
         variances = variance_parts(first, tau_s)
-        series += [_part(name, tau_s, by * np.sqrt(variance)) for name, variance in variances.items()]
-    series += [_model(model, tau_s, by * deviation(model.fit, tau_s)) for model in models]
-    sure = curve.edf > 1
-    low, high = by * float(curve.low.min()), by * float(curve.high[sure].max() if sure.any() else curve.high.max())
+        series += [_part(name, tau_s, factor * np.sqrt(variance)) for name, variance in variances.items()]
+    series += [_model(model, tau_s, factor * deviation(model.fit, tau_s)) for model in models]
+    is_certain = curve.edf > 1
+    low, high = (
+        factor * float(curve.low.min()),
+        factor * float(curve.high[is_certain].max() if is_certain.any() else curve.high.max()),
+    )
     y = Axis(f"Allan deviation ({scaled.unit})", log=True, low=low / 2, high=3 * high)
     return Panel((*series, dots), Axis(TIME, log=True), y, legend="upper center")
 
@@ -150,21 +153,26 @@ def spectrum(
 
     `bounds` (b,) are the intervals of the measured densities.
     """
-    order, by = np.argsort(fit.frequency_hz), scaled.factor
+    order, factor = np.argsort(fit.frequency_hz), scaled.factor
     f = fit.frequency_hz[order]
-    low, high = (by * root(bound[order]) for bound in fit.interval(COVERAGE))
-    density = by * root(fit.seen[order])
-    hover = [f"{value:.3g} {scaled.unit}/√Hz at {at:.4g} Hz" for at, value in zip(f, density, strict=True)]
-    lowest, highest = (by * root(bound[order]) for bound in bounds) if bounds else (None, None)
+    low, high = (factor * root(bound[order]) for bound in fit.interval(COVERAGE))
+    density = factor * root(fit.seen[order])
+    hover = [
+        f"{value:.3g} {scaled.unit}/√Hz at {frequency_hz:.4g} Hz"
+        for frequency_hz, value in zip(f, density, strict=True)
+    ]
+    lowest, highest = (factor * root(bound[order]) for bound in bounds) if bounds else (None, None)
     dots = Points(f, density, "measured", size=4, low=lowest, high=highest, hover=hover)
     series: list[Series] = [Band(f, low, high), dots]
     for effect in fit.effects if len(fit.effects) > 1 else ():
-        series.append(_part(effect.name, f, by * root(fit.part_of(effect)[order])))
+        series.append(_part(effect.name, f, factor * root(fit.part_of(effect)[order])))
     for curve in models:
         by_frequency = np.argsort(curve.fit.frequency_hz)
-        series.append(_model(curve, curve.fit.frequency_hz[by_frequency], by * root(curve.fit.expected[by_frequency])))
+        series.append(
+            _model(curve, curve.fit.frequency_hz[by_frequency], factor * root(curve.fit.expected[by_frequency]))
+        )
     series += [mark for line in fit.lines for mark in _marked(line.frequency_hz)]
-    expected = by * root(fit.expected)
+    expected = factor * root(fit.expected)
     bottom = min(float(expected.min()) / ROOM, float(density.min()) / 2)  # no measured point is cut off
     top = max(ROOM * float(expected.max()), 2 * float(density.max()))
     y = Axis(f"density ({scaled.unit}/√Hz)", log=True, low=bottom, high=top)
@@ -179,8 +187,8 @@ def record(channel: Channel, scaled: Scaled) -> Panel:
     each_s = samples_per_point * channel.size / channel.rate_hz
     size, unit = in_time(channel.length_s)
     hover = f"%{{y:.4g}} {scaled.unit} at %{{x:.4g}} {unit}"
-    at = np.asarray((np.arange(len(values)) + 0.5) * each_s / size)
-    line = Line(at, np.asarray(values), colour=MEASURED, width=1, hover=hover)
+    times = np.asarray((np.arange(len(values)) + 0.5) * each_s / size)
+    line = Line(times, np.asarray(values), colour=MEASURED, width=1, hover=hover)
     x, y = f"time ({unit}); means of {rounded(each_s, 2)} s", f"{channel.axis} − mean ({scaled.unit})"
     return Panel((line,), Axis(x), Axis(y))
 

@@ -143,11 +143,11 @@ def curve_chart(curve: PlaceCurve, forms: Sequence[FittedForm] = ()) -> Chart:
 def curve_panel(curve: PlaceCurve, axis: str, forms: Sequence[FittedForm] = ()) -> Panel:
     """The curve of one axis."""
     scale, unit = in_milli(curve.unit)
-    at, value, band = curve.at[axis], scale * curve.value[axis], COVERAGE * scale * curve.std[axis]
+    abscissas, value, band = curve.at[axis], scale * curve.value[axis], COVERAGE * scale * curve.std[axis]
     series: list[Series] = [
         Rule(0.0, width=0.7),
-        Band(at, value - band, value + band, "95 % band"),
-        Line(at, value, "curve", INK, 1.8, markers=len(at) < 12),
+        Band(abscissas, value - band, value + band, "95 % band"),
+        Line(abscissas, value, "curve", INK, 1.8, markers=len(abscissas) < 12),
     ]
     for colour, form in zip(FORM_COLOURS, forms, strict=False):
         form_curve = form.curve
@@ -189,16 +189,16 @@ def shares_by_place(steps: Falling) -> tuple[list[str], Array]:
     gains = np.maximum(-np.diff(errors), 0.0)
     unexplained = max(float(errors[-1]) - 1.0, 0.0)
     total = float(gains.sum()) + unexplained or 1.0
-    at = [_legend_label(step.name) for step in steps.steps]
-    size = {name: sum(g for g, a in zip(gains, at, strict=True) if a == name) for name in at}
+    place_labels = [_legend_label(step.name) for step in steps.steps]
+    size = {name: sum(g for g, a in zip(gains, place_labels, strict=True) if a == name) for name in place_labels}
     names = sorted(size, key=lambda name: (name == LINEAR, -size[name]))
     minor = [name for name in names if name != LINEAR][MOST_SHARES:]
-    at = [MINOR_PLACES if name in minor else name for name in at]
+    place_labels = [MINOR_PLACES if name in minor else name for name in place_labels]
     names = [*(name for name in names if name not in minor), *([MINOR_PLACES] if minor else [])]
     shares = np.zeros((len(errors), len(names) + 1))
     for row in range(len(errors)):
         for k in range(row, len(gains)):
-            shares[row, names.index(at[k])] += gains[k] / total
+            shares[row, names.index(place_labels[k])] += gains[k] / total
     shares[:, -1] = unexplained / total
     return [*names, UNEXPLAINED], shares
 

@@ -46,7 +46,7 @@ FORESEEN = (
 )
 
 
-def soak_album(soak: Soak, foreseen: Mapping[str, ForecastHistory] = MappingProxyType({})) -> list[Picture]:
+def soak_album(soak: Soak, histories: Mapping[str, ForecastHistory] = MappingProxyType({})) -> list[Picture]:
     """All pictures of a soak, and of what was foreseen of it, with words for a page."""
     course = (
         "Dots are reversals, with their standard errors; the line is the exponential approach with its standard error. "
@@ -66,8 +66,8 @@ def soak_album(soak: Soak, foreseen: Mapping[str, ForecastHistory] = MappingProx
         Picture("drift", "Bias and scale factor since power-on", course, drift(soak)),
         Picture("night", "Temperature, supply and noise", surroundings_words, surroundings(soak)),
     ]
-    if foreseen:
-        pictures.insert(1, Picture("foreseen", "Forecasts of the final values", FORESEEN, forecasts(soak, foreseen)))
+    if histories:
+        pictures.insert(1, Picture("foreseen", "Forecasts of the final values", FORESEEN, forecasts(soak, histories)))
     times_s, _ = soak.allan(soak.axes[0])
     return [*pictures, Picture("allan", "Allan deviation", noise, allan(soak))] if len(times_s) else pictures
 
@@ -84,14 +84,14 @@ def drift(soak: Soak) -> Chart:
     return Chart((tuple(bias_row), tuple(scale_row)), 2.9, share_x=True)
 
 
-def forecasts(soak: Soak, foreseen: Mapping[str, ForecastHistory]) -> Chart:
+def forecasts(soak: Soak, histories: Mapping[str, ForecastHistory]) -> Chart:
     """A column for each axis: forecasts of the final bias and scale factor, less the last forecast."""
     rows = []
     scales = (("bias", "bias", *in_milli(soak.table.unit)), ("scale", "scale factor", 1e6, "ppm"))
     for quantity, name, factor, unit in scales:
         panels = []
         for axis in soak.axes:
-            course = foreseen.get(f"{quantity}-{axis}")
+            course = histories.get(f"{quantity}-{axis}")
             title, y = f"axis {axis}" if quantity == "bias" else "", f"{name} forecast ({unit})"
             if course is None:
                 panels.append(Panel((), Axis(TIME), Axis(y), title))

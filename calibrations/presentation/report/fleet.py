@@ -57,7 +57,7 @@ def calibration_report(
         "batch. Sensors unlike all others of their batch are named and do not use its values."
     )
     picture = Picture("spreads", "The sensors of each batch", caption, spreads(quantities))
-    unlike = sum(int(spread.apart.sum()) for values in quantities.values() for spread in values)
+    outlier_count = sum(int(spread.apart.sum()) for values in quantities.values() for spread in values)
     return html(
         Page(
             headline=f"{subject}: calibrated together with their batches",
@@ -66,7 +66,7 @@ def calibration_report(
             subject="Fleet",
             summary="The model assumes that the parameters of a batch's sensors are from one population, whose mean "
             "and spread are estimated with them. A sensor with little data of its own gains most.",
-            figures=[("batches", str(count), ""), ("values unlike the rest", str(unlike), "")],
+            figures=[("batches", str(count), ""), ("values unlike the rest", str(outlier_count), "")],
             sections=[Section("Parameters", (picture,)), batches],
             provenance=facts,
         )

@@ -27,8 +27,8 @@ def estimate_cells(e: Estimate, without_std: str = "") -> tuple[str, str]:
     if not e.identified:
         return f"not identified: {e.why}", ""
     remark = f" ({without_std})" if without_std and not e.std else ""
-    factor, of = in_prefix(e.value, e.std, e.unit)
-    return estimate_text(e.value * factor, e.std * factor if e.std else None) + remark, unit(of)
+    factor, prefixed_unit = in_prefix(e.value, e.std, e.unit)
+    return estimate_text(e.value * factor, e.std * factor if e.std else None) + remark, unit(prefixed_unit)
 
 
 def matrices_section(fit: Fit) -> Section | None:

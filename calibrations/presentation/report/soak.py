@@ -147,9 +147,9 @@ def _figures(soak: Soak) -> list[tuple[str, str, str]]:
     return figures
 
 
-def _course(course: Course, of: str) -> tuple[str, ...]:
-    """One row of the table; `of` is the unit of the outputs: a bias in mV, a scale factor in mV/g."""
-    state, (factor, unit) = course.state, in_milli(of if course.quantity == "bias" else f"{of}/g")
+def _course(course: Course, output_unit: str) -> tuple[str, ...]:
+    """One row of the table; `output_unit` is the unit of the outputs: a bias in mV, a scale factor in mV/g."""
+    state, (factor, unit) = course.state, in_milli(output_unit if course.quantity == "bias" else f"{output_unit}/g")
     name = course.quantity.replace("scale", "scale factor")
     if state is None:
         return name, course.axis, rounded(factor * course.values[-1], 6), "–", "–", unit, "–", "–"

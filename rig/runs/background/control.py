@@ -172,8 +172,8 @@ def _begin(order: Order) -> str:
 
 def begun(status: Status) -> str:
     """The time of day, local, at which a background run began."""
-    at = datetime.strptime(status.key.rpartition("-")[0], KEY_TIME).replace(tzinfo=UTC)
-    return f"{at.astimezone():%H:%M:%S}"
+    start_time = datetime.strptime(status.key.rpartition("-")[0], KEY_TIME).replace(tzinfo=UTC)
+    return f"{start_time.astimezone():%H:%M:%S}"
 
 
 def latest() -> Status | None:

@@ -172,9 +172,9 @@ def _killed(status: Status) -> Status:
     return status
 
 
-def _stored(run: Run, counted: int, total: int) -> int:
+def _stored(run: Run, seen_poses: int, total: int) -> int:
     """The poses of a run that has ended. A signal can come before a stored one is counted."""
-    return max(run.rows, counted) if total else 0
+    return max(run.rows, seen_poses) if total else 0
 
 
 def _is_starting(status: Status) -> bool:

@@ -168,8 +168,8 @@ def register(desk: Desk) -> None:
 def _head(first: str, second: str, model: str) -> None:
     """The two runs, the model, and a button that swaps the runs."""
 
-    def to(first_data: str, second_data: str, by: str) -> None:
-        query = {"first": first_data, "second": second_data, **({"model": by} if by else {})}
+    def to(first_data: str, second_data: str, model_name: str) -> None:
+        query = {"first": first_data, "second": second_data, **({"model": model_name} if model_name else {})}
         ui.navigate.to(f"/compare?{urlencode(query)}")
 
     with box("row-of chosen"):

@@ -126,12 +126,12 @@ class CompareBox:
 
     def _fields(self) -> None:
         """Show the fields of the selected kind of comparison."""
-        of = self.life.calibrations
+        calibrations = self.life.calibrations
         self.fields.clear()
         self.result.clear()
         with self.fields:
             if self.kind.value == DAYS:
-                choices = (("One day", of[0]), ("Another", of[-1]))
+                choices = (("One day", calibrations[0]), ("Another", calibrations[-1]))
                 self.two = [ui.date_input(name, value=calibration.day).props("dense") for name, calibration in choices]
             elif self.kind.value == SENSOR:
                 self.two = [_select("Sensor", self.others, 0)]
@@ -175,8 +175,12 @@ def _show(compared: Compared, model: str) -> None:
     words(E_N, "quiet small")
 
 
-def _select(name: str, of: Sequence[str], first: int) -> ui.select:
-    return ui.select(list(of), label=name, value=of[first]).props("dense options-dense").style("min-width: 130px")
+def _select(name: str, options: Sequence[str], first: int) -> ui.select:
+    return (
+        ui.select(list(options), label=name, value=options[first])
+        .props("dense options-dense")
+        .style("min-width: 130px")
+    )
 
 
 # Pictures: one quantity over time, and its control charts. A click on a point opens its run.

@@ -71,7 +71,7 @@ def register(desk: Desk) -> None:
             except Exception as error:
                 body.clear()
                 with body:
-                    failed(f"{Path(file).name} cannot be imported", error, to={"Another file": "/import"})
+                    failed(f"{Path(file).name} cannot be imported", error, addresses={"Another file": "/import"})
                 return
             body.clear()
             with body:

@@ -148,8 +148,8 @@ class Workbench:
         except Exception as error:
             self.body.clear()
             with self.body:
-                to = {IMPORT: address(IMPORT, self.data)} if Path(self.data).is_file() else {}
-                failed(f"Cannot analyse {self.data}", error, self.data, to)
+                addresses = {IMPORT: address(IMPORT, self.data)} if Path(self.data).is_file() else {}
+                failed(f"Cannot analyse {self.data}", error, self.data, addresses)
             return
         if session.data.form != "rows":  # what is laid out already may hold what a person wrote
             self._lay_out(session.data.form)
@@ -184,12 +184,12 @@ class Workbench:
             words("Fails at", "k")
             for place in compared.fails:
                 place_text, _, description = for_page(place.text).partition(": ")
-                at = (
+                place_label = (
                     f"{place_text}, {place.axis}: {rounded(place.excess, 2)} ×"
                     if rows
                     else f"{place_text}, {place.axis}"
                 )
-                with ui.button(at, on_click=partial(self._show_place, place)).props("outline dense"):
+                with ui.button(place_label, on_click=partial(self._show_place, place)).props("outline dense"):
                     ui.tooltip(
                         f"{description}. Click to select these {compared.fit.measured.type.rows}"
                         if rows

@@ -82,7 +82,7 @@ class CertificateDialog(Asking):
         from rig.services.certify import Certified, certificate_head, certified, failed_results, format_certificate
 
         session, form = self.session, str(self.form.value)
-        of = Certified(
+        subject = Certified(
             session.request.data,
             session.data.table,  # type: ignore[attr-defined] # the button is enabled for rows
             session.end.model if session.steps else session.model,
@@ -91,7 +91,7 @@ class CertificateDialog(Asking):
             read_bench(self.bench_file) if self.bench_file is not None else None,
             str(self.before.value) or None,
         )
-        document = certified(of, str(self.number.value or "").strip(), str(self.customer.value or "").strip())
+        document = certified(subject, str(self.number.value or "").strip(), str(self.customer.value or "").strip())
         failed = failed_results(document)
         lines = [certificate_head(document), *document.figures.remarks, *document.remarks]
         lines += [f"Beyond its limit: {name}" for name in failed]

@@ -190,11 +190,11 @@ class Missing:
         assert experiment is not None  # noqa: S101 it had one before
         settings = {name: setting_text(value) for name, value in experiment.settings.items()}
         labelled = replace(experiment, settings={setting_label(name): text for name, text in settings.items()})
-        to = f"/run?{urlencode({'procedure': experiment.procedure, **settings})}"
+        run_address = f"/run?{urlencode({'procedure': experiment.procedure, **settings})}"
         place.clear()
         with place:
             words(" ".join([next_words(labelled), next_takes(experiment), *notes]), "quiet")
-            buttons({"Prepare this run": to})
+            buttons({"Prepare this run": run_address})
 
     async def look_at(self, c: Candidate, look: bool = False) -> None:
         """Draw the candidate in the residual; with `look`, against the column that it follows."""

@@ -105,20 +105,20 @@ def _rows(run: Run, calibrated: Container[str]) -> list[dict[str, str]]:
     """A row for a run, or for each sensor of a batch; a calibrated sensor has a link to its history."""
     run_cells = {"procedure": run.procedure, "state": run.state, "extent": run.extent, "source": run.source}
     run_cells["created"] = run.created[:19].replace("T", " ")
-    of = {member: sensor for sensor, member in members(run).items()}
+    sensors = {member: sensor for sensor, member in members(run).items()}
     names = list(run.bench.get("sensors", {})) or [""]
     return [
         {
             "name": f"{run.run}/{name}" if name else run.run,
             "sensor": _sensor_name(run.bench["sensors"][name] if name else run.constants),
-            "to": HistoryRequest(of[name]).address if of.get(name) in calibrated else "",
+            "to": HistoryRequest(sensors[name]).address if sensors.get(name) in calibrated else "",
             **run_cells,
         }
         for name in names
     ]
 
 
-def _sensor_name(of: object) -> str:
+def _sensor_name(description: object) -> str:
     """Name and serial number of a sensor, if known."""
-    entries = dict(of) if isinstance(of, dict) else {}
+    entries = dict(description) if isinstance(description, dict) else {}
     return " ".join(str(entries[key]) for key in ("sensor", "name", "serial") if entries.get(key))

@@ -226,7 +226,7 @@ class Live:
 def _tile(value: Mapping[str, Any]) -> None:
     """One value, to be read from two metres: number, limits, and where it is between them."""
     low, high = value["limits"]
-    at = 100 * min(max((value["reading"] - low) / (high - low), 0.0), 1.0) if high > low else 50.0
+    percent = 100 * min(max((value["reading"] - low) / (high - low), 0.0), 1.0) if high > low else 50.0
     number, _, unit = for_page(value["shown"]).partition(" ")
     with div("tile bad" if value["near"] else "tile"):
         words(value["name"], "quiet small")
@@ -234,7 +234,7 @@ def _tile(value: Mapping[str, Any]) -> None:
             words(number, "value number")
             words(unit, "unit")
         with div("between"):
-            div("").style(f"left: {at:.1f}%")
+            div("").style(f"left: {percent:.1f}%")
         words(_limits(value), "small quiet number")
         words(value["near"] or for_page(value["remark"]), "small")
 

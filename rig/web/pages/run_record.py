@@ -193,8 +193,8 @@ def _new_dwells(run: str, after_number: int) -> tuple[list[tuple[int, Any]], Run
         dwells = record.dwells(run, after_number)
         if not dwells:
             return dwells, RunTime(), {}
-        begun = record.run(run)
-        return dwells, RunTime.of(record, begun), units_of(begun, dwells[0][1].means)
+        run_row = record.run(run)
+        return dwells, RunTime.of(record, run_row), units_of(run_row, dwells[0][1].means)
 
 
 # The page of one run: settings, results, notes, export and report.
@@ -270,9 +270,9 @@ class OneRun:
             words(f"{run.extent}, {run.created[:19].replace('T', ' ')} UTC", "quiet grow")
             of_sensors = [f"{run.run}/{sensor}" for sensor in run.bench.get("sensors", {})] or [run.run]
             for data in of_sensors if run.rows else ():
-                to = f"/?{urlencode({'data': data})}"
+                target = f"/?{urlencode({'data': data})}"
                 ui.button(f"Model of {data.rpartition('/')[2]}" if "/" in data else "Model", icon="insights",
-                          on_click=lambda to=to: ui.navigate.to(to)).props("dense")  # fmt: skip
+                          on_click=lambda target=target: ui.navigate.to(target)).props("dense")  # fmt: skip
                 ui.button("Report", icon="description", on_click=lambda data=data: self._report(data)).props(
                     "dense outline"
                 )
