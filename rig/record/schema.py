@@ -252,22 +252,23 @@ answers = Table(  # about one sensor of a fleet, so that the same question is no
 
 def upgrade(connection: Connection, version: int) -> None:
     """Make missing tables, and change those of the older `version`; 0 is a database without tables."""
-    older = set(inspect(connection).get_table_names())
     metadata.create_all(connection)
     for statement in (migration for old in range(version or SCHEMA, SCHEMA) for migration in MIGRATIONS[old]):
-        if statement.split()[2] in older:  # ALTER TABLE name; a new table has every column
+        table, column = statement.split()[2:6:3]  # ALTER TABLE poses ADD COLUMN up; a new table has every column
+        if column not in {known["name"] for known in inspect(connection).get_columns(table)}:
             connection.execute(text(statement))
 
 
+_TURNS = (
+    "ALTER TABLE poses ADD COLUMN up VARCHAR NOT NULL DEFAULT 'z'",
+    "ALTER TABLE poses ADD COLUMN rate_deg_s FLOAT NOT NULL DEFAULT 0",
+)
 # Statements from each version to the next, see `upgrade`.
 MIGRATIONS = {
     1: ("ALTER TABLE poses ADD COLUMN excluded VARCHAR",),
     2: tuple(f"ALTER TABLE poses ADD COLUMN {role}_read_deg FLOAT" for role in ("alpha", "beta")),
-    3: (
-        "ALTER TABLE poses ADD COLUMN up VARCHAR NOT NULL DEFAULT 'z'",
-        "ALTER TABLE poses ADD COLUMN rate_deg_s FLOAT NOT NULL DEFAULT 0",
-    ),
-    4: (),  # a new table
+    3: _TURNS,
+    4: _TURNS,  # two programs wrote version 4, one of them without these columns
     5: (),  # a new table
     6: ("ALTER TABLE runs ADD COLUMN uid VARCHAR NOT NULL DEFAULT ''",),  # and a new table
     7: (),  # a new table

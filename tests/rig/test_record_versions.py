@@ -1,6 +1,7 @@
 """Records of every version of the program are opened by this one: read, written to, and gone on with.
 
-`tests/data/records` has, of each version, a sweep of six poses that was stopped after four.
+`tests/data/records` has, of each version before this one, a sweep of six poses that was stopped after four, as that
+program wrote it; from version 4 on also an imported table of six rows.
 """
 
 from __future__ import annotations
@@ -27,6 +28,11 @@ def restored(file: Path, folder: Path) -> Path:
     return folder
 
 
+def version(file: Path) -> int:
+    """The schema of a dump."""
+    return int(file.stem.rpartition("-")[2])
+
+
 def shape(path: Path) -> dict[str, set[tuple[str, str]]]:
     """The columns of every table with their types."""
     with closing(sqlite3.connect(path)) as connection:
@@ -36,14 +42,14 @@ def shape(path: Path) -> dict[str, set[tuple[str, str]]]:
 
 def test_there_is_a_way_from_every_version() -> None:
     assert sorted(MIGRATIONS) == list(range(1, SCHEMA))
-    assert [int(file.stem.rpartition("-")[2]) for file in FILES] == [1, 2, 3]
+    assert [version(file) for file in FILES] == list(range(1, SCHEMA))
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_an_older_record_becomes_one_of_this_version(file: Path, tmp_path: Path) -> None:
     old = restored(file, tmp_path / "old")
     with Record(old) as record:
-        (run,) = record.runs()
+        *imported, run = sorted(record.runs(), key=lambda run: run.state)
         assert (run.state, run.rows, run.procedure) == ("stopped", 4, "sweep")
         table = table_of(record, run.run)
         assert table.n == 4
@@ -51,7 +57,10 @@ def test_an_older_record_becomes_one_of_this_version(file: Path, tmp_path: Path)
         record.exclude(run.run, 0, "touched")
         record.log(run.run, 0.0, "run", "doing", "nothing")
         record.set_state(run.run, "stopped")
-        assert [line.text for line in record.lines(run.run)] == ["nothing"]
+        assert record.lines(run.run)[-1].text == "nothing"
+        assert [(other.state, other.rows) for other in imported] == [("complete", 6)] * (version(file) > 3)
+        for other in imported:
+            assert list(table_of(record, other.run).column("vx_v"))[2] == 3.4998
     with Record(tmp_path / "new") as fresh:
         assert shape(old / "record.db") == shape(fresh.path)
     with closing(sqlite3.connect(old / "record.db")) as connection:

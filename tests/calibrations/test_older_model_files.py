@@ -1,0 +1,32 @@
+"""Model files of older programs are read, and mean what they meant.
+
+`tests/data/models` has, of each program that wrote other keys, a model file and a table whose outputs are that
+program's answers of the model. Keys that came later are optional.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibrations.fitting.fit import evaluate
+from calibrations.importing.foreign import read_csv
+from calibrations.model.file import dump_model, parse_model, read_model
+from tests.docs.markdown import ROOT
+
+FILES = sorted((ROOT / "tests" / "data" / "models").glob("*.yaml"))
+
+
+def test_there_is_a_file_of_each_format() -> None:
+    assert [file.stem for file in FILES] == ["covered", "expressions", "first"]
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_an_older_model_answers_as_before(file: Path) -> None:
+    model = read_model(file)
+    assert parse_model(dump_model(model), "again") == model
+    evaluated = evaluate(model, read_csv(file.with_suffix(".csv")))
+    assert evaluated is not None
+    assert np.max(np.abs(evaluated.residual)) < 1e-12
