@@ -39,18 +39,19 @@ class Seconds:
         return self.left < 0
 
 
-def shown(terminal: bool, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Standard error after two seconds of work and a remark."""
+def shown(terminal: bool, monkeypatch: pytest.MonkeyPatch, seconds: int = 2) -> str:
+    """Standard error after some seconds of work and a remark."""
     stream = Stream(terminal)
     monkeypatch.setattr(sys, "stderr", stream)
-    progress._show(progress.Progress("searching", 0.5), stream, terminal, Seconds(2))  # type: ignore[arg-type]
+    progress._show(progress.Progress("searching", 0.5), stream, terminal, Seconds(seconds))  # type: ignore[arg-type]
     note("a remark")
     return stream.getvalue()
 
 
 def test_a_pipe_receives_plain_lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    lines = shown(False, monkeypatch).splitlines()
-    assert [("searching" in line) for line in lines] == [True, True, False]
+    """After 1, 10, 20 and 30 seconds."""
+    lines = shown(False, monkeypatch, 35).splitlines()
+    assert [("searching" in line) for line in lines] == [True, True, True, True, False]
     assert not any(sign in "".join(lines) for sign in "\r\x1b")
 
 

@@ -1,6 +1,7 @@
 """Progress of work that takes longer than a second, on standard error.
 
-In a terminal: one line that is written again and then removed. In a pipe or a file: one line a second.
+In a terminal: one line that is written again every second and then removed. In a pipe or a file: a line after the first
+second and every ten seconds, since a log keeps all of them.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from calibrations.effects import Effect
 
 EVERY_S = 1.0
+LOG_EVERY = 10  # of these, in a pipe or a file
 WIDTH = 30  # characters of a bar
 ERASE = "\r\x1b[K"
 
@@ -49,7 +51,7 @@ class Progress:
 
 @contextmanager
 def working(text: str, share: float | None = None) -> Iterator[Progress]:
-    """Show the progress of the block after its first second, every second. Shorter work shows nothing."""
+    """Show the progress of the block from its first second on. Shorter work shows nothing."""
     progress, stream, stop_event = Progress(text, share), sys.stderr, threading.Event()
     thread = threading.Thread(target=_show, args=(progress, stream, stream.isatty(), stop_event), daemon=True)
     thread.start()
@@ -73,7 +75,11 @@ _DRAWN = threading.Event()  # a line of progress is on the terminal
 
 
 def _show(progress: Progress, stream: TextIO, terminal: bool, stop_event: threading.Event) -> None:
+    seconds = 0
     while not stop_event.wait(EVERY_S):
+        seconds += 1
+        if not (terminal or seconds == 1 or seconds % LOG_EVERY == 0):
+            continue
         stream.write(f"{ERASE}{progress.line()}" if terminal else f"{progress.line()}\n")
         stream.flush()
         if terminal:
