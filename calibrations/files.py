@@ -102,7 +102,7 @@ def open_text_file(path: Path, garbled: bool = False) -> Source:
         with _bytes(path) as file:
             head = file.read(HEAD_BYTES)
     except (OSError, EOFError, zlib.error) as error:
-        fault = "cannot be read as text" if path.suffix == ".gz" else "cannot be read"
+        fault = "cannot be read as text" if _is_packed(path) else "cannot be read"
         raise DataError(f"{path}: {fault}: {_reason(error)}") from None
     encoding = _encoding(head, path, MOST_GARBLED if garbled else 0.0)
     return Source(
@@ -118,7 +118,16 @@ def text_source(content: str, name: str) -> Source:
 
 
 def _bytes(path: Path) -> BinaryIO:
-    return cast(BinaryIO, _Unpacked(path) if path.suffix == ".gz" else path.open("rb"))
+    return cast(BinaryIO, _Unpacked(path) if _is_packed(path) else path.open("rb"))
+
+
+def _is_packed(path: Path) -> bool:
+    """Whether a file is packed by gzip, by its name or its first bytes."""
+    try:
+        with path.open("rb") as file:
+            return path.suffix == ".gz" or file.read(2) == b"\x1f\x8b"
+    except OSError:
+        return path.suffix == ".gz"
 
 
 class _Unpacked(gzip.GzipFile):

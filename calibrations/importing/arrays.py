@@ -324,7 +324,7 @@ def excel_topics(path: Path) -> list[Topic]:
     """
     openpyxl = library("openpyxl", "formats", path, "an Excel workbook")
     require_size(path, _zip_bytes(path))
-    book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+    book = openpyxl.load_workbook(io.BytesIO(path.read_bytes()), read_only=True, data_only=True)
     try:
         sizes = {sheet.title: (sheet.max_row or 0, sheet.max_column or 0) for sheet in book.worksheets}
         heads = {sheet.title: _first_row(sheet) for sheet in book.worksheets}
@@ -346,12 +346,19 @@ def _first_row(sheet: Any) -> tuple[str, ...]:
     return tuple(widest)
 
 
+def _first_column(sheet: Any) -> int:
+    """The first column, from 1, with a cell in the rows of the header and below it."""
+    rows = [row for row in sheet.iter_rows(max_row=20, values_only=True) if sum(v is not None for v in row) > 1]
+    return 1 + min((next(k for k, v in enumerate(row) if v is not None) for row in rows), default=0)
+
+
 def _worksheet(openpyxl: Any, path: Path, name: str) -> str:
     text, cells = io.StringIO(), 0
-    book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+    book = openpyxl.load_workbook(io.BytesIO(path.read_bytes()), read_only=True, data_only=True)
     try:
         writer = csv.writer(text, lineterminator="\n")
-        for row in book[name].iter_rows(values_only=True):
+        first = _first_column(book[name])
+        for row in book[name].iter_rows(min_col=first, values_only=True):
             cells += len(row)
             if cells > MOST_CELLS:
                 raise DataError(f"{path}: sheet {name} has more than {MOST_CELLS} cells; save it as CSV")

@@ -120,6 +120,7 @@ def _import_with(
     _check_units(table, laid, mapping)
     check_at_rest(table)
     check_turning(table)
+    _check_clock(table, laid, mapping)
     return ImportedTable(table, laid, tuple(mapping), tuple(notes))
 
 
@@ -194,7 +195,7 @@ def _check_units(table: Table, laid: Sheet, mapping: Sequence[ColumnMapping]) ->
     with_unit = {m.name for m in mapping if m.unit}
     doubts = find_unit_doubts(table, with_unit)
     is_timed = is_raw_log(table) and "t_s" in table and "t_s" not in with_unit
-    if is_timed and (doubt := find_log_time_doubt(table.column("t_s"))) is not None:
+    if is_timed and (doubt := find_log_time_doubt(table.column("t_s"), _clock(mapping))) is not None:
         doubts["t_s"] = doubt
     if not doubts:
         return
@@ -211,6 +212,22 @@ def _check_units(table: Table, laid: Sheet, mapping: Sequence[ColumnMapping]) ->
         f"    {import_command(laid, table.kind, corrected)}\n\n"
         f"If its unit is {as_stated.unit} after all, state it: --column {as_stated.text}"
     )
+
+
+def _check_clock(table: Table, laid: Sheet, mapping: Sequence[ColumnMapping]) -> None:
+    """Raises MissingColumn for a log without t_s whose time has another name in the file."""
+    if "t_s" in table or "sample_rate_hz" in table.constants or not is_raw_log(table) or table.type.field:
+        return
+    from calibrations.importing.proposal import propose_mapping  # as above
+
+    theirs = _clock(propose_mapping(laid, table.kind, mapping))
+    if theirs:
+        raise MissingColumn(f'{laid.place}: a raw log needs the column t_s; "{theirs}" looks like the time')
+
+
+def _clock(mapping: Sequence[ColumnMapping]) -> str:
+    """The file's name of the time."""
+    return next((m.theirs for m in mapping if m.name == "t_s"), "")
 
 
 def _output_unit(mapped: Sequence[ColumnMapping], kind: str, field: bool, source: str) -> dict[str, Constant]:

@@ -1,7 +1,7 @@
 """A JSON file of measurements as the lines of a table: named arrays of equal length, or a list of named values.
 
     {"mag": [[-17.2, -2.1, 47.0], ...], "t_s": [0.0, ...], "unit": "uT"}      mag_x, mag_y, mag_z, t_s; # unit: uT
-    [{"mx": -17.2, "my": -2.1, "mz": 47.0}, ...]
+    [{"mx": -17.2, "my": -2.1, "mz": 47.0}, ...]                              or a value a line: {...} {...}
 
 An array of triples is three columns, by axis; of other lists, columns by number from 1. What is no array is a
 constant.
@@ -31,10 +31,20 @@ def json_as_lines(source: Source) -> Source:
     try:
         document = json.loads(text)
     except (ValueError, RecursionError):
+        document = _by_lines(text)
+    if document is None:
         if source.name.endswith(".json"):
-            raise DataError(f"{source.name}: is not valid JSON; {JSON_FORM}") from None
+            raise DataError(f"{source.name}: is not valid JSON; {JSON_FORM}")
         return source
     return text_source(_csv_text(document, source.name), source.name)
+
+
+def _by_lines(text: str) -> Any:
+    """The documents of single lines as a list; None if a line is none."""
+    try:
+        return [json.loads(line) for line in text.splitlines() if line.strip()]
+    except (ValueError, RecursionError):
+        return None
 
 
 def _bounded(lines: Iterator[str], name: str) -> Iterator[str]:

@@ -20,12 +20,13 @@ from calibrations.importing.plausible import (
     Doubt,
     covers_all_directions,
     field_unit,
+    find_log_time_doubt,
     find_time_doubt,
     gravity_unit,
     likely_unit,
 )
 from calibrations.importing.raw_logs import average_raw_log
-from calibrations.importing.sheet import Sheet, is_number, parse_number
+from calibrations.importing.sheet import Sheet, parse_cell
 from calibrations.importing.units import UNITS, ColumnMapping, column_unit, split_unit
 from calibrations.table import AXES, NUMBERS, Array, Constant, Table
 from calibrations.tables import KINDS
@@ -64,15 +65,17 @@ NAME_PATTERNS: Mapping[str, Sequence[tuple[str, str]]] = {
         (r"temp|thermo", "temperature_c"),
         (r"^t(_?s)?$|time|elapsed|seconds", "t_s"),
         (r"^n$|samples|averag", "n"),
-        (r"gyr|omega|rate|^g[xyz]$", "g{axis}"),
+        (r"orient|quat", ""),
+        (r"gyr|omega|rate|angular|^g[xyz]$", "g{axis}"),
         (r"mag|^m[xyz]$", "m{axis}"),
     ),
     "rates": (
         (r"temp|thermo", "temperature_c"),
         (r"^t(_?s)?$|time|elapsed|seconds", "t_s"),
         (r"^n$|samples|averag", "n"),
+        (r"orient|quat", ""),
         (r"acc|^a[xyz]$", "a{axis}"),
-        (r"gyr|omega|^g[xyz]$", "g{axis}"),
+        (r"gyr|omega|angular|^g[xyz]$", "g{axis}"),
         (r"rate|speed|velocity", "rate_deg_s"),
     ),
     "motion": (
@@ -84,6 +87,7 @@ NAME_PATTERNS: Mapping[str, Sequence[tuple[str, str]]] = {
 }
 INDEXED = re.compile(r"(?P<name>.*(?:acc|gyr|mag).*)\[(?P<index>\d)\]$", re.IGNORECASE)
 SECTION = r"part|section|segment|phase|activity|label|step|^path$"  # of a session by hand, in a column of words
+LONG_TABLE = 150  # rows, of the first HEAD_LINES
 STD_COLUMNS = {"poses": "v{axis}_std_v", "positions": "a{axis}_std", "rates": "g{axis}_std"}
 
 
@@ -103,15 +107,15 @@ def propose_mapping(laid: Sheet, kind: str | None = None, mapped: Sequence[Colum
     values = {name: numbers for name in unmapped if len(numbers := sample_values(laid, name))}
     guesses = guess_by_names(laid, values, kind) if laid.named else guess_by_values(values, kind)
     for name, target in guesses:
-        if (
-            target not in {m.name for m in mapping}
-            and target not in laid.header
-            and (target != "n" or _counts(values[name]))
-        ):
+        if target == "n" and not _counts(values[name], guesses):
+            continue
+        if target not in {m.name for m in mapping} and target not in laid.header:
             mapping.append(ColumnMapping(target, name, _unit(laid, name, target, values[name])))
     if kind == "rates":
         return _with_sections(mapping, laid)
-    return _with_gravity(mapping, values) if kind == "positions" else _with_scatter(_with_time(mapping, laid))
+    if kind == "positions":
+        return _with_log_time(_with_gravity(mapping, values), values)
+    return _with_scatter(_with_time(mapping, laid))
 
 
 def likely_kinds(laid: Sheet, mapped: Iterable[ColumnMapping] = ()) -> list[str]:
@@ -205,7 +209,11 @@ def guess_by_values(values: Mapping[str, Array], kind: str) -> list[tuple[str, s
 def sample_values(laid: Sheet, name: str) -> Array:
     """The first values of a column; none for a column of words."""
     cells = [row[laid.header.index(name)] for row in laid.sample]
-    return np.array([parse_number(cell) for cell in cells]) if all(map(is_number, cells)) else np.zeros(0)
+    try:
+        values = np.array([parse_cell(cell) for cell in cells])
+    except ValueError:
+        return np.zeros(0)
+    return values if np.isfinite(values).all() else np.zeros(0)
 
 
 def sensed_by(header: Iterable[str], topic: str) -> str:
@@ -263,8 +271,13 @@ def _unit(laid: Sheet, name: str, target: str, values: Array) -> str:
     return likely_unit(target, values)
 
 
-def _counts(values: Array) -> bool:
-    """Whether numbers can count averaged samples: whole, 1 or more, and not a running row number."""
+def _counts(values: Array, guesses: Collection[tuple[str, str]]) -> bool:
+    """Whether numbers can count averaged samples: whole, 1 or more, and not a running row number.
+
+    A long table without a standard deviation is a log, and its column of numbers does not count samples of a mean.
+    """
+    if len(values) >= LONG_TABLE and not any("_std" in target for _, target in guesses):
+        return False
     running = len(values) > 2 and float(np.mean(np.diff(values) == 1)) > 0.5
     return bool(np.all(values >= 1) and np.all(values % 1 == 0)) and not running
 
@@ -297,6 +310,13 @@ def _with_time(mapping: list[ColumnMapping], laid: Sheet) -> list[ColumnMapping]
     """The mapping in which a time that cannot be in s has the unit that fits."""
     doubt = time_doubt(laid, mapping)
     return [replace(m, unit=doubt[1]) if doubt and m.name == "t_s" else m for m in mapping]
+
+
+def _with_log_time(mapping: list[ColumnMapping], values: Mapping[str, Array]) -> list[ColumnMapping]:
+    """The mapping in which the time of a log has the unit that gives a likely sample rate."""
+    logs = {m for m in mapping if m.name == "t_s" and not m.unit and len(values.get(m.theirs, ())) >= LONG_TABLE}
+    doubts = {m: find_log_time_doubt(values[m.theirs], m.theirs) for m in logs}
+    return [replace(m, unit=doubt[1]) if (doubt := doubts.get(m)) else m for m in mapping]
 
 
 def _with_scatter(mapping: list[ColumnMapping]) -> list[ColumnMapping]:

@@ -12,6 +12,7 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import date, timedelta
 from itertools import chain, islice
 from math import isfinite
 from operator import and_
@@ -21,6 +22,7 @@ import numpy as np
 from calibrations.errors import DataError
 from calibrations.files import Source
 from calibrations.importing.bad_lines import BadLines
+from calibrations.importing.line_logs import as_table
 from calibrations.importing.units import parse_unit, split_unit
 from calibrations.table import Array, Constant
 
@@ -35,6 +37,13 @@ HEAD_LINES = 200  # lines that the layout is taken from
 MOST_WORDS = 0.1  # of the rows of a column of numbers
 LONGEST_SHOWN = 20  # characters of a wrong cell
 BLANK = " \t\r\n\x1a"
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:(?:,\d{3})+\.\d+|(?:\.\d{3})+,\d+)")  # 1,234.5 and 1.234,5
+_TIME = re.compile(
+    r"(?:(?P<date>\d{4}[-/]\d\d[-/]\d\d)[T ])?"
+    r"(?P<hour>[01]?\d|2[0-3]):(?P<minute>[0-5]\d):(?P<second>[0-5]\d(?:[.,]\d+)?)(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?"
+)
+_HEXADECIMAL = re.compile(r"0[xX][0-9a-fA-F]+")
+EPOCH = date(1970, 1, 1)
 _COMMA = re.compile(r",(?=\d+([eE]|$))")
 NAME = re.compile(r"[^\W\d][\w .()\[\]/°%^*+-]{0,39}|")  # of a column: words and a unit, or nothing
 NO_UNIT = ("", "-", "1", "n/a")
@@ -152,14 +161,15 @@ def _undamaged(rows: list[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
 
 
 def as_lines(source: Source) -> Source:
-    """The source itself, or its JSON document as comma-separated lines. Raises DataError."""
+    """The source itself, or its JSON document or lines of named values as comma-separated lines. Raises DataError."""
     with source.lines(marked=True) as lines:
         first = next((line for line in lines if line.strip()), "").lstrip()
-    if not first.startswith(("{", "[")):
-        return source
-    from calibrations.importing.json_arrays import json_as_lines
+    if first.startswith(("{", "[")):
+        from calibrations.importing.json_arrays import json_as_lines
 
-    return json_as_lines(source)
+        if (document := json_as_lines(source)) is not source:
+            return document
+    return as_table(first, source)
 
 
 def split_rows(lines: Iterable[str], separator: str | None, name: str, first: int) -> Iterator[Row]:
@@ -181,7 +191,32 @@ def parse_number(cell: str) -> float:
     """The number in a cell, with decimal point or decimal comma. Raises ValueError."""
     if "_" in cell:
         raise ValueError(cell)  # float() would take 1_000
+    if _THOUSANDS.fullmatch(cell):
+        mark = "," if cell.rindex(",") < cell.rindex(".") else "."
+        cell = cell.replace(mark, "")
     return float(_COMMA.sub(".", cell) if "," in cell else cell)
+
+
+def parse_cell(cell: str) -> float:
+    """The number in a cell, or its date or time of day in s: `2026-01-04T12:00:00.02Z`, `12:00:00,020`.
+
+    A date counts from 1970 and has no time zone, or its own. Raises ValueError.
+    """
+    try:
+        return parse_number(cell)
+    except ValueError:
+        if not (match := _TIME.fullmatch(cell)):
+            raise
+        hours, minutes, seconds = (float(match[name].replace(",", ".")) for name in ("hour", "minute", "second"))
+        day = date.fromisoformat(match["date"].replace("/", "-")) - EPOCH if match["date"] else timedelta()
+        return day.total_seconds() + 3600 * hours + 60 * minutes + seconds - _zone_s(match["zone"] or "")
+
+
+def _zone_s(zone: str) -> float:
+    """How much a time zone, such as `+02:00`, is ahead, s."""
+    if zone in ("", "Z"):
+        return 0.0
+    return float(zone[0] + "1") * (3600 * int(zone[1:3]) + 60 * int(zone[-2:] if len(zone) > 3 else 0))
 
 
 def is_number(cell: str) -> bool:
@@ -250,6 +285,8 @@ def _empty_behind(rows: Sequence[list[str]]) -> int:
 def _checked(header: list[str], place: str) -> list[str]:
     if "" in header:
         raise DataError(f"{place}: a column has no name" + _names(header, ": {}") + "; name every column")
+    if 2 * sum(map(is_number, header)) > len(header):
+        raise DataError(f"{place}: a header line with column names is missing; write one above the first row")
     if duplicate := next((name for name, count in Counter(header).items() if count > 1), None):
         raise DataError(f'{place}: the column "{duplicate}" occurs twice; rename one')
     return header
@@ -384,9 +421,11 @@ def _number(sheet: Sheet, row: Row, k: int) -> float:
     """The number in cell `k`. Raises DataError with line and column."""
     line, cells = row
     try:
-        value = parse_number(cells[k])
+        value = parse_cell(cells[k])
     except ValueError:
         reason = f'"{cells[k]}" where a number belongs' if cells[k] else "empty where a number belongs"
+        if _HEXADECIMAL.fullmatch(cells[k]):
+            reason = f'"{cells[k]}" is hexadecimal, and a decimal number belongs here'
     else:
         if isfinite(value):
             return value

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibrations.errors import DataError
+from calibrations.table import NUMBERS
 
 # unit -> (unit of the target column, factor, offset)
 UNITS: Mapping[str, tuple[str, float, float]] = {
@@ -16,12 +17,14 @@ UNITS: Mapping[str, tuple[str, float, float]] = {
     "deg": ("deg", 1.0, 0.0), "rad": ("deg", 180 / np.pi, 0.0), "mrad": ("deg", 0.18 / np.pi, 0.0),
     "degC": ("degC", 1.0, 0.0), "K": ("degC", 1.0, -273.15), "degF": ("degC", 5 / 9, -160 / 9),
     "s": ("s", 1.0, 0.0), "ms": ("s", 1e-3, 0.0), "us": ("s", 1e-6, 0.0),
+    "ns": ("s", 1e-9, 0.0), "0.1ms": ("s", 1e-4, 0.0),
     "min": ("s", 60.0, 0.0), "h": ("s", 3600.0, 0.0),
     "m": ("m", 1.0, 0.0), "mm": ("m", 1e-3, 0.0), "um": ("m", 1e-6, 0.0),
     "g": ("g", 1.0, 0.0), "mg": ("g", 1e-3, 0.0), "m/s2": ("m/s2", 1.0, 0.0),
     "count": ("count", 1.0, 0.0), "counts": ("count", 1.0, 0.0), "uT": ("uT", 1.0, 0.0),
     "nT": ("uT", 1e-3, 0.0), "tesla": ("uT", 1e6, 0.0), "gauss": ("uT", 100.0, 0.0), "mgauss": ("uT", 0.1, 0.0),
     "deg/s": ("deg/s", 1.0, 0.0), "rad/s": ("deg/s", 180 / np.pi, 0.0),
+    "mdps": ("deg/s", 1e-3, 0.0),
 }  # fmt: skip
 SUFFIXES = {"_deg_s": "deg/s", "_v": "V", "_deg": "deg", "_c": "degC", "_s": "s", "_m": "m"}
 SPELLINGS = {
@@ -29,9 +32,13 @@ SPELLINGS = {
     "radian": "rad", "radians": "rad", "°c": "degC", "c": "degC", "celsius": "degC", "kelvin": "K", "°f": "degF",
     "f": "degF", "fahrenheit": "degF", "sec": "s", "second": "s", "seconds": "s", "minute": "min", "minutes": "min",
     "hour": "h", "hours": "h", "hr": "h", "µs": "us", "µv": "uV", "µm": "um", "µt": "uT", "m/s^2": "m/s2",
-    "m/s²": "m/s2", "m/s**2": "m/s2", "ms^-2": "m/s2", "lsb": "counts", "raw": "counts", "cnt": "counts",
+    "m/s²": "m/s2", "m/s**2": "m/s2", "ms^-2": "m/s2", "m/(s^2)": "m/s2", "mps2": "m/s2",
+    "lsb": "counts", "raw": "counts", "cnt": "counts",
     "°/s": "deg/s", "dps": "deg/s", "milli-g": "mg",
 }  # fmt: skip
+_SUFFIX = re.compile(
+    r"^(?P<name>.*[^\W_])_(?P<unit>s|ms|us|ns|min|g|mg|mps2|dps|mdps|v|mv|c|degc|degf|deg|rad|ut)$", re.I
+)
 _IN_NAME = re.compile(r"^(?P<name>.*?)\s*(?:\((?P<round>[^()]*)\)|\[(?P<square>[^\[\]]*)\]|/\s*(?P<slash>[^\s/()]+))$")
 
 
@@ -48,13 +55,19 @@ def parse_unit(text: str) -> str:
 
 
 def split_unit(header: str) -> tuple[str, str]:
-    """`Vx (mV)`, `Vx [mV]` or `Vx / mV` as ("Vx", "mV"); (header, "") for a header without a unit."""
+    """`Vx (mV)`, `Vx [mV]`, `Vx / mV` or `Vx_mv` as ("Vx", "mV"); (header, "") for a header without a unit.
+
+    One of our own names stays as it is, such as `vx_v`.
+    """
+    if header in NUMBERS:
+        return header, ""
     match = _IN_NAME.match(header)
     if match and match["name"]:
         unit = parse_unit(match["round"] or match["square"] or match["slash"] or "")
         if unit:
             return match["name"].strip(), unit
-    return header, ""
+    match = _SUFFIX.match(header)
+    return (match["name"], parse_unit(match["unit"])) if match else (header, "")
 
 
 def column_unit(name: str) -> str:
