@@ -31,6 +31,13 @@ SAMPLE = bytes.fromhex(
     "FA FF 36 31 10 20 02 DF C5 10 60 04 00 45 9D A0 40 20 0C BE DC 9A FA 3F 54 9F 37 41 1C BB 70 80 20 0C BB AA 5C 80 "
     "3B 8C 55 01 BB 81 33 00 E0 20 04 00 00 00 81 45"
 )
+RECORDED = bytes.fromhex(
+    "FA FF 36 4E 10 60 04 02 53 35 CB 20 10 10 3F 7F FA 66 BB 40 34 B8 3C 49 96 2D 3B 5A 1F 82 80 20 0C 39 FF 91 01 BA "
+    "EC DD 81 BA 86 53 80 40 20 0C BE 64 DB 99 BC E7 FF 83 41 1D C2 CF C0 20 0C BE 90 48 80 3F 67 32 04 BF 54 89 04 E0 "
+    "20 04 00 00 00 03 C9"
+)
+HIGH_RATE = bytes.fromhex("FA FF 36 0F 80 40 0C 3B 8B BC 00 BB E2 4F 00 3B 4E 4A 00 AF")
+NUMBER_7 = bytes.fromhex("1020020007")
 REALS = st.floats(-2000, 2000, width=32)
 
 
@@ -69,6 +76,23 @@ def test_the_measured_message_of_the_manual_is_read() -> None:
     assert rates == pytest.approx([-0.005199, 0.004283, -0.003943], abs=1e-6)
     assert decoder.good == 1
     assert decoded(SAMPLE, ("mx",))[1] == []
+
+
+def test_data_that_other_programs_recorded_are_read() -> None:
+    """Of two trackers at rest: all sensors and a quaternion; the high rate of the gyroscope. Neither has a number."""
+
+    def read(recorded: bytes, *outputs: str) -> list[float]:
+        ((number, data),) = xbus.messages(Frames(xbus.Xbus()).take(recorded))
+        decoder, (values,) = decoded(xbus.message(number, NUMBER_7 + data), outputs)
+        assert (decoder.good, decoder.damaged) == (1, 0)
+        return values
+
+    force = read(RECORDED, "ax", "ay", "az")
+    assert force == pytest.approx([-0.2235, -0.0283, 9.8601], abs=1e-4)
+    assert read(RECORDED, "gx", "gy", "gz") == pytest.approx([0.000487, -0.001807, -0.001025], abs=1e-6)
+    assert np.linalg.norm(read(RECORDED, "mx", "my", "mz")) == pytest.approx(1.26, abs=0.01)
+    assert read(HIGH_RATE, "gx", "gy", "gz") == pytest.approx([0.004265, -0.006906, 0.003148], abs=1e-6)
+    assert decoded(RECORDED, ("ax", "ay", "az"))[1] == []
 
 
 def test_the_numbers_of_messages_tell_what_is_missing() -> None:
