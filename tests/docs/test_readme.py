@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import click
+import h5py
+import numpy as np
 import pytest
 
+from calibrations.table import STANDARD_GRAVITY
 from rig.cli import Commands
 from rig.cli import rig as group
 from tests.docs.markdown import ROOT, commands, gist, section
@@ -19,6 +23,12 @@ FOLLOWED = {
     "docs/how-to/measurements.md": "My own measurements",
     "docs/how-to/instrument.md": "My first real instrument",
 }
+BENCHES = (
+    ("docs/how-to/digital.md", "A flight controller"),
+    ("docs/how-to/digital.md", "An Xsens MTi"),
+    ("docs/how-to/epics.md", "The bench file"),
+    ("docs/how-to/scpi.md", "The bench file"),
+)
 COMMANDS = Commands().list_commands(click.Context(group))
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
 LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]+))?\)")
@@ -28,6 +38,35 @@ LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]+))?\)")
 @pytest.mark.parametrize(("page", "title"), FOLLOWED.items())
 def test_a_section_works_as_written(page: str, title: str, follow: Callable[..., Any]) -> None:
     follow(commands(section(page, title)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("page", "title"), BENCHES)
+def test_a_bench_file_works_as_written(page: str, title: str, tmp_path: Path, follow: Callable[..., Any]) -> None:
+    text = section(page, title)
+    (bench,) = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
+    (name,) = set(re.findall(r"--bench (\S+)", text))
+    (tmp_path / name).write_text(bench, encoding="utf-8")
+    follow(commands(text))
+
+
+def test_every_how_to_page_with_a_bench_is_followed() -> None:
+    with_bench = {page for page in (ROOT / "docs/how-to").glob("*.md") if "```yaml\nname:" in page.read_text("utf-8")}
+    assert with_bench == {ROOT / page for page, _ in BENCHES}
+
+
+@pytest.mark.slow
+def test_a_log_of_another_format_is_imported_as_written(tmp_path: Path, follow: Callable[..., Any]) -> None:
+    rng, (recipe,) = np.random.default_rng(1), commands((ROOT / "docs/how-to/formats.md").read_text(encoding="utf-8"))
+    sides = np.array([side for side in product((-1, 0, 1), repeat=3) if any(side)], dtype=float)
+    sides /= np.linalg.norm(sides, axis=1, keepdims=True)
+    turned = np.concatenate(
+        [np.vstack([rng.normal(0, 0.5, (20, 3)) + side, np.tile(side, (100, 1))]) for side in sides]
+    )
+    with h5py.File(tmp_path / "flight.h5", "w") as file:
+        file["imu/acc"] = STANDARD_GRAVITY * turned + rng.normal(0, 1e-2, turned.shape)
+        file["imu/time"] = 0.02 * np.arange(len(turned))
+    follow([recipe])
 
 
 @pytest.mark.slow
