@@ -179,14 +179,14 @@ def _descent(
         slow = SLOW_FIRST if number < len(COARSE) else SLOW_MOST
         most |= {} if flicker else dict.fromkeys(noise, (slow * floor) ** 2)
         limit = caution * (max(ENTER, COARSE[number] * g.squares) if number < len(COARSE) else ENTER)
-        before = set(variances)
+        previous_names = set(variances)
         previous = values, dict(variances), state
         sizes = estimate(g, variances, most)
         pools = pools_of(components, catalogue_first and number < len(COARSE))
         sizes, steps = select(g, sizes, components, pools, most, limit, number >= len(COARSE))
         path += steps
         variances = dict(sizes.variances)
-        values, moved = _damped(data, model_effects, previous[0], coefficients(g, sizes), components, white)
+        values, moved_state = _damped(data, model_effects, previous[0], coefficients(g, sizes), components, white)
         reshaped = _refined(components, g, sizes, X, b, state, scales, white)
         if reshaped is not None:
             X, blocks, scales = whitened(state, model_effects, previous[0], reshaped, scales, white)
@@ -194,11 +194,12 @@ def _descent(
             sizes = estimate(g, variances, most)
             reshaped_values = coefficients(g, sizes)
             reshaped_state = state_at(data, model_effects, reshaped_values, reshaped)
-            if _misfit(reshaped_state, white) < _misfit(moved, white):
-                components, values, moved, variances = reshaped, reshaped_values, reshaped_state, dict(sizes.variances)
-        change = float(np.sqrt(np.mean(((moved.predicted - state.predicted) / white) ** 2)))
-        state = moved
-        if _misfit(moved, white) > 1.5 * g.squares / g.rows + 10.0:  # components against each other: no step
+            if _misfit(reshaped_state, white) < _misfit(moved_state, white):
+                components, values, moved_state = reshaped, reshaped_values, reshaped_state
+                variances = dict(sizes.variances)
+        change = float(np.sqrt(np.mean(((moved_state.predicted - state.predicted) / white) ** 2)))
+        state = moved_state
+        if _misfit(moved_state, white) > 1.5 * g.squares / g.rows + 10.0:  # components against each other: no step
             values, variances, state = previous
             saws = {c.name for c in components if c.cause == "quantisation"} & set(sizes.variances)
             rejected += [c.shape[0] for c in components if c.name in saws]
@@ -212,7 +213,7 @@ def _descent(
             if extra is not None:
                 components = [*components, extra]
                 continue
-        if number >= len(COARSE) and set(variances) == before and change < 0.03:
+        if number >= len(COARSE) and set(variances) == previous_names and change < 0.03:
             break
     X, blocks, scales = whitened(state, model_effects, values, components, scales, white)
     g = gram(X, blocks, scales, b)
@@ -225,20 +226,20 @@ def _descent(
 def _damped(
     data: PoseData,
     model_effects: ModelEffects,
-    before: Coefficients,
-    after: Coefficients,
+    origin: Coefficients,
+    target: Coefficients,
     components: Sequence[Component],
     white: Array,
 ) -> tuple[Coefficients, State]:
-    """The step from `before` to `after`, halved as long as half of it leaves less."""
-    state = state_at(data, model_effects, after, components)
+    """The step from `origin` to `target`, halved as long as half of it leaves less."""
+    state = state_at(data, model_effects, target, components)
     for _ in range(HALVINGS):
-        half = _between(before, after)
+        half = _midpoint(origin, target)
         half_state = state_at(data, model_effects, half, components)
         if _misfit(half_state, white) >= _misfit(state, white):
             break
-        after, state = half, half_state
-    return after, state
+        target, state = half, half_state
+    return target, state
 
 
 def _misfit(state: State, white: Array) -> float:
@@ -246,12 +247,12 @@ def _misfit(state: State, white: Array) -> float:
     return float(np.mean(((state.data.outputs - state.predicted) / white) ** 2))
 
 
-def _between(before: Coefficients, after: Coefficients) -> Coefficients:
+def _midpoint(origin: Coefficients, end: Coefficients) -> Coefficients:
     """Halfway; a component that only one of them has, begins or ends at zero."""
-    names = {**before.of, **after.of}
-    nothing = np.zeros(1)
-    of = {name: (before.of.get(name, nothing) + after.of.get(name, nothing)) / 2 for name in names}
-    return Coefficients((before.base + after.base) / 2, of)
+    names = {**origin.of, **end.of}
+    zero = np.zeros(1)
+    coefficients_by_name = {name: (origin.of.get(name, zero) + end.of.get(name, zero)) / 2 for name in names}
+    return Coefficients((origin.base + end.base) / 2, coefficients_by_name)
 
 
 def _refined(
@@ -265,8 +266,8 @@ def _refined(
     white: Array,
 ) -> list[Component] | None:
     """The active components at their likeliest shapes, the others held; None: no change."""
-    changed = list(components)
-    moved = False
+    reshaped_components = list(components)
+    is_reshaped = False
     for i, comp in enumerate(components):
         if comp.name not in sizes.variances or comp.reshaped is None:
             continue
@@ -279,9 +280,9 @@ def _refined(
 
         best = climb(gained, comp.shape, comp.step)
         if best != comp.shape:
-            changed[i] = comp.reshaped(best)
-            moved = True
-    return changed if moved else None
+            reshaped_components[i] = comp.reshaped(best)
+            is_reshaped = True
+    return reshaped_components if is_reshaped else None
 
 
 def climb(
