@@ -1,7 +1,9 @@
-"""Kills at random moments that runs survived: `python -m tests.benchmark.kills [KILLS] [SEED]`; 500 take some minutes.
+"""Kills at random moments that runs survived: `python -m tests.benchmark.kills [KILLS] [SEED]`.
 
 A third of them come to a sweep, the rest to a soak and a motion, which are records without gaps, to a misalignment,
 which chooses its poses by what it measured, to positions by hand, to imports, and to pushes to a server of PostgreSQL.
+Each of these is killed at least once, and reports its count on standard error when it has ended. Before the first kill
+come the warm-up and two undisturbed runs of each procedure; on a busy machine these take minutes.
 
 Each is checked as in tests/rig/test_kill.py; the first that costs more than the pose in flight ends it with an error.
 """
@@ -31,13 +33,20 @@ def main(kills: int = 500, seed: int = 1000) -> None:
         folder, began, survived = Path(temporary), time.perf_counter(), dict[str, Counter[str]]()
         for words, share in RUNS:
             place = folder / words[1]
-            survived[words[1]] = many(nursery, place, undisturbed(nursery, place, words), seed, round(share * kills))
-        survived["import"] = kills_of_imports(nursery, folder / "imports", seed, round(IMPORTS * kills))
-        survived["push"] = pushes(nursery, folder / "pushes", seed, round(PUSHES * kills))
+            whole = undisturbed(nursery, place, words)
+            survived[words[1]] = many(nursery, place, whole, seed, number(share, kills))
+            print(f"{words[1]}: {survived[words[1]].total()} kills", file=sys.stderr)
+        survived["import"] = kills_of_imports(nursery, folder / "imports", seed, number(IMPORTS, kills))
+        survived["push"] = pushes(nursery, folder / "pushes", seed, number(PUSHES, kills))
         seconds = time.perf_counter() - began
     kinds = sum(survived.values(), Counter[str]())
     counts = {name: count.total() for name, count in survived.items()}
     print(json.dumps({"seconds": [seconds], "kills": kinds.total(), "kinds": dict(kinds), "procedures": counts}))
+
+
+def number(share: float, kills: int) -> int:
+    """How many of the kills are this share: at least one."""
+    return max(1, round(share * kills))
 
 
 def pushes(nursery: Nursery, folder: Path, seed: int, kills: int) -> Counter[str]:

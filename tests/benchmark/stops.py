@@ -1,7 +1,8 @@
 """From a fault to the stop command on the wire, in real time: `python -m tests.benchmark.stops [TIMES]`.
 
 Twins are served by a thread on the wall clock; a stage turns; a fault comes at a random moment. The time is when
-the drive receives the stop, on the clock that the fault is set by.
+the drive receives the stop, on the clock that the fault is set by. First all kernels are compiled: in a fresh
+environment this takes minutes.
 """
 
 from __future__ import annotations

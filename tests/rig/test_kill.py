@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 
 from rig.record import Record
+from tests.benchmark.kills import number
 from tests.rig.killing import MOTION, RUN, SOAK, Story, Undisturbed, finished, inspected, many, measured, undisturbed
 from tests.rig.killing_transfers import kills_of_a_push, kills_of_imports
 from tests.rig.nursery import Harm, Nursery
@@ -38,6 +39,11 @@ def nursery() -> Iterator[Nursery]:
 @pytest.fixture(scope="module")
 def whole(nursery: Nursery, tmp_path_factory: pytest.TempPathFactory) -> Undisturbed:
     return undisturbed(nursery, tmp_path_factory.mktemp("undisturbed"))
+
+
+@pytest.mark.parametrize(("kills", "expected"), [(1, 1), (10, 1), (50, 7), (500, 70)])
+def test_the_benchmark_kills_each_procedure_at_least_once(kills: int, expected: int) -> None:
+    assert number(0.14, kills) == expected
 
 
 @pytest.mark.slow
