@@ -200,8 +200,8 @@ def bound(value: float, limit: float | Sequence[float]) -> str:
 
 
 def unit(text: str) -> str:
-    """`V/g^2/sqrt(Hz)` as `V/g²/√Hz`, `degC` as `°C`; nothing for a pure number."""
-    text = text.replace("degC", "°C").replace("sqrt(Hz)", "√Hz").replace("sqrt(s)", "√s")
+    """`V/g^2/sqrt(Hz)` as `V/g²/√Hz`, `V*s` as `V·s`, `degC` as `°C`; nothing for a pure number."""
+    text = text.replace("degC", "°C").replace("sqrt(Hz)", "√Hz").replace("sqrt(s)", "√s").replace("*", "·")
     head, *powers = text.split("^")
     return "" if text == "1" else head + "".join(p[:1].translate(SUPERSCRIPT) + p[1:] for p in powers)
 

@@ -93,7 +93,7 @@ def _detail(coefficient: Coefficient) -> str:
 
 def _coefficient_text(coefficient: Coefficient, factor: float, unit: str, base: str) -> str:
     """`12.34(56) uV/sqrt(Hz)`, or the upper bound. `base` is the unit of the channel, `unit` that of the result."""
-    per = coefficient.unit.removeprefix(base)
+    per = coefficient.unit.removeprefix(base).replace("*", "·")  # uV·s
     if coefficient.upper is not None and np.isinf(coefficient.upper):
         return "not known"
     if coefficient.upper is not None:

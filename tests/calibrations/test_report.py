@@ -351,7 +351,7 @@ def test_rounded_numbers_have_three_digits(value: float, shown: str) -> None:
 
 def test_probabilities_and_units() -> None:
     assert [probability(p) for p in (1.0, 0.0187, 9.7e-12, 0.0)] == ["1", "0.019", "1 × 10⁻¹¹", "below 10⁻³⁰⁰"]
-    assert [unit(u) for u in ("V/g^2", "1", "degC", "V")] == ["V/g²", "", "°C", "V"]
+    assert [unit(u) for u in ("V/g^2", "V*s", "1", "degC", "V")] == ["V/g²", "V·s", "", "°C", "V"]
 
 
 @pytest.mark.parametrize(
