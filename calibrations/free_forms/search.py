@@ -25,6 +25,7 @@ from calibrations.free_forms.reml import (
 )
 from calibrations.free_forms.selection import ENTER, SPILL, pools_of, prices, select
 from calibrations.free_forms.stairs import find_saw
+from calibrations.progress import doing
 from calibrations.table import Array
 
 COARSE = (1e-3, 2e-5)  # of the misfit, at each linearisation: less may be a second-order remainder
@@ -168,7 +169,10 @@ def _descent(
     first = find_saw(data, state, white, data.outputs - state.predicted, rejected, ENTER)
     components += [first] if first is not None else []
     caution = 1.0
+    beginning = "effects first" if catalogue_first else "all forms together"
+    beginning += ", loops" * loops + ", flicker" * flicker
     for number in range(ROUNDS):
+        doing(f"searching for places ({beginning}), pass {number + 1} of at most {ROUNDS}")
         X, blocks, scales = whitened(state, model_effects, values, components, scales, white)
         g = gram(X, blocks, scales, b)
         if number == 0:

@@ -7,19 +7,20 @@ from collections.abc import Iterator, Mapping
 from calibrations.effects import Effect
 
 
-class Cancelled(Exception):
-    """The search was cancelled: nobody waits for its result."""
+class Cancelled(BaseException):
+    """The search was cancelled: nobody waits for its result. No effect of a user takes it for a fault of its own."""
 
 
 class Counted(Mapping[str, Effect]):
     """The effects of a search, with its progress: a search reads all of them once a round.
 
-    `round` is the number of the present round, `at` the index of the effect in it. `cancelled` ends the search.
+    `round` is the number of the present round, `at` the index of the effect in it. `doing` says what the search does
+    after the round. `cancelled` ends the search.
     """
 
     def __init__(self, effects: Mapping[str, Effect]) -> None:
         self._effects = effects
-        self.round, self.at, self.now = 0, 0, ""
+        self.round, self.at, self.now, self.doing = 0, 0, "", ""
         self.cancelled = False
 
     def __getitem__(self, name: str) -> Effect:
@@ -33,6 +34,7 @@ class Counted(Mapping[str, Effect]):
 
     def __iter__(self) -> Iterator[str]:
         self.round += 1
+        self.doing = ""
         for number, name in enumerate(self._effects):
             self.at, self.now = number, name
             yield name
@@ -49,5 +51,5 @@ class Counted(Mapping[str, Effect]):
         if not self.round:
             return "Fitting the model"
         if self.at == len(self):
-            return f"Round {self.round}: comparing the results"
+            return f"Round {self.round}: {self.doing or 'comparing the results'}"
         return f"Round {self.round}, effect {self.at + 1} of {len(self)}: {self.now}"

@@ -18,6 +18,7 @@ from weakref import WeakSet
 from nicegui import ui
 
 from calibrations.effects import Effect
+from calibrations.progress import shown_by
 from rig.services.search import Cancelled, Counted
 
 P = ParamSpec("P")
@@ -27,6 +28,8 @@ R = TypeVar("R")
 class Visit:
     """One visit to a page: analyses for it end when the page is closed. A run is a process of its own and goes on.
 
+    `doing` says what the present analysis does.
+
     Made while a page is built; ends after the time in which a lost browser may come back.
     """
 
@@ -34,6 +37,7 @@ class Visit:
         self.closed = False
         self.search = Counted({})
         self.calculations: list[Calculation[Any]] = []
+        self.doing = ""
         ui.context.client.on_delete(self.close)
 
     def searched(self, effects: Mapping[str, Effect]) -> Counted:
@@ -50,12 +54,16 @@ class Visit:
     async def work(self, call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Call in a thread that ends with the visit. Raises Cancelled at its end, and what `call` raises."""
         self.check()
-        calculation = begin(call, *args, **kwargs)
+        with shown_by(self._show):
+            calculation = begin(call, *args, **kwargs)
         self.calculations.append(calculation)
         try:
             return await asyncio.wrap_future(calculation.future)
         finally:
             self.calculations.remove(calculation)
+
+    def _show(self, doing: str) -> None:
+        self.doing = self.search.doing = doing
 
     def cancel(self) -> None:
         """Cancel the present analyses of this visit; it may start others."""

@@ -12,7 +12,7 @@ from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI
-from nicegui import run, ui
+from nicegui import core, run, ui
 from nicegui.translations import translations
 
 from rig.errors import RigError
@@ -27,6 +27,8 @@ LOST = {  # the message of a page whose server does not answer
     "trying_to_reconnect": "A run continues; to stop the rig now, use its emergency stop. This page connects again by "
     "itself. If it does not, start the workbench again.",
 }
+RETURN_S = 20.0  # a browser that lost the connection may come back so long; its analyses go on
+PING_S, ANSWER_S = 8.0, 20.0  # between two looks at a connection, and until it counts as lost: an analysis delays both
 PORT = 8473  # preferred, so that an open page finds a restarted server
 
 
@@ -62,7 +64,7 @@ def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[
         language="en-US",
         tailwind=False,
         show_welcome_message=False,
-        reconnect_timeout=10.0,
+        reconnect_timeout=RETURN_S,
         gzip_middleware_factory=None,
     )
     guarded = Guard(app, place.token, names(host, place.port))
@@ -83,6 +85,8 @@ class _Server(uvicorn.Server):
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
+        connections = core.sio.eio  # NiceGUI gives a busy browser 4 s, and makes its page anew after that
+        connections.ping_interval, connections.ping_timeout = PING_S, ANSWER_S
         self._ready()
 
 

@@ -20,7 +20,7 @@ from rig.record import Kept, Record
 from rig.runs.runner import resume, start
 from tests.browser.conftest import Workbench
 from tests.browser.held import held_up
-from tests.browser.measured import hidden, hundred_thousand, thousand, unexplained, wandering
+from tests.browser.measured import hidden, hundred_thousand, thousand, two_faults, unexplained, wandering
 
 pytestmark = pytest.mark.slow
 
@@ -152,6 +152,28 @@ def test_a_search_is_told_cancelled_and_begun_again(
     (tmp_path / "go").touch()
     page.get_by_role("button", name="Search for missing effects").click()
     expect(page.locator(".verdict .headline").first).to_contain_text("o effect is missing")
+    page.close()
+
+
+SLOW = """schema: rig.model/1
+name: slow
+effects: [{effect: bias}, {effect: scale-factor}, {effect: held-up}]
+"""
+
+
+def test_a_fit_says_what_it_does_and_for_how_long_and_is_cancelled(
+    served: Callable[..., Any], context: BrowserContext, tmp_path: Path
+) -> None:
+    said, _ = served("--bench", str(held_up(tmp_path)))
+    context.request.get(said["url"])
+    (model := tmp_path / "slow.yaml").write_text(SLOW)
+    page = context.new_page()
+    page.goto(f"{said['url'].partition('/?')[0]}/?data={quote(two_faults(tmp_path))}&model={quote(str(model))}")
+    expect(page.locator(".verdict .headline").first).to_have_text(
+        re.compile(r"^Fitting slow to 180 poses of .*two-faults\.csv \.\.\. \d+ s$")
+    )
+    page.locator(".verdict").get_by_role("button", name="Cancel").click()
+    expect(page.get_by_text("The analysis was cancelled")).to_be_visible()
     page.close()
 
 

@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 
 from calibrations.effects.catalogue import catalogue
+from calibrations.progress import doing, shown_by
 from rig.services.request import Request
 from rig.services.search import Cancelled, Counted
 from rig.services.session import model_session
-from tests.browser.measured import hidden
+from tests.browser.measured import hidden, two_faults
 
 
 def test_it_tells_what_is_tried() -> None:
@@ -23,8 +24,25 @@ def test_it_tells_what_is_tried() -> None:
     assert (counted.text, counted.share) == ("Round 1, effect 2 of 2: hysteresis", 0.5)
     assert list(effects) == []
     assert (counted.text, counted.share) == ("Round 1: comparing the results", 1.0)
+    counted.doing = "fitting curves"
+    assert counted.text == "Round 1: fitting curves"
     assert list(counted) == ["bias", "hysteresis"]
-    assert counted.round == 2
+    assert (counted.round, counted.doing) == (2, "")
+
+
+def test_an_analysis_says_what_it_does(tmp_path: Path) -> None:
+    texts: list[str] = []
+
+    def seen(text: str) -> None:
+        texts.append(text)
+        if text.startswith("searching"):
+            raise Cancelled
+
+    with shown_by(seen), pytest.raises(Cancelled):
+        model_session(Request(two_faults(tmp_path))).diagnosed()
+    doing("nobody shows this")
+    assert [text.partition(" ")[0] for text in texts] == ["Reading", "Fitting", "searching"]
+    assert texts[-1] == "searching for places (effects first), pass 1 of at most 7"
 
 
 def test_what_is_cancelled_ends(tmp_path: Path) -> None:

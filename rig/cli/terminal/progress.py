@@ -14,8 +14,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TextIO
 
+from calibrations.progress import shown_by
+
 if TYPE_CHECKING:
     from calibrations.effects import Effect
+    from rig.services.search import Counted
 
 EVERY_S = 1.0
 LOG_EVERY = 10  # of these, in a pipe or a file
@@ -30,6 +33,7 @@ class Progress:
     text: str | Callable[[], str]
     share: float | None = None
     began_s: float = field(default_factory=time.monotonic)
+    search: Counted | None = None
 
     def line(self) -> str:
         """The present state in one line."""
@@ -44,9 +48,14 @@ class Progress:
         """The effects for a search, whose progress is shown from now on."""
         from rig.services.search import Counted
 
-        counted = Counted(effects)
+        self.search = counted = Counted(effects)
         self.text = lambda: f"searching for missing effects. {counted.text}"
         return counted
+
+    def show(self, doing: str) -> None:
+        """Show what a search does now."""
+        if self.search is not None:
+            self.search.doing = doing
 
 
 @contextmanager
@@ -56,7 +65,8 @@ def working(text: str, share: float | None = None) -> Iterator[Progress]:
     thread = threading.Thread(target=_show, args=(progress, stream, stream.isatty(), stop_event), daemon=True)
     thread.start()
     try:
-        yield progress
+        with shown_by(progress.show):
+            yield progress
     finally:
         stop_event.set()
         thread.join()

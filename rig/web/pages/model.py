@@ -16,7 +16,7 @@ from rig.errors import RecordError
 from rig.services.content import Content, content_of
 from rig.services.exclusion import numbered_run
 from rig.services.page_words import IMPORT, address
-from rig.services.search import Cancelled, Counted
+from rig.services.search import Cancelled
 from rig.web.address import ModelState, parse_state
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk, runs
@@ -56,7 +56,6 @@ class Workbench:
         self.data, self.model, self.noise = address.data, address.model, address.noise
         self.address = ""
         self.session: ModelSession[Any] | None = None
-        self.search = Counted({})
         self.visit = Visit()
         self.turn = 0  # results of older requests are ignored
         self.diagnoses: dict[tuple[str, ...], Diagnosis[Any]] = {}
@@ -138,7 +137,7 @@ class Workbench:
 
     async def open(self) -> None:
         """Read the data, fit the model, and show the session."""
-        self.verdict.wait(f"Reading {self.data} and fitting the model")
+        self.verdict.wait(f"Reading {self.data}", self.visit)
         self.verdict.offer_cancel(self.visit.cancel)
         try:
             session = await self.visit.work(self.desk.open, self.data, self.model, self.given.added, self.noise)
@@ -244,15 +243,14 @@ class Workbench:
         await asyncio.gather(self.parameters.show(session), self._diagnose(session, turn))
 
     async def _diagnose(self, session: ModelSession[Any], turn: int) -> None:
-        self.search.cancelled = True  # the result of the previous search is not needed
-        self.visit.cancel()
+        self.visit.cancel()  # the result of the previous search is not needed
         key = session.names
         if key not in self.diagnoses:
-            self.search = Counted(session.effects)
-            self.missing.wait(self.search)
+            search = self.visit.searched(session.effects)
+            self.missing.wait(search)
             self.verdict.wait("Searching for missing effects")
             try:
-                self.diagnoses[key] = await self.visit.work(session.among(self.search).diagnosed)
+                self.diagnoses[key] = await self.visit.work(session.among(search).diagnosed)
             except Cancelled:
                 return
             except Exception as error:
@@ -268,7 +266,6 @@ class Workbench:
         """End the search for missing effects: the page is closed, and nobody waits for the result."""
         self.discovering = False
         self.turn += 1
-        self.search.cancelled = True
         self.visit.cancel()
 
     def cancel(self) -> None:
@@ -305,7 +302,7 @@ class Workbench:
         """Remove one of the added effects; the later ones are fitted again."""
         if self.session is None:
             return
-        self.verdict.wait(f"Removing {name} and fitting the others")
+        self.verdict.wait(f"Removing {name} and fitting the others", self.visit)
         try:
             session = await self.visit.work(self.session.removed, name)
         except Cancelled:

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 FIRST = 6  # cards without unfolding the rest
-PROGRESS_S = 0.15
+PROGRESS_S = 0.5  # the text shows whole seconds; more often costs a busy server time
 
 
 class Missing:

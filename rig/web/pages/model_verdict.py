@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
@@ -14,7 +15,9 @@ from rig.web.parts import box, div, for_page, words
 if TYPE_CHECKING:
     from calibrations.discovery.results import Comparison, Diagnosis
     from rig.services.session import ModelSession
+    from rig.web.calculations import Visit
 
+PROGRESS_S = 0.5
 FIRST_LINES = 200  # characters of the details that every width shows
 LOOKS = {
     Verdict.ADEQUATE: "good",
@@ -30,6 +33,8 @@ class VerdictBox:
 
     def __init__(self) -> None:
         self.described = ""  # the model and the data
+        self.watched: Visit | None = None
+        self.begun_s = 0.0
         with box("verdict").props("role=status aria-live=polite") as self.box:
             with div("grow"):
                 self.headline = words("", "headline")
@@ -37,6 +42,7 @@ class VerdictBox:
                 self.more = ui.button("Whole verdict", on_click=self._unfold).props("flat dense size=sm")
                 self.more.set_visibility(False)
             self.numbers = div("row-of numbers")
+            ui.timer(PROGRESS_S, self._tick)
 
     def offer_cancel(self, cancel: Callable[[], None]) -> None:
         """A button that cancels the first fit, in place of the numbers."""
@@ -51,13 +57,21 @@ class VerdictBox:
                 with div("figure"):
                     words(value, "value")
                     words(name, "quiet small")
-        self.described = _failing(compared)
+        self.described, self.watched = _failing(compared), None
         self._show(self.described)
 
-    def wait(self, activity: str) -> None:
-        """Show that the verdict is not known yet."""
+    def wait(self, activity: str, visit: Visit | None = None) -> None:
+        """Show that the verdict is not known yet; with `visit`, what its analysis does and its time."""
         self.headline.set_text(f"{activity} ...")
         self.box.classes(remove="good bad doubt")
+        self.watched, self.begun_s = visit, monotonic()
+        if visit is not None:
+            visit.doing = activity
+
+    def _tick(self) -> None:
+        """Show what the analysis does; the seconds from the first one on."""
+        if self.watched is not None and (seconds := int(monotonic() - self.begun_s)):
+            self.headline.set_text(f"{self.watched.doing} ... {seconds} s")
 
     def found(self, result: Diagnosis[Any]) -> None:
         """Show the verdict."""

@@ -1,0 +1,25 @@
+"""What a long analysis does now, for a terminal or a page that shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+_SHOW: ContextVar[Callable[[str], None] | None] = ContextVar("show", default=None)
+
+
+def doing(text: str) -> None:
+    """Report what an analysis does now. Nothing happens if nobody shows it."""
+    if (show := _SHOW.get()) is not None:
+        show(text)
+
+
+@contextmanager
+def shown_by(show: Callable[[str], None]) -> Iterator[None]:
+    """Call `show` with what the analyses in this block do, also in threads that copy its context."""
+    before = _SHOW.set(show)
+    try:
+        yield
+    finally:
+        _SHOW.reset(before)
