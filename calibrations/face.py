@@ -38,21 +38,28 @@ class Columns(Protocol):
 
 def read(path: Path | str, kind: str | None = None, topic: str | None = None) -> Table:
     """The table in a data file: CSV, JSON, HDF5, MATLAB, NumPy, Parquet, Excel, ULog, DataFlash, ROS bags; `topic`
-    names the group, worksheet or topic of a file that has several. Raises DataError naming file, line and column.
+    names the group, worksheet or topic of a file that has several. The rows of a raw log are averaged over its dwells
+    or still intervals, as `rig.load` does it. Raises DataError naming file, line and column.
     """
     from calibrations.importing.foreign import read_csv
+    from calibrations.importing.raw_logs import average_raw_log
 
-    return read_csv(path, kind, topic)
+    return average_raw_log(read_csv(path, kind, topic))
 
 
 def table(columns: Columns, kind: str, constants: Mapping[str, Constant] | None = None) -> Table:
-    """A table of `kind` (poses, positions, motion, rates) from columns in the units of data files. Raises DataError."""
+    """A table of `kind` (poses, positions, motion, rates) from columns in the units of data files.
+
+    The rows of a raw log are averaged, as `read` does it. Raises DataError.
+    """
+    from calibrations.importing.raw_logs import average_raw_log
+
     if not callable(getattr(columns, "items", None)):
         raise DataError(
             f"cal.table: columns with names are needed, and a {type(columns).__name__} was given; give a data frame or "
             'a mapping, such as {"ax": a[:, 0], "ay": a[:, 1], "az": a[:, 2]}'
         )
-    return Table.from_columns(kind, dict(columns.items()), constants, "the given columns")
+    return average_raw_log(Table.from_columns(kind, dict(columns.items()), constants, "the given columns"))
 
 
 def fit(data: Table, model: GivenModel) -> Fit:

@@ -17,6 +17,7 @@ import numpy as np
 import openpyxl
 import pytest
 
+import calibrations as cal
 from calibrations.errors import DataError
 from calibrations.importing.bad_lines import SHARES
 from calibrations.importing.binary import open_sheet
@@ -179,6 +180,19 @@ def test_a_log_is_read_by_the_proposed_import(name: str, tmp_path: Path) -> None
     path = tmp_path / "log.csv"
     path.write_bytes(LOGS[name].text.encode())
     check(imported(path), LOGS[name].unit, LOGS[name].begin_s)
+
+
+def test_python_takes_a_log_as_the_command_line_does(tmp_path: Path) -> None:
+    t, outputs = log()
+    columns = {"t_s": t, **dict(zip(("ax", "ay", "az"), outputs.T, strict=True))}
+    check(cal.table(columns, "positions", {"unit": "g"}), "g", 0)
+    path = tmp_path / "log.csv"
+    path.write_text("# unit: g\nt_s,ax,ay,az\n" + rows(lambda t, a: fixed([t, *a])), encoding="utf-8")
+    table = cal.read(path)
+    check(table, "g", 0)
+    fit = cal.fit(table, "linear")
+    assert fit.params["bias.x"].value == pytest.approx(0.02, abs=1e-3)
+    assert fit.params["scale-factor.y"].value == pytest.approx(0.99, abs=1e-3)
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-be", "utf-8-sig", "cp1252", "gzip"])
