@@ -19,6 +19,7 @@ DAMPINGS = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # of each column's squares
 BOUND_ROUNDS = 3
 LARGEST_FACTOR = 2.0  # by which one step changes a parameter that is positive by its meaning
 STRAIGHT = 1e-6  # of the residual: the model is linear where one step predicts the residual better
+IDLE = 1e-9  # of the largest column: a parameter with less changes nothing
 SMALL_GAIN = 3e-3  # of the mean square of the residual or the noise: a parameter moves by 0.05 uncertainties
 
 
@@ -60,7 +61,10 @@ def minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
 
 
 def _at_once(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float] | None:
-    """As `minimise`, where one step of Gauss and Newton's gets there: the model is linear. None where it is not."""
+    """As `minimise`, where one step of Gauss and Newton's gets there: the model is linear. None where it is not.
+
+    A time constant changes nothing while its amplitude is 0. A step that changes the amplitude leaves it to be fitted.
+    """
     typical, (low, high) = problem.layout.typical, problem.layout.bounds
     columns = np.concatenate([problem.residual(start)[:, :, None], problem.jacobian(start)], axis=2)
     rows = problem.layout.prior_rows
@@ -73,6 +77,12 @@ def _at_once(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
     end_residual = np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
     if np.linalg.norm(start_residual + J @ step - end_residual) > STRAIGHT * np.linalg.norm(end_residual):
         return None
+    sizes = np.linalg.norm(J, axis=0)
+    idle = sizes <= IDLE * sizes.max()
+    if idle.any():
+        idle_columns = noise.whiten(problem.jacobian(theta, of=idle)) * typical[idle]
+        if np.any(np.linalg.norm(idle_columns, axis=0) > IDLE * sizes.max()):
+            return None
     return theta, float(end_residual @ end_residual) / 2
 
 

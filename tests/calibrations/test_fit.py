@@ -119,6 +119,17 @@ def test_hysteresis_finds_its_reach_from_either_start(reach: float) -> None:
     assert found.pooled_excess < 1.5
 
 
+def test_a_time_constant_is_fitted_although_its_amplitude_begins_at_zero() -> None:
+    """In white noise alone there is no second fit that would begin with an amplitude."""
+    warming = 0.003 * np.exp(-7.0 * np.arange(len(A_X)) / 250.0)
+    columns = {**COLUMNS, "t_s": 7.0 * np.arange(len(A_X))}
+    data = synthetic.poses(columns, 2.5 + A_X + warming, 2.6 + A_Y - warming, seed=1)
+    found = fit(read_model("linear").with_effect(catalogue()["warm-up-bias"]), data)
+    estimate = found.params["warm-up-bias.time_constant"]
+    assert estimate.value == pytest.approx(250.0, abs=4 * estimate.std)
+    assert found.pooled_excess < 1.2
+
+
 def test_fewer_rows_than_parameters() -> None:
     few = Table.from_columns(
         "poses", {"alpha_deg": [90.0] * 2, "beta_deg": [0.0, 180.0], "vx_v": [3.5, 1.5]}, source="few"
