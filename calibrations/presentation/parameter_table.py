@@ -96,7 +96,8 @@ def _key(term: Term, e: Estimate) -> tuple[str, str, str]:
 def _row(effect: str, e: Estimate, change: str, doc: str) -> ParameterRow:
     name = e.name.replace("_", " ")
     if not e.identified:
-        return ParameterRow(effect, name, e.axis, NOT_IDENTIFIED, "", "", change, e.why or "the data do not determine it", doc)
+        why = e.why or "the data do not determine it"
+        return ParameterRow(effect, name, e.axis, NOT_IDENTIFIED, "", "", change, why, doc)
     factor, prefixed_unit = _scale(e)
     if not e.std:
         return ParameterRow(effect, name, e.axis, minus(f"{e.value * factor:.6g}"), "–", prefixed_unit, change, "", doc)
