@@ -24,7 +24,6 @@ from calibrations.means.noise import Processes, norm_std, white_std
 from calibrations.model import Model
 from calibrations.model.chain import LinearisedChain, Step, backward, force, forward, sensed
 from calibrations.model.parameters import Layout
-from calibrations.motion.spectrum import sample_output
 from calibrations.table import Array, Table
 from calibrations.tables import FITTED
 
@@ -357,6 +356,8 @@ class MotionProblem(Problem):
 
     def of_output(self, theta: Array, changes: Array) -> Array:
         """Behind the output filter."""
+        from calibrations.motion.spectrum import sample_output  # other kinds need no spectra
+
         filtered = [sample_output(change, self.samples) for change in np.moveaxis(changes, 2, 0)]
         return super().of_output(theta, np.stack(filtered, axis=2))
 

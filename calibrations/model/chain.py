@@ -20,7 +20,6 @@ import numpy as np
 from calibrations.effects import Effect, Values
 from calibrations.geometry.orientation import Pose, nominal_pose, specific_force
 from calibrations.geometry.rate_table import rate_deg_s
-from calibrations.motion.spectrum import sample_output
 from calibrations.table import Array, Table
 
 Step = tuple[Effect, Values]
@@ -94,6 +93,8 @@ def converted(parts: Sequence[Array], n: int, table: Table, steps: Sequence[Step
     for part in parts:
         v += part
     if table.type.moving:
+        from calibrations.motion.spectrum import sample_output  # only motion has spectra
+
         v = sample_output(v, table)
     for effect, p in steps:
         v = effect.output(v, table, p)

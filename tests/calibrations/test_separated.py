@@ -85,8 +85,8 @@ def test_a_fault_far_down_is_named_with_its_line(rows: int) -> None:
         assert says in str(error.value)
 
 
-def test_thousands_separators_are_no_numbers() -> None:
-    with pytest.raises(DataError, match=r'line 2, column "vx_v": "3\.498,7" where a number belongs'):
+def test_thousands_separators_are_read_where_a_decimal_separator_follows() -> None:
+    with pytest.raises(DataError, match=r'"vx_v" reaches 3498\.7 V'):
         parse_csv(f"{HEADER}\n90;0;3.498,7\n", "bad.csv")
     with pytest.raises(DataError, match='line 2, column "vx_v": "3_498" where a number belongs'):
         parse_csv(f"{HEADER}\n90;0;3_498\n", "bad.csv")

@@ -1,7 +1,6 @@
 import numpy as np
 
 from calibrations.effects import Effect, Parameter, Values
-from calibrations.motion.spectrum import corner_hz, filter_output, first_order
 from calibrations.table import Array, Table
 
 
@@ -22,6 +21,8 @@ class OutputFilter(Effect):
     off_nominal = Parameter("Hz", typical=2.0, low=-10.0, high=100.0, doc="corner less its nominal value")
 
     def output(self, v: Array, table: Table, p: Values) -> Array:
+        from calibrations.motion.spectrum import corner_hz, filter_output, first_order  # only motion has spectra
+
         nominal = corner_hz(table)
         corners_hz = [nominal + max(float(d), -0.9 * nominal) for d in p.off_nominal]
         return filter_output(

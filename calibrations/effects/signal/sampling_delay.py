@@ -1,5 +1,4 @@
 from calibrations.effects import Effect, Parameter, Values
-from calibrations.motion.spectrum import delay, filter_output
 from calibrations.table import Array, Table
 
 
@@ -20,4 +19,6 @@ class SamplingDelay(Effect):
     delay = Parameter("s", typical=1e-3, low=-0.05, high=0.05, doc="age of the sensor's samples")
 
     def output(self, v: Array, table: Table, p: Values) -> Array:
+        from calibrations.motion.spectrum import delay, filter_output  # only motion has spectra
+
         return filter_output(v, table, lambda k: delay(float(p.delay[k])))

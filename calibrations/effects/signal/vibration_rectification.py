@@ -5,7 +5,6 @@ import scipy  # its rooms are loaded where they are first entered: a list of eff
 
 from calibrations.effects import Constant, Effect, Parameter, Values
 from calibrations.effects.logged import follows_level, level
-from calibrations.motion.spectrum import find_records
 from calibrations.table import Array, Table
 
 SECOND = 1.0
@@ -62,6 +61,8 @@ def _mean_squares_g2(table: Table, output_per_g: float, smooth: bool) -> Array:
 
 def mean_square_g2(table: Table) -> Array:
     """Mean square of the motion about each sample, g^2, shape (n,); records apart."""
+    from calibrations.motion.spectrum import find_records  # only motion has records
+
     squares = (table.column("acceleration_m_s2") / table.gravity_m_s2) ** 2
     for record in find_records(table):
         width = max(1, round(SECOND * record.rate_hz))

@@ -10,11 +10,9 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TextIO
-
-from calibrations.progress import shown_by
 
 if TYPE_CHECKING:
     from calibrations.effects import Effect
@@ -34,6 +32,7 @@ class Progress:
     share: float | None = None
     began_s: float = field(default_factory=time.monotonic)
     search: Counted | None = None
+    at_end: ExitStack = field(default_factory=ExitStack)  # what ends with the work
 
     def line(self) -> str:
         """The present state in one line."""
@@ -46,9 +45,11 @@ class Progress:
 
     def searched(self, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
         """The effects for a search, whose progress is shown from now on."""
+        from calibrations.progress import shown_by  # `rig --help` loads no calibrations
         from rig.services.search import Counted
 
         self.search = counted = Counted(effects)
+        self.at_end.enter_context(shown_by(self.show))
         self.text = lambda: f"searching for missing effects. {counted.text}"
         return counted
 
@@ -65,7 +66,7 @@ def working(text: str, share: float | None = None) -> Iterator[Progress]:
     thread = threading.Thread(target=_show, args=(progress, stream, stream.isatty(), stop_event), daemon=True)
     thread.start()
     try:
-        with shown_by(progress.show):
+        with progress.at_end:
             yield progress
     finally:
         stop_event.set()
