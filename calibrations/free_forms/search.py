@@ -33,7 +33,8 @@ ROUNDS = 7
 LARGEST = 4.0  # of the mean square of the first misfit: more is two components against each other
 HALVINGS = 6  # of a step that overshoots
 NOISE_ALONE, FEW_COMPONENTS = 1.04, 3  # residual over noise and components of a search that needs no second beginning
-# residual over noise between which flicker may be what is left: below there is no need of it, above are unfound effects
+# Flicker is tried where the residual over the noise is between these limits. A smaller residual is explained without
+# flicker. A larger residual contains effects that the search did not find.
 LEAST_MISFIT, MOST_MISFIT = 1.2, 2.0
 SLOW_MOST = 0.5  # slow noise, in noise floors, at most (rms)
 SLOW_FIRST = 0.15  # the same while the first components are found: it would take up part of them

@@ -14,7 +14,7 @@ NAMED = re.compile(PAIR)
 _ANOTHER = re.sub(r"\?P<\w+>", "", PAIR)
 NAMED_LINE = re.compile(rf"\s*{_ANOTHER}(?:[,;\s]+{_ANOTHER})+\s*")
 LONGEST_LOG = 1 << 26  # characters: the text is held in memory
-REFUSED: Mapping[str, str] = {  # the first line, and what to do
+REFUSED: Mapping[str, str] = {  # pattern of the first line -> format of the file, and what to do
     r"FMT, ?128, ?": "is a DataFlash log as text; import the .bin log that it was made from",
     r"version https://git-lfs": "is a pointer of Git LFS, not the file; get it with `git lfs pull`",
     r"<(!doctype|html)": "is a web page, not measurements; download the file itself",

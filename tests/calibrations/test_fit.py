@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -87,6 +88,12 @@ def test_a_fit_does_not_depend_on_the_fits_before_it() -> None:
     for key, estimate in together.params.items():
         assert present.params[key].value == pytest.approx(estimate.value, abs=1e-3 * estimate.std)
         assert present.params[key].std == pytest.approx(estimate.std, rel=1e-3)
+
+
+def test_the_noise_of_the_fit_before_has_no_influence_on_a_refit() -> None:
+    before = fit(read_model("linear"), table(3, slow_v=synthetic.NOISE_V))
+    noise = replace(before.noise, scatter=100 * before.noise.floor, ratio=np.full(2, 2.0))
+    np.testing.assert_array_equal(refit(replace(before, noise=noise), MODEL).theta, refit(before, MODEL).theta)
 
 
 def test_order_of_rows_does_not_matter() -> None:

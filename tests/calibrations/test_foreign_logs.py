@@ -68,7 +68,7 @@ def counts(a: Array) -> list[str]:
 
 @dataclass(frozen=True)
 class Log:
-    """The lines above the rows, a row, and what the import gives: unit, and begin in s."""
+    """A log as its header lines and one row, with the expected unit and the expected start time in s."""
 
     head: str
     row: Callable[[float, Array], Sequence[str]]

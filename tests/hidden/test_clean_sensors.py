@@ -45,7 +45,7 @@ def test_beside_strong_flicker_no_free_form_stays_in_the_model(seed: int) -> Non
     assert {step.name for step in found.findings.steps} == {"quadratic-nonlinearity", "cross-axis-bias"}
 
 
-@pytest.mark.parametrize("seed", first_fast((23, 11, 20, 26), 1))
+@pytest.mark.parametrize("seed", first_fast((11, 23, 20, 26), 1))
 def test_a_straight_drift_in_flicker_has_no_free_form_beside_it(seed: int) -> None:
     """Of 23, the level of standard deviations that only scatter was a straight line too."""
     found = discover(ramp_in_flicker(seed), read_model("linear"))
