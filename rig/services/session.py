@@ -70,6 +70,20 @@ class ModelSession(Generic[F]):
         """The same with other effects to be added."""
         return replace(self, effects=effects)
 
+    def with_own(self, effect: Effect) -> ModelSession[F]:
+        """The same with an effect that a user wrote, in the place of an earlier one of its name.
+
+        Searches that know the earlier one are forgotten.
+        """
+        earlier = self.effects.get(effect.name)
+        forgotten = earlier is not None and earlier.expression != effect.expression
+        plans = {
+            names: found
+            for names, found in self.plans.items()
+            if not forgotten or effect.name not in (*names, *found.names)
+        }
+        return replace(self, effects={**self.effects, effect.name: effect}, plans=plans)
+
     def tried(self, effect: Effect) -> Step[F]:
         """The present model with one effect more, fitted. Raises ModelError where that says nothing new."""
         if self.end.model.holds(effect.name):
@@ -87,7 +101,8 @@ class ModelSession(Generic[F]):
         """
         if text.startswith(PREFIX):
             return free_form_at(text, self.effects)
-        if name in self.effects:
+        known_effect = self.effects.get(name)
+        if known_effect is not None and not known_effect.expression:
             raise ModelError(f"{name} is already in the catalogue; give yours another name")
         return self.data.expression(name, text)
 
@@ -139,7 +154,7 @@ class ModelSession(Generic[F]):
                     effect = known_effect
                 else:
                     effect = session.written(name, expression if equals else text)
-                    session = session.among({**session.effects, effect.name: effect})
+                    session = session.with_own(effect)
                 doing(f"Adding {name}")
                 session = session.with_step(session.tried(effect))
             except CalibrationError as error:

@@ -69,6 +69,19 @@ def test_an_effect_of_ones_own_is_tried_like_any_other(turned: ModelSession) -> 
         turned.written("bias", "a*sin(5*beta)")
 
 
+def test_the_name_of_a_removed_effect_is_free_and_its_searches_are_forgotten(turned: ModelSession) -> None:
+    first = turned.written("mine", "a*az")
+    grown = turned.with_own(first)
+    grown = grown.with_step(grown.tried(first))
+    assert grown.diagnosed().findings in grown.plans.values()
+    removed = grown.removed("mine")
+    second = removed.written("mine", "a*sin(2*beta)")
+    again = removed.with_own(second)
+    assert again.effects["mine"].expression == "a*sin(2*beta)"
+    assert again.with_step(again.tried(second))._plan() is None
+    assert again.plans == {names: found for names, found in grown.plans.items() if "mine" not in names}
+
+
 def test_a_noise_model_grows_as_well(tmp_path: Path) -> None:
     request = Request(wandering(tmp_path))
     found = model_session(request)

@@ -320,7 +320,7 @@ class Workbench:
         """Add an effect to the model."""
         if self.session is not None:
             if (effect := step.effect).expression:
-                self.session = self.session.among({**self.session.effects, effect.name: effect})
+                self.session = self.session.with_own(effect)
             await self.show(self.session.with_step(step))
 
     async def undo(self) -> None:
