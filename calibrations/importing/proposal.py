@@ -47,31 +47,33 @@ COLUMN_NAMES: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "still": {"": ("t_s", "vx_v", "vy_v", "vz_v", "temperature_c", "supply_v")},
 }  # fmt: skip
 AXIS = r"(?:^|[^a-z])(?P<axis>[xyz])(?:[^a-z]|$)"
+TEMPERATURE = r"temp(?!s$|o$)|thermo"
+TIME = r"^t(_?s)?$|time|elapsed|seconds|zeit|^temps$|^tiempo|^tempo$"
 SCATTER = r"std|stdev|sigma|noise|scatter|deviation"
-# meaning of a name, the first match; {axis} is the letter x, y or z in it
+# meaning of a name, the first match; {axis} is the letter x, y or z in it; some names are German or French
 NAME_PATTERNS: Mapping[str, Sequence[tuple[str, str]]] = {
     "poses": (
-        (r"alpha|inclin|tilt|pitch|polar|elevation", "alpha_deg"),
-        (r"beta|table|azimuth|yaw|rotary|rotation|turn(?!ing)", "beta_deg"),
+        (r"alpha|inclin|tilt|pitch|polar|elevation|neigung|^kipp|schwenk", "alpha_deg"),
+        (r"beta|table|azimu|yaw|rotary|rotation|turn(?!ing)|dreh|rundtisch|plateau", "beta_deg"),
         (r"^dir|direction|turning|sense", "direction"),
         (r"mount", "mount_deg"),
         (r"flip|face", "flip"),
         (r"suppl|vdd|vcc|excitation", "supply_v"),
-        (r"temp|thermo", "temperature_c"),
-        (r"^t(_?s)?$|time|elapsed|seconds", "t_s"),
+        (TEMPERATURE, "temperature_c"),
+        (TIME, "t_s"),
         (r"^n$|count|samples|averag", "n"),
     ),
     "positions": (
-        (r"temp|thermo", "temperature_c"),
-        (r"^t(_?s)?$|time|elapsed|seconds", "t_s"),
+        (TEMPERATURE, "temperature_c"),
+        (TIME, "t_s"),
         (r"^n$|samples|averag", "n"),
         (r"orient|quat", ""),
         (r"gyr|omega|rate|angular|^g[xyz]$", "g{axis}"),
         (r"mag|^m[xyz]$", "m{axis}"),
     ),
     "rates": (
-        (r"temp|thermo", "temperature_c"),
-        (r"^t(_?s)?$|time|elapsed|seconds", "t_s"),
+        (TEMPERATURE, "temperature_c"),
+        (TIME, "t_s"),
         (r"^n$|samples|averag", "n"),
         (r"orient|quat", ""),
         (r"acc|^a[xyz]$", "a{axis}"),
@@ -81,8 +83,8 @@ NAME_PATTERNS: Mapping[str, Sequence[tuple[str, str]]] = {
     "motion": (
         (r"displac|distance|position|stroke", "displacement_m"),
         (r"suppl|vdd|vcc|excitation", "supply_v"),
-        (r"temp|thermo", "temperature_c"),
-        (r"^t(_?s)?$|time|elapsed|seconds", "t_s"),
+        (TEMPERATURE, "temperature_c"),
+        (TIME, "t_s"),
     ),
 }
 INDEXED = re.compile(r"(?P<name>.*(?:acc|gyr|mag).*)\[(?P<index>\d)\]$", re.IGNORECASE)
@@ -180,7 +182,7 @@ def guess_by_names(laid: Sheet, values: Mapping[str, Array], kind: str) -> list[
     """(their name, our name) for the columns with a meaningful name."""
     unitless = dict(zip(laid.header, laid.bare, strict=True))
     units = dict(zip(laid.header, laid.units, strict=True))
-    guesses = [(name, _by_name(unitless[name], kind) or _by_unit(unitless[name], units[name])) for name in values]
+    guesses = [(name, _by_name_and_unit(unitless[name], units[name], kind)) for name in values]
     targets = {target for _, target in guesses}
     nameless = iter(name for name in KINDS[kind].outputs if name not in targets)
     outputs = {name: next(nameless, "") for name, target in guesses if not target and _is_output(unitless[name])}
@@ -203,7 +205,15 @@ def guess_by_values(values: Mapping[str, Array], kind: str) -> list[tuple[str, s
         )
         guesses += list(zip(angles[:2], ("alpha_deg", "beta_deg"), strict=False))
         remaining = {name: v for name, v in remaining.items() if name not in angles[:2]}
+        outputs = list(remaining.values())[:1]
+        remaining = {name: v for name, v in remaining.items() if _alike(v, outputs[0])}
     return [*guesses, *zip(remaining, KINDS[kind].outputs, strict=False)]
+
+
+def _alike(values: Array, output: Array) -> bool:
+    """Whether numbers come near the range of an output; a temperature beside voltages does not."""
+    margin = max(float(np.ptp(output)), float(np.ptp(values)), float(np.abs(output).max()))
+    return bool(values.min() <= output.max() + margin and values.max() >= output.min() - margin)
 
 
 def sample_values(laid: Sheet, name: str) -> Array:
@@ -245,6 +255,14 @@ def _by_name(unitless: str, kind: str) -> str:
     last = re.search(r"(?:^|[_\W]|^v|^u|^a|acc|out)(?P<axis>[xyz])\d*$", lower)
     axis = axis or (last["axis"] if last else "")
     return dict(zip(AXES, KINDS[kind].outputs, strict=False)).get(axis, "")
+
+
+def _by_name_and_unit(unitless: str, unit: str, kind: str) -> str:
+    """Our name for theirs; a name whose unit is that of another quantity has the meaning of the unit."""
+    target = _by_name(unitless, kind)
+    target_unit = column_unit(target)
+    contradicts = unit and target_unit and UNITS[unit][0] != target_unit
+    return target if target and not contradicts else _by_unit(unitless, unit)
 
 
 def _by_unit(unitless: str, unit: str) -> str:

@@ -135,8 +135,8 @@ def read_sheet(source: Source) -> Sheet:
         raise DataError(_another_width(source.name, *data_rows[0], header))
     if not any(is_number(cell) for cells in sample for cell in cells):
         raise DataError(
-            f"{source.name}: has no numbers in its first {len(sample)} rows; a table of measurements has a header "
-            "line with column names, and rows of numbers below it"
+            f"{source.name}: has no numbers in its first rows; a table of measurements has a header line "
+            "with column names, and rows of numbers below it"
         )
     return Sheet(
         source,

@@ -34,7 +34,7 @@ SPELLINGS = {
     "hour": "h", "hours": "h", "hr": "h", "µs": "us", "µv": "uV", "µm": "um", "µt": "uT", "m/s^2": "m/s2",
     "m/s²": "m/s2", "m/s**2": "m/s2", "ms^-2": "m/s2", "m/(s^2)": "m/s2", "mps2": "m/s2",
     "lsb": "counts", "raw": "counts", "cnt": "counts",
-    "°/s": "deg/s", "dps": "deg/s", "milli-g": "mg",
+    "°/s": "deg/s", "grad": "deg", "grad/s": "deg/s", "dps": "deg/s", "milli-g": "mg",
 }  # fmt: skip
 _SUFFIX = re.compile(
     r"^(?P<name>.*[^\W_])_(?P<unit>s|ms|us|ns|min|g|mg|mps2|dps|mdps|v|mv|c|degc|degf|deg|rad|ut)$", re.I

@@ -16,7 +16,7 @@ from tests.browser.conftest import Workbench
 pytestmark = pytest.mark.slow
 
 
-def foreign(folder: Path, clock: str = "Zeitpunkt") -> Path:
+def foreign(folder: Path, clock: str = "Takt") -> Path:
     """125 poses in 12.4 minutes, outputs in mV, with names of another laboratory."""
     rng = np.random.default_rng(5)
     rows = []
@@ -155,3 +155,26 @@ def test_a_table_that_was_taken_by_itself_says_how_to_take_another(workbench: Wo
     expect(page.get_by_label("Table of the file")).to_have_value("imu")
     choose(page, "Kind of table", "Still record: single samples at rest")
     expect(page.locator("body")).not_to_contain_text("--topic")
+
+
+def test_a_unit_that_does_not_fit_the_values_is_asked_for(workbench: Workbench, tmp_path: Path) -> None:
+    turn = "".join(f"90,{beta},{2500 + 1000 * np.cos(np.radians(beta)):.3f}\n" for beta in range(0, 360, 15))
+    (path := tmp_path / "ours.csv").write_text(f"alpha_deg,beta_deg,vx_v\n{turn}")
+    page = workbench.visit(f"/import?file={quote(str(path))}")
+    question = page.get_by_role("group", name="Unit of vx_v")
+    expect(page.get_by_role("alert")).not_to_contain_text("import it")
+    question.get_by_role("button", name="mV", exact=True).click()
+    expect(question).to_have_count(0)
+    expect(page.get_by_text("24 rows of poses")).to_be_visible()
+    expect(page.get_by_text("1.5 to 3.5 V")).to_be_visible()
+    page.reload()
+    question.get_by_role("button", name="V", exact=True).click()
+    expect(page.get_by_text("1500 to 3500 V")).to_be_visible()
+
+
+def test_an_import_can_be_cancelled(workbench: Workbench, tmp_path: Path) -> None:
+    (path := tmp_path / "one.csv").write_text("alpha_deg,beta_deg,vx_v\n90,0,3.5\n")
+    page = workbench.visit(f"/import?file={quote(str(path))}")
+    expect(page.get_by_text("1 row of poses")).to_be_visible()
+    page.get_by_role("button", name="Cancel").click()
+    page.wait_for_url("**/record")

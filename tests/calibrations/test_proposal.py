@@ -37,6 +37,12 @@ ROWS = "90;0;3500\n90;30;3400\n30;0;3000\n"
         ("alphaAngle;tableAngle;accX", {"alpha_deg=alphaAngle", "beta_deg=tableAngle", "vx_v=accX:mV"}),
         ("alpha_deg;beta_deg;signal", {"vx_v=signal:mV"}),
         ("pitch;yaw;CH0", {"alpha_deg=pitch", "beta_deg=yaw", "vx_v=CH0:mV"}),
+        (
+            "Neigung [Grad];Drehung [Grad];Ausgang X [mV]",
+            {"alpha_deg=Neigung [Grad]:deg", "beta_deg=Drehung [Grad]:deg", "vx_v=Ausgang X [mV]:mV"},
+        ),
+        ("Neigungswinkel;Drehtisch;Ux", {"alpha_deg=Neigungswinkel", "beta_deg=Drehtisch", "vx_v=Ux:mV"}),
+        ("inclinaison;plateau;Ux", {"alpha_deg=inclinaison", "beta_deg=plateau", "vx_v=Ux:mV"}),
     ],
 )
 def test_names_and_values(header: str, expected: set[str]) -> None:
@@ -57,6 +63,9 @@ def test_names_and_values(header: str, expected: set[str]) -> None:
         ("std_x", 0.7, "vx_std_v=std_x:mV"),
         ("noise y", 0.7, "vy_std_v=noise y"),
         ("samples", 500, "n=samples"),
+        ("Zeit [min]", 3, "t_s=Zeit [min]:min"),
+        ("temps (min)", 3, "t_s=temps (min):min"),
+        ("temperature (s)", 3, "t_s=temperature (s):s"),
         ("humidity", 40, None),
     ],
 )
@@ -85,6 +94,7 @@ def test_columns_without_names_are_told_by_their_values() -> None:
         f"{k}.5 {a} {b} {2.5 + b / 1000}\n" for k, (a, b) in enumerate([(90, 0), (90, 30), (90, 60), (30, 0)])
     )
     assert proposed(turn) == {"t_s=1", "alpha_deg=2", "beta_deg=3", "vx_v=4"}
+    assert proposed(turn.replace("\n", " 22.1\n")) == {"t_s=1", "alpha_deg=2", "beta_deg=3", "vx_v=4"}  # no output
     held = "".join(f"{k} {x} {y} {z}\n" for k, (x, y, z) in enumerate(np.roll(np.eye(3), 1, axis=0) * 9.8))
     assert proposed(held) == {"t_s=1", "ax=2:m/s2", "ay=3:m/s2", "az=4:m/s2"}
 

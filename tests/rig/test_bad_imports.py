@@ -64,7 +64,7 @@ def test_an_import_that_cannot_be(
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ("root:x:0:0:root:/root:/bin/sh\ndaemon:x:1:1:daemon:/:/bin/false\n", "has no numbers in its first 1 rows"),
+        ("root:x:0:0:root:/root:/bin/sh\ndaemon:x:1:1:daemon:/:/bin/false\n", "has no numbers in its first rows"),
         ("key = s3cret\nother = 7\n", "line 1: a header line with column names is missing"),
         ("Its s3cret: a, b\n1\n2\n3,4\n5,6\n", "line 1: a header line with column names is missing"),
         ("daemon\t\t7/s3cret\nx\ty\t8\n", "line 1: a column has no name"),

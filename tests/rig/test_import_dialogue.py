@@ -17,7 +17,7 @@ from calibrations.importing.units import ColumnMapping
 from rig.record import Record
 from rig.services.importing import opened, proposal
 
-THEIRS = "Zeit;inclination;table;Ux\n" + "".join(f"{k};90;{30 * k};{2500 + k}\n" for k in range(12))
+THEIRS = "Takt;inclination;table;Ux\n" + "".join(f"{k};90;{30 * k};{2500 + k}\n" for k in range(12))
 
 
 @pytest.fixture
@@ -36,8 +36,8 @@ def test_a_mapping_is_confirmed_corrected_and_can_be_repeated(file: Path, rig: C
     with at_terminal(file) as terminal:
         for question, answer in (
             (r"\[poses\]: ", ""),
-            (r"Zeit .*\[-\]: ", "times"),
-            (r'"times" is not a column name.*Zeit .*\[-\]: ', "t_s:min"),
+            (r"Takt .*\[-\]: ", "times"),
+            (r'"times" is not a column name.*Takt .*\[-\]: ', "t_s:min"),
             (r"inclination +90 \.\. 90 +\[alpha_deg\]: ", ""),
             (r"table .*\[beta_deg\]: ", "V"),
             (r'in deg; "table" in V cannot be converted to it.*table .*\[beta_deg\]: ', "alpha_deg"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import filecmp
+import re
 import secrets
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
@@ -10,20 +11,23 @@ from functools import partial
 from pathlib import Path
 from urllib.parse import urlencode
 
+import numpy as np
 from nicegui import events, ui
+from numpy.typing import NDArray
 
 from calibrations.importing.proposal import column_names, sample_values
 from calibrations.importing.sheet import Sheet
 from calibrations.importing.topics import SeveralTopics
 from calibrations.importing.units import ColumnMapping, column_unit
 from calibrations.table import Constant
+from calibrations.text import unit as unit_text
 from rig.files import home
 from rig.services.importing import Preview, data_chart, lacking, opened, preview, proposal, stored, units_for
-from rig.services.page_words import IMPORT, address
+from rig.services.page_words import IMPORT, address, page_step
 from rig.web.calculations import off_loop
 from rig.web.desk import FILES, Desk
 from rig.web.frame import frame
-from rig.web.parts import box, div, facts, failed, message, noted, waiting, wide_table, words
+from rig.web.parts import box, div, facts, failed, for_page, noted, raw_message, waiting, wide_table, words
 from rig.web.pictures import downloads, draw, empty_plot
 
 MOST_BYTES = 200_000_000
@@ -46,6 +50,11 @@ CONSTANTS = {  # constants that a person may know, with the labels of their fiel
 OF_KIND = {"turn_deg": ("rates",), "sample_rate_hz": ("positions", "rates", "still", "motion")}  # else of all kinds
 PICTURE = "Data as imported"
 TIMES = ("s", "min", "h", "ms")
+UNIT_DOUBT = re.compile(  # the end of a message about a unit that does not fit the values
+    r"\nIf its unit is (?P<likely>\S+), import it with:.*\nIf its unit is (?P<stated>\S+) after all, "
+    r"state it: --column (?P<name>\w+)=",
+    re.DOTALL,
+)
 
 
 def register(desk: Desk) -> None:
@@ -172,9 +181,9 @@ class Column:
     def _offer_units(self, unit: str) -> None:
         name = str(self.name.value or "")
         offered = units_for(name)
-        options = {unit: unit for unit in offered} if column_unit(name) else {"": "as it is", **{u: u for u in offered}}
         default_unit = unit or column_unit(name)
-        self.unit.set_options({**options, default_unit: default_unit or "as it is"}, value=default_unit)
+        options = [*([] if column_unit(name) else [""]), *offered, default_unit]
+        self.unit.set_options({unit: unit_text(unit) or "as it is" for unit in options}, value=default_unit)
         self.unit.set_visibility(bool(offered))
 
     def _renamed(self) -> None:
@@ -186,9 +195,10 @@ class Column:
         self.page.look()
 
     def state(self, unit: str) -> None:
-        """Set the unit that a person gives."""
+        """Set the unit that a person gives, also if it is the present one."""
         self.stated = unit
         self.unit.set_value(unit)
+        self.page.look()
 
     @property
     def mapping(self) -> ColumnMapping | None:
@@ -216,6 +226,7 @@ class ImportPage:
             self.kind = ui.select(KINDS, label="Kind of table", value=proposed.kind, on_change=self._other_kind)
             self.kind.props("dense options-dense").style("min-width: 300px")
             self.button = ui.button("Import", icon="download_done", on_click=self._import)
+            ui.button("Cancel", on_click=partial(ui.navigate.to, "/record")).props("flat")
         self.fault = div("stack")
         self.question = div("")
         with div("import-page"):
@@ -275,7 +286,7 @@ class ImportPage:
         """Ask for the unit of the time; nothing is imported before the answer."""
         clock = next(column for column in self.columns.values() if column.name.value == "t_s")
         with self.question, box("question stack").props("role=group aria-label='Unit of the time'"):
-            words(f'Which unit has the time "{clock.theirs}"?', "title")
+            words(f'What is the unit of the time "{clock.theirs}"?', "title")
             words(f"It {doubt}; no stage does that." + (f" It fits {fits}." if fits else ""), "quiet")
             with div("row-of"):
                 for unit in TIMES:
@@ -286,7 +297,6 @@ class ImportPage:
         self.asked = False
         self.question.clear()
         clock.state(unit)
-        self.look()
 
     @property
     def mappings(self) -> list[ColumnMapping]:
@@ -332,7 +342,21 @@ class ImportPage:
             if isinstance(reason, str):
                 noted(reason)
             else:
-                failed(title, message(reason))
+                text = raw_message(reason)
+                doubt = UNIT_DOUBT.search(text)
+                failed(title, page_step(text[: doubt.start()] if doubt else text).text)
+                if doubt:
+                    self._offer_doubted_units(doubt["name"], (doubt["likely"], doubt["stated"]))
+
+    def _offer_doubted_units(self, name: str, units: tuple[str, str]) -> None:
+        """Buttons for the unit that fits the values, and for the present one, which a person may confirm."""
+        column = next(column for column in self.columns.values() if column.name.value == name)
+        with box("question").props(f"role=group aria-label='Unit of {name}'"):
+            words(f'What is the unit of the column "{column.theirs}"?', "title")
+            with div("row-of"):
+                for k, unit in enumerate(units):
+                    button = ui.button(unit_text(unit), on_click=partial(column.state, unit)).props("no-caps")
+                    button.props("outline" if k else "")
 
     def _show(self, preview_of: Preview) -> None:
         """The picture and the table's first values; the import is possible."""
@@ -341,8 +365,8 @@ class ImportPage:
         table = preview_of.table
         draw(self.plot, data_chart(table), "import")
         with self.result:
-            words(f"{table.n} rows of {table.kind}", "title")
-            ranges = {name: f"{values.min():.6g} to {values.max():.6g} {column_unit(name)}".rstrip()
+            words(f"{table.n} {'row' if table.n == 1 else 'rows'} of {table.kind}", "title")
+            ranges = {name: for_page(f"{_range_text(values)} {unit_text(column_unit(name))}".rstrip())
                       for name, values in table.columns.items()}  # fmt: skip
             facts(ranges)
             for note in preview_of.notes:
@@ -369,7 +393,13 @@ def _sample_text(sheet: Sheet, name: str) -> str:
     if not len(values):
         return ", ".join(dict.fromkeys(row[sheet.header.index(name)] for row in sheet.sample[:20]))[:60]
     first = ", ".join(f"{value:.6g}" for value in values[:3])
-    return f"{first} … ({values.min():.6g} to {values.max():.6g})"
+    return for_page(first if len(values) <= 3 else f"{first} … ({_range_text(values)})")
+
+
+def _range_text(values: NDArray[np.float64]) -> str:
+    """`1.5 to 3.5`, or the one value that all have."""
+    low, high = f"{values.min():.6g}", f"{values.max():.6g}"
+    return low if low == high else f"{low} to {high}"
 
 
 def _number(text: str) -> Constant:
