@@ -55,10 +55,13 @@ class RestWindows:
 def hand_positions(
     rig: Session, *, target_g: float = 0.001, rest_s: float = 2.0, most_positions: int = 40, wait_s: float = 120.0
 ) -> None:
-    """Take positions at rest, each of `rest_s`, until every parameter is known to `target_g`.
+    """Take positions at rest until every parameter is known well enough.
 
-    `target_g` is a standard uncertainty as an error at 1 g: 0.001 is 1 mg of bias, 0.1 % of scale factor, 0.06 deg of
-    an angle. The run ends at `most_positions` in any case. It stops after `wait_s` without a new position.
+    target_g        The standard uncertainty to reach, as an error at 1 g: 0.001 is 1 mg of bias, 0.1 % of scale factor,
+                    0.06 deg of an angle.
+    rest_s          How long the sensor must rest in each position.
+    most_positions  The run ends after this number of positions, also if the uncertainty is not reached.
+    wait_s          The run stops after this time without a new position.
     """
     if min(target_g, wait_s) <= 0 or rest_s < 2 * WINDOW_S or most_positions < FEWEST:
         raise SettingError(

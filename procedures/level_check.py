@@ -22,8 +22,10 @@ Place = Literal["table", "base"]
 def level_check(rig: Session, *, settle_s: float = 2.0, on: Place = "table") -> None:
     """Read the level at beta = 0 and 180 deg with alpha = 0. Raises SafetyLimit if the table is not level.
 
-    Other procedures begin with this check if the bench has limits.level_deg. With `on="base"` a person puts the level
-    on the base next to the stages, reads it, turns it by half a turn and reads it again.
+    Other procedures begin with this check if the bench has limits.level_deg.
+
+    on  Where the level lies. base: a person puts the level on the base next to the stages, reads it, turns it by half a
+        turn and reads it again.
     """
     if on == "base":
         _read_base(rig)

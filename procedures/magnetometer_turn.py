@@ -30,12 +30,14 @@ def magnetometer_turn(
     dwell_s: float = 1.0,
     settle_s: float = 0.5,
 ) -> None:
-    """Hold the sensor at every `step_deg` of a full turn of beta at alpha = 0, on `mounts` of its three edges.
+    """Hold the sensor at the steps of full turns of beta at alpha = 0.
 
-    With `over`, alpha = 180 deg turns the sensor over, and beta makes a second turn. One mount (z up) without `over`
-    gives a horizontal turn only: two of the three components of hard iron. Three mounts cover the sphere: with `over`
-    everywhere on earth, without it where the dip of the field is 50 deg at most. Switch `over` off if iron of the rig
-    moves with alpha.
+    step_deg  The step of beta.
+    mounts    The number of edges of the sensor that are upright, one after another. One mount without over gives a
+              horizontal turn only: two of the three components of hard iron. Three mounts cover all directions: with
+              over everywhere on earth, without over where the dip of the field is 50 deg at most.
+    over      Whether alpha = 180 deg turns the sensor over for a second turn of beta. Choose no if iron of the rig
+              moves with alpha.
     """
     if not 0 < step_deg <= 360 / STEPS or dwell_s <= 0 or settle_s < 0:
         most = f"step_deg must be above 0 and at most {360 / STEPS:g}"

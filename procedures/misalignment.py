@@ -48,10 +48,10 @@ class Centre:
 def misalignment(
     rig: Session, *, target_deg: float = 0.005, dwell_s: float = 5.0, settle_s: float = 0.5, most_rounds: int = 12
 ) -> None:
-    """Bracket both maxima, centre the brackets, and repeat until the standard error of the angles is `target_deg`.
+    """Bracket both maxima, centre the brackets, and repeat until the angles are known well enough.
 
-    The standard error follows from the scatter of rounds about the same centre. The search ends after `most_rounds`
-    rounds in any case.
+    target_deg   The standard error of the angles to reach. It follows from the scatter of rounds about the same centre.
+    most_rounds  The search ends after this number of rounds, also if the standard error is not reached.
     """
     if min(target_deg, dwell_s, most_rounds) <= 0 or settle_s < 0:
         raise SettingError("misalignment: target_deg, dwell_s, most_rounds must be above 0, settle_s must be 0 or more")

@@ -43,11 +43,14 @@ def motion(
     dwell_s: float = 2.0,
     settle_s: float = 0.5,
 ) -> None:
-    """Sweep, then record the sensor still for `still_s` and in motion for `duration_s`. The records have no gaps.
+    """Sweep, then record the sensor still and in motion. The records have no gaps.
 
-    The positioner moves the sensor along x by `peak_to_peak_um` about `centre_um` of its range, as a sine of each
-    `frequency_hz` in turn. Several frequencies separate a corner of the output filter from a delay. The first frequency
-    is the one for the comparison of the models.
+    peak_to_peak_um  The travel of the positioner along x.
+    frequency_hz     The frequencies of the sine, one after another. Several frequencies separate a corner of the output
+                     filter from a delay. The first one is that of the comparison of the models.
+    centre_um        The position in the range of the positioner about which the sensor moves.
+    duration_s       How long the motion is recorded at each frequency.
+    still_s          How long the still sensor is recorded.
     """
     positive = (peak_to_peak_um, *frequency_hz, duration_s, still_s, block_s, dwell_s)
     if not frequency_hz or min(positive) <= 0 or settle_s < 0:

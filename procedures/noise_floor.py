@@ -19,7 +19,10 @@ SCALE_POSES = tuple(Pose(90.0, beta, 0, "scale") for beta in (0.0, 90.0, 180.0, 
 def noise_floor(
     rig: Session, *, duration_s: float = 60.0, block_s: float = 10.0, dwell_s: float = 2.0, settle_s: float = 1.0
 ) -> None:
-    """Measure the scale factor at +-1 g on each axis, then record `duration_s` seconds with the sensor horizontal."""
+    """Measure the scale factor at +-1 g on each axis, then record the sensor with its axes horizontal.
+
+    duration_s  How long the still sensor is recorded.
+    """
     if min(duration_s, block_s, dwell_s) <= 0:
         raise SettingError("noise-floor: duration_s, block_s and dwell_s must be above 0")
     check_level(rig)

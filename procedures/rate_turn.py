@@ -34,11 +34,14 @@ def rate_turn(
     rest_s: float = 10.0,
     settle_s: float = 0.5,
 ) -> None:
-    """Turn beta by `turn_deg` at each of `rates_deg_s` both ways, with the axis up and down, on `mounts` edges.
+    """Turn beta at each rate both ways, with the axis up and down.
 
-    Before the turns the table rests for `rest_s` at each of two headings, which gives the bias.
-    One mount (z up) gives turns about z only. Give a `turn_deg` below 360 if the stage's limits do not allow a full
-    turn. The limits must leave room for acceleration and braking.
+    rates_deg_s  The rates.
+    turn_deg     The angle of each turn. Give less than 360 if the limits of the stage do not allow a full turn. The
+                 limits must leave room for acceleration and braking.
+    mounts       The number of edges of the sensor that are upright, one after another. One mount (z up) gives turns
+                 about z only.
+    rest_s       How long the table rests at each of two headings before the turns, which gives the bias.
     """
     if not rates_deg_s or min(rates_deg_s) <= 0 or min(turn_deg, rest_s) <= 0 or settle_s < 0:
         raise SettingError("rate-turn: rates_deg_s, turn_deg and rest_s must be above 0, settle_s must be 0 or more")

@@ -28,10 +28,13 @@ def repeat(
     dwell_s: float = 5.0,
     settle_s: float = 0.5,
 ) -> None:
-    """Tumble the sensor `times` times without a change, `times` times after a power cycle, `times` after a remount.
+    """Tumble the sensor several times without a change, after power cycles, and after remounts.
 
-    Without `power` there are no power cycles. Without `mount` the sensor stays where it is mounted.
-    A power cycle is `off_s` without power, then `warm_s` with power. The bench's power line switches it, or a person.
+    times   The number of tumbles of each sort.
+    power   Whether there are power cycles. The bench's power line switches the power, or a person.
+    mount   Whether a person mounts the sensor again before tumbles.
+    off_s   The time without power in a power cycle.
+    warm_s  The time with power before the next tumble.
     """
     if times < 2 or min(off_s, warm_s, settle_s) < 0 or dwell_s <= 0:
         raise SettingError(

@@ -1,12 +1,16 @@
 """The settings of a procedure, read from text. They are the keywords of its function, with their annotated types.
 
+A line `name  meaning` in the docstring of the function says what a setting means.
+
 Types: float, int, bool, str, a `Literal` of texts, `tuple[float, ...]` as 90,30,150, and `tuple[str, ...]`: the name of
 a file, whose lines are the value.
 """
 
 from __future__ import annotations
 
+import inspect
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
@@ -17,6 +21,11 @@ from procedures.errors import SettingError
 
 Value = Any
 YES_OR_NO = ("yes", "no")
+SHARED = {  # settings that mean the same in every procedure
+    "dwell_s": "How long samples are averaged at each pose.",
+    "settle_s": "How long the stages stand still before samples are taken.",
+    "block_s": "A record is saved in blocks of this length; a fault costs at most one block.",
+}
 
 
 def parse(procedure: Procedure, entries: Mapping[str, Value]) -> dict[str, Value]:
@@ -33,6 +42,22 @@ def parse(procedure: Procedure, entries: Mapping[str, Value]) -> dict[str, Value
         name: _value(f"{procedure.name}: the setting {name}", types.get(name, str), value)
         for name, value in entries.items()
     }
+
+
+def meaning(procedure: Procedure, name: str) -> str:
+    """What a setting means: its line in the docstring of the procedure's function, else as in every procedure."""
+    doc = inspect.cleandoc(procedure.function.__doc__ or "")
+    line = re.search(rf"^{name}  +(.*(?:\n  .*)*)", doc, re.MULTILINE)
+    return " ".join(line[1].split()) if line else SHARED.get(name, "")
+
+
+def setting_text(value: Any) -> str:
+    """The text of a value, as a person types it."""
+    if isinstance(value, (list, tuple)):
+        return ",".join(f"{part:g}" if isinstance(part, float) else str(part) for part in value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def choices(procedure: Procedure) -> dict[str, tuple[str, ...]]:

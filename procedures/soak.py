@@ -34,12 +34,16 @@ def soak(
     oven_c: float = 0.0,
     until_steady: bool = False,
 ) -> None:
-    """Hold the sensor level for `duration_s`, with a tumble before, after, and every `interval_s`.
+    """Hold the sensor level for hours, with a tumble before, after, and at intervals.
 
-    The hold is recorded without gaps in blocks of `block_s`. The tumbles take extra time. The first intervals are
-    shorter and double each time, because drift is fastest at the beginning. If the bench has a power line, the soak
-    begins cold: `off_s` without power, then power on (0: no power cycle). `oven_c` is the temperature of the oven
-    (0: no oven). `until_steady` ends the soak when bias and scale factor are steady.
+    The first intervals are shorter and double each time, because drift is fastest at the beginning.
+
+    duration_s    How long the sensor is held. The tumbles take extra time.
+    interval_s    The longest time between two tumbles.
+    off_s         The time without power before the soak, so that it begins cold; 0: no power cycle. Only on a bench
+                  with a power line.
+    oven_c        The temperature of the oven; 0: no oven.
+    until_steady  Whether the soak ends when bias and scale factor are steady.
     """
     if min(duration_s, dwell_s) <= 0 or not 0 < block_s <= interval_s or min(settle_s, off_s) < 0:
         raise SettingError(

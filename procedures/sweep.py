@@ -36,13 +36,17 @@ def sweep(
     face: Face = "up",
     pose_list: tuple[str, ...] = (),
 ) -> None:
-    """Record `dwell_s` seconds at every angle of the grid, with beta rising, then falling.
+    """Record the mean at every angle of a grid, with beta rising, then falling.
 
-    The grid has every `step_deg` of a full turn of beta, at each angle alpha of `inclinations_deg`.
-    `paths="ang"` adds the negative of every inclination, and half turns to each side at 90 deg. `reference_every` is
-    the number of poses between two reference poses, which separate drift from the other effects; 0: none.
-    `face="both"`: a person turns the sensor over half way, which separates errors of the sensor from errors of the
-    stages. `pose_list` is a CSV file with all poses in order, instead of a grid; `rig plan sweep --optimal` writes one.
+    inclinations_deg  The angles of alpha, in this order. Beta makes a full turn and back at each.
+    step_deg          The step of beta. It divides 180.
+    paths             grid: a full turn and back at each inclination. ang: also the negative of every inclination, and
+                      half turns to each side at 90 deg.
+    reference_every   The number of poses between two reference poses, which separate drift from the other effects;
+                      0: no reference poses.
+    face              The side of the sensor that is up. both: a person turns the sensor over half way, which separates
+                      errors of the sensor from errors of the stages.
+    pose_list         A CSV file with all poses in order, in place of a grid; rig plan sweep --optimal writes one.
     """
     if dwell_s <= 0 or settle_s < 0:
         raise SettingError(f"sweep: dwell_s is {dwell_s:g} and settle_s is {settle_s:g}; give times above 0")

@@ -26,11 +26,14 @@ def temperature_cycle(
     dwell_s: float = 5.0,
     settle_s: float = 0.5,
 ) -> None:
-    """Step through `temperatures_c` in rising, then falling order. At each wait `soak_s`, then tumble the sensor.
+    """Step through the temperatures in rising, then falling order, with a tumble at each.
 
-    All of this is done `cycles` times: two cycles or more tell whether the sensor comes back to where it was.
     The oven cannot cool: the lowest temperature must be above the temperature of the powered sensor in the room. The
     oven is switched off at the end, and when a run fails.
+
+    temperatures_c  The temperatures of the oven.
+    cycles          The number of cycles. Two or more show whether the sensor comes back to where it was.
+    soak_s          How long the sensor stays at a temperature before its tumble.
     """
     steps = staircase(temperatures_c, cycles)
     if min(soak_s, settle_s) < 0 or dwell_s <= 0:

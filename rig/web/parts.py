@@ -183,12 +183,3 @@ def setting_label(name: str) -> str:
     unit = next((end for end in UNITS if name.endswith(f"_{end}")), "")
     head = name.removesuffix(f"_{unit}").replace("_", " ")
     return f"{head} ({UNITS[unit]})" if unit else head
-
-
-def setting_text(value: Any) -> str:
-    """The text of a value, as a person types it."""
-    if isinstance(value, (list, tuple)):
-        return ",".join(f"{part:g}" if isinstance(part, float) else str(part) for part in value)
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -138,7 +138,7 @@ def test_a_plan_that_cannot_be_says_why_and_does_not_start(workbench: Workbench)
 def test_a_setting_that_takes_one_of_a_few_is_a_list_and_what_they_mean_is_told(workbench: Workbench) -> None:
     page = workbench.visit("/run?procedure=sweep&step_deg=45")
     page.get_by_text("What the settings mean").click()
-    expect(page.get_by_text('face = "both"')).to_be_visible()
+    expect(page.get_by_text("both: a person turns the sensor over half way")).to_be_visible()
     page.get_by_label("face").click()
     page.get_by_role("option", name="both").click()
     expect(page.get_by_text("252 poses")).to_be_visible()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,15 +9,10 @@ from typing import Any
 import click
 
 from procedures.catalogue import Procedure, find, paths
-from procedures.settings import choices
+from procedures.settings import choices, meaning, setting_text
 from rig.bench import read_bench
 
-UNITS = {"deg_s": "deg/s", "m_s2": "m/s^2", "deg": "deg", "hz": "Hz", "um": "um", "c": "C", "s": "s"}  # ends of names
-SHARED = {
-    "dwell_s": "How long samples are averaged at each pose.",
-    "settle_s": "How long the stages stand still before samples are taken.",
-    "block_s": "A record is saved in blocks of this length, which is what a fault costs at most.",
-}  # settings that mean the same in every procedure
+UNITS = {"deg_s": "deg/s", "m_s2": "m/s^2", "deg": "deg", "hz": "Hz", "um": "um", "c": "°C", "s": "s"}  # ends of names
 HELP = ("-h", "--help")
 WIDTH = 100
 
@@ -46,32 +39,13 @@ def procedure_text(procedure: Procedure) -> str:
 
 
 def settings_lines(procedure: Procedure) -> Iterator[str]:
-    """For each setting the option with its default, then unit, allowed values and meaning."""
+    """For each setting its option with unit and default, then its meaning and allowed values."""
     choices_by_name = choices(procedure)
+    yield "Settings:"
     for name, default in procedure.defaults.items():
-        yield f"  --{name.replace('_', '-')} {default_text(default)}".rstrip()
         unit = next((UNITS[end] for end in UNITS if name.endswith(f"_{end}")), "")
-        parts = [
-            f"In {unit}." if unit else "",
-            f"One of: {', '.join(choices_by_name[name])}." if name in choices_by_name else "",
-        ]
-        text = " ".join(filter(None, [*parts, meaning(procedure, name)]))
-        if text:
+        shown = " ".join(filter(None, [setting_text(default), unit]))
+        yield f"  --{name.replace('_', '-')}  (default: {shown or 'none'})"
+        allowed = f"One of: {', '.join(choices_by_name[name])}." if name in choices_by_name else ""
+        if text := " ".join(filter(None, [meaning(procedure, name), allowed])):
             yield click.wrap_text(text, WIDTH, "        ", "        ")
-
-
-def meaning(procedure: Procedure, name: str) -> str:
-    """The sentences of the procedure's docstring that name the setting; else what it means in every procedure."""
-    doc = " ".join(inspect.cleandoc(procedure.function.__doc__ or "").split())
-    sentences = re.split(r"(?<=[.:])\s+(?=[A-Z`])", doc)
-    own_sentences = " ".join(sentence for sentence in sentences if re.search(rf"`{name}[`=]", sentence)).replace(
-        "`", ""
-    )
-    return own_sentences or SHARED.get(name, "")
-
-
-def default_text(value: Any) -> str:
-    """The text of a default on the command line."""
-    if isinstance(value, tuple):
-        return ",".join(f"{part:g}" for part in value)
-    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -16,6 +16,7 @@ from calibrations.presentation.formula import formula_html
 from calibrations.presentation.report.report import next_takes, next_words
 from calibrations.presentation.views import view_of
 from calibrations.text import capital, probability, rounded
+from procedures.settings import setting_text
 from rig.web.calculations import off_loop
 from rig.web.parts import (
     box,
@@ -25,7 +26,6 @@ from rig.web.parts import (
     failed,
     message,
     setting_label,
-    setting_text,
     waiting,
     words,
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
@@ -15,7 +14,7 @@ from nicegui import ui
 
 from calibrations.text import duration
 from procedures.catalogue import Procedure, find, paths, summary
-from procedures.settings import choices, parse
+from procedures.settings import choices, meaning, parse, setting_text
 from rig.bench import Bench, read_bench
 from rig.bench.certificates import expired
 from rig.bench.file import DEMO
@@ -29,7 +28,7 @@ from rig.web.frame import Key, frame
 from rig.web.pages.run_begin import BeginDialog, before_start, plan_facts
 from rig.web.pages.run_live import Live
 from rig.web.pages.run_optimal import OptimalDialog
-from rig.web.parts import box, div, facts, failed, message, setting_label, setting_text, table, waiting, words
+from rig.web.parts import box, div, facts, failed, message, setting_label, table, waiting, words
 
 MOST_STRETCHES = 12
 DEFAULT_PROCEDURE = "sweep"
@@ -160,7 +159,7 @@ class Planning:
             self.about = words("", "quiet small")
             self.fields = div("settings")
             with ui.expansion("What the settings mean").props("dense") as self.meant:
-                self.meaning = words("", "quiet small")
+                self.meaning = div("")
             self.attended = ui.switch("Ask me, even if the simulated rig can answer", value=not bench.simulated)
             self.attended.set_visibility(bench.simulated)
             with div("row-of"):
@@ -184,7 +183,9 @@ class Planning:
         """Show the settings of the selected procedure."""
         procedure = self.procedure
         self.about.set_text(" ".join(procedure.doc.partition("\n\n")[2].split("Source")[0].split()))
-        self.meaning.set_text(_meaning(procedure))
+        self.meaning.clear()
+        with self.meaning:
+            facts({setting_label(name): meaning(procedure, name) for name in procedure.defaults})
         self.meant.set_visibility(bool(procedure.defaults))
         self.optimal.set_visibility(procedure.name == "sweep")
         self.fields.clear()
@@ -288,13 +289,3 @@ def _field(name: str, value: str, options: Sequence[str]) -> ui.select | ui.inpu
     if value in options:
         return ui.select(list(options), label=setting_label(name), value=value).props("dense options-dense")
     return ui.input(setting_label(name), value=value).props("dense debounce=300")
-
-
-def _meaning(procedure: Procedure) -> str:
-    """The docstring of the procedure with the labels of the page in place of the names of settings."""
-    text = " ".join(inspect.cleandoc(procedure.function.__doc__ or "").split())
-    for name in sorted(procedure.defaults, key=len, reverse=True):
-        text = text.replace(f"`{name}`", setting_label(name).partition(" (")[0]).replace(
-            f"`{name}=", f"`{setting_label(name)} = "
-        )
-    return text.replace("`", "")

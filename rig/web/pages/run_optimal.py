@@ -11,7 +11,7 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.model.file import read_model
 from procedures.catalogue import Procedure
 from procedures.pose_list import format_poses
-from procedures.settings import parse
+from procedures.settings import parse, setting_text
 from rig.bench import Bench
 from rig.files import home, write_whole
 from rig.planning.optimal import Optimal, optimal
@@ -19,7 +19,7 @@ from rig.services.optimal_words import PLANS, plan_rows, purpose, savings
 from rig.services.search import Cancelled
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import FILES, models
-from rig.web.parts import div, failed, named_dialog, setting_text, table, waiting, wide_table, words
+from rig.web.parts import div, failed, named_dialog, table, waiting, wide_table, words
 
 CRITERIA = {"I": "I: error of the prediction", "D": "D: joint uncertainty of the parameters"}
 Use = Callable[[Mapping[str, str]], None]

@@ -13,6 +13,7 @@ from nicegui import ui
 
 from calibrations.presentation.interactive import figure
 from calibrations.text import join_words
+from procedures.settings import setting_text
 from rig.errors import RecordError
 from rig.record import Event, Record, Run
 from rig.record.tables import units_of
@@ -39,7 +40,6 @@ from rig.web.parts import (
     message,
     named_dialog,
     setting_label,
-    setting_text,
     step_row,
     table,
     words,
