@@ -104,8 +104,16 @@ def begin(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> Calculatio
 
 
 async def off_loop(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-    """Call in a thread, so that the page stays responsive."""
-    return await asyncio.wrap_future(begin(call, *args, **kwargs).future)
+    """Call in a thread, so that the page stays responsive.
+
+    Raises what `call` raises, and asyncio.CancelledError if the page was closed meanwhile: nobody sees the rest.
+    """
+    client = ui.context.client
+    try:
+        return await asyncio.wrap_future(begin(call, *args, **kwargs).future)
+    finally:
+        if client.is_deleted:
+            raise asyncio.CancelledError
 
 
 def leave_calculations() -> None:

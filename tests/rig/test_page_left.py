@@ -16,7 +16,7 @@ from rig.bench import DEFAULT
 from rig.services.report import reported
 from rig.services.request import Request
 from rig.services.search import Cancelled, Counted
-from rig.web.calculations import Visit, begin
+from rig.web.calculations import Visit, begin, off_loop
 from rig.web.desk import Desk
 from rig.web.pages import register
 from tests.browser.measured import two_faults
@@ -75,6 +75,46 @@ def test_a_cancelled_calculation_ends_at_its_next_line() -> None:
     calculation.thread.join(60)
     assert not calculation.thread.is_alive()
     calculation.cancel()  # after the end: nothing happens
+
+
+def test_nothing_follows_a_calculation_whose_page_was_closed() -> None:
+    """Not even an error: the server's log would call it a fault of the program."""
+    go, ended, said = threading.Event(), asyncio.Event(), list[str]()
+
+    def work(fails: bool) -> None:
+        assert go.wait(60)
+        if fails:
+            raise ValueError
+
+    async def simulated() -> None:
+        async with user_simulation() as user:
+            try:
+
+                @ui.page("/visited")
+                def visited() -> None:
+                    for fails in (False, True):
+                        ui.timer(0.0, lambda fails=fails: show(fails), once=True)
+
+                async def show(fails: bool) -> None:
+                    try:
+                        await off_loop(work, fails)
+                        said.append("result")
+                    except Exception:
+                        said.append("error")
+                    finally:
+                        ended.set()
+
+                client = await user.open("/visited")
+                await asyncio.sleep(0.2)
+                client.delete()
+                go.set()
+                await asyncio.wait_for(ended.wait(), 60)
+                await asyncio.sleep(0.1)
+            finally:
+                Client.page_routes.clear()
+
+    asyncio.run(simulated())
+    assert said == []
 
 
 def test_a_visit_ends_its_searches_and_its_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

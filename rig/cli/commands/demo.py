@@ -46,6 +46,7 @@ def demo_command(folder: Path | None, realistic: bool, as_json: bool) -> None:
     from rig.files import make_folder, program, write_whole
     from rig.services.hidden_faults import hidden_faults
     from rig.services.provenance import today, write_model
+    from rig.services.request import effects_of
     from rig.services.tables import load
 
     folder = folder or Path("rig-demo-realistic" if realistic else "rig-demo")
@@ -60,9 +61,9 @@ def demo_command(folder: Path | None, realistic: bool, as_json: bool) -> None:
     )
     with working("connecting", 0.0) as progress:
         run = _measured(bench, settings, progress)
-        progress.text, progress.share = "searching for missing effects", MEASURING
+        progress.share = MEASURING
         table, linear = load(run), read_model("linear")
-        discovered = discover(table, linear)
+        discovered = discover(table, linear, progress.searched(effects_of(None)))
         progress.text, progress.share = "writing the report", 0.9
         faults = hidden_faults(bench, discovered.end, discovered.start)
         comparison = compare(table, linear)
