@@ -87,7 +87,7 @@ def unknown_text(result: Discovery[Any]) -> str:
             remark = " (one output; the others need the same with their own axes)" if one_output else ""
             lines.append(f"    It looks like: {place['expression']}{remark}")
             lines.append(
-                f'    To add that in its stead: rig add "{place["expression"]}" --name {name} --model MODEL '
+                f'    To add this expression in its place: rig add "{place["expression"]}" --name {name} --model MODEL '
                 f"--data {result.findings.data.source} --out MODEL2"
             )
     return "\n".join(lines)

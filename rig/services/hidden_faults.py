@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,7 @@ MATERIAL = 0.3  # times the noise floor: a smaller fault cannot be seen
 STEP_STD = 0.1  # of a parameter, for the derivative of a size
 STEP = 1e-3  # of a typical value, for the derivative of a curve
 AXES = ("x", "y")
+NAMES_WIDTH = 40  # characters of names in a line of the table
 QUIET_S = 0.5  # between samples: without noise they are alike, and few are enough
 
 
@@ -159,11 +161,11 @@ class Faults:
     def _rows(self, group: Group, total: float) -> list[tuple[str, ...]]:
         """A row for each fault, and one for several together."""
         heads = [(f.name, self._quantity(f.size), f"{100 * f.size**2 / total:.2g} %") for f in group.faults]
-        names = ", ".join(e.name for e in group.effects) or "not found"
+        names, *further = wrap(", ".join(e.name for e in group.effects), NAMES_WIDTH) or ["not found"]
         cells = (names, self._quantity(group.found), self._quantity(group.std))
-        if len(heads) == 1:
-            return [(*heads[0], *cells)]
-        return [*((*head, "", "", "") for head in heads), ("  together", self._quantity(group.hidden), "", *cells)]
+        last = heads[0] if len(heads) == 1 else ("  together", self._quantity(group.hidden), "")
+        rows = [(*head, "", "", "") for head in heads[: -1 if len(heads) == 1 else None]]
+        return [*rows, (*last, *cells), *(("", "", "", line, "", "") for line in further)]
 
     def _quantity(self, value: float | None) -> str:
         return quantity(value, self.unit) if value is not None else "-"

@@ -20,7 +20,7 @@ from drivers.world.world import World
 from procedures.sweep import grid
 from rig.bench import read_bench
 from rig.bench.file import DEMO
-from rig.services.hidden_faults import MATERIAL, MECHANISMS, Curve, Faults, grouped, hidden_faults
+from rig.services.hidden_faults import MATERIAL, MECHANISMS, Curve, Faults, Group, grouped, hidden_faults
 
 SAME = {
     "unequal or uneven plates": "quadratic-nonlinearity",
@@ -77,6 +77,14 @@ def test_faults_that_share_an_effect_are_one_group_if_they_agree_together() -> N
     assert extra == (zero,)
     opposite = effect("angle", -2.9 * x, y)
     assert not any(g.effects for g in grouped(hidden, [opposite, zero], 0.01)[0])
+
+
+def test_many_effects_of_a_group_stand_in_several_lines() -> None:
+    fault = Curve("tilt", np.ones((4, 1)))
+    effects = tuple(effect(f"effect-of-the-stage-{k}", np.ones((4, 1)), np.ones((4, 1))) for k in range(5))
+    lines = Faults((Group((fault,), effects, 1.0),), (), 0.01, "V").text().splitlines()
+    assert max(map(len, lines)) < 100
+    assert [len(line.split()) > 3 for line in lines[1:]] == [True, False, False]
 
 
 def test_every_fault_of_the_default_rig_has_a_name() -> None:

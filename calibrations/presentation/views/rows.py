@@ -68,7 +68,7 @@ class RowsView(View[Fit]):
         """The error of each model, with bars."""
         start = discovery.start
         fits = [(start.model.name, start), *((f"+ {s.name}", s.after) for s in discovery.steps)]
-        shares = ["", *("-" if share is None else f"{100 * share:.1f} %" for share in step_shares(discovery))]
+        shares = ["", *("-" if share is None else f"{100 * share:z.1f} %" for share in step_shares(discovery))]
         rows = [
             (name, f"{fit.pooled_excess:.2f}", f"{fit.held_out_excess:.2f}", share, _bar(fit, start))
             for (name, fit), share in zip(fits, shares, strict=True)
