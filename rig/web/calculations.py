@@ -108,11 +108,11 @@ async def off_loop(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R
 
     Raises what `call` raises, and asyncio.CancelledError if the page was closed meanwhile: nobody sees the rest.
     """
-    client = ui.context.client
+    client = ui.context.client if ui.context.slot_stack else None  # none in a task of asyncio.gather
     try:
         return await asyncio.wrap_future(begin(call, *args, **kwargs).future)
     finally:
-        if client.is_deleted:
+        if client is not None and client.is_deleted:
             raise asyncio.CancelledError
 
 

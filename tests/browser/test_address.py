@@ -72,8 +72,11 @@ def test_the_address_holds_data_effects_and_selection(workbench: Workbench, tmp_
     state = ModelState(data, "linear", (f"my-effect={CARD}",), (0, 1, 2, 3, 4, 9))
     expect(page).to_have_url(workbench.origin + state.address)
     address = page.url
+    expect(page.get_by_label("Name", exact=True)).to_have_value("my-effect-2")
     page.get_by_role("button", name="Remove my-effect").click()
     expect(page.get_by_role("button", name="Remove my-effect")).to_have_count(0)
+    expect(page.get_by_label("Name", exact=True)).to_have_value("my-effect")
+    own_effect(page)  # the name is free again
     other = workbench.visit(address.removeprefix(workbench.origin))
     expect(other.get_by_role("button", name="Remove my-effect")).to_be_visible()
     assert selected(other) == [0, 1, 2, 3, 4, 9]

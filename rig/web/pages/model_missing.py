@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 
 FIRST = 6  # cards without unfolding the rest
+OWN_NAME = "my-effect"
 PROGRESS_S = 0.5  # the text shows whole seconds; more often costs a busy server time
 
 
@@ -311,7 +312,7 @@ class OwnEffect:
             self.hint = words("", "quiet small")
             self.text = ui.input("Expression, such as a*sin(5*beta) + b*cos(5*beta)").props("dense debounce=350")
             self.text.classes("formula").on_value_change(self.tries)
-            self.name = ui.input("Name", value="my-effect", on_change=self.tries).props("dense debounce=350")
+            self.name = ui.input("Name", value=OWN_NAME, on_change=self.tries).props("dense debounce=350")
             self.fault = words("", "fault")
             self.fall = words("", "fall small")
             with ui.element("div").classes("row-of"):
@@ -335,8 +336,13 @@ class OwnEffect:
         self.hint.set_text("This expression fits the remaining error. Test it, or write another." if proposed else "")
         self.proposal = pattern.expression if pattern is not None and proposed else ""
         self.text.set_value(self.proposal)
-        if pattern is not None and proposed:
-            self.name.set_value(pattern.name)
+        self.name.set_value(self._free_name(pattern.name if pattern is not None and proposed else OWN_NAME))
+
+    def _free_name(self, name: str) -> str:
+        """The name, with a number if an added effect has it."""
+        names = self.page.session.names if self.page.session is not None else ()
+        numbered = (name, *(f"{name}-{k}" for k in range(2, len(names) + 2)))
+        return next(free for free in numbered if free not in names)
 
     async def tries(self) -> None:
         """Fit the expression and show its curve and the error, or the place of a mistake."""
