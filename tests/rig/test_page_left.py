@@ -16,6 +16,7 @@ from rig.bench import DEFAULT
 from rig.services.report import reported
 from rig.services.request import Request
 from rig.services.search import Cancelled, Counted
+from rig.services.session import ModelSession
 from rig.web.calculations import Visit, begin, off_loop
 from rig.web.desk import Desk
 from rig.web.pages import register
@@ -57,6 +58,28 @@ def test_a_closed_page_ends_its_search(closed: bool, tmp_path: Path, monkeypatch
     assert not searches()
     (session,) = desk.sessions.values()
     assert bool(session.plans) is not closed
+
+
+def test_a_failed_search_leaves_no_page_that_searches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RIG_HOME", str(tmp_path / "home"))
+    data = two_faults(tmp_path)
+
+    def fails(_: object) -> None:
+        raise ValueError
+
+    monkeypatch.setattr(ModelSession, "diagnosed", fails)
+
+    async def simulated() -> None:
+        async with user_simulation() as user:
+            register(Desk(DEFAULT))
+            try:
+                await user.open(f"/?data={quote(data)}&model=linear")
+                await user.should_see("The search for effects failed", retries=200)
+                await user.should_see("Not diagnosed")
+            finally:
+                Client.page_routes.clear()
+
+    asyncio.run(simulated())
 
 
 def test_a_cancelled_calculation_ends_at_its_next_line() -> None:

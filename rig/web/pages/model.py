@@ -255,6 +255,7 @@ class Workbench:
                 return
             except Exception as error:
                 if turn == self.turn:
+                    self.verdict.not_diagnosed()
                     self.missing.fail(message(error))
                 return
         if turn == self.turn:
@@ -271,7 +272,7 @@ class Workbench:
     def cancel(self) -> None:
         """Cancel the search for missing effects."""
         self.left()
-        self.verdict.cancelled()
+        self.verdict.not_diagnosed()
         self.missing.cancelled()
 
     async def again(self) -> None:
