@@ -101,6 +101,7 @@ class Commands(click.Group):
 
 
 NEW_OBJECTS = 50_000  # between two collections of garbage: imports make many objects, and none of them is garbage
+LAST = "last"  # the newest run
 COMPLETE = "_RIG_COMPLETE"  # set by the completion script of a shell
 
 
@@ -112,6 +113,18 @@ def rig() -> None:
     DATA is a file or a run of the record. MODEL is the name of a shipped model or a file. `rig demo` shows a
     calibration on the simulated rig.
     """
+
+
+def last_joined(arguments: Sequence[str]) -> list[str]:
+    """The words with `last` and the name of a procedure as one, which a person need not put in quotes."""
+    words = list(arguments)
+    if LAST in words[:-1]:
+        from procedures.catalogue import paths
+
+        for k in reversed(range(len(words) - 1)):
+            if words[k] == LAST and words[k + 1] in paths():
+                words[k : k + 2] = [f"{LAST} {words[k + 1]}"]
+    return words
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -126,7 +139,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         raise SystemExit(shell_complete(rig, {}, "rig", COMPLETE, instruction))
 
     def call() -> Any:
-        words = list(sys.argv[1:] if arguments is None else arguments)
+        words = last_joined(sys.argv[1:] if arguments is None else arguments)
         with rig.make_context("rig", words) as context:
             return rig.invoke(context)
 

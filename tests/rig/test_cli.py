@@ -171,7 +171,11 @@ def test_commands_and_procedures_are_completed(
     monkeypatch: pytest.MonkeyPatch, capsysbinary: pytest.CaptureFixture[bytes]
 ) -> None:
     monkeypatch.setenv("_RIG_COMPLETE", "bash_complete")
-    for line, number, wanted in (("rig disc", 1, "plain,discover"), ("rig run swe", 2, "plain,sweep")):
+    for line, number, wanted in (
+        ("rig disc", 1, "plain,discover"),
+        ("rig run swe", 2, "plain,sweep"),
+        ("rig plan sweep --st", 3, "plain,--step-deg"),
+    ):
         monkeypatch.setenv("COMP_WORDS", line)
         monkeypatch.setenv("COMP_CWORD", str(number))
         assert completed(capsysbinary).split() == [wanted]

@@ -30,6 +30,14 @@ def test_the_last_run_and_the_last_of_a_procedure() -> None:
             record.run(sweep[:4])
 
 
+def test_the_last_of_a_procedure_needs_no_quotes(rig: Callable[..., Ended]) -> None:
+    with Record() as record:
+        sweep, _ = begun(record, "sweep"), begun(record, "soak")
+    assert rig("show", "last", "sweep").out.startswith(sweep)
+    assert rig("show", "last sweep").out.startswith(sweep)
+    assert rig("show", "last", "sweeps").status == 2
+
+
 def of_sensor(record: Record, procedure: str, name: str, serial: str = "") -> str:
     constants = {"sensor": name, "serial": serial}
     return record.begin(procedure, {}, bench={}, identities={}, configuration="", source="a test", constants=constants)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from procedures.catalogue import Procedure, find, paths
 from procedures.settings import choices, meaning, setting_text
@@ -25,6 +26,15 @@ class ProcedureCommand(click.Command):
             click.echo(f"{ctx.get_help()}\n\n{procedure_text(find(args[0], _folder(args)))}")
             ctx.exit()
         return super().parse_args(ctx, args)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """The options of the command and the settings of its procedure."""
+        items = super().shell_complete(ctx, incomplete)
+        name = ctx.params.get("procedure")
+        if name in paths(None) and incomplete.startswith("--"):
+            options = (f"--{setting.replace('_', '-')}" for setting in find(name, None).defaults)
+            items += [CompletionItem(option) for option in options if option.startswith(incomplete)]
+        return items
 
 
 def _folder(args: list[str]) -> Any:
