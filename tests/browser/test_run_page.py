@@ -135,6 +135,16 @@ def test_a_plan_that_cannot_be_says_why_and_does_not_start(workbench: Workbench)
     expect(page.get_by_role("button", name="Start")).to_be_disabled()
 
 
+def test_the_key_escape_closes_the_checks_and_forgets_them(workbench: Workbench) -> None:
+    page = workbench.visit("/run?procedure=sweep&step_deg=45")
+    for _ in range(2):
+        page.get_by_role("button", name="Start").click()
+        expect(page.get_by_text("4 of 4 checks to do")).to_be_visible()
+        tick(page)
+        page.keyboard.press("Escape")
+        expect(page.get_by_role("dialog")).to_have_count(0)
+
+
 def test_a_setting_that_takes_one_of_a_few_is_a_list_and_what_they_mean_is_told(workbench: Workbench) -> None:
     page = workbench.visit("/run?procedure=sweep&step_deg=45")
     page.get_by_text("What the settings mean").click()

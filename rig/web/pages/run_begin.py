@@ -78,7 +78,7 @@ class BeginDialog:
 
     def __init__(self, content: Preparation, begin: Begin) -> None:
         self.content, self.begin = content, begin
-        with named_dialog(content.title).props("persistent") as self.dialog, ui.card().classes("begin"):
+        with named_dialog(content.title).props("no-backdrop-dismiss") as self.dialog, ui.card().classes("begin"):
             words(content.title, "title")
             with div("attitude"):
                 ui.html(strip(content.attitude), sanitize=False)
@@ -95,6 +95,7 @@ class BeginDialog:
                 ui.button("Cancel", on_click=self.close).props("flat")
                 self.hint = words("", "quiet small")
         self._look()
+        self.dialog.on("hide", self.dialog.delete)
         self.dialog.open()
 
     def _sensor(self) -> None:
@@ -135,5 +136,4 @@ class BeginDialog:
 
     def close(self) -> None:
         """Close the dialog and forget its ticks."""
-        self.dialog.close()
-        self.dialog.delete()
+        self.dialog.close()  # then it is hidden, as by the key Escape
