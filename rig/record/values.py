@@ -50,6 +50,16 @@ class Run:
         return dict.fromkeys(_names(self.constants, "sensor"), "")
 
     @property
+    def batch(self) -> tuple[str, ...]:
+        """The names of the sensors of the batch, in order; empty without a batch."""
+        return tuple(self.bench.get("sensors") or ())
+
+    @property
+    def data(self) -> list[str]:
+        """The names that its data have in commands: `RUN`, or `RUN/SENSOR` of each sensor of a batch."""
+        return [f"{self.run}/{sensor}" for sensor in self.batch] or [self.run]
+
+    @property
     def extent(self) -> str:
         """The number of poses, rows or turns, as text. A record without gaps consists of many blocks."""
         if not self.bench:

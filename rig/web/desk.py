@@ -143,11 +143,12 @@ def lab_read() -> str | None:
     return masked_url(lab_url(url, RECORD))
 
 
-def models(selected: str = "", default: str = "by kind of data") -> dict[str, str]:
-    """The available models by name or file, with their labels; "" is the default model."""
+def models(selected: str = "", default: str | None = "by kind of data") -> dict[str, str]:
+    """The available models by name or file, with their labels; "" is the default model, where there is one."""
     from calibrations.model.file import shipped_names
 
-    labels = {"": default, **{name: name for name in shipped_names()}, **saved_models()}
+    labels = {} if default is None else {"": default}
+    labels |= {name: name for name in shipped_names()} | saved_models()
     return labels if selected in labels else {**labels, selected: selected}
 
 

@@ -17,7 +17,7 @@ from rig.errors import RigError
 from rig.runs.background import control
 from rig.runs.background.status import Status
 from rig.web.desk import Desk, lab_read
-from rig.web.parts import message, named_dialog
+from rig.web.parts import button, message, named_dialog
 
 # The present run in the head of every page: progress, pause and stop.
 
@@ -36,9 +36,7 @@ class Strip:
         self.begun = False
         with ui.element("div").classes("under-way").props("role=status") as self.box:
             self.link = ui.link("", "/run")
-            self.pause = ui.button("Pause", icon="pause", on_click=lambda: control_run(control.pause)).props(
-                "outline dense"
-            )
+            self.pause = button("Pause", "pause", lambda: control_run(control.pause))
             self.stop = ui.button("Stop", icon="stop", color="negative", on_click=lambda: control_run(control.stop))
             self.stop.props("unelevated dense")
             with self.stop:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import html
 import logging
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 from nicegui import ui
 from nicegui.element import Element
@@ -19,6 +19,10 @@ from drivers.errors import DriverError
 from procedures.errors import ProcedureError
 from rig.errors import RigError
 from rig.services.page_words import PageStep, page_step
+from rig.services.search import Cancelled
+
+R = TypeVar("R")
+PROGRESS_S = 0.5  # the text shows whole seconds; more often costs a busy server time
 
 # Boxes, tables and states.
 
@@ -53,6 +57,19 @@ def words(text: str, classes: str = "") -> ui.label:
     return ui.label(text).classes(classes)
 
 
+def button(label: str, icon: str, act: Callable[..., Any], look: str = "outline dense") -> ui.button:
+    """A button with an icon; `look`: properties of Quasar."""
+    return ui.button(label, icon=icon, on_click=act).props(look)
+
+
+@contextmanager
+def afresh(place: Element) -> Iterator[None]:
+    """Empty a place; the body fills it again."""
+    place.clear()
+    with place:
+        yield
+
+
 @contextmanager
 def state(title: str, advice: str = "", kind: str = "") -> Iterator[None]:
     """A box for missing content that says what to do; the body adds buttons."""
@@ -69,6 +86,38 @@ def waiting(text: str) -> ui.label:
     with div("row-of").props("role=status"):
         ui.spinner(size="1.4em")
         return words(text, "quiet")
+
+
+async def shown(
+    place: Element,
+    hint: str | Callable[[], str],
+    title: str,
+    work: Awaitable[R],
+    current: Callable[[], bool] = lambda: True,
+    data: str = "",
+) -> R | None:
+    """Show `hint` in `place` until the work is done, and return its result; the place is empty then.
+
+    None if the work was cancelled, if it is no longer `current`, or if it failed: then the place shows the error under
+    `title`, with buttons for `data`. A `hint` that is a function is asked again and again.
+    """
+    with afresh(place):
+        label = waiting(hint if isinstance(hint, str) else hint())
+        if callable(hint):
+            ui.timer(PROGRESS_S, lambda: label.set_text(hint()))
+    try:
+        result = await work
+    except Cancelled:
+        return None
+    except Exception as error:
+        if current():
+            with afresh(place):
+                failed(title, error, data)
+        return None
+    if not current():
+        return None
+    place.clear()
+    return result
 
 
 def failed(title: str, reason: str | Exception, data: str = "", addresses: Mapping[str, str] | None = None) -> None:
@@ -115,8 +164,16 @@ class Link:
     to: str
 
 
-def table(head: tuple[str, ...], rows: Sequence[tuple[str | Link, ...]]) -> None:
-    """A plain table of text and links, with a head or without."""
+def sortable(labels: Mapping[str, str], fixed: Collection[str] = ()) -> list[dict[str, object]]:
+    """The columns of an `ui.table` by the keys of its rows; all but the `fixed` ones can be sorted."""
+    return [
+        {"name": name, "label": label, "field": name, "align": "left", "sortable": name not in fixed}
+        for name, label in labels.items()
+    ]
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str | Link | Callable[[], Any]]]) -> None:
+    """A plain table, with a head or without. A cell is a text, a link, or a function that makes its content."""
     with ui.element("table").classes("plain-table"):
         if head:
             with ui.element("tr"):
@@ -127,7 +184,12 @@ def table(head: tuple[str, ...], rows: Sequence[tuple[str | Link, ...]]) -> None
             with ui.element("tr"):
                 for cell in row:
                     with ui.element("td"):
-                        ui.link(cell.text, cell.to) if isinstance(cell, Link) else words(cell)
+                        if isinstance(cell, str):
+                            words(cell)
+                        elif isinstance(cell, Link):
+                            ui.link(cell.text, cell.to)
+                        else:
+                            cell()
 
 
 def redraw(plot: ui.plotly, figure: dict[str, Any]) -> None:
@@ -145,6 +207,12 @@ KNOWN = (CalibrationError, ProcedureError, DriverError, RigError)
 def message(error: Exception) -> str:
     """The text of an error for a page: pages in place of commands."""
     return for_page(page_step(raw_message(error)).text)
+
+
+def complain(error: Exception, stays: bool = False) -> None:
+    """Show an error as a notification, for some seconds or, with `stays`, until a person closes it."""
+    lasting: dict[str, Any] = {"timeout": 0, "close_button": "Close"} if stays else {}
+    ui.notify(message(error), type="negative", multi_line=True, **lasting)
 
 
 def raw_message(error: Exception) -> str:

@@ -13,7 +13,7 @@ from nicegui import ui
 from calibrations.presentation.chart import Chart
 from calibrations.presentation.interactive import figure
 from rig.web.calculations import off_loop
-from rig.web.parts import message, redraw
+from rig.web.parts import complain, div, redraw, words
 
 _CHARTS: WeakKeyDictionary[ui.plotly, Chart] = WeakKeyDictionary()
 
@@ -25,6 +25,33 @@ EMPTY = {"data": [], "layout": {"xaxis": {"visible": False}, "yaxis": {"visible"
 def empty_plot(title: str, classes: str = "plot") -> ui.plotly:
     """A plot without axes, until `draw` draws a chart in it."""
     return ui.plotly(EMPTY).classes(classes).props(f'role=group aria-label="{title}"')
+
+
+def titled_plot(title: str, legend: str = "", classes: str = "plot", name: str = "") -> ui.plotly:
+    """An empty plot below its title, the menu of its downloads, and its legend. `name`: for screen readers."""
+    with div("title"):
+        words(title, "grow")
+        downloads(lambda: plot, title)
+    if legend:
+        words(legend, "legend quiet")
+    plot = empty_plot(name or title, classes)
+    return plot
+
+
+class AxisAndUnit:
+    """The choice of the channel and of the unit of pictures, and what their keys do."""
+
+    axis: ui.toggle | ui.select
+    unit: ui.toggle
+
+    def next_axis(self) -> None:
+        """Select the next channel."""
+        self.axis.set_value((int(self.axis.value or 0) + 1) % len(self.axis.options))
+
+    def other_unit(self) -> None:
+        """Switch between V and g, if the scale factor is known."""
+        if len(self.unit.options) > 1:
+            self.unit.set_value(not self.unit.value)
 
 
 def draw(plot: ui.plotly, chart: Chart, keep: str, drag: Literal["select", "zoom", False] = "zoom") -> None:
@@ -58,6 +85,6 @@ async def _download(plot: Callable[[], ui.plotly | None], name: str, form: str) 
     try:
         content = await off_loop({"svg": static.svg, "png": static.png}[form], chart)
     except Exception as error:
-        ui.notify(message(error), type="negative", multi_line=True)
+        complain(error)
         return
     ui.download.content(content, f"{re.sub(r'[^a-z0-9]+', '-', name.lower()).strip('-')}.{form}")

@@ -13,8 +13,8 @@ from rig.record import Run
 from rig.services.control import HEAD, OUT, PROCEDURE, controlled, row, signals, worst
 from rig.services.history import when
 from rig.web.pages.history_results import CLICKED, untitled
-from rig.web.parts import box, div, failed, for_page, table, wide_table, words
-from rig.web.pictures import downloads, draw, empty_plot
+from rig.web.parts import box, button, div, failed, for_page, table, wide_table, words
+from rig.web.pictures import draw, titled_plot
 
 LOOKS = {OUT: "bad", "in control": "good", "baseline": "plain"}
 
@@ -31,7 +31,7 @@ class CheckStandards:
                 verdict = words("", "chip")
                 div("grow")
                 measure = partial(ui.navigate.to, f"/run?procedure={PROCEDURE}")
-                ui.button("Measure the check standard", icon="play_arrow", on_click=measure).props("outline dense")
+                button("Measure the check standard", "play_arrow", measure)
             try:
                 self.standards = controlled(runs)
             except RecordError as error:  # one run so far
@@ -52,11 +52,7 @@ class CheckStandards:
             with div("pictures three"):
                 for title in self._panels():
                     with div("picture"):
-                        with div("title"):
-                            words(title, "grow")
-                            downloads(partial(self.plots.get, title), title)
-                        words(CONTROL_LEGENDS[title], "legend quiet")
-                        plot = empty_plot(f"Check standard: {title}", "live-plot")
+                        plot = titled_plot(title, CONTROL_LEGENDS[title], "live-plot", f"Check standard: {title}")
                         self.plots[title] = plot.on("plotly_click", _clicked, js_handler=CLICKED)
         self.draw()
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 from urllib.parse import urlencode
 
@@ -15,7 +14,7 @@ from calibrations.noise.comparison import compared_deviations
 from calibrations.noise.fit import NoiseFit
 from calibrations.presentation.chart import Chart
 from calibrations.presentation.charts.noise import scaled, units
-from calibrations.presentation.interactive import figure, height_px
+from calibrations.presentation.interactive import height_px
 from calibrations.presentation.residual import ChannelResidual, choices, first_choices, residual_units
 from calibrations.text import estimate_in_prefix, rounded
 from rig.record import Record
@@ -26,8 +25,8 @@ from rig.services.two_runs import Pair, fit_both, match_poses, parameters_of, re
 from rig.web.calculations import Visit
 from rig.web.desk import Desk, models
 from rig.web.frame import Key, frame
-from rig.web.parts import box, div, failed, noted, state, table, waiting, wide_table, words
-from rig.web.pictures import downloads, draw, empty_plot, remember
+from rig.web.parts import afresh, box, button, div, failed, noted, state, table, waiting, wide_table, words
+from rig.web.pictures import AxisAndUnit, draw, titled_plot
 
 # Pictures of one axis: for two tables, or for two still records.
 
@@ -45,7 +44,7 @@ class Comparison:
     draw: Callable[[int, bool], Sequence[Chart]]
 
 
-class Pictures:
+class Pictures(AxisAndUnit):
     """The pictures of one axis in one unit."""
 
     def __init__(self, comparison: Comparison) -> None:
@@ -63,10 +62,7 @@ class Pictures:
         with div("two" if len(comparison.titles) > 1 else ""):
             for title in comparison.titles:
                 with box("picture"):
-                    with div("title"):
-                        words(title, "grow")
-                        downloads(partial(self.plots.__getitem__, len(self.plots)), title)
-                    self.plots.append(empty_plot(title, "tall-plot"))
+                    self.plots.append(titled_plot(title, classes="tall-plot"))
         self.draw()
 
     def draw(self) -> None:
@@ -74,15 +70,6 @@ class Pictures:
         charts = self.comparison.draw(int(self.axis.value or 0), bool(self.unit.value))
         for plot, chart in zip(self.plots, charts, strict=True):
             draw(plot, chart, f"{self.axis.value} {self.unit.value}")
-
-    def next_axis(self) -> None:
-        """Select the next channel."""
-        self.axis.set_value((int(self.axis.value or 0) + 1) % len(self.comparison.axes))
-
-    def other_unit(self) -> None:
-        """Switch between V and g."""
-        if len(self.comparison.units) > 1:
-            self.unit.set_value(not self.unit.value)
 
 
 def _of_rows(first: Fit, second: Fit) -> Comparison:
@@ -135,26 +122,22 @@ def register(desk: Desk) -> None:
         visit = Visit()
 
         async def fit() -> None:
-            with fitted:
-                with box("row-of"):
-                    waiting("Fitting one model to both")
-                    ui.button("Cancel", icon="close", on_click=visit.cancel).props("dense flat")
-                notes: list[str] = []
-                first_request, second_request = (
-                    Request(data, model or None, desk.bench_file) for data in (first, second)
-                )
-                try:
-                    data, *fits = await visit.work(fit_both, first_request, second_request, notes.append)
-                except Cancelled:
-                    fitted.clear()
-                    with state("The comparison was cancelled"):
-                        ui.button("Compare again", icon="refresh", on_click=ui.navigate.reload)
-                    return
-                except Exception as error:
-                    fitted.clear()
+            with fitted, box("row-of"):
+                waiting("Fitting one model to both")
+                button("Cancel", "close", visit.cancel, "dense flat")
+            notes: list[str] = []
+            one, other = (Request(data, model or None, desk.bench_file) for data in (first, second))
+            try:
+                data, *fits = await visit.work(fit_both, one, other, notes.append)
+            except Cancelled:
+                with afresh(fitted), state("The comparison was cancelled"):
+                    ui.button("Compare again", icon="refresh", on_click=ui.navigate.reload)
+                return
+            except Exception as error:
+                with afresh(fitted):
                     failed("Cannot fit one model to both", error)
-                    return
-                fitted.clear()
+                return
+            with afresh(fitted):
                 _parameters(fits[0].model.name, parameters_of(*fits))
                 pictures = Pictures(PICTURES[data.form](*fits))
                 for note in dict.fromkeys(notes):
@@ -208,13 +191,8 @@ def _parameters(model: str, pairs: list[Pair]) -> None:
     title = f"Differences of the parameters of {model}"
     with div("two beside"):
         with box("picture"):
-            with div("title"):
-                words(title, "grow")
-                downloads(lambda: plot, title)
-            plot = ui.plotly(figure(chart, "differences", False)).props(f'aria-label="{title}"')
-            remember(plot, chart)
-            plot.style(f"height: {height_px(chart)}px; width: 100%")
-            words("Second minus first, with ± two standard uncertainties; ◆ differs by more.", "quiet small")
+            plot = titled_plot(title, "Second minus first, with ± two standard uncertainties; ◆ differs by more.", "")
+            draw(plot.style(f"height: {height_px(chart)}px; width: 100%"), chart, "differences", False)
         with box("stack"):
             words(f"Parameters of {model}", "title")
             with wide_table():

@@ -12,12 +12,11 @@ from nicegui import ui
 from calibrations.model.file import dump_model, read_model
 from rig.fleet.members import Member, fleet_of
 from rig.record import Record
-from rig.services.search import Cancelled
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk, models
 from rig.web.frame import frame
 from rig.web.pages.run_report import framed
-from rig.web.parts import box, div, failed, state, waiting, words
+from rig.web.parts import box, button, div, shown, state, words
 
 WHY = (
     "A fleet is the last complete run of every sensor in the record, or the tables of a folder or of an index with the "
@@ -43,55 +42,38 @@ class FleetPage:
         self.done = ""
         with box("chosen"):
             self.source = ui.input("Folder or index; empty: the record", value=source).classes("data").props("dense")
-            model_labels = {name: label for name, label in models(model).items() if name}
-            self.model = ui.select(model_labels, label="Model", value=model).props("dense options-dense")
+            self.model = ui.select(models(model, None), label="Model", value=model).props("dense options-dense")
             self.buttons = [
-                ui.button("Find missing effects", icon="search", on_click=partial(self.show, discovered)),
-                ui.button("Calibrate", icon="straighten", on_click=partial(self.show, calibrated)),
+                button("Find missing effects", "search", partial(self.show, discovered)),
+                button("Calibrate", "straighten", partial(self.show, calibrated)),
             ]
-            for button in self.buttons:
-                button.props("outline dense")
         self.place = div("stack")
         with self.place, state("Many sensors at once", WHY):
             pass
 
     async def show(self, analyse: Callable[..., str]) -> None:
         """Analyse the fleet, and show the report."""
-        for button in self.buttons:
-            button.disable()
-        self.place.clear()
-        with self.place, box("stack"):
-            label = waiting("Reading the sensors")
-            timer = ui.timer(0.5, lambda: label.set_text(self.done or label.text))
-        self.done = ""
-        try:
-            source, model = str(self.source.value or "").strip(), str(self.model.value)
-            text = await off_loop(analyse, [source] if source else [], model, self.desk.bench_file, self._show_progress)
-        except Cancelled:
+        for choice in self.buttons:
+            choice.disable()
+        self.done = "Reading the sensors"
+        source, model = str(self.source.value or "").strip(), str(self.model.value)
+        work = off_loop(analyse, [source] if source else [], model, self.desk.bench_file, self._show_progress)
+        text = await shown(self.place, lambda: self.done, "This fleet cannot be analysed", work)
+        if self.visit.closed:
             return
-        except Exception as error:
-            self._end(timer)
-            with self.place:
-                failed("This fleet cannot be analysed", error)
+        for choice in self.buttons:
+            choice.enable()
+        if text is None:
             return
-        self._end(timer)
         with self.place, box("stack report"):
             with div("row-of"):
                 words("Report", "title grow")
-                ui.button("Download", icon="download", on_click=lambda: ui.download.content(text, "fleet.html")).props(
-                    "outline dense"
-                )
+                button("Download", "download", lambda: ui.download.content(text, "fleet.html"))
             ui.html(framed("Report on the fleet", text), sanitize=False)
 
     def _show_progress(self, count: int, of: int) -> None:
         self.visit.check()
         self.done = f"{count} of {of} sensors analysed"
-
-    def _end(self, timer: ui.timer) -> None:
-        timer.cancel()
-        self.place.clear()
-        for button in self.buttons:
-            button.enable()
 
 
 def discovered(sources: list[str], model: str, bench_file: Any, notify: Tell) -> str:

@@ -24,7 +24,6 @@ from rig.services.history import (
     when,
 )
 from rig.services.request import effects_of
-from rig.services.search import Cancelled
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk, models, runs
 from rig.web.frame import Key, frame
@@ -39,16 +38,11 @@ from rig.web.pages.history_results import (
     quantities_table,
     summary_of,
 )
-from rig.web.parts import LINKED, box, div, failed, state, waiting, words
+from rig.web.parts import LINKED, afresh, box, button, div, failed, shown, sortable, state, words
 
 # The list of sensors.
 
-COLUMNS: list[dict[str, object]] = [
-    {"name": "sensor", "label": "sensor", "field": "sensor", "align": "left", "sortable": True},
-    {"name": "count", "label": "calibration runs", "field": "count", "align": "left", "sortable": True},
-    {"name": "first", "label": "first", "field": "first", "align": "left", "sortable": True},
-    {"name": "last", "label": "last", "field": "last", "align": "left", "sortable": True},
-]
+COLUMNS = sortable({"sensor": "sensor", "count": "calibration runs", "first": "first", "last": "last"})
 PAGE = 25
 NONE = (
     "The history of a sensor consists of its calibrations: sweeps and other runs of poses, positions or rotations. A "
@@ -70,7 +64,7 @@ def sensor_table(runs_by_sensor: Mapping[str, list[Run]]) -> None:
     with box("stack"):
         with div("row-of"):
             words("Sensors", "title grow")
-            ui.button("Fleet", icon="grid_view", on_click=lambda: ui.navigate.to("/fleet")).props("outline dense")
+            button("Fleet", "grid_view", lambda: ui.navigate.to("/fleet"))
         search = ui.input("Search: serial number or name").props("dense clearable")
         rows = [_row(sensor, runs) for sensor, runs in runs_by_sensor.items()]
         table = ui.table(rows=rows, columns=COLUMNS, row_key="sensor", pagination=PAGE).props(
@@ -89,9 +83,6 @@ def _row(sensor: str, runs: list[Run]) -> dict[str, object]:
         "first": days[0],
         "last": days[-1],
     }
-
-
-LOOK_S = 0.15
 
 
 def register(desk: Desk) -> None:
@@ -136,8 +127,7 @@ class HistoryPage:
                 on_change=lambda e: self._go(HistoryRequest(e.value, self.request.model)),
             ).props("dense options-dense")  # fmt: skip
             ui.select(
-                {name: title for name, title in models(request.model).items() if name},
-                label="Model", value=request.model,
+                models(request.model, None), label="Model", value=request.model,
                 on_change=lambda e: self._go(HistoryRequest(self.request.sensor, e.value)),
             ).props("dense options-dense")  # fmt: skip
             self.quantity = ui.select([], label="Quantity", on_change=self._other_quantity).props("dense options-dense")
@@ -159,23 +149,12 @@ class HistoryPage:
 
     async def open(self) -> None:
         """Calibrate every run of the sensor in a thread."""
-        with self.body, box("stack"):
-            hint = waiting(self.under_way)
-            ui.timer(LOOK_S, lambda: hint.set_text(self.under_way))
-            for height in ("230px", "180px"):
-                ui.skeleton(height=height)
-        try:
-            self.found = await off_loop(self._read)
-        except Cancelled:
-            return
-        except Exception as error:
-            self.body.clear()
-            with self.body:
-                failed(f"Cannot show the history of {self.request.sensor}", error)
-            return
-        self._lay_out(self.found)
-        self._offer(self.found)
-        self.show()
+        title = f"Cannot show the history of {self.request.sensor}"
+        self.found = await shown(self.body, lambda: self.under_way, title, off_loop(self._read))
+        if self.found is not None:
+            self._lay_out(self.found)
+            self._offer(self.found)
+            self.show()
 
     def _read(self) -> History:
         def notify(text: str) -> None:
@@ -194,7 +173,6 @@ class HistoryPage:
             return latest(record, sensor, model)
 
     def _lay_out(self, history: History) -> None:
-        self.body.clear()
         with self.body:
             self.summary_box = div("")
             self.pictures = HistoryPictures(self.request.model)
@@ -227,11 +205,9 @@ class HistoryPage:
         self._label(q)
         self.pictures.show(q)
         self.closest.show(history)
-        for place in (self.summary_box, self.tables):
-            place.clear()
-        with self.summary_box:
+        with afresh(self.summary_box):
             summary_of(history, q)
-        with self.tables:
+        with afresh(self.tables):
             quantities_table(history)
             calibrations_table(history, self.request.model)
 

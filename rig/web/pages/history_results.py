@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
-from functools import partial
 from urllib.parse import urlencode
 
 from nicegui import events, ui
@@ -32,8 +31,8 @@ from rig.services.history_words import (
 )
 from rig.services.provenance import today
 from rig.web.calculations import off_loop
-from rig.web.parts import Link, box, div, failed, for_page, table, words
-from rig.web.pictures import downloads, draw, empty_plot
+from rig.web.parts import Link, box, button, div, for_page, shown, table, words
+from rig.web.pictures import draw, titled_plot
 
 MODEL = "linear"
 
@@ -120,7 +119,7 @@ class CompareBox:
             with div("row-of"):
                 self.kind = ui.toggle(kinds, value=kinds[0], on_change=self._fields).props("dense no-caps")
                 self.fields = div("row-of")
-                ui.button("Compare", icon="compare_arrows", on_click=self.compare).props("dense outline")
+                button("Compare", "compare_arrows", self.compare)
             self.result = div("stack").props("role=status")
         self._fields()
 
@@ -140,17 +139,11 @@ class CompareBox:
 
     async def compare(self) -> None:
         """Compare the shared quantities."""
-        days = [str(field.value) for field in self.two]
-        try:
-            compared = await off_loop(self._compared, days)
-        except Exception as error:
-            self.result.clear()
+        work = off_loop(self._compared, [str(field.value) for field in self.two])
+        compared = await shown(self.result, "Comparing", "Cannot compare these calibrations", work)
+        if compared is not None:
             with self.result:
-                failed("Cannot compare these calibrations", error)
-            return
-        self.result.clear()
-        with self.result:
-            _show(compared, self.model)
+                _show(compared, self.model)
 
     def _compared(self, days: Sequence[str]) -> Compared:
         if self.kind.value == SENSOR:
@@ -176,11 +169,8 @@ def _show(compared: Compared, model: str) -> None:
 
 
 def _select(name: str, options: Sequence[str], first: int) -> ui.select:
-    return (
-        ui.select(list(options), label=name, value=options[first])
-        .props("dense options-dense")
-        .style("min-width: 130px")
-    )
+    choice = ui.select(list(options), label=name, value=options[first])
+    return choice.props("dense options-dense").style("min-width: 130px")
 
 
 # Pictures: one quantity over time, and its control charts. A click on a point opens its run.
@@ -202,9 +192,6 @@ class HistoryPictures:
         self.model = model
         with div("pictures three"):
             with box("picture wide"):
-                with div("title"):
-                    self.title = words(LIFE, "grow")
-                    downloads(lambda: self.life, LIFE)
                 self.life = self._plot(LIFE)
                 self.text_box = words("", "quiet small")
             self.few = box("wide state")
@@ -214,11 +201,7 @@ class HistoryPictures:
             self.charts: dict[str, ui.plotly] = {}
             for title, legend in CONTROL_LEGENDS.items():
                 with box("picture") as place:
-                    with div("title"):
-                        words(title, "grow")
-                        downloads(partial(self.charts.get, title), title)
-                    words(legend, "legend quiet")
-                    self.charts[title] = self._plot(title)
+                    self.charts[title] = self._plot(title, legend)
                 self.boxes.append(place)
 
     def show(self, q: Quantity) -> None:
@@ -233,10 +216,8 @@ class HistoryPictures:
             for title, panel in control_panels(q.name, q.chart, q.unit, days, keys).items():
                 draw(self.charts[title], untitled(panel), f"{title} {q.name}")
 
-    def _plot(self, title: str) -> ui.plotly:
-        plot = empty_plot(title)
-        plot.on("plotly_click", self._clicked, js_handler=CLICKED)
-        return plot
+    def _plot(self, title: str, legend: str = "") -> ui.plotly:
+        return titled_plot(title, legend).on("plotly_click", self._clicked, js_handler=CLICKED)
 
     def _clicked(self, event: events.GenericEventArguments) -> None:
         ui.navigate.to(model_of(str(event.args), self.model))

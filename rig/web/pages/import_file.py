@@ -27,8 +27,8 @@ from rig.services.page_words import IMPORT, address, page_step
 from rig.web.calculations import off_loop
 from rig.web.desk import FILES, Desk
 from rig.web.frame import frame
-from rig.web.parts import box, div, facts, failed, for_page, noted, raw_message, waiting, wide_table, words
-from rig.web.pictures import downloads, draw, empty_plot
+from rig.web.parts import afresh, box, div, facts, failed, for_page, noted, raw_message, waiting, wide_table, words
+from rig.web.pictures import draw, titled_plot
 
 MOST_BYTES = 200_000_000
 UNUSED = ""
@@ -73,18 +73,14 @@ def register(desk: Desk) -> None:
             try:
                 sheet = await off_loop(opened, Path(file), topic or None)
             except SeveralTopics as several:
-                body.clear()
-                with body:
+                with afresh(body):
                     _choose_topic(Path(file), several)
-                return
             except Exception as error:
-                body.clear()
-                with body:
+                with afresh(body):
                     failed(f"{Path(file).name} cannot be imported", error, addresses={"Another file": "/import"})
-                return
-            body.clear()
-            with body:
-                ImportPage(sheet, Path(file))
+            else:
+                with afresh(body):
+                    ImportPage(sheet, Path(file))
 
 
 def _choose() -> None:
@@ -167,7 +163,7 @@ class Column:
             with ui.element("td"):
                 self.name = ui.select({UNUSED: "other"}, value=UNUSED, on_change=self._renamed)
             with ui.element("td"):
-                self.unit = ui.select([], on_change=self._update_preview)
+                self.unit = ui.select([], on_change=page.look)
         for field, label in ((self.name, "meaning"), (self.unit, "unit")):
             field.props(f'dense options-dense aria-label="{label} of {file_column}"')
 
@@ -189,9 +185,6 @@ class Column:
     def _renamed(self) -> None:
         self.stated = ""
         self._offer_units("")
-        self.page.look()
-
-    def _update_preview(self) -> None:
         self.page.look()
 
     def state(self, unit: str) -> None:
@@ -223,7 +216,7 @@ class ImportPage:
             if len(sheet.topics) > 1:
                 tables = ui.select(list(sheet.topics), label="Table of the file", value=sheet.topic)
                 tables.props("dense options-dense").on_value_change(lambda event: _go_to(path, event.value))
-            self.kind = ui.select(KINDS, label="Kind of table", value=proposed.kind, on_change=self._other_kind)
+            self.kind = ui.select(KINDS, label="Kind of table", value=proposed.kind, on_change=self._offer)
             self.kind.props("dense options-dense").style("min-width: 300px")
             self.button = ui.button("Import", icon="download_done", on_click=self._import)
             ui.button("Cancel", on_click=partial(ui.navigate.to, "/record")).props("flat")
@@ -243,10 +236,7 @@ class ImportPage:
                 self._constants()
             with div("stack"):
                 with box("picture"):
-                    with div("title"):
-                        words(PICTURE, "grow")
-                        downloads(lambda: self.plot, PICTURE)
-                    self.plot = empty_plot(PICTURE, "tall-plot")
+                    self.plot = titled_plot(PICTURE, classes="tall-plot")
                 self.result = box("stack")
         self._offer()
 
@@ -260,9 +250,6 @@ class ImportPage:
                 for name, label in CONSTANTS.items()
                 if name not in self.sheet.constants
             }
-
-    def _other_kind(self) -> None:
-        self._offer()
 
     def _offer(self) -> None:
         """Offer the columns of the kind of table, with the proposals."""
@@ -336,9 +323,8 @@ class ImportPage:
 
     def _show_fault(self, title: str, reason: str | Exception) -> None:
         self.button.disable()
-        self.fault.clear()
         self.result.clear()
-        with self.fault:
+        with afresh(self.fault):
             if isinstance(reason, str):
                 noted(reason)
             else:

@@ -28,10 +28,10 @@ from rig.web.pages.model_noise import NoisePictures
 from rig.web.pages.model_parameters import ParametersBox
 from rig.web.pages.model_pictures import Pictures
 from rig.web.pages.model_verdict import VerdictBox
-from rig.web.parts import box, div, failed, for_page, message, noted, state, words
+from rig.web.parts import afresh, box, complain, div, failed, for_page, message, noted, state, words
 
 if TYPE_CHECKING:
-    from calibrations.discovery.findings import Place, Step
+    from calibrations.discovery.findings import Step
     from calibrations.discovery.results import Comparison, Diagnosis
     from rig.services.session import ModelSession
 
@@ -89,8 +89,7 @@ class Workbench:
 
     def _lay_out(self, form: str) -> None:
         """Place pictures and candidates for the kind of data."""
-        self.analysis.clear()
-        with self.analysis:
+        with afresh(self.analysis):
             rows = form == "rows"
             with div("stack"):
                 self.pictures: Pictures | NoisePictures = (
@@ -145,8 +144,7 @@ class Workbench:
             self._cancelled()
             return
         except Exception as error:
-            self.body.clear()
-            with self.body:
+            with afresh(self.body):
                 addresses = {IMPORT: address(IMPORT, self.data)} if Path(self.data).is_file() else {}
                 failed(f"Cannot analyse {self.data}", error, self.data, addresses)
             return
@@ -169,8 +167,7 @@ class Workbench:
         """The person cancelled the fit: nothing is shown."""
         if self.visit.closed:
             return
-        self.body.clear()
-        with self.body, state("The analysis was cancelled", f"{self.data} is unchanged."):
+        with afresh(self.body), state("The analysis was cancelled", f"{self.data} is unchanged."):
             ui.button("Analyse again", icon="refresh", on_click=partial(self.go, self.data, self.model, self.noise))
 
     def _show_places(self, compared: Comparison[Any]) -> None:
@@ -183,20 +180,12 @@ class Workbench:
             words("Fails at", "k")
             for place in compared.fails:
                 place_text, _, description = for_page(place.text).partition(": ")
-                place_label = (
-                    f"{place_text}, {place.axis}: {rounded(place.excess, 2)} ×"
-                    if rows
-                    else f"{place_text}, {place.axis}"
-                )
-                with ui.button(place_label, on_click=partial(self._show_place, place)).props("outline dense"):
-                    ui.tooltip(
-                        f"{description}. Click to select these {compared.fit.measured.type.rows}"
-                        if rows
-                        else description
-                    )
-
-    def _show_place(self, place: Place) -> None:
-        self.pictures.show_place(place)
+                place_label = f"{place_text}, {place.axis}"
+                if rows:
+                    place_label += f": {rounded(place.excess, 2)} ×"
+                    description += f". Click to select these {compared.fit.measured.type.rows}"
+                with ui.button(place_label, on_click=partial(self.pictures.show_place, place)).props("outline dense"):
+                    ui.tooltip(description)
 
     async def _look_for_changes(self) -> None:
         """Say that the run grows, or that data or model have changed, with a button that updates the analysis."""
@@ -309,7 +298,7 @@ class Workbench:
         except Cancelled:
             return
         except Exception as error:
-            ui.notify(message(error), type="negative", multi_line=True)
+            complain(error)
             return
         for note in session.notes[len(self.session.notes) :]:
             with self.notes:

@@ -16,7 +16,7 @@ from rig.services.page_words import IMPORT, address
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import MODELS, models, noise_models, runs, saved_models
 from rig.web.pages.import_file import upload
-from rig.web.parts import box, message, named_dialog, words
+from rig.web.parts import box, button, message, named_dialog, words
 
 if TYPE_CHECKING:
     from rig.services.session import ModelSession
@@ -29,11 +29,8 @@ class Choice:
     def __init__(self, page: Workbench) -> None:
         self.page, self.visit = page, Visit()
         with box("chosen"):
-            self.data = (
-                ui.input("Data: a run, the path of a file, or several: A + B", value=page.data)
-                .classes("data")
-                .props("dense")
-            )
+            self.data = ui.input("Data: a run, the path of a file, or several: A + B", value=page.data)
+            self.data.classes("data").props("dense")
             self.data.on("keydown.enter", lambda: self._open(str(self.data.value).strip(), page.model))
             with self.data.add_slot("append"):
                 ui.button(icon="arrow_drop_down").props("flat dense round aria-label='Runs of the record'")
@@ -46,19 +43,17 @@ class Choice:
                 value=page.model,
                 on_change=lambda e: self._open(page.data, e.value, page.noise),
             ).props("dense options-dense")
-            ui.button(icon="upload_file", on_click=self._ask_file).props("flat dense aria-label='Open a file'").tooltip(
+            button("", "upload_file", self._ask_file, "flat dense aria-label='Open a file'").tooltip(
                 "Open a file from this computer"
             )
-            ui.button(icon="refresh", on_click=page.afresh).props("flat dense aria-label='Read again'").tooltip(
-                "Read the data again"
-            )
+            button("", "refresh", page.afresh, "flat dense aria-label='Read again'").tooltip("Read the data again")
             self._noise()
-            ui.button("Parameters", icon="tune", on_click=page.see_parameters).props("outline dense")
-            self.undo = ui.button("Undo", icon="undo", on_click=page.undo).props("outline dense")
-            self.save = ui.button("Save model", icon="save", on_click=self._ask_name).props("outline dense")
-            self.report = ui.button("Report", icon="description", on_click=self._report).props("outline dense")
-        for button in (self.undo, self.save, self.report):
-            button.disable()
+            button("Parameters", "tune", page.see_parameters)
+            self.undo = button("Undo", "undo", page.undo)
+            self.save = button("Save model", "save", self._ask_name)
+            self.report = button("Report", "description", self._report)
+        for choice in (self.undo, self.save, self.report):
+            choice.disable()
 
     def _open(self, data: str | None, model: str | None, noise: str = "") -> None:
         if (data or "", model or "", noise) != (self.page.data, self.page.model, self.page.noise):
@@ -69,9 +64,9 @@ class Choice:
         page = self.page
         if not (saved_noise := noise_models()) and not page.noise:
             return
-        with ui.button(icon="graphic_eq").props("flat dense aria-label='Noise of the sensor'") as button:
+        with ui.button(icon="graphic_eq").props("flat dense aria-label='Noise of the sensor'") as menu:
             if page.noise:
-                button.props("color=positive")
+                menu.props("color=positive")
             ui.tooltip(f"Noise of the sensor: {Path(page.noise).stem or 'from the samples of the data'}")
             with ui.menu():
                 for path, label in {"": "from the samples of the data", **saved_noise}.items():
@@ -123,9 +118,9 @@ class Choice:
 
             def save() -> None:
                 path = _file_of(str(name.value))
-                if path.exists() and button.text == "Save":
+                if path.exists() and confirm.text == "Save":
                     folder_text.set_text(f"{path.name} exists already. Replace it, or choose another name.")
-                    button.set_text("Replace")
+                    confirm.set_text("Replace")
                     return
                 try:
                     self._write(path)
@@ -138,11 +133,12 @@ class Choice:
                 ui.notify(f"written: {path}", type="positive")
 
             with ui.element("div").classes("row-of"):
-                button: ui.button = ui.button("Save", on_click=save)
-                name.on_value_change(lambda: button.set_text("Save"))
-                ui.button("Download", on_click=lambda: ui.download.content(self._text(), f"{name.value}.yaml")).props(
-                    "outline"
+                confirm: ui.button = ui.button("Save", on_click=save)
+                name.on_value_change(lambda: confirm.set_text("Save"))
+                download = ui.button(
+                    "Download", on_click=lambda: ui.download.content(self._text(), f"{name.value}.yaml")
                 )
+                download.props("outline")
                 ui.button("Cancel", on_click=dialog.close).props("flat")
         dialog.open()
 
@@ -162,30 +158,14 @@ class Choice:
     async def _report(self) -> None:
         """Download the report, as from `rig report`."""
         from rig.services.load import Loaded
-        from rig.services.report import reported
         from rig.services.request import Request
-        from rig.services.search import Cancelled
+        from rig.web.pages.run_report import download_report
 
         page, session = self.page, self.page.session
         question = Loaded(session.data, session.model, session.effects) if session is not None else None
-        hint = ui.notification("Making the report", spinner=True, timeout=None)
-        try:
-            notes: list[str] = []
-            _, page_text = await off_loop(
-                reported,
-                Request(page.data, page.model or None, page.desk.bench_file, page.noise or None),
-                notes.append,
-                self.visit.searched,
-                question,
-            )
-            text = await off_loop(page_text)
-            ui.download.content(text, f"{Path(page.data).stem}-{session.model.name if session else 'model'}.html")
-        except Cancelled:
-            return
-        except Exception as error:
-            ui.notify(message(error), type="negative", multi_line=True, timeout=0, close_button="Close")
-        finally:
-            hint.dismiss()
+        request = Request(page.data, page.model or None, page.desk.bench_file, page.noise or None)
+        name = f"{Path(page.data).stem}-{session.model.name if session else 'model'}.html"
+        await download_report(request, self.visit, name, question)
 
 
 def _file_of(name: str) -> Path:
@@ -200,8 +180,4 @@ def _runs() -> dict[str, str]:
         listed = runs()
     except RigError:
         listed = []
-    return {
-        name: f"{name}  ({run.extent}, {run.state})"
-        for run in listed
-        for name in [f"{run.run}/{sensor}" for sensor in run.bench.get("sensors", {})] or [run.run]
-    }
+    return {name: f"{name}  ({run.extent}, {run.state})" for run in listed for name in run.data}

@@ -19,8 +19,12 @@ from calibrations.text import capital, probability, rounded
 from procedures.settings import setting_text
 from rig.web.calculations import off_loop
 from rig.web.parts import (
+    PROGRESS_S,
+    afresh,
     box,
+    button,
     buttons,
+    complain,
     div,
     facts,
     failed,
@@ -41,7 +45,6 @@ if TYPE_CHECKING:
 
 FIRST = 6  # cards without unfolding the rest
 OWN_NAME = "my-effect"
-PROGRESS_S = 0.5  # the text shows whole seconds; more often costs a busy server time
 
 
 class Missing:
@@ -66,9 +69,8 @@ class Missing:
 
     def wait(self, counted: Counted) -> None:
         """Show the progress of the search."""
-        self.cards.clear()
         self.own.begin()
-        with self.cards, box():
+        with afresh(self.cards), box():
             hint = waiting(counted.text)
             bar = ui.linear_progress(0.0, show_value=False).props("aria-label='progress of the round'")
 
@@ -81,7 +83,7 @@ class Missing:
                 bar.props(add="indeterminate" if compares else "", remove="" if compares else "indeterminate")
 
             ui.timer(PROGRESS_S, tell)
-            ui.button("Cancel", icon="close", on_click=self.page.cancel).props("dense flat")
+            button("Cancel", "close", self.page.cancel, "dense flat")
             for _ in range(3):
                 ui.skeleton(height="58px").style("margin-top: 8px")
 
@@ -93,18 +95,16 @@ class Missing:
         with self.added:
             words("Added:", "quiet small")
             for name in session.names:
-                button = ui.button(name, on_click=partial(self.page.remove, name))
-                button.props(f'outline dense no-caps icon-right=close aria-label="Remove {name}"')
-                with button:
+                removal = ui.button(name, on_click=partial(self.page.remove, name))
+                with removal.props(f'outline dense no-caps icon-right=close aria-label="Remove {name}"'):
                     ui.tooltip(f"Remove {name}; the others are fitted again")
 
     def discovering(self, name: str, at: int, of: int) -> None:
         """Show the present step of the discovery, with a button that ends it after this step."""
-        self.steps.clear()
-        with self.steps, box("stack").props("role=status"):
+        with afresh(self.steps), box("stack").props("role=status"):
             words(f"Step {at} of {of}: adding {name}")
             ui.linear_progress((at - 1) / of, show_value=False).props("aria-label='progress of the discovery'")
-            ui.button("Stop after this step", icon="stop", on_click=self._stop).props("dense flat")
+            button("Stop after this step", "stop", self._stop, "dense flat")
 
     def discovered(self) -> None:
         """The discovery has ended."""
@@ -115,32 +115,29 @@ class Missing:
 
     def cancelled(self) -> None:
         """The search was cancelled; an effect of your own can still be tested."""
-        self.cards.clear()
-        with self.cards, box("stack"):
+        with afresh(self.cards), box("stack"):
             words("The search was cancelled.", "quiet")
-            ui.button("Search for missing effects", icon="search", on_click=self.page.again).props("dense outline")
+            button("Search for missing effects", "search", self.page.again)
 
     def fail(self, reason: str) -> None:
         """The search ended in an error."""
-        self.cards.clear()
-        with self.cards:
+        with afresh(self.cards):
             failed("The search for effects failed", reason)
 
     async def show(self, result: Diagnosis[Any]) -> None:
         """Show the candidates, best first, and the curve of the best if an effect is missing."""
-        self.cards.clear()
         self.tried, self.looked_at = {}, None
         if not self.own.written:  # a person may have written one meanwhile
             self.own.begin(result.pattern if result.verdict is Verdict.UNEXPLAINED else None)
         missing = bool(result.missing)
-        with self.cards:
+        with afresh(self.cards):
             if not missing:
                 self._nothing_to_add(result)
             if missing and result.judgement.provisional:
                 words("Provisional: may change when further effects are added.", "quiet small")
             if len(result.missing) > 1 and result.findings.steps and not self.page.discovering:
                 title = f"Discover: add all {len(result.missing)} effects"
-                ui.button(title, icon="auto_fix_high", on_click=self.page.discover).props("dense outline")
+                button(title, "auto_fix_high", self.page.discover)
             cards = [Card(self, c, result, missing and not k) for k, c in enumerate(result.candidates[:FIRST])]
             if len(result.candidates) > FIRST:
                 self._show_further(result)
@@ -181,8 +178,7 @@ class Missing:
             planned = await off_loop(page.session.with_next, result, notes.append)
         except Exception as error:
             if not place.is_deleted:  # else the page shows another model by now
-                place.clear()
-                with place:
+                with afresh(place):
                     words(message(error), "quiet")
             return
         if place.is_deleted:
@@ -192,8 +188,7 @@ class Missing:
         settings = {name: setting_text(value) for name, value in experiment.settings.items()}
         labelled = replace(experiment, settings={setting_label(name): text for name, text in settings.items()})
         run_address = f"/run?{urlencode({'procedure': experiment.procedure, **settings})}"
-        place.clear()
-        with place:
+        with afresh(place):
             words(" ".join([next_words(labelled), next_takes(experiment), *notes]), "quiet")
             buttons({"Prepare this run": run_address})
 
@@ -211,7 +206,7 @@ class Missing:
             try:
                 self.tried[c.name] = await off_loop(session.tried, c.effect)
             except Exception as error:
-                ui.notify(message(error), type="negative", multi_line=True)
+                complain(error)
         return self.tried.get(c.name)
 
     async def add_shown(self) -> None:
@@ -242,7 +237,7 @@ class Card:
             with self.body:
                 words(capital(c.effect.summary))
                 with div("row-of"):
-                    ui.button(f"Add {c.name}", icon="add", on_click=lambda: side.add(c)).props("dense unelevated")
+                    button(f"Add {c.name}", "add", lambda: side.add(c), "dense unelevated")
                     ui.button("Show the curve", on_click=lambda: side.look_at(c, look=True)).props("dense flat")
                 self._describe(result)
 
@@ -316,7 +311,7 @@ class OwnEffect:
             self.fault = words("", "fault")
             self.fall = words("", "fall small")
             with ui.element("div").classes("row-of"):
-                self.add = ui.button("Add effect", icon="add", on_click=self._add).props("dense unelevated")
+                self.add = button("Add effect", "add", self._add, "dense unelevated")
                 with ui.button(icon="help_outline").props("flat round dense aria-label='Columns and functions'"):
                     ui.tooltip(HELP).props("max-width=360px")
         self.add.disable()

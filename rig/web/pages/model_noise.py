@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import TYPE_CHECKING
 
 from nicegui import ui
@@ -22,7 +21,7 @@ from calibrations.presentation.charts.noise import (
     units,
 )
 from rig.web.parts import box, div, words
-from rig.web.pictures import downloads, draw, empty_plot
+from rig.web.pictures import AxisAndUnit, draw, titled_plot
 
 if TYPE_CHECKING:
     from calibrations.discovery.findings import Place, Step
@@ -46,7 +45,7 @@ LEGENDS = {
 }
 
 
-class NoisePictures:
+class NoisePictures(AxisAndUnit):
     """Pictures of a noise model and its record, one axis at a time."""
 
     def __init__(self) -> None:
@@ -63,12 +62,7 @@ class NoisePictures:
             self.plots: dict[str, ui.plotly] = {}
             for name, title in TITLES.items():
                 with box("picture wide" if name == "record" else "picture"):
-                    with div("title"):
-                        words(title, "grow")
-                        downloads(partial(self.plots.get, name), title)
-                    if LEGENDS[name]:
-                        words(LEGENDS[name], "legend quiet")
-                    self.plots[name] = empty_plot(title)
+                    self.plots[name] = titled_plot(title, LEGENDS[name])
 
     def show(self, compared: Comparison[NoiseFit], session: ModelSession[NoiseFit]) -> None:
         """Show a new fit."""
@@ -108,16 +102,6 @@ class NoisePictures:
         for name, panel in panels.items():
             draw(self.plots[name], single_chart(panel), f"{name} {channel.channel.axis} {units.unit}")
         draw(self.plots["waterfall"], steps_chart(self.session.start, self.session.steps), "waterfall", False)
-
-    def next_axis(self) -> None:
-        """Select the next channel."""
-        if self.compared is not None:
-            self.axis.set_value((int(self.axis.value or 0) + 1) % len(self.compared.fit.channels))
-
-    def other_unit(self) -> None:
-        """Switch between V and g, if the scale factor is known."""
-        if len(self.unit.options) > 1:
-            self.unit.set_value(not self.unit.value)
 
     def show_place(self, place: Place) -> None:
         """Show the output that fails there."""

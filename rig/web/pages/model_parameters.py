@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +18,7 @@ from calibrations.presentation.parameter_table import HEAD, STRONG, correlations
 from calibrations.text import minus, unit
 from rig.web.calculations import off_loop
 from rig.web.pages.model_documents import CertificateDialog, CompensationDialog
-from rig.web.parts import box, div, for_page, message, table, wide_table, words
+from rig.web.parts import afresh, box, button, complain, div, for_page, message, table, wide_table, words
 
 if TYPE_CHECKING:
     from calibrations.discovery.results import Diagnosis
@@ -43,13 +45,13 @@ class ParametersBox:
             with div("row-of"):
                 words("Parameters", "title spread")
                 self.buttons = [
-                    ui.button("Copy table", icon="content_copy", on_click=self.copy),
-                    ui.button("Download model", icon="download", on_click=self.download),
-                    ui.button("Certificate", icon="workspace_premium", on_click=self.certificate),
-                    ui.button("Compensation", icon="code", on_click=self.compensation),
+                    button("Copy table", "content_copy", self.copy),
+                    button("Download model", "download", self.download),
+                    button("Certificate", "workspace_premium", self.certificate),
+                    button("Compensation", "code", self.compensation),
                 ]
-                for button in self.buttons:
-                    button.props("outline dense").disable()
+                for choice in self.buttons:
+                    choice.disable()
             self.values = wide_table()
             self.pairs = div("stack")
             self.noise = div("stack")
@@ -63,11 +65,11 @@ class ParametersBox:
         if turn != self.turn:
             return
         rows = session.data.form == "rows"
-        for button, usable in zip(self.buttons, (True, True, rows, rows), strict=True):
-            button.set_enabled(usable)
-        self.values.clear()
-        with self.values:
-            _values(self.rows, has_changes=bool(session.steps))
+        for choice, usable in zip(self.buttons, (True, True, rows, rows), strict=True):
+            choice.set_enabled(usable)
+        head = HEAD if session.steps else HEAD[:-1]  # without a step there is no change
+        with afresh(self.values):
+            table(head, [_cells(row)[: len(head)] for row in self.rows])
         self.noise.clear()
         self.pairs.clear()
         try:
@@ -77,8 +79,7 @@ class ParametersBox:
                 words(f"No correlations: {message(error)}", "quiet small")
             return
         if turn == self.turn:
-            self.pairs.clear()
-            with self.pairs:
+            with afresh(self.pairs):
                 _pairs(pairs)
 
     def diagnosed(self, result: Diagnosis[Any]) -> None:
@@ -87,8 +88,7 @@ class ParametersBox:
         if not isinstance(findings, NoiseFindings):
             return
         still = findings.data.still  # type: ignore[attr-defined] # the data of noise findings are a still record
-        self.noise.clear()
-        with self.noise:
+        with afresh(self.noise):
             for axis, noise in NoiseAnalysis(still, findings.search).channels.items():
                 words(f"Noise coefficients of {axis}, by all processes that the search found", "title")
                 head, rows = coefficient_table(noise, still.sensed.get(axis))
@@ -103,16 +103,14 @@ class ParametersBox:
 
     def download(self) -> None:
         """Download the model file."""
-        if self.page.session is not None:
-            self._download(self.page.session)
-
-    def _download(self, session: ModelSession[Any]) -> None:
         from calibrations.model.file import dump_model
 
+        if (session := self.page.session) is None:
+            return
         try:
             text = dump_model(session.complete_model())
         except Exception as error:
-            ui.notify(message(error), type="negative", multi_line=True)
+            complain(error)
             return
         ui.download.content(text, f"{Path(self.page.data).stem}-model.yaml")
 
@@ -130,20 +128,10 @@ class ParametersBox:
 SYMBOLS = {"white-noise": "N", "flicker-noise": "B", "rate-random-walk": "K", "quantisation-noise": "Q"}
 
 
-def _values(rows: list[ParameterRow], has_changes: bool) -> None:
-    """The table; without a change its column is left out."""
-    head = HEAD if has_changes else HEAD[:-1]
-    with ui.element("table").classes("plain-table"):
-        with ui.element("tr"):
-            for name in head:
-                with ui.element("th"):
-                    words(name)
-        for row in rows:
-            with ui.element("tr"):
-                cells = (row.effect, row.name, row.axis, row.value, row.std, row.unit, row.change)
-                for name, cell in zip(head, cells[: len(head)], strict=True):
-                    with ui.element("td"):
-                        _cell(row, name, cell)
+def _cells(row: ParameterRow) -> list[Callable[[], None]]:
+    """The cells in the order of `HEAD`."""
+    texts = (row.effect, row.name, row.axis, row.value, row.std, row.unit, row.change)
+    return [partial(_cell, row, name, text) for name, text in zip(HEAD, texts, strict=True)]
 
 
 def _cell(row: ParameterRow, name: str, text: str) -> None:

@@ -19,7 +19,7 @@ from calibrations.presentation.charts.fit import failure, is_function, measureme
 from calibrations.presentation.interactive import figure
 from calibrations.presentation.residual import ChannelResidual, Column, choices, first_choices, residual_units
 from rig.web.parts import box, div, redraw, words
-from rig.web.pictures import downloads, draw, empty_plot, remember
+from rig.web.pictures import AxisAndUnit, downloads, draw, empty_plot, remember
 
 if TYPE_CHECKING:
     from calibrations.discovery.findings import Place, Step
@@ -41,7 +41,7 @@ POINTS = (
 )
 
 
-class Pictures:
+class Pictures(AxisAndUnit):
     """Pictures of a fit: axis, unit, column and selected rows."""
 
     def __init__(
@@ -64,7 +64,7 @@ class Pictures:
 
     def _controls(self) -> None:
         with box("controls row-of"):
-            self.axis: ui.toggle | ui.select = ui.toggle({0: "x"}, value=0, on_change=self.draw)
+            self.axis = ui.toggle({0: "x"}, value=0, on_change=self.draw)
             self.axis.props("dense no-caps")
             self.unit = ui.toggle({False: "V", True: "g"}, value=False, on_change=self.draw).props("dense no-caps")
             self.x = self._column("against")
@@ -165,11 +165,8 @@ class Pictures:
         """Draw all pictures again."""
         if self.fit is None or self.session is None or self.x.value not in self.columns:
             return
-        session, channel, colour = (
-            self.session,
-            self.shown,
-            self.columns.get(self.colour.value or "", self.columns[self.x.value]),
-        )
+        session, channel = self.session, self.shown
+        colour = self.columns.get(self.colour.value or "", self.columns[self.x.value])
         is_motion = channel.fit.table.type.moving  # samples are drawn, not rows
         abscissa = self.columns[self.x.value if self.x.value != FOLLOWED else next(iter(self.columns))]
         panels = {
@@ -202,16 +199,6 @@ class Pictures:
         self.legends["residual"].set_text(f"grey band: ± noise floor{sides}{effect}")
         self.legends["failure"].set_text("orange: measured above the model; blue: below it")
         self.legends["waterfall"].set_text(f"bar: fit; ◆ {kind.rows} not used in the fit; grey: the noise floor")
-
-    def next_axis(self) -> None:
-        """Select the next channel."""
-        if self.fit is not None:
-            self.axis.set_value((self.c + 1) % len(self.fit.channels))
-
-    def other_unit(self) -> None:
-        """Switch between V and g."""
-        if len(self.unit.options) > 1:
-            self.unit.set_value(not self.unit.value)
 
     def leave_selected(self) -> None:
         """Open the dialog that excludes the selected rows."""

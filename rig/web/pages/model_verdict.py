@@ -10,14 +10,13 @@ from nicegui import ui
 
 from calibrations.discovery.verdict import Verdict
 from calibrations.presentation.views import view_of
-from rig.web.parts import box, div, for_page, words
+from rig.web.parts import PROGRESS_S, afresh, box, div, for_page, words
 
 if TYPE_CHECKING:
     from calibrations.discovery.results import Comparison, Diagnosis
     from rig.services.session import ModelSession
     from rig.web.calculations import Visit
 
-PROGRESS_S = 0.5
 FIRST_LINES = 200  # characters of the details that every width shows
 LOOKS = {
     Verdict.ADEQUATE: "good",
@@ -51,8 +50,7 @@ class VerdictBox:
 
     def error(self, compared: Comparison[Any], session: ModelSession[Any]) -> None:
         """Show the error and where it is largest, before the diagnosis."""
-        self.numbers.clear()
-        with self.numbers:
+        with afresh(self.numbers):
             for name, value in view_of(session.data).figures(compared.fit).items():
                 with div("figure"):
                     words(value, "value")

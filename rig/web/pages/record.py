@@ -14,17 +14,15 @@ from rig.services.tables import AND
 from rig.web.desk import Desk, runs
 from rig.web.frame import frame
 from rig.web.pages.history_results import HistoryRequest
-from rig.web.parts import LINKED, box, div, failed, state, words
+from rig.web.parts import LINKED, box, button, div, failed, sortable, state, words
 
-COLUMNS: list[dict[str, object]] = [
-    {"name": "name", "label": "run", "field": "name", "align": "left", "sortable": True},
-    {"name": "procedure", "label": "procedure", "field": "procedure", "align": "left", "sortable": True},
-    {"name": "state", "label": "state", "field": "state", "align": "left", "sortable": True},
-    {"name": "extent", "label": "content", "field": "extent", "align": "left"},
-    {"name": "created", "label": "start (UTC)", "field": "created", "align": "left", "sortable": True},
-    {"name": "sensor", "label": "sensor", "field": "sensor", "align": "left", "sortable": True},
-    {"name": "source", "label": "bench or file", "field": "source", "align": "left", "sortable": True},
-]
+COLUMNS = sortable(
+    {
+        "name": "run", "procedure": "procedure", "state": "state", "extent": "content", "created": "start (UTC)",
+        "sensor": "sensor", "source": "bench or file",
+    },
+    fixed=("extent",),
+)  # fmt: skip
 PAGE = 25
 MARK_ALL = '<q-checkbox v-model="props.selected" dense aria-label="Select all runs" />'
 MARK = '<q-checkbox v-model="props.selected" dense :aria-label="`Select ${props.row.name}`" />'
@@ -47,9 +45,7 @@ def register(desk: Desk) -> None:
                 advice = "It stores every run of the rig with all samples, and your own files that you import."
                 with state("The record is empty", advice):
                     ui.button("Measure", icon="play_arrow", on_click=lambda: ui.navigate.to("/run"))
-                    ui.button("Import a file", icon="upload_file", on_click=partial(ui.navigate.to, "/import")).props(
-                        "outline"
-                    )
+                    button("Import a file", "upload_file", partial(ui.navigate.to, "/import"), "outline")
 
 
 class Runs:
@@ -60,10 +56,8 @@ class Runs:
             with div("row-of"):
                 search = ui.input("Search: run, procedure, sensor, file").props("dense clearable").classes("grow")
                 self.hint = words("Select two to compare them, or several of one sensor for one model.", "quiet small")
-                ui.button("Import a file", icon="upload_file", on_click=partial(ui.navigate.to, "/import")).props(
-                    "outline"
-                )
-                self.together = ui.button("One model", icon="insights", on_click=self._model).props("outline")
+                button("Import a file", "upload_file", partial(ui.navigate.to, "/import"), "outline")
+                self.together = button("One model", "insights", self._model, "outline")
                 self.compare = ui.button("Compare", icon="compare_arrows", on_click=self._compare)
             runs_by_sensor = calibrating(listed)
             rows = [row for run in listed for row in _rows(run, runs_by_sensor)]
@@ -106,7 +100,7 @@ def _rows(run: Run, calibrated: Container[str]) -> list[dict[str, str]]:
     run_cells = {"procedure": run.procedure, "state": run.state, "extent": run.extent, "source": run.source}
     run_cells["created"] = run.created[:19].replace("T", " ")
     sensors = {member: sensor for sensor, member in members(run).items()}
-    names = list(run.bench.get("sensors", {})) or [""]
+    names = run.batch or ("",)
     return [
         {
             "name": f"{run.run}/{name}" if name else run.run,

@@ -28,7 +28,7 @@ from rig.web.frame import Key, frame
 from rig.web.pages.run_begin import BeginDialog, before_start, plan_facts
 from rig.web.pages.run_live import Live
 from rig.web.pages.run_optimal import OptimalDialog
-from rig.web.parts import box, div, facts, failed, message, setting_label, table, waiting, words
+from rig.web.parts import box, button, div, facts, failed, message, setting_label, shown, table, words
 
 MOST_STRETCHES = 12
 DEFAULT_PROCEDURE = "sweep"
@@ -113,28 +113,20 @@ class Instruments:
                     ("role", "instrument", "at"),
                     [(r, i.driver, _url_text(i.url)) for r, i in bench.instruments.items()],
                 )
-            ui.button("Check the instruments", icon="fact_check", on_click=self.check).props("outline dense")
+            button("Check the instruments", "fact_check", self.check)
 
     async def check(self) -> None:
         """Identify and self-test every instrument."""
-        self.rows.clear()
-        with self.rows:
-            waiting("Connecting; nothing moves")
-        try:
-            results = await off_loop(checked, self.bench)
-        except Exception as error:
-            self.rows.clear()
-            with self.rows:
-                failed("The bench cannot be checked", error)
-            return
+        work = off_loop(checked, self.bench)
+        results = await shown(self.rows, "Connecting; nothing moves", "The bench cannot be checked", work)
         rows = [
             (role, f"{'✓' if test.ok else '✗ FAILED'} {test.name}", test.detail)
-            for role, (_, tests) in results.items()
+            for role, (_, tests) in (results or {}).items()
             for test in tests
         ]
-        self.rows.clear()
-        with self.rows:
-            table(("role", "check", "detail"), rows)
+        if results is not None:
+            with self.rows:
+                table(("role", "check", "detail"), rows)
 
 
 def _url_text(url: str) -> str:
@@ -169,7 +161,7 @@ class Planning:
 
     def lay_out_plan(self) -> None:
         """Place the box of the plan on the page."""
-        with box() as self.plan_box:
+        with box():
             words("Plan", "title")
             self.plan = div("stack")
         self._show_settings()
@@ -226,24 +218,17 @@ class Planning:
         turn, self.planned = self.turn, None
         self.button.disable()
         self._tell_address()
-        self.plan.clear()
-        with self.plan:
-            waiting("Planning; nothing moves")
-        try:
-            procedure = self.procedure
-            planned = await off_loop(plan, self.bench, procedure, parse(procedure, self.settings()))
-        except Exception as error:
-            if turn == self.turn:
-                self.plan.clear()
-                with self.plan:
-                    failed("This procedure cannot run", error)
-            return
-        if turn == self.turn:
+        work = off_loop(self._plan, self.procedure, self.settings())
+        title = "This procedure cannot run"
+        planned = await shown(self.plan, "Planning; nothing moves", title, work, lambda: turn == self.turn)
+        if planned is not None:
             self.planned = planned
             self.button.enable()
-            self.plan.clear()
             with self.plan:
                 _show(planned, self.bench)
+
+    def _plan(self, procedure: Procedure, settings: Mapping[str, str]) -> Plan:
+        return plan(self.bench, procedure, parse(procedure, settings))
 
     def start(self) -> None:
         """Open the checks before the run; their Begin starts it."""

@@ -21,7 +21,7 @@ from rig.web.calculations import off_loop
 from rig.web.frame import control_run
 from rig.web.pages.run_begin import BeginDialog, before_resume
 from rig.web.pages.run_record import OverTime
-from rig.web.parts import box, div, failed, for_page, named_dialog, table, words
+from rig.web.parts import afresh, box, button, div, failed, for_page, named_dialog, table, words
 
 LOOK_S = 0.4
 PHASES = {
@@ -71,16 +71,13 @@ class Live:
 
     def buttons(self) -> None:
         """Buttons; those without effect in the present state are hidden."""
-        self.pause = ui.button("Pause", icon="pause", on_click=lambda: control_run(control.pause)).props(
-            "outline dense"
-        )
-        self.resume = ui.button("Continue", icon="play_arrow", on_click=lambda: self.decide("resume")).props("dense")
-        self.repeat = ui.button("Repeat the last pose", icon="replay", on_click=lambda: self.decide("repeat"))
-        self.repeat.props("outline dense")
+        self.pause = button("Pause", "pause", lambda: control_run(control.pause))
+        self.resume = button("Continue", "play_arrow", lambda: self.decide("resume"), "dense")
+        self.repeat = button("Repeat the last pose", "replay", lambda: self.decide("repeat"))
         self.stop = ui.button("Stop", icon="stop", color="negative", on_click=lambda: control_run(control.stop))
         self.stop.props("unelevated dense")
-        self.again = ui.button("Resume", icon="play_arrow", on_click=self.go_on).props("outline dense")
-        self.see = ui.button("Open the model", icon="insights", on_click=self._see).props("dense")
+        self.again = button("Resume", "play_arrow", self.go_on)
+        self.see = button("Open the model", "insights", self._see, "dense")
 
     def decide(self, decision: str) -> None:
         """Send a decision or an answer to the run."""
@@ -153,15 +150,11 @@ class Live:
         self.see.set_visibility(status.state == "complete")
         self.see.set_text("Open the model" if status.done else "Open the results")
         self.again.set_visibility(not active and status.state in ("stopped", "failed") and bool(status.run))
-        if previous is None or (previous.error, previous.moving, previous.phase) != (
-            status.error,
-            status.moving,
-            status.phase,
-        ):
+        if _differ(previous, status, "error", "moving", "phase"):
             self._alarm(status)
-        if previous is None or previous.asked != status.asked:
+        if _differ(previous, status, "asked"):
             self._show_question(status.asked if status.phase == "asking" else None, status.seat == "page")
-        if previous is None or previous.values != status.values:
+        if _differ(previous, status, "values"):
             self._values(status)
 
     def _links(self, status: Status) -> None:
@@ -169,8 +162,7 @@ class Live:
         self.to_record.props(f'href="/record/{status.run}"' if status.run else 'href="/record"')
 
     def _alarm(self, status: Status) -> None:
-        self.alarm.clear()
-        with self.alarm:
+        with afresh(self.alarm):
             if status.moving:
                 failed("Not at rest", "\n".join(status.moving))
             if stop_text := stop_words(status):
@@ -208,19 +200,22 @@ class Live:
 
     def _values(self, status: Status) -> None:
         """The last values: large with their limits, the others in a table."""
-        self.tiles.clear()
-        with self.tiles:
+        with afresh(self.tiles):
             for value in status.values:
                 if value["limits"] is not None:
                     _tile(value)
-        self.values.clear()
         small_values = [value for value in status.values if value["limits"] is None]
-        with self.values:
+        with afresh(self.values):
             table((), [(value["name"], for_page(value["shown"]), for_page(value["remark"])) for value in small_values])
         self.attitude.clear()
         if status.attitude:
             with self.attitude:
                 ui.html(_drawing(status.attitude), sanitize=False)
+
+
+def _differ(previous: Status | None, present: Status, *names: str) -> bool:
+    """Whether one of these values has changed; True without a previous status."""
+    return previous is None or any(getattr(previous, name) != getattr(present, name) for name in names)
 
 
 def _tile(value: Mapping[str, Any]) -> None:
@@ -235,7 +230,7 @@ def _tile(value: Mapping[str, Any]) -> None:
             words(unit, "unit")
         with div("between"):
             div("").style(f"left: {percent:.1f}%")
-        words(_limits(value), "small quiet number")
+        words(for_page(f"{low:g} to {high:g} {value['shown'].rpartition(' ')[2]}"), "small quiet number")
         words(value["near"] or for_page(value["remark"]), "small")
 
 
@@ -246,14 +241,6 @@ def stop_words(status: Status) -> str:
     if not status.run and status.error.endswith(NOT_BEGUN):
         return STOPPED_EARLY
     return STOPPED if status.error.startswith(tuple(STOPPED_BY.values())) else ""
-
-
-def _limits(value: Mapping[str, Any]) -> str:
-    """The limits of a value, in its unit."""
-    if value["limits"] is None:
-        return ""
-    low, high = value["limits"]
-    return for_page(f"{low:g} to {high:g} {value['shown'].rpartition(' ')[2]}")
 
 
 def _drawing(attitude: Mapping[str, Any]) -> str:

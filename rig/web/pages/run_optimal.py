@@ -19,7 +19,7 @@ from rig.services.optimal_words import PLANS, plan_rows, purpose, savings
 from rig.services.search import Cancelled
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import FILES, models
-from rig.web.parts import div, failed, named_dialog, table, waiting, wide_table, words
+from rig.web.parts import afresh, div, failed, named_dialog, table, waiting, wide_table, words
 
 CRITERIA = {"I": "I: error of the prediction", "D": "D: joint uncertainty of the parameters"}
 Use = Callable[[Mapping[str, str]], None]
@@ -39,11 +39,10 @@ class OptimalDialog:
                 "quiet small",
             )
             with div("row-of"):
-                model_labels = {name: label for name, label in models("linear").items() if name}
-                self.model = ui.select(model_labels, label="Model", value="linear").props("dense options-dense")
+                self.model = ui.select(models("linear", None), label="Model", value="linear")
                 self.poses = ui.number("Poses (empty: a quarter)", min=1, max=60, precision=0).props("dense")
                 self.criterion = ui.select(CRITERIA, label="Smallest", value="I").props("dense options-dense")
-                for field in (self.model, self.poses, self.criterion):
+                for field in (self.model.props("dense options-dense"), self.poses, self.criterion):
                     field.classes("grow")
             self.place = div("stack")
             with div("row-of"):
@@ -54,8 +53,7 @@ class OptimalDialog:
     async def find(self) -> None:
         """Choose the poses, and compare them with the standard sweep."""
         self.choose.disable()
-        self.place.clear()
-        with self.place:
+        with afresh(self.place):
             waiting("Choosing the poses; nothing moves. This takes up to some minutes.")
             ui.button("Stop choosing", icon="close", on_click=self.visit.cancel).props("dense flat")
         try:
@@ -63,16 +61,13 @@ class OptimalDialog:
         except Cancelled:
             if self.dialog.is_deleted:
                 return
-            self.place.clear()
-            with self.place:
+            with afresh(self.place):
                 words("Stopped; no poses are chosen.", "quiet")
         except Exception as error:
-            self.place.clear()
-            with self.place:
+            with afresh(self.place):
                 failed("No poses can be chosen", error)
         else:
-            self.place.clear()
-            with self.place:
+            with afresh(self.place):
                 self._show(choice)
         self.choose.enable()
 

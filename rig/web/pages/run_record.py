@@ -22,17 +22,18 @@ from rig.services.exclusion import exclude, numbered_run
 from rig.services.export import export
 from rig.services.history import lives
 from rig.services.next_steps import page_steps, result_rows
-from rig.services.report import reported
 from rig.services.request import Request
 from rig.services.result_meaning import meaning
-from rig.services.search import Cancelled
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk
 from rig.web.frame import frame
 from rig.web.pages.history_results import HistoryRequest
-from rig.web.pages.run_report import RunReport
+from rig.web.pages.run_report import RunReport, download_report
 from rig.web.parts import (
+    afresh,
     box,
+    button,
+    complain,
     div,
     facts,
     failed,
@@ -99,7 +100,7 @@ async def change(data: str, numbers: Sequence[int], reason: str | None, on_done:
     try:
         await off_loop(_change, data, numbers, reason)
     except Exception as error:
-        ui.notify(message(error), type="negative", multi_line=True)
+        complain(error)
         return
     on_done()
 
@@ -268,16 +269,12 @@ class OneRun:
             words(run.run, "title")
             words(run.state, f"chip {'good' if run.state == 'complete' else 'doubt'}")
             words(f"{run.extent}, {run.created[:19].replace('T', ' ')} UTC", "quiet grow")
-            of_sensors = [f"{run.run}/{sensor}" for sensor in run.bench.get("sensors", {})] or [run.run]
-            for data in of_sensors if run.rows else ():
-                target = f"/?{urlencode({'data': data})}"
-                ui.button(f"Model of {data.rpartition('/')[2]}" if "/" in data else "Model", icon="insights",
-                          on_click=lambda target=target: ui.navigate.to(target)).props("dense")  # fmt: skip
-                ui.button("Report", icon="description", on_click=lambda data=data: self._report(data)).props(
-                    "dense outline"
-                )
+            for data in run.data if run.rows else ():
+                title = f"Model of {data.rpartition('/')[2]}" if "/" in data else "Model"
+                button(title, "insights", partial(ui.navigate.to, f"/?{urlencode({'data': data})}"), "dense")
+                button("Report", "description", partial(self._report, data))
             for kind, (label, _) in FORMATS.items() if run.rows else ():
-                ui.button(label, icon="download", on_click=lambda kind=kind: self._export(kind)).props("dense outline")
+                button(label, "download", partial(self._export, kind))
 
     def _notes(self) -> None:
         words("Events and notes", "title")
@@ -303,8 +300,7 @@ class OneRun:
     def _show_events(self) -> None:
         with Record.to_read() as record:
             events = record.events(self.run.run)
-        self.events.clear()
-        with self.events:
+        with afresh(self.events):
             if events:
                 table(("time (UTC)", "event", ""), [_event(event) for event in events])
             else:
@@ -318,22 +314,11 @@ class OneRun:
                 await off_loop(export, self.run.run, kind, path)
                 ui.download.content(path.read_bytes(), path.name)
         except Exception as error:
-            ui.notify(message(error), type="negative", multi_line=True)
+            complain(error)
 
     async def _report(self, data: str) -> None:
-        hint = ui.notification("Making the report", spinner=True, timeout=None)
-        try:
-            notes: list[str] = []
-            _, make = await off_loop(
-                reported, Request(data, None, self.desk.bench_file), notes.append, self.visit.searched
-            )
-            ui.download.content(await off_loop(make), f"{data.replace('/', '-')}.html")
-        except Cancelled:
-            return
-        except Exception as error:
-            ui.notify(message(error), type="negative", multi_line=True, timeout=0, close_button="Close")
-        finally:
-            hint.dismiss()
+        request = Request(data, None, self.desk.bench_file)
+        await download_report(request, self.visit, f"{data.replace('/', '-')}.html")
 
 
 def _results(run: Run) -> None:

@@ -10,12 +10,13 @@ from nicegui.element import Element
 
 from rig.record import Run
 from rig.services.content import content_of
+from rig.services.load import Loaded
 from rig.services.report import reported
 from rig.services.request import Request
 from rig.services.search import Cancelled
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk
-from rig.web.parts import box, div, failed, waiting, words
+from rig.web.parts import box, button, complain, div, shown, words
 
 # the frame is as high as the report; a report has no scripts, and the page's policy lets it load nothing
 FITTED = (
@@ -33,12 +34,11 @@ class RunReport:
     def __init__(self, desk: Desk, run: Run, headline: Element) -> None:
         """`headline`: where the first sentence of the report appears."""
         self.desk, self.run, self.headline, self.visit = desk, run, headline, Visit()
-        self.names = [f"{run.run}/{sensor}" for sensor in run.bench.get("sensors", {})] or [run.run]
         with box("stack report"):
             with div("row-of"):
                 words("Report", "title")
-                self.sensor = ui.toggle(self.names, value=self.names[0], on_change=self.show).props("dense no-caps")
-                self.sensor.set_visibility(len(self.names) > 1)
+                self.sensor = ui.toggle(run.data, value=run.data[0], on_change=self.show).props("dense no-caps")
+                self.sensor.set_visibility(len(run.data) > 1)
             self.place = div("")
         ui.timer(0.0, self.show, once=True)
 
@@ -49,29 +49,18 @@ class RunReport:
 
     async def show(self) -> None:
         """Make the report, unless it is made already, and show it."""
-        data = self.data
-        self.place.clear()
-        with self.place:
-            waiting("Fitting the model, searching for missing effects, drawing")
-        try:
-            text = await off_loop(self.text, data)
-        except Cancelled:
+        data, hint = self.data, "Fitting the model, searching for missing effects, drawing"
+        work = off_loop(self.text, data)
+        text = await shown(self.place, hint, "This run has no report", work, lambda: data == self.data, self.run.run)
+        if text is None:
             return
-        except Exception as error:
-            self.place.clear()
-            with self.place:
-                failed("This run has no report", error, self.run.run)
-            return
-        if data != self.data:
-            return
-        self.place.clear()
         with self.place:
             ui.html(framed(f"Report on {data}", text), sanitize=False)
         self.headline.clear()
         if headline := HEADLINE.search(text):
             with self.headline, box("row-of verdict").props("role=status"):
                 words(html.unescape(re.sub(r"<[^>]*>", "", headline[1])).strip(), "headline grow")
-                ui.button("Report below", icon="south", on_click=self.see).props("flat dense")
+                button("Report below", "south", self.see, "flat dense")
 
     def see(self) -> None:
         """Scroll to the report."""
@@ -84,6 +73,20 @@ class RunReport:
             _, make = reported(Request(data, None, self.desk.bench_file), lambda _: None, self.visit.searched)
             self.desk.keep_report(key, make())
         return self.desk.reports[key]
+
+
+async def download_report(request: Request, visit: Visit, name: str, question: Loaded | None = None) -> None:
+    """Make a report as `rig report` does, and download it as the file `name`."""
+    hint = ui.notification("Making the report", spinner=True, timeout=None)
+    try:
+        _, page = await off_loop(reported, request, lambda _: None, visit.searched, question)
+        ui.download.content(await off_loop(page), name)
+    except Cancelled:
+        return
+    except Exception as error:
+        complain(error, stays=True)
+    finally:
+        hint.dismiss()
 
 
 def framed(title: str, text: str) -> str:
