@@ -9,7 +9,7 @@ from contextvars import ContextVar
 _SHOW: ContextVar[Callable[[str], None] | None] = ContextVar("show", default=None)
 
 
-def doing(text: str) -> None:
+def report(text: str) -> None:
     """Report what an analysis does now. Nothing happens if nobody shows it."""
     if (show := _SHOW.get()) is not None:
         show(text)

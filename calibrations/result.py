@@ -53,6 +53,6 @@ class Result(ReportedResult):
         return data_frame(list(self.records()))
 
     def _repr_html_(self) -> str:
-        from calibrations.presentation.notebook import result_html  # the terminal needs no pictures
+        from calibrations.presentation.page import result_html  # the terminal needs no pictures
 
         return result_html(self.report(), self.pictures())

@@ -20,8 +20,7 @@ def noise_rms(stretches: Sequence[Array]) -> tuple[float, float]:
     """(rms about the mean, its standard error) of stretches of samples, each of shape (n,).
 
     Filtered samples are correlated: n of them carry n / (1 + 2 sum rho_k^2) for the variance (Bartlett). Raises
-    DataError
-    for constant samples.
+    DataError for constant samples.
     """
     samples = np.concatenate(stretches)
     centred = samples - samples.mean()

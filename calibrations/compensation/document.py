@@ -2,10 +2,9 @@
 
 `before`, `loop` and `after` are lines [name, operation, [operands]]; operands are names and numbers. Run `before` once,
 start every output at 0, and run `loop` `steps` times, each time setting the outputs to `next`. Names in `remembered`
-are
-0 before the first sample; run `after` once, then set each to its operand. The operation "table" has the operands x and
-the name of one of `tables`: with s = (x - low) / step, limited to 0 .. the number of pieces, and u = s - i within piece
-i, its value is c0 + c1 u + c2 u^2 + c3 u^3.
+are 0 before the first sample; run `after` once, then set each to its operand. The operation "table" has the operands x
+and the name of one of `tables`: with s = (x - low) / step, limited to 0 .. the number of pieces, and u = s - i within
+piece i, its value is c0 + c1 u + c2 u^2 + c3 u^3.
 """
 
 from __future__ import annotations
@@ -346,12 +345,8 @@ def files(compensation: Compensation, origin: Origin, checks: ReferenceVectors) 
 
 def summary(compensation: Compensation, origin: Origin) -> dict[str, Any]:
     """The document without the program."""
-    program, bound, input_spans, correlations = (
-        compensation.program,
-        compensation.bound,
-        compensation.beside,
-        _correlations(compensation),
-    )
+    program, bound, input_spans = compensation.program, compensation.bound, compensation.beside
+    correlations = _correlations(compensation)
     return {
         "schema": "rig.compensation/1",
         "name": origin.name,

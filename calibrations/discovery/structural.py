@@ -41,7 +41,7 @@ from calibrations.free_forms.structure import FloorSource, Structure, find_struc
 from calibrations.means.noise import rms, with_white
 from calibrations.model import Estimate
 from calibrations.model.chain import force
-from calibrations.progress import doing
+from calibrations.progress import report
 from calibrations.table import Array
 
 STAIRS = "quantisation"
@@ -110,7 +110,7 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     places, causes, forms, end = best.structure, best.causes, best.forms, best.end
     needed_effects = [name for name in basic if chance(*first_order_cost(end, name, shared=True)) < SIGNIFICANT]
     selected = [*largest_first(at_values_of(end, causes), end, places), *at_values_of(end, forms)]
-    doing("fitting the model with one effect more at a time")
+    report("fitting the model with one effect more at a time")
     if needed_effects != basic:
         base = _freed(start, needed_effects, effects)
         end = fit_together(base, selected)
@@ -126,7 +126,7 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     forms = [a for a in selected if a.effect.name.startswith(PREFIX)]
     steps = _steps(start, needed_effects, base, effects)
     steps += [Step(a.effect.name, *pair) for a, pair in zip(selected, pairwise(fits), strict=True)]
-    doing("testing each effect alone")
+    report("testing each effect alone")
     ranked = _first(start, steps, candidates(start, effects))
     return StructuralSearch(start, tuple(steps), places, ranked, causes_alone(end, forms), remarks)
 
@@ -162,7 +162,7 @@ class _StructureFit:
 
 def _fit_structure(base: Fit, places: Structure, effects: Mapping[str, Effect]) -> _StructureFit:
     """Fit of the causes and free forms of a structure; if its residual is more than noise, with the forms renewed."""
-    doing("fitting the effects and curves that were found")
+    report("fitting the effects and curves that were found")
     all_additions = additions(places, base.model, effects)
     causes = fit_separately(base, places, all_additions)
     forms = free_additions(places, base.model)

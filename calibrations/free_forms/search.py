@@ -25,7 +25,7 @@ from calibrations.free_forms.reml import (
 )
 from calibrations.free_forms.selection import ENTER, SPILL, pools_of, prices, select
 from calibrations.free_forms.stairs import find_saw
-from calibrations.progress import doing
+from calibrations.progress import report
 from calibrations.table import Array
 
 COARSE = (1e-3, 2e-5)  # of the misfit, at each linearisation: less may be a second-order remainder
@@ -173,7 +173,7 @@ def _descent(
     beginning = "effects first" if catalogue_first else "all forms together"
     beginning += ", loops" * loops + ", flicker" * flicker
     for number in range(ROUNDS):
-        doing(f"searching for places ({beginning}), pass {number + 1} of at most {ROUNDS}")
+        report(f"searching for places ({beginning}), pass {number + 1} of at most {ROUNDS}")
         X, blocks, scales = whitened(state, model_effects, values, components, scales, white)
         g = gram(X, blocks, scales, b)
         if number == 0:

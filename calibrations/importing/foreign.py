@@ -17,10 +17,11 @@ import numpy as np
 from calibrations.errors import DataError, MissingColumn, nearest
 from calibrations.files import text_source
 from calibrations.importing.binary import open_sheet
+from calibrations.importing.cells import is_number
 from calibrations.importing.plausible import check_at_rest, check_turning, find_log_time_doubt, find_unit_doubts
 from calibrations.importing.raw_logs import is_raw_log
 from calibrations.importing.sessions import RATE, is_session, sample_rates
-from calibrations.importing.sheet import Sheet, is_number, look_like_names, read_cells, read_sheet
+from calibrations.importing.sheet import Sheet, look_like_names, read_cells, read_sheet
 from calibrations.importing.units import UNITS, ColumnMapping, column_unit
 from calibrations.table import NUMBERS, Array, Constant, Table, guess_kind
 from calibrations.tables import FILE_KINDS
@@ -76,7 +77,7 @@ def import_sheet(
     try:
         return _import_with(laid, kind, mapping, constants or {})
     except MissingColumn as error:
-        from calibrations.importing.proposal import suggest_import  # a table with its columns needs no proposal
+        from calibrations.importing.suggestion import suggest_import  # a table with its columns needs no proposal
 
         tail = suggest_import(
             laid, kind, mapping, constants or {}, lambda *meant: _import_with(laid, *_completed(laid, *meant)).table
@@ -199,7 +200,7 @@ def _check_units(table: Table, laid: Sheet, mapping: Sequence[ColumnMapping]) ->
         doubts["t_s"] = doubt
     if not doubts:
         return
-    from calibrations.importing.proposal import import_command  # as above
+    from calibrations.importing.suggestion import import_command  # as above
 
     name, (reason, unit) = next(iter(doubts.items()))
     by_name = {name: ColumnMapping(name, name) for name in doubts} | {m.name: m for m in mapping}

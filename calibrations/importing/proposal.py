@@ -1,34 +1,29 @@
 """Proposed column mappings of a file, from its column names, units and values.
 
 A person confirms a proposal: `rig import` asks for each column at a terminal; elsewhere the message about a missing
-column ends with the command to copy. That import has been tried: the columns are converted and averaged as `rig import`
-does it. A constant that only a person knows is tried with an example value, and is a placeholder in the command.
+column ends with the command to copy (`suggestion.py`).
 """
 
 from __future__ import annotations
 
 import re
-import shlex
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from calibrations.criteria import FEWEST_POSITIONS
-from calibrations.errors import DataError, MissingConstant
+from calibrations.importing.cells import parse_cell
 from calibrations.importing.plausible import (
     Doubt,
-    covers_all_directions,
     field_unit,
     find_log_time_doubt,
     find_time_doubt,
     gravity_unit,
     likely_unit,
 )
-from calibrations.importing.raw_logs import average_raw_log
-from calibrations.importing.sheet import Sheet, parse_cell
+from calibrations.importing.sheet import Sheet
 from calibrations.importing.units import UNITS, ColumnMapping, column_unit, split_unit
-from calibrations.table import AXES, NUMBERS, Array, Constant, Table
+from calibrations.table import AXES, NUMBERS, Array
 from calibrations.tables import KINDS
 
 # names of columns by kind of table; each second list belongs to another sensor
@@ -159,23 +154,6 @@ def missing_columns(kind: str | None, laid: Sheet, mapped: Iterable[ColumnMappin
 def required_columns(kind: str | None, present: Collection[str]) -> tuple[str, ...]:
     """The columns that a table of this kind needs; of several sets the one nearest to `present`."""
     return min(KINDS[kind].columns, key=lambda columns: len(set(columns) - set(present))) if kind else ()
-
-
-def import_command(
-    laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping], constants: Sequence[str] = ()
-) -> str:
-    """The `rig import` command with this mapping."""
-    topic = ["--topic", laid.topic] if laid.topic else []
-    words = ["rig", "import", laid.name, *topic, *(["--kind", kind] if kind else [])]
-    words += [word for m in mapped for word in ("--column", replace(m, theirs=_shortest(laid, m.theirs)).text)]
-    words += [word for constant in constants for word in ("--constant", constant)]
-    return shlex.join(words)
-
-
-def _shortest(laid: Sheet, column: str) -> str:
-    """The file's column name without its unit, where that is unique."""
-    unitless = split_unit(column)[0]
-    return unitless if laid.bare.count(unitless) == 1 else column
 
 
 def guess_by_names(laid: Sheet, values: Mapping[str, Array], kind: str) -> list[tuple[str, str]]:
@@ -351,94 +329,3 @@ def _with_gravity(mapping: list[ColumnMapping], values: Mapping[str, Array]) -> 
             unit = unit_of_all(np.column_stack([values[column] for column in axes.values()]))
             mapping = [replace(m, unit=unit) if m.name in axes else m for m in mapping]
     return mapping
-
-
-# The import that may be meant, which has been tried: the tail of a message about a column that is missing.
-#
-# The columns are those that names and values speak for (`proposal.py`). The file is taken by them and averaged as
-# `rig import` does it; a constant that only a person knows is tried with an example, and left open in the command.
-
-PLACEHOLDER = "YOURS"
-EXAMPLES = {  # of constants: a value to try with, and what it is
-    "sample_rate_hz": (100.0, "the sample rate in Hz"),
-    "turn_deg": (360.0, "the angle of each turn in deg"),
-}
-ImportSheet = Callable[[str, Sequence[ColumnMapping], Mapping[str, Constant]], Table]
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """A tried import: `lacking` columns, `unknown` constants, and the reason if it was refused."""
-
-    kind: str
-    columns: tuple[ColumnMapping, ...]
-    constants: Mapping[str, Constant]
-    lacking: tuple[str, ...] = ()
-    unknown: tuple[str, ...] = ()
-    refused: str = ""
-
-
-def suggest_import(
-    laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping], constants: Mapping[str, Constant], take: ImportSheet
-) -> str:
-    """The end of an error message: a likely import command. `import_sheet` raises DataError."""
-    kinds = [kind] if kind else likely_kinds(laid, mapped)
-    attempts = [_attempt(laid, likely, mapped, constants, take) for likely in kinds]
-    return _suggestion(laid, next((a for a in attempts if not a.refused), attempts[0]))
-
-
-def _attempt(
-    laid: Sheet, kind: str, mapped: Sequence[ColumnMapping], constants: Mapping[str, Constant], take: ImportSheet
-) -> Attempt:
-    columns = tuple(propose_mapping(laid, kind, mapped))
-    if lacking := missing_columns(kind, laid, columns):
-        return Attempt(kind, columns, constants, tuple(lacking))
-    merged, unknown = dict(constants), []
-    while True:
-        try:
-            table = average_raw_log(take(kind, columns, merged))
-            objection = _objection(table, laid)
-        except MissingConstant as error:
-            if error.name in merged:
-                objection = str(error)
-            else:
-                merged[error.name] = error.likely or EXAMPLES[error.name][0]
-                unknown += [] if error.likely else [error.name]
-                continue
-        except DataError as error:
-            objection = str(error)
-        return Attempt(kind, columns, merged, (), tuple(unknown), objection)
-
-
-def _objection(table: Table, laid: Sheet) -> str:
-    """The reason why the tried table is implausible; "" for none."""
-    if table.type.magnitude and table.n < FEWEST_POSITIONS:
-        return f"{table.source}: {table.n} positions; no model has fewer than {FEWEST_POSITIONS} parameters"
-    if table.type.magnitude and not laid.named and not covers_all_directions(table.outputs):
-        return f"{table.source}: no three columns keep their magnitude over many directions"
-    return ""
-
-
-def _suggestion(laid: Sheet, attempt: Attempt) -> str:
-    free = [name for name in laid.header if name not in {m.theirs for m in attempt.columns}]
-    cannot = len(attempt.lacking) == len(required_columns(attempt.kind, ())) or len(attempt.lacking) > len(free)
-    if not attempt.columns or (not laid.named and (attempt.lacking or attempt.refused)) or (laid.named and cannot):
-        example = "such as vx_v=Vout:mV" if laid.named else "by its number, such as vx_v=2:mV"
-        return f"; name a column with --column, {example}"
-    columns = [*attempt.columns, *(ColumnMapping(name, PLACEHOLDER) for name in attempt.lacking)]
-    constants = {k: PLACEHOLDER if k in attempt.unknown else v for k, v in attempt.constants.items()}
-    words = [
-        f"{key}={value:.15g}" if isinstance(value, float) else f"{key}={value}" for key, value in constants.items()
-    ]
-    line = f"\n\n    {import_command(laid, attempt.kind, columns, words)}\n"
-    if attempt.refused:
-        return f"\nThe most likely import fails: {attempt.refused}{line}"
-    fill = f" (put {'; '.join(_placeholders(attempt, free))})" if attempt.lacking or attempt.unknown else ""
-    return f"\nThe names and values suggest this import{fill}:{line}"
-
-
-def _placeholders(attempt: Attempt, free: Sequence[str]) -> list[str]:
-    """The entries that a person has to fill in."""
-    if attempt.lacking:
-        return [f"your column's name for {PLACEHOLDER}: {', '.join(free)}"]
-    return [f"{EXAMPLES[name][1]} for {PLACEHOLDER} in {name}" for name in attempt.unknown]

@@ -12,7 +12,6 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import date, timedelta
 from itertools import chain, islice
 from math import isfinite
 from operator import and_
@@ -21,7 +20,7 @@ import numpy as np
 
 from calibrations.errors import DataError
 from calibrations.files import Source
-from calibrations.importing.bad_lines import BadLines
+from calibrations.importing.cells import BadLines, is_number, number_or_text, parse_cell
 from calibrations.importing.line_logs import as_table
 from calibrations.importing.units import parse_unit, split_unit
 from calibrations.table import Array, Constant
@@ -36,15 +35,8 @@ EMPTY = "the file is empty: a header line with column names is missing; export t
 HEAD_LINES = 200  # lines that the layout is taken from
 MOST_WORDS = 0.1  # of the rows of a column of numbers
 LONGEST_SHOWN = 20  # characters of a wrong cell
-BLANK = " \t\r\n\x1a"
-_THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:(?:,\d{3})+\.\d+|(?:\.\d{3})+,\d+)")  # 1,234.5 and 1.234,5
-_TIME = re.compile(
-    r"(?:(?P<date>\d{4}[-/]\d\d[-/]\d\d)[T ])?"
-    r"(?P<hour>[01]?\d|2[0-3]):(?P<minute>[0-5]\d):(?P<second>[0-5]\d(?:[.,]\d+)?)(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?"
-)
 _HEXADECIMAL = re.compile(r"0[xX][0-9a-fA-F]+")
-EPOCH = date(1970, 1, 1)
-_COMMA = re.compile(r",(?=\d+([eE]|$))")
+BLANK = " \t\r\n\x1a"
 NAME = re.compile(r"[^\W\d][\w .()\[\]/°%^*+-]{0,39}|")  # of a column: words and a unit, or nothing
 NO_UNIT = ("", "-", "1", "n/a")
 Row = tuple[int, list[str]]  # the number of a line, from 1, and its cells
@@ -185,51 +177,6 @@ def split_rows(lines: Iterable[str], separator: str | None, name: str, first: in
                 yield first + reader.line_num - 1, cells
     except csv.Error as error:
         raise DataError(f"{name}: cannot be split into columns: {error}") from None
-
-
-def parse_number(cell: str) -> float:
-    """The number in a cell, with decimal point or decimal comma. Raises ValueError."""
-    if "_" in cell:
-        raise ValueError(cell)  # float() would take 1_000
-    if _THOUSANDS.fullmatch(cell):
-        mark = "," if cell.rindex(",") < cell.rindex(".") else "."
-        cell = cell.replace(mark, "")
-    return float(_COMMA.sub(".", cell) if "," in cell else cell)
-
-
-def parse_cell(cell: str) -> float:
-    """The number in a cell, or its date or time of day in s: `2026-01-04T12:00:00.02Z`, `12:00:00,020`.
-
-    A date counts from 1970 and has no time zone, or its own. Raises ValueError.
-    """
-    try:
-        return parse_number(cell)
-    except ValueError:
-        if not (match := _TIME.fullmatch(cell)):
-            raise
-        hours, minutes, seconds = (float(match[name].replace(",", ".")) for name in ("hour", "minute", "second"))
-        day = date.fromisoformat(match["date"].replace("/", "-")) - EPOCH if match["date"] else timedelta()
-        return day.total_seconds() + 3600 * hours + 60 * minutes + seconds - _zone_s(match["zone"] or "")
-
-
-def _zone_s(zone: str) -> float:
-    """How much a time zone, such as `+02:00`, is ahead, s."""
-    if zone in ("", "Z"):
-        return 0.0
-    return float(zone[0] + "1") * (3600 * int(zone[1:3]) + 60 * int(zone[-2:] if len(zone) > 3 else 0))
-
-
-def is_number(cell: str) -> bool:
-    """Whether a cell holds a finite number."""
-    return isinstance(value := number_or_text(cell), float) and abs(value) != float("inf") and value == value
-
-
-def number_or_text(cell: str) -> Constant:
-    """The cell as a number, or else as text."""
-    try:
-        return parse_number(cell)
-    except ValueError:
-        return cell
 
 
 def _head(source: Source) -> tuple[dict[str, Constant], int, list[str]]:

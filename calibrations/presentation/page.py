@@ -1,9 +1,12 @@
-"""Documents as HTML: one page that needs no network, with its pictures inside."""
+"""Documents as HTML: one page that needs no network, with its pictures inside; and results in a notebook."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
+from html import escape
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -22,6 +25,15 @@ def pictures_html(pictures: Sequence[Picture]) -> str:
     """The pictures as a page shows them, each with title and caption: HTML text."""
     macros = templates().get_template("blocks.html").module
     return "".join(str(macros.block(picture)) for picture in pictures)  # type: ignore[attr-defined]
+
+
+def result_html(text: str, pictures: Sequence[Picture]) -> str:
+    """`text`, then `pictures` with titles and captions. Their ids are those of this output alone: a notebook is one
+    page, and clip paths of the same id in two outputs would be exchanged.
+    """
+    mark = hashlib.sha256(text.encode()).hexdigest()[:8]
+    figures = pictures_html([replace(picture, name=f"{picture.name}-{mark}") for picture in pictures])
+    return f'<pre>{escape(text)}</pre><div style="max-width: 60em; background: white; color: black">{figures}</div>'
 
 
 @cache

@@ -24,8 +24,8 @@ from rig.fleet.crew import run_tasks
 from rig.fleet.members import Member, content
 from rig.fleet.worker import Question, Task, answer
 from rig.record import Record
+from rig.record.rows import timestamp
 from rig.record.schema import answers, insert_or
-from rig.record.store import timestamp
 
 if TYPE_CHECKING:
     from distributed import Client

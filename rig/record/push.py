@@ -17,8 +17,9 @@ from sqlalchemy import Connection, Table, insert, select, update
 from rig.bench import Lab
 from rig.errors import LabAway, RecordError
 from rig.record.content import count, digest, head, rows_of, run_row, uid_of
+from rig.record.rows import timestamp
 from rig.record.schema import arrivals, is_new, poses, runs
-from rig.record.store import Record, timestamp
+from rig.record.store import Record
 from rig.record.values import Run
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import secrets
+import uuid
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import UTC, datetime
 from typing import Any
 
 from sqlalchemy import (
@@ -22,14 +25,29 @@ from sqlalchemy import (
 )
 from sqlalchemy import Table as SqlTable
 
+from drivers.errors import did_you_mean
 from procedures.session import Dwell, Pose
-from rig.errors import RecordError
+from rig.errors import RecordError, UnknownRun
 from rig.record import codec
-from rig.record.checksum import is_damaged
+from rig.record.checksum import is_damaged, with_checksum
 from rig.record.file import RECOVER
-from rig.record.schema import arrivals, blocks, columns, insert_or, newest_first, poses, readings, runs, states
+from rig.record.schema import (
+    arrivals,
+    blocks,
+    columns,
+    dwells,
+    insert_or,
+    is_new,
+    newest_first,
+    poses,
+    readings,
+    runs,
+    states,
+)
 from rig.record.values import Block, Event, Kept, Run
 
+MOST_LISTED = 5
+MOST_SUGGESTED = 20  # names of a kind from which a suggestion is chosen
 LAST = "last"  # the newest run, in the place of an id
 POSE = ("alpha_deg", "beta_deg", "direction", "path", "mount_deg", "flip", "up", "rate_deg_s")
 BESIDE = ("t_s", "temperature_c", "alpha_read_deg", "beta_read_deg")
@@ -43,18 +61,18 @@ def select_runs() -> Select[Any]:
     return select(runs, func.coalesce(imported.scalar_subquery(), pose_count).label("rows")).where(~on_its_way)
 
 
-def select_named(connection: Connection, name: str) -> Select[Any]:
-    """The run of this id; the newest one for `last`, or the newest of a procedure for `last PROCEDURE`."""
+def named_rows(connection: Connection, name: str) -> Sequence[Row[Any]]:
+    """The run of this id, else all whose id begins so.
+
+    The newest one for `last`, or the newest of a procedure for `last PROCEDURE`.
+    """
     last, _, procedure = name.partition(" ")
-    if last != LAST:
-        return select_runs().where(runs.c.run == name)
-    query = select_runs().where(runs.c.procedure == procedure) if procedure else select_runs()
-    return query.order_by(newest_first(connection)).limit(1)
-
-
-def select_beginning(name: str) -> Select[Any]:
-    """The runs whose id begins so; none for no beginning."""
-    return select_runs().where(runs.c.run.startswith(name, autoescape=True) if name else false())
+    query = select_runs().where(runs.c.run == name)
+    if last == LAST:
+        query = select_runs().where(runs.c.procedure == procedure) if procedure else select_runs()
+        query = query.order_by(newest_first(connection)).limit(1)
+    beginning = select_runs().where(runs.c.run.startswith(name, autoescape=True) if name else false())
+    return connection.execute(query).all() or connection.execute(beginning).all()
 
 
 def runs_of_sensor(runs: Sequence[Run], name: str) -> list[Run]:
@@ -63,6 +81,33 @@ def runs_of_sensor(runs: Sequence[Run], name: str) -> list[Run]:
     procedure, _, sensor = selector.partition(" ")
     of_procedure = [run for run in runs if run.procedure == procedure and sensor in run.sensors]
     return [run for run in runs if selector in run.sensors] or (of_procedure if selector != name else [])
+
+
+def known_names(connection: Connection, name: str) -> list[str]:
+    """The ids of all runs, or the procedures after `last `, oldest first: what a wrong name may have meant."""
+    query = select(runs.c.procedure if name.startswith(f"{LAST} ") else runs.c.run)
+    return list(dict.fromkeys(connection.execute(query).scalars()))
+
+
+def several_error(found: Sequence[Row[Any]], name: str, place: str) -> UnknownRun:
+    """The error for a beginning that several ids have."""
+    listed = ", ".join(sorted(row.run for row in found)[:MOST_LISTED])
+    return UnknownRun(f"{len(found)} runs in {place} begin with {name!r}: {listed}; write more of the id")
+
+
+def unknown_error(
+    name: str, place: str, of_sensor: Sequence[Run], all_runs: Sequence[Run], names: list[str]
+) -> UnknownRun:
+    """The error for a name that several runs `of_sensor` have, or none: then with a suggestion."""
+    if of_sensor:
+        listed = ", ".join(run.run for run in of_sensor[:MOST_LISTED])
+        return UnknownRun(
+            f"{len(of_sensor)} runs in {place} are of the sensor {name!r}: {listed}"
+            f"{' ...' if of_sensor[MOST_LISTED:] else ''}; write an id, or '{LAST} {name}' for the newest one"
+        )
+    sensors = list(dict.fromkeys(sensor for run in all_runs for sensor in run.sensors))[:MOST_SUGGESTED]
+    suggestion = did_you_mean(name.removeprefix(f"{LAST} "), names[-MOST_SUGGESTED:], sensors)
+    return UnknownRun(f"no run {name!r} in {place}.{suggestion}")
 
 
 def run_of(row: Row[Any]) -> Run:
@@ -141,6 +186,14 @@ def lost_rows(connection: Connection) -> list[str]:
     return [_lost_text(run, number) for run in run_ids for number in _incomplete(connection, run)]
 
 
+def changed_rows(connection: Connection) -> Iterator[str]:
+    """A phrase for each row that changed on the disk, except the entries of runs."""
+    checked = set(connection.execute(select(runs.c.run).where(runs.c.checksum.is_not(None))).scalars())
+    for table in (poses, blocks, dwells, readings, columns):
+        rows = connection.execution_options(yield_per=32).execute(select(table))
+        yield from (place_text(row, table) for row in rows if is_damaged(table, row._mapping, row.run in checked))
+
+
 def _incomplete(connection: Connection, run: str) -> list[int]:
     """The numbers of poses that are not exactly once in both tables, without the excluded ones. One statement, so that
     a run in progress is seen at one instant.
@@ -212,3 +265,17 @@ def insert_or_replace(connection: Connection, table: SqlTable, values: Mapping[s
     connection.execute(
         insert_or(connection, table).values(values).on_conflict_do_update(index_elements=list(key), set_=dict(values))
     )
+
+
+def timestamp() -> str:
+    """ISO 8601, UTC; microseconds, so that no two runs of a record begin at the same time."""
+    return datetime.now(UTC).isoformat(timespec="microseconds")
+
+
+def new_run(connection: Connection, values: Mapping[str, Any]) -> str:
+    """Add a run. Returns its id, which sorts by time: 20261121-093012-sweep-a1b."""
+    while True:
+        run = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-{values['procedure']}-{secrets.token_hex(2)[:3]}"
+        row = {"results": {}, "identities": {}, **values, "run": run, "created": timestamp(), "uid": uuid.uuid4().hex}
+        if is_new(connection, runs, with_checksum(runs, row)):
+            return run  # else a run of the same second has this id

@@ -6,23 +6,19 @@ A pose, its samples and the state of the simulated bench are one transaction, so
 from __future__ import annotations
 
 import os
-import secrets
-import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import URL, Connection, Engine, func, insert, select, true, update
+from sqlalchemy import URL, Column, Connection, Row, func, insert, select, true, update
+from sqlalchemy import Table as SqlTable
 from sqlalchemy.exc import DatabaseError
 
 from calibrations.table import Table
-from drivers.errors import did_you_mean
 from procedures.session import Dwell, Pose, Reading
 from rig.errors import RecordError, UnknownRun
 from rig.files import RECORD, home
@@ -34,6 +30,7 @@ from rig.record.rows import (
     BESIDE,
     LAST,
     POSE,
+    changed_rows,
     damage_text,
     dwell_of,
     excluded_rows,
@@ -41,26 +38,28 @@ from rig.record.rows import (
     imported_rows,
     insert_or_replace,
     kept_of,
+    known_names,
     lost_pose_error,
     lost_rows,
-    place_text,
+    named_rows,
+    new_run,
     pose_of,
     put_state,
     require_rows,
     require_whole,
     run_of,
     runs_of_sensor,
-    select_beginning,
-    select_named,
     select_runs,
+    several_error,
     sound,
+    timestamp,
+    unknown_error,
 )
 from rig.record.schema import (
     blocks,
     columns,
     dwells,
     events,
-    is_new,
     log,
     newest_first,
     poses,
@@ -70,8 +69,6 @@ from rig.record.schema import (
 )
 from rig.record.values import Event, Kept, Line, Run
 
-MOST_LISTED = 5
-MOST_SUGGESTED = 20  # names of a kind from which a suggestion is chosen
 MOST_LINES = 1000  # of the log in memory
 
 
@@ -87,9 +84,11 @@ class Record:
         self.path = self.folder / FILE
         self.remarks: list[str] = []  # on the file: it was repaired during this command
         if isinstance(place, URL):
-            self.where, self._engine = _open_engine(place)
+            from rig.record.lab import masked_url, open_server
+
+            self.where, self.engine = masked_url(place), open_server(place)
         else:
-            self.where, self._engine = str(self.path), open_file(self.path, self.remarks.append)
+            self.where, self.engine = str(self.path), open_file(self.path, self.remarks.append)
         self._lines: list[dict[str, Any]] = []  # of the log, not written yet
 
     @classmethod
@@ -116,18 +115,11 @@ class Record:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
-    @property
-    def engine(self) -> Engine:
-        """The database."""
-        return self._engine
-
     def close(self) -> None:
-        self._engine.dispose()
+        self.engine.dispose()
 
     # writing
 
@@ -146,8 +138,8 @@ class Record:
         """Add a run of `procedure` in the state "running", for a table of `kind`. Returns its id."""
         values = {"kind": kind, "procedure": procedure, "state": "running", "settings": dict(settings)}
         values |= {"bench": dict(bench), "identities": dict(identities), "configuration": configuration}
-        with self._engine.begin() as connection:
-            return _new_run(connection, values | {"constants": dict(constants), "source": source})
+        with self.engine.begin() as connection:
+            return new_run(connection, values | {"constants": dict(constants), "source": source})
 
     def keep(self, run: str, number: int, recorded: Kept, state: Mapping[str, Any] | None) -> None:
         """Add pose, samples and the `state` of the simulated bench, in one transaction."""
@@ -158,7 +150,7 @@ class Record:
         samples |= {"samples": codec.encode(recorded.samples.volts)}
         measured = recorded.dwell
         dwell = {"n": measured.n, "means": dict(measured.means), "stds": dict(measured.stds)}
-        with self._engine.begin() as connection:
+        with self.engine.begin() as connection:
             pose |= {name: getattr(recorded, name) for name in BESIDE}
             for table, values in ((poses, pose), (blocks, samples), (dwells, dwell)):
                 connection.execute(insert(table), with_checksum(table, key | values))
@@ -168,7 +160,7 @@ class Record:
 
     def keep_readings(self, run: str, new_readings: Iterable[Reading], state: Mapping[str, Any] | None) -> None:
         """Add readings and the `state` of the simulated bench, in one transaction. An existing name is replaced."""
-        with self._engine.begin() as connection:
+        with self.engine.begin() as connection:
             for reading in new_readings:
                 row = with_checksum(readings, {"run": run, "at": timestamp(), **vars(reading)})
                 insert_or_replace(connection, readings, row, ("run", "name"))
@@ -181,7 +173,7 @@ class Record:
         line = {"run": run, "at": timestamp(), "clock_s": clock_s, "who": source, "what": event, "text": text}
         self._lines.append(line)
         if len(self._lines) >= MOST_LINES:
-            with self._engine.begin() as connection:
+            with self.engine.begin() as connection:
                 self._put_lines(connection)
 
     def exclude(self, run: str, number: int, reason: str | None) -> None:
@@ -190,7 +182,7 @@ class Record:
         For a row of an imported table the event alone says it. Raises RecordError for an unknown pose.
         """
         is_pose = (poses.c.run == run) & (poses.c.number == number)
-        with self._engine.begin() as connection:
+        with self.engine.begin() as connection:
             updated = connection.execute(update(poses).where(is_pose).values(excluded=reason)).rowcount
             if not updated and not 0 <= number < imported_rows(connection, run):
                 raise RecordError(f"run {run} has no pose {number}; `rig show {run} --poses` lists its poses")
@@ -201,7 +193,7 @@ class Record:
 
     def keep_state(self, run: str, state: Mapping[str, Any]) -> None:
         """Store the state of the simulated bench before the first pose."""
-        with self._engine.begin() as connection:
+        with self.engine.begin() as connection:
             put_state(connection, run, state)
 
     def set_state(
@@ -210,18 +202,18 @@ class Record:
         """Set the state: running, complete, stopped or failed. The last three end the run."""
         end_time = None if state == "running" else timestamp()
         values = {"state": state, "message": message, "ended": end_time, "results": dict(results or {})}
-        with self._engine.begin() as connection:
+        with self.engine.begin() as connection:
             connection.execute(update(runs).where(runs.c.run == run).values(values))
             self._put_lines(connection)
 
     def set_results(self, run: str, results: Mapping[str, Any]) -> None:
         """Replace the results of a run after its end."""
-        with self._engine.begin() as connection:
+        with self.engine.begin() as connection:
             connection.execute(update(runs).where(runs.c.run == run).values(results=dict(results)))
 
     def note(self, run: str, event: str, text: str) -> None:
         """Add an event to a run."""
-        with self._engine.begin() as connection:
+        with self.engine.begin() as connection:
             connection.execute(insert(events), {"run": run, "at": timestamp(), "what": event, "text": text})
 
     def add_table(self, table: Table, settings: Mapping[str, Any] | None = None) -> str:
@@ -233,8 +225,8 @@ class Record:
             *({"name": name, "numbers": column.astype("<f8").tobytes()} for name, column in table.columns.items()),
             *({"name": name, "texts": list(column)} for name, column in table.labels.items()),
         ]
-        with self._engine.begin() as connection:
-            run = _new_run(connection, values | {"ended": timestamp()})
+        with self.engine.begin() as connection:
+            run = new_run(connection, values | {"ended": timestamp()})
             for position, cell in enumerate(cells):
                 row = with_checksum(columns, {**cell, "position": position})
                 connection.execute(insert(columns), {**row, "run": run})
@@ -257,14 +249,7 @@ class Record:
     def damaged_rows(self) -> list[str]:
         """A phrase for each row of a run, except its entry, that changed on the disk or is lost."""
         with self._reading() as connection:
-            phrases = lost_rows(connection)
-            checked = set(connection.execute(select(runs.c.run).where(runs.c.checksum.is_not(None))).scalars())
-            for table in (poses, blocks, dwells, readings, columns):
-                rows = connection.execution_options(yield_per=32).execute(select(table))
-                phrases += [
-                    place_text(row, table) for row in rows if is_damaged(table, row._mapping, row.run in checked)
-                ]
-        return phrases
+            return [*lost_rows(connection), *changed_rows(connection)]
 
     def run(self, name: str) -> Run:
         """The run with this id, or whose id alone begins so, or the only one of the sensor with this name or serial.
@@ -273,36 +258,17 @@ class Record:
         Raises UnknownRun with a suggestion; RecordError if the entry of the run is damaged.
         """
         with self._reading() as connection:
-            rows = (
-                connection.execute(select_named(connection, name)).all()
-                or connection.execute(select_beginning(name)).all()
-            )
-            names = (
-                connection.execute(select(runs.c.procedure if name.startswith(f"{LAST} ") else runs.c.run))
-                .scalars()
-                .all()
-            )
+            rows, names = named_rows(connection, name), known_names(connection, name)
         if len(rows) == 1:
             if is_damaged(runs, rows[0]._mapping):
                 raise RecordError(f"{self.where}: {damage_text(rows[0].run)}")
             return self._with_true_state(run_of(rows[0]))
         if rows:
-            listed = ", ".join(sorted(row.run for row in rows)[:MOST_LISTED])
-            raise UnknownRun(f"{len(rows)} runs in {self.where} begin with {name!r}: {listed}; write more of the id")
-        sensor = name.removeprefix(f"{LAST} ")
-        if of_sensor := runs_of_sensor(all_runs := self.runs(), name):
-            if len(of_sensor) == 1 or sensor != name:
-                return of_sensor[0]
-            listed = ", ".join(match.run for match in of_sensor[:MOST_LISTED])
-            raise UnknownRun(
-                f"{len(of_sensor)} runs in {self.where} are of the sensor {name!r}: {listed}"
-                f"{' ...' if of_sensor[MOST_LISTED:] else ''}; write an id, or '{LAST} {name}' for the newest one"
-            )
-        newest = list(dict.fromkeys(names))[-MOST_SUGGESTED:]
-        sensors = list(dict.fromkeys(name_of_sensor for run in all_runs for name_of_sensor in run.sensors))[
-            :MOST_SUGGESTED
-        ]
-        raise UnknownRun(f"no run {name!r} in {self.where}.{did_you_mean(sensor, newest, sensors)}")
+            raise several_error(rows, name, self.where)
+        of_sensor = runs_of_sensor(all_runs := self.runs(), name)
+        if len(of_sensor) == 1 or (of_sensor and name.startswith(f"{LAST} ")):
+            return of_sensor[0]
+        raise unknown_error(name, self.where, of_sensor, all_runs, names)
 
     def poses(self, run: str) -> list[Pose]:
         """The poses in order, without the excluded ones."""
@@ -323,25 +289,17 @@ class Record:
 
     def next_number(self, run: str) -> int:
         """The number of the next pose. Excluded poses count."""
-        with self._reading() as connection:
-            highest = connection.execute(select(func.max(poses.c.number)).where(poses.c.run == run)).scalar_one()
+        highest = self._greatest(poses.c.number, run)
         return 0 if highest is None else int(highest) + 1
 
     def last_t_s(self, run: str) -> float | None:
         """The time of the last pose; None before the first."""
-        with self._reading() as connection:
-            last: float | None = connection.execute(
-                select(func.max(poses.c.t_s)).where(poses.c.run == run)
-            ).scalar_one()
+        last: float | None = self._greatest(poses.c.t_s, run)
         return last
 
     def readings(self, run: str) -> list[Reading]:
         """The run's readings, in the order of their names."""
-        query = select(readings).where(readings.c.run == run).order_by(readings.c.name)
-        with self._reading() as connection:
-            require_rows(connection, readings, run)
-            required = has_checksums(connection, run)
-            rows = [sound(row, readings, required=required) for row in connection.execute(query)]
+        rows = self._sound_rows(readings, run, readings.c.name)
         return [Reading(row.name, row.value, row.unit, row.std) for row in rows]
 
     def kept(self, run: str) -> Iterator[Kept]:
@@ -354,9 +312,8 @@ class Record:
             options = connection.execution_options(yield_per=32)
             for row in options.execute(query.order_by(poses.c.number)):
                 excluded.discard(row.number)
-                if row.excluded is None or not any(
-                    is_damaged(table, row._mapping, required) for table in (poses, blocks)
-                ):
+                damaged = any(is_damaged(table, row._mapping, required) for table in (poses, blocks))
+                if row.excluded is None or not damaged:
                     yield kept_of(sound(row, poses, blocks, required=required))
             for number in sorted(excluded):
                 raise lost_pose_error(run, number)
@@ -376,11 +333,8 @@ class Record:
             rows = [sound(row, poses, dwells, required=required) for row in selected]
         for number in sorted(excluded - {row.number for row in rows}):
             raise lost_pose_error(run, number)
-        older = (
-            {recorded.number: recorded.dwell for recorded in self.kept(run)}
-            if any(row.n is None for row in rows)
-            else {}
-        )
+        is_old = any(row.n is None for row in rows)
+        older = {recorded.number: recorded.dwell for recorded in self.kept(run)} if is_old else {}
         return [(row.number, older.get(row.number) or dwell_of(row)) for row in rows]
 
     def state(self, run: str) -> dict[str, Any] | None:
@@ -403,11 +357,7 @@ class Record:
 
     def columns(self, run: str) -> tuple[dict[str, NDArray[np.float64]], dict[str, tuple[str, ...]]]:
         """The columns of an imported table: numbers, and texts, by name."""
-        query = select(columns).where(columns.c.run == run).order_by(columns.c.position)
-        with self._reading() as connection:
-            require_rows(connection, columns, run)
-            required = has_checksums(connection, run)
-            rows = [sound(row, columns, required=required) for row in connection.execute(query)]
+        rows = self._sound_rows(columns, run, columns.c.position)
         numbers = {row.name: np.frombuffer(row.numbers, "<f8") for row in rows if row.numbers is not None}
         return numbers, {row.name: tuple(row.texts) for row in rows if row.numbers is None}
 
@@ -415,11 +365,24 @@ class Record:
     def _reading(self) -> Iterator[Connection]:
         """A connection for reading. An impossible value is a RecordError."""
         try:
-            with self._engine.connect() as connection:
+            with self.engine.connect() as connection:
                 yield connection
         except (ValueError, TypeError, LookupError, OverflowError, DatabaseError) as error:
             reason = f"{type(error).__name__}: {error}".partition("\n")[0]
             raise RecordError(f"{self.where}: the record is damaged; {RECOVER} ({reason})") from None
+
+    def _greatest(self, column: Column[Any], run: str) -> Any:
+        """The greatest value in a column of a run; None without any."""
+        with self._reading() as connection:
+            return connection.execute(select(func.max(column)).where(column.table.c.run == run)).scalar_one()
+
+    def _sound_rows(self, table: SqlTable, run: str, order: Column[Any]) -> list[Row[Any]]:
+        """The rows of a run in a table. Raises RecordError where one is lost or has changed on the disk."""
+        with self._reading() as connection:
+            require_rows(connection, table, run)
+            required = has_checksums(connection, run)
+            query = select(table).where(table.c.run == run).order_by(order)
+            return [sound(row, table, required=required) for row in connection.execute(query)]
 
     def _put_lines(self, connection: Connection) -> None:
         """Write the lines of the log. After a failure they are dropped."""
@@ -432,23 +395,3 @@ class Record:
         if run.state != "running" or is_held(self.folder, run.run):
             return run
         return replace(run, state="stopped", message="its process was killed")
-
-
-def _open_engine(url: URL) -> tuple[str, Engine]:
-    from rig.record.lab import masked_url, open_server
-
-    return masked_url(url), open_server(url)
-
-
-def timestamp() -> str:
-    """ISO 8601, UTC; microseconds, so that no two runs of a record begin at the same time."""
-    return datetime.now(UTC).isoformat(timespec="microseconds")
-
-
-def _new_run(connection: Connection, values: Mapping[str, Any]) -> str:
-    """Add a run. Returns its id, which sorts by time: 20261121-093012-sweep-a1b."""
-    while True:
-        run = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-{values['procedure']}-{secrets.token_hex(2)[:3]}"
-        row = {"results": {}, "identities": {}, **values, "run": run, "created": timestamp(), "uid": uuid.uuid4().hex}
-        if is_new(connection, runs, with_checksum(runs, row)):
-            return run  # else a run of the same second has this id

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from calibrations.errors import MissingColumn
-from calibrations.importing.bad_lines import SHARES, Policy
 from calibrations.importing.binary import open_sheet
+from calibrations.importing.cells import SHARES, Policy
 from calibrations.importing.foreign import import_sheet, needs_mapping
 from calibrations.importing.plausible import Doubt
 from calibrations.importing.proposal import (

@@ -20,7 +20,7 @@ from calibrations.errors import CalibrationError, ModelError
 from calibrations.free_forms.place_names import PREFIX
 from calibrations.free_forms.requested import resolve_effect as free_form_at
 from calibrations.model import Model
-from calibrations.progress import doing
+from calibrations.progress import report
 from rig.errors import RecordError
 from rig.services.content import Content, content_of
 from rig.services.load import loaded
@@ -155,7 +155,7 @@ class ModelSession(Generic[F]):
                 else:
                     effect = session.written(name, expression if equals else text)
                     session = session.with_own(effect)
-                doing(f"Adding {name}")
+                report(f"Adding {name}")
                 session = session.with_step(session.tried(effect))
             except CalibrationError as error:
                 note = f"{name} is not in the model any more: {error}"
@@ -172,7 +172,7 @@ class ModelSession(Generic[F]):
 
     def compared(self) -> Comparison[F]:
         """The present model beside the data: as given, where it came with values."""
-        doing(f"Testing the model on {self.data.unseen}")
+        report(f"Testing the model on {self.data.unseen}")
         return self.kept.compare(self.end.model if self.steps else self.model)
 
     def diagnosed(self) -> Diagnosis[F]:
@@ -206,9 +206,9 @@ def model_session(request: Request) -> ModelSession[Any]:
     content = Content("")
     with suppress(RecordError, OSError):  # `loaded` says better what is wrong
         content = content_of(request.data, request.model)  # before the data: a later row makes the session old
-    doing(f"Reading {request.data}")
+    report(f"Reading {request.data}")
     question = loaded(request, notes.append)
-    doing(f"Fitting {question.model.name} to {question.data.description}")
+    report(f"Fitting {question.model.name} to {question.data.description}")
     prepared, start = question.data.beginning(question.model)
     return ModelSession(
         request, question.model, question.data, prepared, question.effects, tuple(notes), start, content=content

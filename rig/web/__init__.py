@@ -1,7 +1,7 @@
 """The workbench: pages in a browser that do what the command line does, by the same functions.
 
     server     listens, and lets in who has the token
-    guard      token, host and origin of every request and websocket
+    guard      the token of the user; token, host and origin of every request and websocket
     frame      what all pages share: navigation, the run under way, light and dark, keys
     desk       what lies open: data, the model as it grew, what is on its way
     pages      one a file, in pages/

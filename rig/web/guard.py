@@ -8,11 +8,18 @@ the workbench load nothing from other hosts.
 from __future__ import annotations
 
 import hmac
+import os
+import re
+import secrets
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from urllib.parse import parse_qsl, urlencode
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from rig.files import home
 
 TOKEN = "token"  # noqa: S105 the name of the query's field
 POLICY = "; ".join(
@@ -116,3 +123,45 @@ async def _refuse(scope: Scope, send: Send, status: int, reason: str) -> None:
     headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"cache-control", b"no-store"), *HEADERS]
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": reason.encode()})
+
+
+# The token is kept for the user, so that a bookmark and open pages last over a restart.
+
+NAME = "web-token"
+BYTES = 24
+FORM = re.compile(r"[\w-]{32}")  # of a token of so many bytes
+OTHERS = 0o077  # permissions of other users
+
+
+def kept_token(new: bool = False) -> str:
+    """The token of this user; a new one if none is kept, if other users may read it, or if `new` is set.
+
+    Where it cannot be kept, for example on a full disk, it is for this start only.
+    """
+    path = home() / NAME
+    if not new and (stored := _read_token(path)) is not None:
+        return stored
+    token = secrets.token_urlsafe(BYTES)
+    with suppress(OSError):
+        _write(path, token)
+    return token
+
+
+def _read_token(path: Path) -> str | None:
+    """The token in a file that only its owner can read, else None."""
+    try:
+        text = path.read_text(encoding="ascii").strip()
+        private = os.name != "posix" or not path.stat().st_mode & OTHERS
+    except (OSError, ValueError):
+        return None
+    return text if private and FORM.fullmatch(text) else None
+
+
+def _write(path: Path, token: str) -> None:
+    """Replace the file; no other user can read it at any time. Raises OSError."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(f".{path.name}.{os.getpid()}")
+    draft.unlink(missing_ok=True)
+    with os.fdopen(os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+        file.write(token)
+    draft.replace(path)

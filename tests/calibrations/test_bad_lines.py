@@ -10,7 +10,7 @@ import pytest
 
 from calibrations.errors import DataError
 from calibrations.files import open_text_file
-from calibrations.importing.bad_lines import SHARES, Policy
+from calibrations.importing.cells import SHARES, Policy
 from calibrations.importing.foreign import ImportedTable, import_sheet
 from calibrations.importing.sheet import read_sheet
 

@@ -19,11 +19,10 @@ import pytest
 
 import calibrations as cal
 from calibrations.errors import DataError
-from calibrations.importing.bad_lines import SHARES
 from calibrations.importing.binary import open_sheet
+from calibrations.importing.cells import SHARES, parse_cell
 from calibrations.importing.foreign import import_sheet
 from calibrations.importing.raw_logs import average_raw_log
-from calibrations.importing.sheet import parse_cell
 from calibrations.importing.units import ColumnMapping
 from calibrations.table import Array, Table
 

@@ -12,7 +12,7 @@ import pytest
 import calibrations as cal
 from calibrations.errors import UnknownName
 from calibrations.fitting.fit import Fit
-from calibrations.presentation.notebook import result_html
+from calibrations.presentation.page import result_html
 from calibrations.table import Table
 from calibrations.text import rounded
 from tests.calibrations import synthetic

@@ -11,8 +11,9 @@ import pytest
 from calibrations.errors import DataError, MissingColumn
 from calibrations.files import text_source
 from calibrations.importing.foreign import import_sheet, needs_mapping
-from calibrations.importing.proposal import import_command, likely_kind, propose_mapping
+from calibrations.importing.proposal import likely_kind, propose_mapping
 from calibrations.importing.sheet import Sheet, read_sheet
+from calibrations.importing.suggestion import import_command
 from calibrations.importing.units import ColumnMapping, parse_unit, split_unit
 from calibrations.table import Array
 

@@ -15,8 +15,7 @@ from procedures.session import Pose, Reading
 from rig.errors import RecordError
 from rig.record import Kept, Record
 from rig.record.measured import table_of
-from rig.record.recover import recover
-from rig.record.repair import is_sound
+from rig.record.recover import is_sound, recover
 from tests.rig.test_doctor import PAGE, recorded
 from tests.rig.test_store import begin, block
 

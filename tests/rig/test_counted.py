@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from calibrations.effects.catalogue import catalogue
-from calibrations.progress import doing, shown_by
+from calibrations.progress import report, shown_by
 from rig.services.request import Request
 from rig.services.search import Cancelled, Counted
 from rig.services.session import model_session
@@ -40,7 +40,7 @@ def test_an_analysis_says_what_it_does(tmp_path: Path) -> None:
 
     with shown_by(seen), pytest.raises(Cancelled):
         model_session(Request(two_faults(tmp_path))).diagnosed()
-    doing("nobody shows this")
+    report("nobody shows this")
     assert [text.partition(" ")[0] for text in texts] == ["Reading", "Fitting", "searching"]
     assert texts[-1] == "searching for places (effects first), pass 1 of at most 7"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.web.token import NAME, kept_token
+from rig.web.guard import NAME, kept_token
 
 
 @pytest.fixture

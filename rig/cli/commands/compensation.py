@@ -24,7 +24,7 @@ from rig.cli.terminal.output import (
 from rig.cli.terminal.progress import working
 
 if TYPE_CHECKING:
-    from calibrations.compensation.inverse import Range
+    from calibrations.compensation.inverse import Range, Residual
     from calibrations.model import Model
 
 
@@ -92,25 +92,23 @@ def compensate_command(
     require_outputs(*(out / file for file in files))
     for file, text in files.items():
         write_whole(out / file, text)
+    _draw(residual, picture)
+    paths = [*(str(out / file) for file in files), *([str(picture)] if picture else [])]
+    if as_json:
+        emit(summary(compensation, origin) | {"files": paths, "residual": residual.document() if residual else None})
+        return
+    lines = [*compensation_lines(compensation), *(residual.lines() if residual else [])]
+    lines += [*(f"written: {path}" for path in paths), *how_to_test(language, str(out), origin.name)]
+    click.echo("\n".join(lines))
+
+
+def _draw(residual: Residual | None, picture: Path | None) -> None:
+    """The picture of the test, where both are given."""
     if picture is not None and residual is not None:
         from calibrations.presentation.charts.motion import compensated
         from calibrations.presentation.static import save
 
         save(compensated(residual), picture)
-    paths = [*(str(out / file) for file in files), *([str(picture)] if picture else [])]
-    if as_json:
-        emit(summary(compensation, origin) | {"files": paths, "residual": residual.document() if residual else None})
-    else:
-        click.echo(
-            "\n".join(
-                [
-                    *compensation_lines(compensation),
-                    *(residual.lines() if residual else []),
-                    *(f"written: {path}" for path in paths),
-                    *how_to_test(language, str(out), origin.name),
-                ]
-            )
-        )
 
 
 def _range(model: Model, reach: float | None, ranges: Sequence[str]) -> Range:

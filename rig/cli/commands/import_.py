@@ -21,8 +21,8 @@ from calibrations.importing.proposal import (
     propose_mapping,
     sample_values,
 )
-from calibrations.importing.proposal import import_command as repeating_command
 from calibrations.importing.sheet import Sheet
+from calibrations.importing.suggestion import import_command as repeating_command
 from calibrations.importing.units import ColumnMapping, parse_unit
 from calibrations.table import NUMBERS
 from rig.cli.terminal.output import emit, json_option, note

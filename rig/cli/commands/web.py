@@ -47,8 +47,8 @@ def web_command(
     from rig.bench import read_bench
     from rig.bench.file import DEMO
     from rig.web.desk import Desk
+    from rig.web.guard import kept_token
     from rig.web.server import serve
-    from rig.web.token import kept_token
 
     benches = bench_files or (None, DEMO)
     for bench_file in benches:

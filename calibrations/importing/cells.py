@@ -1,4 +1,4 @@
-"""Damaged lines of a text log: counted, shown and skipped as long as they are few.
+"""Cells of a text as numbers and times, and the lines that are damaged: counted, shown and skipped while they are few.
 
 A log of hours has lines that were cut or garbled on a wire, and a header again after each restart of the logger. A
 table whose lines are damaged as a rule was understood wrongly: it is refused with the first of them.
@@ -6,11 +6,71 @@ table whose lines are damaged as a rule was understood wrongly: it is refused wi
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from datetime import date, timedelta
 from typing import Literal
 
 from calibrations.errors import DataError
+from calibrations.table import Constant
+
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:(?:,\d{3})+\.\d+|(?:\.\d{3})+,\d+)")  # 1,234.5 and 1.234,5
+_TIME = re.compile(
+    r"(?:(?P<date>\d{4}[-/]\d\d[-/]\d\d)[T ])?"
+    r"(?P<hour>[01]?\d|2[0-3]):(?P<minute>[0-5]\d):(?P<second>[0-5]\d(?:[.,]\d+)?)(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?"
+)
+EPOCH = date(1970, 1, 1)
+_COMMA = re.compile(r",(?=\d+([eE]|$))")
+
+
+def parse_number(cell: str) -> float:
+    """The number in a cell, with decimal point or decimal comma. Raises ValueError."""
+    if "_" in cell:
+        raise ValueError(cell)  # float() would take 1_000
+    if _THOUSANDS.fullmatch(cell):
+        mark = "," if cell.rindex(",") < cell.rindex(".") else "."
+        cell = cell.replace(mark, "")
+    return float(_COMMA.sub(".", cell) if "," in cell else cell)
+
+
+def parse_cell(cell: str) -> float:
+    """The number in a cell, or its date or time of day in s: `2026-01-04T12:00:00.02Z`, `12:00:00,020`.
+
+    A date counts from 1970 and has no time zone, or its own. Raises ValueError.
+    """
+    try:
+        return parse_number(cell)
+    except ValueError:
+        if not (match := _TIME.fullmatch(cell)):
+            raise
+        hours, minutes, seconds = (float(match[name].replace(",", ".")) for name in ("hour", "minute", "second"))
+        day = date.fromisoformat(match["date"].replace("/", "-")) - EPOCH if match["date"] else timedelta()
+        return day.total_seconds() + 3600 * hours + 60 * minutes + seconds - _zone_s(match["zone"] or "")
+
+
+def _zone_s(zone: str) -> float:
+    """How much a time zone, such as `+02:00`, is ahead, s."""
+    if zone in ("", "Z"):
+        return 0.0
+    return float(zone[0] + "1") * (3600 * int(zone[1:3]) + 60 * int(zone[-2:] if len(zone) > 3 else 0))
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell holds a finite number."""
+    return isinstance(value := number_or_text(cell), float) and abs(value) != float("inf") and value == value
+
+
+def number_or_text(cell: str) -> Constant:
+    """The cell as a number, or else as text."""
+    try:
+        return parse_number(cell)
+    except ValueError:
+        return cell
+
+
+# Damaged lines
+
 
 MOST_SKIPPED = 0.01  # of the lines, unless a person asks for more
 MOST_ASKED = 0.5  # of the lines in any case
