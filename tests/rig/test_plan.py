@@ -49,7 +49,7 @@ def test_duration_and_room_are_those_of_the_run() -> None:
     with Record() as record:
         run = start(record, read_bench(), *small_sweep(), Onlooker()).run.run
         state: Any = record.state(run)
-        with record._engine.connect() as at:
+        with record.engine.connect() as at:
             stored = at.exec_driver_sql("SELECT sum(length(samples)) FROM blocks").scalar()
     assert state["rig"]["clock_s"] == pytest.approx(planned.duration_s, rel=0.05)
     assert stored < planned.bytes < 3 * stored

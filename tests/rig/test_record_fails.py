@@ -46,7 +46,7 @@ def fill(record: Record) -> None:
     """The disk has no page left."""
     with closing(sqlite3.connect(record.path)) as connection:
         pages = connection.execute("PRAGMA page_count").fetchone()[0]
-    record._engine.raw_connection().execute(f"PRAGMA max_page_count = {pages}")  # type: ignore[attr-defined]
+    record.engine.raw_connection().execute(f"PRAGMA max_page_count = {pages}")  # type: ignore[attr-defined]
 
 
 def test_a_full_disk_stops_the_run_which_goes_on_when_there_is_room(tmp_path: Path) -> None:
@@ -172,6 +172,6 @@ def test_two_processes_write_one_record(rig_home: Path) -> None:
 
 def test_what_is_no_fault_of_the_disk_is_not_called_one(tmp_path: Path) -> None:
     with Record(tmp_path) as record, pytest.raises(Exception, match="no such table") as failed:
-        record._engine.connect().exec_driver_sql("SELECT * FROM nowhere")
+        record.engine.connect().exec_driver_sql("SELECT * FROM nowhere")
     assert not isinstance(failed.value, RecordError)
     assert set(file.FAILURES) >= {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR}

@@ -125,7 +125,7 @@ def test_events_are_told_in_order() -> None:
 
 
 def test_a_commit_is_on_the_disk_when_it_returns() -> None:
-    with Record() as record, record._engine.connect() as connection:
+    with Record() as record, record.engine.connect() as connection:
         assert connection.exec_driver_sql("PRAGMA journal_mode").scalar() == "wal"
         assert connection.exec_driver_sql("PRAGMA synchronous").scalar() == 2  # FULL
 
@@ -165,7 +165,7 @@ def test_a_damaged_block_names_its_pose() -> None:
     with Record() as record:
         run = begin(record)
         record.keep(run, 0, Kept(Pose(90, 0), block([[2.0, 1.0]]), 3.5, 21.5), None)
-        with record._engine.begin() as connection:
+        with record.engine.begin() as connection:
             connection.exec_driver_sql("UPDATE blocks SET samples = x'00'")
         with pytest.raises(RecordError, match="pose 0: its values changed on the disk"):
             list(record.kept(run))
@@ -237,7 +237,7 @@ def test_means_and_scatter_come_without_the_samples() -> None:
         assert last[0] == 2
         assert last[1].means == {"vx": 3.0, "vy": 1.5}
         assert record.dwells(run, after_number=0) == [last]
-        with record._engine.begin() as connection:  # as a run of an older program
+        with record.engine.begin() as connection:  # as a run of an older program
             connection.exec_driver_sql("DELETE FROM dwells WHERE number = 0")
         assert record.dwells(run) == [first, last]
 
