@@ -26,6 +26,7 @@ SHARED = {  # settings that mean the same in every procedure
     "settle_s": "How long the stages stand still before samples are taken.",
     "block_s": "A record is saved in blocks of this length; a fault costs at most one block.",
 }
+UNITS = {"deg_s": "deg/s", "m_s2": "m/s^2", "deg": "deg", "hz": "Hz", "um": "um", "c": "°C", "s": "s"}  # ends of names
 
 
 def parse(procedure: Procedure, entries: Mapping[str, Value]) -> dict[str, Value]:
@@ -51,15 +52,6 @@ def meaning(procedure: Procedure, name: str) -> str:
     return " ".join(line[1].split()) if line else SHARED.get(name, "")
 
 
-def setting_text(value: Any) -> str:
-    """The text of a value, as a person types it."""
-    if isinstance(value, (list, tuple)):
-        return ",".join(f"{part:g}" if isinstance(part, float) else str(part) for part in value)
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
 def choices(procedure: Procedure) -> dict[str, tuple[str, ...]]:
     """The settings that have a list of allowed texts, with this list."""
     types = get_type_hints(procedure.function)
@@ -67,6 +59,21 @@ def choices(procedure: Procedure) -> dict[str, tuple[str, ...]]:
         name: tuple(map(str, get_args(kind))) for name, kind in types.items() if get_origin(kind) is Literal
     }
     return choices_by_name | {name: YES_OR_NO for name, kind in types.items() if kind is bool}
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """`step_deg` as (`step`, `deg`); the unit is "" for a name without one."""
+    end = next((end for end in UNITS if name.endswith(f"_{end}")), "")
+    return name.removesuffix(f"_{end}"), UNITS.get(end, "")
+
+
+def setting_text(value: Value) -> str:
+    """The text of a value, as a person types it."""
+    if isinstance(value, (list, tuple)):
+        return ",".join(map(setting_text, value))
+    if isinstance(value, bool):
+        return YES_OR_NO[not value]
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _value(subject: str, kind: Any, value: Value) -> Value:

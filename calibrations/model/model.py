@@ -188,6 +188,11 @@ class Model(ReportedResult):
         """The estimates of one effect; () if the model does not have it, or has no values yet."""
         return next((term.estimates for term in self.terms if term.name == effect), ())
 
+    @property
+    def all_estimates(self) -> list[tuple[Term, Estimate]]:
+        """Every estimate with its effect's term, in the order of the parameters of a fit."""
+        return [(term, e) for term in self.terms for e in term.estimates]
+
     def report(self) -> str:
         """The parameters as a table for people; the effects, where the model has no values yet."""
         rows = [(key, e.text) for key, e in self.params.items()]

@@ -125,7 +125,6 @@ def _budget(fit: Fit) -> Budget | None:
 
 def _identified_estimates(fit: Fit) -> Iterator[tuple[int, str, Estimate]]:
     """Number, effect and estimate of each identified quantity; coefficients of free forms have no budget."""
-    estimates = ((term, e) for term in fit.model.terms for e in term.estimates)
-    for k, (term, e) in enumerate(estimates):
+    for k, (term, e) in enumerate(fit.model.all_estimates):
         if e in term.quantities and e.identified and e.std is not None:
             yield k, term.name, e

@@ -128,7 +128,7 @@ def _change(e: Estimate, earlier: Estimate | None) -> str:
 def _matrices(fit: FittedModel) -> Iterator[tuple[list[str], Array]]:
     """Names and correlation matrix of parameters that were fitted together."""
     if isinstance(fit, Fit):
-        estimates = [(term, e) for term in fit.model.terms for e in term.estimates]
+        estimates = fit.model.all_estimates
         listed = [k for k, (term, e) in enumerate(estimates) if e.identified and e.std and e in term.quantities]
         if listed:
             names = [_name(estimates[k][0].name, estimates[k][1].name, estimates[k][1].axis) for k in listed]

@@ -258,8 +258,7 @@ def _calibration(record: Record, data: str, run: Run, model: Model) -> Calibrati
     fitted = fit(model, table)
     values = {
         result_name(term.effect, e.name, e.axis): Value(e.value, e.std, e.unit)
-        for term in fitted.model.terms
-        for e in term.estimates
+        for term, e in fitted.model.all_estimates
         if e.identified and e.std
     }
     if len(values) < len(fitted.theta):

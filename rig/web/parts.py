@@ -15,8 +15,10 @@ from nicegui import ui
 from nicegui.element import Element
 
 from calibrations.errors import CalibrationError
+from calibrations.text import unit
 from drivers.errors import DriverError
 from procedures.errors import ProcedureError
+from procedures.settings import split_unit
 from rig.errors import RigError
 from rig.services.page_words import PageStep, page_step
 from rig.services.search import Cancelled
@@ -235,19 +237,9 @@ def for_page(text: str) -> str:
 
 # Settings of a procedure as text: `step_deg = 10.0` is shown as `step (deg)`, `10`.
 
-UNITS = {  # ends of names, longest first
-    "deg_s": "deg/s",
-    "m_s2": "m/s²",
-    "deg": "deg",
-    "hz": "Hz",
-    "um": "µm",
-    "c": "°C",
-    "s": "s",
-}
-
 
 def setting_label(name: str) -> str:
     """`step_deg` as `step (deg)`."""
-    unit = next((end for end in UNITS if name.endswith(f"_{end}")), "")
-    head = name.removesuffix(f"_{unit}").replace("_", " ")
-    return f"{head} ({UNITS[unit]})" if unit else head
+    head, stated_unit = split_unit(name)
+    spelt = {"um": "µm"}.get(stated_unit, unit(stated_unit))
+    return f"{head.replace('_', ' ')} ({spelt})" if spelt else head.replace("_", " ")

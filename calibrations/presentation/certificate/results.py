@@ -126,10 +126,10 @@ def figures(fit: Fit, earlier_model: Model | None, limits: Mapping[str, Limit], 
     trial = simulate(fit, inputs, trials)
     weights = _weights(fit)
     earlier = _values(earlier_model) if earlier_model is not None else {}
-    certified = [k for k, (_, e) in enumerate(_estimates(fit.model)) if e.identified and e.std]
+    certified = [k for k, (_, e) in enumerate(fit.model.all_estimates) if e.identified and e.std]
     outcomes = tuple(
         _outcome(k, t, e, budget, trial[:, k], weights[k], fit, earlier, limits)
-        for k, (t, e) in enumerate(_estimates(fit.model))
+        for k, (t, e) in enumerate(fit.model.all_estimates)
         if k in certified
     )
     if not outcomes:
@@ -155,12 +155,8 @@ def require_reference(source: str, kind: str) -> None:
         )
 
 
-def _estimates(model: Model) -> Iterator[tuple[Term, Estimate]]:
-    return ((t, e) for t in model.terms for e in t.estimates)
-
-
 def _values(model: Model) -> dict[tuple[str, str, str], tuple[float, float | None]]:
-    return {(t.name, e.name, e.axis): (e.value, e.std) for t, e in _estimates(model) if e.identified}
+    return {(t.name, e.name, e.axis): (e.value, e.std) for t, e in model.all_estimates if e.identified}
 
 
 def _outcome(
@@ -242,7 +238,7 @@ def _remarks(fit: Fit) -> Iterator[str]:
             f"The residual is larger than the noise (Birge ratio {fit.birge:.2f}). The uncertainties are multiplied "
             "by this ratio, and the budget lists it as misfit."
         )
-    for t, e in _estimates(fit.model):
+    for t, e in fit.model.all_estimates:
         if not e.identified:
             quantity = f"{t.name} {f'{e.name} {e.axis}'.strip()}"
             yield f"Not determined by these data and not certified: {quantity} ({e.why})."

@@ -70,11 +70,8 @@ def _sections(
     yield Section(f"Mismatch of the model {name}", (PLACES, Items(fails)) if fails else (NO_PLACE,))
     if discovery.findings.candidates:
         yield Section("Candidates", _candidates(discovery))
-    rows = [
-        (term.name, e.name.replace("_", " "), e.axis, *estimate_cells(e))
-        for term in discovery.end.model.terms
-        for e in term.estimates
-    ]
+    estimates = discovery.end.model.all_estimates
+    rows = [(term.name, e.name.replace("_", " "), e.axis, *estimate_cells(e)) for term, e in estimates]
     coefficients = ("effect", "parameter", "axis", "value (standard uncertainty)", "unit")
     title = "The model, extended" if discovery.steps else "The model"
     yield Section(title, (discovery.end.model.name, Table("Coefficients", coefficients, rows, headed=False)))

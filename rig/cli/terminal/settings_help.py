@@ -10,10 +10,9 @@ import click
 from click.shell_completion import CompletionItem
 
 from procedures.catalogue import Procedure, find, paths
-from procedures.settings import choices, meaning, setting_text
+from procedures.settings import choices, meaning, setting_text, split_unit
 from rig.bench import read_bench
 
-UNITS = {"deg_s": "deg/s", "m_s2": "m/s^2", "deg": "deg", "hz": "Hz", "um": "um", "c": "°C", "s": "s"}  # ends of names
 HELP = ("-h", "--help")
 WIDTH = 100
 
@@ -53,8 +52,7 @@ def settings_lines(procedure: Procedure) -> Iterator[str]:
     choices_by_name = choices(procedure)
     yield "Settings:"
     for name, default in procedure.defaults.items():
-        unit = next((UNITS[end] for end in UNITS if name.endswith(f"_{end}")), "")
-        shown = " ".join(filter(None, [setting_text(default), unit]))
+        shown = " ".join(filter(None, [setting_text(default), split_unit(name)[1]]))
         yield f"  --{name.replace('_', '-')}  (default: {shown or 'none'})"
         allowed = f"One of: {', '.join(choices_by_name[name])}." if name in choices_by_name else ""
         if text := " ".join(filter(None, [meaning(procedure, name), allowed])):
