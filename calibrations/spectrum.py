@@ -257,14 +257,14 @@ class Welch:
 
     def __init__(self, rate_hz: float) -> None:
         self._rate_hz = rate_hz
-        self._rest = np.empty(0)
+        self._remainder = np.empty(0)
         self._power = np.zeros((MOST_PARTS, LENGTH // 2 - 1))
         self._stretches = np.zeros(MOST_PARTS, dtype=np.int64)
         self._part, self._full = 0, 1  # the part that is filled now, and how many stretches fill one
 
     def add(self, samples: Array) -> None:
         """The next samples, shape (n,)."""
-        waiting = np.concatenate([self._rest, samples])
+        waiting = np.concatenate([self._remainder, samples])
         starts = range(0, len(waiting) - LENGTH + 1, LENGTH // 2)
         for start in starts:
             if self._stretches[self._part] == self._full:
@@ -272,7 +272,7 @@ class Welch:
             stretch = waiting[start : start + LENGTH]
             self._power[self._part] += np.abs(np.fft.rfft((stretch - stretch.mean()) * WINDOW))[1:-1] ** 2
             self._stretches[self._part] += 1
-        self._rest = waiting[len(starts) * LENGTH // 2 :]
+        self._remainder = waiting[len(starts) * LENGTH // 2 :]
 
     def segments(self) -> Segments:
         """By time."""
@@ -299,7 +299,7 @@ class Means:
         self.size = 1  # samples to a mean
         self._sums = np.empty(MOST_MEANS)
         self._filled = 0
-        self._rest = np.empty(0)  # samples that fill no mean yet
+        self._remainder = np.empty(0)  # samples that fill no mean yet
         self._offset: float | None = None  # taken off before sums, so that they keep their digits
 
     def add(self, samples: Array) -> None:
@@ -307,7 +307,7 @@ class Means:
         samples = np.asarray(samples, dtype=np.float64)
         if self._offset is None and len(samples):
             self._offset = float(samples.mean())
-        waiting = np.concatenate([self._rest, samples - (self._offset or 0.0)])
+        waiting = np.concatenate([self._remainder, samples - (self._offset or 0.0)])
         while len(waiting) >= self.size:
             count = min(len(waiting) // self.size, MOST_MEANS - self._filled)
             sums = waiting[: count * self.size].reshape(-1, self.size).sum(axis=1)
@@ -316,7 +316,7 @@ class Means:
             waiting = waiting[count * self.size :]
             if self._filled == MOST_MEANS:
                 self._halve()
-        self._rest = waiting
+        self._remainder = waiting
 
     def values(self) -> Array:
         """The means less their mean, shape (n,)."""

@@ -27,14 +27,14 @@ LARGE_STD = 100.0  # from here on the digits in brackets would be before the dec
 # Values with their uncertainty
 
 
-def concise(value: float, std: float | None, of: str = "") -> str:
+def concise(value: float, std: float | None, unit_name: str = "") -> str:
     """`2.500123(45) V` in ASCII: the digits in brackets are the standard uncertainty of the last digits."""
     if not _is_known(std):
-        return f"{value:.6g} {of}".rstrip()
+        return f"{value:.6g} {unit_name}".rstrip()
     decimals = max(0, 1 - exponent(float(f"{std:.1e}")))  # of the rounded one: 0.0998 is 0.10
     if decimals > MOST_DECIMALS or std >= LARGE_STD:
-        return f"{value:.6g} +- {std:.2g} {of}".rstrip()
-    return f"{value:.{decimals}f}({round(std * 10**decimals)}) {of}".rstrip()
+        return f"{value:.6g} +- {std:.2g} {unit_name}".rstrip()
+    return f"{value:.{decimals}f}({round(std * 10**decimals)}) {unit_name}".rstrip()
 
 
 def estimate_text(value: float, std: float | None) -> str:
@@ -48,24 +48,24 @@ def estimate_text(value: float, std: float | None) -> str:
     return minus(concise(value / 10.0**power, std / 10.0**power)) + times_ten_to(power)
 
 
-def concise_in_prefix(value: float, std: float | None, of: str) -> str:
+def concise_in_prefix(value: float, std: float | None, unit_name: str) -> str:
     """`concise` in the prefix that reads best: `785.5(73) uV`, `0.00(16) mV`, `0.98510(25) V/g`."""
-    factor, spelt = in_prefix(value, std, of)
+    factor, spelt = in_prefix(value, std, unit_name)
     return concise(value * factor, None if std is None else std * factor, spelt.replace("µ", "u"))
 
 
-def estimate_in_prefix(value: float, std: float | None, of: str) -> str:
+def estimate_in_prefix(value: float, std: float | None, unit_name: str) -> str:
     """`estimate_text` with its unit, in the prefix that reads best: `785.5(73) µV`, `−1.0(16) mV/g²`."""
-    factor, spelt = in_prefix(value, std, of)
+    factor, spelt = in_prefix(value, std, unit_name)
     return f"{estimate_text(value * factor, None if std is None else std * factor)} {unit(spelt)}".rstrip()
 
 
-def in_prefix(value: float, std: float | None, of: str) -> tuple[float, str]:
+def in_prefix(value: float, std: float | None, unit_name: str) -> tuple[float, str]:
     """Factor and unit of an output or a rate of it. The unit itself stays down to a tenth of it."""
-    if of.partition("/")[0] not in ("V", "g"):
-        return 1.0, of
+    if unit_name.partition("/")[0] not in ("V", "g"):
+        return 1.0, unit_name
     reach = max(abs(value), 10 * (std or 0.0))
-    return (1.0, of) if reach >= 0.1 or reach == 0 else prefixed(of, reach)
+    return (1.0, unit_name) if reach >= 0.1 or reach == 0 else prefixed(unit_name, reach)
 
 
 def time_text(value: float, std: float | None) -> str:
@@ -131,19 +131,19 @@ def tick_text(value: float) -> str:
     return rounded(value, 1).removeprefix("1 × ")
 
 
-def quantity(value: float, of: str) -> str:
+def quantity(value: float, unit_name: str) -> str:
     """A value with the prefix that reads best, in ASCII: `51.2 uV`, `0.1 mg`, `3 per mille` of a field."""
-    if of == "field":
+    if unit_name == "field":
         return f"{1e3 * value:.3g} per mille"
-    if of not in ("V", "g") or value == 0:
-        return f"{value:.3g} {of}"
+    if unit_name not in ("V", "g") or value == 0:
+        return f"{value:.3g} {unit_name}"
     factor, prefix = next((f, p) for f, p in PREFIXES if abs(value) * f >= 0.1 or p == "µ")
-    return f"{value * factor:.3g} {prefix.replace('µ', 'u')}{of}"
+    return f"{value * factor:.3g} {prefix.replace('µ', 'u')}{unit_name}"
 
 
-def in_milli(of: str) -> tuple[float, str]:
+def in_milli(unit_name: str) -> tuple[float, str]:
     """Factor and unit that make small outputs readable: mV, mg and mm/s^2; other units stay as they are."""
-    return (1e3, f"m{of}") if of.partition("/")[0] in ("V", "g", "m") else (1.0, of)
+    return (1e3, f"m{unit_name}") if unit_name.partition("/")[0] in ("V", "g", "m") else (1.0, unit_name)
 
 
 def as_written(value: str | float) -> str:
@@ -206,12 +206,12 @@ def unit(text: str) -> str:
     return "" if text == "1" else head + "".join(p[:1].translate(SUPERSCRIPT) + p[1:] for p in powers)
 
 
-def prefixed(of: str, reach: float) -> tuple[float, str]:
+def prefixed(unit_name: str, reach: float) -> tuple[float, str]:
     """(factor, unit with prefix) for values up to `reach` in the unit `of`, as `unit` writes it."""
-    if not of.startswith(PREFIXED):
-        return 1.0, of
+    if not unit_name.startswith(PREFIXED):
+        return 1.0, unit_name
     factor, letter = prefix(reach)
-    return factor, f"{letter}{of}"
+    return factor, f"{letter}{unit_name}"
 
 
 def prefix(size: float) -> tuple[float, str]:
@@ -219,9 +219,9 @@ def prefix(size: float) -> tuple[float, str]:
     return next(((factor, letter) for factor, letter in PREFIXES if abs(size) * factor >= 1), PREFIXES[0])
 
 
-def labelled(name: str, of: str) -> str:
+def labelled(name: str, unit_name: str) -> str:
     """An axis label: the name with its unit, where it has one."""
-    return f"{name} ({of})" if of else name
+    return f"{name} ({unit_name})" if unit_name else name
 
 
 # Words

@@ -142,14 +142,16 @@ class SoakForecast:
             return replace(self, followed={})
         filters: dict[str, QuantityFilter] = dict(self.followed)
         for axis in (axis for axis in part.axes if axis in AXES):
-            filters |= self._held(part, axis) if part.labels["path"][0].startswith(HOLD) else self._turned(part, axis)
+            filters |= (
+                self._follow_holds(part, axis) if part.labels["path"][0].startswith(HOLD) else self._turned(part, axis)
+            )
         return replace(self, followed=filters)
 
     def forecasts(self) -> dict[str, Forecast]:
         """The present forecast of each quantity."""
         return {name: quantity_filter.forecast() for name, quantity_filter in self.followed.items()}
 
-    def _held(self, part: Table, axis: str) -> dict[str, QuantityFilter]:
+    def _follow_holds(self, part: Table, axis: str) -> dict[str, QuantityFilter]:
         previous = self.followed.get(name := f"bias-{axis}")
         if previous is None:
             return {}

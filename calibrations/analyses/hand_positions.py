@@ -41,7 +41,7 @@ class HandPosition:
     mean: Array
     std: Array
     n: int
-    told: Array
+    stated_up: Array
     t_s: float = 0.0
 
 
@@ -82,7 +82,7 @@ class HandCourse:
     @cached_property
     def ups(self) -> Array:
         """Directions upward of the positions, unit vectors (n, 3)."""
-        return directions_up(self.outputs, np.array([p.told for p in self.positions]).reshape(-1, 3))
+        return directions_up(self.outputs, np.array([p.stated_up for p in self.positions]).reshape(-1, 3))
 
     @cached_property
     def next(self) -> Next:

@@ -98,9 +98,9 @@ class Direction:
     def angles_covariance_deg2(self) -> Array:
         """Covariance of `angles_deg`, shape (2, 2)."""
         x, y, _ = self.theta
-        across = x * x + y * y
+        radius_squared = x * x + y * y
         sign = 1.0 if self.axis == "x" else -1.0
-        slope = np.degrees([[0, 0, -sign / np.sqrt(across)], [-y / across, x / across, 0]])
+        slope = np.degrees([[0, 0, -sign / np.sqrt(radius_squared)], [-y / radius_squared, x / radius_squared, 0]])
         return np.asarray(slope @ self.covariance @ slope.T)
 
 

@@ -60,8 +60,8 @@ class Interval:
     def __truediv__(self, divisor: Interval) -> Interval:
         with np.errstate(divide="ignore"):
             inverse = _outward(1 / divisor.high, 1 / divisor.low)
-        across = (divisor.low <= 0) & (divisor.high >= 0)
-        endless = Interval(np.where(across, -np.inf, inverse.low), np.where(across, np.inf, inverse.high))
+        spans_zero = (divisor.low <= 0) & (divisor.high >= 0)
+        endless = Interval(np.where(spans_zero, -np.inf, inverse.low), np.where(spans_zero, np.inf, inverse.high))
         return self * endless
 
     @property
@@ -240,8 +240,8 @@ def _wave(x: Interval, phase: float = 0.0) -> Interval:
 
 def _bounded(x: Interval) -> Interval:
     """Unbounded where there is no number."""
-    none = np.isnan(x.low) | np.isnan(x.high)
-    return Interval(np.where(none, -np.inf, x.low), np.where(none, np.inf, x.high))
+    is_undefined = np.isnan(x.low) | np.isnan(x.high)
+    return Interval(np.where(is_undefined, -np.inf, x.low), np.where(is_undefined, np.inf, x.high))
 
 
 BOXES_PER_AXIS, BOXES_PER_INPUT, MOST_BOXES = 8, 4, 4_000

@@ -95,8 +95,8 @@ def _largest(stds: Stds, spans: Mapping[str, Span]) -> tuple[Inputs, float]:
 
     best = max(_corners(spans), key=most)
     for name, (low, high) in spans.items():
-        soon = low + (high - low) * np.geomspace(10.0**-LOG_DECADES, 1, 3 * LOG_DECADES)
-        levels = [*np.linspace(low, high, INPUT_LEVELS).tolist(), *soon.tolist()]
+        early = low + (high - low) * np.geomspace(10.0**-LOG_DECADES, 1, 3 * LOG_DECADES)
+        levels = [*np.linspace(low, high, INPUT_LEVELS).tolist(), *early.tolist()]
         best = max([best, *({**best, name: value} for value in levels)], key=most)
     return best, most(best)
 

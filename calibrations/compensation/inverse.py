@@ -97,7 +97,7 @@ class Compensation:
 
 
 def invert_model(
-    model: Model, within: Range | None = None, without: Collection[str] = (), precision: str = "double"
+    model: Model, input_range: Range | None = None, without: Collection[str] = (), precision: str = "double"
 ) -> Compensation:
     """The compensation of a fitted model for the range `within`, without the effects in `without`.
 
@@ -110,38 +110,38 @@ def invert_model(
     if all(known_at_run_time(term.effect) == NOTHING for term in model.terms):
         raise ModelError(f"{model.name}: a model of noise alone has no inverse; give the model of a sensor")
     unit = input_unit(model)
-    within = within or Range.for_model(model)
+    input_range = input_range or Range.for_model(model)
     forward = trace_model(model, without)
-    bound = _bound(forward, within, precision)
+    bound = _bound(forward, input_range, precision)
     if bound is None:
-        raise ModelError(_why_not(model, within, without, precision, unit))
+        raise ModelError(_why_not(model, input_range, without, precision, unit))
     program = write_program(forward, bound)
     return Compensation(
         model,
         forward,
-        within,
+        input_range,
         bound,
         program,
         precision,
         unit,
-        compensation_costs(model, forward, program, within.reach, unit, within.beside),
+        compensation_costs(model, forward, program, input_range.reach, unit, input_range.beside),
     )
 
 
-def _bound(forward: Forward, within: Range, precision: str) -> Bound | None:
-    inputs = within.of(
+def _bound(forward: Forward, input_range: Range, precision: str) -> Bound | None:
+    inputs = input_range.of(
         [name for name in variable_names(forward.outputs) if name not in {*forward.sought, *forward.memory}]
     )
-    want = DEFAULT_TOLERANCE[precision] * within.reach
-    return prove_bound(forward.outputs, forward.sought, within.reach, inputs, want, tuple(forward.memory))
+    want = DEFAULT_TOLERANCE[precision] * input_range.reach
+    return prove_bound(forward.outputs, forward.sought, input_range.reach, inputs, want, tuple(forward.memory))
 
 
-def _why_not(model: Model, within: Range, without: Collection[str], precision: str, unit: str) -> str:
+def _why_not(model: Model, input_range: Range, without: Collection[str], precision: str, unit: str) -> str:
     """The message for a model without a provable inverse; it names a single effect that prevents it."""
     inverted = [fate.effect for fate in trace_model(model, without).fates if fate.how == INVERTED]
-    guilty = [n for n in inverted if _bound(trace_model(model, [*without, n]), within, precision) is not None]
+    guilty = [n for n in inverted if _bound(trace_model(model, [*without, n]), input_range, precision) is not None]
     message = (
-        f"{model.name}: the inverse does not converge for certain within +-{within.reach:g} {unit}: no number of "
+        f"{model.name}: the inverse does not converge for certain within +-{input_range.reach:g} {unit}: no number of "
         "steps is "
         "proved to be enough"
     )

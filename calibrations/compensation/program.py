@@ -101,7 +101,7 @@ class _Names:
     """Names of the lines that compute nodes."""
 
     def __init__(self) -> None:
-        self._of: dict[Node, str] = {}
+        self._names: dict[Node, str] = {}
         self._lines = 0
         self.tables: dict[Table, str] = {}
 
@@ -110,18 +110,18 @@ class _Names:
         inner = tuple(self.word(operand) for operand in node.inner)
         if node.table is not None:
             inner = (*inner, self.tables.setdefault(node.table, f"table{len(self.tables)}"))
-        self._of[node] = f"t{self._lines}"
+        self._names[node] = f"t{self._lines}"
         self._lines += 1
-        return Line(self._of[node], node.operation, inner)
+        return Line(self._names[node], node.operation, inner)
 
     def word(self, node: Node) -> str | float:
         """The node in later lines."""
-        return node.value if node.constant else node.name or self._of[node]
+        return node.value if node.constant else node.name or self._names[node]
 
     def forget(self, nodes: Sequence[Node]) -> None:
         """Compute these nodes again."""
         for node in nodes:
-            self._of.pop(node, None)
+            self._names.pop(node, None)
 
 
 def _next(forward: Forward, bound: Bound, outputs: tuple[str, ...]) -> list[Node]:

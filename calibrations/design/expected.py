@@ -67,8 +67,8 @@ def expected_gain(best: Fit, rival: Fit, table: Table) -> Expected:
     Both are fits to the same data. Of the two cases, the best right and the rival right, the worse one counts. Times
     of `table` come after those of the data.
     """
-    ways = [vary_one_way(best, rival, table), vary_one_way(rival, best, table)]
-    return Expected(min(w.alone for w in ways), min(w.together for w in ways))
+    variations = [vary_one_way(best, rival, table), vary_one_way(rival, best, table)]
+    return Expected(min(w.alone for w in variations), min(w.together for w in variations))
 
 
 def pairs_separated(noncentrality: float) -> float:
@@ -188,7 +188,7 @@ def _values(layout: Layout) -> Array:
 PLANNED = ("t_s", "direction")  # a plan's own: the mean of other data does not replace them
 
 
-def predict_data(like: Fit, columns: Mapping[str, Array]) -> Table:
+def predict_data(template: Fit, columns: Mapping[str, Array]) -> Table:
     """The table of poses that planned `columns` would give a sensor such as that of `like`.
 
     `columns`, each of shape (n,): alpha_deg and beta_deg; optionally direction, flip, mount_deg, t_s,
@@ -199,36 +199,36 @@ def predict_data(like: Fit, columns: Mapping[str, Array]) -> Table:
     Raises DataError for a fit to another kind of table, and for `dwell_s` where no sample rate is known; MissingColumn
     for a time or a direction that the model needs.
     """
-    data = like.table
+    data = template.table
     if not data.type.stage_angles:
         raise DataError(f"{data.source}: a fit to {data.kind} cannot predict poses; fit the model to poses")
     names = data.output_names
     planned = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items() if name != "dwell_s"}
     rows = len(planned["alpha_deg"])
     constant = {
-        name: np.full(rows, np.mean(data.column(name))) for name in _unplanned_columns(like) if name not in planned
+        name: np.full(rows, np.mean(data.column(name))) for name in _unplanned_columns(template) if name not in planned
     }
-    values = constant | _noise(like, columns, rows) | planned | {name: np.zeros(rows) for name in names}
+    values = constant | _noise(template, columns, rows) | planned | {name: np.zeros(rows) for name in names}
     table = Table.from_columns("poses", values, data.constants, f"a plan like {data.source}")
-    _check_planned(like, table)
-    outputs = forward(table, like.problem.layout.steps(like.theta))
+    _check_planned(template, table)
+    outputs = forward(table, template.problem.layout.steps(template.theta))
     return replace(table, columns={**table.columns, **dict(zip(names, outputs.T, strict=True))})
 
 
-def _unplanned_columns(like: Fit) -> set[str]:
+def _unplanned_columns(template: Fit) -> set[str]:
     """Columns of the data that the model's effects read, and that a plan need not know."""
-    return {name for term in like.model.terms for name in term.effect.needs} - set(PLANNED)
+    return {name for term in template.model.terms for name in term.effect.needs} - set(PLANNED)
 
 
-def _check_planned(like: Fit, table: Table) -> None:
-    for term in like.model.terms:
+def _check_planned(template: Fit, table: Table) -> None:
+    for term in template.model.terms:
         if reason := term.effect.excluded(table):
             raise MissingColumn(f"{table.source}: {term.name} {reason}; plan it")
 
 
-def _noise(like: Fit, columns: Mapping[str, Array], rows: int) -> dict[str, Array]:
+def _noise(template: Fit, columns: Mapping[str, Array], rows: int) -> dict[str, Array]:
     """Standard deviation of samples, and how many a mean is of; nothing where the data has none."""
-    data = like.table
+    data = template.table
     usual = {name: float(np.median(data.column(name))) for name in _std_names(data)}
     if "n" in data and "n" not in columns:
         usual["n"] = float(np.median(data.column("n")))

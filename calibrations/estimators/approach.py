@@ -136,8 +136,8 @@ class Bank:
         random = np.random.default_rng(seed)
         draws = np.sort(random.choice(len(self.weight), n, p=self.weight))
         members, member = np.unique(draws, return_inverse=True)
-        sizes, ways = np.linalg.eigh(self.belief.covariance[members, :SLOW, :SLOW])
-        roots = ways * np.sqrt(np.maximum(sizes, 0.0))[:, None, :]
+        sizes, directions = np.linalg.eigh(self.belief.covariance[members, :SLOW, :SLOW])
+        roots = directions * np.sqrt(np.maximum(sizes, 0.0))[:, None, :]
         deviations = roots[member] @ random.standard_normal((n, SLOW, 1))
         return np.asarray(self.belief.mean[draws, :SLOW] + deviations[:, :, 0])
 

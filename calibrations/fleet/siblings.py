@@ -47,19 +47,19 @@ class Siblings:
 
     y: Array
     v: Array
-    apart: NDArray[np.bool_]
+    outliers: NDArray[np.bool_]
     tau: Array
     weight: Array
 
     @property
     def pooled(self) -> bool:
         """Whether there are enough sensors to pool."""
-        return int(np.sum(~self.apart)) >= FEWEST_SIBLINGS
+        return int(np.sum(~self.outliers)) >= FEWEST_SIBLINGS
 
     @cached_property
     def _means(self) -> tuple[Array, Array]:
         """mu and its variance given each tau, (grid,)."""
-        return _means(self.y[~self.apart], self.v[~self.apart], self.tau)
+        return _means(self.y[~self.outliers], self.v[~self.outliers], self.tau)
 
     @property
     def mean(self) -> float:
@@ -91,7 +91,7 @@ class Siblings:
         """Mean and standard deviation of every theta given each tau, (grid, n)."""
         mu, variance = (value[:, None] for value in self._means)
         share = self.v / (self.v + self.tau[:, None] ** 2)
-        share = np.where(self.apart | (not self.pooled), 0.0, share)
+        share = np.where(self.outliers | (not self.pooled), 0.0, share)
         return self.y - share * (self.y - mu), np.sqrt(self.v * (1 - share) + share**2 * variance)
 
     @cached_property
@@ -195,9 +195,9 @@ class Pooled:
         return np.asarray(ends[:, 0].T * self.scale), np.asarray(ends[:, 1].T * self.scale)
 
     @property
-    def apart(self) -> Array:
+    def outliers(self) -> Array:
         """(n, p): whether a sensor's parameter is unlike those of all siblings."""
-        return np.column_stack([parameter.apart for parameter in self.parameters])
+        return np.column_stack([parameter.outliers for parameter in self.parameters])
 
 
 def pool_siblings(theta: Array, information: Array, typical: Array) -> Pooled:
@@ -233,4 +233,4 @@ def _foretold(siblings: Siblings) -> tuple[Array | float, Array | float]:
     if not siblings.pooled:
         return 0.0, WIDE**-2.0
     precision = 1 / (siblings.variance + siblings.mean_std**2)
-    return np.where(siblings.apart, 0.0, siblings.mean), np.where(siblings.apart, WIDE**-2.0, precision)
+    return np.where(siblings.outliers, 0.0, siblings.mean), np.where(siblings.outliers, WIDE**-2.0, precision)

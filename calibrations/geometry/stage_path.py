@@ -80,9 +80,9 @@ def _on_the_way(table: Table, alpha: Array, beta: Array, by_alpha: Array, by_bet
     def after(s: float) -> Array:
         return _at(table, alpha + s * np.sign(by_alpha), beta + s * np.sign(by_beta))
 
-    start, across, opposite = after(0.0), after(np.pi / 2), after(np.pi)
+    start, quarter, opposite = after(0.0), after(np.pi / 2), after(np.pi)
     middle = (start + opposite) / 2
-    A, B = start - middle, across - middle
+    A, B = start - middle, quarter - middle
     end = np.abs(by_alpha + by_beta)[:, None, None]
     turns = np.arange(max(1, int(np.ceil(np.max(end) / np.pi))))[:, None]
     s = np.minimum((np.arctan2(B, A) % np.pi)[:, None] + np.pi * turns, end)

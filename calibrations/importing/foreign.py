@@ -221,9 +221,9 @@ def _check_clock(table: Table, laid: Sheet, mapping: Sequence[ColumnMapping]) ->
         return
     from calibrations.importing.proposal import propose_mapping  # as above
 
-    theirs = _clock(propose_mapping(laid, table.kind, mapping))
-    if theirs:
-        raise MissingColumn(f'{laid.place}: a raw log needs the column t_s; "{theirs}" looks like the time')
+    clock_column = _clock(propose_mapping(laid, table.kind, mapping))
+    if clock_column:
+        raise MissingColumn(f'{laid.place}: a raw log needs the column t_s; "{clock_column}" looks like the time')
 
 
 def _clock(mapping: Sequence[ColumnMapping]) -> str:

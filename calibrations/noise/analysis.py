@@ -123,7 +123,7 @@ class ChannelNoise:
     def interval(self) -> tuple[Array, Array]:
         """Bounds (b,) between which the true densities lie with a probability of COVERAGE each."""
         tail, freedom = (1 - COVERAGE) / 2, self.fit.freedom
-        low, high = (self.fit.seen * freedom / chdtri(freedom, p) for p in (tail, 1 - tail))
+        low, high = (self.fit.density * freedom / chdtri(freedom, p) for p in (tail, 1 - tail))
         return low, high
 
     def _coefficient(self, effect: Effect) -> Coefficient:
@@ -276,7 +276,7 @@ def _channel(noise: ChannelNoise) -> Document:
     order = noise.fit.frequency_hz.argsort()
     low, high = noise.interval
     bands = {
-        "frequency_hz": noise.fit.frequency_hz, "density": noise.fit.seen, "low": low, "high": high,
+        "frequency_hz": noise.fit.frequency_hz, "density": noise.fit.density, "low": low, "high": high,
         "model": noise.fit.expected,
     }  # fmt: skip
     return {

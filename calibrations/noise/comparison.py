@@ -189,7 +189,7 @@ def stretches(fit: ChannelFit, most: int = 3) -> list[Stretch]:
     """Those that differ most certainly, none of which overlap, surest first; with chances of 1 where none does."""
     order = np.argsort(fit.frequency_hz)
     f, nu = fit.frequency_hz[order], fit.freedom[order]
-    power = nu * (fit.seen / fit.expected)[order]
+    power = nu * (fit.density / fit.expected)[order]
     sums = [np.concatenate([[0.0], np.cumsum(x)]) for x in (nu, power)]
     candidates = []
     for length in (size for size in LENGTHS if size <= len(f)):

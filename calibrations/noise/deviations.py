@@ -100,7 +100,7 @@ class Octaves:
     @property
     def n(self) -> int:
         """Samples so far."""
-        return int(self._tree.seen[0])
+        return int(self._tree.bin_counts[0])
 
     def curve(self, kind: str = OVERLAPPING) -> Curve:
         """The deviation at 1, 2, 4 ... samples, as far as the record has two windows (hadamard: three)."""
@@ -138,10 +138,10 @@ def _point(tree: Tree, kind: str, octave: int) -> tuple[float, float, int] | Non
         return None
     m, bins = 2.0**octave, 2**factor
     if kind == "total":
-        total, number = total + _ends(tree, level, bins), int(tree.seen[level]) - 1
+        total, number = total + _ends(tree, level, bins), int(tree.bin_counts[level]) - 1
     variance = total / number / divisor / (m**4 if kind == "modified" else m**2)
     alpha = _octave_noise_type(tree, octave)
-    return float(np.sqrt(variance)), freedom(kind, alpha, int(tree.seen[0]), int(m), bins), alpha
+    return float(np.sqrt(variance)), freedom(kind, alpha, int(tree.bin_counts[0]), int(m), bins), alpha
 
 
 def _ends(tree: Tree, level: int, bins: int) -> float:
@@ -153,7 +153,7 @@ def _ends(tree: Tree, level: int, bins: int) -> float:
 def _octave_noise_type(tree: Tree, octave: int) -> int:
     """The noise type at an averaging time, estimated at the longest time up to it that has enough means."""
     for level in range(octave, -1, -1):
-        alpha = noise_type(int(tree.seen[level]), tree.moments[level])
+        alpha = noise_type(int(tree.bin_counts[level]), tree.moments[level])
         if alpha is not None:
             return alpha
     return 0

@@ -116,9 +116,9 @@ def upper_bound(
     def loss(log_power: float) -> float:
         base = np.exp(log_power) * column
         if G is None:
-            value = log_likelihood(base, fit.seen, fit.freedom)
+            value = log_likelihood(base, fit.density, fit.freedom)
         else:
-            value = maximise_from(start.copy(), G, fit.seen, fit.freedom, base)[1]
+            value = maximise_from(start.copy(), G, fit.density, fit.freedom, base)[1]
         return 2 * (likeliest.log_likelihood - float(value)) - threshold
 
     weight = column / likeliest.expected
@@ -325,9 +325,9 @@ def _best_strengths(channel_fit: ChannelFit, shapes: Mapping[str, Values]) -> di
     """Values of all effects with the most likely strengths for given shapes."""
     power, _ = maximise(
         _unit_columns(channel_fit, channel_fit.effects, shapes),
-        channel_fit.seen,
+        channel_fit.density,
         channel_fit.freedom,
-        np.zeros(len(channel_fit.seen)),
+        np.zeros(len(channel_fit.density)),
     )
     return {
         effect.name: {effect.parameters[0].name: float(np.sqrt(v)), **shapes[effect.name]}
@@ -345,22 +345,22 @@ def _best_shape(channel_fit: ChannelFit, effect: Effect, grid: Array, shapes: Ma
     name = effect.parameters[1].name
     companions = [e for e in channel_fit.effects if e is not effect]
     G = (
-        np.column_stack([_unit_columns(channel_fit, companions, shapes), channel_fit.seen])
+        np.column_stack([_unit_columns(channel_fit, companions, shapes), channel_fit.density])
         if companions
-        else channel_fit.seen[:, None].copy()
+        else channel_fit.density[:, None].copy()
     )
     spectra = np.array([unit_spectrum(effect, channel_fit.parts, {name: value}) for value in grid.tolist()])
-    thetas, values = profile(G, spectra, channel_fit.seen, channel_fit.freedom)
+    thetas, values = profile(G, spectra, channel_fit.density, channel_fit.freedom)
     best = int(np.argmax(values))
     logs = np.log(grid)
     ends = logs[max(0, best - 1)], logs[min(len(logs) - 1, best + 1)]
     if ends[0] == ends[1]:
         return {name: float(np.exp(ends[0]))}
-    none = np.zeros(len(channel_fit.seen))
+    none = np.zeros(len(channel_fit.density))
 
     def loss(log_value: float) -> float:
         G[:, -1] = unit_spectrum(effect, channel_fit.parts, {name: float(np.exp(log_value))})
-        return -float(maximise_from(thetas[best].copy(), G, channel_fit.seen, channel_fit.freedom, none)[1])
+        return -float(maximise_from(thetas[best].copy(), G, channel_fit.density, channel_fit.freedom, none)[1])
 
     optimum = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": 0.02})
     return {name: float(np.exp(optimum.x))}

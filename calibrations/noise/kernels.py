@@ -35,7 +35,7 @@ class Tree(NamedTuple):
     measured: Counts  # were in windows before, and
     paired: Counts  # were given to the next level
     heads: Array  # (LEVELS, 2 OVERLAP) the first bins
-    seen: Counts  # (LEVELS,) bins in all
+    bin_counts: Counts  # (LEVELS,) bins in all
     squares: Array  # (LEVELS, FACTORS, 3) sums of squared differences: second order, third, third of summed phase
     windows: Counts  # (LEVELS, FACTORS, 3) how many
     moments: Array  # (LEVELS, 5) of bins z, and their differences w: z, z^2, z z', w^2, w w'
@@ -83,11 +83,11 @@ def finish(tree: Tree, third: bool) -> None:
 def _noted(tree: Tree, level: int, count: int) -> None:
     """Count bins that were put into a buffer, and keep the very first."""
     filled = tree.filled[level]
-    count_before = tree.seen[level]
+    count_before = tree.bin_counts[level]
     lacks = max(0, min(count, 2 * OVERLAP - count_before))
     tree.heads[level, count_before : count_before + lacks] = tree.sums[level, filled : filled + lacks]
     tree.filled[level] += count
-    tree.seen[level] += count
+    tree.bin_counts[level] += count
 
 
 @njit(cache=True, nogil=True)

@@ -132,7 +132,7 @@ class ChannelFit:
     fits: dict[frozenset[str], ChannelFit] = field(default_factory=dict, repr=False)  # to this spectrum, by effects
 
     @cached_property
-    def seen(self) -> Array:
+    def density(self) -> Array:
         """Measured density; no band is without power."""
         density = np.concatenate([part.density for part in self.parts])
         return np.asarray(np.maximum(density, LEAST_DENSITY * density.max()))
@@ -154,8 +154,8 @@ class ChannelFit:
     @cached_property
     def expected(self) -> Array:
         """The model's density."""
-        total = sum((self.part_of(effect) for effect in self.effects), np.zeros(len(self.seen)))
-        return np.asarray(np.maximum(total, LEAST_DENSITY * self.seen.max()))
+        total = sum((self.part_of(effect) for effect in self.effects), np.zeros(len(self.density)))
+        return np.asarray(np.maximum(total, LEAST_DENSITY * self.density.max()))
 
     def interval(self, coverage: float) -> tuple[Array, Array]:
         """(lowest, highest) density: between them the model expects this part of what is seen."""
@@ -170,12 +170,12 @@ class ChannelFit:
     @cached_property
     def log_likelihood(self) -> float:
         """Up to a constant of the bands."""
-        return float(log_likelihood(self.expected, self.seen, self.freedom))
+        return float(log_likelihood(self.expected, self.density, self.freedom))
 
     @cached_property
     def deviance(self) -> float:
         """Twice the log-likelihood that a spectrum of its own in each band would gain."""
-        ratio = self.seen / self.expected
+        ratio = self.density / self.expected
         return float(np.sum(self.freedom * (ratio - 1 - np.log(ratio))))
 
     @cached_property

@@ -128,7 +128,7 @@ def _best(candidates: Iterable[Pattern], kind: str, cause: str) -> Pattern:
 class _Ordinates:
     """Cosine coefficients of the means below the filter, (k,), and their variances by the model."""
 
-    seen: Array
+    measured: Array
     variance: Array
     n: int
 
@@ -143,22 +143,22 @@ class _Ordinates:
 
     def coefficients(self, form: Array) -> Array:
         """Cosine coefficients (k,) of a form of the means (n,)."""
-        return np.asarray(dct(form, type=2, norm="ortho")[1 : len(self.seen) + 1])
+        return np.asarray(dct(form, type=2, norm="ortho")[1 : len(self.measured) + 1])
 
     def matched(self, form: Array) -> tuple[float, float, float]:
         """(amplitude, its standard deviation, gain) of a form of the means (n,)."""
         c = self.coefficients(form)
         weight = float(np.sum(c * c / self.variance))
-        amplitude = float(np.sum(c * self.seen / self.variance)) / weight
+        amplitude = float(np.sum(c * self.measured / self.variance)) / weight
         return amplitude, weight**-0.5, amplitude**2 * weight
 
 
 def _step(channel: Channel, ordinates: _Ordinates, unit: str) -> Pattern:
     """The step with the greatest gain, over all places."""
-    n, k = ordinates.n, len(ordinates.seen)
+    n, k = ordinates.n, len(ordinates.measured)
     per_step = _per_step(n, k)
     gain_terms, power = np.zeros(n - 1), np.zeros(n + 1)
-    gain_terms[: min(k, n - 1)] = (ordinates.seen * per_step / ordinates.variance)[: n - 1]
+    gain_terms[: min(k, n - 1)] = (ordinates.measured * per_step / ordinates.variance)[: n - 1]
     power[1 : k + 1] = per_step**2 / ordinates.variance
     top = dst(gain_terms, type=1) / 2
     turned = dct(power, type=1) + power[0]
@@ -189,7 +189,9 @@ def _courses(channel: Channel, ordinates: _Ordinates, unit: str) -> Iterator[Pat
     """A straight drift, and the settling with the greatest gain."""
     n, axis = ordinates.n, channel.axis
     tops, bottoms = matched_sums(
-        _course_coefficients(n, len(ordinates.seen)), ordinates.seen / ordinates.variance, 1 / ordinates.variance
+        _course_coefficients(n, len(ordinates.measured)),
+        ordinates.measured / ordinates.variance,
+        1 / ordinates.variance,
     )
     sizes, stds, gains = (values.tolist() for values in (tops / bottoms, bottoms**-0.5, tops**2 / bottoms))
     hours = channel.sampling.interval_s / 3600
@@ -295,7 +297,7 @@ def refitted(patterns: tuple[Pattern, ...], fit: ChannelFit, channel: Channel) -
         np.column_stack([ordinates.coefficients(pattern.form) for pattern in patterns])
         / np.sqrt(ordinates.variance)[:, None]
     )
-    size, *_ = np.linalg.lstsq(forms, ordinates.seen / np.sqrt(ordinates.variance), rcond=None)
+    size, *_ = np.linalg.lstsq(forms, ordinates.measured / np.sqrt(ordinates.variance), rcond=None)
     std = np.sqrt(np.diag(np.linalg.pinv(forms.T @ forms)))
     std = np.hypot(std, [pattern.doubt * a for pattern, a in zip(patterns, size, strict=True)])
     return tuple(replace(p, size=float(a), std=float(s)) for p, a, s in zip(patterns, size, std, strict=True))

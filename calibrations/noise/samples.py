@@ -113,11 +113,11 @@ def hidden_step(values: Array) -> float | None:
 def _reaching(curve: Curve, rate_hz: float, corner_hz: float) -> float:
     """The variance of noise, as it reaches the converter within some samples, or behind its low-pass."""
     variance = curve.deviation**2
-    soon = float(np.max(variance[curve.tau_s <= SOON / rate_hz]))
+    short_term = float(np.max(variance[curve.tau_s <= SOON / rate_hz]))
     if not np.isfinite(corner_hz):
-        return soon
+        return short_term
     index = min(int(np.searchsorted(curve.tau_s, FILTER_PERIODS / corner_hz)), len(variance) - 1)
-    return max(soon, float(variance[index] * curve.tau_s[index]) * min(rate_hz, np.pi * corner_hz))
+    return max(short_term, float(variance[index] * curve.tau_s[index]) * min(rate_hz, np.pi * corner_hz))
 
 
 PART = 4096  # samples whose scale is common

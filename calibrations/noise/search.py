@@ -249,7 +249,7 @@ def candidates(search: Search, base: NoiseFit, doubts: Mapping[str, tuple[str, .
     gains = {name: 2 * (extended.log_likelihood - base.log_likelihood) for name, extended in extended_fits.items()}
     if search.liner is not None:
         gains[search.liner.name] = max(gains[search.liner.name], search.gains[search.liner.name])
-    bands = sum(len(extended.seen) for extended in base.channels)
+    bands = sum(len(extended.density) for extended in base.channels)
     scores = np.array([_schwarz(effect, gains[effect.name], base, bands) for effect in missing])
     odds = np.exp(np.minimum(np.append(scores, 0.0) - max([*scores, 0.0]), 0.0) / 2)
     probability = odds / odds.sum()

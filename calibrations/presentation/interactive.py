@@ -124,9 +124,9 @@ def _panel(panel: c.Panel, number: str, x: Any, y: Any, data: list[Trace], layou
         data += [{**trace, **axes, "legend": f"legend{number}"} if number else trace for trace in traces]
         layout["shapes"] += [_referred(shape, number) for shape in shapes]
         layout["annotations"] += [_referred(note, number) for note in notes]
-    for side, axis, domain, across in (("x", panel.x, x, "y"), ("y", panel.y, y, "x")):
+    for side, axis, domain, other in (("x", panel.x, x, "y"), ("y", panel.y, y, "x")):
         settings = _axis(axis) | ({"domain": domain} if domain else {})
-        layout[f"{side}axis{number}"] = settings | ({"anchor": f"{across}{number}"} if number else {})
+        layout[f"{side}axis{number}"] = settings | ({"anchor": f"{other}{number}"} if number else {})
     if panel.equal:
         layout[f"yaxis{number}"]["scaleanchor"] = f"x{number}"
     if panel.legend:
@@ -255,20 +255,20 @@ def _band(s: c.Band, panel: c.Panel) -> Parts:
 
 @_series.register
 def _span(s: c.Span, panel: c.Panel) -> Parts:
-    across: c.Along = "x" if s.along == "y" else "y"
+    other: c.Along = "x" if s.along == "y" else "y"
     shape = {"type": "rect", "layer": "below", "fillcolor": _clear(s.colour, s.opacity), "line": {"width": 0}}
     ends = _list(np.array([s.low, s.high]), panel.x if s.along == "x" else None)
     sides = {f"{s.along}0": ends[0], f"{s.along}1": ends[1], f"{s.along}ref": s.along}
-    return [], [shape | _across(across) | sides], []
+    return [], [shape | _whole_side(other) | sides], []
 
 
 @_series.register
 def _rule(s: c.Rule, panel: c.Panel) -> Parts:
-    across: c.Along = "x" if s.along == "y" else "y"
+    other: c.Along = "x" if s.along == "y" else "y"
     position = _list(np.array([s.at]), panel.x if s.along == "x" else None)[0]
     look = {"color": _visible(s.colour), "width": s.width, "dash": s.dash}
     shape = {"type": "line", "layer": "below", "line": look, f"{s.along}0": position, f"{s.along}1": position}
-    return [], [shape | _across(across) | {f"{s.along}ref": s.along}], []
+    return [], [shape | _whole_side(other) | {f"{s.along}ref": s.along}], []
 
 
 @_series.register
@@ -318,7 +318,7 @@ def _trace(s: c.Points | c.Line, panel: c.Panel, mode: str) -> Trace:
             "showlegend": bool(s.label)}  # fmt: skip
 
 
-def _across(direction: c.Along) -> dict[str, Any]:
+def _whole_side(direction: c.Along) -> dict[str, Any]:
     return {f"{direction}ref": f"{direction} domain", f"{direction}0": 0, f"{direction}1": 1}
 
 

@@ -77,7 +77,7 @@ class Frames:
     misfits: int = 0
     unread: int = 0
     rest: bytes = b""
-    _inside: bool = False  # the last byte belongs to a good frame
+    _ends_in_frame: bool = False  # the last byte belongs to a good frame
 
     def take(self, data: bytes) -> Found:
         """The frames that `data` completes."""
@@ -93,11 +93,11 @@ class Frames:
             frames.append((starts[:n], lengths[:n], verdicts[:n]))
             if is_complete := n == len(starts):
                 self.rest = text[end:]
-                self._inside = self._inside and not self._missed(gap)
+                self._ends_in_frame = self._ends_in_frame and not self._missed(gap)
             else:
                 follows = not gaps[n + 1] if n + 1 < len(starts) else starts[n] + lengths[n] == len(text)
                 self.misfits += int(follows)
-                self._inside = self._inside and not self._missed(True)
+                self._ends_in_frame = self._ends_in_frame and not self._missed(True)
                 start = int(starts[n]) + 1
         starts, lengths, verdicts = (np.concatenate(column) for column in zip(*frames, strict=True))
         if len(good_frames := np.flatnonzero(verdicts == GOOD)):
@@ -135,18 +135,18 @@ class Frames:
     def _accepted(self, gaps: NDArray[np.bool_], verdicts: Ints) -> int:
         """The number of frames before a damaged one. A frame of an unknown kind must follow a good one at once."""
         trusted = ~gaps
-        trusted[:1] &= self._inside
+        trusted[:1] &= self._ends_in_frame
         is_wrong = (verdicts == BAD) | ((verdicts == UNKNOWN) & ~trusted)
         n = int(np.argmax(is_wrong)) if is_wrong.any() else len(verdicts)
         if n:
-            self.damaged += int(gaps[1:n].sum()) + int(gaps[0] and self._inside)
+            self.damaged += int(gaps[1:n].sum()) + int(gaps[0] and self._ends_in_frame)
             self.good += int((verdicts[:n] == GOOD).sum())
-            self._inside = True
+            self._ends_in_frame = True
         return n
 
     def _missed(self, gap: bool) -> bool:
         """Count bytes without a good frame, once until the next one."""
-        self.damaged += int(gap and self._inside)
+        self.damaged += int(gap and self._ends_in_frame)
         return gap
 
 

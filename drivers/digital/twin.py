@@ -102,7 +102,7 @@ class DigitalTwin(Twin):
         self._names = list(settings.wired)
         self._factors = factors(settings)
         self._clock, self._zero_s = Clock(1 / settings.rate_hz), 0.0  # the sensor's time of tick 0
-        self._held: float | None = None
+        self._stuck_value: float | None = None
 
     @abstractmethod
     def _messages(self, values: Floats, ticks: NDArray[np.int64]) -> list[bytes]:
@@ -170,8 +170,8 @@ class DigitalTwin(Twin):
     def _spoil(self, row: Floats, now_s: float) -> None:
         """Change the values of a sample by the faults of the moment."""
         if self.faults.size("stuck-axis", now_s) is not None:
-            self._held = float(row[0]) if self._held is None else self._held
-            row[0] = self._held
+            self._stuck_value = float(row[0]) if self._stuck_value is None else self._stuck_value
+            row[0] = self._stuck_value
 
     def _spoilt(self, message: bytes, now_s: float) -> bytes:
         """A line or message with the faults of the moment."""

@@ -51,7 +51,7 @@ class Motor(Twin):
         low, high = settings.limits_deg
         self._plan = at_rest(world.motor_angle_deg(axis))
         self._homed = False
-        self._own = dict.fromkeys(mr.FIELDS, 0.0) | {
+        self._fields = dict.fromkeys(mr.FIELDS, 0.0) | {
             mr.TARGET: world.motor_angle_deg(axis),
             mr.LOW_LIMIT: low if math.isfinite(low) else 0.0,
             mr.HIGH_LIMIT: high if math.isfinite(high) else 0.0,
@@ -68,14 +68,14 @@ class Motor(Twin):
 
     def state(self) -> dict[str, Any]:
         """The plan of the motion, and what has been written."""
-        return {"plan": asdict(self._plan), "own": self._own, "homed": self._homed}
+        return {"plan": asdict(self._plan), "own": self._fields, "homed": self._homed}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from `state`."""
-        self._plan, self._own, self._homed = Trajectory(**state["plan"]), dict(state["own"]), state["homed"]
+        self._plan, self._fields, self._homed = Trajectory(**state["plan"]), dict(state["own"]), state["homed"]
 
     def has(self, name: str) -> bool:
-        return name.startswith(self._name) and self._field(name) in self._own
+        return name.startswith(self._name) and self._field(name) in self._fields
 
     def field(self, name: str, now_s: float) -> Field:
         self.advance(now_s)
@@ -95,7 +95,7 @@ class Motor(Twin):
             self._homed = True
             self._follow(Trajectory(now_s, self._angle_deg(), 0.0, HOMING_DEG_S, 2 * HOMING_DEG_S))
         elif field in (mr.SPEED, mr.ACCELERATION_TIME):
-            self._own[field] = value
+            self._fields[field] = value
 
     def _field(self, name: str) -> str:
         return name.removeprefix(self._name) or mr.TARGET
@@ -110,20 +110,20 @@ class Motor(Twin):
         }
         if field == mr.MODE and self.faults.size("stopped", now_s) is not None:
             return 0.0
-        return computed.get(field, self._own[field])
+        return computed.get(field, self._fields[field])
 
     def _move(self, target_deg: float, now_s: float) -> None:
         """Begin a move; one beyond the limits is not begun, which LVIO shows."""
-        low, high = self._own[mr.LOW_LIMIT], self._own[mr.HIGH_LIMIT]
-        self._own[mr.LIMIT_VIOLATION] = float(low < high and not low <= target_deg <= high)
+        low, high = self._fields[mr.LOW_LIMIT], self._fields[mr.HIGH_LIMIT]
+        self._fields[mr.LIMIT_VIOLATION] = float(low < high and not low <= target_deg <= high)
         is_blocked = any(self.faults.size(fault, now_s) is not None for fault in BRAKES)
-        if self._own[mr.LIMIT_VIOLATION] or is_blocked:
+        if self._fields[mr.LIMIT_VIOLATION] or is_blocked:
             return
-        self._own[mr.TARGET] = target_deg
+        self._fields[mr.TARGET] = target_deg
         if self.faults.size("stuck", now_s) is None:
-            speed = self._own[mr.SPEED]
+            speed = self._fields[mr.SPEED]
             self._follow(
-                Trajectory(now_s, self._angle_deg(), target_deg, speed, speed / self._own[mr.ACCELERATION_TIME])
+                Trajectory(now_s, self._angle_deg(), target_deg, speed, speed / self._fields[mr.ACCELERATION_TIME])
             )
 
     def _brake(self, at_s: float) -> None:

@@ -161,9 +161,9 @@ class Script:
         if segment.tremor:
             swing = segment.tremor * np.sqrt(2 / len(TREMOR_HZ))
             turns = 2 * np.pi * np.outer(times_s, TREMOR_HZ)
-            shaken = np.stack([np.sin(turns + 1.7 * k + np.arange(len(TREMOR_HZ)) ** 2).sum(axis=1) for k in range(6)])
-            tilted = np.cross(force, math.radians(hand.tremor_deg) * swing * shaken[:3].T)
-            force = force + tilted + hand.tremor_g * swing * shaken[3:].T
+            tremor = np.stack([np.sin(turns + 1.7 * k + np.arange(len(TREMOR_HZ)) ** 2).sum(axis=1) for k in range(6)])
+            tilted = np.cross(force, math.radians(hand.tremor_deg) * swing * tremor[:3].T)
+            force = force + tilted + hand.tremor_g * swing * tremor[3:].T
         if segment.bumps:
             after_s = times_s - segment.start_s
             bump = hand.bump_g * np.exp(-after_s / BUMP_S) * np.cos(2 * np.pi * BUMP_HZ * after_s)
@@ -177,13 +177,13 @@ def _turned(segment: Segment, times_s: Floats) -> Floats:
     angle = _angle(start, end)
     if angle < 1e-9:
         return np.repeat(end[None], len(times_s), axis=0)
-    across = end - (end @ start) * start
-    if np.linalg.norm(across) < 1e-6:  # upside down: over any side
-        across = np.cross(start, np.eye(3)[int(np.argmin(np.abs(start)))])
-    across = _unit(across)
+    perpendicular = end - (end @ start) * start
+    if np.linalg.norm(perpendicular) < 1e-6:  # upside down: over any side
+        perpendicular = np.cross(start, np.eye(3)[int(np.argmin(np.abs(start)))])
+    perpendicular = _unit(perpendicular)
     share = (times_s - segment.start_s) / (segment.end_s - segment.start_s)
     turned = angle * share**2 * (3 - 2 * share)
-    return np.asarray(np.outer(np.cos(turned), start) + np.outer(np.sin(turned), across))
+    return np.asarray(np.outer(np.cos(turned), start) + np.outer(np.sin(turned), perpendicular))
 
 
 def _perturbed(direction: Floats, std_deg: float, random: np.random.Generator) -> Floats:

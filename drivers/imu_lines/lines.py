@@ -111,7 +111,7 @@ class Assembly:
             if not columns <= values.keys():
                 return None
             self._pending = {}
-        if not columns <= values.keys() or not all(math.isfinite(values[each]) for each in columns):
+        if not columns <= values.keys() or not all(math.isfinite(values[column]) for column in columns):
             self._count_damaged(line)
             return None
         self.good += 1

@@ -54,8 +54,8 @@ class Packets:
     def __init__(self, samples: int, name: str, first: int = 0) -> None:
         self.layout = packet_type(samples)
         self._name = name
-        self._seen = 0
-        self._rest = b""
+        self._packet_count = 0
+        self._remainder = b""
         self._last = np.array([first - 1])  # transaction number of the last packet seen
 
     def codes(self, data: bytes | bytearray) -> NDArray[np.uint16]:
@@ -63,13 +63,13 @@ class Packets:
 
         Raises StreamError when the device reports lost scans, a packet is missing, or one is not of this stream.
         """
-        data = self._rest + data
+        data = self._remainder + data
         packets = np.frombuffer(data, self.layout, count=len(data) // self.layout.itemsize)
-        self._rest = bytes(data[len(packets) * self.layout.itemsize :])
+        self._remainder = bytes(data[len(packets) * self.layout.itemsize :])
         self._require_ours(packets)
         self._require_no_loss(packets)
         self._require_all(packets["transaction"].astype(np.int64))
-        self._seen += len(packets)
+        self._packet_count += len(packets)
         return packets["samples"].astype(np.uint16).ravel()
 
     def _require_ours(self, packets: NDArray[np.void]) -> None:
@@ -78,7 +78,7 @@ class Packets:
         for field, value in zip(fields, expected, strict=True):
             if (wrong_packets := np.flatnonzero(packets[field] != value)).size:
                 got = packets[field][wrong_packets[0]]
-                fault = f"packet {self._seen + wrong_packets[0]} has {field} {got} instead of {value}"
+                fault = f"packet {self._packet_count + wrong_packets[0]} has {field} {got} instead of {value}"
                 raise StreamError(
                     f"{self._name}: {fault}", "Close other programs that use the device's stream, then repeat"
                 )
@@ -90,7 +90,7 @@ class Packets:
             words = STATUS.get(int(packet["status"]), "it reports status {status}")
             raise StreamError(
                 f"{self._name}: {words.format(additional=packet['additional'], status=packet['status'])} "
-                f"(status {packet['status']} in packet {self._seen + bad_packets[-1]})",
+                f"(status {packet['status']} in packet {self._packet_count + bad_packets[-1]})",
                 REMEDY,
             )
 
@@ -98,7 +98,7 @@ class Packets:
         numbers = np.concatenate([self._last, transactions])
         steps = np.mod(np.diff(numbers), 65536)
         if (gaps := np.flatnonzero(steps != 1)).size:
-            step, packet_before = int(steps[gaps[0]]), self._seen + int(gaps[0]) - 1
+            step, packet_before = int(steps[gaps[0]]), self._packet_count + int(gaps[0]) - 1
             fault = "are missing" if 1 < step < 32768 else "are repeated or out of order"
             place = f"after packet {packet_before}" if packet_before >= 0 else "at the start"
             raise StreamError(f"{self._name}: packets {fault} {place} of the record", REMEDY)

@@ -158,7 +158,7 @@ class Stream:
         self._scan, self._start_ns, self._interval_ns = scan, round(1e9 * start_s), interval_ns
         self._channels, self.per_packet = channels, per_packet
         self._scans = self._packets = 0
-        self._rest = np.empty(0, np.uint16)
+        self._unsent = np.empty(0, np.uint16)
 
     def packets_until(self, now_s: float) -> bytes:
         """Take all scans that have begun; the packets that became full."""
@@ -167,9 +167,9 @@ class Stream:
             return b""
         codes = self._scan(self._time_s(self._scans), 1e-9 * self._interval_ns, new)
         self._scans += new
-        samples = np.concatenate([self._rest, codes.ravel()])
+        samples = np.concatenate([self._unsent, codes.ravel()])
         count = len(samples) // self.per_packet
-        self._rest = samples[count * self.per_packet :]
+        self._unsent = samples[count * self.per_packet :]
         return self._pack(samples[: count * self.per_packet].reshape(count, self.per_packet))
 
     def stand_still(self, seconds: float) -> None:

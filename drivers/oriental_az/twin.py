@@ -57,7 +57,7 @@ class Drive(Twin):
         self._plan = at_rest(world.motor_angle_deg(axis))
         self._words: dict[int, int] = {}
         self._alarm = 0
-        self._referenced = self._homing = self._beyond = False
+        self._referenced = self._homing = self._was_limited = False
         self._timeout = settings.communication_timeout
         self._heard_s = 0.0
 
@@ -69,7 +69,7 @@ class Drive(Twin):
         timeout_s = self._value(self._timeout)
         if timeout_s and now_s > self._heard_s + timeout_s and not self._alarm:
             self._fail(az.COMMUNICATION_TIMEOUT, self._heard_s + timeout_s)
-        if self._beyond and now_s >= self._plan.end_s:
+        if self._was_limited and now_s >= self._plan.end_s:
             self._fail(az.SOFTWARE_OVERTRAVEL, self._plan.end_s)
         if strike := self.faults.once("e-stop", now_s):
             self._follow(self._plan.stopped(max(strike.at_s, self._plan.start_s)))
@@ -85,7 +85,7 @@ class Drive(Twin):
             "plan": asdict(self._plan),
             "referenced": self._referenced,
             "homing": self._homing,
-            "beyond": self._beyond,
+            "beyond": self._was_limited,
             "heard_s": self._heard_s,
             "words": [[address, word] for address, word in self._words.items()],
         }
@@ -94,7 +94,7 @@ class Drive(Twin):
         """Without its alarm: who goes on with a run has reset it."""
         self._plan = Trajectory(**state["plan"])
         self._alarm, self._referenced, self._homing = 0, state["referenced"], state["homing"]
-        self._beyond = state.get("beyond", False)  # states of before there were limits
+        self._was_limited = state.get("beyond", False)  # states of before there were limits
         self._heard_s, self._words = state["heard_s"], dict(state["words"])
 
     def read_words(self, address: int, count: int, now_s: float) -> list[int]:
@@ -190,7 +190,7 @@ class Drive(Twin):
             target = origins[kind]() + self._value(az.POSITION) / self._steps_per_deg
             limited_deg = self._limit_deg(target)
             self._turn(Trajectory(now_s, self._angle_deg(), limited_deg, speed, rate))
-            self._beyond = limited_deg != target
+            self._was_limited = limited_deg != target
 
     def _limit_deg(self, target_deg: float) -> float:
         """The target, or the drive's own limit before it; limits are kept once coordinates and an action are set."""
@@ -212,7 +212,7 @@ class Drive(Twin):
             self._follow(trajectory)
 
     def _follow(self, plan: Trajectory) -> None:
-        self._plan, self._beyond = plan, False
+        self._plan, self._was_limited = plan, False
         self._world.move_stage(self._axis, plan)
 
     def _angle_deg(self) -> float:

@@ -35,7 +35,7 @@ class Recorder:
 
     def __init__(self, axes: Axes) -> None:
         self._axes = axes
-        self._what: dict[str, tuple[str, int]] = dict.fromkeys(TABLES, (axes.ids[0], 0))
+        self._recorded: dict[str, tuple[str, int]] = dict.fromkeys(TABLES, (axes.ids[0], 0))
         self._triggers = dict.fromkeys(TABLES, e727.WITH_THE_WAVE)
         self._rate = 1
         self._start_s = math.inf
@@ -44,7 +44,9 @@ class Recorder:
     def handlers(self) -> dict[str, Handler]:
         return {
             "DRC": self._set_what,
-            "DRC?": lambda a, _: table((k, f"{self._what[k][0]} {self._what[k][1]}") for k in self._tables_asked(a)),
+            "DRC?": lambda a, _: table(
+                (k, f"{self._recorded[k][0]} {self._recorded[k][1]}") for k in self._tables_asked(a)
+            ),
             "DRT": self._set_triggers,
             "DRT?": lambda a, _: table((k, f"{self._triggers[k]} 0") for k in self._tables_asked(a)),
             "RTR": lambda a, _: self._set_rate(a),
@@ -56,23 +58,23 @@ class Recorder:
 
     def state(self) -> dict[str, Any]:
         """The settings. A restart loses the recording, as a loss of power does."""
-        return {"what": dict(self._what), "triggers": dict(self._triggers), "rate": self._rate}
+        return {"what": dict(self._recorded), "triggers": dict(self._triggers), "rate": self._rate}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        self._what = {place: (axis, option) for place, (axis, option) in state["what"].items()}
+        self._recorded = {place: (axis, option) for place, (axis, option) in state["what"].items()}
         self._triggers, self._rate = dict(state["triggers"]), state["rate"]
         self._start_s = math.inf
 
     def trigger(self, now_s: float, *kinds: int) -> None:
         """Start a new recording if a table waits for one of `kinds`. The next command is taken for the next motion."""
-        if any(self._triggers[k] in kinds and self._what[k][1] for k in TABLES):
+        if any(self._triggers[k] in kinds and self._recorded[k][1] for k in TABLES):
             self._start_s = now_s
             self._data = {place: [] for place in TABLES}
 
     def advance(self, now_s: float) -> None:
         """Record all that is due; the axes have followed their present commands since the last time."""
         interval_s = self._rate * CYCLE_S
-        for place, (axis, option) in self._what.items():
+        for place, (axis, option) in self._recorded.items():
             count = self._count(place)
             if option and now_s >= self._start_s and count < e727.RECORD_POINTS:
                 due = min(math.floor((now_s - self._start_s) / interval_s + 1e-7) + 1, e727.RECORD_POINTS)
@@ -96,7 +98,7 @@ class Recorder:
     def _set_what(self, arguments: Sequence[str], _now_s: float) -> None:
         for place, source, option in groups(arguments, 3):
             axis = one_of(source, self._axes.ids, e727.ILLEGAL_AXIS)
-            self._what[one_of(place, TABLES, OUT_OF_RANGE)] = axis, parse_integer(option, 0, len(OPTIONS) - 1)
+            self._recorded[one_of(place, TABLES, OUT_OF_RANGE)] = axis, parse_integer(option, 0, len(OPTIONS) - 1)
 
     def _set_triggers(self, arguments: Sequence[str], now_s: float) -> None:
         for place, source, _value in groups(arguments, 3):
@@ -121,7 +123,7 @@ class Recorder:
         return lines([*self._header(places, count), *rows])
 
     def _header(self, places: Sequence[str], count: int) -> list[str]:
-        names = [f"{OPTIONS[self._what[place][1]]} {self._what[place][0]}" for place in places]
+        names = [f"{OPTIONS[self._recorded[place][1]]} {self._recorded[place][0]}" for place in places]
         fields = {"TYPE": 1, "SEPARATOR": 32, "DIM": len(places), "SAMPLE_TIME": self._rate * CYCLE_S, "NDATA": count}
         name_fields = {f"NAME{k}": name for k, name in enumerate(names)}
         return [*(f"# {key} = {value}" for key, value in (fields | name_fields).items()), "# END_HEADER"]

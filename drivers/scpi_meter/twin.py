@@ -50,19 +50,19 @@ class Scanner(Twin):
         self._world, self._wiring = world, {number: name for name, number in settings.wired.items()}
         self._errors: deque[int] = deque()
         self._range_v, self._numbers, self._rate_hz, self._count = MOST_RANGE_V, [0], 1.0, 1
-        self._start_s, self._taken, self._left = 0.0, 0, 0
+        self._start_s, self._sent_count, self._remaining_count = 0.0, 0, 0
         self._memory: deque[float] = deque()
 
     def advance(self, now_s: float) -> None:
         """Take all scans that have begun by `now_s`."""
         if strike := self.faults.once("error", now_s):
             self._fail(int(strike.size))
-        due = math.floor((now_s - self._start_s) * self._rate_hz + 1e-6) + 1 if self._left else 0
-        new = min(due - self._taken, self._left)
+        due = math.floor((now_s - self._start_s) * self._rate_hz + 1e-6) + 1 if self._remaining_count else 0
+        new = min(due - self._sent_count, self._remaining_count)
         if new > 0 and self.faults.size("stall", now_s) is None:
-            start_s = self._start_s + self._taken / self._rate_hz
+            start_s = self._start_s + self._sent_count / self._rate_hz
             self._memory.extend(self._scans(start_s, 1 / self._rate_hz, new, now_s).ravel())
-            self._taken, self._left = self._taken + new, self._left - new
+            self._sent_count, self._remaining_count = self._sent_count + new, self._remaining_count - new
 
     def answer(self, command: str, now_s: float) -> str | None:
         """Obey a line; the answer to a question."""
@@ -102,7 +102,7 @@ class Scanner(Twin):
         self._stop()
 
     def _stop(self) -> None:
-        self._start_s, self._taken, self._left = 0.0, 0, 0
+        self._start_s, self._sent_count, self._remaining_count = 0.0, 0, 0
 
     def _configure(self, arguments: str) -> None:
         self._stop()
@@ -124,7 +124,7 @@ class Scanner(Twin):
 
     def _begin(self, now_s: float) -> None:
         self._memory.clear()
-        self._start_s, self._taken, self._left = now_s, 0, self._count
+        self._start_s, self._sent_count, self._remaining_count = now_s, 0, self._count
         self.advance(now_s)
 
     def _remove(self, arguments: str) -> str | None:

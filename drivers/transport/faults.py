@@ -98,30 +98,30 @@ class Faults:
     def __init__(self, faults: Iterable[Fault] = (), kinds: Mapping[str, Kind] | None = None) -> None:
         """`kinds` are all that it can have. Raises KeyError for another one."""
         self._faults = [(f, (kinds or {})[f.what].size if f.size is None else f.size) for f in faults]
-        self._asked = 0
+        self._request_count = 0
         self._struck: list[int] = []
-        self._held: dict[str, Any] = {}
+        self._repeated_values: dict[str, Any] = {}
 
     def __bool__(self) -> bool:
         return bool(self._faults)
 
     def asked(self) -> None:
         """Count a request."""
-        self._asked += 1
+        self._request_count += 1
 
     def size(self, name: str, now_s: float) -> float | None:
         """The size of a fault that is there now; None where it is not."""
         for fault, size in self._faults:
-            active = fault.has_begun(now_s, self._asked) and not fault.has_ended(now_s, self._asked)
-            if fault.what == name and active and fault.happens(now_s, self._asked):
+            active = fault.has_begun(now_s, self._request_count) and not fault.has_ended(now_s, self._request_count)
+            if fault.what == name and active and fault.happens(now_s, self._request_count):
                 return size
         return None
 
     def once(self, name: str, now_s: float) -> Strike | None:
         """A fault that has begun and is not reported yet."""
         for k, (fault, size) in enumerate(self._faults):
-            is_new = k not in self._struck and fault.has_begun(now_s, self._asked)
-            if fault.what == name and is_new and fault.happens(self._asked):
+            is_new = k not in self._struck and fault.has_begun(now_s, self._request_count)
+            if fault.what == name and is_new and fault.happens(self._request_count):
                 self._struck.append(k)
                 return Strike(size, now_s if fault.after else fault.at_s)
         return None
@@ -129,17 +129,21 @@ class Faults:
     def held(self, name: str, now_s: float, value: Any) -> Any:
         """`value`, which is JSON-able; as long as the fault is there, the one that it began with."""
         if self.size(name, now_s) is None:
-            self._held.pop(name, None)
+            self._repeated_values.pop(name, None)
             return value
-        return self._held.setdefault(name, value)
+        return self._repeated_values.setdefault(name, value)
 
     def state(self) -> dict[str, Any]:
         """The state that a resumed run needs, JSON-able."""
-        return {"asked": self._asked, "struck": list(self._struck), "held": dict(self._held)}
+        return {"asked": self._request_count, "struck": list(self._struck), "held": dict(self._repeated_values)}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from `state`."""
-        self._asked, self._struck, self._held = state["asked"], list(state["struck"]), dict(state["held"])
+        self._request_count, self._struck, self._repeated_values = (
+            state["asked"],
+            list(state["struck"]),
+            dict(state["held"]),
+        )
 
 
 # Faults of a wire: one pure function each, applied to the bytes that a simulated instrument sends.

@@ -184,7 +184,7 @@ class Port:
         self.wire = Wire(mends=self.timing.scheme == "tcp")
         self._faults: dict[int, Faults] = {}  # by unit
         self.connections: dict[int, Connection] = {}
-        self.answer, self._held = answer or _ignore, capacity
+        self.answer, self._capacity = answer or _ignore, capacity
         self._socket: socket.socket | None = None
         if self.timing.scheme == "pty":
             self.url = self._open_pty()
@@ -271,8 +271,8 @@ class Port:
             client, peer = self._socket.accept()
             client.setblocking(False)
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            if self._held is not None:
-                client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, self._held)
+            if self._capacity is not None:
+                client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, self._capacity)
             key = connection_key(peer, client.getsockname())
             self.connections[client.fileno()] = Connection(client.fileno(), key, client.close, self._leaving)
 

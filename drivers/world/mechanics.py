@@ -117,10 +117,10 @@ def force_g(world: State, config: WorldConfig, t_ns: int) -> tuple[float, float,
     gx, gy, gz = gravity.felt_g(world.up, world.mount, alpha, beta)
     for axis in range(3):
         if t_ns < world.carriage_rest_ns[axis]:
-            shaken = shaken_g(world, config.positioner, axis, t_ns)
-            gx += world.mount[0, axis] * shaken
-            gy += world.mount[1, axis] * shaken
-            gz += world.mount[2, axis] * shaken
+            shake_g = shaken_g(world, config.positioner, axis, t_ns)
+            gx += world.mount[0, axis] * shake_g
+            gy += world.mount[1, axis] * shake_g
+            gz += world.mount[2, axis] * shake_g
     return gx, gy, gz
 
 

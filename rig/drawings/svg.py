@@ -53,9 +53,9 @@ def head(tip: Point, towards: Point, colour: str) -> str:
     """The head of an arrow that points along a direction of any length."""
     b, direction = np.asarray(tip, float), np.asarray(towards, float)
     direction = direction / np.hypot(*direction)
-    across = np.array([-direction[1], direction[0]])
+    normal = np.array([-direction[1], direction[0]])
     foot = b - HEAD_PX * direction
-    return polygon([b, foot + 0.42 * HEAD_PX * across, foot - 0.42 * HEAD_PX * across], colour)
+    return polygon([b, foot + 0.42 * HEAD_PX * normal, foot - 0.42 * HEAD_PX * normal], colour)
 
 
 def text(

@@ -59,7 +59,7 @@ class Stand:
 
     start: Question
     faults: Mapping[Member, str]
-    seen: Mapping[Member, ScreeningSummary] = field(default_factory=dict)
+    screening: Mapping[Member, ScreeningSummary] = field(default_factory=dict)
     effects: Mapping[str, tuple[BatchEffect, ...]] = field(default_factory=dict)
     errors: tuple[RigError, ...] = ()
 
@@ -127,7 +127,7 @@ def _add_missing_effects(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
 def _judged(fleet: Fleet, stand: Stand, batches: Batches) -> tuple[Stand, dict[str, list[BatchEffect]]]:
     """The state with the screened sensors, and the missing effects of each batch, found after its last sensor."""
     stage = {name for name, effect in effects_of(stand.start.own).items() if "pose" in effect.places}
-    faults, screened = dict(stand.faults), dict(stand.seen)
+    faults, screened = dict(stand.faults), dict(stand.screening)
     waiting = {batch: sum(m not in faults for m in members) for batch, members in batches.items()}
     screenings: dict[str, dict[Member, Screening]] = defaultdict(dict)
     missing = {}
@@ -144,7 +144,7 @@ def _judged(fleet: Fleet, stand: Stand, batches: Batches) -> tuple[Stand, dict[s
             missing[batch] = find_batch_effects(
                 [batch_screenings[m] for m in batches[batch] if m in batch_screenings], stage
             )
-    return replace(stand, faults=faults, seen=screened), missing
+    return replace(stand, faults=faults, screening=screened), missing
 
 
 def _settled(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
@@ -178,9 +178,12 @@ def _test_jointly(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Memb
 
 def _diagnosed(fleet: Fleet, stand: Stand, batches: Batches) -> dict[Member, Any]:
     """The diagnoses of the sensors that differ from their batch."""
-    usual = {batch: [stand.seen[m].excess for m in members if m in stand.seen] for batch, members in batches.items()}
+    usual = {
+        batch: [stand.screening[m].excess for m in members if m in stand.screening]
+        for batch, members in batches.items()
+    }
     outliers = [
-        m for m, screened in stand.seen.items() if m not in stand.faults and stands_out(screened, usual[m.batch])
+        m for m, screened in stand.screening.items() if m not in stand.faults and stands_out(screened, usual[m.batch])
     ]
     return dict(fleet.ask([(m, stand.question("diagnosis", m)) for m in outliers]))
 
@@ -199,7 +202,7 @@ def _population(stand: Stand, diagnosed: Mapping[Member, Any], members: Sequence
         batch_sensors = tuple(verdict for verdict in sensors if verdict.batch == batch)
         batches.append(batch_verdict(batch, stand.effects.get(batch, ()), batch_sensors))
     unconnected = unconnected_rigs(
-        [Measured(m.batch, m.rig, NOWHERE) for m, screened in stand.seen.items() if screened.on_stages]
+        [Measured(m.batch, m.rig, NOWHERE) for m, screened in stand.screening.items() if screened.on_stages]
     )
     return Population(sensors, tuple(batches), stand.errors, tuple(unconnected))
 
@@ -211,7 +214,7 @@ def _verdict(member: Member, stand: Stand, diagnosis: Any | None) -> SensorVerdi
     fault = stand.faults.get(member) or (diagnosis or {}).get("fault")
     if fault:
         return SensorVerdict(*identity, "failed", remark=fault)
-    facts = diagnosis or {"effects": (), "rivals": {}, "excess": stand.seen[member].excess}
+    facts = diagnosis or {"effects": (), "rivals": {}, "excess": stand.screening[member].excess}
     own_effects = tuple(facts["effects"])
     rivals |= {name: tuple(alternatives) for name, alternatives in facts["rivals"].items()}
     judgement = Judgement(

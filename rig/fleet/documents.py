@@ -74,7 +74,7 @@ def _batch(batch: Calibrated) -> Document:
             "spread": parameter.spread * size,
             "spread_interval": (parameter.spread_interval(0.025, 0.975) * size).tolist(),
             "pooled": parameter.pooled,
-            "apart": [m.sensor for m, is_outlier in zip(batch.members, parameter.apart, strict=True) if is_outlier],
+            "apart": [m.sensor for m, is_outlier in zip(batch.members, parameter.outliers, strict=True) if is_outlier],
         }
         for name, parameter, size in zip(batch.names, batch.pooled.parameters, scale, strict=True)
     ]
@@ -83,7 +83,7 @@ def _batch(batch: Calibrated) -> Document:
 
 def _sensors(batch: Calibrated) -> list[Document]:
     pooled, (low, high) = batch.pooled, batch.pooled.intervals()
-    values, stds, own_stds, is_outlier = pooled.values, pooled.stds, pooled.alone, pooled.apart
+    values, stds, own_stds, is_outlier = pooled.values, pooled.stds, pooled.alone, pooled.outliers
     return [
         {
             "sensor": member.sensor,
@@ -153,7 +153,7 @@ def _spread(batch: Calibrated, k: int) -> Spread:
     reach = HOLDS_95 * float(np.sqrt(parameter.variance + parameter.mean_std**2))
     band = ((parameter.mean - reach) * size, (parameter.mean + reach) * size) if parameter.pooled else None
     expanded = np.maximum(high - value, value - low)
-    return Spread(batch.batch, value, expanded, [m.sensor for m in batch.members], parameter.apart, band)
+    return Spread(batch.batch, value, expanded, [m.sensor for m in batch.members], parameter.outliers, band)
 
 
 def _rows(batch: Calibrated) -> list[tuple[object, ...]]:
@@ -166,7 +166,7 @@ def _rows(batch: Calibrated) -> list[tuple[object, ...]]:
             estimate_text(parameter.mean * size, parameter.mean_std * size),
             rounded(parameter.spread * size, 2),
             rounded(float(gain), 2),
-            ", ".join(m.sensor for m, is_outlier in zip(batch.members, parameter.apart, strict=True) if is_outlier)
+            ", ".join(m.sensor for m, is_outlier in zip(batch.members, parameter.outliers, strict=True) if is_outlier)
             or "-",
         )
         for name, parameter, size, gain in zip(

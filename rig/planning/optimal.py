@@ -81,18 +81,18 @@ class Optimal:
 
     def worst(self, judged: Judged) -> int:
         """Index of the parameter with the largest error at full scale, of those that the standard sweep determines."""
-        return int(np.argmax(np.where(self.standard.told, judged.errors, -1.0)))
+        return int(np.argmax(np.where(self.standard.determined, judged.errors, -1.0)))
 
 
 def relative(standard: Judged, judged: Judged) -> float:
     """Ratio of the worst standard errors to the standard sweep, for the parameters that it determines."""
-    determined = standard.told
+    determined = standard.determined
     return float(np.max(judged.errors[determined]) / np.max(standard.errors[determined]))
 
 
 def most_relative(standard: Judged, judged: Judged) -> float:
     """The largest ratio of a standard error to that of the same parameter in the standard sweep."""
-    determined = standard.told
+    determined = standard.determined
     return float(np.max(judged.errors[determined] / standard.errors[determined]))
 
 
@@ -111,7 +111,7 @@ def optimal(
     raise.
     """
     design_range = Range(bench, sweep, settings, model)
-    if not design_range.standard.told.any():
+    if not design_range.standard.determined.any():
         raise PlanError(f"this sweep determines no parameter of {model.name}; give it more inclinations")
     parameters = len(design_range.fit.theta)
     least = 3 * FEWEST + -(-parameters // len(design_range.axes))
@@ -150,7 +150,7 @@ def _dwell_s(design_range: Range, design: Sequence[Pose]) -> float:
     """All dwells together at equal worst standard error: in any order about the same. Raises PlanError."""
     unordered = design_range.judged(_listing(design_range.settings, design))
     if undetermined := [
-        design_range.name(int(k)) for k in np.flatnonzero(design_range.standard.told & ~unordered.told)
+        design_range.name(int(k)) for k in np.flatnonzero(design_range.standard.determined & ~unordered.determined)
     ]:
         raise PlanError(
             f"{len(design)} poses do not determine {', '.join(undetermined)}, but the sweep does; choose more poses"

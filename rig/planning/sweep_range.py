@@ -87,7 +87,7 @@ class Judged:
         return float(self.plan.settings["dwell_s"])
 
     @property
-    def told(self) -> NDArray[np.bool_]:
+    def determined(self) -> NDArray[np.bool_]:
         """Mask of the parameters that the plan determines, shape (p,)."""
         return np.isfinite(self.errors)
 

@@ -71,14 +71,14 @@ class Course:
     """The dwells of one kind of pose; `names` are channels, their noise as `rms vx`, and the temperature."""
 
     parts: list[Part] = field(default_factory=list)
-    each: int = 1  # dwells in a part that is full
+    dwells_per_part: int = 1  # dwells in a part that is full
 
     def add(self, dwell: Dwell) -> None:
         """One dwell more."""
         values = dict(dwell.means) | {f"rms {name}": std for name, std in dwell.stds.items()}
         if dwell.temperature_c is not None:
             values["temperature"] = dwell.temperature_c
-        if not self.parts or self.parts[-1].n >= self.each:
+        if not self.parts or self.parts[-1].n >= self.dwells_per_part:
             if len(self.parts) == MOST:
                 self._join()
             self.parts.append(Part())
@@ -87,7 +87,7 @@ class Course:
     def _join(self) -> None:
         for first, second in zip(self.parts[::2], self.parts[1::2], strict=True):
             first.join(second)
-        self.parts, self.each = self.parts[::2], 2 * self.each
+        self.parts, self.dwells_per_part = self.parts[::2], 2 * self.dwells_per_part
 
     @property
     def names(self) -> list[str]:
@@ -156,7 +156,9 @@ def course_chart(course: Course, name: str, time: RunTime = RunTime(), units: Ma
     t_s = [at_s - time.zero_s for at_s in run_s]
     size, unit_s = in_time(t_s[-1] - t_s[0] if t_s else 0.0)
     times, colour = np.array(t_s) / size, CANDIDATE if name == "temperature" else MEASURED
-    band = (Band(times, np.array(low), np.array(high), colour=colour, opacity=0.2),) if course.each > 1 else ()
+    band = (
+        (Band(times, np.array(low), np.array(high), colour=colour, opacity=0.2),) if course.dwells_per_part > 1 else ()
+    )
     hover = f"%{{y:.6g}} at %{{x:.4g}} {unit_s}<br>%{{text}}"
     clock = [time.clock(at_s) for at_s in run_s]
     line = Line(times, np.array(mean), colour=colour, hover=hover, markers=len(times) < FEW, texts=clock)

@@ -180,8 +180,8 @@ def _reference(table: Table) -> str:
         return "the local magnetic field, constant in place and time; its strength is not known"
     if table.type.turning:
         return "angular rate of the rate table, deg/s, about the stated axes"
-    across = "its direction from the stage angles" if table.type.stage_angles else "its magnitude alone"
-    return f"local gravity, {table.gravity_m_s2:.6g} m/s²; {across}"
+    quantity = "its direction from the stage angles" if table.type.stage_angles else "its magnitude alone"
+    return f"local gravity, {table.gravity_m_s2:.6g} m/s²; {quantity}"
 
 
 def _gravity_remarks(table: Table) -> Iterator[str]:

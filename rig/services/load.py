@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from rig.services.still import Stream
 
 Tell = Callable[[str], None]
-CHANNELS = {f"{what}{axis}{end}" for what in ("v", "a", "g", "m", "") for axis in "xyz" for end in ("", "_v")}
+CHANNELS = {f"{letter}{axis}{end}" for letter in ("v", "a", "g", "m", "") for axis in "xyz" for end in ("", "_v")}
 LONGEST_BEGINNING = 1 << 16  # characters
 TRIADS = ({"ax", "ay", "az"}, {"mx", "my", "mz"})  # with times: a raw log of positions, unless a noise model is named
 

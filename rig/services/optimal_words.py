@@ -28,7 +28,7 @@ def savings(optimum: Optimal) -> Iterator[str]:
     yield f"{optimum.times_less:.1f} times less rig time for the same worst standard error ({_worst(optimum)})."
     yield f"{_times(optimum.times_less_for_all)} if no parameter may be less certain: {_longest(optimum)}."
     if undetermined := [
-        optimum.over.name(k) for k, is_determined in enumerate(optimum.standard.told) if not is_determined
+        optimum.over.name(k) for k, is_determined in enumerate(optimum.standard.determined) if not is_determined
     ]:
         yield f"The standard sweep cannot determine {', '.join(undetermined)}; the comparison ignores them."
 

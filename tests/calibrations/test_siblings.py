@@ -23,7 +23,7 @@ def test_eight_schools_as_in_the_book() -> None:
     assert np.abs(low - LOW).max() < 3
     assert np.sort(np.abs(high - HIGH))[5] < 3  # of 200 draws five lie beyond: two of the book's ends are far out
     assert found.mean == pytest.approx(8, abs=0.5)
-    assert not found.apart.any()
+    assert not found.outliers.any()
 
 
 # Efron and Morris, Stein's paradox in statistics (1977): 18 batters after 45 times at bat, and how the season ended.
@@ -58,7 +58,7 @@ def test_one_that_is_unlike_the_rest_pulls_nobody_and_is_not_pulled(count: int) 
     assert all(found.values[0] == pytest.approx(found.y[0], abs=1.0) for found in strange)
     assert all(found.stds[1:].mean() < 1.15 * np.sqrt(found.v[1:].mean()) for found in strange)
     if count == 20:
-        assert all(found.apart[0] and found.apart.sum() == 1 for found in strange)
+        assert all(found.outliers[0] and found.outliers.sum() == 1 for found in strange)
 
 
 def test_nobody_is_set_apart_where_all_are_alike() -> None:

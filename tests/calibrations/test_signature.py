@@ -13,7 +13,7 @@ def test_a_square_leaves_a_parabola_over_the_own_force() -> None:
     x, y = signature(catalogue()["quadratic-nonlinearity"])
     assert (x.label, y.label) == ("specific force along x (g)", "specific force along y (g)")
     for panel, square in ((x, 0.02), (y, 0.012)):
-        rise = np.ptp(panel.left[np.isclose(panel.over, 0.0, atol=1e-9) | np.isclose(panel.over, 1.0)])
+        rise = np.ptp(panel.residual[np.isclose(panel.abscissa, 0.0, atol=1e-9) | np.isclose(panel.abscissa, 1.0)])
         assert rise == pytest.approx(1e3 * square, rel=0.03)
 
 
@@ -37,10 +37,10 @@ def test_both_directions_are_drawn_where_they_differ() -> None:
     assert styles == {"hysteresis": {"-", "--"}, "base-tilt": {"-"}}
     loop = signature(catalogue()["hysteresis"])[0]
     up, down = (np.concatenate([c.rows for c in loop.curves if c.style == style]) for style in ("-", "--"))
-    assert np.corrcoef(loop.left[up], loop.left[down][::-1])[0, 1] < 0  # opposite branches
+    assert np.corrcoef(loop.residual[up], loop.residual[down][::-1])[0, 1] < 0  # opposite branches
 
 
 def test_bias_and_scale_factor_are_shown_beside_a_model_without_them() -> None:
-    assert signature(catalogue()["bias"])[0].left == pytest.approx(20.0)
+    assert signature(catalogue()["bias"])[0].residual == pytest.approx(20.0)
     panel = signature(catalogue()["scale-factor"])[0]
-    assert panel.left == pytest.approx(20.0 * panel.over, abs=0.5)
+    assert panel.residual == pytest.approx(20.0 * panel.abscissa, abs=0.5)

@@ -153,7 +153,7 @@ def test_a_given_line_is_taken_off_with_the_phase_that_it_has() -> None:
         without_effects(channel, lines) for lines in ((), (Line(0.371, 0.3, 0.0),), (Line(0.371, 0.15, 0.0),))
     )
     at = int(np.argmin(np.abs(before.frequency_hz - 0.371)))
-    heights = [each.seen[at] * RATE_HZ for each in (before, right, half)]
+    heights = [each.density[at] * RATE_HZ for each in (before, right, half)]
     assert heights[1] == pytest.approx(1, rel=0.4)
     assert (heights[2] - heights[1]) / (heights[0] - heights[1]) == pytest.approx(0.25, abs=0.05)
 

@@ -73,7 +73,7 @@ def test_the_same_question_has_the_same_answer() -> None:
 
 def test_what_the_sweep_tells_is_told() -> None:
     found = chosen("physical")
-    assert found.standard.told.all()
+    assert found.standard.determined.all()
     assert np.all(np.isfinite(found.equal.errors))
 
 

@@ -92,13 +92,15 @@ def residual_chart(fit: Fit) -> Chart:
     """A row of panels for each channel, a column for each thing that the residual may follow."""
     columns_of_fit = choices(fit)
     colour = columns_of_fit[first_choices(list(columns_of_fit), fit.table)[1]]
-    across = columns(fit)
+    columns_across = columns(fit)
     rows = tuple(
-        tuple(residual(ChannelResidual(fit, c, False), x, colour, second=x is across[-1]) for x in across)
+        tuple(
+            residual(ChannelResidual(fit, c, False), x, colour, second=x is columns_across[-1]) for x in columns_across
+        )
         for c in drawn_channels(fit, fit.residual)
     )
     has_one_colour = bool(np.ptp(colour.values) == 0)  # a motion has one inclination
-    bar = None if has_one_colour or any(colour is x for x in across) else scale_of(colour, 0)
+    bar = None if has_one_colour or any(colour is x for x in columns_across) else scale_of(colour, 0)
     return Chart(rows, row_height(fit), share_x=True, share_y=True, bar=bar)
 
 
@@ -197,8 +199,8 @@ def _marker_px(channel: ChannelResidual) -> float:
     table = channel.fit.table
     if not table.type.stage_angles:
         return MOST_PX
-    across, rows_down = (len(np.unique(table.column(name))) for name in ("beta_deg", "alpha_deg"))
-    return min(max(min(ACROSS_PX / across, DOWN_PX / (2 * rows_down)), LEAST_PX), MOST_PX)
+    columns_across, rows_down = (len(np.unique(table.column(name))) for name in ("beta_deg", "alpha_deg"))
+    return min(max(min(ACROSS_PX / columns_across, DOWN_PX / (2 * rows_down)), LEAST_PX), MOST_PX)
 
 
 def scale_of(colour: Column, c: int) -> Scale:

@@ -69,7 +69,7 @@ class Spread:
     values: Array
     expanded: Array
     sensors: Sequence[str]
-    apart: NDArray[np.bool_]
+    outliers: NDArray[np.bool_]
     band: tuple[float, float] | None  # the range of 95 % of the batch's sensors
 
 
@@ -92,16 +92,16 @@ def spreads(quantities: Mapping[str, Sequence[Spread]]) -> Chart:
 def _spread(place: int, spread: Spread) -> Iterator[Band | Points | Note]:
     rng = np.random.default_rng(place)
     drawn_rows = np.sort(rng.permutation(len(spread.values))[:MOST_DOTS])
-    drawn_rows = np.union1d(drawn_rows, np.flatnonzero(spread.apart))
+    drawn_rows = np.union1d(drawn_rows, np.flatnonzero(spread.outliers))
     x = place + WIDE * rng.uniform(-1, 1, len(spread.values))
     if spread.band is not None:
         low, high = (np.full(2, end) for end in spread.band)
         yield Band(np.array([place - 0.4, place + 0.4]), low, high)
     values, expanded = spread.values[drawn_rows], spread.expanded[drawn_rows]
-    colours = [VERMILION if is_unlike else BLUE for is_unlike in spread.apart[drawn_rows]]
+    colours = [VERMILION if is_unlike else BLUE for is_unlike in spread.outliers[drawn_rows]]
     hover = [spread.sensors[k] for k in drawn_rows]
     yield Points(
         x[drawn_rows], values, colour=colours, size=4, low=values - expanded, high=values + expanded, hover=hover
     )
-    for k in np.flatnonzero(spread.apart)[:MOST_NAMED]:
+    for k in np.flatnonzero(spread.outliers)[:MOST_NAMED]:
         yield Note(spread.sensors[k], float(x[k]), float(spread.values[k]), vertical="middle")

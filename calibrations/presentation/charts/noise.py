@@ -156,7 +156,7 @@ def spectrum(
     order, factor = np.argsort(fit.frequency_hz), scaled.factor
     f = fit.frequency_hz[order]
     low, high = (factor * root(bound[order]) for bound in fit.interval(COVERAGE))
-    density = factor * root(fit.seen[order])
+    density = factor * root(fit.density[order])
     hover = [
         f"{value:.3g} {scaled.unit}/√Hz at {frequency_hz:.4g} Hz"
         for frequency_hz, value in zip(f, density, strict=True)
@@ -299,11 +299,11 @@ def noise_album(analysis: NoiseAnalysis) -> list[Picture]:
     )
     album = []
     for k, (axis, noise) in enumerate(analysis.channels.items()):
-        end, of = (f"-{axis}", f" of {axis}") if k else ("", "")
+        end, of_axis = (f"-{axis}", f" of {axis}") if k else ("", "")
         model, scaled = _present_processes(noise), Scaled(1.0, noise.unit)
         density = single_chart(spectrum(model.fit, scaled, [model], noise.interval), 4.0)
-        album.append(Picture(f"allan{end}", f"Allan deviation{of}", averaging, _deviations(noise, model, scaled)))
-        album.append(Picture(f"spectrum{end}", f"Spectrum{of}", power, density))
+        album.append(Picture(f"allan{end}", f"Allan deviation{of_axis}", averaging, _deviations(noise, model, scaled)))
+        album.append(Picture(f"spectrum{end}", f"Spectrum{of_axis}", power, density))
     return album
 
 

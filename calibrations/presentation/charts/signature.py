@@ -53,9 +53,9 @@ def _part_panel(part: Part, *, legend: bool) -> Panel:
         for k, curve in enumerate(curves):
             name = label if legend and k == 0 else ""
             dash: Dash = "dash" if curve.style == "--" else "solid"
-            lines.append(Line(part.over[curve.rows], part.left[curve.rows], name, curve.colour, 1.6, dash))
+            lines.append(Line(part.abscissa[curve.rows], part.residual[curve.rows], name, curve.colour, 1.6, dash))
     if legend and any(curve.style == "--" for curve in part.curves):
-        lines.append(Line(part.over[:0], part.left[:0], "turning back", INK, 1.6, "dash"))
+        lines.append(Line(part.abscissa[:0], part.residual[:0], "turning back", INK, 1.6, "dash"))
     title = f"{part.axis} axis" if len(part.axis) == 1 else part.axis
     x = Axis(part.label, ticks="quarters" if part.label.startswith("β") else "")
     return Panel((Rule(0.0, width=0.7), *lines), x, Axis(f"residual ({part.unit})"), remark=title,
@@ -197,8 +197,8 @@ class Part:
     """The residual of one axis, in `unit`, shape (n,), over a column of that shape, and the rows that lines join."""
 
     axis: str
-    left: Array
-    over: Array
+    residual: Array
+    abscissa: Array
     label: str
     curves: tuple[Curve, ...]
     unit: str = "mV"
@@ -214,9 +214,9 @@ def shown_value(p: Parameter, effect: Effect) -> Array:
     """A typical value, of shape (3,) if per axis."""
     typical = p.typical if p.starts == (0.0,) else p.starts[-1]
     values = SHOWN.get(effect.name, {})
-    across = np.ones(3) if p.name in values else ACROSS
+    factors = np.ones(3) if p.name in values else ACROSS
     value = values.get(p.name, typical)
-    return value * across if p.per_axis else np.asarray(value)
+    return value * factors if p.per_axis else np.asarray(value)
 
 
 COLOURS = (VERMILION, GREEN, BLUE)
@@ -261,8 +261,8 @@ def _curves(n: int) -> Iterator[Curve]:
 
 def _turned_in_a_field() -> Table:
     """Full turns about x, y and z across a field of 1."""
-    c, s, none = np.cos(np.radians(TURN_DEG)), np.sin(np.radians(TURN_DEG)), np.zeros(len(TURN_DEG))
-    turns = [np.column_stack(components) for components in ((none, c, s), (s, none, c), (c, s, none))]
+    c, s, zero = np.cos(np.radians(TURN_DEG)), np.sin(np.radians(TURN_DEG)), np.zeros(len(TURN_DEG))
+    turns = [np.column_stack(components) for components in ((zero, c, s), (s, zero, c), (c, s, zero))]
     m: Array = np.vstack(turns)
     return Table.from_columns("positions", dict(zip(("mx", "my", "mz"), m.T, strict=True)), source="turns")
 

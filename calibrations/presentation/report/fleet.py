@@ -57,7 +57,7 @@ def calibration_report(
         "batch. Sensors unlike all others of their batch are named and do not use its values."
     )
     picture = Picture("spreads", "The sensors of each batch", caption, spreads(quantities))
-    outlier_count = sum(int(spread.apart.sum()) for values in quantities.values() for spread in values)
+    outlier_count = sum(int(spread.outliers.sum()) for values in quantities.values() for spread in values)
     return html(
         Page(
             headline=f"{subject}: calibrated together with their batches",

@@ -166,11 +166,11 @@ def _course(course: Course, output_unit: str) -> tuple[str, ...]:
     )
 
 
-def _outlook(name: str, history: ForecastHistory, of: str) -> tuple[str, ...]:
+def _outlook(name: str, history: ForecastHistory, output_unit: str) -> tuple[str, ...]:
     """One row of the forecasts: the last forecast with its 95 % bounds, and when it became known."""
     quantity, _, axis = name.partition("-")
     final, known_s = history.last.final, history.known_s
-    factor, unit = in_milli(of if quantity == "bias" else f"{of}/g")
+    factor, unit = in_milli(output_unit if quantity == "bias" else f"{output_unit}/g")
     if known_s is not None:
         value = f"{rounded(factor * final.value, 7)} ± {rounded(factor * final.half, 2)}"
     elif history.last.surprised:

@@ -237,7 +237,7 @@ def _batch(batch: Calibrated) -> Iterator[str]:
         batch.names, batch.pooled.parameters, batch.pooled.scale, _gains(batch), strict=True
     ):
         mean = concise(parameter.mean * size, parameter.mean_std * size, unit)
-        outliers = [m.sensor for m, is_outlier in zip(batch.members, parameter.apart, strict=True) if is_outlier]
+        outliers = [m.sensor for m, is_outlier in zip(batch.members, parameter.outliers, strict=True) if is_outlier]
         spread = f"{parameter.spread * size:.2g} {unit}"
         rows.append((effect, name, axis or "-", mean, spread, f"{gain:.2f}", _sensor_list(outliers)))
     yield columns(("effect", "parameter", "axis", "mean", "spread", "std / alone", "outliers"), rows)

@@ -149,16 +149,16 @@ def _draw(life: History, folder: Path, form: str) -> list[Path]:
 
 
 def lines(life: History) -> Iterator[str]:
-    of = life.calibrations
+    calibrations = life.calibrations
     yield summary(life)
     yield ""
     head = ("date", "data", "rig", *(q.name for q in life.quantities))
-    yield columns(head, [_row(calibration, life.quantities) for calibration in of])
+    yield columns(head, [_row(calibration, life.quantities) for calibration in calibrations])
     yield ""
     yield columns(("quantity", "drift a year", "scatter", "chart", "allowed", "due"), map(_stability, life.quantities))
     yield ""
     yield next_due(life, "--limit bias-x=0.005")
-    yield from (f"{calibration.data}: {calibration.expired}." for calibration in of if calibration.expired)
+    yield from (f"{calibration.data}: {calibration.expired}." for calibration in calibrations if calibration.expired)
     yield from life.warnings
     for data, reason in life.passed_over.items():
         note(f"Not used: {data}: {reason}")

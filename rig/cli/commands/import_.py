@@ -125,7 +125,7 @@ def ask_mapping(
             "Known stage angles (poses), still positions by hand (positions), rotation (rates), vibration (motion)"
         )
         kind = str(click.prompt(question, default=likely_kind(sheet, mapped), type=kinds, err=True))
-    names = "; ".join(" ".join(filter(None, (of, *names))) for of, names in COLUMN_NAMES[kind].items())
+    names = "; ".join(" ".join(filter(None, (group, *names))) for group, names in COLUMN_NAMES[kind].items())
     note(f"\nColumn names: {names}\nEnter accepts the proposal in brackets, {LEAVE} skips the column. Or type a name,")
     note("with a unit if it differs (vx_v:mV), or only a unit (mV).\n")
     mapping = _columns(sheet, kind, mapped)

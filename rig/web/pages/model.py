@@ -52,14 +52,14 @@ class Workbench:
     """One open page: data, model session, pictures, candidates."""
 
     def __init__(self, desk: Desk, address: ModelState) -> None:
-        self.desk, self.given = desk, address
+        self.desk, self.requested = desk, address
         self.data, self.model, self.noise = address.data, address.model, address.noise
         self.address = ""
         self.session: ModelSession[Any] | None = None
         self.visit = Visit()
         self.turn = 0  # results of older requests are ignored
         self.diagnoses: dict[tuple[str, ...], Diagnosis[Any]] = {}
-        self.seen: tuple[bool, Content] | None = None
+        self.shown_state: tuple[bool, Content] | None = None
         self.discovering = False  # effects are added one after another
 
     def build(self) -> None:
@@ -93,7 +93,7 @@ class Workbench:
             rows = form == "rows"
             with div("stack"):
                 self.pictures: Pictures | NoisePictures = (
-                    Pictures(self._exclude_dialog(), self.tell_address, self.given.selected)
+                    Pictures(self._exclude_dialog(), self.tell_address, self.requested.selected)
                     if rows
                     else NoisePictures()
                 )
@@ -139,7 +139,7 @@ class Workbench:
         self.verdict.wait(f"Reading {self.data}", self.visit)
         self.verdict.offer_cancel(self.visit.cancel)
         try:
-            session = await self.visit.work(self.desk.open, self.data, self.model, self.given.added, self.noise)
+            session = await self.visit.work(self.desk.open, self.data, self.model, self.requested.added, self.noise)
         except Cancelled:
             self._cancelled()
             return
@@ -197,9 +197,9 @@ class Workbench:
         except Exception:  # the record is busy, or the file is being written: look again later
             return
         is_changed = present.key != analysed.key
-        if (state := (is_changed, present)) == self.seen:
+        if (state := (is_changed, present)) == self.shown_state:
             return
-        self.seen = state
+        self.shown_state = state
         self.newer.clear()
         if not is_changed and not present.growing:
             return

@@ -51,7 +51,7 @@ class Live:
             with div("row-of"):
                 self.title = words("", "title")
                 self.phase = words("", "chip big-state")
-                self.big = words("", "big-share number")
+                self.share = words("", "big-share number")
                 self.to_record = ui.link("", "/record").classes("small grow")
                 with div("row-of actions"):
                     self.buttons()
@@ -76,7 +76,7 @@ class Live:
         self.repeat = button("Repeat the last pose", "replay", lambda: self.decide("repeat"))
         self.stop = ui.button("Stop", icon="stop", color="negative", on_click=lambda: control_run(control.stop))
         self.stop.props("unelevated dense")
-        self.again = button("Resume", "play_arrow", self.go_on)
+        self.resume_button = button("Resume", "play_arrow", self.go_on)
         self.see = button("Open the model", "insights", self._see, "dense")
 
     def decide(self, decision: str) -> None:
@@ -136,7 +136,7 @@ class Live:
         self.phase.set_text(word)
         self.phase.classes(remove="good bad doubt plain", add=look)
         self.now.set_text(status.now if active else "")
-        self.big.set_text(f"{100 * status.done // status.total} %" if status.total else "")
+        self.share.set_text(f"{100 * status.done // status.total} %" if status.total else "")
         self.bar.set_value(status.done / status.total if status.total else 0.0)
         poses = f"{status.done} of {status.total} poses" if status.total else ""
         self.count.set_text("; ".join(filter(None, (poses, status.left if active else ""))))
@@ -149,7 +149,7 @@ class Live:
         self.stop.set_visibility(active)
         self.see.set_visibility(status.state == "complete")
         self.see.set_text("Open the model" if status.done else "Open the results")
-        self.again.set_visibility(not active and status.state in ("stopped", "failed") and bool(status.run))
+        self.resume_button.set_visibility(not active and status.state in ("stopped", "failed") and bool(status.run))
         if _differ(previous, status, "error", "moving", "phase"):
             self._alarm(status)
         if _differ(previous, status, "asked"):
