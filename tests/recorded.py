@@ -71,8 +71,8 @@ def record(factory: pytest.TempPathFactory, name: str) -> Path:
             shutil.rmtree(begun, ignore_errors=True)
             with pytest.MonkeyPatch.context() as patch:
                 patch.setenv("RIG_HOME", str(begun))
-                patch.setattr("rig.record.store.datetime", Dated)
-                patch.setattr("rig.record.store.secrets.token_hex", lambda _: "000")
+                patch.setattr("rig.record.rows.datetime", Dated)
+                patch.setattr("rig.record.rows.secrets.token_hex", lambda _: "000")
                 for month, words in enumerate(RECORDS[name]):
                     patch.setattr(Dated, "today_is", datetime(2026, 1, 1, 12) + timedelta(days=30 * month))  # noqa: DTZ001
                     status, _, err = command(*words)

@@ -244,7 +244,7 @@ def test_means_and_scatter_come_without_the_samples() -> None:
 
 def test_two_runs_of_one_second_do_not_share_a_name(monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = iter(["aaa0", "aaa1", "bbb0"])
-    monkeypatch.setattr("rig.record.store.secrets.token_hex", lambda _: next(drawn))
+    monkeypatch.setattr("rig.record.rows.secrets.token_hex", lambda _: next(drawn))
     with Record() as record:
         assert begin(record) != begin(record)
 
