@@ -18,10 +18,10 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.loop import discover
 from calibrations.model.file import read_model
 from drivers.world.config import WorldConfig
-from drivers.world.defects import DEFECTS
 from rig.bench import read_bench
 from rig.runs.live import STANDARD, Live, stands
 from tests.hidden import rigs
+from tests.hidden.defects import DEFECTS
 from tests.hidden.quick_rig import QuickRig
 from tests.hidden.test_hidden_defects import NAMES
 

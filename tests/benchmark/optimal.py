@@ -20,7 +20,6 @@ from calibrations.model import Model
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from drivers.world.config import WorldConfig
-from drivers.world.defects import DEFECTS
 from drivers.world.world import World
 from procedures.catalogue import find
 from procedures.session import Pose
@@ -29,6 +28,7 @@ from rig.bench import read_bench
 from rig.planning.optimal import Optimal, optimal
 from rig.planning.sweep_range import Judged
 from tests.hidden import rigs
+from tests.hidden.defects import DEFECTS
 
 STAGES = {"speed_deg_s": 30.0, "acceleration_deg_s2": 60.0}  # of the embedded bench
 HIDDEN = {  # mechanism -> effects that describe it

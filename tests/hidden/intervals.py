@@ -17,8 +17,8 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit, fit, refit
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
-from drivers.world.defects import DEFECTS
 from tests.hidden import rigs, sampled
+from tests.hidden.defects import DEFECTS
 from tests.hidden.test_hidden_defects import NAMES
 
 SUFFICIENT = 1.96  # standard uncertainties either side: 95 %

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from drivers.world import visit
 from drivers.world.config import WorldConfig
-from drivers.world.defects import DEFECTS, UNEXPLAINED, Defect
 from drivers.world.visit import Timing
 from drivers.world.world import World
+from tests.hidden.defects import DEFECTS, UNEXPLAINED, Defect
 
 Table = dict[str, NDArray[Any]]
 

@@ -14,9 +14,9 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.loop import discover
 from calibrations.model.file import read_model
 from drivers.world.config import WorldConfig
-from drivers.world.defects import DEFECTS
 from rig.bench import read_bench
 from rig.planning.next_experiment import proposed
+from tests.hidden.defects import DEFECTS
 from tests.hidden.quick_rig import QuickRig
 from tests.slow import first_fast
 

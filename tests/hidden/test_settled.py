@@ -11,9 +11,9 @@ from calibrations.discovery.results import Discovery
 from calibrations.loop import diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.table import Table
-from drivers.world.defects import DEFECTS
 from tests.benchmark.discovery.cases import case
 from tests.hidden import rigs
+from tests.hidden.defects import DEFECTS
 from tests.hidden.test_hidden_defects import table
 
 

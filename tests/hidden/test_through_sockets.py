@@ -12,7 +12,6 @@ from calibrations.loop import diagnose
 from calibrations.model.file import read_model
 from calibrations.table import Table
 from drivers.world.config import WorldConfig
-from drivers.world.defects import DEFECTS
 from drivers.world.world import World
 from procedures.catalogue import find
 from procedures.settings import parse
@@ -22,6 +21,7 @@ from rig.record import Record
 from rig.record.measured import table_of
 from rig.runs.runner import start
 from tests.hidden import rigs
+from tests.hidden.defects import DEFECTS
 
 EVERY_INCLINATION = {"step_deg": "20"}
 GRID = EVERY_INCLINATION | {"inclinations_deg": "90,30,150"}  # enough for most defects of ten times the noise

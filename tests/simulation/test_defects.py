@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from drivers.world.config import WorldConfig
-from drivers.world.defects import DEFECTS, UNEXPLAINED, Defect
 from drivers.world.world import World
+from tests.hidden.defects import DEFECTS, UNEXPLAINED, Defect
 
 ALL = {**DEFECTS, **UNEXPLAINED}
 TURN = np.concatenate([np.arange(0.0, 361.0, 30.0), np.arange(360.0, -1.0, -30.0)])

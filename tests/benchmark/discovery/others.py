@@ -9,10 +9,10 @@ import numpy as np
 
 from calibrations.means.noise import white_std
 from calibrations.table import Table
-from drivers.world.defects import DEFECTS, UNEXPLAINED
 from tests.benchmark.discovery.cases import Truth
 from tests.benchmark.discovery.layouts import Array
 from tests.hidden import rigs, sampled
+from tests.hidden.defects import DEFECTS, UNEXPLAINED
 from tests.hidden.test_hidden_defects import NAMES, STRUCTURES, table
 
 WORLD = tuple(NAMES)
