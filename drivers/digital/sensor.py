@@ -13,9 +13,10 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.digital.frames import Frames
 from drivers.digital.reception import Batch, Reception, Tally, Thermometer, TimeBase
 from drivers.digital.settings import FORCES, DigitalSettings
-from drivers.errors import DriverError, LimitError, LinkTimeout, OverRange, SensorFault, StreamError
+from drivers.errors import BadFrame, DriverError, LimitError, LinkTimeout, OverRange, SensorFault, StreamError
 from drivers.instrument import Check
 from drivers.recorder import Recorder, Samples
 from drivers.transport.link import Link
@@ -61,6 +62,8 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
     carrier: str
     longest: int
     numbered = False
+    protocol = ""  # of messages with a checksum, and the address of a serial line with a usual baud rate
+    usual_line = ""
 
     def __init__(self, link: Link, settings: Settings, name: str) -> None:
         self.name, self.settings = name, settings
@@ -80,6 +83,18 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
     @abstractmethod
     def _unreadable(self, decoder: Decoding) -> DriverError:
         """The error for bytes without a sample."""
+
+    def _no_frames(self, stream: Frames) -> BadFrame:
+        """The error for bytes that are no message of the protocol, or only damaged ones."""
+        if stream.misfits > 2:
+            return BadFrame(
+                f"{self.name}: {stream.misfits} messages on {self._link.url} have a wrong checksum",
+                "Check the cable; or the sensor uses other definitions of these messages",
+            )
+        return BadFrame(
+            f"{self.name}: {stream.unread} bytes on {self._link.url} are not {self.protocol}",
+            f"The baud rate is probably wrong: write that of the sensor, as {self.usual_line}",
+        )
 
     @abstractmethod
     def _silence(self, timeout_s: float) -> DriverError:

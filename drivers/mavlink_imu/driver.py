@@ -22,7 +22,7 @@ from drivers.digital.frames import FrameDecoder, Frames, Ints, groups
 from drivers.digital.reception import Batch, Floats, Numbers, Reception, TimeBase
 from drivers.digital.sensor import DigitalSensor, no_samples
 from drivers.digital.settings import OUTPUTS, DigitalSettings, require_outputs
-from drivers.errors import BadFrame, DriverError, LinkTimeout, Refused, SensorFault
+from drivers.errors import DriverError, LinkTimeout, Refused, SensorFault
 from drivers.instrument import Identity
 from drivers.mavlink_imu import messages as mav
 from drivers.transport import Address, Links
@@ -136,6 +136,7 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
     """The autopilot at the other end of the link."""
 
     carrier = "messages"
+    protocol, usual_line = "MAVLink", "serial:/dev/ttyACM0?baud=57600"
     longest = 4 * mav.LONGEST
 
     def __init__(self, link: Link, settings: Settings, name: str) -> None:
@@ -261,17 +262,6 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
         if decoder.unread <= self.longest and decoder.good:
             return no_samples(self.name, self._link.url, 2.0, self.settings.message)
         return self._no_frames(decoder.stream)
-
-    def _no_frames(self, stream: Frames) -> BadFrame:
-        if stream.misfits > 2:
-            return BadFrame(
-                f"{self.name}: {stream.misfits} messages on {self._link.url} have a wrong checksum",
-                "Check the cable; or the autopilot uses other definitions of these messages",
-            )
-        return BadFrame(
-            f"{self.name}: {stream.unread} bytes on {self._link.url} are not MAVLink",
-            "The baud rate is probably wrong: write the autopilot's, as serial:/dev/ttyACM0?baud=57600",
-        )
 
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> FlightController:

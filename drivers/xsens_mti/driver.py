@@ -144,6 +144,7 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
     """The tracker at the other end of the line."""
 
     carrier = "messages"
+    protocol, usual_line = "XBus", "serial:/dev/ttyUSB0?baud=115200"
     longest = 2 * xbus.LONGEST
     numbered = True
 
@@ -250,16 +251,6 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
 
     def _unreadable(self, decoder: SampleDecoder) -> DriverError:
         return self._no_frames(decoder.stream) if decoder.unread else self._silence(2.0)
-
-    def _no_frames(self, stream: Frames) -> BadFrame:
-        if stream.misfits > 2:
-            return BadFrame(
-                f"{self.name}: {stream.misfits} messages on {self._link.url} have a wrong checksum", "Check the cable"
-            )
-        return BadFrame(
-            f"{self.name}: {stream.unread} bytes on {self._link.url} are not XBus",
-            "The baud rate is probably wrong: write the tracker's, as serial:/dev/ttyUSB0?baud=115200",
-        )
 
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> Tracker:
