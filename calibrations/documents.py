@@ -231,7 +231,7 @@ def _candidate(c: Candidate, result: Diagnosis[F]) -> Document:
 
 
 def why(c: Candidate, result: Diagnosis[F]) -> str:
-    """The candidate in words: what it is, its symptom, and what adding it does to the held-out error."""
+    """The candidate in words: its summary, its symptom, and the change of the held-out error when it is added."""
     data, error_before = result.findings.data, result.held_out_before
     fall = f"changes the error on {data.unseen} from {error_before:.3g} to {c.held_out_after:.3g} times {data.floor}"
     if c.held_out_after >= error_before:

@@ -27,7 +27,7 @@ class Kind:
     symbol: str = "a"  # of the sensed quantity
     sensed_in: str = "g"  # what its magnitude is given in
     sensed_along: str = "specific force along {} (g)"  # its component along an axis
-    nearest_to: str = "gravity"  # the direction by which rows are told apart
+    nearest_to: str = "gravity"  # the direction that distinguishes rows
     drawn_over: tuple[str, str, str] | None = None  # name, label and column that charts draw its rows over
     measurement_caption: str  # of the picture of measurement beside {model}
     failure_caption: str  # of the picture of where {model} fails
@@ -43,7 +43,7 @@ class Kind:
     known_input: bool = False  # whether each row has a known specific force or rate: the residual is in the output
     stage_angles: bool = False  # whether stages gave each row its orientation
     moving: bool = False  # whether the sensor moves: its output filter matters, and rows are stretches that repeat
-    turning: bool = False  # whether the sensor turns at a constant rate, which is what it senses
+    turning: bool = False  # whether the sensor turns at a constant rate, and senses it
     magnitude: bool = False  # whether only the magnitude of the sensed quantity is known
     field: bool = False  # whether that is a field, whose strength is a parameter
     same_pose: tuple[str, ...] = ()  # columns whose values make two rows the same pose

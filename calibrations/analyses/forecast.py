@@ -28,7 +28,7 @@ from calibrations.means.noise import white_std
 from calibrations.table import Array, Table
 
 STRETCH_S, STRETCHES = 300.0, 3  # of the still record: a value is the mean of so much, or of a third of a hold
-TYPICAL_DRIFT = 4e-3  # of a drift beforehand, over the scale factor: in g, and as a fraction
+TYPICAL_DRIFT = 4e-3  # expected size of a drift over the scale factor: in g, and as a fraction
 DEFAULT_NOISE = 2e-5  # white standard error over the scale factor, where it is not known
 DRAWS = 1000
 FORECASTS = 24
@@ -64,7 +64,7 @@ class Forecast:
     final: Bounds
     steady_s: Bounds
     tolerance: float
-    change: float  # of the whole approach, as foreseen
+    change: float  # of the whole approach, by the forecast
     surprise: float  # see `Bank.surprise`
 
     @property

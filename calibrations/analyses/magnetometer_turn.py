@@ -189,7 +189,7 @@ def _hidden_iron_std(outputs: Array, upright: int, round_z: Ellipse) -> float:
 
 
 def horizontal_per_mille(xy: Array) -> float:
-    """By how much the magnitude of a horizontal field (n, 2) varies."""
+    """The variation of the magnitude of a horizontal field (n, 2)."""
     size = np.linalg.norm(xy, axis=1)
     return float(1e3 * size.std() / size.mean())
 

@@ -36,7 +36,7 @@ from calibrations.means.noise import rms
 from calibrations.noise.deviations import deviations
 from calibrations.table import Array, Table, std_column
 
-# Steady state after switching on: when it is reached, how far the output drifts until then, and how fast.
+# Steady state after switching on: its time, the drift until then, and its time constants.
 #
 # The steady-state time is the first after which the remaining drift stays within the expanded uncertainty (k = 2) of
 # one measured value, slow noise included: from then on no measurement separates the remaining drift from noise. It is

@@ -247,7 +247,7 @@ class _Trial:
         return columns | dict(self.memory)
 
     def size(self, result: Mapping[str, Array]) -> ErrorSize:
-        """By how much what was found is wrong."""
+        """The error of the computed values."""
         return _size(np.column_stack([result[f"a{x}"] - self.a[:, "xyz".index(x)] for x in self.forward.axes]))
 
 

@@ -82,7 +82,7 @@ def write_program(forward: Forward, bound: Bound) -> Program:
     lines_before = [names.line(node) for node in nodes if node not in iterated and node.inner]
     loop = [names.line(node) for node in in_loop if node.inner]
     next_ = tuple(names.word(node) for node in nexts)
-    names.forget(in_loop)  # they follow what is sought, which is found only now
+    names.forget(in_loop)  # they depend on the result of the loop
     lines_after = [names.line(node) for node in sort_nodes(later) if node in iterated and node.inner]
     return Program(
         inputs=(*outputs, *used),

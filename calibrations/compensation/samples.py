@@ -14,7 +14,7 @@ from calibrations.model import Model
 from calibrations.table import AXES, Array, Table
 from calibrations.tables import KINDS
 
-NAMES = {"g": "a{}_g", "field": "m{}", "deg/s": "g{}_deg_s"}  # columns of what is sensed, by its unit
+NAMES = {"g": "a{}_g", "field": "m{}", "deg/s": "g{}_deg_s"}  # columns of the sensed quantity, by its unit
 
 
 def compensate(model: Model, samples: Any, columns: Mapping[str, Any]) -> Any:

@@ -227,7 +227,7 @@ def _check_planned(template: Fit, table: Table) -> None:
 
 
 def _noise(template: Fit, columns: Mapping[str, Array], rows: int) -> dict[str, Array]:
-    """Standard deviation of samples, and how many a mean is of; nothing where the data has none."""
+    """Standard deviation of samples, and the number of samples of a mean; empty if the data has none."""
     data = template.table
     usual = {name: float(np.median(data.column(name))) for name in _std_names(data)}
     if "n" in data and "n" not in columns:

@@ -112,7 +112,7 @@ class DOptimal:
 
 @dataclass(frozen=True)
 class IOptimal:
-    """The mean variance of what is predicted, with `weight` (p, p) the mean of J' J over where it is."""
+    """The mean variance of the predictions, with `weight` (p, p) the mean of J' J over where it is."""
 
     weight: Array
 

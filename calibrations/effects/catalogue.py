@@ -19,7 +19,7 @@ import numpy as np
 from calibrations.effects.effect import HOOKS, Effect
 from calibrations.errors import ModelError, UnknownName, nearest
 
-LOG = logging.getLogger(__name__)  # what is not called off is printed to standard error
+LOG = logging.getLogger(__name__)  # warnings are printed to standard error by default
 SHIPPED = ("signal", "noise")  # folders
 CHOSEN = "_chosen"  # of an effect that was made from a user's class
 
@@ -70,7 +70,7 @@ def with_own(user_effects: Iterable[Effect | type[Effect] | str | Path]) -> Mapp
 def load_effect(source: Effect | type[Effect] | str | Path) -> Effect:
     """An effect by its name in the catalogue, its file (.py), or as a class, such as one of a notebook's cell.
 
-    Raises UnknownName with the nearest, ModelError for what is no whole effect, and for the name of a shipped one.
+    Raises UnknownName with the nearest, ModelError for an incomplete effect, and for the name of a shipped one.
     """
     if isinstance(source, Path) or (isinstance(source, str) and source.endswith(".py")):
         return read_effect(Path(source))

@@ -234,11 +234,11 @@ class Effect:
         return None
 
     def lacks(self, table: Table) -> str | None:
-        """Why the rows of `table` cannot show the effect whatever their number, or None."""
+        """Why the rows of `table` cannot show the effect, even if there were more of them; else None."""
         return None
 
     def searched(self, table: Table) -> float:
-        """From how many different starts `guess` chooses the best."""
+        """The number of different starts from which `guess` chooses the best."""
         return 1.0
 
 

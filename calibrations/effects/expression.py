@@ -32,7 +32,7 @@ DEEPEST = 40  # operations within one another
 INSTEAD = {"^": "a power is **", "&": "to join conditions multiply them", "|": "max(a, b) holds where one of two does"}
 OF_ANGLES = ("sin", "cos", "tan")
 TARGETS = ("v", "vx", "vy", "vz", "alpha_deg", "beta_deg")
-HUGE = 1e100  # beyond what is measured, and its square is still a number
+HUGE = 1e100  # larger than any measurement, and its square is a finite number
 MANY = 20  # arguments of min and max
 # short name -> the column it needs
 COLUMNS: Mapping[str, str] = {
@@ -79,7 +79,7 @@ class Name:
 
 @dataclass(frozen=True)
 class Apply:
-    """An operation on what is inside it."""
+    """An operation on its operands."""
 
     operation: Operation
     inner: tuple[Node, ...]
@@ -118,7 +118,7 @@ def fault(text: str, column: int, message: str) -> ExpressionError:
 
 
 def parse(text: str) -> Expression:
-    """The expression in `text`. Raises ExpressionError, whatever the text is."""
+    """The expression in `text`. Raises ExpressionError, and no other error, for any text."""
     text = " ".join(text.split())
     if len(text) > LONGEST:
         raise ExpressionError(
@@ -217,7 +217,7 @@ def _degrees(node: Node) -> str | None:
 
 
 class _Reader:
-    """Python's tree into ours; what has no place there is refused."""
+    """Python's syntax tree as ours. Raises ExpressionError for other syntax."""
 
     def __init__(self, text: str) -> None:
         self._text = text

@@ -43,7 +43,7 @@ MISSPELT = 0.8  # likeness, as difflib has it, of a name of at least four letter
 def effect_for(name: str, text: str, table: Table) -> Effect:
     """The effect that a person wrote with `table` at hand: names of its columns are columns, others parameters.
 
-    Raises ExpressionError for what it is not, and for a name that looks like a misspelt column.
+    Raises ExpressionError for text that is no expression, and for a name that looks like a misspelt column.
     """
     expression = parse(text)
     column_names = {*COLUMNS, *FORCES, *(column for column in table.columns if column not in MEASURED)}

@@ -39,7 +39,7 @@ def best_start(expression: Expression, parameters: Names, table: Table) -> Mappi
     axes = len(table.axes)
     sizes = scales(expression, parameters, table)
     linear_names = linear(expression.root, parameters)
-    if table.type.magnitude:  # the forces are not known beforehand
+    if table.type.magnitude:  # the forces are not known before the fit
         return {p: np.full(axes, sizes[p] * (FAINT if p in linear_names else 1.0)) for p in parameters}
     groups = [(k,) for k in range(axes)] if expression.target == "v" else [tuple(range(axes))]
     starts = [_Search(expression, parameters, table, group).best() for group in groups]

@@ -49,7 +49,7 @@ def timed(table: Table) -> bool:
 def follows_level(table: Table, names: Sequence[str], power: int = 1) -> float:
     """1.0 where the outputs of poses follow the level of a column, one or one an axis, more closely than its readings.
 
-    Else 0.0. Smooth functions of where gravity points are beside it, as whatever else the sensor has may follow those.
+    Else 0.0. Smooth functions of the direction of gravity are fitted too, because other effects may follow them.
     """
     if table.kind != "poses" or any(name not in table or not level_is_known(table, name, power) for name in names):
         return 0.0

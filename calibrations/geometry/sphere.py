@@ -15,7 +15,7 @@ import numpy as np
 from calibrations.criteria import MOST_WORSE_COVERED
 from calibrations.table import Array, Table
 
-HARD_IRON, SOFT_IRON = 1, 2  # highest degree of what they add to the magnitude
+HARD_IRON, SOFT_IRON = 1, 2  # highest degree of their part of the magnitude
 REMEDIES = {
     HARD_IRON: "turn the sensor about two axes at least",
     SOFT_IRON: "turn the sensor about three axes, with each side up and down",

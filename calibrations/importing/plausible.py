@@ -226,7 +226,7 @@ def _step_s(time_s: Array) -> float:
     return max(float(np.median(np.diff(time_s))), 0.0) if len(time_s) > 1 else 0.0
 
 
-# Outputs in a stated unit, against what they sense.
+# Outputs in a stated unit, against the sensed quantity.
 
 
 def check_turning(table: Table) -> None:

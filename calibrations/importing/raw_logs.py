@@ -317,7 +317,7 @@ def _inflations(log: Table, axes: list[str], bounds: list[tuple[int, int]]) -> d
     }
 
 
-# A raw log as the table of what it holds: means of dwells, of rests and turns, or of still positions.
+# A raw log as a table: means of dwells, of rests and turns, or of still positions.
 
 RATE_NAMES = ("fs", "sample rate", "sampling rate", "sample frequency", "sampling frequency", "odr")
 

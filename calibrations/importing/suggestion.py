@@ -20,7 +20,7 @@ from calibrations.importing.units import ColumnMapping, split_unit
 from calibrations.table import Constant, Table
 
 PLACEHOLDER = "YOURS"
-EXAMPLES = {  # of constants: a value to try with, and what it is
+EXAMPLES = {  # of constants: a value to try, and its meaning
     "sample_rate_hz": (100.0, "the sample rate in Hz"),
     "turn_deg": (360.0, "the angle of each turn in deg"),
 }

@@ -29,7 +29,7 @@ from calibrations.table import Array, Table, std_column
 
 Processes = tuple[tuple[float, float], ...]  # (standard deviation, time constant in s) of Gauss-Markov processes
 
-BEYOND = 10.0  # lengths of a record: the longest times at which it is said to flicker
+BEYOND = 10.0  # lengths of a record: the longest time constants of flicker noise
 MOST_CORRELATED_ROWS = 400  # rows that degrees of freedom are computed on
 SLOW_FREEDOM = 60.0  # as a process has whose time constant is a hundredth of the record
 
@@ -43,7 +43,7 @@ class Noise:
     scatter: Array
     ratio: Array
     taus_s: tuple[tuple[float, ...], ...]  # time constants, per channel: one, or several for flicker noise
-    given: tuple[Processes, ...] = ()  # per channel, known beforehand; none where nothing is
+    given: tuple[Processes, ...] = ()  # per channel, known before the fit; empty if none is known
     reference: Array | None = None  # (channels,), what errors are counted in where the white noise is not known
 
     @property

@@ -167,7 +167,7 @@ def _from_data(model: Model, table: Table) -> dict[tuple[int, str, str], tuple[f
 
 @lru_cache(maxsize=8)
 def _nominal(table: Table) -> float:
-    """Output per unit of what is sensed, as the range of outputs has it; 1 where no orientation changes the output."""
+    """Output per unit of the sensed quantity, by the range of outputs; 1 if no orientation changes the output."""
     if table.type.turning:
         return float(np.max(np.abs(rate_scales(table)))) or 1.0
     if table.type.field:

@@ -162,7 +162,7 @@ LOG_RANGE = (float(np.log(1e-3)), float(np.log(1e12)))  # of r / q: noise far be
 
 @dataclass(frozen=True)
 class Smoothed:
-    """A smoothed record, r / q, and the standard deviation of what was taken for noise."""
+    """A smoothed record, r / q, and the standard deviation of the part taken as noise."""
 
     values: Array
     ratio: float

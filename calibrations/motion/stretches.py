@@ -198,7 +198,7 @@ def _rows(table: Table, samples: Table, lines: Sequence[Line], cuts: list[tuple[
 def _averaged(table: Table, records: Sequence[Record], references: Sequence[Reference]) -> Table:
     """Block means of all columns and of the reference, as many as the fastest line allows.
 
-    Measurement and reference are averaged alike, so that the averaging has no share in what is compared.
+    Measurement and reference are averaged alike, so that the averaging does not change the comparison.
     """
     fastest = max((line.frequency_hz for reference in references for line in reference.lines), default=0.0)
     rate_hz = max(SAMPLES_A_PERIOD * fastest, SLOWEST_RATE_HZ)

@@ -1,4 +1,4 @@
-"""The noise of a still sensor: its processes, and what is no process.
+"""The noise of a still sensor: its processes, and signals that are not noise.
 
 Spectra     lines (sinusoids), deviations (Allan and others; `kernels`)
 Record      samples (wild, equal, clipped, hidden), record (one pass over the samples)

@@ -127,7 +127,7 @@ def _stretch(fit: ChannelFit, limit: float) -> Disturbance | None:
 
 
 LONGER = (2, 4, 8, 16, 32, 64)  # times the record at hand
-MEANS = 1 << 14  # of a record that is foreseen
+MEANS = 1 << 14  # of a simulated record
 PROCEDURE = "noise-floor"
 LONGER_SEPARATES = "the two differ at low frequencies, of which a longer record holds more periods"
 REPEAT_SHOWS = "a disturbance of the sensor or the rig is in a second record of the same length too; an event is not"

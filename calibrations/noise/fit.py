@@ -293,7 +293,7 @@ def without_effects(channel: Channel, lines: Iterable[Line] = ()) -> ChannelFit:
 
 
 def fit_effects(start: ChannelFit, effects: Sequence[Effect]) -> ChannelFit:
-    """Effects with a spectrum fitted to what is seen; a search returns to many of these fits."""
+    """Effects with a spectrum fitted to the measured densities; a search uses many of these fits again."""
     if not effects:
         return start
     names = frozenset(effect.name for effect in effects)

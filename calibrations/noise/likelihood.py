@@ -158,7 +158,7 @@ class ChannelFit:
         return np.asarray(np.maximum(total, LEAST_DENSITY * self.density.max()))
 
     def interval(self, coverage: float) -> tuple[Array, Array]:
-        """(lowest, highest) density: between them the model expects this part of what is seen."""
+        """(lowest, highest) density: between them the model expects this share of the measured densities."""
         low, high = (chdtri(self.freedom, (1 + side * coverage) / 2) for side in (1, -1))
         return self.expected * low / self.freedom, self.expected * high / self.freedom
 

@@ -129,7 +129,7 @@ def fast_lines(f: Array, density: Array, freedom: float, above_hz: float, length
 
 Lines = tuple[Line, ...]
 REACH = 16  # ordinates to each side that a line has a share in
-LEAST_DENSITY = 0.05  # of the density around: what is left where a line was taken off
+LEAST_DENSITY = 0.05  # of the density around it, where a line was removed
 
 
 def bands(channel: Channel, lines: Iterable[Line] = ()) -> tuple[Bands, ...]:

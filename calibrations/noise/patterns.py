@@ -78,7 +78,7 @@ class Pattern:
 
     @property
     def certain(self) -> bool:
-        """Whether chance is excluded, whatever else was fitted."""
+        """Whether chance is excluded, with any other pattern in the fit."""
         return self.worth > (0.0 if self.kind == FOLLOWS else PATTERN_CERTAIN)
 
     @property

@@ -59,7 +59,7 @@ def logged_column(blocks: Sequence[Array], n: int) -> Logged | None:
     return Logged(means_read, level.values, level.doubt, mean)
 
 
-# A still record of any length, reduced in one pass to all that its noise is told from.
+# A still record of any length, reduced in one pass to the values that determine its noise.
 
 
 class Reduction:
@@ -184,7 +184,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Sensed:
-    """An output as what is sensed: multiplied with `factor` it is in `unit`, such as 1.02 g for a V."""
+    """From an output to the sensed quantity: multiplied with `factor` it is in `unit`, such as 1.02 g for a V."""
 
     factor: float
     unit: str
@@ -202,7 +202,7 @@ class Still:
     channels: tuple[Channel, ...]
     allan: Mapping[str, Curve]
     digest: str  # SHA-256 of all samples
-    constants: Mapping[str, str | float] = field(default_factory=dict)  # what is known of the sensor
+    constants: Mapping[str, str | float] = field(default_factory=dict)  # constants of the sensor
     sensed: Mapping[str, Sensed] = field(default_factory=dict)
     deviations: Mapping[str, Mapping[str, Curve]] = field(default_factory=dict)  # by axis and kind
     signal: tuple[Term, ...] = ()  # of a model, taken off the means
@@ -236,7 +236,7 @@ class Still:
 
 @dataclass(frozen=True)
 class Samples:
-    """One channel's samples in blocks (n,) each, in order, and what is known of them."""
+    """One channel's samples in blocks (n,) each, in order, and their rate, unit and filter."""
 
     axis: str
     blocks: Iterable[Any]

@@ -45,14 +45,14 @@ from calibrations.table import Array
 
 LEAST = LEAST_DITHER**2 + 1 / 12  # of a step's square: such noise, and what rounding adds
 SOON = 64  # samples within which noise has to come to that
-FASTEST = ("white-noise", "quantisation-noise")  # what is hidden at least
+FASTEST = ("white-noise", "quantisation-noise")  # processes that are hidden in any case
 
 
 @dataclass(frozen=True)
 class HiddenNoise:
     """Noise below a converter's `step`, over so many `levels`; white noise is below the coefficient `white_below`.
 
-    `all`: whether what is slow is hidden too.
+    `all`: whether slow processes are hidden too.
     """
 
     step: float
@@ -253,7 +253,7 @@ class Stuck:
 
 
 class Ends:
-    """The highest and the lowest value so far, and how many samples have them."""
+    """The highest and the lowest value so far, and the number of samples that have them."""
 
     def __init__(self) -> None:
         self._n = 0

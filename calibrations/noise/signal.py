@@ -26,7 +26,7 @@ from calibrations.table import AXES, Array, Table
 
 TEMPERATURE, PLACE = "temperature_c", "temperature-bias"
 MOST_ROWS = 400  # of the table of means: enough for any curve, and quick to search
-LEAST_STD = 1e-6  # of the range of the means: their noise where none shows
+LEAST_STD = 1e-6  # of the range of the means: their noise, if none is measured
 
 
 def acts_on_record(effect: Effect) -> bool:

@@ -28,7 +28,7 @@ from calibrations.table import Array
 TWO_LEVELS = "two-levels"
 WIDTHS = (1, 8, 64, 512)  # means over which levels are looked for
 ROUNDS = 6  # of path and levels in turn
-LEAST = 1e-6  # noise beside the levels, as a share of how far they are apart: rounding
+LEAST = 1e-6  # noise beside the levels, as a share of their distance: rounding
 Path = NDArray[np.int64]
 
 

@@ -1,4 +1,4 @@
-"""The uncertainty budget as rows of a table and as JSON: each source of a parameter, its size, and how it is known."""
+"""The uncertainty budget as rows of a table and as JSON: each source of a parameter, its size, and its type."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def budget_section(fit: Fit) -> Section | None:
 
 
 def budget_document(fit: Fit) -> Mapping[str, Any] | None:
-    """The budget as JSON: for each parameter what it adds up to, and the contributions by source. None as above."""
+    """The budget as JSON: the combined uncertainty of each parameter, and its contributions by source. None as above."""
     budget = _budget(fit)
     if budget is None:
         return None

@@ -44,7 +44,7 @@ def remarks(analysis: NoiseAnalysis) -> Iterable[str]:
 
 
 def coefficient_table(noise: ChannelNoise, sensed: Sensed | None) -> Cells:
-    """Head and rows of the coefficients of one channel: in its unit, and in that of what is sensed if it is known."""
+    """Head and rows of the coefficients of one channel: in its unit, and in that of the sensed quantity, if known."""
     rows: list[tuple[str, ...]] = []
     for name, coefficient in noise.coefficients.items():
         second = () if sensed is None else (_coefficient_text(coefficient, sensed.factor, sensed.unit, noise.unit),)

@@ -73,11 +73,11 @@ def _sensed(fit: Fit, letter: str) -> list[Column]:
 def telling_columns(fit: Fit, effect: Effect) -> list[Column]:
     """Columns that an effect may follow: the specific forces, beta, and the columns that it needs.
 
-    It cannot follow what it does not know, such as time: inclinations that follow one another would only seem so.
+    An effect does not know other columns, such as time. A change over time can come from successive inclinations.
     """
     table, n = fit.table, len(fit.channels)
     drivers = [_driver(table, name, n) for name in effect.needs if name not in SHOWN_OTHERWISE]
-    if table.type.moving:  # what it explains returns in every stretch
+    if table.type.moving:  # the explained part repeats in every stretch
         return columns(fit)[:1] + drivers
     if table.type.turning:
         return _sensed(fit, "w") + drivers
@@ -173,7 +173,7 @@ TURNING = {1: ", clockwise", -1: ", anticlockwise"}
 
 @dataclass(frozen=True)
 class ChannelResidual:
-    """Channel `c` of a fit, residuals in thousandths of what is sensed if `in_g`, else of the output."""
+    """Channel `c` of a fit, residuals in thousandths of the sensed quantity if `in_g`, else of the output."""
 
     fit: Fit
     c: int
@@ -292,6 +292,6 @@ def residual_unit(fit: Fit) -> str:
 
 
 def zero(fit: Fit, c: int) -> float:
-    """The output at 0 g: the model's bias, else the middle of what was measured."""
+    """The output at 0 g: the model's bias, else the middle of the measured range."""
     measured = fit.table.outputs[:, c]
     return fit.model.value(f"bias.{fit.channels[c]}", float(measured.max() + measured.min()) / 2)

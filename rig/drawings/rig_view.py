@@ -92,7 +92,7 @@ def shaded(colour: str, light: float) -> str:
 STEEL, DARK, ALUMINIUM, LIGHT_METAL = "#8b98a6", "#5b6875", "#c3ccd5", "#dde3e9"
 BOARD, BOARD_EDGE, PACKAGE = "#2f7d5b", "#1c5b40", "#3a4450"
 LAB = np.eye(3)
-EDGE_ON = 1e-6  # cosine: a face that is turned away less is seen along its edge, whatever rounding makes of it
+EDGE_ON = 1e-6  # cosine: a face that is turned away less is seen along its edge, for any rounding
 CAMERA_FROM = (0.62, -1.0, 0.62)
 AXIS_LENGTH = 0.95
 GRAVITY = np.array([[-1.35, -0.9, 0.75], [-1.35, -0.9, -0.15]])  # from, to

@@ -25,7 +25,7 @@ from rig.bench import Bench
 from rig.planning.plan import Plan, plan
 
 PAUSE_S = 60.0  # from the end of the data to the beginning of the next run, at least
-OVEN_S = 1200.0  # in which an oven with what is in it comes near to its set point
+OVEN_S = 1200.0  # until an oven with its load is near its set point
 
 
 def columns(planned: Plan, data: Table) -> dict[str, Array]:
@@ -71,7 +71,7 @@ def _oven_c(settings: Mapping[str, Any], path: str) -> float:
 # only so can volts be set beside degrees. The greatest of them is the worst standard error.
 
 GRID_DEG = 15.0
-SIDE = 0.2  # how far the two directions of one pose count as apart, beside distances of gravity in g
+SIDE = 0.2  # distance of the two directions of one pose, in units of the distances of gravity, g
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ class Range:
 
 
 def _candidates(standard: Sequence[Pose]) -> Iterator[Pose]:
-    """The sweep's own angles and what lies between them, from both sides, on its faces."""
+    """The angles of the sweep and angles between them, from both sides, on its faces."""
     alphas, betas = (_filled(getattr(pose, name) for pose in standard) for name in ("alpha_deg", "beta_deg"))
     for flip in sorted({pose.flip for pose in standard}):
         for alpha in alphas:

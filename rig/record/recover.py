@@ -115,7 +115,7 @@ def _completed_copy(source: Path, padded: Path) -> Path:
         with padded.open("r+b") as file:
             file.truncate(size)
     if not sound:
-        with suppress(*UNREADABLE):  # else nothing is readable, which is said when it is opened
+        with suppress(*UNREADABLE):  # else nothing is readable, and opening the record reports that
             rewrite_schema(padded)
     return padded
 

@@ -235,7 +235,7 @@ arrivals = Table(  # of runs that rigs push into the lab's record; those that ar
     Column("uid", String, primary_key=True),  # of the run
     Column("run", ForeignKey("runs.run"), nullable=False, unique=True),  # its name here
     Column("at", String, nullable=False),  # ISO 8601, UTC
-    Column("head", String),  # digest of what can change of a finished run; NULL while it is on its way
+    Column("head", String),  # digest of the parts of a finished run that can change; NULL during the transfer
     Column("digest", String),  # SHA-256 of all that is here of it, computed here when it was whole
 )
 

@@ -166,7 +166,7 @@ def _lease_run(record: Record, run: str) -> AbstractContextManager[None]:
 def _carry_out(
     record: Record, rig: Rig, run: Run, procedure: Procedure, observer: Observer, first: Confirm | None
 ) -> Outcome:
-    """The run itself. At its end the stages are at rest, and the record has its state, whatever happens."""
+    """The run itself. At its end, also after an error, the stages are at rest, and the record has its state."""
 
     def log(event: str, text: str) -> None:
         record.log(run.run, rig.clock.now(), "run", event, text)

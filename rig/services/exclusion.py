@@ -46,7 +46,7 @@ def numbered_run(data: str) -> str | None:
 
 
 def _evaluate_again(record: Record, run: Run) -> None:
-    """The results of the poses that are left; what is missing, and why, where they do not determine all."""
+    """Evaluate the remaining poses. If they do not determine every result, an event gives the reason."""
     results, reason = judged(record, run)
     if results or reason:
         record.set_results(run.run, results)

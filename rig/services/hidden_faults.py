@@ -233,7 +233,7 @@ def _remainder_rms(fault: Curve, effects: Sequence[Curve]) -> float:
 
 
 def _judged(group: Group, effects: Sequence[Curve]) -> list[Group]:
-    """The group with the free forms of its effects, if what was found agrees with what was hidden; else its faults."""
+    """The group with the free forms of its effects, if its effects agree with its faults; else its faults alone."""
     places = {place_of_effect(e.name) for e in group.effects}
     of_place = [e for e in effects if e.span is None and place_of_effect(e.name) in places]
     extended = replace(group, effects=(*group.effects, *of_place))

@@ -22,7 +22,7 @@ def summary(life: History) -> str:
 
 
 def next_due(life: History, limit_is_given: str) -> str:
-    """The date of the next calibration, or what is needed to compute it; `limit_is_given` shows how to give a limit."""
+    """The date of the next calibration, or the missing input for it; `limit_is_given` shows how to give a limit."""
     if life.due is not None:
         names = ", ".join(q.name for q in life.quantities if q.due == life.due)
         return f"Next calibration due on {life.due}: {names} may exceed the limit then."

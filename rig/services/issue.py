@@ -134,7 +134,7 @@ def _bench(run: Run) -> Bench:
 
 
 def _instruments(run: Run, on: str) -> Iterator[Instrument]:
-    """Every instrument of the run, as it identified itself, and what has a certificate and no role."""
+    """Every instrument of the run, as it identified itself, and items that have a certificate and no role."""
     if not run.bench:
         return
     bench = _bench(run)

@@ -210,7 +210,7 @@ def _has_channels_alone(path: Path) -> bool:
 
 
 def channels_alone(beginning: str) -> bool:
-    """Whether the text of a table has times or a rate, outputs of a sensor, and no column on how it was held."""
+    """Whether the text of a table has times or a rate, outputs of a sensor, and no column of its orientation."""
     constants, names = _beginning(beginning.splitlines())
     columns = set(names)
     timed = "t_s" in columns or "sample_rate_hz" in constants

@@ -85,7 +85,7 @@ def _with_verdict(results: Mapping[str, Any], verdict: str) -> list[str]:
 
 
 def _unjudged(results: Mapping[str, Any]) -> Iterator[str]:
-    """That a result without a limit has no verdict, and how it gets one."""
+    """A remark that a result without a limit has no verdict, and how to give it one."""
     free = [name.rpartition("/")[2] for name, result in results.items() if result["limit"] is None]
     if free:
         yield f"No verdict without a limit: add one to limits.results of the bench file, such as `{free[0]}: ...`"
@@ -128,7 +128,7 @@ def results_table(results: Mapping[str, Any]) -> list[str]:
     return columns(("result", "value", "limit", "verdict"), cells).splitlines()
 
 
-# The rows of the table: what is yes or no, and a forecast, is a sentence.
+# The rows of the table. A result that is yes or no, or a forecast, is a sentence.
 
 STEADY = re.compile(r"(?P<sensor>.*/)?steady-state(?P<axis>-\w)?")
 FORECAST = ("earliest", "expected", "latest")

@@ -51,16 +51,19 @@ class Stream:
     corner_hz: float = np.inf
     others: tuple[str, ...] = ()
     closed: list[tuple[float, float]] = field(default_factory=list)  # gaps: where each begins and how long it is, s
-    uneven_s: float = 0.0  # by how much the times are off the even row that is taken for them
+    uneven_s: float = 0.0  # largest difference of the times from evenly spaced times
     upright: dict[int, float] = field(default_factory=dict)  # output along gravity, +1 and -1 g
     constants: Mapping[str, str | float] = field(default_factory=dict)
-    logged: dict[str, list[Array]] = field(default_factory=dict)  # what was read beside the samples, in their blocks
-    coarse: dict[str, float] = field(default_factory=dict)  # of that, what was read with less noise than these steps
+    logged: dict[str, list[Array]] = field(default_factory=dict)  # other columns of the record, in the same blocks
+    coarse: dict[str, float] = field(default_factory=dict)  # steps of those columns whose noise is less than a step
 
     @property
     def sensed(self) -> Sensed | None:
-        """The output as what is sensed, where its scale factor is known: by its unit, from poses along gravity, or as
-        the data state it (`output_per_g`, `output_per_deg_s`, `output_per_field`)."""
+        """From the output to the sensed quantity, if the scale factor is known.
+
+        It is known by the unit, from poses along gravity, or by a constant of the data (`output_per_g`,
+        `output_per_deg_s`, `output_per_field`).
+        """
         if self.unit in SENSED:
             return SENSED[self.unit]
         if scale := self.scale_per_g:
@@ -170,7 +173,7 @@ def _no_record(subject: str) -> DataError:
 
 
 def _logged(table: Table, channel: str) -> Iterator[str]:
-    """Columns that an output may follow: temperature, supply, and what is no output of a sensor by its name."""
+    """Columns that an output may follow: temperature, supply, and columns whose names are not those of outputs."""
     for name in table.columns:
         is_channel = name not in BESIDE and AXIS.fullmatch(channel) is not None and AXIS.fullmatch(name) is None
         if name in FOLLOWED or (is_channel and name != channel):

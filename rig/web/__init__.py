@@ -3,7 +3,7 @@
     server     listens, and lets in who has the token
     guard      the token of the user; token, host and origin of every request and websocket
     frame      what all pages share: navigation, the run under way, light and dark, keys
-    desk       what lies open: data, the model as it grew, what is on its way
+    desk       state that all pages share: open data, models with their added effects, reports
     pages      one a file, in pages/
     figures    pictures as values that Plotly draws, in figures/
 

@@ -27,7 +27,7 @@ class ModelState:
 
     @property
     def address(self) -> str:
-        """The address, without what is empty. No added effect at all is an empty `add`."""
+        """The address, without empty fields. An empty `add` means no added effect."""
         added_effects = list(self.added) or [""] if self.added is not None else []
         fields = [("data", self.data), ("model", self.model), ("select", ranges(self.selected)), ("noise", self.noise)]
         query = urlencode(

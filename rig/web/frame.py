@@ -59,7 +59,7 @@ class Strip:
             self.pause.set_visibility(status.phase == "running" and status.seat != "nobody")
 
     def _title(self, status: Status | None) -> None:
-        """Show in the browser's tab how far the run is, and that it asks; "" before the first run of this page."""
+        """Show in the browser's tab the progress of the run and its question; "" before the first run of this page."""
         if status is None:
             title = TITLE if self.title else ""
         else:

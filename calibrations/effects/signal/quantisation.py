@@ -90,7 +90,7 @@ def _start(table: Table, k: int) -> Array:
 
 @lru_cache(maxsize=8)
 def _sawtooth(table: Table) -> tuple[float, float, float]:
-    """(step, offset, noise) of the saw that what is not smooth in the angles follows best."""
+    """(step, offset, noise) of the saw that fits best to the part that is not smooth over the angles."""
     smooth = smooth_columns(table)
     v = table.outputs
     even = smooth @ (smooth.T @ v) if smooth.size else v

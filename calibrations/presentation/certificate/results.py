@@ -216,7 +216,7 @@ def _weights(fit: Fit) -> Array:
 
 
 def _errors(fit: Fit, earlier_model: Model | None) -> Iterator[Error]:
-    """In thousandths of what is sensed, by channel; as found where the earlier model has every value that is needed."""
+    """In thousandths of the sensed quantity, by channel; as found, if the earlier model has every needed value."""
     earlier = None if earlier_model is None else evaluate(earlier_model, fit.table)
     for c, channel in enumerate(fit.channels):
         as_found = None if earlier is None else _size(earlier, c, fit)

@@ -44,7 +44,7 @@ SI: Mapping[str, tuple[float, Mapping[str, int]]] = {
     "counts": (1.0, {}),
     "field": (1.0, {}),
 }
-PART = r"\([^)]*\)|[^/]+"  # of a unit; what is in brackets is one
+PART = r"\([^)]*\)|[^/]+"  # of a unit; a group in brackets is one part
 OF_GRAVITY = ("g", "mg")
 
 

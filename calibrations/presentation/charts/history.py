@@ -28,7 +28,7 @@ from calibrations.table import Array
 from calibrations.text import labelled, prefixed, rounded, unit
 
 POINTS = 200
-AHEAD = 0.5  # of the time from first to last calibration: how far the drift is drawn beyond the last
+AHEAD = 0.5  # of the time from first to last calibration: length of the drawn drift after the last
 MARGIN = 0.03  # of the time shown, at both ends
 ALONE_DAYS = 30.0  # around calibrations of one moment
 INDIVIDUALS, EWMA, RANGES = "Single runs", "Weighted mean of the runs (EWMA)", "Change from run to run"

@@ -85,7 +85,7 @@ class ModelCurve:
 
 
 def scaled(still: Still, axis: str, in_sensed: bool) -> Scaled:
-    """The output's own unit; or thousandths of what is sensed, as noise is small."""
+    """The output's own unit; or thousandths of the sensed quantity, because noise is small."""
     sensed = still.sensed.get(axis)
     if sensed is None or not in_sensed:
         return Scaled(1.0, still.unit)
@@ -95,7 +95,7 @@ def scaled(still: Still, axis: str, in_sensed: bool) -> Scaled:
 
 
 def units(still: Still) -> dict[bool, str]:
-    """Units that all of its axes can be drawn in: False the output's, True that of what is sensed."""
+    """Units in which all axes can be drawn: False that of the output, True that of the sensed quantity."""
     names = {sensed.unit for sensed in still.sensed.values()}
     has_one_unit = set(still.sensed) == set(still.axes) and len(names) == 1
     return {False: still.unit} | ({True: names.pop()} if has_one_unit else {})

@@ -1,4 +1,4 @@
-"""An effect's signature: what the linear model leaves where the effect acts, over the column that shows it best.
+"""An effect's signature: the residual of the linear model by the effect, over the column that shows it best.
 
 Made by the effect's own functions, without noise, on a sensor of 1 V/g: a sweep of full turns each way at five
 inclinations while the room warms and cools, or, for an effect that only motion shows, oscillations beside a rest.
@@ -32,7 +32,7 @@ INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0)
 STEP_DEG = 9.0
 SMOOTH = 1.0  # von Neumann's ratio of a residual that is a function of a force; 2 where it is none
 SAME = 0.02  # of its range
-DIGITS = 4  # decimals of mV: what lies beyond depends on the machine
+DIGITS = 4  # decimals of mV: further digits depend on the machine
 INCLINATIONS = ("#440154", "#3b528b", "#21918c", "#5ec962", "#c9d614")  # colours of 30 to 150 deg
 SMALL = 7.2  # inches: the width of a page of the catalogue
 CLOSE_S = (3.0, 4.0)  # of a motion, so that its waves are visible

@@ -1,4 +1,4 @@
-"""Pictures of a soak: bias and scale factor over the hours, what surrounded them, and the still record's noise."""
+"""Pictures of a soak: bias and scale factor over the hours, the surroundings, and the noise of the still record."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ COLOURS = {"x": BLUE, "y": VERMILION}
 TIME = "time since power-on (h)"
 SHOWN = 600  # means of the still record that a line is drawn through, at most
 CURVE = 400  # points of a fitted curve
-WINDOW = 1.6  # times the whole drift: what is shown of bounds that are far wider in the beginning
+WINDOW = 1.6  # times the whole drift: height of the chart; the bounds are far wider in the beginning
 FORESEEN = (
     "Final values of bias and scale factor by the Kalman filters' forecasts at each time: a line within its 95 % "
     "bounds, less the last forecast. The dotted line is the drift at that time. The broken line is the time from which "
@@ -47,7 +47,7 @@ FORESEEN = (
 
 
 def soak_album(soak: Soak, histories: Mapping[str, ForecastHistory] = MappingProxyType({})) -> list[Picture]:
-    """All pictures of a soak, and of what was foreseen of it, with words for a page."""
+    """All pictures of a soak and of its forecasts, with captions."""
     course = (
         "Dots are reversals, with their standard errors; the line is the exponential approach with its standard error. "
         "The grey band is the expanded uncertainty of one reversal about the final value: within it no measurement can "
@@ -208,7 +208,7 @@ def _final(course: Course) -> float:
 
 
 def _still(soak: Soak, course: Course) -> tuple[Array, Array]:
-    """The still record at 0 g, shifted onto the bias: what differs there is load along z."""
+    """The still record at 0 g, shifted onto the bias: the difference is load along z."""
     t_s, volts = _thinned(soak.holds.time_s, soak.holds.output(course.axis))
     return t_s, volts - np.median(volts - np.interp(t_s, course.t_s, course.values))
 

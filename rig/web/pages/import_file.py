@@ -299,7 +299,7 @@ class ImportPage:
     def look(self) -> None:
         """Show what would be imported with the present choices."""
         if not self.quiet:
-            with self.fault:  # whatever was clicked may be gone
+            with self.fault:  # the clicked element may be gone
                 ui.timer(0.0, self._preview, once=True)
 
     async def _preview(self) -> None:

@@ -148,7 +148,7 @@ class Workbench:
                 addresses = {IMPORT: address(IMPORT, self.data)} if Path(self.data).is_file() else {}
                 failed(f"Cannot analyse {self.data}", error, self.data, addresses)
             return
-        if session.data.form != "rows":  # what is laid out already may hold what a person wrote
+        if session.data.form != "rows":  # the present layout may hold text that a person wrote
             self._lay_out(session.data.form)
         self.chosen.opened(session)
         for note in session.notes:
@@ -270,7 +270,7 @@ class Workbench:
             await self._diagnose(self.session, self.turn)
 
     async def discover(self) -> None:
-        """Add what is missing step by step, and show each step, until no effect is missing or a person stops it."""
+        """Add the missing effects step by step, and show each step, until no effect is missing or a person stops it."""
         self.discovering = True
         count = 0
         try:

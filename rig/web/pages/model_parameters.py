@@ -35,7 +35,7 @@ COPY = """(text) => {
 
 
 class ParametersBox:
-    """The parameters of the present model, and what can be made of them."""
+    """The parameters of the present model, and buttons for documents from them."""
 
     def __init__(self, page: Workbench) -> None:
         self.page = page
