@@ -1,17 +1,17 @@
-"""An exponential approach to a steady state, followed while it happens.
+"""An exponential approach to a steady state, followed during the measurement.
 
     value(t) = c + r(t) + room + slow noise + white noise
-    r' = -r / tau      what is left to come, slowest first; none, one (a board's hours) or two (and a package's minutes)
-    room               a swing of a day, which keeps its phase for two
+    r' = -r / tau      the rest of the approach: none, one exponential (hours, of a board) or two (minutes, of a package)
+    room               a daily swing; it keeps its phase for two days
 
-A bank of extended Kalman filters runs side by side. Each has its cell of time constants, within which it estimates
-them, a room of its own, and its own slow noise: Gauss-Markov processes of many time constants, up to days, all alike
-(flicker) or not, with or without a random walk. How well each foresaw what came is its weight. So what cannot be known
-yet, the time constant of a drift that has hardly bent and the noise of a record that has hardly begun, is in the
-bounds, which are those of the whole bank.
+A bank of extended Kalman filters runs side by side. Each has a cell of time constants, within which it estimates them,
+its own swing of the room, and its own slow noise: Gauss-Markov processes of many time constants, up to days, of equal
+size (flicker) or not, with or without a random walk. The weight of a filter is the likelihood of its predictions. The
+bounds are those of the whole bank. So they include values that the data do not determine yet: the time constant of a
+drift that is still straight, and the noise of a short record.
 
-Heat that flows through a board makes many exponentials, not two. The processes of minutes to hours therefore begin
-larger than they stay: what begins and dies away is an exponential.
+Heat that flows through a board makes many exponentials, not two. Therefore the processes of minutes to hours are larger
+at the beginning: a process that decays from the beginning on is an exponential.
 
 Values are in units of the white standard error of one of them.
 
@@ -54,15 +54,15 @@ SHAPES = (
     (0.0, (0.0, 1.0, 1.0, 0.8, 0.8), 0.0, 0.1),  # of hours, likewise
     (1.0, (1.0, 1.0, 1.0, 1.0, 1.0), 3.0, 0.05),
 )
-"""Of slow noise: how large its processes are beside each other, with what is over within a value first; random walk per
-root of an hour; probability beforehand."""
+"""Of slow noise: the scatter within a value, the relative sizes of its processes, random walk per root of an hour, and
+prior probability."""
 NO_SLOW_NOISE = 0.3  # probability beforehand of no slow process
-LEAST_WEIGHT = 1e-5  # a filter of less weight is let go
+LEAST_WEIGHT = 1e-5  # a filter with less weight is removed
 HOUR_S = 3600.0
 DAY_S, LASTING_S = 24 * HOUR_S, 48 * HOUR_S  # the room's cycle, and how long it keeps its phase
 ROOM_SWINGS = ((0.0015, 0.55), (0.005, 0.35), (0.02, 0.1))  # rms of its swing over `most`, and probability beforehand
 SPREAD = 0.015  # of `most`: further exponentials that heat's way through a board adds, rms of each when it begins
-SPREAD_S = 1e4  # the slowest of them: what is slower is no part of warming up
+SPREAD_S = 1e4  # the slowest of them: slower processes are no part of the warm-up
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ class Bank:
 
 
 def make_bank(t_s: float, value: float, most: float) -> Bank:
-    """Before anything is measured: the first `value`, at `t_s`, is near; a drift is seldom much beyond `most`."""
+    """The bank before the measurement. It expects a value near the first `value`, and a drift up to about `most`."""
     kinds = product(_approaches(), _noises(), ROOM_SWINGS)
     members = [(tau, (*noise, swing * most), p * q * w) for (tau, p), (noise, q), (swing, w) in kinds]
     taus_s, noise = np.array([m[0] for m in members]), np.array([m[1] for m in members])
@@ -167,14 +167,14 @@ def make_bank(t_s: float, value: float, most: float) -> Bank:
 
 
 def _swung(gap_s: float) -> tuple[Array, float]:
-    """How a room's swing goes on over a gap, (2, 2), and the share of its variance that is new by then."""
+    """The transition of a room's swing over a gap, (2, 2), and the new share of its variance."""
     angle, decay = 2 * np.pi * gap_s / DAY_S, np.exp(-gap_s / LASTING_S)
     c, s = np.cos(angle), np.sin(angle)
     return decay * np.array([[c, s], [-s, c]]), 1 - decay**2
 
 
 def _approaches() -> list[tuple[tuple[float, float], float]]:
-    """Slow and fast time constant, s, 0 where there is none; and their probability beforehand."""
+    """Slow and fast time constant, s, 0 for none; and their prior probability."""
     pairs = [(s, f) for s, f in product(TAUS_S.tolist(), FAST_S.tolist()) if s > LEAST_TAU_RATIO * f]
     kinds = [(0.0, 0.0)], [(s, 0.0) for s in TAUS_S.tolist()], pairs
     result: list[tuple[tuple[float, float], float]] = []
@@ -186,7 +186,7 @@ def _approaches() -> list[tuple[tuple[float, float], float]]:
 
 
 def _noises() -> list[tuple[tuple[float, ...], float]]:
-    """Scatter, rms of each slow process, and the random walk; and their probability beforehand."""
+    """Scatter, rms of each slow process, and the random walk; and their prior probability."""
     none = np.zeros(1 + len(SLOW_S))
     quiet = [((*none, walk), NO_SLOW_NOISE * p) for walk, p in ((0.0, 0.95), (3.0, 0.05))]
     return quiet + [
