@@ -1,7 +1,7 @@
 """An exponential approach to a steady state, followed during the measurement.
 
     value(t) = c + r(t) + room + slow noise + white noise
-    r' = -r / tau      the rest of the approach: none, one exponential (hours, of a board) or two (minutes, of a package)
+    r' = -r / tau      the rest of the approach: no exponential, one (hours: a board) or two (minutes: a package)
     room               a daily swing; it keeps its phase for two days
 
 A bank of extended Kalman filters runs side by side. Each has a cell of time constants, within which it estimates them,
@@ -37,15 +37,10 @@ SIZE = 14
 TAU_STEP = np.array([0.4, 0.8])  # of a logarithm of a time constant, the slower and the faster one
 TAUS_S = np.exp(np.arange(np.log(150.0), np.log(100e3), TAU_STEP[0]))
 FAST_S = np.exp(np.arange(np.log(60.0), np.log(1300.0), TAU_STEP[1]))
-USUAL_S, USUAL_LN_SPREAD = 5400.0, 0.8  # of a slow time constant beforehand: its median, and the std of its logarithm
-APPROACH_PRIOR = (0.3, 0.4, 0.3)  # probability beforehand of no exponential, one, two
+USUAL_S, USUAL_LN_SPREAD = 5400.0, 0.8  # of a slow time constant, prior: its median, and the std of its logarithm
+APPROACH_PRIOR = (0.3, 0.4, 0.3)  # prior probability of no exponential, one, two
 SLOW_S = np.array([120.0, 800.0, 5e3, 3e4, 1.8e5])  # time constants of slow noise
-SLOW_RMS = (
-    (0.5, 0.45),
-    (1.5, 0.3),
-    (3.5, 0.17),
-    (8.0, 0.08),
-)  # of a slow process, in units, and probability beforehand
+SLOW_RMS = ((0.5, 0.45), (1.5, 0.3), (3.5, 0.17), (8.0, 0.08))  # of a slow process, in units, and prior probability
 SHAPES = (
     (1.0, (1.0, 1.0, 1.0, 1.0, 1.0), 0.0, 0.45),  # flicker
     (0.2, (0.5, 1.0, 2.0, 4.0, 4.0), 0.0, 0.15),  # the slower the larger
@@ -56,18 +51,18 @@ SHAPES = (
 )
 """Of slow noise: the scatter within a value, the relative sizes of its processes, random walk per root of an hour, and
 prior probability."""
-NO_SLOW_NOISE = 0.3  # probability beforehand of no slow process
+NO_SLOW_NOISE = 0.3  # prior probability of no slow process
 LEAST_WEIGHT = 1e-5  # a filter with less weight is removed
 HOUR_S = 3600.0
 DAY_S, LASTING_S = 24 * HOUR_S, 48 * HOUR_S  # the room's cycle, and how long it keeps its phase
-ROOM_SWINGS = ((0.0015, 0.55), (0.005, 0.35), (0.02, 0.1))  # rms of its swing over `most`, and probability beforehand
+ROOM_SWINGS = ((0.0015, 0.55), (0.005, 0.35), (0.02, 0.1))  # rms of its swing over `most`, and prior probability
 SPREAD = 0.015  # of `most`: further exponentials that heat's way through a board adds, rms of each when it begins
 SPREAD_S = 1e4  # the slowest of them: slower processes are no part of the warm-up
 
 
 @dataclass(frozen=True)
 class Bank:
-    """k filters at `t_s`: what each believes; rms of its slow processes (k, 5), its scatter of single values, its
+    """k filters at `t_s`: the belief of each; rms of its slow processes (k, 5), its scatter of single values, its
     random walk, the rms of its room, log weight, (k,) each.
 
     `nis` is the sum of the normalised innovations squared so far, of `count` values.
