@@ -87,10 +87,8 @@ class Series:
         restricted = np.array([self._scored(p, point)[1] for point in self.points])
         weight = np.exp((restricted.min() - restricted) / 2) * np.array(list(self.points.values()))
         likely_points = np.flatnonzero(weight > LEAST_LIKELIHOOD * weight.sum())
-        likely, weight = (
-            [list(self.points)[i] for i in likely_points],
-            weight[likely_points] / weight[likely_points].sum(),
-        )
+        likely = [list(self.points)[i] for i in likely_points]
+        weight = weight[likely_points] / weight[likely_points].sum()
         fits = np.array([self._descended(p, point) for point in likely])
         _, _, covariances, noise = zip(*map(self._scored, fits, likely), strict=True)
         mean = weight @ fits

@@ -74,10 +74,8 @@ class World:
 
     def positioner_um(self, axis: str, times_s: ArrayLike | None = None) -> Floats:
         """Reading of the position sensor of `axis`, now or at `times_s` within its present motion; no time passes."""
-        number, times = (
-            _place(axis, positioner.AXES, "axis of the positioner"),
-            self.now_s if times_s is None else times_s,
-        )
+        number = _place(axis, positioner.AXES, "axis of the positioner")
+        times = self.now_s if times_s is None else times_s
         salt = self._seed * len(positioner.AXES) + number
         return positioner.read_um(self._numbers.positioner, self._world.carriage[number], times, salt)
 

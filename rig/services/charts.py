@@ -171,10 +171,8 @@ def course_chart(course: Course, name: str, time: RunTime = RunTime(), units: Ma
 
 def life_of(q: Quantity) -> Life:
     """One quantity over all calibrations of a sensor, as charts show it."""
-    values, signals = (
-        [calibration.values[q.name] for calibration in q.of],
-        q.chart.signals if q.chart is not None else [],
-    )
+    values = [calibration.values[q.name] for calibration in q.of]
+    signals = q.chart.signals if q.chart is not None else []
     due = None if q.due is None else (q.due - date(1970, 1, 1)).days
     return Life(
         q.name,

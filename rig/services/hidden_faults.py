@@ -31,10 +31,8 @@ from rig.bench import Bench
 
 ALIKE = 0.9  # correlation of a group's faults with its effects
 OF_A_SIZE = 3.0  # their sizes differ by this factor at most
-LEFT, WHOLE = (
-    0.3,
-    0.1,
-)  # of a fault's curve: what its effects cannot make of it at most, and what needs no further effect
+LEFT = 0.3  # of a fault's curve: the largest part that its effects may not describe
+WHOLE = 0.1  # of a fault's curve: with a smaller rest, no further effect is taken
 MATERIAL = 0.3  # times the noise floor: a smaller fault cannot be seen
 STEP_STD = 0.1  # of a parameter, for the derivative of a size
 STEP = 1e-3  # of a typical value, for the derivative of a curve

@@ -305,9 +305,8 @@ def _draw_charts(quantities: list[Controlled], folder: Path, form: str) -> list[
     for sensor in dict.fromkeys(quantity.sensor for quantity in quantities):
         of_sensor = [quantity for quantity in quantities if quantity.sensor == sensor]
         name = "".join(letter if letter.isalnum() else "-" for letter in sensor)
-        charts, units = (
-            {quantity.quantity: quantity.chart for quantity in of_sensor},
-            {quantity.quantity: quantity.unit for quantity in of_sensor},
+        charts = {quantity.quantity: quantity.chart for quantity in of_sensor}
+        figures[f"control-{name}"] = control_charts(
+            charts, {quantity.quantity: quantity.unit for quantity in of_sensor}
         )
-        figures[f"control-{name}"] = control_charts(charts, units)
     return save_all(figures, folder, form)
