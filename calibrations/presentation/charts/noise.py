@@ -126,9 +126,9 @@ def allan(
         series += [_part(name, tau_s, factor * np.sqrt(variance)) for name, variance in variances.items()]
     series += [_model(model, tau_s, factor * deviation(model.fit, tau_s)) for model in models]
     is_certain = curve.edf > 1
-    high = float(curve.high[is_certain].max() if is_certain.any() else curve.high.max())
-    low = float(curve.low.min())
-    y = Axis(f"Allan deviation ({scaled.unit})", log=True, low=factor * low / 2, high=3 * factor * high)
+    low = factor * float(curve.low.min())
+    high = factor * float(curve.high[is_certain].max() if is_certain.any() else curve.high.max())
+    y = Axis(f"Allan deviation ({scaled.unit})", log=True, low=low / 2, high=3 * high)
     return Panel((*series, dots), Axis(TIME, log=True), y, legend="upper center")
 
 
