@@ -62,7 +62,7 @@ def test_one_that_is_unlike_the_rest_pulls_nobody_and_is_not_pulled(count: int) 
 
 
 def test_nobody_is_set_apart_where_all_are_alike() -> None:
-    assert np.mean([_held(20, 1.0, seed)[1].apart.any() for seed in range(200)]) < 0.03
+    assert np.mean([_held(20, 1.0, seed)[1].outliers.any() for seed in range(200)]) < 0.03
 
 
 def _held(count: int, tau: float, seed: int, off: float = 0.0) -> tuple[float, Siblings]:
