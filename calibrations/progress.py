@@ -1,4 +1,4 @@
-"""What a long analysis does now, for a terminal or a page that shows it."""
+"""The progress of a long analysis, for a terminal or a page that shows it."""
 
 from __future__ import annotations
 

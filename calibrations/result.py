@@ -1,4 +1,4 @@
-"""What every result offers to a person: text, a JSON document, a data frame, a picture, the view of a notebook."""
+"""The forms of every result: text, a JSON document, a data frame, a picture, the view of a notebook."""
 
 from __future__ import annotations
 

@@ -128,7 +128,7 @@ class Bands:
     columns: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)  # those computed so far
 
     def column(self, process: str, time_constant_s: float = 0.0) -> Array:
-        """What is expected of a process, for a coefficient of 1, shape (b,).
+        """The expected density of a process, for a coefficient of 1, shape (b,).
 
         What a filter lets through of white noise is a Gauss-Markov process, and none of it folds back as white noise
         would; what is slow is so far below the corner that the filter's gain is enough.
@@ -156,7 +156,7 @@ class Bands:
         return np.asarray(passed * LINEAR[process](f, self.sampling))
 
     def _of_the_ends(self) -> Array:
-        """What the first and the last error of quantisation add to every cosine coefficient."""
+        """The contribution of the first and the last error of quantisation to every cosine coefficient."""
         half_turn = np.pi * self.frequency_hz * self.sampling.interval_s
         n = self.number / (2 * self.frequency_hz * self.sampling.interval_s)
         return (

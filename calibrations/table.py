@@ -139,7 +139,7 @@ class Table:
 
     @property
     def content(self) -> str:
-        """What an effect may be defined for: the kind; of positions, "fields" where a magnetometer was turned.
+        """The kind for which effects are defined: that of the table, or "fields" for positions of a magnetometer.
 
         With an accelerometer in the same table, the constant `triad: m` selects the magnetometer.
         """
@@ -149,7 +149,7 @@ class Table:
 
     @property
     def type(self) -> Kind:
-        """What this kind of data does differently from others."""
+        """The properties of this kind of data."""
         return KINDS[self.content]
 
     @property

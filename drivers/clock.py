@@ -216,7 +216,7 @@ def _pending(fileno: int) -> int:
 
 
 def _readable(filenos: list[int], timeout_s: float) -> list[int]:
-    """Those of `filenos` that can be read; poll, since select ends at descriptor 1023."""
+    """The `filenos` that can be read; poll, since select ends at descriptor 1023."""
     poll = select.poll()
     for fileno in filenos:
         poll.register(fileno, select.POLLIN)

@@ -1,4 +1,4 @@
-"""What can go wrong with an instrument.
+"""Errors of instruments.
 
     DriverError
     ├── LimitError         a value outside its limits was refused; nothing was sent

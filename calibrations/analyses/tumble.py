@@ -1,4 +1,4 @@
-"""What temperature does to bias and scale factor in a cycle: the slope, and the difference between up and down.
+"""Bias and scale factor over a cycle of temperature: the slope, and the difference between up and down.
 
     y = y0 + k (T - T0) + h s [+ d t]     s = 1/2 on the way up, the top included, -1/2 on the way down
 

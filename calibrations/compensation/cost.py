@@ -1,8 +1,8 @@
-"""What a compensation does not know costs, over a simulated sweep: effects left out, an axis that is not measured,
-and the uncertainties of its parameters.
+"""Errors of a compensation over a simulated sweep: by effects left out, by an axis that is not measured, and by the
+uncertainties of its parameters.
 
 The sweep holds the sensor in gravity alone, with every effect of the model but those of the rig, at angles approached
-from both sides, while temperature, supply and what a user added go up and down over their stated ranges.
+from both sides. Temperature, supply and further inputs go up and down over their stated ranges.
 """
 
 from __future__ import annotations
@@ -23,12 +23,11 @@ from calibrations.model import Estimate, Model, Term
 from calibrations.model.chain import Step, respond, sensed
 from calibrations.table import AXES, Array, Table
 
-# How uncertain the result of a compensation is by its parameters: where they were found, and over the whole range.
+# The uncertainty of the result by the uncertainties of the parameters.
 #
-# A parameter that multiplies how far an input is from its reference, such as a temperature coefficient, makes the
-# result the less certain the further the input goes. So there are two figures: over the sphere of directions in
-# gravity, with inputs within what the data of the calibration covered; and the greatest over the stated range of
-# everything.
+# A parameter such as a temperature coefficient multiplies the distance of an input from its reference. The uncertainty
+# grows with this distance. So there are two figures: over all directions of gravity, with inputs in the range of the
+# calibration data; and the greatest over the stated ranges of all inputs.
 
 PARAMETER_STEP = 1e-3  # of a standard uncertainty: steps of derivatives
 INPUT_LEVELS = 9  # of an input over its range, one after the other

@@ -18,7 +18,7 @@ NAMES = {"g": "a{}_g", "field": "m{}", "deg/s": "g{}_deg_s"}  # columns of the s
 
 
 def compensate(model: Model, samples: Any, columns: Mapping[str, Any]) -> Any:
-    """What the sensor senses, from `samples` and further `columns`: an array (n, axes), or a data frame for one.
+    """The sensed quantity, from `samples` and further `columns`: an array (n, axes), or a data frame for one.
 
     Raises ModelError where the model has no values or cannot be inverted, DataError where the samples do not fit it.
     """

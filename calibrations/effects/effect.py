@@ -1,4 +1,4 @@
-"""What a physical effect is: a class with parameters, a docstring for people, and the places where it acts.
+"""A physical effect: a class with parameters, a docstring for people, and the places where it acts.
 
     class TemperatureBias(Effect):
         \"\"\"temperature-bias: the zero-g output follows the temperature.
@@ -199,7 +199,7 @@ class Effect:
         return a
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
-        """What the effect adds to the output, in the output's unit, shape (n, 3)."""
+        """The contribution of the effect to the output, in the output's unit, shape (n, 3)."""
         return NOTHING
 
     def output(self, v: Array, table: Table, p: Values) -> Array:
@@ -227,9 +227,9 @@ class Effect:
         raise NotImplementedError
 
     def columns(self, a: Array, table: Table) -> Mapping[str, Array] | None:
-        """What a unit of each parameter adds to the output, by name, shape (n, 3), where `transduction` is linear.
+        """By name, the part of the output for one unit of each parameter, shape (n, 3), if `transduction` is linear.
 
-        Derivatives are then exact and fast. None where an effect does not say.
+        Derivatives are then exact and fast. None if an effect does not state it.
         """
         return None
 

@@ -1,4 +1,4 @@
-"""What a batch misses: effects that its sensors show together, though perhaps none of them shows it alone.
+"""The missing effects of a batch: its sensors show them together, even if no sensor shows them alone.
 
 Two tests of each effect, both with the sensors as replicates, so that neither leans on any one sensor's noise model:
 

@@ -1,4 +1,4 @@
-"""What candidate effects and patterns could add to a residual, made once for all sensors that share a design.
+"""Possible contributions of effects and patterns to a residual, computed once for all sensors of one design.
 
 Derivatives of the residual cost more than all that is done with them, and at the same poses they are nearly the same
 for every sensor: an effect on pose or force goes with the range of the output, one of transduction does not depend on
@@ -76,7 +76,7 @@ class SharedDesigns:
         self._trials: dict[Key, float] = {}
 
     def of(self, fit: Fit) -> SearchGroups:
-        """Those for a fitted table."""
+        """The groups for a fitted table."""
         table = fit.table
         design = _key(table, ())
         can: Key = (*table.columns, *design)
@@ -192,7 +192,7 @@ NOWHERE = StageScore((), np.zeros(0), np.zeros((0, 0)))  # of a sensor on no sta
 
 @dataclass(frozen=True)
 class Screening:
-    """What is kept of one sensor. `information` (p, p) is the inverse covariance of the parameters `theta` (p,), with
+    """The result for one sensor. `information` (p, p) is the inverse covariance of the parameters `theta` (p,), with
     all that their standard uncertainties are widened by; `typical` what a sensor may show.
 
     `chance`: that noise alone shows as much, over the whole search. `excess` is the error over the noise floor.

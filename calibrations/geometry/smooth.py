@@ -1,4 +1,4 @@
-"""What any static sensor could do: smooth functions of where gravity points, and of the side it was reached from.
+"""Possible outputs of any static sensor: smooth functions of the direction of gravity, and of the side of approach.
 
 Slow noise is fitted beside these columns, so that a misfit of the model, which returns with the angles, is not taken
 for noise, which does not. This is the pure error of a lack-of-fit test, with smoothness in place of repeats.

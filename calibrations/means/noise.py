@@ -164,7 +164,7 @@ def correlated(
 
 
 def processes(slow: float, taus_s: tuple[float, ...], known_noise: Processes = ()) -> Processes:
-    """Those that make up slow noise of a standard deviation, evenly shared, and those that are given."""
+    """The processes of slow noise with a standard deviation, in equal shares, and the given processes."""
     std = slow / len(taus_s) ** 0.5
     return (*((std, tau_s) for tau_s in taus_s if slow or not known_noise), *known_noise)
 

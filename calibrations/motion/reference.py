@@ -319,7 +319,7 @@ def second_derivative(x: Array, rate_hz: float, stencil: Array) -> Array:
 
 
 def reference_biases(reference: Reference) -> tuple[Bias, ...]:
-    """What each step to a reference does by itself: the paper's filter and the sines at the motion's frequency, the
+    """The error of each step to a reference alone: the paper's filter and the sines at the motion's frequency, the
     smoother at a quarter of its corner. An amplitude is never negative: noise makes it longer, by half its variance.
     """
     at_hz, rate_hz, periods = reference.at_hz, reference.rate_hz, 1 / reference.duration_s

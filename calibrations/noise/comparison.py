@@ -186,7 +186,7 @@ class Stretch:
 
 
 def stretches(fit: ChannelFit, most: int = 3) -> list[Stretch]:
-    """Those that differ most certainly, none of which overlap, surest first; with chances of 1 where none does."""
+    """The differences of the smallest p-value, without overlaps, smallest first; p-values of 1 if there is none."""
     order = np.argsort(fit.frequency_hz)
     f, nu = fit.frequency_hz[order], fit.freedom[order]
     power = nu * (fit.density / fit.expected)[order]

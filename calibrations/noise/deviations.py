@@ -74,7 +74,7 @@ class Curve:
 
 
 class Octaves:
-    """What was seen of a record so far; blocks are added in order, `curve` is asked at the end.
+    """The statistics of a record so far. Add blocks in order, and call `curve` at the end.
 
     Differences of the third order, for modified and hadamard, take as long again: False leaves them out.
     """

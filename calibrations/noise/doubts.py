@@ -1,4 +1,4 @@
-"""What a search on a still record leaves in doubt: disturbances, rival processes, and the experiment that decides.
+"""The doubts after a search on a still record: disturbances, rival processes, and the experiment that decides.
 
 A disturbance is everything in a still record that is not a noise process:
 

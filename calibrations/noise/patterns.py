@@ -1,4 +1,4 @@
-"""What no noise process makes: a step, a drift, a settling, a followed column.
+"""Patterns that no noise process makes: a step, a drift, a settling, a followed column.
 
 They look like a random walk in a spectrum. In the cosine transform of the means each has a form of its own, and
 its coefficients are independent: the amplitude that fits best, and its gain, are those of a matched filter, for a step

@@ -1,4 +1,4 @@
-"""What a noise model is missing on a record: lines, a mixture of processes, and disturbances that are not noise.
+"""Search for the missing parts of a noise model on a record: lines, a mixture of processes, and other disturbances.
 
 1. Lines that exceed the widest mixture are removed, if an effect of the catalogue describes lines.
 2. Every mixture of processes is fitted to the remaining spectrum (`mixtures`).

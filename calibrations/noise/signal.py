@@ -1,4 +1,4 @@
-"""What temperature does to a sensor at rest: terms of a model that are taken off a record before its noise is fitted.
+"""The response of a sensor at rest to temperature: terms of a model that are removed before the noise is fitted.
 
 The means of a record in blocks are poses at one orientation, and are searched as such: bias over temperature as a line,
 as a curve, with the lag of the sensor and with branches. What acts over time stays in the record: it is noise, or a
@@ -163,7 +163,7 @@ class SignalSearch:
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """Those that are causes; a curve alone is its own."""
+        """The terms that are causes; a curve alone is a cause of its own."""
         return tuple(name for name in self.names if name in self.findings.causes) or self.names[:1]
 
 

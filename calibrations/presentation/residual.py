@@ -181,7 +181,7 @@ class ChannelResidual:
 
     @cached_property
     def rows(self) -> NDArray[np.intp]:
-        """Those that are drawn: all, or evenly chosen ones and the worst."""
+        """The rows that are drawn: all, or evenly chosen ones and the worst."""
         n = self.fit.table.n
         if n <= MOST:
             return np.arange(n)

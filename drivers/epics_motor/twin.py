@@ -33,7 +33,7 @@ BRAKES = ("stopped", "limit-switch")
 
 
 class World(Protocol):
-    """What a motor knows of physics."""
+    """The physics that a motor moves."""
 
     def advance(self, t_s: float) -> None: ...
 

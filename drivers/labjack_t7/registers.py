@@ -22,7 +22,7 @@ def ain_range(number: int) -> Register:
 
 
 def ain_negative(number: int) -> Register:
-    """What the input is measured against; SINGLE_ENDED is ground."""
+    """The negative channel of the input; SINGLE_ENDED is ground."""
     return Register(41000 + number, "uint16", f"AIN{number}_NEGATIVE_CH")
 
 

@@ -95,7 +95,7 @@ FLASH_WORDS = struct.unpack(">82H", FLASH_BYTES)
 
 
 class World(Protocol):
-    """What a converter knows of physics."""
+    """The physics that a converter measures."""
 
     def advance(self, t_s: float) -> None: ...
 

@@ -118,7 +118,7 @@ MESSAGES: Mapping[int, Message] = {m.number: m for m in (HEARTBEAT, COMMAND_LONG
 
 
 class Mavlink:
-    """What a frame of MAVLink is."""
+    """The form of a frame of MAVLink."""
 
     starts = re.compile(b"[\xfd\xfe]")
     head = 3

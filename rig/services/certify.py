@@ -19,7 +19,7 @@ from rig.services.issue import CertificateDetails, issue, limits
 
 @dataclass(frozen=True)
 class Certified:
-    """What a certificate is made of: a table, a model with the name that people know it by, and the bench.
+    """The input of a certificate: a table, a model with the name that people use, and the bench.
 
     `before`: name or file of the model in use until now; None: `model`, if it has values from other data.
     """

@@ -84,7 +84,7 @@ def package_faults() -> Iterator[str]:
 
 
 def collected(part: Callable[[], Any]) -> Any:
-    """What `part` returns, or the error that it raises, as a document."""
+    """The result of `part`, or the error that it raises, as a document."""
     try:
         return part()
     except Exception as error:  # one damaged part hides no other

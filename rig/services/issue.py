@@ -46,7 +46,7 @@ PLACES = ("alpha_deg", "beta_deg", "direction", "path")
 
 @dataclass(frozen=True)
 class CertificateDetails:
-    """What a person may say of a certificate: its number, who it is for, and what `before` was in use until now."""
+    """Entries of a person: the number, the customer, and `before`, the model in use until now, in words."""
 
     number: str = ""
     customer: str = ""

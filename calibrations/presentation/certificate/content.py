@@ -164,7 +164,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class Figures:
-    """What a fit gives: results, errors, budget sources not given, trials of the simulation, remarks.
+    """The figures of a fit: results, errors, budget sources not given, trials of the simulation, remarks.
 
     `correlations` has a row and a column for each of the results, in their order.
     """

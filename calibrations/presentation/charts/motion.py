@@ -106,7 +106,7 @@ class Waveform:
 
 
 def waveform(fit: Fit, axis: str) -> Waveform:
-    """Those in the middle of the record."""
+    """The periods in the middle of the record."""
     table = _stretches(fit)
     c, t = table.axes.index(axis), table.samples.time_s
     start = int(np.searchsorted(t, table.time_s[len(table.time_s) // 2]))

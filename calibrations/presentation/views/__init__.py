@@ -1,4 +1,4 @@
-"""What one kind of data shows differently from another: figures, tables of text, charts and albums.
+"""The display of each kind of data: figures, tables of text, charts and albums.
 
 `view_of(data)` gives the view of a dataset. Terminal, report, page and notebook take their tables and pictures from it.
 """

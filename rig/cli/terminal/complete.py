@@ -1,4 +1,4 @@
-"""What a shell offers for an unfinished word: procedures, runs and files, sensors, effects.
+"""The words that a shell offers for an unfinished word: procedures, runs and files, sensors, effects.
 
 Nothing is imported before a shell asks, and an error offers nothing: a message would appear inside the typed line.
 """
