@@ -25,7 +25,8 @@ from rig.record.schema import SCHEMA, give_sha256, upgrade
 FILE = "record.db"
 RECOVER = "move it to another folder, or copy its readable rows with `rig doctor --recover FOLDER`"
 FAILURES = {  # primary code of SQLite: fault and remedy
-    sqlite3.SQLITE_FULL: "cannot be written: the disk is full; free some space, then continue with `rig resume`",
+    sqlite3.SQLITE_FULL: "cannot be written: the disk is full; free some space, then try again; "
+    "`rig resume` continues a run",
     sqlite3.SQLITE_READONLY: "cannot be written: it is read-only; make file and folder writable, or set RIG_HOME to "
     "another folder",
     sqlite3.SQLITE_IOERR: "cannot be read or written: the file system fails; check the disk or the network share, "

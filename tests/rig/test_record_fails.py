@@ -53,7 +53,7 @@ def test_a_full_disk_stops_the_run_which_goes_on_when_there_is_room(tmp_path: Pa
     with Record(tmp_path) as record, looking_on() as aftermath:
         outcome = swept(record, lambda: fill(record))
         assert isinstance(outcome.error, RecordError)
-        assert "the disk is full; free some space, then continue with `rig resume`" in str(outcome.error)
+        assert "the disk is full; free some space, then try again; `rig resume` continues a run" in str(outcome.error)
         assert str(record.path) in str(outcome.error)
         assert (aftermath.stops, aftermath.turning) == (1, [])
     with Record(tmp_path) as record:

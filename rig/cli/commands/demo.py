@@ -59,7 +59,7 @@ def demo_command(folder: Path | None, realistic: bool, as_json: bool) -> None:
         if realistic
         else "A simulated sensor has three hidden faults. The analysis does not know them."
     )
-    with working("connecting", 0.0) as progress:
+    with working("starting; the first time takes a minute", 0.0) as progress:
         run = _measured(bench, settings, progress)
         progress.share = MEASURING
         table, linear = load(run), read_model("linear")

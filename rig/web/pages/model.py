@@ -206,7 +206,7 @@ class Workbench:
         extent_text = f"{present.extent} by now; " if is_changed and present.extent else ""
         subject = f"{self.data} is still running" if present.growing else f"{self.data} or the model has changed"
         with self.newer, box("note row-of").props("role=status"):
-            words(f"{subject}: {extent_text}this page analyses {analysed.extent or 'the earlier content'}.", "grow")
+            words(f"{subject}: {extent_text}this page analyses {self.session.data.description}.", "grow")
             if is_changed:
                 reopen = partial(self.go, self.data, self.model, self.noise)
                 ui.button("Update", icon="refresh", on_click=reopen).props("dense")
