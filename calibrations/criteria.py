@@ -180,7 +180,7 @@ TURNED_DEG = 20.0  # mount or zero: marks are within some degrees, so that this 
 LEFT_WITHIN_GROUPS = 0.05  # of the variance: two halves of Gaussian noise leave 0.36, of a sine 0.19
 GROUPS_APART = 10.0  # noise floors: effects and odd rows are less apart, or have a pattern
 SMALLER_GROUP = 0.1  # of the rows: a smaller group is outliers
-PATTERNED = 0.75  # of neighbours in one group: more is a pattern of pose, time or direction
+PATTERNED = 0.5  # of the way from chance to all neighbours in one group: more is a pattern of pose, time or direction
 
 # Orientations
 UPRIGHT_COSINE = 0.94  # of an edge and the vertical: within 20 deg the edge is upright

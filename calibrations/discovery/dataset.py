@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic
 
 from calibrations.discovery.findings import Candidate, F, Findings, Place, Step
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
-from calibrations.discovery.verdict import Finding
+from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.effects import Effect
 from calibrations.errors import ModelError
 from calibrations.model import Model
@@ -197,16 +197,25 @@ class Dataset(ABC, Generic[F]):
         """Whether the noise is known independently of the residual."""
         return True
 
+    def fails_by_scatter_only(self, fit: F) -> bool:  # noqa: ARG002
+        """Whether a model fails nowhere if the scatter from row to row counts as noise."""
+        return False
+
     def compare(self, model: Model, effects: Mapping[str, Effect] | None = None) -> Comparison[F]:
         """The model against the data, fitted first if it has no values.
 
-        If only the residual measures the noise, the method searches for `effects`.
+        If only the residual measures the noise, or the rows scatter more than their samples, the method searches for
+        `effects`: only a search can tell noise from an effect then.
         """
         fit = self.evaluate(model) or self.fit(model)
         compared = Comparison(self, fit, self.places(fit), self.rejection(fit))
-        if effects is None or not compared.adequate or self.noise_known(fit):
+        undecided = self.fails_by_scatter_only(fit) if compared.fails else not self.noise_known(fit)
+        if effects is None or compared.rejection is not None or not undecided:
             return compared
-        return replace(compared, given=self.diagnose(model, effects).judgement)
+        judgement = self.diagnose(model, effects).judgement
+        if compared.fails and judgement.verdict is not Verdict.ADEQUATE:
+            return compared
+        return replace(compared, fails=(), given=judgement)
 
     def diagnose(self, model: Model, effects: Mapping[str, Effect]) -> Diagnosis[F]:
         """The effects that the model misses."""

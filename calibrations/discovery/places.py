@@ -68,7 +68,18 @@ class _Stretch:
 
 def places(fit: Fit) -> tuple[Place, ...]:
     """The worst places where a model fails."""
-    return tuple(stretch.place for stretch in _failing_stretches(fit)[:MOST_PLACES])
+    return tuple(stretch.place for stretch in _failing_stretches(fit, _by_noise(fit))[:MOST_PLACES])
+
+
+def fails_by_scatter_only(fit: Fit) -> bool:
+    """Whether a model fails nowhere if the scatter from row to row counts as noise, as far as a sensor has it.
+
+    The scatter is estimated from the residual and may be an effect without a smooth form: a search has to decide.
+    """
+    if not fit.noise.known or fit.noise.given or not np.any(fit.noise.scatter):
+        return False
+    beyond_white = np.minimum(np.hypot(fit.noise.slow, fit.noise.scatter), MOST_SLOW_NOISE * fit.noise.floor)
+    return not _failing_stretches(fit, fit.residual / np.hypot(fit.noise.floor, beyond_white)[:, None])
 
 
 def rows_at(fit: Fit, place: Place) -> NDArray[np.intp]:
@@ -79,14 +90,16 @@ def rows_at(fit: Fit, place: Place) -> NDArray[np.intp]:
     return np.zeros(0, np.intp)
 
 
-def _failing_stretches(fit: Fit) -> list[_Stretch]:
-    """Places where the residual is more than noise, worst first; at most one for each column and channel."""
+def _failing_stretches(fit: Fit, by_noise: Array) -> list[_Stretch]:
+    """Places where the residual is more than noise, worst first; at most one for each column and channel.
+
+    `by_noise` is the residual over its noise, (channels, n).
+    """
     stretches: list[_Stretch] = []
     chances: list[float] = []
     scale = scales(fit)
     unit, milli = fit.problem.unit, milli_unit(fit)
     floor = fit.noise.floor
-    by_noise = _by_noise(fit)
     for coordinate, low, high, rows in (*_parts(fit.table), *_sides(fit)):
         for c, channel in enumerate(fit.channels):
             r = fit.residual[c, rows]

@@ -48,6 +48,7 @@ from calibrations.means.noise import rms, white_std
 from calibrations.table import AXES, Array, Table
 
 ROUNDS = 20  # of a regression in two clusters
+MOST_SHARED = 3  # rows for each column of the effects that two sensors share: fewer rows would be fitted themselves
 CHECK_WIRING = "check the sensor's supply, the cable and the channel of"
 
 
@@ -202,6 +203,10 @@ def _two_groups(table: Table, known_input: Array | None = None) -> Finding | Non
         known_input = specific_force(nominal_pose(table))
     columns = np.column_stack([np.ones(table.n), known_input])
     labels, within_share, distance = _clusters(columns, table.outputs)
+    if within_share > LEFT_WITHIN_GROUPS:  # effects that both sensors have may hide the groups
+        shared = _shared(table, known_input)
+        if table.n > MOST_SHARED * shared.shape[1]:
+            labels, within_share, distance = _clusters(columns, table.outputs, shared)
     share = float(labels.mean())
     if (
         within_share > LEFT_WITHIN_GROUPS
@@ -222,17 +227,32 @@ def _two_groups(table: Table, known_input: Array | None = None) -> Finding | Non
     )
 
 
+def _shared(table: Table, known_input: Array) -> Array:
+    """Smooth effects of a sensor, (n, columns): a cubic in the input, and the input by direction, time and temperature.
+
+    Unlike two groups of rows, none of them changes from one row to the next.
+    """
+    x = np.column_stack([np.ones(table.n), known_input / max(float(np.abs(known_input).max()), np.finfo(float).tiny)])
+    linear, square = x.T, [x[:, i] * x[:, k] for i in range(4) for k in range(i, 4)]
+    cubes = [part * x[:, k] for part in square for k in range(1, 4)]
+    names = ("direction", "t_s", "temperature_c", "supply_v", "mount_deg", "flip")
+    changing = [c for c in (table.column(name) for name in names if name in table) if np.ptp(c) > 0]
+    by_column = [part * (c - c.mean()) / c.std() for c in changing for part in linear]
+    columns = np.column_stack([*square, *cubes, *by_column])
+    return columns / np.linalg.norm(columns, axis=0).clip(np.finfo(float).tiny)
+
+
 def _distance_text(size: float, unit: str) -> str:
     return f"{1e3 * size:.3g} mV" if unit == "V" else f"{size:.3g} {unit}"
 
 
-def _clusters(columns: Array, outputs: Array) -> tuple[NDArray[np.bool_], float, Array]:
+def _clusters(columns: Array, outputs: Array, shared: Array | None = None) -> tuple[NDArray[np.bool_], float, Array]:
     """(mask of the second group, share of the residual's variance within groups, distance of the groups by axis).
 
-    The first groups are those by the sign of the residual, for two biases, or by its sign along the output, for two
-    scale factors.
+    Both groups have their own response to `columns` and the same to `shared`. The first groups are those by the sign
+    of the residual, for two biases, or by its sign along the output, for two scale factors.
     """
-    basis = np.linalg.qr(columns)[0]
+    basis = np.linalg.svd(columns if shared is None else shared, full_matrices=False)[0]
     residual = outputs - basis @ (basis.T @ outputs)
     size = rms(residual.T)
     if not np.all(size > 0):
@@ -240,28 +260,35 @@ def _clusters(columns: Array, outputs: Array) -> tuple[NDArray[np.bool_], float,
     main = np.linalg.svd(residual / size, full_matrices=False)[0][:, 0]
     along_output = np.sum(residual / size**2 * (outputs - outputs.mean(axis=0)), axis=1)
     labels, within_share, distance = min(
-        (_refined_clusters(start > 0, columns, outputs / size) for start in (main, along_output)), key=_within_share
+        (_refined_clusters(start > 0, columns, residual / size, basis) for start in (main, along_output)),
+        key=_within_share,
     )
     return labels, within_share, distance * size
 
 
 def _refined_clusters(
-    labels: NDArray[np.bool_], columns: Array, scaled: Array
+    labels: NDArray[np.bool_], columns: Array, scaled: Array, basis: Array
 ) -> tuple[NDArray[np.bool_], float, Array]:
-    """The result of `_clusters` for outputs (n, axes) in units of their residual, by iteration from these groups."""
-    errors, fitted = np.zeros((2, len(scaled))), np.zeros((2, *scaled.shape))
+    """The result of `_clusters` for residuals (n, axes) in units of their rms, by iteration from these groups.
+
+    The residuals are orthogonal to the `basis` of what both groups share.
+    """
+    errors, difference = np.zeros((2, len(scaled))), np.zeros_like(scaled)
     for _ in range(ROUNDS):
-        for group, rows in enumerate((~labels, labels)):
-            if rows.sum() < 2 * columns.shape[1]:
-                return labels, 1.0, np.zeros(scaled.shape[1])
-            fitted[group] = columns @ np.linalg.lstsq(columns[rows], scaled[rows], rcond=EXCITED_G)[0]
-            errors[group] = np.sum((scaled - fitted[group]) ** 2, axis=1)
+        if min(labels.sum(), (~labels).sum()) < 2 * columns.shape[1]:
+            return labels, 1.0, np.zeros(scaled.shape[1])
+        own = columns * labels[:, None]
+        beyond = own - basis @ (basis.T @ own)
+        slope = np.linalg.lstsq(beyond, scaled, rcond=EXCITED_G)[0]
+        difference = columns @ slope
+        shared = basis @ (basis.T @ (own @ slope))
+        errors = np.array([np.sum((scaled + shared - group) ** 2, axis=1) for group in (0 * difference, difference)])
         updated = errors[1] < errors[0]
         if np.array_equal(updated, labels):
             break
         labels = updated
     within_share = float(np.mean(np.min(errors, axis=0))) / scaled.shape[1]
-    return labels, within_share, rms((fitted[1] - fitted[0]).T)
+    return labels, within_share, rms(difference.T)
 
 
 def _within_share(clusters: tuple[NDArray[np.bool_], float, Array]) -> float:
@@ -270,21 +297,32 @@ def _within_share(clusters: tuple[NDArray[np.bool_], float, Array]) -> float:
 
 def _patterned(table: Table, labels: NDArray[np.bool_]) -> bool:
     """Whether the groups depend on time, direction, path or angle: then they are an effect of the sensor or rig."""
+    share = float(labels.mean())
+    by_chance = share**2 + (1 - share) ** 2  # neighbours in one group, where the groups are mixed at random
     orders = [np.arange(table.n)]
     orders += [np.argsort(table.column(name), kind="stable") for name in ("temperature_c", "supply_v") if name in table]
-    if any(_agreeing(labels, order) > PATTERNED for order in orders):
+    if any(_beyond_chance(_agreeing(labels, order), by_chance) for order in orders):
         return True
     if table.type.turning:
-        return _agreeing(labels, np.argsort(table.column("rate_deg_s"), kind="stable")) > PATTERNED
+        return _beyond_chance(_agreeing(labels, np.argsort(table.column("rate_deg_s"), kind="stable")), by_chance)
     alpha, beta = table.column("alpha_deg"), table.column("beta_deg")
-    if min(_agreeing(labels, *_order_along(beta, alpha)), _agreeing(labels, *_order_along(alpha, beta))) > PATTERNED:
+    along = min(_agreeing(labels, *_order_along(beta, alpha)), _agreeing(labels, *_order_along(alpha, beta)))
+    if _beyond_chance(along, by_chance):
         return True
     kinds = [table.column(name) for name in ("direction", "flip", "mount_deg") if name in table]
     return any(
-        sum(max(labels[values == value].sum(), (~labels[values == value]).sum()) for value in np.unique(values))
-        > PATTERNED * table.n
+        _beyond_chance(
+            sum(max(labels[values == value].sum(), (~labels[values == value]).sum()) for value in np.unique(values))
+            / table.n,
+            max(share, 1 - share),
+        )
         for values in kinds
     )
+
+
+def _beyond_chance(agreement: float, by_chance: float) -> bool:
+    """Whether rows agree in their group by far more than two groups of this size that are mixed at random."""
+    return agreement - by_chance > PATTERNED * (1 - by_chance)
 
 
 def _agreeing(labels: NDArray[np.bool_], order: NDArray[np.intp], pairs: NDArray[np.bool_] | None = None) -> float:

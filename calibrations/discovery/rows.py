@@ -14,7 +14,7 @@ from calibrations.discovery.dataset import Dataset
 from calibrations.discovery.findings import Candidate, Findings, Place, Step
 from calibrations.discovery.fit_doubts import fit_doubts
 from calibrations.discovery.outliers import fit_without, outliers_in_fit
-from calibrations.discovery.places import places
+from calibrations.discovery.places import fails_by_scatter_only, places
 from calibrations.discovery.plausibility import refusal, rejection
 from calibrations.discovery.row_search import ONE_ORIENTATION, RowSearch
 from calibrations.discovery.verdict import Finding
@@ -127,6 +127,10 @@ class Rows(Dataset[Fit]):
     def noise_known(self, fit: Fit) -> bool:
         """Whether it follows from the samples of each row."""
         return fit.noise.known
+
+    def fails_by_scatter_only(self, fit: Fit) -> bool:
+        """Whether a model fails nowhere if the scatter from row to row counts as noise."""
+        return fails_by_scatter_only(fit)
 
     def places(self, fit: Fit) -> tuple[Place, ...]:
         """Stretches of columns."""

@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from calibrations.criteria import MATERIAL
+from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import fit
 from calibrations.fitting.sensed import scales
-from calibrations.loop import compare, diagnose
+from calibrations.loop import compare, dataset, diagnose
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
@@ -89,6 +91,20 @@ def test_so_few_poses_that_any_misfit_could_be_slow_noise_are_no_excuse() -> Non
     found = compare(few, read_model("linear"))
     assert np.all(found.fit.excess > 100)
     assert not found.adequate
+
+
+def test_scatter_from_row_to_row_is_judged_by_the_search() -> None:
+    """A comparison and a diagnosis give one verdict on rows that scatter 1.4 times more than their samples."""
+    columns = synthetic.turns((90, 30, 150), step_deg=15.0)
+    x, y, _ = synthetic.components(columns)
+    alternating = 1.2e-4 * (np.arange(len(x)) % 2)
+    scattered = synthetic.poses(columns, x + 2.5 + alternating, y + 2.5 - alternating)
+    effects = {"cubic-nonlinearity": catalogue()["cubic-nonlinearity"]}
+    compared = dataset(scattered).compare(read_model("linear"), effects)
+    diagnosed = diagnose(scattered, read_model("linear"), effects)
+    assert compared.fit.pooled_excess > MATERIAL
+    assert compared.adequate is (diagnosed.verdict == "adequate")
+    assert "scatter between rows" in compared.report()
 
 
 def positions(scale_y: float) -> Table:

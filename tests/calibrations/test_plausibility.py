@@ -56,6 +56,20 @@ def two_sensors(d: Data) -> Data:
     return replace(d, vx=d.vx + offset, vy=d.vy + offset)
 
 
+def some_rows_of_another(d: Data) -> Data:
+    offset = 0.02 * (np.random.default_rng(1).random(len(d.vx)) < 0.15)
+    return replace(d, vx=d.vx + offset, vy=d.vy + offset)
+
+
+def two_sensors_with_strong_effects(d: Data) -> Data:
+    """Rows mixed at random, of sensors with the same cubic and hysteresis, ten times as large as their distance."""
+    table = replace(d, samples=False).table()
+    offset = 0.005 * (np.random.default_rng(2).random(len(d.vx)) < 0.5)
+    x, y = d.vx - 2.5, d.vy - 2.5
+    same = 0.02 * table.column("direction")
+    return replace(d, vx=d.vx + 0.05 * x**3 + same + offset, vy=d.vy - 0.05 * y**2 * x + same + offset)
+
+
 def two_scales(d: Data) -> Data:
     factor = 1 + 0.02 * (np.arange(len(d.vx)) % 2)
     return replace(d, vx=2.5 + (d.vx - 2.5) * factor, vy=2.5 + (d.vy - 2.5) * factor)
@@ -86,6 +100,8 @@ DEAD: dict[str, tuple[Callable[[Data], Data], str]] = {
 WRONG: dict[str, tuple[Callable[[Data], Data], str]] = {
     "two sensors": (two_sensors, "two groups of rows"),
     "two scale factors": (two_scales, "two groups of rows"),
+    "some rows of another sensor": (some_rows_of_another, "two groups of rows"),
+    "two sensors with strong effects": (two_sensors_with_strong_effects, "two groups of rows"),
     "two sensors, noise unknown": (lambda d: replace(two_sensors(d), samples=False), "differ by 20 mV"),
     "channels": (lambda d: replace(d, vx=d.vy, vy=d.vx), "the channels are exchanged"),
     "angles": (lambda d: replace(d, alpha=d.beta, beta=d.alpha), "alpha_deg and beta_deg are exchanged"),
