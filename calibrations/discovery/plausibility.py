@@ -239,7 +239,7 @@ def _shared(table: Table, known_input: Array) -> Array:
     changing = [c for c in (table.column(name) for name in names if name in table) if np.ptp(c) > 0]
     by_column = [part * (c - c.mean()) / c.std() for c in changing for part in linear]
     columns = np.column_stack([*square, *cubes, *by_column])
-    return columns / np.linalg.norm(columns, axis=0).clip(np.finfo(float).tiny)
+    return np.asarray(columns / np.linalg.norm(columns, axis=0).clip(np.finfo(float).tiny))
 
 
 def _distance_text(size: float, unit: str) -> str:
