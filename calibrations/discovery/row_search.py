@@ -41,7 +41,7 @@ from calibrations.fitting.determined import undetermined
 from calibrations.fitting.fit import Fit, refit
 from calibrations.free_forms.place_names import place_of_effect, shown_at_rest
 from calibrations.geometry.orientation import one_orientation
-from calibrations.means.noise import correlation_known
+from calibrations.means.noise import correlation_known, neighbours_contradict
 from calibrations.table import Table
 from calibrations.text import sentence
 
@@ -120,8 +120,8 @@ class RowSearch:
         from calibrations.discovery.structural import search_structure  # only this search needs it
 
         structural = search_structure(start, effects)
-        if structural.steps and path.steps and _unseen_error(path.end) <= _unseen_error(structural.end):
-            return self._path_findings(path, effects, origin)  # the larger model must predict unseen rows better
+        if structural.steps and path.steps and _cross_validated(path.end) <= _cross_validated(structural.end):
+            return self._path_findings(path, effects, origin)  # the larger model must predict better
         findings = self._structural_findings(structural, outliers, structural.start if origin is start else origin)
         if not (findings.steps or path.steps) and structure_of(path.end) is None:
             return self._path_findings(path, effects, origin)  # slow noise looks like a pattern in white noise
@@ -244,12 +244,13 @@ def _explained(path: Path) -> bool:
     end = path.end
     largest_excess = NO_MORE_THAN_NOISE if correlation_known(end.table) or one_orientation(end.table) else np.inf
     as_noise = end.noise.known and LEAST_NOISE < end.pooled_excess < largest_excess
+    as_noise = as_noise and not neighbours_contradict(end.residual / end.noise.white)
     return as_noise and structure_of(end) is None and is_complete(path)
 
 
-def _unseen_error(fit: Fit) -> float:
-    """Rms error on unseen rows, in the output's unit: the floors of two fits may differ."""
-    return fit.held_out_excess * float(np.sqrt(np.mean(fit.noise.floor**2)))
+def _cross_validated(fit: Fit) -> float:
+    """Rms error by cross-validation, in the output's unit: the floors of two fits may differ."""
+    return fit.cross_validated_excess * float(np.sqrt(np.mean(fit.noise.floor**2)))
 
 
 def _start_candidates(path: Path, final: FinalModel) -> tuple[Candidate, ...]:

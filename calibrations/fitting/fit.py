@@ -164,16 +164,36 @@ class Fit(Result):
         """The same when columns (channels, n, k) join the fit."""
         jacobian = np.concatenate([self.jacobian, extra], axis=2)
         theta = np.append(self.theta, np.zeros(extra.shape[2]))
-        prior = np.append(self.problem.layout.prior, np.full(extra.shape[2], np.inf))
-        return held_out(self.residual, jacobian, self.noise, folds(self.table), theta, prior)
+        no_bound = np.full(extra.shape[2], np.inf)
+        low, high = self.problem.layout.bounds
+        bounds = np.append(low, -no_bound), np.append(high, no_bound)
+        prior = np.append(self.problem.layout.prior, no_bound)
+        return held_out(self.residual, jacobian, self.noise, folds(self.table), theta, prior, bounds)
+
+    @cached_property
+    def cross_validated_excess(self) -> float:
+        """Excess by generalised cross-validation, in which no row weighs more than the others.
+
+        The error on unseen rows is mostly that of the rows that alone determine a parameter, such as the few poses of
+        a saturation. Source: Golub, Heath and Wahba, Technometrics 21 (1979) 215.
+        """
+        size = np.maximum(np.linalg.norm(self.whitened[:, 1:], axis=0), 1e-300)
+        columns, prior = self.whitened[:, 1:] / size, self.problem.layout.prior * size
+        products = columns.T @ columns
+        parameters = float(np.trace(np.linalg.lstsq(products + np.diag(prior**-2.0), products, rcond=1e-12)[0]))
+        rows = self.residual.size
+        return self.pooled_excess * rows / max(rows - parameters, 1.0)
 
     def share_left(self, start: Fit) -> float:
         """Part of the excess variance of `start` that this fit does not explain.
 
-        On unseen rows where it has priors, because a free form follows the rows of its fit, and in motion (few rows).
+        Where it has priors by cross-validation, because a free form follows the rows of its fit; in motion, which has
+        few rows, on unseen ones.
         """
-        if len(self.problem.layout.prior_rows) or self.table.type.moving:
+        if self.table.type.moving:
             return max(self.held_out_excess**2 - 1, 0.0) / max(start.held_out_excess**2 - 1, 1e-9)
+        if len(self.problem.layout.prior_rows):
+            return max(self.cross_validated_excess**2 - 1, 0.0) / max(start.cross_validated_excess**2 - 1, 1e-9)
         return max(self.pooled_excess**2 - 1, 0.0) / max(start.pooled_excess**2 - 1, 1e-9)
 
     @property

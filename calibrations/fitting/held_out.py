@@ -14,6 +14,7 @@ from calibrations.means.noise import Noise, rms
 from calibrations.table import Array, Table
 
 FOLDS, MOST_FOLDS = 10, 60  # of poses, and of rows
+BOUND_ROUNDS = 8
 
 
 def folds(table: Table) -> NDArray[np.intp]:
@@ -29,26 +30,50 @@ def folds(table: Table) -> NDArray[np.intp]:
 
 
 def held_out(
-    residual: Array, jacobian: Array, noise: Noise, fold: NDArray[np.intp], theta: Array, prior: Array
+    residual: Array,
+    jacobian: Array,
+    noise: Noise,
+    fold: NDArray[np.intp],
+    theta: Array,
+    prior: Array,
+    bounds: tuple[Array, Array],
 ) -> float:
     """Pooled rms of the error on unseen rows over the noise floor.
 
-    From residual (channels, n), jacobian (channels, n, p), the fold of each row (n,), the parameters (p,) and the
-    standard deviation of their priors (p,), inf where there is none.
+    From residual (channels, n), jacobian (channels, n, p), the fold of each row (n,), the parameters (p,), the
+    standard deviation of their priors (p,), inf where there is none, and their bounds. A parameter that the other rows
+    determine badly, such as the loss of a saturation, keeps within its bounds.
     """
     channels, n, p = jacobian.shape
     size = np.linalg.norm(jacobian.reshape(channels * n, p), axis=0)
-    J = jacobian / np.where(size > 0, size, 1.0)
+    size = np.where(size > 0, size, 1.0)
+    J = jacobian / size
     white = noise.whiten(np.concatenate([J, residual[:, :, None]], axis=2)).reshape(channels, n, p + 1)
     total = np.einsum("cni,cnj->ij", white, white)
-    precision = 1 / (prior * np.where(size > 0, size, 1.0)) ** 2
+    precision = 1 / (prior * size) ** 2
     ridge = 1e-12 * np.trace(total[:p, :p]) / max(p, 1) * np.eye(p) + np.diag(precision)
     pulled = precision * theta * size  # towards the mean of the prior
+    low, high = ((bound - theta) * size for bound in bounds)
     error = np.empty_like(residual)
     for k in range(int(fold.max()) + 1):
         rows = fold == k
         part = white[:, rows].reshape(-1, p + 1)
         G = total - part.T @ part
-        change = np.linalg.solve(G[:p, :p] + ridge, G[:p, p] + pulled)
+        change = _bounded(G[:p, :p] + ridge, G[:p, p] + pulled, low, high)
         error[:, rows] = residual[:, rows] - J[:, rows] @ change
     return float(np.sqrt(np.mean((rms(error) / noise.floor) ** 2)))
+
+
+def _bounded(products: Array, side: Array, low: Array, high: Array) -> Array:
+    """The least-squares change (p,) within its bounds: an entry beyond its bound stays there, the others follow."""
+    change = np.linalg.solve(products, side)
+    free = np.ones(len(side), dtype=bool)
+    for _ in range(BOUND_ROUNDS):
+        out_of_bounds = free & ((change < low) | (change > high))
+        if not out_of_bounds.any():
+            break
+        change = np.clip(change, low, high)
+        free &= ~out_of_bounds
+        follows = side[free] - products[np.ix_(free, ~free)] @ change[~free]
+        change[free] = np.linalg.solve(products[np.ix_(free, free)], follows)
+    return np.asarray(np.clip(change, low, high))

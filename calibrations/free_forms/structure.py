@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.special import chdtri  # scipy.stats takes 0.4 s to load
 
-from calibrations.criteria import SIGNIFICANT
+from calibrations.criteria import LEAST_NOISE, SIGNIFICANT
 from calibrations.free_forms.bases import Line
 from calibrations.free_forms.chain import Coefficients, ModelEffects, state_at
 from calibrations.free_forms.form import CROSS, Form
@@ -23,9 +23,9 @@ from calibrations.free_forms.selection import ENTER
 from calibrations.free_forms.stairs import SAW, Stairs
 from calibrations.geometry.orientation import out_of_plane
 from calibrations.geometry.smooth import smooth_columns
+from calibrations.means.noise import NORMAL_MEDIAN, neighbour_std, neighbours_contradict
 from calibrations.table import Array, Table
 
-TOO_SMALL = 0.93  # of a stated noise: a residual below contradicts it
 LARGER_NOISE = 1.5  # times the stated: less may be forms that are nearly right
 FLOOR_ROUNDS = 2  # in which the noise floor is found from the residual
 NO_NOISE = 1e-3  # of the noise of all rows: all samples of a mean are one code of the converter
@@ -320,9 +320,7 @@ def _neighbours(data: PoseData) -> Array:
     y = data.outputs - (smooth @ np.linalg.lstsq(smooth, data.outputs.T, rcond=1e-9)[0]).T
     if data.n < 5:
         return np.full(y.shape, float(np.std(y)) or 1.0)
-    second = y[:, 2:] - 2 * y[:, 1:-1] + y[:, :-2]
-    std = np.median(np.abs(second), axis=1) / 0.6745 / np.sqrt(6)
-    return np.tile(np.maximum(std, 1e-9 * np.ptp(y, axis=1))[:, None], (1, data.n))
+    return np.tile(np.maximum(neighbour_std(y), 1e-9 * np.ptp(y, axis=1))[:, None], (1, data.n))
 
 
 def _scatter(result: SearchResult, source: FloorSource, uniform: bool) -> Array | None:
@@ -333,8 +331,9 @@ def _scatter(result: SearchResult, source: FloorSource, uniform: bool) -> Array 
     """
     residual = result.residual
     ratio = result.ratio
-    agrees = ratio > TOO_SMALL and not _noisy_rows_contradict(result)
-    if agrees and (source is FloorSource.SAMPLES or ratio < 1 / TOO_SMALL):
+    differ_less = neighbours_contradict(residual.reshape(result.white.shape) * np.sqrt(residual.size / result.freedom))
+    agrees = ratio > LEAST_NOISE and not differ_less and not _noisy_rows_contradict(result)
+    if agrees and (source is FloorSource.SAMPLES or ratio < 1 / LEAST_NOISE):
         return None
     r = residual.reshape(result.white.shape) * result.white
     white = np.stack([_rows_noise(result, k, row, uniform) for k, row in enumerate(r)])
@@ -350,15 +349,15 @@ def _noisy_rows_contradict(result: SearchResult) -> bool:
     noisy = white > np.sqrt(np.mean(white**2, axis=1, keepdims=True))
     rows = int(noisy.sum())
     squares = float(np.sum(residual[noisy] ** 2)) * residual.size / result.freedom
-    return rows > 0 and squares < min(TOO_SMALL**2 * rows, float(chdtri(rows, 1 - SIGNIFICANT)))
+    return rows > 0 and squares < min(LEAST_NOISE**2 * rows, float(chdtri(rows, 1 - SIGNIFICANT)))
 
 
 def _rows_noise(result: SearchResult, k: int, residual: Array, uniform: bool) -> Array:
     """Noise of each row of one channel, (n,): a constant part, and parts that follow the samples' variance."""
-    usual = np.median(np.abs(residual - np.median(residual))) / 0.6745
+    usual = np.median(np.abs(residual - np.median(residual))) / NORMAL_MEDIAN
     spread = result.data.spread
     if uniform or spread is None or np.ptp(spread[k]) == 0:
-        return np.full(len(residual), usual)
+        return np.full(len(residual), min(usual, neighbour_std(residual[None])[0]))
     power = spread[k] ** 2 / np.mean(spread[k] ** 2)
     shares = np.column_stack([np.ones(len(residual)), power, power**2])  # the last: an effect of a noisy variance
     variance = np.full(len(residual), np.inf)

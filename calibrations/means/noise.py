@@ -22,8 +22,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import chdtri  # scipy.stats takes 0.4 s to load
 
-from calibrations.criteria import NO_SCATTER
+from calibrations.criteria import LEAST_NOISE, NO_SCATTER, SIGNIFICANT
 from calibrations.means.whitening import whiten, whiten_transposed
 from calibrations.table import Array, Table, std_column
 
@@ -31,6 +32,8 @@ Processes = tuple[tuple[float, float], ...]  # (standard deviation, time constan
 
 BEYOND = 10.0  # lengths of a record: the longest time constants of flicker noise
 MOST_CORRELATED_ROWS = 400  # rows that degrees of freedom are computed on
+NORMAL_MEDIAN = 0.6745  # of the size of normal noise
+DIFFERENCES_PER_ROW = 1.944  # second differences that tell as much as one independent row: 1 + 2 (16 + 1) / 36
 SLOW_FREEDOM = 60.0  # as a process has whose time constant is a hundredth of the record
 
 
@@ -186,6 +189,27 @@ def _about_mean(processes: Processes, span_s: float) -> float:
 def rms(x: Array) -> Array:
     """Root mean square along the last axis."""
     return np.asarray(np.sqrt(np.mean(x * x, axis=-1)))
+
+
+def neighbour_std(rows: Array) -> Array:
+    """Noise of rows (channels, n) in order of time, from the median of their second differences, (channels,)."""
+    return np.asarray(np.median(np.abs(_second_differences(rows)), axis=1) / NORMAL_MEDIAN)
+
+
+def neighbours_contradict(whitened: Array) -> bool:
+    """Whether whitened residuals (channels, n), in order of time, differ by clearly less than white noise of 1.
+
+    Slow noise and missing effects add to the differences, so that smaller ones always show that the noise is less.
+    """
+    differences = _second_differences(whitened)
+    freedom = differences.size / DIFFERENCES_PER_ROW
+    squares = float(np.sum(differences**2)) / DIFFERENCES_PER_ROW
+    return squares < min(LEAST_NOISE**2 * freedom, float(chdtri(max(freedom, 1.0), 1 - SIGNIFICANT)))
+
+
+def _second_differences(rows: Array) -> Array:
+    """Second differences (channels, n - 2) of unit variance where the rows are white noise of unit variance."""
+    return np.asarray((rows[:, 2:] - 2 * rows[:, 1:-1] + rows[:, :-2]) / np.sqrt(6.0))
 
 
 def white_only(white: Array | None, gap_s: Array, channels: int, known_noise: tuple[Processes, ...] = ()) -> Noise:

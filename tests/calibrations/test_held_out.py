@@ -37,8 +37,9 @@ def test_equals_a_refit_without_the_fold(square: float) -> None:
             error[c, out] = found.table.outputs[out, c] - X[out] @ kept
     explicit = np.sqrt(np.mean(np.mean(error**2, axis=1) / found.noise.floor**2))
     white = white_only(found.problem.white, found.noise.gap_s, 2)
+    layout = found.problem.layout
     assert held_out(
-        found.residual, found.jacobian, white, number, found.theta, found.problem.layout.prior
+        found.residual, found.jacobian, white, number, found.theta, layout.prior, layout.bounds
     ) == pytest.approx(explicit, rel=1e-8)
 
 
@@ -92,4 +93,20 @@ def test_equals_a_refit_without_the_fold_where_parameters_have_priors() -> None:
         step = np.linalg.lstsq(X, -y, rcond=None)[0]
         error[:, ~kept] = r[:, ~kept] + J[:, ~kept] @ step
     explicit = np.sqrt(np.mean(np.mean(error**2, axis=1) / floor**2))
-    assert held_out(r, J, white, number, found.theta, prior) == pytest.approx(explicit, rel=1e-6)
+    assert held_out(r, J, white, number, found.theta, prior, found.problem.layout.bounds) == pytest.approx(
+        explicit, rel=1e-6
+    )
+
+
+def test_a_parameter_without_its_rows_keeps_within_its_bounds() -> None:
+    """Without the rows of a fold, the second parameter follows their noise; its bound limits the error on the fold."""
+    x = np.linspace(-1.0, 1.0, 40)
+    fold = np.where(np.abs(x) > 0.9, 0, 1)
+    rare = np.where(fold == 0, 30.0, 1e-3 * np.sign(x))
+    J = np.column_stack([x, rare])[None]
+    residual = np.random.default_rng(2).standard_normal((1, 40)) - J[:, :, 1]
+    noise, theta, prior = white_only(np.ones((1, 40)), np.ones(40), 1), np.zeros(2), np.full(2, np.inf)
+    free = (np.full(2, -np.inf), np.full(2, np.inf))
+    limited = (np.array([-np.inf, -0.5]), np.array([np.inf, 1.0]))
+    assert held_out(residual, J, noise, fold, theta, prior, free) > 100.0
+    assert held_out(residual, J, noise, fold, theta, prior, limited) < 30.0

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from calibrations.means.noise import inflation, measured_inflation, norm_std, white_std
+from calibrations.means.noise import (
+    inflation,
+    measured_inflation,
+    neighbour_std,
+    neighbours_contradict,
+    norm_std,
+    white_std,
+)
 from calibrations.table import Array, Table
 
 FILTER = {"filter_corner_hz": 15.07, "sample_rate_hz": 1000.0}
@@ -90,3 +97,20 @@ def test_a_measured_inflation_comes_before_the_filters() -> None:
     table = Table.from_columns("poses", both, {**FILTER, "noise_inflation_x": 50.0})
     np.testing.assert_allclose(white_std(table)[0], [0.1, np.sqrt(inflation(table, "y") / 5000)])
     assert inflation(table, "y") == inflation(table) == pytest.approx(21.14, abs=0.01)
+
+
+def test_rows_of_the_stated_noise_do_not_contradict_it() -> None:
+    random = np.random.default_rng(5)
+    for n in (3, 12, 100, 500):
+        false_alarms = sum(neighbours_contradict(random.standard_normal((2, n))) for _ in range(500))
+        assert false_alarms <= 500 * 0.01  # SIGNIFICANT of them, and more of short tables, whose rows are dependent
+    assert not neighbours_contradict(np.zeros((2, 2)))
+
+
+def test_rows_that_differ_by_less_contradict_the_noise_whatever_slow_error_they_have() -> None:
+    random, t = np.random.default_rng(6), np.linspace(0.0, 1.0, 200)
+    for level in (0.5, 0.8):
+        rows = level * random.standard_normal((2, 200)) + np.sin(7 * t)
+        assert np.sqrt(np.mean(rows**2)) > 0.8
+        assert neighbours_contradict(rows)
+        assert neighbour_std(rows) == pytest.approx([level, level], rel=0.2)
