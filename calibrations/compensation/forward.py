@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from keyword import iskeyword
 from typing import Any
 
@@ -25,7 +26,7 @@ from calibrations.effects.logged import RATE
 from calibrations.errors import ModelError
 from calibrations.free_forms.effect import FreeForm
 from calibrations.model import Model, Term
-from calibrations.model.chain import Step, scaled
+from calibrations.model.chain import STAGES, Step, scaled, stage_of, staged_part
 from calibrations.table import AXES, NUMBERS
 from calibrations.tables import KINDS
 
@@ -200,9 +201,14 @@ def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str,
             v = v + _response(effect, a, table, p)
         if effect.of_force:
             of_force = of_force + (v - before_v)
-    for effect, p in steps:
-        if effect.scales:
-            v = v + _response(effect, scaled(a, of_force, steps), table, p)
+    force = scaled(a, of_force, steps) if any(effect.of_force and not effect.scales for effect, _ in steps) else a
+    for stage in STAGES[1:]:
+        response = force
+        for effect, p in steps:
+            if stage_of(effect) == stage:
+                part = staged_part(stage, partial(_response, effect, table=table, p=p), a, response)
+                v = v + part
+                force = scaled(force, part, steps) if effect.of_force else force
     for effect, p in steps:
         if isinstance(effect, FreeForm) and "output" in effect.places:
             v = v + trace_free_form(effect, a, v, table, p)

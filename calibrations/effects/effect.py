@@ -116,8 +116,9 @@ class Effect:
     rounds     its output is a staircase, whose slope says nothing
     left_out   why a compensation in the sensor's product cannot undo it; "" where it can
     incidental  nobody plans what excites it: a table that cannot show it is no reason for a remark
-    of_force   it adds what the sensor makes of the force, which a drift of the sensitivity multiplies
-    scales     it is a drift of the sensitivity: it multiplies what the sensor makes of the force
+    of_force   it adds what the sensor makes of the force, which changes of the sensitivity multiply
+    scales     it is a change of the sensitivity: it multiplies what the sensor makes of the force. With `of_force` it
+               follows other forces, and drifts of the sensitivity multiply it; without, it is such a drift
     memory     how many arrays (n, 3) `follow` keeps from one sample to the next; where it is 0, `transduction` follows
                the force of its own row alone, and derivatives rely on that
     """

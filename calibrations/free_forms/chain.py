@@ -120,12 +120,17 @@ def state_at(
             part = comp.jacobian(undrifted) @ values.of[comp.name]
             response += part
             of_force += part if comp.of_force else 0.0
-    if drifts := [comp for comp in active if comp.stage == "response" and comp.scales]:
-        # a drift of the sensitivity multiplies all that the sensor makes of the force
-        total_force = force.copy()
-        total_force[:, :c] += (of_force / np.linalg.norm(rows, axis=1)[:, None]).T
-        drifting = replace(undrifted, force=total_force)
-        response += sum(comp.jacobian(drifting) @ values.of[comp.name] for comp in drifts)
+    for is_of_force in (True, False):
+        # a change of the sensitivity multiplies all that the sensor makes of the force; a drift multiplies this change
+        changing = [c for c in active if c.stage == "response" and c.scales and c.of_force is is_of_force]
+        added = of_force / np.linalg.norm(rows, axis=1)[:, None]
+        for k in range(c if changing else 0):
+            own_force = force.copy()
+            own_force[:, k] += added[k]
+            scaling = replace(undrifted, force=own_force)
+            part = sum(comp.jacobian(scaling)[k] @ values.of[comp.name] for comp in changing)
+            response[k] += part
+            of_force[k] += part if is_of_force else 0.0
 
     def output(response: Array) -> Array:
         unconverted = State(data, force, a, by_alpha, by_beta, by_tilt, response, response, unit_gain)

@@ -15,7 +15,7 @@ from calibrations.table import Array
 PLACES_OF_FORCE = (
     "own-response", "cross-response", "z-response", "scale-over-cross", "scale-over-z", "force", "history",
 )  # fmt: skip
-DRIFTS = ("temperature-scale", "time-scale")
+SCALING = ("scale-over-cross", "scale-over-z", "temperature-scale", "time-scale")
 PRODUCT, GENERAL = 2.0, 8.0  # prices: simple before product before general force
 Columns = Callable[[State], Array]  # (channels, n, m)
 Starts = tuple[tuple[str, str, float], ...]
@@ -70,8 +70,8 @@ class Component:
 
     @property
     def scales(self) -> bool:
-        """Whether it is a drift of the sensitivity."""
-        return self.form.scales if self.form is not None else self.place in DRIFTS
+        """Whether it is a change of the sensitivity."""
+        return self.form.scales if self.form is not None else self.place in SCALING
 
     def jacobian(self, state: State) -> Array:
         """d output / d coefficients, (channels, n, m)."""

@@ -89,8 +89,8 @@ class Form:
 
     @property
     def scales(self) -> bool:
-        """Whether it is a drift of the sensitivity."""
-        return self.factor == "force" and not self.of_force
+        """Whether it is a change of the sensitivity."""
+        return self.factor == "force"
 
     @property
     def of_table(self) -> bool:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +30,8 @@ from calibrations.table import Array
 
 COARSE = (1e-3, 2e-5)  # of the misfit, at each linearisation: less may be a second-order remainder
 ROUNDS = 7
+SETTLING = 5  # Gauss-Newton steps after components are left out
+SMALL_GAIN = 1.0  # of twice the log-likelihood
 LARGEST = 4.0  # of the mean square of the first misfit: more is two components against each other
 HALVINGS = 6  # of a step that overshoots
 NOISE_ALONE, FEW_COMPONENTS = 1.04, 3  # residual over noise and components of a search that needs no second beginning
@@ -131,8 +133,8 @@ def search(
 def _likeliest(data: PoseData, white: Array, model_effects: ModelEffects, general: bool, flicker: bool) -> SearchResult:
     """The likeliest end of several beginnings."""
 
-    def descent(catalogue_first: bool, loops: bool = False) -> SearchResult:
-        return _descent(data, white, model_effects, general, flicker, catalogue_first, loops)
+    def descent(catalogue_first: bool, loops: bool = False, origin: SearchResult | None = None) -> SearchResult:
+        return _descent(data, white, model_effects, general, flicker, catalogue_first, loops, origin)
 
     by_name = descent(catalogue_first=True)
     if by_name.ratio < NOISE_ALONE and len(by_name.active) <= FEW_COMPONENTS:
@@ -140,8 +142,8 @@ def _likeliest(data: PoseData, white: Array, model_effects: ModelEffects, genera
     best = min(by_name, descent(catalogue_first=False), key=lambda end: end.criterion)
     if any(best.component(name).place == "history" for name in best.active):
         looped = descent(catalogue_first=True, loops=True)
-        return looped if looped.criterion < best.criterion - SPILL * abs(best.criterion) else best
-    return best
+        best = looped if looped.criterion < best.criterion - SPILL * abs(best.criterion) else best
+    return _without_spilt(best, lambda origin: descent(catalogue_first=False, origin=origin))
 
 
 def _descent(
@@ -152,8 +154,9 @@ def _descent(
     flicker: bool,
     catalogue_first: bool,
     loops: bool,
+    origin: SearchResult | None = None,
 ) -> SearchResult:
-    """Rounds of selection and Gauss-Newton steps from the base."""
+    """Rounds of selection and Gauss-Newton steps from the base, or from the components of an earlier search."""
     values = start(data, model_effects)
     state = state_at(data, model_effects, values, ())
     components = [
@@ -170,13 +173,17 @@ def _descent(
     first = find_saw(data, state, white, data.outputs - state.predicted, rejected, ENTER)
     components += [first] if first is not None else []
     caution = 1.0
+    first_round = 0
+    if origin is not None:
+        values, state, components = origin.values, origin.state, list(origin.components)
+        variances, first_round = dict(origin.sizes.variances), len(COARSE)
     beginning = "effects first" if catalogue_first else "all forms together"
     beginning += ", loops" * loops + ", flicker" * flicker
-    for number in range(ROUNDS):
+    for number in range(first_round, ROUNDS):
         report(f"searching for places ({beginning}), pass {number + 1} of at most {ROUNDS}")
         X, blocks, scales = whitened(state, model_effects, values, components, scales, white)
         g = gram(X, blocks, scales, b)
-        if number == 0:
+        if number == first_round:
             X, scales = beside_base(X, g, b)
             g = gram(X, blocks, scales, b)
             largest = LARGEST * g.squares / g.rows * floor**2
@@ -226,6 +233,72 @@ def _descent(
     values = coefficients(g, sizes)
     state = state_at(data, model_effects, values, components)
     return SearchResult(data, model_effects, white, components, g, X, sizes, values, state, path, flicker)
+
+
+def _without_spilt(best: SearchResult, descent: Callable[[SearchResult], SearchResult]) -> SearchResult:
+    """The search without components that hold the remainder of others, if that is likelier.
+
+    While the first components are found, what they leave is of second order in large effects, and looks like other
+    places. The derivatives at the end rely on these. So each place, and each component, is left out in turn with
+    Gauss-Newton steps of its own; what is then missing is searched for again.
+    """
+    simplified = best
+    while (simpler := _likelier_without_one(simplified)) is not None:
+        simplified = simpler
+    if simplified is best:
+        return best
+    names = set(simplified.sizes.variances)
+    components = [simplified.component(c.name) if c.name in names else c for c in best.components]
+    return min(best, descent(replace(simplified, components=components)), key=lambda end: end.criterion)
+
+
+def _likelier_without_one(result: SearchResult) -> SearchResult | None:
+    """The search without one place or component, the smallest that makes it likelier; None if there is none."""
+    active = result.active
+    places = {result.component(name).place for name in active}
+    groups = [[n for n in active if result.component(n).place == place] for place in places]
+    groups += [[name] for group in groups if len(group) > 1 for name in group]
+    for group in sorted(groups, key=lambda group: _loss(result, group)):
+        if _loss(result, group) > SPILL * result.gram.squares:
+            break
+        without_group = _settled(result, set(result.sizes.variances) - set(group))
+        if without_group.criterion < result.criterion - SMALL_GAIN:
+            return without_group
+    return None
+
+
+def _loss(result: SearchResult, names: Sequence[str]) -> float:
+    """Loss of twice the log-likelihood without some components, to first order."""
+    sizes = result.sizes
+    for name in names:
+        sizes = without(result.gram, sizes, name)
+    return sizes.deviance - result.sizes.deviance
+
+
+def _settled(result: SearchResult, names: Set[str]) -> SearchResult:
+    """The search with these components alone, after Gauss-Newton steps."""
+    data, model_effects, white = result.data, result.model_effects, result.white
+    components = [c for c in result.components if c.name in names]
+    floor = float(np.sqrt(np.mean(white**2)))
+    most = {} if result.flicker else {c.name: (SLOW_MOST * floor) ** 2 for c in components if c.noise}
+    b = base_size(data, model_effects)
+    variances = {name: v for name, v in result.sizes.variances.items() if name in names}
+    values = Coefficients(result.values.base, {name: v for name, v in result.values.of.items() if name in names})
+    state = state_at(data, model_effects, values, components)
+    scales: Mapping[str, float] = result.gram.scales
+    for _ in range(SETTLING):
+        X, blocks, scales = whitened(state, model_effects, values, components, scales, white)
+        g = gram(X, blocks, scales, b)
+        sizes = estimate(g, variances, most)
+        variances = dict(sizes.variances)
+        values, next_state = _damped(data, model_effects, values, coefficients(g, sizes), components, white)
+        change = float(np.sqrt(np.mean(((next_state.predicted - state.predicted) / white) ** 2)))
+        state = next_state
+        if change < 0.03:
+            break
+    return replace(
+        result, components=components, gram=g, columns=X, sizes=sizes, values=values, state=state, path=result.path
+    )
 
 
 def _damped(

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from calibrations.geometry.rate_table import rate_deg_s
 from calibrations.table import Array, Table
 
 Step = tuple[Effect, Values]
+STAGES = range(3)  # of the response: see `stage_of`
 LITTLE = 1e-5  # of the largest force, and rad: steps of derivatives with respect to the force and the stage angles
 
 
@@ -71,14 +73,47 @@ def respond(a: Array, table: Table, steps: Sequence[Step]) -> Array:
 def effect_contributions(a: Array, table: Table, steps: Sequence[Step]) -> list[Array]:
     """Contribution of each effect to the output of all three axes, shape (n, 3) each; zeros, (1, 3), for none.
 
-    A drift of the sensitivity multiplies all that the sensor makes of the force, also what its nonlinearity adds.
+    A change of the sensitivity multiplies all that the sensor makes of the force, also what its nonlinearity adds.
     """
     if not any(effect.scales for effect, _ in steps):
         return [effect.transduction(a, table, p) for effect, p in steps]
-    parts = {i: effect.transduction(a, table, p) for i, (effect, p) in enumerate(steps) if not effect.scales}
-    of_force = (parts[i] for i, (effect, _) in enumerate(steps) if effect.of_force)
-    force = scaled(a, sum(of_force, np.zeros((1, 3))), steps)
-    return [effect.transduction(force, table, p) if effect.scales else parts[i] for i, (effect, p) in enumerate(steps)]
+    return _staged(a, table, steps)[1]
+
+
+def stage_of(effect: Effect) -> int:
+    """0: adds to the response to the force; 1: scales this over other forces; 2: a drift, which scales all of it."""
+    return int(effect.scales) * (1 if effect.of_force else 2)
+
+
+def _staged(a: Array, table: Table, steps: Sequence[Step]) -> tuple[list[Array], list[Array]]:
+    """The force, g, (n, 3), that each stage gets, and the contribution of each effect."""
+    parts: dict[int, Array] = {}
+    forces = [a]
+    for stage in STAGES:
+        stage_parts = {
+            i: staged_part(stage, partial(_transduced, effect, table, p), a, forces[stage])
+            for i, (effect, p) in enumerate(steps)
+            if stage_of(effect) == stage
+        }
+        of_force = [part for i, part in stage_parts.items() if steps[i][0].of_force]
+        forces.append(scaled(forces[stage], sum(of_force, np.zeros((1, 3))), steps) if of_force else forces[stage])
+        parts |= stage_parts
+    return forces, [parts[i] for i in range(len(steps))]
+
+
+def staged_part(stage: int, part_of: Callable[[Any], Any], a: Any, response: Any) -> Any:
+    """Contribution of an effect of some stage to the output, `part_of` a force, to the `response` before it, (n, 3), g.
+
+    What scales the response over other forces follows the force along these, and not their response.
+    """
+    if stage != 1 or response is a:
+        return part_of(response)
+    parts = [part_of(a + (response - a) * axis) * axis for axis in np.eye(3)[:, None]]
+    return parts[0] + parts[1] + parts[2]
+
+
+def _transduced(effect: Effect, table: Table, p: Values, a: Array) -> Array:
+    return effect.transduction(a, table, p)
 
 
 def scaled(a: Array, response: Array, steps: Sequence[Step]) -> Array:
@@ -182,7 +217,7 @@ class LinearisedChain:
     def columns(self) -> Mapping[int, Mapping[str, Array]]:
         """d output / d each parameter of effects that are linear in them, by term and name, shape (n, axes) each."""
         axes = len(self.table.axes)
-        by_term = {i: effect.columns(self._force_of(effect), self.table) for i, (effect, _) in enumerate(self.steps)}
+        by_term = {i: self._columns_of(effect) for i, (effect, _) in enumerate(self.steps)}
         slopes = {i: self._slope * self._drift_of(effect)[:, :axes] for i, (effect, _) in enumerate(self.steps)}
         return {i: {k: v[:, :axes] * slopes[i] for k, v in c.items()} for i, c in by_term.items() if c is not None}
 
@@ -191,27 +226,44 @@ class LinearisedChain:
         return any(effect.scales for effect, _ in self.steps)
 
     @cached_property
-    def _total_force(self) -> Array:
-        """The force with what nonlinear effects add, g, which a drift of the sensitivity multiplies, shape (n, 3)."""
-        contributions = [part for part, (effect, _) in zip(self._added, self.steps, strict=True) if effect.of_force]
-        return scaled(self._sensed, sum(contributions, np.zeros((1, 3))), self.steps)
+    def _forces(self) -> list[Array]:
+        """The force, g, that each stage of the response gets, shape (n, 3)."""
+        return _staged(self._sensed, self.table, self.steps)[0] if self._scales else [self._sensed] * len(STAGES)
 
     @cached_property
-    def _drift(self) -> Array:
-        """Sensitivity over that of the scale factor, shape (n, 3)."""
-        unit_force = np.ones_like(self._sensed)
-        drifts = [effect.transduction(unit_force, self.table, p) for effect, p in self.steps if effect.scales]
-        return scaled(unit_force, sum(drifts, np.zeros((1, 3))), self.steps)
+    def _gains(self) -> list[Array]:
+        """By stage, the sensitivity that the later stages give it over that of the scale factor, shape (n, 3)."""
+        gains = [np.ones((1, 3))]
+        for stage in reversed(STAGES[1:]):
+            gains.insert(0, gains[0] * self._gain_by(stage))
+        return gains
 
-    def _force_of(self, effect: Effect) -> Array:
-        return self._total_force if effect.scales else self._sensed
+    def _gain_by(self, stage: int) -> Array:
+        """Sensitivity over that of the scale factor, by the effects of one stage, which are linear in the own force."""
+        a, unit = self._sensed, np.ones((1, 3))
+        total = np.zeros((1, 3))
+        for effect, p in self.steps:
+            if stage_of(effect) == stage:
+                part_of = partial(_transduced, effect, self.table, p)
+                total = total + staged_part(stage, part_of, a, a + unit) - part_of(a)
+        return scaled(unit, total, self.steps)
+
+    def _columns_of(self, effect: Effect) -> Mapping[str, Array] | None:
+        """d contribution / d each parameter of an effect that is linear in them, shape (n, 3) each; else None."""
+        a, response, stage = self._sensed, self._forces[stage_of(effect)], stage_of(effect)
+        names = effect.columns(response, self.table)
+        if names is None or stage != 1 or response is a:
+            return names
+        by_axis = [effect.columns(a + (response - a) * axis, self.table) or {} for axis in np.eye(3)[:, None]]
+        return {name: np.column_stack([by_axis[k][name][:, k] for k in range(3)]) for name in names}
 
     def _drift_of(self, effect: Effect) -> Array:
-        return self._drift if effect.of_force and self._scales else np.ones((1, 3))
+        return self._gains[stage_of(effect)] if effect.of_force and self._scales else np.ones((1, 3))
 
     def _contribution(self, effect: Effect, values: Values) -> Array:
         """Contribution of one effect, with the others in the model."""
-        part = effect.transduction(self._force_of(effect), self.table, values)
+        stage = stage_of(effect)
+        part = staged_part(stage, partial(_transduced, effect, self.table, values), self._sensed, self._forces[stage])
         return np.asarray(part * self._drift_of(effect))
 
     def output(self, term: int, values: Values) -> Array:

@@ -52,7 +52,7 @@ def test_what_only_adds_has_derivatives_to_the_last_digits() -> None:
 def test_derivatives_are_those_of_the_whole_chain(stairs: bool) -> None:
     model = read_model("linear")
     others = ("base-tilt", "stage-eccentricity", "temperature-scale", "cubic-nonlinearity", "supply-sensitivity")
-    for each in (*EVERY, *others):
+    for each in (*EVERY, *others, "z-axis-scale", "cross-axis-scale"):
         if each != "quantisation" or stairs:
             model = model.with_effect(catalogue()[each])
     problem = Problem.of(model, TABLE)

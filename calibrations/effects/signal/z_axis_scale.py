@@ -6,7 +6,9 @@ from calibrations.table import Array, Table
 class ZAxisScale(Effect):
     """z-axis-scale: the scale factor follows the out-of-plane axis.
 
-        V += (r1 a_o + r2 a_o^2) a_i          r1 in {out}/g^2, r2 in {out}/g^3, per axis; IEEE K_io = r1 / K1
+        V += (r1 a_o + r2 a_o^2) r_i          r1 in {out}/g^2, r2 in {out}/g^3, per axis; IEEE K_io = r1 / K1
+
+        r_i = a_i + N_i / SF_i, with all that nonlinear effects add, N_i: it multiplies the whole response
 
     Symptom   the slope of the output over the specific force of its own axis differs between inclinations.
     Excited by  full turns of beta at three inclinations or more, below and above alpha = 90 deg.
@@ -15,6 +17,7 @@ class ZAxisScale(Effect):
     """
 
     of_force = True
+    scales = True
     slope = Parameter("{out}/g^2", typical=0.02, doc="scale factor per out-of-plane g")
     square = Parameter("{out}/g^3", typical=0.02, doc="scale factor per square of the out-of-plane g")
 
