@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calibrations.errors import UnknownName, nearest
-from calibrations.fitting.held_out import folds, held_out
+from calibrations.fitting.held_out import folds, held_out, parameters_of_rows
 from calibrations.fitting.identifiability import covariance, estimates
 from calibrations.fitting.minimise import minimise
 from calibrations.fitting.noise_fit import estimate, widening
@@ -177,11 +177,8 @@ class Fit(Result):
         The error on unseen rows is mostly that of the rows that alone determine a parameter, such as the few poses of
         a saturation. Source: Golub, Heath and Wahba, Technometrics 21 (1979) 215.
         """
-        size = np.maximum(np.linalg.norm(self.whitened[:, 1:], axis=0), 1e-300)
-        columns, prior = self.whitened[:, 1:] / size, self.problem.layout.prior * size
-        products = columns.T @ columns
-        parameters = float(np.trace(np.linalg.lstsq(products + np.diag(prior**-2.0), products, rcond=1e-12)[0]))
         rows = self.residual.size
+        parameters = parameters_of_rows(self.whitened[:, 1:], self.problem.layout.prior)
         return self.pooled_excess * rows / max(rows - parameters, 1.0)
 
     def share_left(self, start: Fit) -> float:

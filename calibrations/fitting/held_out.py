@@ -15,6 +15,7 @@ from calibrations.table import Array, Table
 
 FOLDS, MOST_FOLDS = 10, 60  # of poses, and of rows
 BOUND_ROUNDS = 8
+RIDGE = 1e-12  # of the products of normalised columns: some may be the same
 
 
 def folds(table: Table) -> NDArray[np.intp]:
@@ -51,7 +52,7 @@ def held_out(
     white = noise.whiten(np.concatenate([J, residual[:, :, None]], axis=2)).reshape(channels, n, p + 1)
     total = np.einsum("cni,cnj->ij", white, white)
     precision = 1 / (prior * size) ** 2
-    ridge = 1e-12 * np.trace(total[:p, :p]) / max(p, 1) * np.eye(p) + np.diag(precision)
+    ridge = RIDGE * np.trace(total[:p, :p]) / max(p, 1) * np.eye(p) + np.diag(precision)
     pulled = precision * theta * size  # towards the mean of the prior
     low, high = ((bound - theta) * size for bound in bounds)
     error = np.empty_like(residual)
@@ -62,6 +63,18 @@ def held_out(
         change = _bounded(G[:p, :p] + ridge, G[:p, p] + pulled, low, high)
         error[:, rows] = residual[:, rows] - J[:, rows] @ change
     return float(np.sqrt(np.mean((rms(error) / noise.floor) ** 2)))
+
+
+def parameters_of_rows(columns: Array, prior: Array) -> float:
+    """The number of parameters that the rows determine and their priors do not: the trace of the projection.
+
+    From whitened derivatives (rows, p) and the standard deviations of the priors (p,), inf where there is none.
+    """
+    size = np.linalg.norm(columns, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    products = (columns / size).T @ (columns / size)
+    precision = 1 / (prior * size) ** 2
+    return float(np.trace(np.linalg.solve(products + np.diag(precision + RIDGE), products)))
 
 
 def _bounded(products: Array, side: Array, low: Array, high: Array) -> Array:
