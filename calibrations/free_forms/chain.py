@@ -123,10 +123,9 @@ def state_at(
     for is_of_force in (True, False):
         # a change of the sensitivity multiplies all that the sensor makes of the force; a drift multiplies this change
         changing = [c for c in active if c.stage == "response" and c.scales and c.of_force is is_of_force]
-        added = of_force / np.linalg.norm(rows, axis=1)[:, None]
         for k in range(c if changing else 0):
             own_force = force.copy()
-            own_force[:, k] += added[k]
+            own_force[:, k] += of_force[k] / np.linalg.norm(rows[k])
             scaling = replace(undrifted, force=own_force)
             part = sum(comp.jacobian(scaling)[k] @ values.of[comp.name] for comp in changing)
             response[k] += part

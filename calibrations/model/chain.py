@@ -119,7 +119,7 @@ def _transduced(effect: Effect, table: Table, p: Values, a: Array) -> Array:
 def scaled(a: Array, response: Array, steps: Sequence[Step]) -> Array:
     """The force `a` and the force, g, that would give a response (n, 3) in the output's unit; `a` without a scale."""
     scale = next((np.asarray(p["scale"]) for effect, p in steps if effect.name == "scale-factor"), np.zeros(3))
-    return a + response / np.where(scale == 0, np.inf, scale)
+    return a + response * (1 / np.where(scale == 0, np.inf, scale))
 
 
 def converted(parts: Sequence[Array], n: int, table: Table, steps: Sequence[Step]) -> Array:
