@@ -1,20 +1,52 @@
-"""A certificate of data and a model: for `rig certificate` and the workbench."""
+"""A certificate of data and a model: for `rig certificate` and the workbench.
+
+The record tells who measured what, with which instruments, when and where, and has the samples.
+
+DATA that is a file has no rig: then the certificate says so, and its rows have digests of their own numbers.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import UTC, date, datetime
 from pathlib import Path
 
+import numpy as np
+
+from calibrations.criteria import COVERAGE_FACTOR
 from calibrations.effects import Effect
-from calibrations.fitting.fit import fit
+from calibrations.fitting.fit import Fit, fit
+from calibrations.geometry.earth import normal_gravity
 from calibrations.model import Model
-from calibrations.model.file import read_model
-from calibrations.presentation.certificate.content import Certificate
+from calibrations.model.file import dump_model, read_model
+from calibrations.presentation.certificate.content import (
+    UNSTATED,
+    Certificate,
+    Condition,
+    Figures,
+    Instrument,
+    Laboratory,
+    Sample,
+)
 from calibrations.presentation.certificate.results import figures, require_reference
 from calibrations.table import Table
+from calibrations.text import as_written
 from rig.bench import Bench
-from rig.services.issue import CertificateDetails, issue, limits
+from rig.bench.certificates import EXPIRED, certificates
+from rig.files import program
+from rig.record import Record, Run
+from rig.record.codec import digest_of
+from rig.record.measured import Measured
+from rig.services.provenance import today
+
+# condition's column -> name and unit
+CONDITIONS = {"temperature_c": ("temperature", "C"), "supply_v": ("supply voltage", "V")}
+GRAVITY_ANOMALY_M_S2 = 5e-4  # standard deviation of gravity about the normal one: 50 mGal
+UNKNOWN_HEIGHT_M_S2 = 2e-3  # of a laboratory between the sea and 2000 m
+PLACES = ("alpha_deg", "beta_deg", "direction", "path")
 
 
 @dataclass(frozen=True)
@@ -34,17 +66,50 @@ class Certified:
 
 
 def certified(subject: Certified, number: str = "", customer: str = "") -> Certificate:
-    """The certificate. Raises ModelError for data without a reference; UnusableData, UnknownName, RecordError."""
+    """The certificate, with the laboratory of the bench (that of the run where None is given).
+
+    Raises ModelError for data without a reference; UnusableData, UnknownName, RecordError.
+    """
+    data = subject.data
     require_reference(subject.table.source, subject.table.kind)
-    earlier, name = subject.model, subject.name
-    if subject.before is not None:
-        earlier, name = read_model(subject.before, subject.effects), Path(subject.before).name
-    fresh = bool(earlier.params) and earlier.provenance.get("data_sha256") != subject.table.digest
-    fitted = fit(subject.model, subject.table)
-    figured = figures(fitted, earlier if fresh else None, limits(subject.data, subject.bench))
-    created = str(earlier.provenance.get("created", "of unknown date"))[:10]
-    details = CertificateDetails(number, customer, f"the model {name}, {created}" if fresh else "")
-    return issue(subject.data, fitted, figured, subject.bench, details)
+    with _measured(data) as measured:
+        run = measured.run if measured is not None else None
+        bench = subject.bench or (_bench(run) if run is not None and run.bench else None)
+        fitted, figured, before = _results(subject, bench.result_limits if bench is not None else {})
+        table = fitted.table
+        samples = tuple(_samples(table, measured))
+    lab = bench.laboratory if bench is not None else None
+    constant = {name: as_written(value) for name, value in table.constants.items()}
+    end_time = (run.ended or run.created) if run is not None else datetime.now(UTC).isoformat(timespec="seconds")
+    model_digest = hashlib.sha256(dump_model(fitted.model).encode()).hexdigest()
+    digest = hashlib.sha256(f"{table.digest}{model_digest}".encode()).hexdigest()
+    return Certificate(
+        number=number or f"{data.replace('/', '-') if run is not None else Path(data).stem}-{digest[:8]}",
+        issued=today(),
+        program=program(),
+        laboratory=Laboratory(**lab.model_dump(exclude={"customer"})) if lab is not None else Laboratory(),
+        customer=customer or (lab.customer if lab is not None else "") or UNSTATED,
+        sensor=constant.get("sensor", UNSTATED),
+        serial=constant.get("serial", UNSTATED),
+        manufacturer=constant.get("manufacturer", UNSTATED),
+        rig=bench.name if bench is not None else "measured elsewhere",
+        instruments=tuple(_instruments(run, end_time[:10])) if run is not None else (),
+        procedure=run.procedure if run is not None else "data of a file",
+        facts=_facts(run, table),
+        began=run.created if run is not None else end_time,
+        ended=end_time,
+        gravity_m_s2=table.gravity_m_s2,
+        conditions=tuple(_conditions(table)),
+        before=before,
+        figures=figured,
+        samples=samples,
+        data=data if run is not None else Path(data).name,
+        data_sha256=table.digest,
+        model_sha256=model_digest,
+        remarks=(*_remarks(run, lab is not None and lab.name != UNSTATED), *_gravity_remarks(table)),
+        reference=_reference(table),
+        simulated=bool(_simulated(run)),
+    )
 
 
 def failed_results(certificate: Certificate) -> list[str]:
@@ -69,3 +134,145 @@ def certificate_head(certificate: Certificate) -> str:
     conformity = verdict(certificate)
     remark = f"; conformity: {conformity}" if conformity else ""
     return f"{certificate.headline}, No. {certificate.number}{remark}"
+
+
+def _results(subject: Certified, limits: Mapping[str, float | tuple[float, float]]) -> tuple[Fit, Figures, str]:
+    """The fit, its figures, and in words the model in use until now, where it has values from other data."""
+    earlier, name = subject.model, subject.name
+    if subject.before is not None:
+        earlier, name = read_model(subject.before, subject.effects), Path(subject.before).name
+    fresh = bool(earlier.params) and earlier.provenance.get("data_sha256") != subject.table.digest
+    fitted = fit(subject.model, subject.table)
+    figured = figures(fitted, earlier if fresh else None, limits)
+    created = str(earlier.provenance.get("created", "of unknown date"))[:10]
+    return fitted, figured, f"the model {name}, {created}" if fresh else ""
+
+
+@contextmanager
+def _measured(data: str) -> Iterator[Measured | None]:
+    """The run, while its record is open; None for a file."""
+    if Path(data).is_file():
+        yield None
+        return
+    with Record.to_find(data) as record:
+        yield Measured.named(record, data)
+
+
+def _bench(run: Run) -> Bench:
+    return Bench.model_validate(run.bench)
+
+
+def _instruments(run: Run, on: str) -> Iterator[Instrument]:
+    """Every instrument of the run, as it identified itself, and items that have a certificate and no role."""
+    if not run.bench:
+        return
+    bench = _bench(run)
+    papers = certificates(bench)
+    for role, part in bench.instruments.items():
+        identity = run.identities.get(role, {})
+        paper = papers.pop(role, None)
+        number, due = (paper.number, str(paper.due)) if paper is not None else ("", "")
+        expired = paper is not None and paper.due < date.fromisoformat(on)
+        yield Instrument(
+            role,
+            identity.get("model") or part.driver,
+            identity.get("serial", ""),
+            identity.get("firmware", ""),
+            number,
+            due,
+            expired,
+        )
+    for name, paper in papers.items():
+        yield Instrument(name, name, "", "", paper.number, str(paper.due), paper.due < date.fromisoformat(on))
+
+
+def _facts(run: Run | None, table: Table) -> dict[str, str]:
+    """How it was measured."""
+    facts = {"rows": str(table.n), "columns": ", ".join(table.columns)}
+    if run is None:
+        return facts
+    settings = {
+        name.replace("_", " "): _setting_text(value) for name, value in run.settings.items() if _setting_text(value)
+    }
+    return {"run": run.run, "state": run.state, **facts, **settings}
+
+
+def _setting_text(value: object) -> str:
+    if isinstance(value, list | tuple):
+        return ", ".join(str(part) for part in value)
+    return "" if value is None or isinstance(value, Mapping) else str(value)
+
+
+def _reference(table: Table) -> str:
+    """The instruments that the sensor was compared with."""
+    if table.type.field:
+        return "the local magnetic field, constant in place and time; its strength is not known"
+    if table.type.turning:
+        return "angular rate of the rate table, deg/s, about the stated axes"
+    quantity = "its direction from the stage angles" if table.type.stage_angles else "its magnitude alone"
+    return f"local gravity, {table.gravity_m_s2:.6g} m/s²; {quantity}"
+
+
+def _gravity_remarks(table: Table) -> Iterator[str]:
+    """Whether the stated gravity can be that of the stated place; nothing where the latitude is not stated."""
+    if table.input_unit != "g" or "latitude_deg" not in table.constants:
+        return
+    height_m = table.number("height_m", 0.0)
+    expected = normal_gravity(table.number("latitude_deg", 0.0), height_m)
+    off, std = table.gravity_m_s2 - expected, np.hypot(table.number("gravity_std_m_s2", 0.0), GRAVITY_ANOMALY_M_S2)
+    if "height_m" not in table.constants:
+        std = np.hypot(std, UNKNOWN_HEIGHT_M_S2)
+    if abs(off) > COVERAGE_FACTOR * std:
+        yield (
+            f"Check: the stated local gravity of {table.gravity_m_s2:.6g} m/s² differs by {off:+.2g} m/s² from "
+            f"{expected:.6g} m/s² at the stated latitude and {height_m:g} m (uncertainty "
+            f"{COVERAGE_FACTOR * std:.2g} m/s²). Correct gravity_m_s2, latitude_deg or height_m in the bench file."
+        )
+
+
+def _conditions(table: Table) -> Iterator[Condition]:
+    for column, (name, unit) in CONDITIONS.items():
+        if column in table:
+            values = table.column(column)
+            yield Condition(name, unit, float(values.min()), float(values.mean()), float(values.max()))
+
+
+def _simulated(run: Run | None) -> list[str]:
+    """The roles of the run's instruments that were simulated."""
+    if run is None or not run.bench:
+        return []
+    return [role for role, part in _bench(run).instruments.items() if part.simulated]
+
+
+def _remarks(run: Run | None, is_stated: bool) -> Iterator[str]:
+    if roles := _simulated(run):
+        yield f"These instruments were simulated: {', '.join(roles)}. This document certifies no sensor."
+    if run is not None and EXPIRED in run.constants:
+        yield f"{run.constants[EXPIRED]}: measurements with it are not traceable."
+    if run is not None and run.state != "complete":
+        yield f"The run is {run.state}; the certificate covers the data that it has."
+    if not is_stated:
+        yield "The bench file does not name the laboratory (key laboratory)."
+
+
+def _samples(table: Table, measured: Measured | None) -> Iterator[Sample]:
+    """Every row of the table, with the digest of its block of samples, or of its own numbers where there is none."""
+    digests: dict[int, str] = {}
+    if measured is not None and measured.run.bench:  # of the whole block, also where a batch shares it
+        digests = {recorded.number: digest_of(recorded.samples) for recorded in measured.record.kept(measured.run.run)}
+    numbers = table.numbered(np.arange(table.n))
+    for i, number in enumerate(numbers.tolist()):
+        values = np.array([column[i] for column in table.columns.values()])
+        yield Sample(
+            number=number,
+            t_s=float(table.column("t_s")[i]) if "t_s" in table else None,
+            place=_place(table, i),
+            means=tuple(table.outputs[i].tolist()),
+            n=int(table.optional("n", 1.0)[i]),
+            sha256=digests.get(number) or hashlib.sha256(values.tobytes()).hexdigest(),
+        )
+
+
+def _place(table: Table, i: int) -> str:
+    words = [f"{name.removesuffix('_deg')} {table.column(name)[i]:g}" for name in PLACES[:3] if name in table]
+    return ", ".join([*words, *([table.labels["path"][i]] if "path" in table.labels else [])]) or "–"
