@@ -218,12 +218,12 @@ class Stepwise:
         """The tilt of x and of y that p1 and q1 hold."""
         return self._tilt(self.x, self.y, 1), self._tilt(self.y, self.x, 0)
 
-    def _tilt(self, axis_estimate: AxisEstimate, other_axis: AxisEstimate, across: int) -> Tilt:
+    def _tilt(self, axis_estimate: AxisEstimate, other_axis: AxisEstimate, across_axis: int) -> Tilt:
         in_plane = (
             (axis_estimate.p[1] + 2 * axis_estimate.p[0] * other_axis.bias) * other_axis.scale / axis_estimate.scale
         )
         out_of_plane = axis_estimate.q[1] / axis_estimate.scale
-        second_order = in_plane * self.force[:, across] + out_of_plane * self.force[:, 2]
+        second_order = in_plane * self.force[:, across_axis] + out_of_plane * self.force[:, 2]
         return Tilt(float(in_plane), float(out_of_plane), 1e3 * float(rms(second_order)))
 
 

@@ -128,7 +128,7 @@ def _inputs(compensation: Compensation) -> Iterator[str]:
     yield "Inputs:"
     for axis in compensation.forward.axes:
         yield f"  v{axis}  output of the {axis} axis, {unit_of_input(f'v{axis}', compensation)}"
-    for name, (low, high) in compensation.beside.items():
+    for name, (low, high) in compensation.input_limits.items():
         yield f"  {name}  {unit_of_input(name, compensation)}, from {low:g} to {high:g}{_of_axis(name, compensation)}"
     yield f"Proved for +-{compensation.range.reach:g} {compensation.unit} on each axis; not beyond these ranges."
 
@@ -205,7 +205,7 @@ def coverage_text(compensation: Compensation) -> str:
         )
     covered = ", ".join(f"{name} {_span(name, spans[name], compensation)}" for name in spans)
     extrapolated = [
-        name for name, (low, high) in compensation.beside.items()
+        name for name, (low, high) in compensation.input_limits.items()
         if name not in FORCES and (name not in spans or low < spans[name][0] or high > spans[name][1])
     ]  # fmt: skip
     text = f"Covered by the data of the calibration: {covered}; beyond, the model is extrapolated"
@@ -291,7 +291,7 @@ def make_vectors(compensation: Compensation, count: int = COUNT) -> ReferenceVec
     """`count` vectors, a power of two; the first is a corner of the range, the second its middle."""
     ranges = (
         dict.fromkeys(compensation.forward.sought, (-compensation.range.reach, compensation.range.reach))
-        | compensation.beside
+        | compensation.input_limits
     )
     unit = scipy.stats.qmc.Sobol(len(ranges), scramble=False).random(count)
     low, high = np.array(list(ranges.values())).T
@@ -345,7 +345,7 @@ def files(compensation: Compensation, origin: Origin, checks: ReferenceVectors) 
 
 def summary(compensation: Compensation, origin: Origin) -> dict[str, Any]:
     """The document without the program."""
-    program, bound, input_spans = compensation.program, compensation.bound, compensation.beside
+    program, bound, input_spans = compensation.program, compensation.bound, compensation.input_limits
     correlations = _correlations(compensation)
     return {
         "schema": "rig.compensation/1",

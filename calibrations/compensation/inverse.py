@@ -52,10 +52,10 @@ class Range:
     """The range of the proof: `reach` to either side of 0 on every axis, and the ranges of the other inputs."""
 
     reach: float
-    beside: Mapping[str, tuple[float, float]] = field(default_factory=lambda: dict(DEFAULT_INPUTS))
+    input_limits: Mapping[str, tuple[float, float]] = field(default_factory=lambda: dict(DEFAULT_INPUTS))
 
     @staticmethod
-    def for_model(model: Model, reach: float | None = None, **beside: tuple[float, float]) -> Range:
+    def for_model(model: Model, reach: float | None = None, **input_limits: tuple[float, float]) -> Range:
         """The default range for the model's kind of sensor, with the given `reach` and ranges by input name."""
         constants = {name: value for term in model.terms for name, value in term.constants.items()}
         supply = (
@@ -63,14 +63,14 @@ class Range:
             if "reference_v" in constants
             else {}
         )
-        return Range(reach or DEFAULT_REACH[input_unit(model)], DEFAULT_INPUTS | supply | beside)
+        return Range(reach or DEFAULT_REACH[input_unit(model)], DEFAULT_INPUTS | supply | input_limits)
 
     def of(self, inputs: Collection[str]) -> dict[str, tuple[float, float]]:
         """The range of each input besides the outputs; another axis' force has the sensor's own range.
 
         Raises ModelError for an input with unknown range.
         """
-        ranges = dict.fromkeys(FORCES, (-self.reach, self.reach)) | dict(self.beside)
+        ranges = dict.fromkeys(FORCES, (-self.reach, self.reach)) | dict(self.input_limits)
         for name in inputs:
             if name not in ranges:
                 raise ModelError(f"the range of the input {name} is unknown; give --input {name}=LOW:HIGH")
@@ -91,7 +91,7 @@ class Compensation:
     costs: Cost
 
     @property
-    def beside(self) -> dict[str, tuple[float, float]]:
+    def input_limits(self) -> dict[str, tuple[float, float]]:
         """The inputs besides the outputs, with their ranges."""
         return self.range.of(self.program.inputs[len(self.forward.axes) :])
 
@@ -124,7 +124,7 @@ def invert_model(
         program,
         precision,
         unit,
-        compensation_costs(model, forward, program, input_range.reach, unit, input_range.beside),
+        compensation_costs(model, forward, program, input_range.reach, unit, input_range.input_limits),
     )
 
 

@@ -194,8 +194,8 @@ AS_NUMPY: Mapping[str, Callable[..., Any]] = {
     "!=": np.not_equal, "sin": np.sin, "cos": np.cos, "tan": np.tan, "exp": np.exp, "log": np.log, "sqrt": np.sqrt,
     "abs": np.abs, "sign": np.sign, "where": np.where,
     "step": lambda x: np.greater_equal(x, 0.0),
-    "min": lambda *each: reduce(np.minimum, each),
-    "max": lambda *each: reduce(np.maximum, each),
+    "min": lambda *arguments: reduce(np.minimum, arguments),
+    "max": lambda *arguments: reduce(np.maximum, arguments),
 }  # fmt: skip
 
 

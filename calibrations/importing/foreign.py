@@ -104,15 +104,15 @@ def _import_with(
         raise MissingColumn(f"{laid.place}: {reason}") from None
     merged = {**laid.constants, **constants}
     merged |= _output_unit(mapping, kind, merged.get("triad") == "m", laid.name)
-    mapped_names = {m.theirs for m in mapping}
-    path = next((m.theirs for m in mapping if m.name == PATH), PATH)
+    mapped_names = {m.file_column for m in mapping}
+    path = next((m.file_column for m in mapping if m.name == PATH), PATH)
     first = zip(laid.header, laid.sample[0], strict=True)
     words = [name for name, cell in first if name not in mapped_names and _is_text(name, cell)]
     required = {*mapped_names - {path}, *NUMBERS}
     notes: list[str] = []
     words = list(dict.fromkeys([*words, path])) if path in laid.header else words
     numbers, texts = read_cells(laid, words, required, notes.append)
-    columns = {m.name: _converted(numbers[m.theirs], m) for m in mapping if m.name != PATH}
+    columns = {m.name: _converted(numbers[m.file_column], m) for m in mapping if m.name != PATH}
     columns |= {name: numbers[name] for name in unmapped if name in numbers}
     labels = {k: texts[k] for k in unmapped if k in texts} | ({PATH: texts[path]} if path in texts else {})
     if is_session(kind, columns, labels.get(PATH)):
@@ -132,11 +132,11 @@ def complete_mapping(laid: Sheet, mapped: Sequence[ColumnMapping]) -> list[Colum
         if m.name in [mapping.name for mapping in mappings]:
             raise DataError(f'{laid.name}: the column "{m.name}" is mapped twice; give it once')
         mappings.append(_locate(laid, m))
-    mapped_names = {m.theirs for m in mappings}
+    mapped_names = {m.file_column for m in mappings}
     for header, name, unit in zip(laid.header, laid.bare, laid.units, strict=True):
         if name in NUMBERS - {m.name for m in mappings} and header not in mapped_names:
             mappings.append(check_unit(ColumnMapping(name, header, unit), laid.name))
-    return [m for m in mappings if m.unit or m.name != m.theirs]
+    return [m for m in mappings if m.unit or m.name != m.file_column]
 
 
 def needs_mapping(laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping]) -> bool:
@@ -155,13 +155,13 @@ def needs_mapping(laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping]
 def _locate(laid: Sheet, m: ColumnMapping) -> ColumnMapping:
     """The mapping with the file's full column name and unit. Raises MissingColumn, DataError."""
     for names in (laid.header, laid.bare):
-        if m.theirs in names:
-            place = names.index(m.theirs)
-            return check_unit(replace(m, theirs=laid.header[place], unit=m.unit or laid.units[place]), laid.name)
-    column, _, unit = m.theirs.rpartition(":")
+        if m.file_column in names:
+            place = names.index(m.file_column)
+            return check_unit(replace(m, file_column=laid.header[place], unit=m.unit or laid.units[place]), laid.name)
+    column, _, unit = m.file_column.rpartition(":")
     if not m.unit and column in laid.header:
         raise DataError(f'{laid.name}: unknown unit "{unit}" of the column "{column}"{nearest(unit, UNITS)}')
-    raise MissingColumn(f'{laid.name}: there is no column "{m.theirs}"{nearest(m.theirs, laid.header)}')
+    raise MissingColumn(f'{laid.name}: there is no column "{m.file_column}"{nearest(m.file_column, laid.header)}')
 
 
 def check_unit(m: ColumnMapping, source: str) -> ColumnMapping:
@@ -169,14 +169,15 @@ def check_unit(m: ColumnMapping, source: str) -> ColumnMapping:
     target_unit = column_unit(m.name)
     if m.unit and target_unit and UNITS[m.unit][0] != target_unit:
         raise DataError(
-            f'{source}: the column "{m.name}" is in {target_unit}; "{m.theirs}" in {m.unit} cannot be converted to it'
+            f'{source}: the column "{m.name}" is in {target_unit}; "{m.file_column}" in {m.unit} cannot be converted '
+            "to it"
         )
     return m
 
 
 def _unmapped_columns(laid: Sheet, mapping: Sequence[ColumnMapping], is_mapped: bool) -> list[str]:
     """The columns that keep their own names; none of a file without a header if some are mapped."""
-    used = {name for m in mapping for name in (m.name, m.theirs)}
+    used = {name for m in mapping for name in (m.name, m.file_column)}
     return [name for name in laid.header if name not in used] if laid.named or not is_mapped else []
 
 
@@ -228,7 +229,7 @@ def _check_clock(table: Table, laid: Sheet, mapping: Sequence[ColumnMapping]) ->
 
 def _clock(mapping: Sequence[ColumnMapping]) -> str:
     """The file's name of the time."""
-    return next((m.theirs for m in mapping if m.name == "t_s"), "")
+    return next((m.file_column for m in mapping if m.name == "t_s"), "")
 
 
 def _output_unit(mapped: Sequence[ColumnMapping], kind: str, field: bool, source: str) -> dict[str, Constant]:

@@ -192,16 +192,16 @@ SLOWEST_LOG_HZ = 2.0  # of samples: a hand moves within less than a second
 LIKELY_LOG_HZ = (10.0, 20_000.0)
 
 
-def find_log_time_doubt(time_s: Array, theirs: str = "") -> Doubt | None:
+def find_log_time_doubt(time_s: Array, file_column: str = "") -> Doubt | None:
     """The doubt that the time column of a log of samples is in s: no log of a sensor is so slow.
 
-    `theirs`: the file's name of the column. SampleTimeFine of Xsens counts 0.1 ms, or us.
+    `file_column`: the file's name of the column. SampleTimeFine of Xsens counts 0.1 ms, or us.
     """
     step = _step_s(time_s)
     if not step or 1 / step >= SLOWEST_LOG_HZ:
         return None
     low, high = LIKELY_LOG_HZ
-    units = ("0.1ms", "us") if theirs == "SampleTimeFine" else ("ms", "us", "ns")
+    units = ("0.1ms", "us") if file_column == "SampleTimeFine" else ("ms", "us", "ns")
     fits = next((unit for unit in units if low <= 1 / (step * UNITS[unit][1]) <= high), "")
     return f"gives {1 / step:.3g} samples a second if it is in s", fits
 

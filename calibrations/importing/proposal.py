@@ -100,7 +100,7 @@ def propose_mapping(laid: Sheet, kind: str | None = None, mapped: Sequence[Colum
     if kind not in NAME_PATTERNS:
         return list(mapped)
     mapping = list(mapped)
-    unmapped = [name for name in laid.header if name not in {m.theirs for m in mapped} | NUMBERS]
+    unmapped = [name for name in laid.header if name not in {m.file_column for m in mapped} | NUMBERS]
     values = {name: numbers for name in unmapped if len(numbers := sample_values(laid, name))}
     guesses = guess_by_names(laid, values, kind) if laid.named else guess_by_values(values, kind)
     for name, target in guesses:
@@ -293,12 +293,12 @@ def _with_sections(mapping: list[ColumnMapping], laid: Sheet) -> list[ColumnMapp
 
 def time_doubt(laid: Sheet, mapped: Iterable[ColumnMapping]) -> Doubt | None:
     """The doubt about the unit of the time, as the first rows show it; None where a unit is stated."""
-    columns = {m.name: m.theirs for m in mapped}
+    columns = {m.name: m.file_column for m in mapped}
     clock = next((m for m in mapped if m.name == "t_s" and not m.unit), None)
     angles = [sample_values(laid, columns[name]) for name in ("alpha_deg", "beta_deg") if name in columns]
     if clock is None or not angles or not all(map(len, angles)):
         return None
-    time_s = sample_values(laid, clock.theirs)
+    time_s = sample_values(laid, clock.file_column)
     return find_time_doubt(time_s, np.column_stack(angles)) if len(time_s) else None
 
 
@@ -310,8 +310,8 @@ def _with_time(mapping: list[ColumnMapping], laid: Sheet) -> list[ColumnMapping]
 
 def _with_log_time(mapping: list[ColumnMapping], values: Mapping[str, Array]) -> list[ColumnMapping]:
     """The mapping in which the time of a log has the unit that gives a likely sample rate."""
-    logs = {m for m in mapping if m.name == "t_s" and not m.unit and len(values.get(m.theirs, ())) >= LONG_TABLE}
-    doubts = {m: find_log_time_doubt(values[m.theirs], m.theirs) for m in logs}
+    logs = {m for m in mapping if m.name == "t_s" and not m.unit and len(values.get(m.file_column, ())) >= LONG_TABLE}
+    doubts = {m: find_log_time_doubt(values[m.file_column], m.file_column) for m in logs}
     return [replace(m, unit=doubt[1]) if (doubt := doubts.get(m)) else m for m in mapping]
 
 
@@ -324,7 +324,7 @@ def _with_scatter(mapping: list[ColumnMapping]) -> list[ColumnMapping]:
 def _with_gravity(mapping: list[ColumnMapping], values: Mapping[str, Array]) -> list[ColumnMapping]:
     """The mapping in which axes have the unit that gives 1 g, else counts; axes of a magnetometer uT, where it fits."""
     for names, unit_of_all in ((KINDS["positions"].outputs, gravity_unit), (KINDS["fields"].outputs, field_unit)):
-        axes = {m.name: m.theirs for m in mapping if m.name in names and not m.unit and m.theirs in values}
+        axes = {m.name: m.file_column for m in mapping if m.name in names and not m.unit and m.file_column in values}
         if len(axes) == len(AXES):
             unit = unit_of_all(np.column_stack([values[column] for column in axes.values()]))
             mapping = [replace(m, unit=unit) if m.name in axes else m for m in mapping]

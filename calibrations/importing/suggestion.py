@@ -45,7 +45,9 @@ def import_command(
     """The `rig import` command with this mapping."""
     topic = ["--topic", laid.topic] if laid.topic else []
     words = ["rig", "import", laid.name, *topic, *(["--kind", kind] if kind else [])]
-    words += [word for m in mapped for word in ("--column", replace(m, theirs=_shortest(laid, m.theirs)).text)]
+    words += [
+        word for m in mapped for word in ("--column", replace(m, file_column=_shortest(laid, m.file_column)).text)
+    ]
     words += [word for constant in constants for word in ("--constant", constant)]
     return shlex.join(words)
 
@@ -98,7 +100,7 @@ def _objection(table: Table, laid: Sheet) -> str:
 
 
 def _suggestion(laid: Sheet, attempt: Attempt) -> str:
-    free = [name for name in laid.header if name not in {m.theirs for m in attempt.columns}]
+    free = [name for name in laid.header if name not in {m.file_column for m in attempt.columns}]
     cannot = len(attempt.lacking) == len(required_columns(attempt.kind, ())) or len(attempt.lacking) > len(free)
     if not attempt.columns or (not laid.named and (attempt.lacking or attempt.refused)) or (laid.named and cannot):
         example = "such as vx_v=Vout:mV" if laid.named else "by its number, such as vx_v=2:mV"

@@ -80,13 +80,13 @@ class ColumnMapping:
     """One column: our name, the file's name, and the file's unit ("" where it is ours)."""
 
     name: str
-    theirs: str
+    file_column: str
     unit: str = ""
 
     @property
     def text(self) -> str:
         """The mapping as `--column` takes it: `vx_v=Vout:mV`."""
-        return f"{self.name}={self.theirs}{f':{self.unit}' if self.unit else ''}"
+        return f"{self.name}={self.file_column}{f':{self.unit}' if self.unit else ''}"
 
     @staticmethod
     def parse(text: str) -> ColumnMapping:

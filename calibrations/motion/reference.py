@@ -225,7 +225,7 @@ class Reference:
 
     acceleration_m_s2: Array
     lines: tuple[Sine, ...]
-    rest: Smoothed
+    remainder: Smoothed
     rate_hz: float
 
     @property
@@ -245,8 +245,10 @@ class Reference:
     def amplitude(self) -> tuple[float, float]:
         """Peak acceleration and its standard uncertainty, m/s^2: of the strongest line, else the greatest of all."""
         if not self.lines:
-            corner_hz = self.rest.corner_hz(self.rate_hz)
-            noise = self.rest.noise_std * np.sqrt(2 * corner_hz / self.rate_hz)  # noise that the smoother lets through
+            corner_hz = self.remainder.corner_hz(self.rate_hz)
+            noise = self.remainder.noise_std * np.sqrt(
+                2 * corner_hz / self.rate_hz
+            )  # noise that the smoother lets through
             return float(np.max(np.abs(self.acceleration_m_s2))), float(noise * (2 * np.pi * corner_hz) ** 2)
         line = self.lines[0]
         turn, turn_std = 2 * np.pi * line.frequency_hz, 2 * np.pi * line.frequency_std_hz
@@ -256,7 +258,7 @@ class Reference:
     @property
     def moves(self) -> bool:
         """Whether there is motion above the displacement's noise."""
-        return bool(self.lines) or float(np.std(self.rest.values)) > self.rest.noise_std
+        return bool(self.lines) or float(np.std(self.remainder.values)) > self.remainder.noise_std
 
 
 @dataclass(frozen=True)
@@ -328,9 +330,9 @@ def reference_biases(reference: Reference) -> tuple[Bias, ...]:
         return np.asarray(correct_at(butterworth(rate_hz), at_hz)(f) * _differences(f, rate_hz, (-2.0, 2.0)))
 
     def smoother(f: Array) -> Complex:
-        return np.asarray(reference.rest.response(f, rate_hz) * _differences(f, rate_hz, (-2.5, 16 / 6, -1 / 6)))
+        return np.asarray(reference.remainder.response(f, rate_hz) * _differences(f, rate_hz, (-2.5, 16 / 6, -1 / 6)))
 
-    quarter, edge_s = reference.rest.corner_hz(rate_hz) / 4, reference.rest.edge_s(rate_hz)
+    quarter, edge_s = reference.remainder.corner_hz(rate_hz) / 4, reference.remainder.edge_s(rate_hz)
     longer = [(line.amplitude_std / line.amplitude) ** 2 / 2 for line in reference.lines[:1]]
     return (
         filter_bias("Butterworth low-pass, two differences", paper, at_hz, rate_hz, 4 / PAPER_CORNER_HZ),

@@ -76,12 +76,12 @@ class Frames:
     damaged: int = 0
     misfits: int = 0
     unread: int = 0
-    rest: bytes = b""
+    remainder: bytes = b""
     _ends_in_frame: bool = False  # the last byte belongs to a good frame
 
     def take(self, data: bytes) -> Found:
         """The frames that `data` completes."""
-        text = self.rest + data
+        text = self.remainder + data
         array = np.frombuffer(text, dtype=np.uint8)
         self.unread += len(data)
         frames: list[tuple[Ints, ...]] = []
@@ -92,7 +92,7 @@ class Frames:
             n = self._accepted(gaps, verdicts)
             frames.append((starts[:n], lengths[:n], verdicts[:n]))
             if is_complete := n == len(starts):
-                self.rest = text[end:]
+                self.remainder = text[end:]
                 self._ends_in_frame = self._ends_in_frame and not self._missed(gap)
             else:
                 follows = not gaps[n + 1] if n + 1 < len(starts) else starts[n] + lengths[n] == len(text)

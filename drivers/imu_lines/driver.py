@@ -92,7 +92,7 @@ class LineDecoder:
 
     @property
     def unread(self) -> int:
-        return len(self.assembly.rest)
+        return len(self.assembly.remainder)
 
     def take(self, data: bytes) -> Batch:
         rows = self.assembly.take(data)
@@ -120,7 +120,7 @@ class LineSensor(DigitalSensor[Settings, LineDecoder]):
         return LineDecoder(self.settings)
 
     def _content(self, decoder: LineDecoder) -> str:
-        return f"the lines have the columns {', '.join(map(str, decoder.assembly.seen))}{self._warm}"
+        return f"the lines have the columns {', '.join(map(str, decoder.assembly.last_columns))}{self._warm}"
 
     def _advice(self, decoder: LineDecoder, begun_s: float) -> list[Check]:
         """Settings that fit the lines since `begun_s`, after this test; none if no settings fit."""

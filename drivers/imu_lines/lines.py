@@ -66,7 +66,7 @@ def _none(line: str) -> dict[Column, float]:
 class Assembly:
     """Makes samples of bytes as they come. The first line may be cut, so it is dropped without being counted.
 
-    `damaged`: lines that could not be read. `unread`: the first of them. `seen`: the columns of the last good line.
+    `damaged`: lines that could not be read. `unread`: the first of them. `last_columns`: of the last good line.
     `shown`: the first whole lines.
     """
 
@@ -75,15 +75,15 @@ class Assembly:
     damaged: int = 0
     good: int = 0
     unread: str = ""
-    seen: tuple[Column, ...] = ()
+    last_columns: tuple[Column, ...] = ()
     shown: list[str] = field(default_factory=list)
-    rest: bytes = b""
+    remainder: bytes = b""
     _cut: bool = True
     _pending: dict[Column, float] = field(default_factory=dict)
 
     def take(self, data: bytes) -> list[dict[str, float]]:
         """The samples that `data` completes, each by the names of `columns`."""
-        *lines, self.rest = (self.rest + data).split(b"\n")
+        *lines, self.remainder = (self.remainder + data).split(b"\n")
         if self._cut and lines:
             lines, self._cut = lines[1:], False
         return [sample for line in lines if (sample := self._read(line)) is not None]
@@ -99,7 +99,9 @@ class Assembly:
         except ValueError:
             self._count_damaged(line)
             return None
-        self.seen = tuple(dict.fromkeys([*self.seen, *values])) if self.style == "teleplot" else tuple(values)
+        self.last_columns = (
+            tuple(dict.fromkeys([*self.last_columns, *values])) if self.style == "teleplot" else tuple(values)
+        )
         columns = set(self.columns.values())
         if self.style == "teleplot":
             if not columns & values.keys():

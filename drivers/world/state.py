@@ -85,22 +85,22 @@ def from_json(values: dict[str, Any]) -> State:
     return world
 
 
-def _as_json(part: Any, like: Any) -> dict[str, Any]:
+def _as_json(part: Any, template: Any) -> dict[str, Any]:
     """`part` is a record with the names of the dataclass `like`."""
-    pairs = [(f.name, getattr(part, f.name), getattr(like, f.name)) for f in fields(like)]
+    pairs = [(f.name, getattr(part, f.name), getattr(template, f.name)) for f in fields(template)]
     return {
         name: _as_json(value, field_type) if is_dataclass(field_type) else np.asarray(value).tolist()
         for name, value, field_type in pairs
     }
 
 
-def _fill(part: Any, values: Any, like: Any) -> None:
-    names = {f.name for f in fields(like)}
+def _fill(part: Any, values: Any, template: Any) -> None:
+    names = {f.name for f in fields(template)}
     if not isinstance(values, dict) or values.keys() != names:
         odd = ", ".join(sorted(set(values) ^ names)) if isinstance(values, dict) else repr(values)
         raise BadSetting(f"The kept world does not fit this version ({odd})", "Start the run anew")
     for name, value in values.items():
-        if is_dataclass(getattr(like, name)):
-            _fill(getattr(part, name), value, getattr(like, name))
+        if is_dataclass(getattr(template, name)):
+            _fill(getattr(part, name), value, getattr(template, name))
         else:
             setattr(part, name, value)

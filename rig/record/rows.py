@@ -89,10 +89,10 @@ def known_names(connection: Connection, name: str) -> list[str]:
     return list(dict.fromkeys(connection.execute(query).scalars()))
 
 
-def several_error(found: Sequence[Row[Any]], name: str, place: str) -> UnknownRun:
+def several_error(matches: Sequence[Row[Any]], name: str, place: str) -> UnknownRun:
     """The error for a beginning that several ids have."""
-    listed = ", ".join(sorted(row.run for row in found)[:MOST_LISTED])
-    return UnknownRun(f"{len(found)} runs in {place} begin with {name!r}: {listed}; write more of the id")
+    listed = ", ".join(sorted(row.run for row in matches)[:MOST_LISTED])
+    return UnknownRun(f"{len(matches)} runs in {place} begin with {name!r}: {listed}; write more of the id")
 
 
 def unknown_error(

@@ -84,7 +84,7 @@ class RunningEstimates:
     """Estimates of the sensor from the poses of a run so far. There are none before `begun`."""
 
     law: Law | None = None
-    known: dict[str, Recursive] = field(default_factory=dict)
+    estimators: dict[str, Recursive] = field(default_factory=dict)
     pose: Pose | None = None  # the last one
     units: Mapping[str, str] = field(default_factory=dict)  # of the channels that are not in V
 
@@ -92,7 +92,7 @@ class RunningEstimates:
         """The run begins or continues: take the poses in the record."""
         with Record() as record:
             run_row = record.run(run)
-            self.law, self.known = LAWS.get(run_row.kind), {}
+            self.law, self.estimators = LAWS.get(run_row.kind), {}
             self.units = units_of(run_row, self.law.channels) if self.law and run_row.bench else {}
             for _, dwell in record.dwells(run) if self.law else ():
                 self._take(dwell)
@@ -116,10 +116,10 @@ class RunningEstimates:
 
     def _take(self, dwell: Dwell) -> None:
         for name, row, value in self.law.rows(dwell) if self.law else ():
-            self.known[name] = self.known.get(name, Recursive.of(len(row))).after(row, value)
+            self.estimators[name] = self.estimators.get(name, Recursive.of(len(row))).after(row, value)
 
     def _estimates(self) -> Iterator[Value]:
-        for name, squares in self.known.items():
+        for name, squares in self.estimators.items():
             estimate, (sensor, _, channel) = squares.estimate(), name.rpartition(".")
             output_unit = self.units.get(channel, "V")
             for parameter, (place, unit) in self.law.parameters(name).items() if self.law else ():

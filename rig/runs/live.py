@@ -42,7 +42,7 @@ class Measurement:
 
     experiment: Experiment
     run: str
-    found: Discovery[Fit]
+    discovery: Discovery[Fit]
     used_s: float  # rig time so far, as planned
     following: Experiment | None = None
 
@@ -68,8 +68,8 @@ class Live:
             measurements.append(Measurement(following, run, discover(table, self.model, self.effects), used_s))
             telling = self._telling(measurements)
             following = None if stands(measurements) else self._following(telling, measurements)
-            discovered = replace(measurements[-1].found, next_experiment=telling)
-            measurements[-1] = replace(measurements[-1], found=discovered, following=following)
+            discovered = replace(measurements[-1].discovery, next_experiment=telling)
+            measurements[-1] = replace(measurements[-1], discovery=discovered, following=following)
             yield measurements[-1]
 
     def planned(self, experiment: Experiment) -> Experiment:
@@ -78,7 +78,7 @@ class Live:
 
     def _telling(self, measurements: Sequence[Measurement]) -> Experiment | None:
         """The experiment that separates the explanations, with or without time for it; None for one explanation."""
-        discovered = measurements[-1].found
+        discovered = measurements[-1].discovery
         if discovered.next_experiment is None:
             return None
         dispute = Dispute.of(discovered.end, discovered.next_experiment.separates, self.effects)
@@ -101,9 +101,9 @@ class Live:
 
 def stands(measurements: Sequence[Measurement]) -> bool:
     """Whether the last data have confirmed the explanation of the data before, or one of its alternatives."""
-    if len(measurements) < 2 or measurements[-1].found.undecided:
+    if len(measurements) < 2 or measurements[-1].discovery.undecided:
         return False
-    previous, present = measurements[-2].found, measurements[-1].found
+    previous, present = measurements[-2].discovery, measurements[-1].discovery
     explanations = {*previous.causes, *(name for names in previous.alternatives.values() for name in names)}
     is_confirmed = previous.verdict in (present.verdict, "ambiguous") and _kind(previous) == _kind(present)
     return is_confirmed and set(present.causes) <= explanations and len(present.causes) == len(previous.causes)

@@ -171,13 +171,13 @@ def course_chart(course: Course, name: str, time: RunTime = RunTime(), units: Ma
 
 def life_of(q: Quantity) -> Life:
     """One quantity over all calibrations of a sensor, as charts show it."""
-    values = [calibration.values[q.name] for calibration in q.of]
+    values = [calibration.values[q.name] for calibration in q.calibrations]
     signals = q.chart.signals if q.chart is not None else []
     due = None if q.due is None else (q.due - date(1970, 1, 1)).days
     return Life(
         q.name,
         q.unit,
-        [calibration.at.timestamp() / DAY_S for calibration in q.of],
+        [calibration.at.timestamp() / DAY_S for calibration in q.calibrations],
         [value.value for value in values],
         [value.std for value in values],
         q.line,
@@ -185,8 +185,8 @@ def life_of(q: Quantity) -> Life:
         due,
         f"due {q.due}",
         signals,
-        [_quantity_text(q, calibration, k in signals) for k, calibration in enumerate(q.of)],
-        [calibration.data for calibration in q.of],
+        [_quantity_text(q, calibration, k in signals) for k, calibration in enumerate(q.calibrations)],
+        [calibration.data for calibration in q.calibrations],
     )
 
 

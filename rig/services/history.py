@@ -113,7 +113,7 @@ class Quantity:
 
     name: str
     unit: str
-    of: tuple[Calibration, ...]
+    calibrations: tuple[Calibration, ...]
     chart: Chart | None
     line: Stability | None
     allowed: tuple[float, float] | None
@@ -122,7 +122,7 @@ class Quantity:
 
     @property
     def last(self) -> Value:
-        return self.of[-1].values[self.name]
+        return self.calibrations[-1].values[self.name]
 
 
 @dataclass(frozen=True)

@@ -69,9 +69,9 @@ def proposal(sheet: Sheet, kind: str | None = None) -> Proposal:
     kind = kind or _kind(sheet, mapping)
     target_names = column_names(kind)
     proposed = propose_mapping(sheet, "poses" if kind == "still" else kind, mapping)
-    mappings = {m.theirs: m for m in proposed if m.name in target_names or m in mapping}
+    mappings = {m.file_column: m for m in proposed if m.name in target_names or m in mapping}
     with_stated_unit = [
-        replace(m, unit=_header_unit(sheet, m.theirs)) if m.name == "t_s" else m for m in mappings.values()
+        replace(m, unit=_header_unit(sheet, m.file_column)) if m.name == "t_s" else m for m in mappings.values()
     ]
     return Proposal(kind, {name: mappings.get(name) for name in sheet.header}, time_doubt(sheet, with_stated_unit))
 

@@ -146,11 +146,11 @@ class _Steps:
     def __init__(self) -> None:
         self._printed = (0, 0)
 
-    def __call__(self, count: int, of: int) -> None:
-        step = (of, 10 * count // of)
+    def __call__(self, count: int, total: int) -> None:
+        step = (total, 10 * count // total)
         if step != self._printed:
             self._printed = step
-            note(f"{count} of {of} sensors analysed")
+            note(f"{count} of {total} sensors analysed")
 
 
 # Results in words.
@@ -188,7 +188,7 @@ def _shares(shares: Mapping[str, float], shared: set[str]) -> str:
 
 
 def _rigs(result: Population) -> Iterator[str]:
-    faulty = [error for error in result.rigs if error.beyond]
+    faulty = [error for error in result.rigs if error.is_significant]
     if faulty:
         yield ""
         yield "Errors of rigs relative to their median; the poses were corrected for them:"

@@ -139,10 +139,12 @@ def ask_mapping(
 def _columns(sheet: Sheet, kind: str, mapped: Sequence[ColumnMapping]) -> list[ColumnMapping]:
     """Ask for the name of each unknown column."""
     mapping = list(mapped)
-    proposals = {m.theirs: m for m in propose_mapping(sheet, kind, mapped)}
-    open_ones = [t for t, unitless in zip(sheet.header, sheet.bare, strict=True) if unitless not in NUMBERS]
-    for column in open_ones:
-        if column not in {m.theirs for m in mapped} and (m := _column(sheet, column, proposals.get(column), mapping)):
+    proposals = {m.file_column: m for m in propose_mapping(sheet, kind, mapped)}
+    mapped_columns = {m.file_column for m in mapped}
+    for column, name in zip(sheet.header, sheet.bare, strict=True):
+        if name in NUMBERS or column in mapped_columns:
+            continue
+        if m := _column(sheet, column, proposals.get(column), mapping):
             mapping.append(m)
     return mapping
 

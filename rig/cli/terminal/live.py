@@ -97,7 +97,7 @@ def discover_live(
         except KeyboardInterrupt:
             experiments.stopped()
             raise
-    discovered = measurements[-1].found
+    discovered = measurements[-1].discovery
     path = write_model(discovered.findings.data, discovered.end, start_model, out, note)
     if as_json:
         emit(document(measurements, standard_s, path))
@@ -109,10 +109,9 @@ def discover_live(
 
 def progress(measurements: list[Measurement], time_s: float) -> str:
     """After a measurement: the verdict, the next experiment with its reason, the remaining time."""
-    last = measurements[-1]
-    lines = [
-        f"{last.run}: {last.found.end.table.n} poses in {duration(last.used_s)} so far. {last.found.judgement.text}"
-    ]
+    last, judgement = measurements[-1], measurements[-1].discovery.judgement
+    poses = last.discovery.end.table.n
+    lines = [f"{last.run}: {poses} poses in {duration(last.used_s)} so far. {judgement.text}"]
     if last.following is not None:
         e, remaining = last.following, duration(time_s - last.used_s)
         lines.append(f"Next, {duration(e.duration_s or 0.0)} of the remaining {remaining}: {e.command}\n    {e.why}")
@@ -123,7 +122,7 @@ def ending(measurements: list[Measurement], time_s: float) -> str:
     """The reason for the end."""
     if stands(measurements):
         return "The last measurement did not change the result."
-    if measurements[-1].found.next_experiment is not None:
+    if measurements[-1].discovery.next_experiment is not None:
         return "The open question needs more time than remains, or another bench."
     return f"The time is over ({duration(time_s)}), or no experiment would help."
 
@@ -137,19 +136,19 @@ def document(measurements: list[Measurement], standard_s: float, out: Path | Non
             "why": m.experiment.why,
             "run": m.run,
             "duration_s": m.experiment.duration_s,
-            "verdict": m.found.verdict,
-            "causes": list(m.found.causes),
+            "verdict": m.discovery.verdict,
+            "causes": list(m.discovery.causes),
         }
         for m in measurements
     ]
     times = {"rig_time_s": measurements[-1].used_s, "standard_rig_time_s": standard_s, "stands": stands(measurements)}
     runs = {"runs": [m.run for m in measurements], "experiments": experiments}
-    return discovery_document(measurements[-1].found, str(out) if out else None) | runs | times
+    return discovery_document(measurements[-1].discovery, str(out) if out else None) | runs | times
 
 
 def _end(measurements: list[Measurement], live: Live, standard_s: float, out: Path | None) -> str:
     """Verdict, causes, model, and the rig time compared with that of the standard sweep."""
-    discovered, used_s = measurements[-1].found, measurements[-1].used_s
+    discovered, used_s = measurements[-1].discovery, measurements[-1].used_s
     data = f"{discovered.end.table.n} poses of {join_words(m.run for m in measurements)}"
     time = f"Rig time {duration(used_s)}; the standard sweep takes {duration(standard_s)}."
     command_text = f"To repeat the analysis: rig discover {' '.join(m.run for m in measurements)}"

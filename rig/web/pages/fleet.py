@@ -71,9 +71,9 @@ class FleetPage:
                 button("Download", "download", lambda: ui.download.content(text, "fleet.html"))
             ui.html(framed("Report on the fleet", text), sanitize=False)
 
-    def _show_progress(self, count: int, of: int) -> None:
+    def _show_progress(self, count: int, total: int) -> None:
         self.visit.check()
-        self.done = f"{count} of {of} sensors analysed"
+        self.done = f"{count} of {total} sensors analysed"
 
 
 def discovered(sources: list[str], model: str, bench_file: Any, notify: Tell) -> str:

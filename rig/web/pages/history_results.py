@@ -212,7 +212,10 @@ class HistoryPictures:
         for place in self.boxes:
             place.set_visibility(q.chart is not None)
         if q.chart is not None:
-            days, keys = [calibration.day for calibration in q.of], [calibration.data for calibration in q.of]
+            days, keys = (
+                [calibration.day for calibration in q.calibrations],
+                [calibration.data for calibration in q.calibrations],
+            )
             for title, panel in control_panels(q.name, q.chart, q.unit, days, keys).items():
                 draw(self.charts[title], untitled(panel), f"{title} {q.name}")
 

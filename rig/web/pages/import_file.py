@@ -153,7 +153,7 @@ class Column:
     """One column of the file: its meaning and its unit. A unit that a person selects counts as stated."""
 
     def __init__(self, file_column: str, sample_text: str, page: ImportPage) -> None:
-        self.theirs, self.page = file_column, page
+        self.file_column, self.page = file_column, page
         self.stated = ""
         with ui.element("tr"):
             with ui.element("td"):
@@ -200,7 +200,7 @@ class Column:
         if name == UNUSED:
             return None
         is_default = unit == column_unit(name) and not self.stated
-        return ColumnMapping(name, self.theirs, "" if is_default else unit)
+        return ColumnMapping(name, self.file_column, "" if is_default else unit)
 
 
 class ImportPage:
@@ -273,7 +273,7 @@ class ImportPage:
         """Ask for the unit of the time; nothing is imported before the answer."""
         clock = next(column for column in self.columns.values() if column.name.value == "t_s")
         with self.question, box("question stack").props("role=group aria-label='Unit of the time'"):
-            words(f'What is the unit of the time "{clock.theirs}"?', "title")
+            words(f'What is the unit of the time "{clock.file_column}"?', "title")
             words(f"It {doubt}; no stage does that." + (f" It fits {fits}." if fits else ""), "quiet")
             with div("row-of"):
                 for unit in TIMES:
@@ -338,7 +338,7 @@ class ImportPage:
         """Buttons for the unit that fits the values, and for the present one, which a person may confirm."""
         column = next(column for column in self.columns.values() if column.name.value == name)
         with box("question").props(f"role=group aria-label='Unit of {name}'"):
-            words(f'What is the unit of the column "{column.theirs}"?', "title")
+            words(f'What is the unit of the column "{column.file_column}"?', "title")
             with div("row-of"):
                 for k, unit in enumerate(units):
                     button = ui.button(unit_text(unit), on_click=partial(column.state, unit)).props("no-caps")

@@ -137,7 +137,7 @@ class CompensationDialog(Asking):
     def _inputs(self) -> dict[str, tuple[float, float]]:
         """The inputs that the model's own effects need, with their usual ranges."""
         required = {name for term in self.model.terms for name in term.effect.needs}
-        return {name: ends for name, ends in self.default.beside.items() if name in required}
+        return {name: ends for name, ends in self.default.input_limits.items() if name in required}
 
     def _range(self) -> Range:
         """The range of the proof. Raises RigError for ends that are not in order."""

@@ -99,11 +99,11 @@ class Missing:
                 with removal.props(f'outline dense no-caps icon-right=close aria-label="Remove {name}"'):
                     ui.tooltip(f"Remove {name}; the others are fitted again")
 
-    def discovering(self, name: str, at: int, of: int) -> None:
+    def discovering(self, name: str, at: int, total: int) -> None:
         """Show the present step of the discovery, with a button that ends it after this step."""
         with afresh(self.steps), box("stack").props("role=status"):
-            words(f"Step {at} of {of}: adding {name}")
-            ui.linear_progress((at - 1) / of, show_value=False).props("aria-label='progress of the discovery'")
+            words(f"Step {at} of {total}: adding {name}")
+            ui.linear_progress((at - 1) / total, show_value=False).props("aria-label='progress of the discovery'")
             button("Stop after this step", "stop", self._stop, "dense flat")
 
     def discovered(self) -> None:
