@@ -83,7 +83,7 @@ class RigError:
     std: float
     p_value: float
     sensors: int
-    is_significant: bool  # whether this rig's own value is more than chance
+    beyond: bool  # whether this rig's own value is more than chance
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def find_rig_errors(fleet: Sequence[Measured]) -> list[RigError]:
         best = max(significant, key=lambda effect: results[effect].fall)
         errors += results[best].errors
         for error in results[best].errors:
-            if error.is_significant:
+            if error.beyond:
                 corrections[error.rig][_place(names, error.effect, error.parameter)] = error.value
         effects.remove(best)
     return errors
@@ -164,7 +164,7 @@ def _effect(
     errors = tuple(replace(error, p_value=least) for rig_errors in errors_of_parameters for error in rig_errors)
     off = {rig: np.zeros(len(own_rows)) for rig in corrections}
     for error in errors:
-        if error.is_significant:
+        if error.beyond:
             off[error.rig][[names[k][1] for k in own_rows].index(error.parameter)] = error.value
     falls = (
         -2 * score @ off[measured.rig] - off[measured.rig] @ own_information @ off[measured.rig]

@@ -87,7 +87,7 @@ def errors_of(errors: Iterable[RigError], rig: str) -> StageErrors:
     """Errors of the stages of a rig: effect -> parameter -> value."""
     values: dict[str, dict[str, float]] = defaultdict(dict)
     for error in errors:
-        if error.rig == rig and error.is_significant:
+        if error.rig == rig and error.beyond:
             values[error.effect][error.parameter] = error.value
     return dict(values)
 

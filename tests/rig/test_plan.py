@@ -119,7 +119,7 @@ def test_a_dwell_that_no_memory_holds_is_refused(rig: Callable[..., Any], name: 
 def test_the_help_of_a_procedure_shows_its_settings_with_units_and_meaning() -> None:
     status, out, _ = command("run", "sweep", "--help")
     assert status == 0
-    assert "--step-deg 10\n        In deg." in out
+    assert "--step-deg  (default: 10 deg)\n" in out
     assert "up, down, both" in out
     assert command("procedures", "soak")[1].startswith("soak: ")
     assert "PROCEDURE" in command("run", "--help")[1]

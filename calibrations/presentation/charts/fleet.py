@@ -52,7 +52,7 @@ def rigs(errors: Sequence[RigError]) -> Chart:
         rig_errors = [e for e in errors if (e.effect, e.parameter, e.unit) == (effect, parameter, unit)]
         place = np.array([float(rig_names.index(e.rig)) for e in rig_errors])
         value = np.array([e.value for e in rig_errors])
-        colours = [VERMILION if e.is_significant else BLUE for e in rig_errors]
+        colours = [VERMILION if e.beyond else BLUE for e in rig_errors]
         dots = Points(value, place, colour=colours, reach=np.array([2 * e.std for e in rig_errors]))
         y = Axis(low=-0.5, high=len(rig_names) - 0.5, names=tuple(rig_names), reverse=True)
         panels.append(Panel((Rule(0.0, "x", width=0.7), dots), Axis(), y, f"{effect}, {parameter} in {unit}"))

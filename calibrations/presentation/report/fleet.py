@@ -25,7 +25,7 @@ SHARED = (
 def population_report(population: Population, model: str, facts: Mapping[str, str]) -> str:
     """The page of a discovery as HTML text; `facts` its provenance."""
     persons = [sensor for sensor in population.sensors if sensor.needs_a_person]
-    faulty_rigs = {error.rig for error in population.rigs if error.is_significant}
+    faulty_rigs = {error.rig for error in population.rigs if error.beyond}
     missing = [batch for batch in population.batches if batch.effects]
     state = "found" if missing or faulty_rigs or persons else "adequate"
     return html(
@@ -130,7 +130,7 @@ def _rigs(population: Population) -> Section:
     rows = [
         (e.rig, e.effect, e.parameter, f"{estimate_text(e.value, e.std)} {e.unit}", probability(e.p_value), e.sensors)
         for e in population.rigs
-        if e.is_significant
+        if e.beyond
     ]
     head = ("rig", "effect", "parameter", "value", "p-value", "sensors")
     return Section("Rigs", (*blocks, *_table("Rigs", head, rows)))

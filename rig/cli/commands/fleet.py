@@ -188,7 +188,7 @@ def _shares(shares: Mapping[str, float], shared: set[str]) -> str:
 
 
 def _rigs(result: Population) -> Iterator[str]:
-    faulty = [error for error in result.rigs if error.is_significant]
+    faulty = [error for error in result.rigs if error.beyond]
     if faulty:
         yield ""
         yield "Errors of rigs relative to their median; the poses were corrected for them:"
