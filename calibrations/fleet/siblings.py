@@ -42,8 +42,8 @@ HALVINGS = 40
 
 @dataclass(frozen=True)
 class Siblings:
-    """The posterior. `y` and their variances `v`, (n,); `outliers` (n,) are not pooled; `tau` a grid with weights that add
-    up to 1. With fewer than FEWEST that are alike nothing is pooled."""
+    """The posterior. `y` and their variances `v`, (n,); `outliers` (n,) are not pooled; `tau` a grid with weights that
+    add up to 1. With fewer than FEWEST that are alike nothing is pooled."""
 
     y: Array
     v: Array
