@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from calibrations.analyses.motion import MotionResult
+from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
 from calibrations.errors import UnusableData
 from rig.files import program
@@ -19,6 +20,7 @@ from rig.services.provenance import today
 from rig.services.request import Request
 
 if TYPE_CHECKING:
+    from calibrations.discovery.findings import Findings
     from calibrations.effects import Effect
     from calibrations.presentation.chart import Picture
 
@@ -87,23 +89,33 @@ Searched = Callable[[Mapping[str, "Effect"]], Mapping[str, "Effect"]]
 
 
 def reported(
-    request: Request, notify: Callable[[str], None], searched: Searched, question: Loaded | None = None
+    request: Request,
+    notify: Callable[[str], None],
+    searched: Searched,
+    question: Loaded | None = None,
+    found: Findings[Any] | None = None,
 ) -> Page:
     """On a model, or on the night of a soak where none is named. Raises what `loaded` and `fit` raise, UnusableData.
 
     `searched` makes the effects of the search, which report its progress and may end it. `question`: data and model in
-    memory, so that the page and its report show the same rows.
+    memory, so that the page and its report show the same rows. `found`: the search on these that the page has made.
     """
     night = night_of(request.data, today(), program()) if request.model is None and request.channel is None else None
-    return night or _on_a_model(request, question or loaded(request, notify), notify, searched)
+    if night is not None:
+        return night
+    question = question or loaded(request, notify)
+    return _on_a_model(
+        request, question, notify, lambda: found or question.data.search(question.model, searched(question.effects))
+    )
 
 
-def _on_a_model(request: Request, question: Loaded, notify: Callable[[str], None], searched: Searched) -> Page:
+def _on_a_model(
+    request: Request, question: Loaded, notify: Callable[[str], None], search: Callable[[], Findings[Any]]
+) -> Page:
     comparison = question.data.compare(question.model)
     if (reason := comparison.rejection) is not None and reason.verdict == Verdict.NO_RESPONSE:
         raise UnusableData(f"{question.data.source}: no report is written: {reason.verdict}: {reason.text}")
-    discovery = question.data.discover(question.model, searched(question.effects))
-    discovery = planned(discovery, request, question.effects, notify)
+    discovery = planned(Discovery.of(search()), request, question.effects, notify)
     if question.data.form == "samples":
         from calibrations.presentation.charts.noise import still_album
         from calibrations.presentation.report.still import still_report

@@ -190,6 +190,12 @@ class ModelSession(Generic[F]):
                 return plan if not remaining else self.data.followed(plan, len(remaining), self.effects)
         return None
 
+    @property
+    def search_made(self) -> Findings[F] | None:
+        """The search from the first model, if it was made among the present effects."""
+        own = any(step.effect.expression for step in self.steps)
+        return None if own else self.plans.get(())
+
     def _search(self) -> Findings[F]:
         if not self.steps:
             return self.data.search(self.model, self.effects)

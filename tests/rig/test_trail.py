@@ -9,6 +9,8 @@ import pytest
 from calibrations.errors import ExpressionError, ModelError
 from calibrations.importing.foreign import write_csv
 from calibrations.presentation.charts.discovery import levels
+from rig.services.load import Loaded
+from rig.services.report import reported
 from rig.services.request import Request
 from rig.services.session import ModelSession, model_session
 from tests.browser.measured import hidden, wandering
@@ -80,6 +82,15 @@ def test_the_name_of_a_removed_effect_is_free_and_its_searches_are_forgotten(tur
     assert again.effects["mine"].expression == "a*sin(2*beta)"
     assert again.with_step(again.tried(second))._plan() is None
     assert again.plans == {names: found for names, found in grown.plans.items() if "mine" not in names}
+
+
+def test_a_report_takes_the_search_that_its_session_has_made(turned: ModelSession) -> None:
+    assert turned.search_made is None
+    turned.diagnosed()
+    question = Loaded(turned.data, turned.model, turned.effects)
+    assert turned.search_made is not None
+    _, page = reported(turned.request, pytest.fail, pytest.fail, question, turned.search_made)
+    assert "misses axis-misalignment" in page()
 
 
 def test_a_noise_model_grows_as_well(tmp_path: Path) -> None:

@@ -165,7 +165,8 @@ class Choice:
         question = Loaded(session.data, session.model, session.effects) if session is not None else None
         request = Request(page.data, page.model or None, page.desk.bench_file, page.noise or None)
         name = f"{Path(page.data).stem}-{session.model.name if session else 'model'}.html"
-        await download_report(request, self.visit, name, question)
+        found = session.search_made if session is not None else None
+        await download_report(request, self.visit, name, question, found)
 
 
 def _file_of(name: str) -> Path:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import html
 import re
+from typing import Any
 
 from nicegui import ui
 from nicegui.element import Element
 
+from calibrations.discovery.findings import Findings
 from rig.record import Run
 from rig.services.content import content_of
 from rig.services.load import Loaded
@@ -75,11 +77,17 @@ class RunReport:
         return self.desk.reports[key]
 
 
-async def download_report(request: Request, visit: Visit, name: str, question: Loaded | None = None) -> None:
-    """Make a report as `rig report` does, and download it as the file `name`."""
+async def download_report(
+    request: Request,
+    visit: Visit,
+    name: str,
+    question: Loaded | None = None,
+    found: Findings[Any] | None = None,
+) -> None:
+    """Make a report as `rig report` does, and download it as the file `name`; `found` as in `reported`."""
     hint = ui.notification("Making the report", spinner=True, timeout=None)
     try:
-        _, page = await off_loop(reported, request, lambda _: None, visit.searched, question)
+        _, page = await off_loop(reported, request, lambda _: None, visit.searched, question, found)
         ui.download.content(await off_loop(page), name)
     except Cancelled:
         return
