@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import calibrations as cal
 from tests.benchmark.foreign.__main__ import STRENGTHS
 from tests.benchmark.foreign.causes import CATALOGUE, UNKNOWN, Cause
-from tests.benchmark.foreign.sensor import table
+from tests.benchmark.foreign.sensor import WHITE_V, table
 from tests.benchmark.hidden import Score, score, shipped
 
 SEED = 2028
@@ -74,3 +75,15 @@ def test_what_the_readings_or_the_form_leave_gets_no_second_name(tmp_path: Path,
     path.write_text(table(random, [cause], [floors], slow))
     found = score(path.stem, [cause.name], shipped(path), 0.0)
     assert found.exact, (reason, found.answer)
+
+
+@pytest.mark.slow
+def test_vibration_in_the_standard_deviations_does_not_hide_slow_effects(tmp_path: Path) -> None:
+    """With the stated noise, twice the true one and more, one effect leaves noise; two slow ones are in it."""
+    causes = [CATALOGUE[k] for k in (24, 29, 22)]
+    random = np.random.default_rng([311, 205])
+    path = tmp_path / "vibrating.csv"
+    path.write_text(table(random, causes, [10.0] * 3, slow=float(random.uniform(0.0, 0.6))))
+    end = cal.discover(cal.read(path), "linear").findings.end
+    assert np.all(end.noise.floor < 1.5 * WHITE_V)
+    assert end.held_out_excess < 1.15
