@@ -307,6 +307,8 @@ def _check_numbers(table: Table) -> None:
             is_wrong, must = values < 1, "at least 1: it counts averaged samples"
         elif name == "direction":
             is_wrong, must = ~np.isin(values, (-1, 0, 1)), "1 (beta growing), -1 (falling) or 0 (unknown)"
+        elif name == "flip":
+            is_wrong, must = ~np.isin(values, (0, 1)), "1 (face down, turned by 180 deg about x) or 0 (face up)"
         elif "_std" in name:
             is_wrong, must = values < 0, "0 or more"
         elif name == "supply_v":

@@ -87,6 +87,7 @@ def test_a_gravity_that_is_not_of_this_earth_is_refused(value: str | float, says
         ("n", 0.0, "is 0; it must be at least 1: it counts averaged samples"),
         ("vx_std_v", -1e-3, "is -0.001; it must be 0 or more"),
         ("direction", 2.0, r"is 2; it must be 1 \(beta growing\), -1 \(falling\) or 0 \(unknown\)"),
+        ("flip", -1.0, r"is -1; it must be 1 \(face down, turned by 180 deg about x\) or 0 \(face up\)"),
     ],
 )
 def test_a_number_that_cannot_be(name: str, value: float, says: str) -> None:

@@ -79,6 +79,10 @@ class File:
         rows = np.arange(self.n) % every == 1
         return self.changed(**{k: np.where(rows, other.columns[k], v) for k, v in self.columns.items()})
 
+    def mixed(self, other: File, share: float) -> File:
+        """Rows of another sensor in place of a random share."""
+        return self.changed(**{k: np.where(self.some(share), other.columns[k], v) for k, v in self.columns.items()})
+
 
 def poses(seed: int = 5, bias: float = 2.5, scale: float = 1.0) -> File:
     """A dual-axis accelerometer on two stages."""
@@ -284,6 +288,14 @@ WRONG: Mapping[str, Mapping[str, Spoil]] = {
         "the header names vx for the temperature": lambda f: f.swapped("vx_v", "temperature_c"),
         "the header names std for the output": lambda f: f.swapped("vx_v", "vx_std_v"),
         "directions of the approach are reversed": lambda f: f.scaled("direction", -1.0),
+        "directions of the approach as -10 and 10": lambda f: f.scaled("direction", 10.0),
+        "face down is stated as -1": lambda f: f.changed(flip=np.full(f.n, -1.0), vy_v=5.0 - f.columns["vy_v"]),
+        "face down is stated as 180": lambda f: f.changed(flip=np.full(f.n, 180.0), vy_v=5.0 - f.columns["vy_v"]),
+        "the mount in radians": lambda f: f.changed(mount_deg=np.full(f.n, np.pi)),
+        "some rows of another sensor": lambda f: f.mixed(poses(8, 2.52), 0.15),
+        "two sensors mixed at random": lambda f: f.mixed(poses(8, 2.52), 0.5),
+        "time in hours": lambda f: f.scaled("t_s", 1 / 3600),
+        "n is negative": lambda f: f.scaled("n", -1.0),
     },
     "positions": {
         "outputs in m/s^2 stated as g": _all(A, lambda v: 9.80665 * v),
@@ -342,6 +354,10 @@ WRONG: Mapping[str, Mapping[str, Spoil]] = {
         "two sensors in one file": lambda f: f.changed(mx=f.columns["mx"] + 5.0 * (np.arange(f.n) % 2)),
         "variance in place of the standard deviation": _all("mx_std my_std mz_std", np.square),
         "0 for missing readings": lambda f: _pick(f, f.some(0.1), "mx", 0.0),
+        "outputs in gauss stated as uT": _all(M, lambda v: v / 100),
+        "iron came near in mid-run": lambda f: f.changed(
+            mx=f.columns["mx"] + np.where(np.arange(f.n) > f.n // 2, 10.0, 0.0)
+        ),
         "the accelerometer in the columns of the field": lambda f: f.changed(
             **dict(zip(M.split(), Rotation.random(f.n, rng=np.random.default_rng(1)).as_matrix()[:, 2].T, strict=True))
         ),
@@ -383,6 +399,18 @@ WRONG: Mapping[str, Mapping[str, Spoil]] = {
 }  # fmt: skip
 
 UNSEEN: Mapping[str, Mapping[str, tuple[Spoil, str]]] = {  # what no data of this kind can show, and what shows it
+    "rates": {
+        "the rate is off by 1 %": (
+            lambda f: f.scaled("rate_deg_s", 1.01),
+            "a gyroscope with another scale factor gives the same file; compare with a second rate table",
+        ),
+    },
+    "fields": {
+        "one axis has the wrong sign": (
+            lambda f: f.scaled("my", -1.0),
+            "only the magnitude of the field is known; a turn to a known azimuth shows it",
+        ),
+    },
     "positions": {
         "x and y are exchanged": (
             lambda f: f.swapped("ax", "ay"),
