@@ -48,6 +48,9 @@ from calibrations.means.noise import rms, white_std
 from calibrations.table import AXES, Array, Table
 
 ROUNDS = 20  # of a regression in two clusters
+# Of the rows, those at which the groups differ by so many times what they leave: an effect of a few poses divides the
+# other rows by their noise.
+APART_ROWS, CLEARLY_APART = 0.5, 3.0
 MOST_SHARED = 3  # rows for each column of the effects that two sensors share: fewer rows would be fitted themselves
 CHECK_WIRING = "check the sensor's supply, the cable and the channel of"
 
@@ -288,6 +291,9 @@ def _refined_clusters(
             break
         labels = updated
     within_share = float(np.mean(np.min(errors, axis=0))) / scaled.shape[1]
+    within = np.sqrt(within_share * scaled.shape[1])
+    if np.mean(np.linalg.norm(difference, axis=1) > CLEARLY_APART * within) < APART_ROWS:
+        within_share = 1.0
     return labels, within_share, rms(difference.T)
 
 

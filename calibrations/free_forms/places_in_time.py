@@ -127,11 +127,15 @@ def _warmer(data: PoseData, first: State, name: str, place: str, factor: Factor,
 
 
 def _curve_over_temperature(data: PoseData, first: State, place: str, factor: Factor, price: float) -> Make:
-    """A curve over the temperature that the thermometer shows some seconds later."""
+    """A curve over the temperature that the thermometer shows some seconds later.
+
+    It has as many columns at any lead: a coarse thermometer shows few values, and its level has many.
+    """
+    intervals = spline(leading_temperature(data.table, 0.0), 8).intervals
 
     def at(shape: tuple[float, ...]) -> Component:
         error = reading_error(data.table, "temperature_c", lead_s=shape[0]) if data.timed else 0.0
-        smooth = spline(leading_temperature(data.table, shape[0]), 8)
+        smooth = replace(spline(leading_temperature(data.table, shape[0])), intervals=intervals)
         form = Form(place, "curve", "temperature", (smooth,), factor, lead_s=shape[0])
         component = free(form, first, price=price, family=f"{place}/curve", shape=shape, step=(30.0,), error=error)
         return (

@@ -30,7 +30,8 @@ from calibrations.table import Array
 
 COARSE = (1e-3, 2e-5)  # of the misfit, at each linearisation: less may be a second-order remainder
 ROUNDS = 7
-SETTLING = 5  # Gauss-Newton steps after components are left out
+CONVERGED = 0.03  # noise floors by which the output changes, rms
+SETTLING = 6  # Gauss-Newton steps after components are left out
 SMALL_GAIN = 1.0  # of twice the log-likelihood
 LARGEST = 4.0  # of the mean square of the first misfit: more is two components against each other
 HALVINGS = 6  # of a step that overshoots
@@ -192,7 +193,7 @@ def _descent(
         most |= {} if flicker else dict.fromkeys(noise, (slow * floor) ** 2)
         limit = caution * (max(ENTER, COARSE[number] * g.squares) if number < len(COARSE) else ENTER)
         previous_names = set(variances)
-        previous = values, dict(variances), state
+        previous = values, dict(variances), state, components
         sizes = estimate(g, variances, most)
         pools = pools_of(components, catalogue_first and number < len(COARSE))
         sizes, steps = select(g, sizes, components, pools, most, limit, number >= len(COARSE))
@@ -212,7 +213,7 @@ def _descent(
         change = float(np.sqrt(np.mean(((moved_state.predicted - state.predicted) / white) ** 2)))
         state = moved_state
         if _misfit(moved_state, white) > 1.5 * g.squares / g.rows + 10.0:  # components against each other: no step
-            values, variances, state = previous
+            values, variances, state, components = previous
             saws = {c.name for c in components if c.cause == "quantisation"} & set(sizes.variances)
             rejected += [c.shape[0] for c in components if c.name in saws]
             components = [c for c in components if c.name not in saws]
@@ -225,7 +226,7 @@ def _descent(
             if extra is not None:
                 components = [*components, extra]
                 continue
-        if number >= len(COARSE) and set(variances) == previous_names and change < 0.03:
+        if number >= len(COARSE) and set(variances) == previous_names and change < CONVERGED:
             break
     X, blocks, scales = whitened(state, model_effects, values, components, scales, white)
     g = gram(X, blocks, scales, b)
@@ -262,7 +263,7 @@ def _likelier_without_one(result: SearchResult) -> SearchResult | None:
         if _loss(result, group) > SPILL * result.gram.squares:
             break
         without_group = _settled(result, set(result.sizes.variances) - set(group))
-        if without_group.criterion < result.criterion - SMALL_GAIN:
+        if without_group is not None and without_group.criterion < result.criterion - SMALL_GAIN:
             return without_group
     return None
 
@@ -275,8 +276,8 @@ def _loss(result: SearchResult, names: Sequence[str]) -> float:
     return sizes.deviance - result.sizes.deviance
 
 
-def _settled(result: SearchResult, names: Set[str]) -> SearchResult:
-    """The search with these components alone, after Gauss-Newton steps."""
+def _settled(result: SearchResult, names: Set[str]) -> SearchResult | None:
+    """The search with these components alone, after Gauss-Newton steps; None where these do not converge."""
     data, model_effects, white = result.data, result.model_effects, result.white
     components = [c for c in result.components if c.name in names]
     floor = float(np.sqrt(np.mean(white**2)))
@@ -293,12 +294,12 @@ def _settled(result: SearchResult, names: Set[str]) -> SearchResult:
         variances = dict(sizes.variances)
         values, next_state = _damped(data, model_effects, values, coefficients(g, sizes), components, white)
         change = float(np.sqrt(np.mean(((next_state.predicted - state.predicted) / white) ** 2)))
+        if not _misfit(next_state, white) <= 1.5 * _misfit(state, white) + 10.0:
+            return None
         state = next_state
-        if change < 0.03:
-            break
-    return replace(
-        result, components=components, gram=g, columns=X, sizes=sizes, values=values, state=state, path=result.path
-    )
+        if change < CONVERGED:
+            return replace(result, components=components, gram=g, columns=X, sizes=sizes, values=values, state=state)
+    return None
 
 
 def _damped(

@@ -163,6 +163,20 @@ def test_two_groups_of_rows_that_differ_in_direction_are_an_effect() -> None:
     assert findings(replace(table, columns={**table.columns, "direction": direction})) == ()
 
 
+def test_an_effect_at_a_few_poses_of_a_soak_is_no_second_sensor() -> None:
+    """Both groups are the same at the orientation of the soak, whose rows the noise divides between them."""
+    alpha = np.r_[np.tile(90.0, 88), np.zeros(540)]
+    beta = np.r_[np.tile([0.0, 90.0, 180.0, 270.0, 270.0, 180.0, 90.0, 0.0], 11), np.zeros(540)]
+    direction = np.r_[np.tile([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0], 11), np.zeros(540)]
+    ax, ay, _ = components({"alpha_deg": alpha, "beta_deg": beta})
+    noise = NOISE_V * np.random.default_rng(8).standard_normal((2, 628))
+    hysteresis = 0.005 * direction * np.array([np.abs(ay), np.abs(ax)])
+    measured = {"vx_v": 2.5 + ax + hysteresis[0] + noise[0], "vy_v": 2.5 + ay + hysteresis[1] + noise[1]}
+    spread = dict.fromkeys(("vx_std_v", "vy_std_v"), np.full(628, NOISE_V * np.sqrt(500)))
+    columns = {"alpha_deg": alpha, "beta_deg": beta, "t_s": 10.0 * np.arange(628), "n": np.full(628, 500.0)}
+    assert findings(Table.from_columns("poses", {**columns, **measured, **spread}, source="made")) == ()
+
+
 @pytest.mark.parametrize("spoil", [DEAD["noise"][0], two_sensors])
 def test_every_command_gives_the_same_verdict(spoil: Callable[[Data], Data]) -> None:
     table, model = spoil(healthy()).table(), read_model("linear")

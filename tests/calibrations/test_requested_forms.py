@@ -133,6 +133,18 @@ def test_effects_of_the_search_are_listed_at_their_places() -> None:
         assert not c.cause or place_of_effect(c.cause) == c.place
 
 
+def test_a_component_has_as_many_columns_at_any_lead_of_a_coarse_thermometer() -> None:
+    """Its readings have few values, and the level that leads them has many."""
+    data = PoseData.of(table(temperature_c=np.round(WARMING / np.ptp(WARMING) * 3) / 3))
+    nothing = ModelEffects.without_effects(data)
+    state = state_at(data, nothing, start(data, nothing), ())
+    curves = [c for c in components(data, state) if c.name in ("temperature-bias/curve", "temperature-scale/curve")]
+    assert len(curves) == 2
+    for curve in curves:
+        assert curve.reshaped is not None
+        assert curve.reshaped((-60.0,)).jacobian(state).shape == curve.jacobian(state).shape
+
+
 def test_a_place_left_out_gets_neither_a_cause_nor_a_curve() -> None:
     data = table(1e-3 * FORCES[:, [1, 0]] ** 2)
     assert discover(data, read_model("linear")).causes == ("cross-axis-bias",)
