@@ -26,7 +26,7 @@ from calibrations.effects.logged import RATE
 from calibrations.errors import ModelError
 from calibrations.free_forms.effect import FreeForm
 from calibrations.model import Model, Term
-from calibrations.model.chain import STAGES, Step, scaled, stage_of, staged_part
+from calibrations.model.chain import Stage, Step, scaled, stage_of, staged_part
 from calibrations.table import AXES, NUMBERS
 from calibrations.tables import KINDS
 
@@ -202,7 +202,7 @@ def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str,
         if effect.of_force:
             of_force = of_force + (v - before_v)
     force = scaled(a, of_force, steps) if any(effect.of_force and not effect.scales for effect, _ in steps) else a
-    for stage in STAGES[1:]:
+    for stage in (Stage.SCALE, Stage.DRIFT):
         response = force
         for effect, p in steps:
             if stage_of(effect) == stage:

@@ -10,7 +10,7 @@ from scipy.special import chdtrc  # scipy.stats takes 0.4 s to load
 
 from calibrations.free_forms.chain import base_size
 from calibrations.free_forms.components import Component
-from calibrations.free_forms.reml import Sizes, gains, without
+from calibrations.free_forms.reml import gains
 from calibrations.free_forms.search import SearchResult, climb
 from calibrations.table import Array
 
@@ -125,25 +125,13 @@ def _with_substitutes(result: SearchResult, acting_places: Sequence[ActingPlace]
         if (place.material and place.own >= LEAST_SIZE) or place.size < max(LEAST_SIZE, LEAST_SHARE * place.largest):
             continue
         for substitute in (o for o in places_kept[i + 1 :] if not o.material):
-            gain = _cost_without(result, (*place.components, *substitute.components))
+            gain = result.cost_without((*place.components, *substitute.components))
             if _own_size(result, gain) >= LEAST_SIZE:
                 names = substitute.causes or (substitute.name,)
                 alternatives = tuple(sorted({*place.inseparable_from, *names} - set(place.causes)))
                 places_kept[i] = replace(place, material=True, gain=gain, inseparable_from=alternatives)
                 break
     return places_kept
-
-
-def _cost_without(result: SearchResult, names: Sequence[str]) -> float:
-    """Loss of twice the log-likelihood without some components."""
-    return _sizes_without(result, names).deviance - result.sizes.deviance
-
-
-def _sizes_without(result: SearchResult, names: Sequence[str]) -> Sizes:
-    sizes = result.sizes
-    for name in names:
-        sizes = without(result.gram, sizes, name)
-    return sizes
 
 
 def _reading_errors(result: SearchResult, sizes: Mapping[str, float]) -> float:
@@ -341,7 +329,7 @@ def _rivals(result: SearchResult, names: Sequence[str], larger: set[str]) -> tup
     Of one component those that gain nearly as much. At a `larger` place that acts, also a form that gains most of it:
     the form of a mechanism is never quite that of the catalogue.
     """
-    reduced = _sizes_without(result, names)
+    reduced = result.sizes_without(names)
     cost = reduced.deviance - result.sizes.deviance
     acting_components = [result.component(name) for name in names]
     inactive = [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -91,6 +91,17 @@ class SearchResult:
         )
         return float(max(len(self.columns) - self.gram.base_rank - parameters, 1.0))
 
+    def sizes_without(self, names: Iterable[str]) -> Sizes:
+        """Sizes without some components, the other variances held."""
+        sizes = self.sizes
+        for name in names:
+            sizes = without(self.gram, sizes, name)
+        return sizes
+
+    def cost_without(self, names: Iterable[str]) -> float:
+        """Loss of twice the log-likelihood without some components, to first order."""
+        return self.sizes_without(names).deviance - self.sizes.deviance
+
     @property
     def active(self) -> list[str]:
         return [name for name in self.sizes.variances if not self.component(name).noise]
@@ -144,7 +155,7 @@ def _likeliest(data: PoseData, white: Array, model_effects: ModelEffects, genera
     if any(best.component(name).place == "history" for name in best.active):
         looped = descent(catalogue_first=True, loops=True)
         best = looped if looped.criterion < best.criterion - SPILL * abs(best.criterion) else best
-    return _without_spilt(best, lambda origin: descent(catalogue_first=False, origin=origin))
+    return _without_remainders(best, lambda origin: descent(catalogue_first=False, origin=origin))
 
 
 def _descent(
@@ -236,7 +247,7 @@ def _descent(
     return SearchResult(data, model_effects, white, components, g, X, sizes, values, state, path, flicker)
 
 
-def _without_spilt(best: SearchResult, descent: Callable[[SearchResult], SearchResult]) -> SearchResult:
+def _without_remainders(best: SearchResult, descent: Callable[[SearchResult], SearchResult]) -> SearchResult:
     """The search without components that hold the remainder of others, if that is likelier.
 
     While the first components are found, what they leave is of second order in large effects, and looks like other
@@ -259,21 +270,13 @@ def _likelier_without_one(result: SearchResult) -> SearchResult | None:
     places = {result.component(name).place for name in active}
     groups = [[n for n in active if result.component(n).place == place] for place in places]
     groups += [[name] for group in groups if len(group) > 1 for name in group]
-    for group in sorted(groups, key=lambda group: _loss(result, group)):
-        if _loss(result, group) > SPILL * result.gram.squares:
+    for group in sorted(groups, key=result.cost_without):
+        if result.cost_without(group) > SPILL * result.gram.squares:
             break
         without_group = _settled(result, set(result.sizes.variances) - set(group))
         if without_group is not None and without_group.criterion < result.criterion - SMALL_GAIN:
             return without_group
     return None
-
-
-def _loss(result: SearchResult, names: Sequence[str]) -> float:
-    """Loss of twice the log-likelihood without some components, to first order."""
-    sizes = result.sizes
-    for name in names:
-        sizes = without(result.gram, sizes, name)
-    return sizes.deviance - result.sizes.deviance
 
 
 def _settled(result: SearchResult, names: Set[str]) -> SearchResult | None:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from functools import cached_property, lru_cache, partial
 from typing import Any
 
@@ -24,8 +25,22 @@ from calibrations.geometry.rate_table import rate_deg_s
 from calibrations.table import Array, Table
 
 Step = tuple[Effect, Values]
-STAGES = range(3)  # of the response: see `stage_of`
 LITTLE = 1e-5  # of the largest force, and rad: steps of derivatives with respect to the force and the stage angles
+
+
+class Stage(IntEnum):
+    """The stages of the response to the force; each changes what the one before makes of the force."""
+
+    RESPONSE = 0  # adds to it, as a nonlinearity does, or to the output alone
+    SCALE = 1  # scales it over other forces
+    DRIFT = 2  # scales all of it, over time or temperature
+
+
+def stage_of(effect: Effect) -> Stage:
+    """The stage at which an effect acts."""
+    if not effect.scales:
+        return Stage.RESPONSE
+    return Stage.SCALE if effect.of_force else Stage.DRIFT
 
 
 def force(table: Table, steps: Sequence[Step]) -> Array:
@@ -80,16 +95,11 @@ def effect_contributions(a: Array, table: Table, steps: Sequence[Step]) -> list[
     return _staged(a, table, steps)[1]
 
 
-def stage_of(effect: Effect) -> int:
-    """0: adds to the response to the force; 1: scales this over other forces; 2: a drift, which scales all of it."""
-    return int(effect.scales) * (1 if effect.of_force else 2)
-
-
 def _staged(a: Array, table: Table, steps: Sequence[Step]) -> tuple[list[Array], list[Array]]:
     """The force, g, (n, 3), that each stage gets, and the contribution of each effect."""
     parts: dict[int, Array] = {}
     forces = [a]
-    for stage in STAGES:
+    for stage in Stage:
         stage_parts = {
             i: staged_part(stage, partial(_transduced, effect, table, p), a, forces[stage])
             for i, (effect, p) in enumerate(steps)
@@ -101,12 +111,12 @@ def _staged(a: Array, table: Table, steps: Sequence[Step]) -> tuple[list[Array],
     return forces, [parts[i] for i in range(len(steps))]
 
 
-def staged_part(stage: int, part_of: Callable[[Any], Any], a: Any, response: Any) -> Any:
+def staged_part(stage: Stage, part_of: Callable[[Any], Any], a: Any, response: Any) -> Any:
     """Contribution of an effect of some stage to the output, `part_of` a force, to the `response` before it, (n, 3), g.
 
     What scales the response over other forces follows the force along these, and not their response.
     """
-    if stage != 1 or response is a:
+    if stage is not Stage.SCALE or response is a:
         return part_of(response)
     parts = [part_of(a + (response - a) * axis) * axis for axis in np.eye(3)[:, None]]
     return parts[0] + parts[1] + parts[2]
@@ -228,17 +238,17 @@ class LinearisedChain:
     @cached_property
     def _forces(self) -> list[Array]:
         """The force, g, that each stage of the response gets, shape (n, 3)."""
-        return _staged(self._sensed, self.table, self.steps)[0] if self._scales else [self._sensed] * len(STAGES)
+        return _staged(self._sensed, self.table, self.steps)[0] if self._scales else [self._sensed] * len(Stage)
 
     @cached_property
     def _gains(self) -> list[Array]:
         """By stage, the sensitivity that the later stages give it over that of the scale factor, shape (n, 3)."""
         gains = [np.ones((1, 3))]
-        for stage in reversed(STAGES[1:]):
+        for stage in (Stage.DRIFT, Stage.SCALE):
             gains.insert(0, gains[0] * self._gain_by(stage))
         return gains
 
-    def _gain_by(self, stage: int) -> Array:
+    def _gain_by(self, stage: Stage) -> Array:
         """Sensitivity over that of the scale factor, by the effects of one stage, which are linear in the own force."""
         a, unit = self._sensed, np.ones((1, 3))
         total = np.zeros((1, 3))
@@ -252,7 +262,7 @@ class LinearisedChain:
         """d contribution / d each parameter of an effect that is linear in them, shape (n, 3) each; else None."""
         a, response, stage = self._sensed, self._forces[stage_of(effect)], stage_of(effect)
         names = effect.columns(response, self.table)
-        if names is None or stage != 1 or response is a:
+        if names is None or stage is not Stage.SCALE or response is a:
             return names
         by_axis = [effect.columns(a + (response - a) * axis, self.table) or {} for axis in np.eye(3)[:, None]]
         return {name: np.column_stack([by_axis[k][name][:, k] for k in range(3)]) for name in names}
