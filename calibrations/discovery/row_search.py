@@ -244,8 +244,9 @@ def _explained(path: Path) -> bool:
     end = path.end
     largest_excess = NO_MORE_THAN_NOISE if correlation_known(end.table) or one_orientation(end.table) else np.inf
     as_noise = end.noise.known and LEAST_NOISE < end.pooled_excess < largest_excess
-    as_noise = as_noise and not neighbours_contradict(end.residual / end.noise.white)
-    return as_noise and structure_of(end) is None and is_complete(path)
+    if not as_noise or (np.all(end.noise.white > 0) and neighbours_contradict(end.residual / end.noise.white)):
+        return False
+    return structure_of(end) is None and is_complete(path)
 
 
 def _cross_validated(fit: Fit) -> float:
