@@ -30,6 +30,7 @@ from calibrations.table import Array
 
 COARSE = (1e-3, 2e-5)  # of the misfit, at each linearisation: less may be a second-order remainder
 ROUNDS = 7
+EXCHANGES_AGAIN = 0.3  # noise floors by which the output changes, rms: exchanges of the same components are tried again
 CONVERGED = 0.03  # noise floors by which the output changes, rms
 SETTLING = 6  # Gauss-Newton steps after components are left out
 SMALL_GAIN = 1.0  # of twice the log-likelihood
@@ -184,8 +185,8 @@ def _descent(
     rejected: list[float] = []
     first = find_saw(data, state, white, data.outputs - state.predicted, rejected, ENTER)
     components += [first] if first is not None else []
-    caution = 1.0
-    first_round = 0
+    caution, change = 1.0, np.inf
+    first_round, exchanged = 0, set[str]()
     if origin is not None:
         values, state, components = origin.values, origin.state, list(origin.components)
         variances, first_round = dict(origin.sizes.variances), len(COARSE)
@@ -207,9 +208,11 @@ def _descent(
         previous = values, dict(variances), state, components
         sizes = estimate(g, variances, most)
         pools = pools_of(components, catalogue_first and number < len(COARSE))
-        sizes, steps = select(g, sizes, components, pools, most, limit, number >= len(COARSE))
+        is_same = set(variances) == exchanged and change < EXCHANGES_AGAIN
+        sizes, steps = select(g, sizes, components, pools, most, limit, number >= len(COARSE) and not is_same)
         path += steps
         variances = dict(sizes.variances)
+        exchanged = set(variances) if number >= len(COARSE) else set()
         values, moved_state = _damped(data, model_effects, previous[0], coefficients(g, sizes), components, white)
         reshaped = _refined(components, g, sizes, X, b, state, scales, white)
         if reshaped is not None:
