@@ -50,7 +50,7 @@ def compared(defect: str, seed: int) -> Case:
     live = Live(bench, None, model, effects, standard_s, live.measure)
     done = list(live.measurements())
     _, table = QuickRig(config, seed, bench).measure(STANDARD)
-    found = done[-1].found
+    found = done[-1].discovery
     standard = is_right(defect, discover(table, model, effects))
     return Case(
         defect, seed, is_right(defect, found), stands(done), standard, standard_s / done[-1].used_s, found.causes

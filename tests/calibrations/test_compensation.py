@@ -63,7 +63,7 @@ def drawn(made: Compensation, n: int, seed: int) -> tuple[Table, Array]:
     """Rows all over the range, and specific force (n, 3): by the library's own chain, and not by the graph."""
     rng = np.random.default_rng(seed)
     a = made.range.reach * rng.uniform(-1, 1, (n, 3))
-    columns = {name: rng.uniform(low, high, n) for name, (low, high) in made.beside.items() if name[0] != "a"}
+    columns = {name: rng.uniform(low, high, n) for name, (low, high) in made.input_limits.items() if name[0] != "a"}
     return Table.from_columns("poses", columns | {k: np.zeros(n) for k in ("alpha_deg", "beta_deg", "vx_v", "vy_v")}), a
 
 

@@ -136,7 +136,7 @@ def test_nothing_is_begun_that_there_is_no_time_for() -> None:
 @pytest.mark.slow
 def test_what_no_poses_can_tell_is_proposed_and_the_time_is_used() -> None:
     told = loop({"base": {"tilt_y_deg": 0.1}}, minutes=20)
-    last = told[-1].found
+    last = told[-1].discovery
     assert last.verdict == "ambiguous"
     assert {*last.causes, *last.alternatives[last.causes[0]]} == {"base-tilt", "stage-zero-offset"}
     assert isinstance(last.next_experiment, Experiment)
