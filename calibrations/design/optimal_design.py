@@ -22,6 +22,8 @@ from calibrations.fitting.problem import Problem
 from calibrations.means.noise import Noise, rms
 from calibrations.table import Array, Table
 
+NOTHING = 1e-12  # of the largest column: a smaller one is rounding, as the out-of-plane axis of a level turn
+
 
 def information(fit: Fit, table: Table) -> Array:
     """Derivatives of the model at the fitted values on another `table`, made white, shape (axes * n, parameters).
@@ -41,7 +43,7 @@ def covariance_of(rows: Array) -> Array:
     """
     p = rows.shape[1]
     size = np.linalg.norm(rows, axis=0)
-    scale = np.where(size > 0, size, 1.0)
+    scale = np.where(size > NOTHING * size.max(initial=0.0), size, np.inf)
     _, s, Vt = np.linalg.svd(np.vstack([rows / scale, np.zeros((p, p))]), full_matrices=False)
     determined = s > RELATIVE_RANK * s[0]
     root = Vt[determined].T / s[determined] / scale[:, None]

@@ -1,7 +1,8 @@
 """Model files of older programs are read, and mean what they meant.
 
 `tests/data/models` has, of each program that wrote other keys, a model file and a table whose outputs are that
-program's answers of the model. Keys that came later are optional.
+program's answers of the model. Keys that came later are optional. Since then, z-axis-scale and cross-axis-scale also
+multiply what nonlinear effects add: of the model `first`, 4 uV.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from calibrations.importing.foreign import read_csv
 from calibrations.model.file import dump_model, parse_model, read_model
 from tests.docs.markdown import ROOT
 
+SECOND_ORDER_V = {"first": 5e-6}
 FILES = sorted((ROOT / "tests" / "data" / "models").glob("*.yaml"))
 
 
@@ -29,4 +31,4 @@ def test_an_older_model_answers_as_before(file: Path) -> None:
     assert parse_model(dump_model(model), "again") == model
     evaluated = evaluate(model, read_csv(file.with_suffix(".csv")))
     assert evaluated is not None
-    assert np.max(np.abs(evaluated.residual)) < 1e-12
+    assert np.max(np.abs(evaluated.residual)) < SECOND_ORDER_V.get(file.stem, 1e-12)

@@ -72,7 +72,7 @@ class Bench:
     def record(self, motor: motor_driver.MotorRecord, **fields: float) -> None:
         """Set fields of the twin's record, as another client would."""
         twin = self.servers[0]._twins["beta"]
-        twin._own |= {f".{name}": value for name, value in fields.items()}  # type: ignore[attr-defined]
+        twin._fields |= {f".{name}": value for name, value in fields.items()}  # type: ignore[attr-defined]
 
 
 @pytest.fixture

@@ -57,7 +57,7 @@ def framed_samples(make: Callable[[], Any]) -> Callable[[bytes], object]:
         decoder, half = make(), len(data) // 2
         batches = [decoder.take(data[:half]), decoder.take(data[half:])]
         assert all(len(batch.values) == len(batch.missing) for batch in batches)
-        assert len(decoder.stream.rest) < 4096
+        assert len(decoder.stream.remainder) < 4096
         return decoder.damaged
 
     return take

@@ -65,7 +65,7 @@ def test_scaled_counts_are_the_same_bytes_both_ways(
     own = mav.fields(message, time=time, **triads, temperature=more[0] if more else 0)
     assert mav.frames(message, own, np.array([sequence]), 1, 1, version) == [data]
     frames, found, heads = found_in(data)
-    assert (frames.good, frames.damaged, frames.rest) == (1, 0, b"")
+    assert (frames.good, frames.damaged, frames.remainder) == (1, 0, b"")
     assert heads.sequence.tolist() == [sequence]
     assert mav.contents(found, heads, message, np.array([0])) == own
 
@@ -108,8 +108,8 @@ def test_any_bytes_can_come_and_the_cuts_do_not_matter(data: bytes, cuts: list[i
     for n in [*cuts, len(data)]:
         numbers += mav.heads(parts.take(data[at : at + n])).number.tolist()
         at += n
-    assert (numbers, parts.good, parts.rest) == (expected, whole.good, whole.rest)
-    assert len(parts.rest) <= mav.LONGEST + 13
+    assert (numbers, parts.good, parts.remainder) == (expected, whole.good, whole.remainder)
+    assert len(parts.remainder) <= mav.LONGEST + 13
 
 
 @given(

@@ -52,7 +52,7 @@ def test_messages_are_the_bytes_of_the_manual(text: str) -> None:
     assert xbus.message(number, bytes.fromhex(data)) == bytes.fromhex(text)
     stream = Frames(xbus.Xbus())
     assert list(xbus.messages(stream.take(bytes.fromhex(text)))) == [(number, bytes.fromhex(data))]
-    assert (stream.good, stream.damaged, stream.rest) == (1, 0, b"")
+    assert (stream.good, stream.damaged, stream.remainder) == (1, 0, b"")
 
 
 def test_an_output_configuration_is_that_of_the_manual() -> None:
@@ -125,7 +125,7 @@ def test_each_format_of_numbers_is_read(values: list[float], kind: int, frame: i
 def test_a_message_comes_back(data: bytes) -> None:
     stream = Frames(xbus.Xbus())
     assert list(xbus.messages(stream.take(b"noise" + xbus.message(0x12, data) + b"\xfa"))) == [(0x12, data)]
-    assert stream.rest == b"\xfa"
+    assert stream.remainder == b"\xfa"
 
 
 def test_too_much_data_is_refused() -> None:
@@ -141,7 +141,7 @@ def test_any_bytes_can_come_and_the_cuts_do_not_matter(data: bytes, cuts: list[i
     for n in [*cuts, len(data)]:
         rows += len(parts.take(data[at : at + n]).values)
         at += n
-    assert (rows, parts.good, parts.stream.rest) == (expected, whole.good, whole.stream.rest)
+    assert (rows, parts.good, parts.stream.remainder) == (expected, whole.good, whole.stream.remainder)
 
 
 @given(st.binary(max_size=120))
