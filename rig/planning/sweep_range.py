@@ -71,6 +71,7 @@ def _oven_c(settings: Mapping[str, Any], path: str) -> float:
 # only so can volts be set beside degrees. The greatest of them is the worst standard error.
 
 GRID_DEG = 15.0
+MOST_ERROR = 0.01  # of the output per g: a plan that leaves more at full scale does not determine the parameter
 SIDE = 0.2  # distance of the two directions of one pose, in units of the distances of gravity, g
 
 
@@ -147,8 +148,8 @@ class Range:
         fitted = replace(planned, held=tuple(dwell for dwell in planned.held if not dwell.pose.path.startswith(MARK)))
         rows = information(self.fit, predict_data(self.fit, _columns(fitted)))
         std = np.sqrt(np.diag(covariance_of(rows)))
-        unknown = np.full(len(std), np.inf)
-        return Judged(planned, np.multiply(std, self._full_scale, where=np.isfinite(std), out=unknown))
+        errors = np.multiply(std, self._full_scale, where=np.isfinite(std), out=np.full(len(std), np.inf))
+        return Judged(planned, np.where(errors < MOST_ERROR * self.fit.problem.layout.nominal, errors, np.inf))
 
     def name(self, k: int) -> str:
         """A parameter: `scale-factor scale x`."""

@@ -113,9 +113,10 @@ def test_too_many_and_too_few_are_refused(poses: int, told: str) -> None:
         chosen(poses=poses)
 
 
-def test_a_sweep_that_tells_nothing_is_no_standard() -> None:
+@pytest.mark.parametrize("inclination", ["0", "90"])
+def test_a_sweep_that_tells_nothing_is_no_standard(inclination: str) -> None:
     with pytest.raises(PlanError, match="determines no parameter of physical"):
-        chosen("physical", inclinations_deg="0")
+        chosen("physical", inclinations_deg=inclination)
 
 
 def test_people_are_told_what_it_saves_and_how_to_run_it() -> None:
