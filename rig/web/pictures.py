@@ -39,7 +39,7 @@ def titled_plot(title: str, legend: str = "", classes: str = "plot", name: str =
 
 
 class AxisAndUnit:
-    """The choice of the channel and of the unit of pictures, and what their keys do."""
+    """Controls that select the channel and the unit of the pictures."""
 
     axis: ui.toggle | ui.select
     unit: ui.toggle

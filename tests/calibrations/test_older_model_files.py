@@ -2,7 +2,7 @@
 
 `tests/data/models` has, of each program that wrote other keys, a model file and a table whose outputs are that
 program's answers of the model. Keys that came later are optional. Since then, z-axis-scale and cross-axis-scale also
-multiply what nonlinear effects add: of the model `first`, 4 uV.
+multiply the nonlinear part of the response. This changes the answers of the model `first` by 4 uV.
 """
 
 from __future__ import annotations
