@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
+from tests.rig.measurement_files import GOOD
 from tests.rig.wrong_answers import HARMLESS, REFUSED, SILENT, WARNED, answer
-from tests.rig.wrong_measurements import GOOD, UNSEEN, WRONG
+from tests.rig.wrong_measurements import UNSEEN, WRONG
 from tests.rig.wrong_page import PAGE, answers, listed, unseen
 
 REMEDIES = (

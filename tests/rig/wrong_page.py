@@ -7,8 +7,9 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from tests.rig.measurement_files import GOOD
 from tests.rig.wrong_answers import SILENT, Answer, answer
-from tests.rig.wrong_measurements import GOOD, UNSEEN, WRONG
+from tests.rig.wrong_measurements import UNSEEN, WRONG
 
 PAGE = Path(__file__).parents[2] / "docs" / "wrong-inputs.md"
 TABLE = ("<!-- answers -->", "<!-- end of answers -->")
