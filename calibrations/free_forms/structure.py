@@ -29,6 +29,7 @@ from calibrations.table import Array, Table
 LARGER_NOISE = 1.5  # times the stated: less may be forms that are nearly right
 FLOOR_ROUNDS = 2  # in which the noise floor is found from the residual
 NO_NOISE = 1e-3  # of the noise of all rows: all samples of a mean are one code of the converter
+RESOLVED = 1e-9  # of the range of an output: no converter resolves less, and rounding of numbers is no noise
 LEAST_WHITE = 0.1  # the same: the noise that such a mean is given, though its samples show none
 OUTLYING = 4.0  # times the usual residual: more counts as so much
 SEEN_FORM = 0.9  # of a place's variance: the form of the catalogue itself, not one near it
@@ -320,7 +321,12 @@ def _neighbours(data: PoseData) -> Array:
     y = data.outputs - (smooth @ np.linalg.lstsq(smooth, data.outputs.T, rcond=1e-9)[0]).T
     if data.n < 5:
         return np.full(y.shape, float(np.std(y)) or 1.0)
-    return np.tile(np.maximum(neighbour_std(y), 1e-9 * np.ptp(y, axis=1))[:, None], (1, data.n))
+    return np.maximum(np.tile(neighbour_std(y)[:, None], (1, data.n)), _resolved(data))
+
+
+def _resolved(data: PoseData) -> Array:
+    """The smallest noise that data can show, per channel, (channels, 1)."""
+    return RESOLVED * np.ptp(data.outputs, axis=1, keepdims=True)
 
 
 def _scatter(result: SearchResult, source: FloorSource, uniform: bool) -> Array | None:
@@ -337,7 +343,8 @@ def _scatter(result: SearchResult, source: FloorSource, uniform: bool) -> Array 
         return None
     r = residual.reshape(result.white.shape) * result.white
     white = np.stack([_rows_noise(result, k, row, uniform) for k, row in enumerate(r)])
-    return white * np.sqrt(residual.size / result.freedom) if np.all(white > 0) else None
+    white = np.maximum(white * np.sqrt(residual.size / result.freedom), _resolved(result.data))
+    return white if np.all(white > 0) and not np.array_equal(white, result.white) else None
 
 
 def _noisy_rows_contradict(result: SearchResult) -> bool:

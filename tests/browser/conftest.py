@@ -31,7 +31,7 @@ from playwright.sync_api import (
 
 SIZE = {"width": 1280, "height": 720}
 TABLET = {"width": 768, "height": 1024}
-PATIENCE_MS = 30_000
+PATIENCE_MS = 150_000  # for a search of missing effects, while other tests run
 LEFT = "net::ERR_ABORTED"  # the page was left, or the answer is a download
 LOCAL = ("http://127.0.0.", "ws://127.0.0.", "data:", "blob:")  # addresses on this computer
 expect.set_options(timeout=PATIENCE_MS)

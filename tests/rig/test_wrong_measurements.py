@@ -18,7 +18,7 @@ REMEDIES = (
     *(
         "check",
         "choose",
-        "must be from",
+        "must be",
         "correct",
         "exchange",
         "give",
