@@ -321,12 +321,12 @@ def _neighbours(data: PoseData) -> Array:
     y = data.outputs - (smooth @ np.linalg.lstsq(smooth, data.outputs.T, rcond=1e-9)[0]).T
     if data.n < 5:
         return np.full(y.shape, float(np.std(y)) or 1.0)
-    return np.maximum(np.tile(neighbour_std(y)[:, None], (1, data.n)), _resolved(data))
+    return np.asarray(np.maximum(np.tile(neighbour_std(y)[:, None], (1, data.n)), _resolved(data)))
 
 
 def _resolved(data: PoseData) -> Array:
     """The smallest noise that data can show, per channel, (channels, 1)."""
-    return RESOLVED * np.ptp(data.outputs, axis=1, keepdims=True)
+    return np.asarray(RESOLVED * np.ptp(data.outputs, axis=1, keepdims=True))
 
 
 def _scatter(result: SearchResult, source: FloorSource, uniform: bool) -> Array | None:
