@@ -22,7 +22,7 @@ from drivers.labjack_t7.stream import Calibration, Reception
 from drivers.recorder import Inputs, Recorder, Samples
 from drivers.transport import Address, Links
 from drivers.transport.link import Link
-from drivers.transport.modbus import Register, Unit
+from drivers.transport.modbus import REPEATED, RETRIES, Register, Unit
 
 
 @dataclass(frozen=True)
@@ -129,10 +129,7 @@ class T7(Recorder[Settings]):
         """
         channels, scans, block = tuple(self.settings.channels), self.scans(duration_s), self.scans(block_s)
         per_packet = _scans_per_packet(scans, len(channels))
-        self._configure(per_packet * len(channels))
-        self._stream.discard()
-        start_s = self._clock.now()
-        self._write_block((t7.ENABLE, 1))
+        start_s = self._start(per_packet * len(channels))
         try:
             rate_hz = self._unit.read(t7.ACTUAL_RATE)
             reception = Reception(self._stream, self.name, start_s, rate_hz, len(channels), per_packet)
@@ -158,6 +155,31 @@ class T7(Recorder[Settings]):
             "Check the sensor's supply and wiring, or set a wider range_v in the bench file",
         )
 
+    def _start(self, samples_per_packet: int) -> float:
+        """Start the stream; returns the time of the command.
+
+        If its answer is lost or late, the stream runs already, and the device declines the same command again. So the
+        stream is stopped and started anew.
+        """
+        for _ in range(RETRIES):
+            with contextlib.suppress(*REPEATED):
+                return self._enable(samples_per_packet)
+        return self._enable(samples_per_packet)
+
+    def _enable(self, samples_per_packet: int) -> float:
+        self._configure(samples_per_packet)
+        self._stream.discard()
+        start_s = self._clock.now()
+        try:
+            self._write_block((t7.ENABLE, 1), retries=0)
+        except Refused:  # a stream that runs is another program's
+            raise
+        except BaseException:
+            with contextlib.suppress(DriverError):
+                self._stop()
+            raise
+        return start_s
+
     def _configure(self, samples_per_packet: int) -> None:
         inputs = list(self.settings.channels.values())
         self._write_block(
@@ -179,10 +201,10 @@ class T7(Recorder[Settings]):
         with contextlib.suppress(Refused):  # it has stopped by itself
             self._unit.write(t7.ENABLE, 0)
 
-    def _write_block(self, *values: tuple[Register, float]) -> None:
+    def _write_block(self, *values: tuple[Register, float], retries: int = RETRIES) -> None:
         """As the unit's, but a refusal is explained in the device's own words."""
         try:
-            self._unit.write_block(*values)
+            self._unit.write_block(*values, retries=retries)
         except Refused as refusal:
             detail = int(self._unit.read(t7.LAST_ERROR))
             explanation = t7.ERRORS.get(detail, "see the list of error codes in its datasheet")

@@ -72,7 +72,8 @@ logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # our errors de
 
 TIMEOUT_S = 0.5  # for one answer; the slowest instrument needs a tenth of it
 LATE_S = 2 * TIMEOUT_S  # of quiet, after which no answer to an earlier request comes any more
-RETRIES = 2  # after silence, a bad frame or a wrong unit; every request of ours may be repeated
+REPEATED = (LinkTimeout, BadFrame, WrongUnit)  # after these a request is repeated
+RETRIES = 2  # every request of ours may be repeated, but for those that say otherwise
 ON_A_LINE = (  # what to look at after silence, and after noise
     "that baud rate and parity are the instrument's",
     "shielding, termination, baud rate and parity of the line",
@@ -114,7 +115,7 @@ class Bus:
             for _ in range(retries):
                 try:
                     return self._attempt(request, action)
-                except (LinkTimeout, BadFrame, WrongUnit):
+                except REPEATED:
                     self.link.discard(self._url.gap_s)
             return self._attempt(request, action)
         except LinkRefused as link_error:
@@ -210,10 +211,10 @@ class Unit:
             request = WriteSingleRegisterRequest(address=register.address, registers=words)
             self._bus.ask(request, self._unit, f"{self.name}: writing {register}", retries)
 
-    def write_block(self, *values: tuple[Register, float]) -> None:
+    def write_block(self, *values: tuple[Register, float], retries: int = RETRIES) -> None:
         """Set registers that follow each other without a gap, in one exchange."""
         words = [word for register, value in values for word in register.encode(value)]
-        self.write_words(values[0][0].address, words, str(values[0][0]))
+        self.write_words(values[0][0].address, words, str(values[0][0]), retries)
 
     def write_words(self, address: int, words: Sequence[int], doc: str, retries: int = RETRIES) -> None:
         """Set neighbouring words as they are on the wire."""

@@ -83,6 +83,24 @@ def test_a_stream_without_its_first_packet_is_refused(afflicted: Callable[..., A
         converter.acquire(1.0)
 
 
+@pytest.mark.parametrize("request_number", [0, 1, 2, 4])  # with 3 the packets of the stream are lost as well
+@pytest.mark.parametrize("what", ["lost-answers", "delay", "garbage"])
+def test_one_lost_answer_costs_no_record(afflicted: Callable[..., Any], what: str, request_number: int) -> None:
+    """The device executed the command: a stream that it started must not be declined as another program's."""
+    converter, _ = afflicted("labjack_t7", Fault(what, after=request_number, times=1))
+    for _ in range(2):
+        assert converter.acquire(0.5).volts.shape == (500, 1)
+    assert converter.read_volts("supply") == pytest.approx(5.0, abs=1e-3)  # declined while a stream runs
+
+
+def test_a_stream_whose_start_is_never_answered_is_stopped(afflicted: Callable[..., Any]) -> None:
+    converter, clock = afflicted("labjack_t7", Fault("lost-answers", after=2, for_s=7.0))
+    with pytest.raises(LinkTimeout, match="no answer within 0.5 s"):
+        converter.acquire(0.5)
+    clock.sleep(8.0)
+    assert converter.read_volts("supply") == pytest.approx(5.0, abs=1e-3)
+
+
 @pytest.mark.parametrize("what", EFFECTS)
 @pytest.mark.parametrize("name", DRIVERS)
 def test_no_driver_hangs_on_a_wire(afflicted: Callable[..., Any], name: str, what: str) -> None:
