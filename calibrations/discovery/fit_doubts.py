@@ -24,6 +24,7 @@ from calibrations.criteria import (
     WRONG_FLOOR,
 )
 from calibrations.discovery.outliers import outlier_text
+from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.estimators.robust import robust_std
 from calibrations.fitting.fit import Fit
 from calibrations.geometry.orientation import one_orientation
@@ -152,10 +153,7 @@ def _outliers(fit: Fit) -> Iterator[str]:
 
 def _misfit(fit: Fit) -> Iterator[str]:
     """A residual that is larger than the effects of a sensor."""
-    table = fit.table
-    if table.n < FEWEST_RESPONSE_ROWS and not table.type.moving:
-        return
-    if table.type.moving:
+    if fit.table.type.moving:
         if fit.noise.known and fit.pooled_excess > MUCH_MORE_THAN_NOISE:
             yield (
                 f"the model leaves {fit.pooled_excess:.3g} times the noise: it does not follow the motion; "
@@ -163,16 +161,25 @@ def _misfit(fit: Fit) -> Iterator[str]:
                 "`rig diagnose`"
             )
         return
-    if one_orientation(table):
-        return  # an output at rest varies only by effects that the model may lack
+    if (finding := misfit(fit)) is not None:
+        yield finding.text
+
+
+def misfit(fit: Fit) -> Finding | None:
+    """A residual at known poses, rates or magnitudes that is larger than the effects of a sensor; None if it is not."""
+    table = fit.table
+    if table.n < FEWEST_RESPONSE_ROWS or table.type.moving or one_orientation(table):
+        return None  # an output at rest varies only by effects that the model may lack
     size = np.ones(1) if table.type.magnitude else table.outputs.std(axis=0)
     share = float(np.max(fit.rmse / np.maximum(size, np.finfo(float).tiny)))
-    if share > LARGEST_MISFIT:
-        quantity = "magnitude" if table.type.magnitude else "variation of an output"
-        yield (
-            f"the model leaves {share:.0%} of the {quantity}, more than effects of a sensor: the values cannot be "
-            "used; check units, rounding and the order of rows and columns, then use `rig diagnose`"
-        )
+    if share <= LARGEST_MISFIT:
+        return None
+    quantity = "magnitude" if table.type.magnitude else "variation of an output"
+    return Finding(
+        Verdict.UNEXPLAINED,
+        f"the model leaves {share:.0%} of the {quantity}, more than effects of a sensor: the values cannot be "
+        "used; check units, rounding and the order of rows and columns, then use `rig diagnose`",
+    )
 
 
 def _response(fit: Fit) -> Iterator[str]:

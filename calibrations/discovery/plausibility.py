@@ -6,7 +6,8 @@ no response      an output that is constant, holds noise only, is stuck in many 
 two groups       rows that belong to two sensors: without a pattern in pose or time, and nothing between them
 wrong geometry   outputs that follow the poses in another reading of the table (`readings.py`)
 
-Tables of poses are checked, and tables of rates whose axes of turn are stated: elsewhere the input is not known.
+Tables of poses are checked, and tables of rates whose axes of turn are stated: elsewhere the input is not known. Where
+its magnitude alone is known, an axis that does not respond shows in the other axes.
 
 Source  Wald and Wolfowitz (1940), runs of two kinds of rows; DeSarbo and Cron (1988), regression in two clusters.
 """
@@ -27,6 +28,7 @@ from calibrations.criteria import (
     FEWEST_RESPONSE_ROWS,
     FOLLOWS_GRAVITY,
     GROUPS_APART,
+    LARGEST_MISFIT,
     LEAST_ASIDE,
     LEAST_OTHER_SIDE,
     LEFT_WITHIN_GROUPS,
@@ -62,6 +64,8 @@ def findings(table: Table) -> tuple[Finding, ...]:
         return ()
     if table.type.turning:
         return tuple(_of_rates(table))
+    if table.type.magnitude:
+        return tuple(_of_magnitudes(table))
     if not table.type.stage_angles:
         return ()
     force = specific_force(nominal_pose(table))
@@ -166,6 +170,24 @@ def _of_rates(table: Table) -> Iterator[Finding]:
             "that turns the other way or an inverted output; rates are positive by the right-hand rule about the "
             "sensor's axis: check the sign of rate_deg_s and of the outputs",
         )
+
+
+def _of_magnitudes(table: Table) -> Iterator[Finding]:
+    """An axis that hardly changes is not excited if the magnitude of the others is constant, and dead if it is not."""
+    outputs, spread = table.outputs, table.outputs.std(axis=0)
+    for k, name in enumerate(table.output_names):
+        others = np.delete(outputs, k, axis=1)
+        if spread[k] > FAR_LESS_VARIATION * spread.max() or others.shape[1] < 2:
+            continue
+        u, v = ((others - others.mean(axis=0)) / spread.max()).T
+        columns = np.column_stack([u * u, u * v, v * v, u, v])
+        coefficients = np.linalg.lstsq(columns, np.ones(table.n), rcond=None)[0]
+        if np.std(columns @ coefficients) > LARGEST_MISFIT:
+            yield Finding(
+                Verdict.NO_RESPONSE,
+                f"{name} changes by only {spread[k]:.2g} {table.unit} rms, and the other axes show that the sensor "
+                f"turns about more than this axis; {CHECK_WIRING} {AXES[k]}",
+            )
 
 
 def _stuck(output: Array, a: Array, name: str, unit: str = "V", input_name: str = "gravity") -> str | None:

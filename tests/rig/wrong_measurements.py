@@ -162,6 +162,9 @@ WRONG: Mapping[str, Mapping[str, Spoil]] = {
         "one axis in m/s^2": lambda f: f.scaled("ax", 9.80665),
         "one axis read twice": lambda f: f.changed(ay=f.columns["ax"]),
         "an axis is constant": lambda f: f.changed(az=np.full(f.n, 0.02)),
+        "an axis holds noise only": lambda f: f.changed(
+            az=0.02 + 1e-4 * np.random.default_rng(7).standard_normal(f.n)
+        ),
         "an axis is stuck in half of the rows": lambda f: _pick(f, f.some(0.5), "az", 0.4),
         "an axis without its sign": lambda f: f.changed(az=np.abs(f.columns["az"])),
         "an axis is saturated": _clip("ax", 0.6),
@@ -207,6 +210,9 @@ WRONG: Mapping[str, Mapping[str, Spoil]] = {
         "one axis in other units": lambda f: f.scaled("mx", 1e3),
         "one axis read twice": lambda f: f.changed(my=f.columns["mx"]),
         "an axis is constant": lambda f: f.changed(mz=np.full(f.n, 21.0)),
+        "an axis holds noise only": lambda f: f.changed(
+            mz=21 + 0.02 * np.random.default_rng(7).standard_normal(f.n)
+        ),
         "an axis without its sign": lambda f: f.changed(mz=np.abs(f.columns["mz"] - 21)),
         "an axis is saturated": _clip("mx", 40.0),
         "rows of one axis are shifted by one": _roll("my"),

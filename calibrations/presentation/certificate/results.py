@@ -23,7 +23,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from calibrations.discovery.fit_doubts import fit_doubts
+from calibrations.discovery.fit_doubts import fit_doubts, misfit
 from calibrations.discovery.plausibility import doubt, rejection
 from calibrations.discovery.structure import unexplained_scatter
 from calibrations.errors import ModelError, UnusableData
@@ -119,7 +119,7 @@ def figures(fit: Fit, earlier_model: Model | None, limits: Mapping[str, Limit], 
     Raises ModelError for another kind of table, and where nothing is determined; UnusableData.
     """
     require_reference(fit.table.source, fit.table.kind)
-    if (reason := rejection(fit) or unexplained_scatter(fit)) is not None:
+    if (reason := rejection(fit) or unexplained_scatter(fit) or misfit(fit)) is not None:
         raise UnusableData(f"{fit.table.source}: no certificate: {reason.verdict}: {reason.text}")
     inputs = input_contributions(fit.table)
     budget = make_budget(fit, inputs)
