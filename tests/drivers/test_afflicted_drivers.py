@@ -95,7 +95,7 @@ def test_one_lost_answer_costs_no_record(afflicted: Callable[..., Any], what: st
 
 def test_a_stream_whose_start_is_never_answered_is_stopped(afflicted: Callable[..., Any]) -> None:
     converter, clock = afflicted("labjack_t7", Fault("lost-answers", after=2, for_s=7.0))
-    with pytest.raises(LinkTimeout, match="no answer within 0.5 s"):
+    with pytest.raises(LinkTimeout, match=r"no answer within 0\.5 s"):
         converter.acquire(0.5)
     clock.sleep(8.0)
     assert converter.read_volts("supply") == pytest.approx(5.0, abs=1e-3)
