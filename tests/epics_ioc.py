@@ -34,7 +34,7 @@ class Ioc(PVGroup):
     slow = pvproperty(value=1.0, record="ai", units="V")
     mm = pvproperty(value=1.0, record="ai", units="mm")
 
-    @ai1.scan(period=0.01)
+    @ai1.scan(period=0.01)  # type: ignore[no-redef]
     async def ai1(self, instance: Any, async_lib: Any) -> None:
         """Both outputs, without noise."""
         alpha, beta = (
@@ -43,7 +43,7 @@ class Ioc(PVGroup):
         await instance.write(2.5 + np.sin(alpha) * np.cos(beta))
         await self.ai2.write(1e3 * (2.5 + np.sin(alpha) * np.sin(beta)))
 
-    @slow.scan(period=1.0)
+    @slow.scan(period=1.0)  # type: ignore[no-redef]
     async def slow(self, instance: Any, async_lib: Any) -> None:
         """The same value, processed anew."""
         await instance.write(1.0)

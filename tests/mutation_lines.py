@@ -47,7 +47,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
         return (yield)
     finally:
         sys.settrace(None)
-        threading.settrace(None)  # type: ignore[arg-type]
+        threading.settrace(None)
         lines = {file: sorted(each) for file, each in seen.items() if each}
         done.append((item.nodeid, time.process_time() - began, lines))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from itertools import chain
@@ -83,7 +83,7 @@ class Fleet:
     record: Record
     tell: Tell
 
-    def ask(self, questions: Sequence[tuple[Member, Question]]) -> Iterator[tuple[Member, Any]]:
+    def ask(self, questions: Sequence[tuple[Member, Question]]) -> Generator[tuple[Member, Any], None, None]:
         """Every member with its answer or a `fault`, roughly in the order of `questions`."""
         stored_answers: list[tuple[Member, Any]] = []
         open_: dict[str, list[tuple[Member, Question]]] = {}

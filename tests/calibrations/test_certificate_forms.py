@@ -168,7 +168,7 @@ def test_sections_are_those_of_a_certificate() -> None:
         "Identification", "Procedure", "Environment", "Results", "As found and as left", "Uncertainty", "Traceability",
     ]  # fmt: skip
     (results,) = next(s for s in sections(certificate()) if s.title == "Results").tables
-    assert results.rows[0][1].startswith("2.50")
+    assert str(results.rows[0][1]).startswith("2.50")
     check = next(s for s in sections(certificate()) if s.title == "Uncertainty").tables[0]
     assert check.rows[0][-1] in ("confirmed", "conservative", "widened to the simulation")
 

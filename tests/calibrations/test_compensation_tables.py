@@ -121,7 +121,7 @@ def test_every_language_has_the_same_tables(compiler: str, tmp_path: Path) -> No
     ],
 )
 def test_a_form_that_no_product_knows_is_left_out(place: str, driver: str, basis: Basis, factor: str) -> None:
-    form = Form(place, "curve", driver, (basis,), factor, (1e-3, 1e-3))  # type: ignore[arg-type]
+    form = Form(place, "curve", driver, (basis,), factor, (1e-3, 1e-3))
     fate = trace_model(with_forms(form)).fates[-1]
     assert (fate.how, bool(fate.why)) == (LEFT_OUT, True)
 

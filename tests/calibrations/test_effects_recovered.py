@@ -35,7 +35,7 @@ def made(name: str, **truth: float) -> Callable[[Callable[[Columns, Array], Arra
 
     def register(outputs: Callable[[Columns, Array], Array]) -> None:
         keys = {tuple(key.split("__")) if "__" in key else (key, ""): value for key, value in truth.items()}
-        MADE[name] = Made(outputs, keys)  # type: ignore[arg-type]
+        MADE[name] = Made(outputs, keys)
 
     return register
 

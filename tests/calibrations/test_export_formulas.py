@@ -168,7 +168,7 @@ def test_a_file_has_the_error_that_its_export_states(form: str, name: str) -> No
 def test_a_file_corrects_readings_in_si_units_whatever_the_unit_of_the_model(form: str, unit: str) -> None:
     per = {"g": G, "mg": G / 1e3, "m/s^2": 1.0}[unit]
     values = {
-        effect: {name: tuple(value / per for value in numbers) for name, numbers in given.items()}
+        effect: {name: tuple(np.divide(numbers, per)) for name, numbers in given.items()}
         for effect, given in SENSORS["linear"].items()
     }
     a, t = forces(100)

@@ -225,7 +225,7 @@ def test_a_model_file_with_an_impossible_form_is_refused(change: dict[str, objec
     text = dump_model(found.model)
     effect = found.model.terms[-1].effect
     assert isinstance(effect, FreeForm)
-    broken = replace(effect.forms[0], **change)  # type: ignore[arg-type]
+    broken = replace(effect.forms[0], **change)
     import yaml
     from pydantic import TypeAdapter
 
@@ -326,7 +326,7 @@ def test_the_saw_of_a_quantiser_tells_its_step_offset_and_noise() -> None:
     v = np.linspace(0.0, 1.0, 20000, endpoint=False)
     quantiser = catalogue()["quantisation"]
     p = SimpleNamespace(step=step, offset=offset, noise=noise)
-    saw = quantiser.output(v, poses(np.zeros((len(forces_of_sweep()), 2))), p) - v  # type: ignore[arg-type]
+    saw = quantiser.output(v, poses(np.zeros((len(forces_of_sweep()), 2))), p) - v
     turned = 2 * np.pi * v / step
     sine, cosine = (float(2 * np.mean(saw * wave(turned))) for wave in (np.sin, np.cos))
     found = {name: value for name, _, value in _steps(1 / step, sine, cosine)}

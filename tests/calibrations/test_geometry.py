@@ -32,7 +32,8 @@ def test_specific_force(alpha: float, beta: float, mount: float, flip: bool, lea
     up = about("x", lean_x) @ about("y", lean_y) @ [0.0, 0.0, 1.0]
     F = np.diag([1.0, -1.0, -1.0]) if flip else np.eye(3)
     explicit = F @ about("z", mount) @ about("z", beta) @ about("y", alpha) @ up
-    pose = Pose(*(np.radians([v]) for v in (alpha, beta, mount)), np.array([float(flip)]), up)
+    stages = (np.radians([angle]) for angle in (alpha, beta, mount))
+    pose = Pose(next(stages), next(stages), next(stages), np.array([float(flip)]), up)
     a = specific_force(pose)
     np.testing.assert_allclose(a[0], explicit, atol=1e-13)
     assert np.linalg.norm(a) == pytest.approx(1.0, abs=1e-14)

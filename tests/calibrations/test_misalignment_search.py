@@ -27,7 +27,7 @@ def test_two_facts_about_theta_y_that_do_not_agree() -> None:
 
 @pytest.mark.parametrize("make", [theta_x, theta_y])
 def test_unit_vectors(make: object) -> None:
-    assert np.linalg.norm(make(7.0, -11.0)) == pytest.approx(1, abs=1e-15)  # type: ignore[operator]
+    assert np.linalg.norm(make(7.0, -11.0)) == pytest.approx(1, abs=1e-15)
 
 
 def greatest(direction: np.ndarray) -> tuple[float, float]:

@@ -77,7 +77,7 @@ def test_parameters_are_right_within_their_uncertainty() -> None:
 def test_a_hidden_defect_of_the_output_is_found_first(
     effect: str, hidden: dict[str, float], parameter: str, true: float, noise_v: float, times: int
 ) -> None:
-    table = shaken.record(shaken.TWO, 20.0, times, noise_v=noise_v / times, **hidden)  # type: ignore[arg-type]
+    table = shaken.record(shaken.TWO, 20.0, times, noise_v=noise_v / times, **hidden)
     found = diagnose(shaken.without_y(table), LINEAR)
     assert found.verdict == "effect-missing"
     assert found.candidates[0].name == effect

@@ -108,5 +108,5 @@ def test_paper_reference_is_right_at_one_frequency_only() -> None:
     ids=["R-C", "delay", "corrected"],
 )
 def test_a_sine_goes_through_a_filter_exactly(response: object, gain: float, late_s: float) -> None:
-    out = apply_response(5.0 + np.sin(TURN * T), RATE, response)  # type: ignore[arg-type]
+    out = apply_response(5.0 + np.sin(TURN * T), RATE, response)
     np.testing.assert_allclose(out[INNER], 5 + gain * np.sin(TURN * (T - late_s))[INNER], atol=2e-5)

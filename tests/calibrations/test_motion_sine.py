@@ -22,7 +22,7 @@ def made(seed: int) -> np.ndarray:
 
 
 def of_many(fit: object) -> list[Sine]:
-    return [fit(made(seed)) for seed in range(SEEDS)]  # type: ignore[operator]
+    return [fit(made(seed)) for seed in range(SEEDS)]
 
 
 def test_amplitude_reaches_the_cramer_rao_bound() -> None:

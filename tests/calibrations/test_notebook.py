@@ -34,7 +34,8 @@ def test_a_table_shows_its_first_and_last_rows() -> None:
     short = Table.from_columns("positions", {"ax": [1.0, 0.0], "ay": [0.0, 1.0], "az": [0.0, 0.0]}, source="<a&b>")
     assert repr(short).splitlines()[3:] == ["0  1   0   0", "1  0   1   0"]
     shown = ElementTree.fromstring(short._repr_html_())  # noqa: S314 made here
-    assert "".join(shown.find("caption").itertext()) == "2 rows of positions, <a&b>"
+    (caption,) = shown.iter("caption")
+    assert "".join(caption.itertext()) == "2 rows of positions, <a&b>"
     assert [cell.text for cell in shown.findall("tbody/tr[2]/td")] == ["1", "0", "1", "0"]
 
 

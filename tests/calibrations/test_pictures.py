@@ -33,7 +33,7 @@ from calibrations.presentation.charts.discovery import (
 )
 from calibrations.presentation.charts.noise import ratio
 from calibrations.presentation.interactive import figure
-from calibrations.presentation.residual import choices, first_choices, telling_columns
+from calibrations.presentation.residual import ChannelResidual, choices, first_choices, telling_columns
 from calibrations.presentation.static import PictureError, compact, draw, inline, png, save, save_all, svg
 from calibrations.table import Array, Table
 from tests.calibrations.synthetic import components, poses, turns
@@ -160,7 +160,7 @@ def test_the_right_axis_is_the_left_over_the_scale_factor() -> None:
     assert second == Second(pytest.approx(0.99, rel=1e-3), 0.0, "mg")
     drawing = draw(charts.residual_chart(warm().start))
     drawing.draw_without_rendering()
-    left, right = drawing.axes[5].get_ylim(), drawing.axes[5].child_axes[0].get_ylim()  # type: ignore[attr-defined]
+    left, right = drawing.axes[5].get_ylim(), drawing.axes[5].child_axes[0].get_ylim()
     np.testing.assert_allclose(np.array(left) / 0.99, right, rtol=1e-3)
 
 
@@ -177,7 +177,7 @@ def test_the_map_holds_the_residual_over_the_floor_at_each_pose() -> None:
     found = warm().start
     for c, panel in enumerate(panels(charts.failure_chart(found))):
         shown = dots(panel)
-        np.testing.assert_allclose(shown.values, found.residual[c] / found.noise.floor[c])  # type: ignore[arg-type]
+        np.testing.assert_allclose(shown.values, found.residual[c] / found.noise.floor[c])
         np.testing.assert_array_equal(shown.x, found.table.column("beta_deg"))
         side = found.table.column("direction")
         inclination = [float(panel.y.names[k]) for k in np.rint(shown.y).astype(int)]  # the name of its row is true
@@ -188,11 +188,9 @@ def test_the_map_holds_the_residual_over_the_floor_at_each_pose() -> None:
 
 def test_an_effect_is_a_line_only_over_a_column_that_it_is_a_function_of() -> None:
     step, table = warm().steps[0], warm().start.table
-    found = charts.choices(warm().start)
+    found = choices(warm().start)
     for name, wanted in (("temperature_c", Line), ("beta", Points)):
-        series = charts.residual(
-            charts.ChannelResidual(warm().start, 0, False), found[name], found["alpha_deg"], step
-        ).series
+        series = charts.residual(ChannelResidual(warm().start, 0, False), found[name], found["alpha_deg"], step).series
         assert isinstance(series[-1], wanted)
     change = charts.change_of(step)[0]
     np.testing.assert_allclose(series[-1].y, 1e3 * change)  # type: ignore[union-attr] # a cross at the change of each row
@@ -321,7 +319,7 @@ def test_only_the_greatest_falls_are_drawn() -> None:
 
 @pytest.mark.parametrize("make", [svg, png])
 def test_the_same_chart_gives_the_same_bytes(make: object) -> None:
-    first, second = (make(charts.residual_chart(warm().start)) for _ in range(2))  # type: ignore[operator]
+    first, second = (make(charts.residual_chart(warm().start)) for _ in range(2))
     assert first == second
     assert b"20" + b"2" not in first.split(b"<defs>")[0] if make is svg else True  # no date
 

@@ -114,7 +114,7 @@ def changed(found: Discovery[Fit], **values: Any) -> Discovery[Fit]:
 
 @pytest.mark.parametrize("make", [page, hand_page])
 def test_the_page_is_valid(make: object) -> None:
-    read = Page(make())  # type: ignore[operator]
+    read = Page(make())
     assert not read.open
     assert set(read.ids.values()) == {1}
     assert read.tags["h1"] == 1
@@ -123,7 +123,7 @@ def test_the_page_is_valid(make: object) -> None:
 
 @pytest.mark.parametrize("make", [page, hand_page])
 def test_the_page_reaches_nowhere(make: object) -> None:
-    text = make()  # type: ignore[operator]
+    text = make()
     read = Page(text)
     assert "http" not in text
     assert "script" not in read.tags

@@ -35,7 +35,7 @@ def test_all_coefficients_of_an_axis_beside_a_linear_one(own: str) -> None:
     v_other = SF[other] * across + B[other]
     p, r = crossed(0.011, B[other]), (*R, SF[own])
     v = np.polyval(r, a_z) * a + B[own] + np.polyval(p, v_other) + np.polyval(Q, a_z)
-    found = estimate_stepwise(table(*((v, v_other) if own == "x" else (v_other, v)), columns))
+    found = estimate_stepwise(table(v if own == "x" else v_other, v_other if own == "x" else v, columns))
     axis = getattr(found, own)
     assert axis.bias == pytest.approx(B[own], abs=1e-12)
     assert axis.scale == pytest.approx(SF[own], abs=1e-12)

@@ -111,7 +111,7 @@ def test_axes_have_coefficients_of_their_own() -> None:
         (("sinusoidal-noise",), lambda r, n: 0.2 * r.standard_normal(n) + noises.sinusoid(n, 0.0123)),
     ],
 )
-def test_the_modelled_allan_deviation_is_right_at_every_time(names: tuple[str, ...], make) -> None:  # type: ignore[no-untyped-def]
+def test_the_modelled_allan_deviation_is_right_at_every_time(names: tuple[str, ...], make) -> None:
     record = still(x=make(np.random.default_rng(2), 1 << 16))
     result = compare(record, model(*names))
     curve = compare_deviations(result.fit.channels[0], record.allan["x"])
@@ -243,7 +243,7 @@ def test_an_effect_of_ones_own_is_one_more_process() -> None:
         kinds = ("still",)
         level = Parameter("{out}", typical=1.0, low=0.0)
 
-        def spectrum(self, at, p):  # type: ignore[no-untyped-def]
+        def spectrum(self, at, p):
             return p.level**2 * at.frequency_hz
 
     own = BlueNoise()

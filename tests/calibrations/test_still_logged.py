@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.fft import idct
 
-from calibrations.discovery.results import Discovery
+from calibrations.discovery.results import Diagnosis, Discovery
 from calibrations.estimators.scatter import without_scatter
 from calibrations.loop import diagnose, discover
 from calibrations.model import Estimate
 from calibrations.model.file import read_model
-from calibrations.noise.patterns import STEP
+from calibrations.noise.dataset import NoiseFindings
+from calibrations.noise.patterns import STEP, Pattern
 from calibrations.noise.record import Samples, Still, reduce_record
 from calibrations.table import Array
 from tests.calibrations.hidden_noise import FOLLOWING, RATE_HZ, SAMPLES, room, white
@@ -27,6 +30,11 @@ def beside(x: Array, **logged: Array) -> Still:
 
 def found(x: Array, **logged: Array) -> Discovery:
     return discover(beside(x, **logged), read_model("still"))
+
+
+def patterns_of(answer: Diagnosis[Any] | Discovery[Any]) -> Sequence[Pattern]:
+    assert isinstance(answer.findings, NoiseFindings)
+    return answer.findings.search.patterns
 
 
 @pytest.mark.parametrize("name", FOLLOWING)
@@ -68,7 +76,7 @@ def test_a_temperature_and_a_step_are_two_things() -> None:
     random = np.random.default_rng(1)
     warm = room(random)
     result = found(white(random) + 0.5 * warm + 0.5 * (np.arange(SAMPLES) > 9000), temperature_c=warm)
-    (step,) = result.findings.search.patterns
+    (step,) = patterns_of(result)
     assert step.kind == STEP
     assert step.size == pytest.approx(0.5, abs=3 * step.std)
     slope = result.model.params["temperature-bias.x"]
@@ -102,7 +110,7 @@ def test_a_jitter_that_the_sensor_feels_is_no_scatter() -> None:
     random = np.random.default_rng(5)
     supply = room(random) + 0.3 * random.standard_normal(SAMPLES)
     still = beside(white(random) + 0.8 * supply, supply_v=supply)
-    (pattern,) = diagnose(still, read_model("still")).findings.search.patterns
+    (pattern,) = patterns_of(diagnose(still, read_model("still")))
     assert pattern.size == pytest.approx(0.8, abs=3 * pattern.std)
     assert pattern.std < 0.02
 

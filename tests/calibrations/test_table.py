@@ -103,7 +103,7 @@ def test_columns_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="read-only"):
         table.column("vx_v")[0] = 1.0
     with pytest.raises(TypeError):
-        table.columns["vx_v"] = np.zeros(3)  # type: ignore[index]
+        table.columns["vx_v"] = np.zeros(3)
 
 
 def test_axes_unit_and_outputs() -> None:

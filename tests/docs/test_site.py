@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from html.parser import HTMLParser
+from importlib import import_module
 from pathlib import Path
 
 import click
@@ -101,8 +102,7 @@ def test_every_page_has_one_title(page: Path) -> None:
 def test_the_reference_has_every_command_and_option(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("sphinx", reason="pip install -e '.[docs]'")
     monkeypatch.syspath_prepend(str(ROOT / "docs" / "extensions"))
-    import command_reference
-
+    command_reference = import_module("command_reference")
     text = "\n".join(command_reference.reference())
     context = click.Context(group)
     for name in Commands().list_commands(context):

@@ -29,7 +29,7 @@ FAST = {"deg_per_unit": 1.0, "speed_deg_s": 100.0, "speed_limit_deg_s": 200.0, "
 @pytest.mark.sockets
 def test_motors_and_records_of_an_ioc_of_others(ioc: None) -> None:
     links = Links(WallClock())
-    settings = motor_driver.Settings(**FAST)  # type: ignore[arg-type]
+    settings = motor_driver.Settings(**FAST)
     alpha, beta = (
         motor_driver.connect(Address(f"ca:test:{role}"), links, settings, role) for role in ("alpha", "beta")
     )
@@ -48,7 +48,7 @@ def test_motors_and_records_of_an_ioc_of_others(ioc: None) -> None:
             Address("ca:test:beta"),
             links,
             motor_driver.Settings(limits_deg=(-900.0, 900.0), **FAST),
-            "beta",  # type: ignore[arg-type]
+            "beta",
         ).move_to(500.0)
     slow = adc_driver.Settings({"vx": "slow"}, rate_hz=5.0)
     with pytest.raises(StreamError, match=r"vx \(test:slow\) had a new time stamp in [1-4] of 10 readings"):

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from drivers.clock import SimulatedClock
 from drivers.errors import LimitError, LinkTimeout, StreamError
 from drivers.labjack_t7 import driver as labjack_t7
+from drivers.labjack_t7 import registers as t7
 from drivers.labjack_t7 import stream as labjack_t7_reception
 from drivers.labjack_t7 import twin as labjack_t7_twin
 from drivers.labjack_t7.stream import Packets, Reception
@@ -92,7 +93,7 @@ def test_a_dwell_ends_with_its_last_scan(bench: Any, duration_s: float, late_s: 
 
 
 def test_transaction_numbers_turn_over_within_a_long_stream(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(labjack_t7.t7, "MOST_SAMPLES_PER_PACKET", 3)  # one scan a packet: over 65536 in 66 s
+    monkeypatch.setattr(t7, "MOST_SAMPLES_PER_PACKET", 3)  # one scan a packet: over 65536 in 66 s
     scans = [len(block.volts) for block in bench.adc.stream(70.0, 30.0)]
     assert scans == [30_000, 30_000, 10_000]
 

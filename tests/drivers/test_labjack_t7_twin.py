@@ -13,6 +13,7 @@ from drivers.clock import SimulatedClock
 from drivers.errors import Interlocked, OverRange, Refused
 from drivers.instrument import Check
 from drivers.labjack_t7 import driver as labjack_t7
+from drivers.labjack_t7 import registers as t7
 from drivers.labjack_t7 import twin as labjack_t7_twin
 from drivers.labjack_t7.driver import Settings
 from drivers.transport import Links
@@ -97,18 +98,18 @@ def test_a_stage_may_be_asked_while_the_stream_runs(bench: Any) -> None:
     bench.alpha.home()
     unit = bench.adc._unit
     bench.adc._configure(300)
-    unit.write(labjack_t7.t7.ENABLE, 1)
+    unit.write(t7.ENABLE, 1)
     for _ in range(5):
         bench.clock.sleep(0.0437)
         bench.alpha.angle_deg()
-    unit.write(labjack_t7.t7.ENABLE, 0)
+    unit.write(t7.ENABLE, 0)
     assert len(bench.adc._stream.read(0.0)) == 2 * (16 + 600)
 
 
 def test_a_stream_of_a_dead_program_is_ended(bench: Any) -> None:
-    bench.adc._unit.write_block((labjack_t7.t7.SCAN_RATE, 1000.0), (labjack_t7.t7.NUM_ADDRESSES, 1))
-    bench.adc._unit.write(labjack_t7.t7.SAMPLES_PER_PACKET, 10)
-    bench.adc._unit.write(labjack_t7.t7.ENABLE, 1)
+    bench.adc._unit.write_block((t7.SCAN_RATE, 1000.0), (t7.NUM_ADDRESSES, 1))
+    bench.adc._unit.write(t7.SAMPLES_PER_PACKET, 10)
+    bench.adc._unit.write(t7.ENABLE, 1)
     heir = labjack_t7.connect(bench.servers["adc"].addresses["adc"], Links(bench.clock), bench.adc.settings, "adc")
     assert heir.acquire(0.1).volts.shape == (100, 3)
     assert len(heir._stream.read(0.0)) == 0
@@ -116,10 +117,10 @@ def test_a_stream_of_a_dead_program_is_ended(bench: Any) -> None:
 
 def test_no_input_is_read_while_the_stream_runs(bench: Any) -> None:
     bench.adc._configure(300)
-    bench.adc._unit.write(labjack_t7.t7.ENABLE, 1)
+    bench.adc._unit.write(t7.ENABLE, 1)
     with pytest.raises(Refused, match="exception 4"):
         bench.adc.read_volts("supply")
-    assert bench.adc._unit.read(labjack_t7.t7.LAST_ERROR) == 2605
+    assert bench.adc._unit.read(t7.LAST_ERROR) == 2605
 
 
 @pytest.mark.parametrize(
@@ -128,10 +129,10 @@ def test_no_input_is_read_while_the_stream_runs(bench: Any) -> None:
 )
 def test_what_is_not_possible_is_declined_with_its_reason(bench: Any, register: str, value: float, detail: int) -> None:
     bench.adc._configure(300)
-    bench.adc._unit.write(getattr(labjack_t7.t7, register), value)
+    bench.adc._unit.write(getattr(t7, register), value)
     with pytest.raises(Refused, match=f"device error {detail}"):
-        bench.adc._write_block((labjack_t7.t7.ENABLE, 1))
-    assert bench.adc._unit.read(labjack_t7.t7.ENABLE) == 0
+        bench.adc._write_block((t7.ENABLE, 1))
+    assert bench.adc._unit.read(t7.ENABLE) == 0
 
 
 def test_a_narrow_range_is_finer_and_clips(small_world: Any) -> None:

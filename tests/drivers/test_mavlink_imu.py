@@ -11,6 +11,7 @@ import pytest
 from drivers.digital.settings import FIELDS, FORCES, RATES
 from drivers.errors import BadFrame, DriverError, LimitError, LinkTimeout, OverRange, Refused, SensorFault, StreamError
 from drivers.mavlink_imu import driver as mavlink_imu
+from drivers.mavlink_imu import messages as mav
 from drivers.mavlink_imu import twin
 from drivers.transport.faults import Fault
 from tests.drivers.digital import LEVEL, DigitalSensors
@@ -34,7 +35,7 @@ def connect(digital: DigitalSensors) -> Connect:
 
 
 @pytest.mark.parametrize("listen", [twin.LISTEN, "pty:?baud=921600", "udpin://127.0.0.1:0"])
-@pytest.mark.parametrize("message", list(twin.mav.IMU))
+@pytest.mark.parametrize("message", list(mav.IMU))
 def test_a_record_has_the_outputs_in_the_units_of_the_message(connect: Connect, message: str, listen: str) -> None:
     raw = {"raw": "milli"} if message == "RAW_IMU" else {}
     adc = connect(message=message, rate_hz=200.0, listen=listen, **raw)
@@ -167,7 +168,7 @@ def test_a_temperature_that_the_message_marks_as_missing_is_none(
     message: Any, field: float, updated: int, expected_c: float | None
 ) -> None:
     fields = {"temperature": field} | ({"updated": updated} if message == "HIGHRES_IMU" else {})
-    kind = twin.mav.IMU[message]
-    frames = twin.mav.frames(kind, twin.mav.fields(kind, **fields), np.array([1]), 1, 1)
+    kind = mav.IMU[message]
+    frames = mav.frames(kind, mav.fields(kind, **fields), np.array([1]), 1, 1)
     decoder = mavlink_imu.SampleDecoder(mavlink_imu.Settings(message=message), (1, 1))
     assert decoder.take(frames[0]).warm_c.tolist() == ([] if expected_c is None else [expected_c])

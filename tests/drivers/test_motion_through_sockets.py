@@ -14,6 +14,7 @@ from drivers.labjack_t7 import twin as labjack_t7_twin
 from drivers.philtec_d63 import SIMULATED, Curve
 from drivers.pi_e727 import driver as pi_e727
 from drivers.pi_e727 import twin as pi_e727_twin
+from drivers.recorder import Samples
 from drivers.transport import Links
 from drivers.world.config import WorldConfig
 from drivers.world.world import World
@@ -46,7 +47,7 @@ def bench() -> Iterator[Bench]:
         server.close()
 
 
-def displaced_um(samples: labjack_t7.Samples) -> np.ndarray:
+def displaced_um(samples: Samples) -> np.ndarray:
     return Curve.from_file(SIMULATED).displacement_um(samples.volts[:, 2])
 
 

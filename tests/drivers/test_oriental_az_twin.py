@@ -9,6 +9,7 @@ import pytest
 
 from drivers.clock import SimulatedClock
 from drivers.errors import LimitError, LinkTimeout, NotSettled, StageLost
+from drivers.oriental_az import registers as az
 from drivers.oriental_az import twin as oriental_az_twin
 from drivers.oriental_az.driver import Settings, connect
 from drivers.transport import Address
@@ -182,7 +183,7 @@ def test_a_stop_ends_a_move_on_the_way(bench: Any) -> None:
 def test_a_homing_that_is_stopped_sets_no_coordinates(bench: Any) -> None:
     bench.alpha.home()
     bench.alpha.move_to(90.0)
-    bench.alpha._unit.write(oriental_az_twin.az.INPUTS, oriental_az_twin.az.ZHOME)
+    bench.alpha._unit.write(az.INPUTS, az.ZHOME)
     bench.clock.sleep(1.0)
     bench.alpha.stop()
     assert not bench.alpha.referenced()

@@ -92,7 +92,7 @@ class Client:
 
 def modbus_answer(url: str) -> Callable[[bytes], object]:
     def take(data: bytes) -> object:
-        bus: Any = Bus(Said(url, data))  # type: ignore[arg-type]
+        bus: Any = Bus(Said(url, data))
         return bus.ask(ReadHoldingRegistersRequest(address=0x80, count=2), 1, "alpha: reading", retries=0).registers
 
     return take
@@ -100,7 +100,7 @@ def modbus_answer(url: str) -> Callable[[bytes], object]:
 
 def modbus_request(url: str) -> Callable[[bytes], object]:
     responder = Responder({1: Words()}, Url.parse(url))
-    return lambda data: responder.answer(Client(data), 0.0)  # type: ignore[arg-type]
+    return lambda data: responder.answer(Client(data), 0.0)
 
 
 def sealed(take: Callable[[bytes], object]) -> Callable[[bytes], object]:
@@ -110,7 +110,7 @@ def sealed(take: Callable[[bytes], object]) -> Callable[[bytes], object]:
 
 def gcs_answer(data: bytes) -> object:
     def gcs() -> Gcs:
-        return Gcs(Said("tcp://h:1", data), "positioner", e727.explain)  # type: ignore[arg-type]
+        return Gcs(Said("tcp://h:1", data), "positioner", e727.explain)
 
     for ask in (lambda: gcs().values("POS?"), lambda: gcs().number("POS? 1"), lambda: gcs().rows("DRR?")):
         with suppress(DriverError):

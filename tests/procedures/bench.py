@@ -190,5 +190,5 @@ def session(world: World, limits: Limits | None = None, dwells: Sequence[Dwell] 
     book = Book(world, list(dwells))
     alpha, beta = Stage(world, "alpha"), Stage(world, "beta")
     positioner: object = None
-    rig = Session(alpha, beta, Adc(world), Oven(world), None, positioner, Clock(world), book, limits or Limits())  # type: ignore[arg-type]
+    rig = Session(alpha, beta, Adc(world), Oven(world), None, positioner, Clock(world), book, limits or Limits())
     return rig, book

@@ -98,7 +98,7 @@ def test_a_position_that_is_known_is_not_taken_twice() -> None:
     """The hand always puts the sensor back as it was."""
     world = HandheldWorld(WorldConfig.ideal(), 1, Handheld(hand=CALM))
     rig, book = session(world)
-    book.guide = book.guided.append  # type: ignore[method-assign]
+    book.guide = book.guided.append
     with pytest.raises(NoAnswer, match="this position is known already"):
         hand_positions(replace(rig, by_hand=HandAnalysis()), wait_s=15.0)
     assert len(book.dwells) == 1
@@ -114,7 +114,7 @@ def test_a_side_that_was_taken_under_another_name_is_not_wanted_for_ever() -> No
         wrong = guidance.moves and not guidance.taken
         follow(replace(guidance, up=(0.0, 0.0, 1.0)) if wrong else guidance)
 
-    book.guide = wrong_at_first  # type: ignore[method-assign]
+    book.guide = wrong_at_first
     hand_positions(replace(rig, by_hand=HandAnalysis()))
     assert FEWEST <= len(book.dwells) <= FEWEST + 2
     wanted = [guidance.up for guidance in book.guided if guidance.moves]
@@ -141,7 +141,7 @@ def test_settings_out_of_range_are_refused(settings: Mapping[str, Any]) -> None:
 def test_a_sensor_that_is_not_on_the_table_is_not_measured() -> None:
     world = HandheldWorld(WorldConfig.ideal(), 1, Handheld(hand=CALM))
     rig, book = session(world)
-    book.ask = lambda question: "no"  # type: ignore[method-assign]
+    book.ask = lambda question: "no"
     with pytest.raises(Declined):
         hand_positions(replace(rig, by_hand=HandAnalysis()))
     assert not book.dwells

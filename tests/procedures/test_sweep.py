@@ -38,7 +38,7 @@ def test_angs_paths_add_negative_inclinations_and_half_turns() -> None:
 
 @given(ANGLES, STEPS, st.sampled_from(["grid", "ang"]))
 def test_steps_are_even_and_each_turn_is_closed(inclinations: list[float], step: float, paths: str) -> None:
-    poses = list(grid(inclinations, step, paths))  # type: ignore[arg-type]
+    poses = list(grid(inclinations, step, paths))
     for a, b in pairwise(poses):
         same = (a.alpha_deg, a.path, a.direction) == (b.alpha_deg, b.path, b.direction)
         if same and a.beta_deg not in (360, 180):

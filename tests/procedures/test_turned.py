@@ -16,7 +16,7 @@ from tests.procedures.bench import Book, session
 
 def measured(procedure: object, *, dwells: tuple = (), **settings: object) -> Book:
     rig, book = session(World(WorldConfig.ideal(), seed=3), dwells=dwells)
-    procedure(rig, **settings)  # type: ignore[operator]
+    procedure(rig, **settings)
     return book
 
 

@@ -189,9 +189,9 @@ def inspected(home: Path, whole: Undisturbed) -> Seen:
     assert len(found) == seen.poses
     assert _same(found, whole)
     assert seen.state in ("", "stopped", "complete")
-    with sqlite3.connect(copy / "record.db") as file:
-        assert file.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
-    file.close()
+    with sqlite3.connect(copy / "record.db") as connection:
+        assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+    connection.close()
     return seen
 
 

@@ -90,7 +90,7 @@ class Aftermath:
         moved = {name: abs(place - before[name]) for name, place in self._places(rig).items()}
         self.turning += [name for name in STAGES if moved[name] > 0]
         self.swinging += [name for name in ("x", "y", "z") if moved[name] > 0.1]
-        self.heating |= bool(rig.world.state()["world"]["warmth"]["oven_running"])  # type: ignore[index,call-overload]
+        self.heating |= bool(rig.world.state()["world"]["warmth"]["oven_running"])
 
     def _places(self, rig: Rig) -> dict[str, float]:
         assert rig.world

@@ -171,7 +171,7 @@ class Points:
             self._pass("sql")
             os.write(kept, b".")
 
-        Link.write, Record.keep = written, committed  # type: ignore[method-assign]
+        Link.write, Record.keep = written, committed
         if self._harm.kind == "disk":
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
             resource.setrlimit(resource.RLIMIT_FSIZE, (int(self._harm.at), int(self._harm.at)))

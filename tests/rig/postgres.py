@@ -44,7 +44,7 @@ class Server:
     def sql(self, statement: str, database: str = OWNER) -> list[tuple[Any, ...]]:
         """What the owner is answered."""
         with psycopg.connect(self.url(database), autocommit=True) as connection:
-            answer = connection.execute(statement)  # type: ignore[call-overload]
+            answer = connection.execute(statement)
             return list(answer.fetchall()) if answer.description else []
 
     def new_database(self, like: str = "template1") -> str:

@@ -59,9 +59,8 @@ def test_a_still_record_and_poses_have_no_model_in_common(tmp_path: Path) -> Non
     write_csv(table(range(36)), poses := tmp_path / "poses.csv")
     rows = {"vx_v": 2.5 + 1e-3 * np.random.default_rng(1).standard_normal(5000)}
     write_csv(Table.from_columns("still", rows, {"sample_rate_hz": 10.0}, "still"), still := tmp_path / "still.csv")
-    asked = [Request(str(path)) for path in (poses, still)]
     with pytest.raises(RecordError, match=r"poses\.csv is of poses, .*still\.csv of still: no model"):
-        fit_both(*asked, print)
+        fit_both(Request(str(poses)), Request(str(still)), print)
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,7 @@ def test_a_session_of_changed_data_is_made_anew_with_its_effects(run: str) -> No
         exclude(record, run, [3, 4], "a bump")
     again = desk.open(run, "linear")
     assert again.names == ("axis-misalignment",)
-    assert again.data.table.n == again.end.table.n == session.data.table.n - 2
+    assert again.end.table.n == session.end.table.n - 2
     assert "have changed" in again.notes[0]
 
 
@@ -68,7 +68,7 @@ def test_several_data_are_one_table_whose_content_follows_each(run: str, tmp_pat
     export(run, "csv", exported)
     both = f"{run} + {exported}"
     session = Desk(None).open(both, "linear")
-    assert session.data.table.n == 2 * Desk(None).open(run, "linear").data.table.n
+    assert session.end.table.n == 2 * Desk(None).open(run, "linear").end.table.n
     assert content_of(both, "linear").extent == "114 poses + a file"
     key = content_of(both, "linear").key
     exported.write_text(exported.read_text().replace("90", "90.5", 1))

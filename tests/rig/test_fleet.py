@@ -100,7 +100,7 @@ def test_what_the_record_knows_is_not_worked_out_again(
     monkeypatch.setattr("rig.fleet.questions.run_tasks", lambda *_: pytest.fail("asked again"))
     members = [m for m in fleet_of([str(folder)]) if m.sensor not in ("BAD", "GONE")]
     with Record(home) as record:
-        again = discover_fleet(Fleet(None, record, lambda *_: None), members, START)  # type: ignore[arg-type]
+        again = discover_fleet(Fleet(None, record, lambda *_: None), members, START)
     assert [each.verdict for each in again.sensors] == [each["verdict"] for each in discovered["sensors"][:12]]
 
 

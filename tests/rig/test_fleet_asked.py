@@ -171,7 +171,7 @@ START = Question("look", dump_model(read_model("linear")))
 
 def effects_found(of: dict[tuple[str, ...], dict[str, float]]) -> tuple[list[str], Told]:
     told = Told(of)
-    (batch,) = discover_fleet(told, MEMBERS, START).batches  # type: ignore[arg-type]
+    (batch,) = discover_fleet(told, MEMBERS, START).batches
     return [each.effect for each in batch.effects], told
 
 
@@ -200,7 +200,7 @@ def test_what_the_record_knows_passes_through_in_slices(tmp_path: Path, monkeypa
         return {key: {"fault": ""} for key in keys}
 
     monkeypatch.setattr(asked_module, "kept", kept)
-    fleet = Fleet(None, None, lambda *_: None)  # type: ignore[arg-type]
+    fleet = Fleet(None, None, lambda *_: None)
     answers = fleet.ask([(replace(m, digest=str(k)), START) for k, m in enumerate(MEMBERS * 50)])
     next(answers)
     assert asked_for == [asked_module.SLICE]

@@ -46,7 +46,7 @@ def shown(renderable: RenderableType) -> str:
     """As a terminal of 120 columns shows it, without colour."""
     console = Console(file=io.StringIO(), width=120)
     console.print(renderable)
-    return console.file.getvalue()  # type: ignore[attr-defined, no-any-return]
+    return console.file.getvalue()  # type: ignore[attr-defined]
 
 
 @pytest.fixture
@@ -72,7 +72,7 @@ def run() -> str:
     """A run that has begun, as the record has it."""
     with Record() as record:
         made = {"bench": {}, "configuration": "", "constants": {}, "source": "test", "identities": {}}
-        return record.begin("sweep", {}, kind="poses", **made)  # type: ignore[arg-type]
+        return record.begin("sweep", {}, kind="poses", **made)
 
 
 def guide(**answers: str) -> tuple[Guide, io.StringIO]:

@@ -73,8 +73,8 @@ def test_an_imported_table_reads_the_same_from_the_lab(
 
 
 def test_every_command_that_reads_runs_takes_the_record() -> None:
-    names = commands.list_commands(None)  # type: ignore[arg-type]
-    found = {name: commands.get_command(None, name) for name in names}  # type: ignore[arg-type]
+    names = commands.list_commands(None)
+    found = {name: commands.get_command(None, name) for name in names}
     takes = {name for name, each in found.items() if each and OPTION in each.params}
     reads = {n for n, c in found.items() if c and {p.name for p in c.params} & {"data", "run", "sensor", "request"}}
     assert reads - {"resume", "doctor"} <= takes
@@ -176,8 +176,8 @@ def test_a_password_is_nowhere(
     for each in shown:
         assert WORD not in each.out + each.err
         assert "Traceback" not in each.err
-    with Record(lab_url(right)) as lab:
-        assert WORD not in str([held(lab, each.run) for each in lab.runs()])
+    with Record(lab_url(right)) as record:
+        assert WORD not in str([held(record, kept.run) for kept in record.runs()])
 
 
 def test_where_runs_are_pushed_is_no_part_of_what_they_depend_on(bench_file: Callable[..., Path]) -> None:

@@ -57,7 +57,7 @@ def test_every_experiment_can_be_planned_and_its_command_line_means_the_same(exp
     found = find(procedure)
     assert parse(found, read_settings(rest[:-2], (), found.defaults)) == planned.settings
     assert e.duration_s == pytest.approx(planned.duration_s, abs=0.1)
-    assert run in commands.list_commands(None)  # type: ignore[arg-type]
+    assert run in commands.list_commands(None)
 
 
 @cache

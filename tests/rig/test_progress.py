@@ -43,7 +43,7 @@ def shown(terminal: bool, monkeypatch: pytest.MonkeyPatch, seconds: int = 2) -> 
     """Standard error after some seconds of work and a remark."""
     stream = Stream(terminal)
     monkeypatch.setattr(sys, "stderr", stream)
-    progress._show(progress.Progress("searching", 0.5), stream, terminal, Seconds(seconds))  # type: ignore[arg-type]
+    progress._show(progress.Progress("searching", 0.5), stream, terminal, Seconds(seconds))
     note("a remark")
     return stream.getvalue()
 

@@ -134,7 +134,7 @@ def test_a_server_that_ends_the_connection_loses_nothing(
     def ended(*arguments: object) -> None:
         monkeypatch.setattr(pushing, "_seal", seal)
         server.sql(others)
-        seal(*arguments)  # type: ignore[arg-type]
+        seal(*arguments)
 
     monkeypatch.setattr(pushing, "_seal", ended)
     with pytest.raises(LabAway, match="terminating connection due to administrator command"):

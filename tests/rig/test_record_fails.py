@@ -46,7 +46,7 @@ def fill(record: Record) -> None:
     """The disk has no page left."""
     with closing(sqlite3.connect(record.path)) as connection:
         pages = connection.execute("PRAGMA page_count").fetchone()[0]
-    record.engine.raw_connection().execute(f"PRAGMA max_page_count = {pages}")  # type: ignore[attr-defined]
+    record.engine.raw_connection().execute(f"PRAGMA max_page_count = {pages}")
 
 
 def test_a_full_disk_stops_the_run_which_goes_on_when_there_is_room(tmp_path: Path) -> None:

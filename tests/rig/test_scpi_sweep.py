@@ -48,7 +48,7 @@ def swept(rig: Callable[..., Any], tmp_path: Path, bench: dict[str, Any]) -> tup
     assert fitted.status == 0, fitted.err
     document = json.loads(fitted.out)
     scale = {(p["name"], p.get("axis")): p["value"] for p in document["parameters"]}
-    return tuple(value for (name, _), value in scale.items() if "scale" in name)  # type: ignore[return-value]
+    return tuple(value for (name, _), value in scale.items() if "scale" in name)
 
 
 @pytest.fixture

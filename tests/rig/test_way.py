@@ -64,7 +64,7 @@ def gone(poses: list[Pose]) -> tuple[Array, list[int]]:
         "host": Silent(),
         "limits": Limits(),
     }
-    session = Session(alpha=Stage(way, 0), beta=Stage(way, 1), **parts)  # type: ignore[arg-type]
+    session = Session(alpha=Stage(way, 0), beta=Stage(way, 1), **parts)
     for pose in poses:
         session.move_to(pose)
         places.append(len(way.points) - 1)

@@ -78,7 +78,7 @@ def test_a_repeated_pose_stays_in_the_record_and_is_measured_again() -> None:
 def test_with_nothing_kept_there_is_nothing_to_repeat() -> None:
     watch = Onlooker(wishes=["repeat"])
     first = iter([interrupt])
-    watch.doing = lambda text: next(first, lambda: None)()  # type: ignore[method-assign]
+    watch.doing = lambda text: next(first, lambda: None)()
     with Record() as record:
         outcome = start(record, read_bench(), *small_sweep(), watch)
         assert (outcome.run.state, outcome.run.rows) == ("complete", POSES)
@@ -150,7 +150,7 @@ def test_a_run_that_is_not_wanted_leaves_nothing() -> None:
         assert plan.poses == POSES
         raise Declined("not begun")
 
-    watch.planned = refuse  # type: ignore[method-assign]
+    watch.planned = refuse
     with Record() as record:
         with pytest.raises(Declined):
             start(record, read_bench(), *small_sweep(), watch)

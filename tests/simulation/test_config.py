@@ -43,7 +43,7 @@ def test_a_section_must_be_a_mapping() -> None:
 
 def test_settings_are_frozen() -> None:
     with pytest.raises(FrozenInstanceError):
-        WorldConfig.ideal().heat.ambient_c = 3.0  # type: ignore[misc]
+        WorldConfig.ideal().heat.ambient_c = 3.0
 
 
 UNITS = ("v", "g", "g2", "deg", "nm", "um", "um2", "pm", "hz", "s", "k", "h", "c", "ohm", "farad", "fraction", "cycles")
@@ -51,7 +51,7 @@ UNITS += ("mm", "m2", "ut", "mt2", "ppm", "ratio")
 
 
 def leaves(settings: object) -> list[tuple[str, float]]:
-    pairs = [(f.name, getattr(settings, f.name)) for f in fields(settings)]  # type: ignore[arg-type]
+    pairs = [(f.name, getattr(settings, f.name)) for f in fields(settings)]
     nested = [pair for _, value in pairs if is_dataclass(value) for pair in leaves(value)]
     return [(name, value) for name, value in pairs if not is_dataclass(value)] + nested
 

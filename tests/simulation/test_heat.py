@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drivers.world.config import WorldConfig
-from drivers.world.heat import wandered
+from drivers.world.kernel import wandered
 from drivers.world.world import World
 
 

@@ -61,7 +61,7 @@ def test_a_restored_world_continues_sample_for_sample() -> None:
 def test_a_state_of_another_version_is_refused() -> None:
     world = turning()
     kept = world.state()
-    kept["world"]["phlogiston"] = 1.0  # type: ignore[index, call-overload]
+    kept["world"]["phlogiston"] = 1.0
     with pytest.raises(BadSetting, match="phlogiston"):
         world.restore(kept)
 

@@ -187,4 +187,4 @@ def test_a_reading_that_has_stuck(level: Levels) -> None:
 )
 def test_settings_that_cannot_be(settings: dict[str, float], words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        Settings(**settings)  # type: ignore[arg-type]
+        Settings(**settings)

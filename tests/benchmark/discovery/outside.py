@@ -89,7 +89,7 @@ def grain(x: Pair, run: Run, size: Array) -> Pair:
 
 
 def _m(place: str, change: object, structure: str) -> Mechanism:
-    return Mechanism(place, change, frozenset(), structure=structure)  # type: ignore[arg-type]
+    return Mechanism(place, change, frozenset(), structure=structure)
 
 
 OUTSIDE: dict[str, Mechanism] = {
