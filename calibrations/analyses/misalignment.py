@@ -31,7 +31,7 @@ from calibrations.table import AXES, Array, Table
 #     Theta_x = Ry(alpha_x) Rz(beta_x) [1 0 0]^T        Theta_y = Rx(alpha_y) Rz(beta_y) [0 1 0]^T
 #
 # Ang (18)-(21), with two misprints set right: x_ref is [1 0 0], not [0 0 1], and (20) subtracts theta_xy A_y, not
-# theta_yx A_y. The printed angles for y do not give the printed Theta_y; a test keeps both facts.
+# theta_yx A_y. The printed angles for y do not give the printed Theta_y.
 
 
 def search_angles_x(alpha_deg: float, beta_deg: float) -> tuple[float, float]:
@@ -42,16 +42,6 @@ def search_angles_x(alpha_deg: float, beta_deg: float) -> tuple[float, float]:
 def search_angles_y(alpha_deg: float, beta_deg: float) -> tuple[float, float]:
     """(alpha_y, beta_y) in deg, from the stage angles at which the y output is greatest."""
     return 90.0 - alpha_deg, beta_deg - 90.0
-
-
-def theta_x(alpha_x_deg: float, beta_x_deg: float) -> Array:
-    """Direction of the x sensing axis in the reference frame, a unit vector, shape (3,). Ang (18)."""
-    return np.asarray(_rotation_about("y", alpha_x_deg) @ _rotation_about("z", beta_x_deg) @ [1.0, 0.0, 0.0])
-
-
-def theta_y(alpha_y_deg: float, beta_y_deg: float) -> Array:
-    """Direction of the y sensing axis in the reference frame, a unit vector, shape (3,). Ang (19)."""
-    return np.asarray(_rotation_about("x", alpha_y_deg) @ _rotation_about("z", beta_y_deg) @ [0.0, 1.0, 0.0])
 
 
 def along_reference(a: Array, x: Array, y: Array) -> Array:

@@ -26,7 +26,6 @@ from calibrations.motion.reference import (
     Bias,
     Reference,
     filter_bias,
-    paper_reference,
     reference_acceleration,
     reference_biases,
 )
@@ -120,14 +119,10 @@ class Quantity:
 
 @dataclass(frozen=True)
 class MotionResult:
-    """Acceleration along the motion, mm/s^2, shape (n,): reference and both models; and what follows from them.
-
-    `by_the_paper` is the reference as the paper makes it, in the same band.
-    """
+    """Acceleration along the motion, mm/s^2, shape (n,): reference and both models; and the results of both."""
 
     t_s: Array
     reference: Array
-    by_the_paper: Array
     linear: Array
     physical: Array
     rmse_linear: Quantity
@@ -171,7 +166,6 @@ def evaluate_motion(table: Table, linear: Model, physical: Model, still: Table |
         raise DataError(f"{table.source}: the displacement shows no motion above its noise")
     band = correct_at(butterworth(record.rate_hz), reference.at_hz)
     true = 1e3 * apply_response(reference.acceleration_m_s2, record.rate_hz, band)
-    paper = 1e3 * paper_reference(part.column("displacement_m"), record.rate_hz, reference.at_hz)
     errors = {
         name: measured_acceleration(part, record, m, band) - true
         for name, m in (("linear", linear), ("physical", physical))
@@ -189,7 +183,6 @@ def evaluate_motion(table: Table, linear: Model, physical: Model, still: Table |
     return MotionResult(
         t_s=times_s[inner],
         reference=true[inner],
-        by_the_paper=paper[inner],
         linear=(true + errors["linear"])[inner],
         physical=(true + errors["physical"])[inner],
         rmse_linear=Quantity(*low, "mm/s^2"),

@@ -22,7 +22,6 @@ from calibrations.motion.spectrum import (
     PAPER_CORNER_HZ,
     Complex,
     Response,
-    apply_response,
     butterworth,
     correct_at,
     periodogram,
@@ -52,8 +51,6 @@ class Sine:
     offset: float
     frequency_std_hz: float
     amplitude_std: float
-    phase_std_rad: float
-    offset_std: float
     density: float
 
     def at(self, t_s: Array) -> Array:
@@ -124,8 +121,7 @@ def _refit_sines(t_s: Array, x: Array, sines: list[Sine]) -> list[Sine]:
 def _as_sine(a: float, b: float, offset: float, turn: float, cov: Array, middle: float, density: float) -> Sine:
     """From x = offset + a cos(turn (t - middle)) + b sin(turn (t - middle)) to amplitude and phase at t = 0."""
     amplitude = float(np.hypot(a, b))
-    by_amplitude, by_phase = np.array([a, b]) / amplitude, np.array([b, -a]) / amplitude**2
-    phase_row = np.array([*by_phase, 0.0, -middle])
+    by_amplitude = np.array([a, b]) / amplitude
     return Sine(
         frequency_hz=turn / (2 * np.pi),
         amplitude=amplitude,
@@ -133,8 +129,6 @@ def _as_sine(a: float, b: float, offset: float, turn: float, cov: Array, middle:
         offset=float(offset),
         frequency_std_hz=float(np.sqrt(cov[3, 3])) / (2 * np.pi),
         amplitude_std=float(np.sqrt(by_amplitude @ cov[:2, :2] @ by_amplitude)),
-        phase_std_rad=float(np.sqrt(phase_row @ cov @ phase_row)),
-        offset_std=float(np.sqrt(cov[2, 2])),
         density=density,
     )
 
@@ -305,12 +299,6 @@ def reference_acceleration(t_s: Array, displacement_m: Array, rate_hz: float) ->
 def line_prominence(line: Sine) -> float:
     """The factor of a line's acceleration."""
     return line.frequency_hz**2 * line.amplitude
-
-
-def paper_reference(displacement_m: Array, rate_hz: float, frequency_hz: float) -> Array:
-    """The acceleration as in Ang V, m/s^2, shape (n,)."""
-    low_passed = apply_response(displacement_m, rate_hz, correct_at(butterworth(rate_hz), frequency_hz))
-    return second_derivative(low_passed, rate_hz, np.array([1.0, -2.0, 1.0]))
 
 
 def second_derivative(x: Array, rate_hz: float, stencil: Array) -> Array:

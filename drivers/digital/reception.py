@@ -125,7 +125,6 @@ class Reception:
     numbered: bool = False
     count: int = 0
     lost: int = 0
-    unnumbered: int = 0  # messages that did not arrive, by their numbers
     doubled: int = 0
     back: bool = False  # the sensor's time went back: it began anew
     clipped: str = ""
@@ -191,9 +190,7 @@ class Reception:
         """Which samples are repeated, and the messages that are missing before each, both by the numbers."""
         if batch.missing is None:
             return np.zeros(len(batch.values), dtype=bool), None
-        repeated, gaps = batch.missing < 0, np.maximum(batch.missing, 0)
-        self.unnumbered += int(gaps.sum())
-        return repeated, gaps
+        return batch.missing < 0, np.maximum(batch.missing, 0)
 
     def _lost(self, steps: Floats, gaps: Ints | None) -> int:
         """Samples lost. A time of low resolution only says that a missing message may be a sample."""

@@ -94,10 +94,6 @@ class T7(Recorder[Settings]):
             *([] if contacts is None else [Check("interlocks", not contacts, relays)]),
         ]
 
-    def read_volts(self, name: str) -> float:
-        """One reading of one channel, in V."""
-        return self._unit.read(t7.ain(self._input(name)))
-
     def power(self, on: bool) -> None:
         """Switch the sensor's power by the digital line of the settings."""
         if self.settings.power_dio is None:
@@ -226,12 +222,6 @@ class T7(Recorder[Settings]):
         if not calibration.plausible:
             raise StreamError(f"{self.name}: its calibration is {calibration}", "Have the device calibrated")
         return calibration
-
-    def _input(self, name: str) -> int:
-        if name not in self.settings.channels:
-            known_names = ", ".join(self.settings.channels)
-            raise LimitError(f"{self.name}: no channel {name!r}; there are {known_names}", "Correct the name")
-        return self.settings.channels[name]
 
 
 def _scans_per_packet(scans: int, channels: int) -> int:

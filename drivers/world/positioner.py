@@ -76,13 +76,6 @@ def standing(at_um: float, since_s: float = 0.0) -> Command:
     return Command(since_s, at_um, end_s=since_s)
 
 
-def at_rest(at_um: float = 0.0) -> Floats:
-    """The motion of a carriage that has always stood at `at_um`; shape (PIECES, TERMS)."""
-    pieces = np.zeros((PIECES, TERMS))
-    pieces[:, 1] = at_um
-    return pieces
-
-
 def following(positioner: Positioner, pieces: Floats, command: Command) -> tuple[Floats, float]:
     """The motion from the command's start on, given the motion until then; and when it has decayed, in s."""
     new = np.zeros((PIECES, TERMS))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.motion.reference import paper_reference, reference_acceleration, reference_biases, smooth
+from calibrations.motion.reference import reference_acceleration, reference_biases, second_derivative, smooth
 from calibrations.motion.spectrum import apply_response, butterworth, correct_at, delay, first_order
 from calibrations.table import Array
 
@@ -70,6 +70,12 @@ def test_smoother_follows_a_motion_that_begins_in_the_record() -> None:
     found = reference_acceleration(T, x + 0.1e-6 * np.random.default_rng(0).standard_normal(len(T)), RATE)
     error = (found.acceleration_m_s2 - true)[INNER]
     assert np.sqrt(np.mean(error**2)) < 0.06 * np.sqrt(np.mean(true**2))
+
+
+def paper_reference(displacement_m: Array, rate_hz: float, frequency_hz: float) -> Array:
+    """The acceleration as in Ang V, m/s^2, shape (n,)."""
+    low_passed = apply_response(displacement_m, rate_hz, correct_at(butterworth(rate_hz), frequency_hz))
+    return second_derivative(low_passed, rate_hz, np.array([1.0, -2.0, 1.0]))
 
 
 def test_each_filter_does_what_its_bias_says() -> None:

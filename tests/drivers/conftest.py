@@ -22,6 +22,7 @@ from drivers.transport.server import Server
 from drivers.world import positioner
 from drivers.world.kernel import record
 from drivers.world.stage import Trajectory, at_rest
+from tests.carriages import at_rest as carriage_at_rest
 from tests.drivers.digital import DigitalSensors
 
 STAGE = oriental_az.Settings(limits_deg=(-400.0, 400.0), speed_deg_s=20.0, acceleration_deg_s2=40.0)
@@ -38,7 +39,7 @@ class SmallWorld:
         self.powered = True
         self.oven = (25.0, False)
         self.plans = {"alpha": at_rest(7.0), "beta": at_rest(0.0)}
-        self.carriages = {axis: positioner.at_rest(0.5) for axis in positioner.AXES}
+        self.carriages = {axis: carriage_at_rest(0.5) for axis in positioner.AXES}
         self._random = np.random.Generator(np.random.PCG64(seed))
 
     def advance(self, t_s: float) -> None:

@@ -119,7 +119,7 @@ def test_no_input_is_read_while_the_stream_runs(bench: Any) -> None:
     bench.adc._configure(300)
     bench.adc._unit.write(t7.ENABLE, 1)
     with pytest.raises(Refused, match="exception 4"):
-        bench.adc.read_volts("supply")
+        bench.adc._unit.read(t7.ain(0))
     assert bench.adc._unit.read(t7.LAST_ERROR) == 2605
 
 

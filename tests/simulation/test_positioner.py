@@ -12,7 +12,6 @@ from drivers.world.kernel import record
 from drivers.world.positioner import (
     Command,
     Positioner,
-    at_rest,
     following,
     motion,
     normal_at,
@@ -20,6 +19,7 @@ from drivers.world.positioner import (
     read_um,
     standing,
 )
+from tests.carriages import at_rest
 
 LOOP = record(Positioner(servo_hz=120.0, damping_fraction=0.8))
 SINE = Command(0.02, 50.0, amplitude_um=30.0, frequency_hz=10.0, phase_rad=-math.pi / 2)

@@ -118,16 +118,6 @@ def test_a_refusal_is_explained_by_the_device(converter: Converters) -> None:
         converter(refused).acquire(0.004)
 
 
-def test_one_reading(converter: Converters) -> None:
-    ask = ("00 06 00 00 00 06 01 03 00 06 00 02", "00 06 00 00 00 07 01 03 04 40 20 00 00")
-    assert converter([ask]).read_volts("vx") == 2.5
-
-
-def test_a_channel_that_is_not_there_is_named(converter: Converters) -> None:
-    with pytest.raises(LimitError, match="adc: no channel 'vz'; there are vx"):
-        converter([]).read_volts("vz")
-
-
 def test_without_a_line_for_it_the_power_is_not_switched(converter: Converters) -> None:
     with pytest.raises(LimitError, match="Set power_dio"):
         converter([]).power(True)
