@@ -35,9 +35,11 @@ class Addition:
     def to(self, model: Model) -> Model:
         """The model with the effect, its parameters at their start values."""
         larger = model.with_effect(self.effect)
-        return replace(larger, terms=tuple(self._started(t) if t.name == self.effect.name else t for t in larger.terms))
+        return replace(
+            larger, terms=tuple(self._with_start_values(t) if t.name == self.effect.name else t for t in larger.terms)
+        )
 
-    def _started(self, term: Term) -> Term:
+    def _with_start_values(self, term: Term) -> Term:
         known = {name: value for name, value in self.constants.items() if name in term.effect.constants}
         return replace(term, constants={**term.constants, **known}, estimates=self.estimates)
 
@@ -161,7 +163,7 @@ def at_values_of(end: Fit, added: list[Addition]) -> list[Addition]:
     return [replace(a, estimates=end.model.estimates(a.effect.name) or a.estimates) for a in added]
 
 
-def small_beside_forms(causes: list[Addition], forms: list[Addition]) -> list[Addition]:
+def start_small_at_forms(causes: list[Addition], forms: list[Addition]) -> list[Addition]:
     """The causes, with small start values at places with a free form; empty if there is no such place.
 
     The form can describe the signal of the cause. A cause with a large start value and a wrong nonlinear parameter

@@ -64,9 +64,9 @@ def candidates(base: Fit, effects: Mapping[str, Effect]) -> list[RowCandidate]:
     ranked.sort(
         key=lambda c: (c.held_out_after < unseen, round(schwarz(c, base.residual.size), DECIMALS)), reverse=True
     )
-    rivals = [_same_signal(c, ranked, screen) for c in ranked]
+    rivals = [_find_same_signals(c, ranked, screen) for c in ranked]
     return [
-        replace(c, indistinguishable_from=(*names, *_unlogged(c.effect, base, effects)))
+        replace(c, indistinguishable_from=(*names, *_find_unlogged_effects(c.effect, base, effects)))
         for c, names in zip(ranked, rivals, strict=True)
     ]
 
@@ -252,7 +252,7 @@ def _with_probabilities(ranked: list[RowCandidate], rows: int, unseen: float) ->
     return [replace(c, probability=float(w / weight.sum())) for c, w in zip(ranked, weight[:-1], strict=True)]
 
 
-def _unlogged(effect: Effect, base: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:
+def _find_unlogged_effects(effect: Effect, base: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:
     """Effects of temperature that the table cannot separate from an effect of time, because it has no temperature."""
     if "t_s" not in effect.needs or not base.table.type.stage_angles:
         return ()
@@ -263,7 +263,7 @@ def _unlogged(effect: Effect, base: Fit, effects: Mapping[str, Effect]) -> tuple
     )
 
 
-def _same_signal(c: RowCandidate, ranked: list[RowCandidate], screen: Screen) -> tuple[str, ...]:
+def _find_same_signals(c: RowCandidate, ranked: list[RowCandidate], screen: Screen) -> tuple[str, ...]:
     """Candidates that explain nearly all of the signal of `c`, with at most one parameter more."""
     signal = c.basis @ (c.basis.T @ screen.residual)
     strength = float(signal @ signal)

@@ -74,8 +74,8 @@ def unseen(model: Model, table: Table) -> Check | None:
     if fitted.problem.white is None:
         return None
     problem = fitted.problem.on(table.rows(marked))
-    errors = _standardised(fitted, problem)
-    squares, freedom = repeated(fitted)
+    errors = _standardise(fitted, problem)
+    squares, freedom = compare_repeated_poses(fitted)
     noise_known = freedom < FEWEST_CHECKS * len(table.axes)
     pure, ratio = 1.0 if noise_known else squares / freedom, float(np.mean(errors**2))
     return Check(
@@ -88,7 +88,7 @@ def unseen(model: Model, table: Table) -> Check | None:
     )
 
 
-def repeated(fit: Fit) -> tuple[float, int]:
+def compare_repeated_poses(fit: Fit) -> tuple[float, int]:
     """Sum of squares of repeated poses about their means in units of white noise, and its degrees of freedom.
 
     It is that of residuals, without the effects of time and temperature that the model describes.
@@ -102,7 +102,7 @@ def repeated(fit: Fit) -> tuple[float, int]:
     return float(np.sum((white - means[:, group]) ** 2)), len(white) * (fit.table.n - len(count))
 
 
-def _standardised(fit: Fit, problem: Problem) -> Array:
+def _standardise(fit: Fit, problem: Problem) -> Array:
     """Errors on the rows of `problem`, each of variance 1 and independent of the others, shape (axes * n,)."""
     weighted, J = fit.jacobian / _white(fit.problem)[:, :, None], problem.jacobian(fit.theta)
     cov, _ = covariance(weighted.reshape(-1, weighted.shape[2]), fit.problem.layout.typical)

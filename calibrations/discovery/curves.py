@@ -78,7 +78,7 @@ class PlaceCurve:
     def expression(self) -> str | None:
         """An expression that describes the largest curve and can be added; None where none does."""
         axis = self.largest
-        return _proposed_expression(self, axis, self.at[axis], self.value[axis], self.std[axis])
+        return _propose_expression(self, axis, self.at[axis], self.value[axis], self.std[axis])
 
 
 def place_curves(findings: Findings[Fit]) -> dict[str, PlaceCurve]:
@@ -91,7 +91,7 @@ def place_curves(findings: Findings[Fit]) -> dict[str, PlaceCurve]:
 def place_curve(end: Fit, place: str) -> PlaceCurve | None:
     """The curve of a place in a fitted model; None without an effect there, or without a single driver."""
     names = [term.name for term in end.model.terms if place_of_effect(term.name) == place]
-    place_driver = DRIVERS.get(place) or _logged(place, end.table)
+    place_driver = DRIVERS.get(place) or _find_logged_column(place, end.table)
     if not names or place_driver is None:
         return None
     driver, driver_unit, factor = place_driver
@@ -102,7 +102,7 @@ def place_curve(end: Fit, place: str) -> PlaceCurve | None:
     explained = _contribution(end, effect_names, base)[0] if effect_names else np.zeros(value.shape)
     abscissas, values, bands, parts = {}, {}, {}, {}
     for axis, (rows, x, weight) in groups.items():
-        averaged = _averaged(x, weight, value[rows].ravel(), std[rows].ravel(), explained[rows].ravel())
+        averaged = _average_curve(x, weight, value[rows].ravel(), std[rows].ravel(), explained[rows].ravel())
         abscissas[axis], values[axis], bands[axis], parts[axis] = averaged
     if not abscissas:
         return None
@@ -111,7 +111,7 @@ def place_curve(end: Fit, place: str) -> PlaceCurve | None:
     return PlaceCurve(place, driver, driver_unit, unit, abscissas, values, bands, parts)
 
 
-def _logged(place: str, table: Table) -> tuple[str, str, str] | None:
+def _find_logged_column(place: str, table: Table) -> tuple[str, str, str] | None:
     name = place.removeprefix("column:")
     return (name, "", "") if name != place and name in table else None
 
@@ -173,7 +173,9 @@ def _with(table: Table, columns: Mapping[str, Array]) -> Table:
     return Table(table.kind, columns, table.constants, table.source, table.labels, table.numbers, table.noise)
 
 
-def _averaged(x: Array, weight: Array, value: Array, std: Array, explained: Array) -> tuple[Array, Array, Array, Array]:
+def _average_curve(
+    x: Array, weight: Array, value: Array, std: Array, explained: Array
+) -> tuple[Array, Array, Array, Array]:
     """A curve f with value = weight f(x), by least squares at each of at most MOST_POINTS places along x."""
     distinct = np.unique(np.round(x, 6))
     if len(distinct) <= MOST_POINTS:
@@ -217,7 +219,7 @@ def _wave(x: Array, k: float) -> Array:
     return np.column_stack([np.sin(k * x), np.cos(k * x)])
 
 
-def _proposed_expression(curve: PlaceCurve, axis: str, x: Array, value: Array, std: Array) -> str | None:
+def _propose_expression(curve: PlaceCurve, axis: str, x: Array, value: Array, std: Array) -> str | None:
     """The simplest expression that explains nearly as much of the curve as the best one."""
     variable = _variable(curve.driver, axis)
     if variable is None or len(x) < 6 or not np.ptp(value) > 0:

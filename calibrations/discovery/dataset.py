@@ -109,11 +109,11 @@ class Dataset(ABC, Generic[F]):
     def candidates(self, base: F, plan: Findings[F], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:
         """Every effect alone on top of a fit that belongs to a search, the next one of `plan` first."""
 
-    def beginning(self, model: Model) -> tuple[Dataset[F], F]:
+    def fit_without_outliers(self, model: Model) -> tuple[Dataset[F], F]:
         """(the data without gross outliers, the model fitted to them)."""
         return self, self.fit(model)
 
-    def followed(self, plan: Findings[F], k: int, effects: Mapping[str, Effect]) -> Findings[F]:
+    def follow_plan(self, plan: Findings[F], k: int, effects: Mapping[str, Effect]) -> Findings[F]:
         """The remaining findings of a search after its first `k` steps."""
         start = plan.steps[k - 1].after
         remaining = replace(plan, added=(*plan.added, *plan.names[:k]), steps=plan.steps[k:])
@@ -193,7 +193,7 @@ class Dataset(ABC, Generic[F]):
         """Doubts about the input of a fit."""
         return []
 
-    def noise_known(self, fit: F) -> bool:  # noqa: ARG002
+    def is_noise_known(self, fit: F) -> bool:  # noqa: ARG002
         """Whether the noise is known independently of the residual."""
         return True
 
@@ -209,7 +209,7 @@ class Dataset(ABC, Generic[F]):
         """
         fit = self.evaluate(model) or self.fit(model)
         compared = Comparison(self, fit, self.places(fit), self.rejection(fit))
-        undecided = self.fails_by_scatter_only(fit) if compared.fails else not self.noise_known(fit)
+        undecided = self.fails_by_scatter_only(fit) if compared.fails else not self.is_noise_known(fit)
         if effects is None or compared.rejection is not None or not undecided:
             return compared
         judgement = self.diagnose(model, effects).judgement

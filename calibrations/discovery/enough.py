@@ -60,7 +60,7 @@ class Enough:
                 "or floors"
             )
         floor = fit.noise.floor if measures == OUTPUT else in_milli(fit.noise.floor, fit) / 1e3
-        return self.value * factor / _pooled(floor)
+        return self.value * factor / _pool_channels(floor)
 
     def error(self, fit: Fit) -> str:
         """The error on unseen data, in this unit."""
@@ -68,7 +68,7 @@ class Enough:
             return f"{rounded(fit.held_out_excess)} noise floors"
         measures, base, _ = UNITS[self.of]
         floor = fit.noise.floor if measures == OUTPUT else in_milli(fit.noise.floor, fit) / 1e3
-        value = fit.held_out_excess * _pooled(floor)
+        value = fit.held_out_excess * _pool_channels(floor)
         scale, name = prefixed(base, value)
         return f"{rounded(scale * value)} {name}"
 
@@ -113,6 +113,6 @@ def until(findings: Findings[Fit], enough: Enough) -> Findings[Fit]:
     )
 
 
-def _pooled(floor: Array) -> float:
+def _pool_channels(floor: Array) -> float:
     """Rms over the channels."""
     return float(np.sqrt(np.mean(floor**2)))

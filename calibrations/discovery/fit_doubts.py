@@ -106,7 +106,7 @@ def _without_pattern(fit: Fit, channel: int) -> bool:
     if fit.excess[channel] < MUCH_MORE_THAN_NOISE:
         return False
     table = fit.table
-    r = _beyond_squares(fit.residual[channel], table)
+    r = _regression_residual(fit.residual[channel], table)
     if rms(r) < LEAST_REMAINDER * rms(fit.residual[channel]) or robust_std(r) < LEAST_REMAINDER * rms(r):
         return False  # an effect, or outliers: other checks name them
     orders = [np.arange(table.n)]
@@ -118,7 +118,7 @@ def _without_pattern(fit: Fit, channel: int) -> bool:
     return all(_ratio(r[order]) > limit for order in orders)
 
 
-def _beyond_squares(r: Array, table: Table) -> Array:
+def _regression_residual(r: Array, table: Table) -> Array:
     """The residual of a regression on outputs, temperature, supply, time and products, scaled for its freedom."""
     v = (table.outputs - table.outputs.mean(axis=0)) / np.maximum(table.outputs.std(axis=0), np.finfo(float).tiny)
     rows, columns = np.triu_indices(v.shape[1])

@@ -40,7 +40,7 @@ WIDEST = 10.0  # times the noise of a mean, by the widest form of a kind
 
 def doubts(table: Table) -> tuple[str, ...]:
     """All doubts about a table, () for a healthy one."""
-    checks = (_times, _copies, _equal_values, _rounded, _field, _beyond_widest)
+    checks = (_times, _copies, _equal_values, _check_rounding, _field, _check_most_general_model)
     return tuple(text for check in checks for text in check(table))
 
 
@@ -121,7 +121,7 @@ def _copies(table: Table) -> Iterator[str]:
         yield "displacement_m never changes: the displacement sensor is stuck or not connected; measure again"
 
 
-def _rounded(table: Table) -> Iterator[str]:
+def _check_rounding(table: Table) -> Iterator[str]:
     """Outputs in steps that add more than the noise of a mean."""
     white = white_std(table)
     if white is None or not table.type.known_input or table.n < FEWEST_RESPONSE_ROWS:
@@ -154,7 +154,7 @@ def _field(table: Table) -> Iterator[str]:
     yield f"the field is {size:.4g} uT, and the earth's is {EARTH_UT[0]:g} to {EARTH_UT[1]:g} uT; {fits}"
 
 
-def _beyond_widest(table: Table) -> Iterator[str]:
+def _check_most_general_model(table: Table) -> Iterator[str]:
     """Rows that even the most general model of their kind does not describe."""
     white = white_std(table)
     if white is None or not (table.type.widest_form or table.type.magnitude):

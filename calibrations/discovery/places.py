@@ -68,7 +68,7 @@ class _Stretch:
 
 def places(fit: Fit) -> tuple[Place, ...]:
     """The worst places where a model fails."""
-    return tuple(stretch.place for stretch in _failing_stretches(fit, _by_noise(fit))[:MOST_PLACES])
+    return tuple(stretch.place for stretch in _find_failing_stretches(fit, _by_noise(fit))[:MOST_PLACES])
 
 
 def fails_by_scatter_only(fit: Fit) -> bool:
@@ -79,7 +79,7 @@ def fails_by_scatter_only(fit: Fit) -> bool:
     if not fit.noise.known or fit.noise.given or not np.any(fit.noise.scatter):
         return False
     beyond_white = np.minimum(np.hypot(fit.noise.slow, fit.noise.scatter), MOST_SLOW_NOISE * fit.noise.floor)
-    return not _failing_stretches(fit, fit.residual / np.hypot(fit.noise.floor, beyond_white)[:, None])
+    return not _find_failing_stretches(fit, fit.residual / np.hypot(fit.noise.floor, beyond_white)[:, None])
 
 
 def rows_at(fit: Fit, place: Place) -> NDArray[np.intp]:
@@ -90,7 +90,7 @@ def rows_at(fit: Fit, place: Place) -> NDArray[np.intp]:
     return np.zeros(0, np.intp)
 
 
-def _failing_stretches(fit: Fit, by_noise: Array) -> list[_Stretch]:
+def _find_failing_stretches(fit: Fit, by_noise: Array) -> list[_Stretch]:
     """Places where the residual is more than noise, worst first; at most one for each column and channel.
 
     `by_noise` is the residual over its noise, (channels, n).

@@ -229,14 +229,14 @@ def _two_groups(table: Table, known_input: Array | None = None) -> Finding | Non
     columns = np.column_stack([np.ones(table.n), known_input])
     labels, within_share, distance = _clusters(columns, table.outputs)
     if within_share > LEFT_WITHIN_GROUPS:  # effects that both sensors have may hide the groups
-        shared = _shared(table, known_input)
+        shared = _smooth_effects(table, known_input)
         if table.n > MOST_SHARED * shared.shape[1]:
             labels, within_share, distance = _clusters(columns, table.outputs, shared)
     share = float(labels.mean())
     if (
         within_share > LEFT_WITHIN_GROUPS
         or not SMALLER_GROUP <= share <= 1 - SMALLER_GROUP
-        or _patterned(table, labels)
+        or _has_pattern(table, labels)
     ):
         return None
     white = white_std(table)
@@ -252,7 +252,7 @@ def _two_groups(table: Table, known_input: Array | None = None) -> Finding | Non
     )
 
 
-def _shared(table: Table, known_input: Array) -> Array:
+def _smooth_effects(table: Table, known_input: Array) -> Array:
     """Smooth effects of a sensor, (n, columns): a cubic in the input, and the input by direction, time and temperature.
 
     Unlike two groups of rows, none of them changes from one row to the next.
@@ -285,13 +285,13 @@ def _clusters(columns: Array, outputs: Array, shared: Array | None = None) -> tu
     main = np.linalg.svd(residual / size, full_matrices=False)[0][:, 0]
     along_output = np.sum(residual / size**2 * (outputs - outputs.mean(axis=0)), axis=1)
     labels, within_share, distance = min(
-        (_refined_clusters(start > 0, columns, residual / size, basis) for start in (main, along_output)),
-        key=_within_share,
+        (_refine_clusters(start > 0, columns, residual / size, basis) for start in (main, along_output)),
+        key=_variance_within_clusters,
     )
     return labels, within_share, distance * size
 
 
-def _refined_clusters(
+def _refine_clusters(
     labels: NDArray[np.bool_], columns: Array, scaled: Array, basis: Array
 ) -> tuple[NDArray[np.bool_], float, Array]:
     """The result of `_clusters` for residuals (n, axes) in units of their rms, by iteration from these groups.
@@ -319,27 +319,31 @@ def _refined_clusters(
     return labels, within_share, rms(difference.T)
 
 
-def _within_share(clusters: tuple[NDArray[np.bool_], float, Array]) -> float:
+def _variance_within_clusters(clusters: tuple[NDArray[np.bool_], float, Array]) -> float:
     return clusters[1]
 
 
-def _patterned(table: Table, labels: NDArray[np.bool_]) -> bool:
+def _has_pattern(table: Table, labels: NDArray[np.bool_]) -> bool:
     """Whether the groups depend on time, direction, path or angle: then they are an effect of the sensor or rig."""
     share = float(labels.mean())
     by_chance = share**2 + (1 - share) ** 2  # neighbours in one group, where the groups are mixed at random
     orders = [np.arange(table.n)]
     orders += [np.argsort(table.column(name), kind="stable") for name in ("temperature_c", "supply_v") if name in table]
-    if any(_beyond_chance(_agreeing(labels, order), by_chance) for order in orders):
+    if any(_exceeds_chance(_share_of_agreement(labels, order), by_chance) for order in orders):
         return True
     if table.type.turning:
-        return _beyond_chance(_agreeing(labels, np.argsort(table.column("rate_deg_s"), kind="stable")), by_chance)
+        return _exceeds_chance(
+            _share_of_agreement(labels, np.argsort(table.column("rate_deg_s"), kind="stable")), by_chance
+        )
     alpha, beta = table.column("alpha_deg"), table.column("beta_deg")
-    along = min(_agreeing(labels, *_order_along(beta, alpha)), _agreeing(labels, *_order_along(alpha, beta)))
-    if _beyond_chance(along, by_chance):
+    along = min(
+        _share_of_agreement(labels, *_order_along(beta, alpha)), _share_of_agreement(labels, *_order_along(alpha, beta))
+    )
+    if _exceeds_chance(along, by_chance):
         return True
     kinds = [table.column(name) for name in ("direction", "flip", "mount_deg") if name in table]
     return any(
-        _beyond_chance(
+        _exceeds_chance(
             sum(max(labels[values == value].sum(), (~labels[values == value]).sum()) for value in np.unique(values))
             / table.n,
             max(share, 1 - share),
@@ -348,12 +352,14 @@ def _patterned(table: Table, labels: NDArray[np.bool_]) -> bool:
     )
 
 
-def _beyond_chance(agreement: float, by_chance: float) -> bool:
+def _exceeds_chance(agreement: float, by_chance: float) -> bool:
     """Whether rows agree in their group by far more than two groups of this size that are mixed at random."""
     return agreement - by_chance > PATTERNED * (1 - by_chance)
 
 
-def _agreeing(labels: NDArray[np.bool_], order: NDArray[np.intp], pairs: NDArray[np.bool_] | None = None) -> float:
+def _share_of_agreement(
+    labels: NDArray[np.bool_], order: NDArray[np.intp], pairs: NDArray[np.bool_] | None = None
+) -> float:
     """Share of neighbours in an order that are in one group, of the `pairs` given; 1 if there are no neighbours."""
     agreeing = labels[order][1:] == labels[order][:-1]
     agreeing = agreeing if pairs is None else agreeing[pairs]

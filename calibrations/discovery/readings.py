@@ -68,13 +68,13 @@ def response(outputs: Array, a: Array) -> Response:
 
 def geometry_finding(table: Table, stated_response: Response) -> Finding | None:
     """The geometry that explains the outputs better than the stated one; None if there is none."""
-    if (reading := _other_columns(table, 1 - stated_response.share)) is not None:
+    if (reading := _find_better_columns(table, 1 - stated_response.share)) is not None:
         return Finding(Verdict.UNEXPLAINED, f"the outputs do not follow the poses as stated; they do if {reading}")
     explained = bool(np.all(stated_response.share >= EXPLAINED_BY_GEOMETRY))
     assignment = _assignment(table, stated_response, specific_force(nominal_pose(table))) if explained else None
     if explained and (assignment is None or assignment.verdict is None):
         return assignment
-    angle_readings = " or if ".join(_other_angles(table, stated_response, explained))
+    angle_readings = " or if ".join(_find_better_angles(table, stated_response, explained))
     if not angle_readings:
         return assignment
     if assignment is not None:
@@ -82,7 +82,7 @@ def geometry_finding(table: Table, stated_response: Response) -> Finding | None:
     return Finding(Verdict.UNEXPLAINED, f"the outputs do not follow the poses as stated; they do if {angle_readings}")
 
 
-def _other_columns(table: Table, residual_shares: Array) -> str | None:
+def _find_better_columns(table: Table, residual_shares: Array) -> str | None:
     """The reading of the table that explains its outputs far better, with a check to make; None if there is none.
 
     `residual_shares`: residual share of each output's variance after a linear response at the stated poses, (axes,).
@@ -95,7 +95,7 @@ def _other_columns(table: Table, residual_shares: Array) -> str | None:
     if stated_share < max(floor, UNTOUCHED_BY_READINGS) or table.n < 2 * FEWEST_RESPONSE_ROWS:
         return None
     limit = min(FAR_BETTER_GEOMETRY * stated_share, 1 - EXPLAINED_BY_GEOMETRY)
-    return _scaled(table, limit) or _shifted(table, limit) or _response_change(table, limit)
+    return _check_angle_scale(table, limit) or _check_row_shift(table, limit) or _response_change(table, limit)
 
 
 def _unexplained_share(outputs: Array, force: Array) -> Array:
@@ -116,17 +116,17 @@ class _Angle(NamedTuple):
         return specific_force(nominal_pose(replace(table, columns={**table.columns, self.column: angle})))
 
 
-def _scaled(table: Table, limit: float) -> str | None:
+def _check_angle_scale(table: Table, limit: float) -> str | None:
     """A stage angle with a wrong factor, or with a zero that is wrong by tens of degrees."""
     angles = []
     sample = _some_rows(table)
     for column in COLUMNS:
         if np.ptp(table.column(column)) == 0:
             continue
-        shifted = _refined(_Angle(column, 1.0, 0.0), table, free_scale=False)
+        shifted = _refine_angle(_Angle(column, 1.0, 0.0), table, free_scale=False)
         starts = [_best_zero(column, scale, sample) for scale in SCALES]
         start = starts[int(np.argmin([_worst_share(angle, sample) for angle in starts]))]
-        scaled = _refined(start, table, free_scale=True)
+        scaled = _refine_angle(start, table, free_scale=True)
         angles += [(_worst_share(shifted, table), shifted), (_worst_share(scaled, table), scaled)]
     angles = [(share, angle) for share, angle in angles if share <= limit]
     zeros = [item for item in angles if item[1].scale == 1.0 and abs(item[1].zero_deg) > TURNED_DEG]
@@ -183,7 +183,7 @@ def _worst_share(angle: _Angle, table: Table) -> float:
     return float(np.max(_unexplained_share(table.outputs, angle.force(table))))
 
 
-def _refined(angle: _Angle, table: Table, *, free_scale: bool) -> _Angle:
+def _refine_angle(angle: _Angle, table: Table, *, free_scale: bool) -> _Angle:
     """The scale and zero of least residual, by least squares from these."""
     size = table.outputs.std(axis=0)
     reach = float(np.max(np.abs(table.column(angle.column))))
@@ -199,7 +199,7 @@ def _refined(angle: _Angle, table: Table, *, free_scale: bool) -> _Angle:
     return shifted(scipy.optimize.least_squares(error, np.zeros(2 if free_scale else 1), x_scale=10.0, max_nfev=30).x)
 
 
-def _shifted(table: Table, limit: float) -> str | None:
+def _check_row_shift(table: Table, limit: float) -> str | None:
     """One output, or all outputs, in another row than their pose."""
     force = specific_force(nominal_pose(table))
     names = table.output_names
@@ -260,7 +260,7 @@ def _two_responses(columns: Array, outputs: Array, k: int) -> tuple[float, float
     return float(np.max(squares)) / len(columns), change
 
 
-def _other_angles(table: Table, stated_response: Response, explained: bool) -> list[str]:
+def _find_better_angles(table: Table, stated_response: Response, explained: bool) -> list[str]:
     """Readings of the angle columns by which each output follows its own axis, unlike by the stated ones."""
     texts = []
     for text, pose in _angle_readings(nominal_pose(table)).items():

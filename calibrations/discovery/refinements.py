@@ -65,12 +65,12 @@ def causes(steps: tuple[Step[Fit], ...], trials: int) -> tuple[str, ...]:
     material = _one_of_slow_pair(end, material)
     named: list[str] = []
     for name in sorted(material, key=lambda n: -costs[n]):
-        forms = [_whitened_forms(end, larger) for larger in named]
+        forms = [_whiten_forms(end, larger) for larger in named]
         if (
             not forms
             or name in BASE
             or not (
-                of_search(chance(*_cost_beside_forms(end, name, np.hstack(forms))), trials) >= SIGNIFICANT
+                of_search(chance(*_cost_of_removal(end, name, np.hstack(forms))), trials) >= SIGNIFICANT
                 or _follows(end, name, [larger for larger in named if _is_smaller(costs[name], costs[larger])])
             )
         ):
@@ -114,7 +114,7 @@ def _follows(end: Fit, name: str, larger: list[str]) -> bool:
     return _takes_up(Shown.of(in_white_noise(end), forms, apart=name))
 
 
-def _cost_beside_forms(end: Fit, name: str, forms: Array) -> tuple[float, int]:
+def _cost_of_removal(end: Fit, name: str, forms: Array) -> tuple[float, int]:
     """Growth of the whitened sum of squares without an effect, to first order, and the number of its parameters.
 
     `forms`: columns that may replace it, whitened, (rows, m), for coefficients of prior N(0, 1).
@@ -130,21 +130,21 @@ def _cost_beside_forms(end: Fit, name: str, forms: Array) -> tuple[float, int]:
     return float(lost_signal @ lost_signal), int(mask.sum())
 
 
-def _whitened_forms(end: Fit, name: str) -> Array:
+def _whiten_forms(end: Fit, name: str) -> Array:
     """Other forms of an effect, whitened, (rows, m): columns for coefficients of prior N(0, 1)."""
     white = end.whitened[:, 1:]
     base = white[:, np.any([end.problem.layout.of_effect(base_name) for base_name in BASE], axis=0)]
     mask = end.problem.layout.of_effect(name)
-    size_of_effect = np.linalg.norm(_freed(white[:, mask] @ end.theta[mask], base))
+    size_of_effect = np.linalg.norm(_project_off(white[:, mask] @ end.theta[mask], base))
     blocks = [np.zeros((len(white), 0))]
     for form, part in _forms(end, name):
-        columns = _freed(end.noise.whiten(form_columns(end, form)), base)
+        columns = _project_off(end.noise.whiten(form_columns(end, form)), base)
         size = np.linalg.norm(columns)
         blocks.append(columns * (part * size_of_effect / size if size > 0 else 0.0))
     return np.hstack(blocks)
 
 
-def _freed(rows: Array, base: Array) -> Array:
+def _project_off(rows: Array, base: Array) -> Array:
     return rows - base @ np.linalg.lstsq(base, rows, rcond=1e-9)[0]
 
 

@@ -34,12 +34,12 @@ from calibrations.discovery.search import (
     in_final_floor,
     is_complete,
 )
-from calibrations.discovery.structure import competing_pattern, poorly_predicted, structure_of
+from calibrations.discovery.structure import find_competing_pattern, poorly_predicted, structure_of
 from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.effects import Effect
 from calibrations.fitting.determined import undetermined
 from calibrations.fitting.fit import Fit, refit
-from calibrations.free_forms.place_names import place_of_effect, shown_at_rest
+from calibrations.free_forms.place_names import is_visible_at_rest, place_of_effect
 from calibrations.geometry.orientation import one_orientation
 from calibrations.means.noise import correlation_known, neighbours_contradict
 from calibrations.table import Table
@@ -105,7 +105,7 @@ class RowSearch:
     def _searchable(self, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
         """The effects at places that are not excluded; at one orientation, only those that the data can show."""
         if one_orientation(self.table):
-            effects = {name: effect for name, effect in effects.items() if shown_at_rest(name)}
+            effects = {name: effect for name, effect in effects.items() if is_visible_at_rest(name)}
         return {name: effect for name, effect in effects.items() if place_of_effect(name) not in self.table.left_out}
 
     def _search_model(
@@ -113,9 +113,9 @@ class RowSearch:
     ) -> Findings[Fit]:
         is_motion = self.table.type.moving
         path = find_path(start, outliers, effects, max_steps=1 if self._shows_places or is_motion else MOST_EFFECTS)
-        if is_motion and competing_pattern(path.start, path.end) is None:
+        if is_motion and find_competing_pattern(path.start, path.end) is None:
             path = continue_path(path, effects)
-        if not self._shows_places or _explained(path):
+        if not self._shows_places or _is_explained(path):
             return self._path_findings(path, effects, origin)
         from calibrations.discovery.structural import search_structure  # only this search needs it
 
@@ -140,8 +140,8 @@ class RowSearch:
         path, final = in_final_floor(path, final.end), replace(final, end=final.end.in_floor(final.end.noise.scatter))
         if (reason := rejection(final.end)) is not None:
             return self.rejected(path.start, reason)
-        pattern = competing_pattern(path.start, final.end)
-        steps = _ordered_steps(path.start, final, effects)
+        pattern = find_competing_pattern(path.start, final.end)
+        steps = _order_steps(path.start, final, effects)
         causes = _causes(steps, len(path.first))
         inseparable = {
             name: final.effect_candidates[name].indistinguishable_from
@@ -172,7 +172,7 @@ class RowSearch:
         start, end = structural.start, structural.end
         if (reason := rejection(end)) is not None:
             return self.rejected(start, reason)
-        pattern = competing_pattern(start, end, structural.causes_alone if structural.causes else None)
+        pattern = find_competing_pattern(start, end, structural.causes_alone if structural.causes else None)
         remainder = pattern or _material_structure(end)
         if remainder is None and any(place.unknown for place in structural.structure.places):
             remainder = structure_of(structural.causes_alone)
@@ -235,7 +235,7 @@ def _material_structure(end: Fit) -> Pattern | None:
     return structure_of(end) if end.pooled_excess > MATERIAL else None
 
 
-def _explained(path: Path) -> bool:
+def _is_explained(path: Path) -> bool:
     """Whether the residual of a path has the size of the samples' noise, and no pattern.
 
     If the samples of a mean may be correlated, the residual may be larger than their noise. At one orientation it may
@@ -266,7 +266,7 @@ def _start_candidates(path: Path, final: FinalModel) -> tuple[Candidate, ...]:
     return leading, *(c for c in first if c.name != name)
 
 
-def _ordered_steps(start: Fit, final: FinalModel, effects: Mapping[str, Effect]) -> tuple[Step[Fit], ...]:
+def _order_steps(start: Fit, final: FinalModel, effects: Mapping[str, Effect]) -> tuple[Step[Fit], ...]:
     """One step an effect: first the effects that free a value which the model already has, then new ones."""
     freed = {term.name for term in start.model.terms}
     order = sorted(final.names, key=lambda name: name not in freed)

@@ -124,7 +124,7 @@ class Rows(Dataset[Fit]):
         """The model with its values."""
         return evaluate(model, self.table)
 
-    def noise_known(self, fit: Fit) -> bool:
+    def is_noise_known(self, fit: Fit) -> bool:
         """Whether it follows from the samples of each row."""
         return fit.noise.known
 
@@ -166,7 +166,7 @@ class Rows(Dataset[Fit]):
         ranked = candidates(base, effects)
         return tuple(with_planned(ranked, plan.steps[0]) if plan.steps else ranked)
 
-    def beginning(self, model: Model) -> tuple[Rows, Fit]:
+    def fit_without_outliers(self, model: Model) -> tuple[Rows, Fit]:
         """(the table without gross outliers, the model fitted to it)."""
         start, outliers = fit_without(model, self.table)
         return (Rows(start.table) if outliers else self), start

@@ -122,11 +122,11 @@ def in_final_floor(path: Path, end: Fit) -> Path:
     floor = end.noise.scatter
     times = float(rms(path.end.noise.floor) / rms(floor))
 
-    def rescaled(c: RowCandidate) -> RowCandidate:
+    def rescale(c: RowCandidate) -> RowCandidate:
         return replace(c, excess_after=times * c.excess_after, held_out_after=times * c.held_out_after)
 
-    def rescaled_step(s: ForwardStep) -> ForwardStep:
-        rescaled_candidates = tuple(map(rescaled, s.candidates))
+    def rescale_step(s: ForwardStep) -> ForwardStep:
+        rescaled_candidates = tuple(map(rescale, s.candidates))
         selected = next(
             c for c, candidate in zip(rescaled_candidates, s.candidates, strict=True) if candidate is s.selected
         )
@@ -134,8 +134,8 @@ def in_final_floor(path: Path, end: Fit) -> Path:
 
     return Path(
         path.start.in_floor(floor),
-        tuple(map(rescaled_step, path.steps)),
-        tuple(map(rescaled, path.last_candidates)),
+        tuple(map(rescale_step, path.steps)),
+        tuple(map(rescale, path.last_candidates)),
         path.outliers,
     )
 
@@ -253,7 +253,7 @@ def _first_exchange(
     """
     present = likelihood(end)
     for name, ranked in candidates_by_effect.items():
-        for c in _promising(ranked):
+        for c in _select_promising(ranked):
             exchanged = refit_with(_refit_without(end, name), c)
             exchanged_names = tuple(c.name if n == name else n for n in names)
             if present - CLEARLY_BETTER < likelihood(exchanged) <= present + CLEARLY_BETTER and c.name != name:
@@ -263,7 +263,7 @@ def _first_exchange(
     return None
 
 
-def _promising(ranked: tuple[RowCandidate, ...]) -> list[RowCandidate]:
+def _select_promising(ranked: tuple[RowCandidate, ...]) -> list[RowCandidate]:
     """The best candidate, and those that explain nearly as much."""
     return [c for c in ranked[:CANDIDATES_FOR_A_PLACE] if c.gain > NEARLY_AS_GOOD * ranked[0].gain]
 

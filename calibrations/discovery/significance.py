@@ -38,15 +38,15 @@ class Screen:
     @cached_property
     def residual(self) -> Array:
         """The whitened residual, projected off the model's columns, shape (rows,)."""
-        return _freed(self.fit.whitened[:, 0], self.explained)
+        return _project_off(self.fit.whitened[:, 0], self.explained)
 
     def freed(self, residual: Array) -> Array:
         """The part of a residual (channels, n) that the model cannot explain, whitened, shape (rows,)."""
-        return _freed(self.fit.noise.whiten(residual[:, :, None])[:, 0], self.explained)
+        return _project_off(self.fit.noise.whiten(residual[:, :, None])[:, 0], self.explained)
 
     def basis(self, columns: Array) -> Array:
         """Orthonormal basis of the directions that `columns` (channels, n, k) add to the model, shape (rows, rank)."""
-        return _added_basis(self.fit.noise.whiten(columns), self.explained, NOT_SHOWN)
+        return _extend_basis(self.fit.noise.whiten(columns), self.explained, NOT_SHOWN)
 
     def reductions(self, columns: Sequence[Array]) -> Array:
         """Reduction of the residual's sum of squares by each of `columns`, (channels, n, k) each."""
@@ -118,17 +118,19 @@ def reductions(model: Array, residual: Array, candidates: Sequence[Array]) -> Ar
     enough digits, the function makes a basis.
     """
     Q = _basis(model)
-    remainder = _freed(residual, Q)
+    remainder = _project_off(residual, Q)
     basis = np.column_stack([Q, remainder]).T
     products = [(_gram(columns), basis @ columns) for columns in candidates]
     sums, least_eigenvalues = _by_gram(products)
     nearly_spanned = list(map(int, np.flatnonzero(least_eigenvalues < NEARLY)))
     sizes = [np.sqrt(np.diagonal(products[k][0])) for k in nearly_spanned]
-    sums[nearly_spanned] = _freed_reductions([_freed(candidates[k], Q) for k in nearly_spanned], remainder, sizes)
+    sums[nearly_spanned] = _reductions_off_model(
+        [_project_off(candidates[k], Q) for k in nearly_spanned], remainder, sizes
+    )
     return sums
 
 
-def _freed_reductions(free: Sequence[Array], remainder: Array, sizes: Sequence[Array]) -> Array:
+def _reductions_off_model(free: Sequence[Array], remainder: Array, sizes: Sequence[Array]) -> Array:
     """The same for candidates projected off the model; `sizes`: column lengths before, which show rounding."""
     products = [(_gram(columns), (remainder @ columns)[None]) for columns in free]
     sums, least_eigenvalues = _by_gram(products)
@@ -162,10 +164,10 @@ def _by_gram(products: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
     return squares.sum(axis=1), np.min(values, axis=1, initial=1.0)
 
 
-def _added_basis(columns: Array, basis: Array, smallest_share: float) -> Array:
+def _extend_basis(columns: Array, basis: Array, smallest_share: float) -> Array:
     """Orthonormal basis of the part of `columns` off `basis`; drops columns with a smaller share than this off it."""
     size = np.linalg.norm(columns, axis=0)
-    free = _freed(columns, basis)
+    free = _project_off(columns, basis)
     return _basis(free[:, np.linalg.norm(free, axis=0) > smallest_share * np.where(size > 0, size, 1.0)])
 
 
@@ -179,7 +181,7 @@ def _basis(columns: Array) -> Array:
     return Q if rank == Q.shape[1] else Q @ U[:, :rank]
 
 
-def _freed(columns: Array, basis: Array) -> Array:
+def _project_off(columns: Array, basis: Array) -> Array:
     free = columns - basis @ (basis.T @ columns)
     return np.asarray(free - basis @ (basis.T @ free))  # twice is enough: Kahan and Parlett
 

@@ -24,7 +24,7 @@ from calibrations.discovery.additions import (
     fitted,
     free_additions,
     largest_first,
-    small_beside_forms,
+    start_small_at_forms,
 )
 from calibrations.discovery.candidates import RowCandidate, candidates, with_planned, with_rivals
 from calibrations.discovery.findings import Step
@@ -36,7 +36,7 @@ from calibrations.fitting.problem import Problem
 from calibrations.fitting.requested_forms import effects_beyond_base
 from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
 from calibrations.free_forms.place_names import PREFIX
-from calibrations.free_forms.stairs import before_stairs, find_stairs, fitted_stairs
+from calibrations.free_forms.stairs import before_stairs, find_stairs, fit_stairs
 from calibrations.free_forms.structure import FloorSource, Structure, find_structure, with_stairs
 from calibrations.means.noise import rms, with_white
 from calibrations.model import Estimate
@@ -89,7 +89,7 @@ class StructuralSearch:
 def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSearch:
     """The effects and free forms that the model of `start` misses."""
     basic = [name for name in BASIC if name in effects and not start.model.holds(name)]
-    base = _freed(start, basic, effects)
+    base = _fit_each_axis(start, basic, effects)
     from_stairs, remaining_share = _fit_before_stairs(base, effects)
     remarks: tuple[str, ...] = ()
     stated_white = start.problem.white
@@ -112,7 +112,7 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     selected = [*largest_first(at_values_of(end, causes), end, places), *at_values_of(end, forms)]
     report("fitting the model with one effect more at a time")
     if needed_effects != basic:
-        base = _freed(start, needed_effects, effects)
+        base = _fit_each_axis(start, needed_effects, effects)
         end = fit_together(base, selected)
     accepted_additions, fits = fit_gradually(base, selected, end)
     if fits[-1].pooled_excess < NO_WORSE * end.pooled_excess:
@@ -193,7 +193,7 @@ def _fit_structure(base: Fit, places: Structure, effects: Mapping[str, Effect]) 
         alternative = fit_together(base, [*at_values_of(end, causes), *forms_beside])
         if alternative.held_out_excess < end.held_out_excess:
             causes, forms, end = at_values_of(end, causes), forms_beside, alternative
-    if end.held_out_excess > MATERIAL and (small := small_beside_forms(at_values_of(end, causes), forms)):
+    if end.held_out_excess > MATERIAL and (small := start_small_at_forms(at_values_of(end, causes), forms)):
         alternative = fit_together(base, [*small, *forms])
         if alternative.held_out_excess < end.held_out_excess:
             causes, end = small, alternative
@@ -216,7 +216,7 @@ def _fit_before_stairs(base: Fit, effects: Mapping[str, Effect]) -> tuple[_Struc
     places = structure(smooth, effects)
     causes = fit_separately(smooth, places, additions(places, smooth.model, effects))
     forms = free_additions(places, smooth.model)
-    stairs = fitted_stairs(base.table, places.result.state.predicted, white, stairs)
+    stairs = fit_stairs(base.table, places.result.state.predicted, white, stairs)
     values = {"step": stairs.step, "offset": stairs.offset, "noise": stairs.noise}
     rounding = Addition(
         effects[STAIRS], {}, tuple(Estimate(name, "", value, None, "") for name, value in values.items())
@@ -228,7 +228,7 @@ def _fit_before_stairs(base: Fit, effects: Mapping[str, Effect]) -> tuple[_Struc
     return structure_fit, end.share_left(unconverted)
 
 
-def _freed(start: Fit, names: list[str], effects: Mapping[str, Effect]) -> Fit:
+def _fit_each_axis(start: Fit, names: list[str], effects: Mapping[str, Effect]) -> Fit:
     """The fit in which each axis has its own value of these effects."""
     model = start.model
     for name in names:
@@ -238,7 +238,7 @@ def _freed(start: Fit, names: list[str], effects: Mapping[str, Effect]) -> Fit:
 
 def _steps(start: Fit, names: list[str], base: Fit, effects: Mapping[str, Effect]) -> list[Step[Fit]]:
     """A step for each effect that was freed; the last ends at `base`."""
-    fits = [start, *(_freed(start, names[: k + 1], effects) for k in range(len(names) - 1)), base]
+    fits = [start, *(_fit_each_axis(start, names[: k + 1], effects) for k in range(len(names) - 1)), base]
     return [Step(name, *pair) for name, pair in zip(names, pairwise(fits[: len(names) + 1]), strict=True)]
 
 

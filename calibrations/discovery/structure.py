@@ -44,7 +44,7 @@ def structure_of(fit: Fit) -> Pattern | None:
     all_patterns = patterns(fit.table, fit.channels)
     significant = _significant(all_patterns, Screen(fit)) or ([p for p in all_patterns if p.slow] if noise else [])
     significant = sorted(significant, key=lambda p: score(p, screen), reverse=True)[:FINALISTS]
-    finalists = [sharpened(pattern, screen) for pattern in (*significant, *_outlier_pattern(fit))]
+    finalists = [sharpen(pattern, screen) for pattern in (*significant, *_outlier_pattern(fit))]
     finalists = [
         p for p in finalists if not (p.slow and noise) or _remaining_share(p, screen) < MOST_UNDER_SLOW_PATTERN
     ]
@@ -89,7 +89,7 @@ def _significant(all_patterns: list[Pattern], screen: Screen) -> list[Pattern]:
     return [p for (p, _), chance in zip(tested, chances, strict=True) if chance < SIGNIFICANT]
 
 
-def sharpened(pattern: Pattern, screen: Screen) -> Pattern:
+def sharpen(pattern: Pattern, screen: Screen) -> Pattern:
     """The best of the pattern and the finer ones up to its neighbours, for both directions of turning or for one."""
     table, channels = screen.fit.table, len(screen.fit.channels)
     neighbours = [pattern, *(per_channel(p, channels) for p in pattern.finer() if np.ptp(p.columns) > 0)]
@@ -99,7 +99,7 @@ def sharpened(pattern: Pattern, screen: Screen) -> Pattern:
 
 def _outlier_pattern(fit: Fit) -> list[Pattern]:
     """The poses that stand out, as one pattern; empty if there are none, or too many."""
-    rows, n = standing_out(fit.residual, np.hypot(fit.noise.floor, fit.noise.wander)), fit.table.n
+    rows, n = find_outlying_rows(fit.residual, np.hypot(fit.noise.floor, fit.noise.wander)), fit.table.n
     if fit.table.type.moving or not 0 < len(rows) <= max(1, MOST_ROWS_STAND_OUT * n):
         return []
     columns = per_channel(Pattern("", np.eye(n)[:, rows]), len(fit.channels)).columns
@@ -108,7 +108,7 @@ def _outlier_pattern(fit: Fit) -> list[Pattern]:
     return [Pattern(outlier_text(numbers, fit.table.kind, NAMED), columns, price=2 * float(choices), poses=numbers)]
 
 
-def standing_out(residual: Array, noise: Array) -> NDArray[np.intp]:
+def find_outlying_rows(residual: Array, noise: Array) -> NDArray[np.intp]:
     """Rows whose residual (channels, n) is too large for noise with the spread of the other rows, by medians.
 
     The spread is at least `noise` (channels,), white and slow together: medians of slow noise are uncertain.
@@ -120,7 +120,7 @@ def standing_out(residual: Array, noise: Array) -> NDArray[np.intp]:
     return np.flatnonzero(np.any(np.abs(residual - middle) > limit * spread, axis=0))
 
 
-def unexplained_scatter(fit: Fit) -> Finding | None:
+def find_unexplained_scatter(fit: Fit) -> Finding | None:
     """Scatter of a fit that neither the samples' noise nor a pattern explains; None if there is none."""
     if _excess_noise(fit) is None or (pattern := structure_of(fit)) is None or pattern.columns.size:
         return None
@@ -156,7 +156,7 @@ def poorly_predicted(fit: Fit) -> Pattern | None:
     return Pattern(text, np.zeros((0, 0, 0)))
 
 
-def competing_pattern(start: Fit, end: Fit, named_fit: Fit | None = None) -> Pattern | None:
+def find_competing_pattern(start: Fit, end: Fit, named_fit: Fit | None = None) -> Pattern | None:
     """The pattern that explains the residual of `start` better than the effects added up to `end`; None if none does.
 
     The likelihood under the noise without its slow part compares the two, because slow noise would absorb either. A
@@ -181,7 +181,7 @@ def competing_pattern(start: Fit, end: Fit, named_fit: Fit | None = None) -> Pat
         or _contains(pattern, start, named_fit or end, screen)
     ):
         return None
-    return sharpened(pattern, screen)
+    return sharpen(pattern, screen)
 
 
 def _leaves_noise(pattern: Pattern, screen: Screen) -> bool:

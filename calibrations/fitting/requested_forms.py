@@ -23,7 +23,7 @@ from calibrations.free_forms.form import Factor, Form
 from calibrations.free_forms.geometry import GEOMETRY, Geometry
 from calibrations.free_forms.places import components
 from calibrations.free_forms.poses import PoseData
-from calibrations.free_forms.reml import beside_base, coefficients, estimate, gains, gram, whitened
+from calibrations.free_forms.reml import coefficients, estimate, gains, gram, scale_components, whiten
 from calibrations.free_forms.requested import RequestedForm
 from calibrations.free_forms.search import SearchResult
 from calibrations.free_forms.selection import ENTER, select
@@ -146,10 +146,10 @@ def _sized(
     by_name = {c.name: c for c in forms}
     pools = [by_name]
     for number in range(ROUNDS):
-        X, blocks, scales = whitened(state, model_effects, values, all_components, scales, white)
+        X, blocks, scales = whiten(state, model_effects, values, all_components, scales, white)
         g = gram(X, blocks, scales, b)
         if number == 0:
-            X, scales = beside_base(X, g, b)
+            X, scales = scale_components(X, g, b)
             g = gram(X, blocks, scales, b)
         sizes = estimate(g, variances, most)
         sizes, _ = select(g, sizes, all_components, pools, most, ENTER, number > 0)
@@ -165,7 +165,7 @@ def _sized(
         state = updated
         if number > 0 and change < FLOOR_KNOWN:
             break
-    X, blocks, scales = whitened(state, model_effects, values, all_components, scales, white)
+    X, blocks, scales = whiten(state, model_effects, values, all_components, scales, white)
     g = gram(X, blocks, scales, b)
     sizes = estimate(g, variances, most)
     values = coefficients(g, sizes)

@@ -22,7 +22,7 @@ from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.form import CROSS, Factor, Form
 from calibrations.free_forms.places import DEGREE, THRESHOLDS_G
 from calibrations.free_forms.places_in_time import AGES
-from calibrations.free_forms.reml import Gram, Sizes, beside_base, eliminated, estimate, gains
+from calibrations.free_forms.reml import Gram, Sizes, eliminate_base, estimate, gains, scale_components
 from calibrations.free_forms.selection import ENTER, select
 from calibrations.free_forms.structure import with_size
 from calibrations.geometry.orientation import out_of_plane
@@ -72,7 +72,7 @@ class Shown:
         left = fit.whitened[:, 0] - J[:, own] @ fit.theta[own]
         X = np.hstack([J[:, ~own], *parts.values(), left[:, None]])
         g = _gram(fit, X, ~own, blocks, dict.fromkeys(blocks, 1.0))
-        X, scales = beside_base(X, g, int(np.sum(~own)))
+        X, scales = scale_components(X, g, int(np.sum(~own)))
         return Shown(fit, forms, _gram(fit, X, ~own, blocks, scales), X, apart)
 
     @cached_property
@@ -152,7 +152,7 @@ def _gram(
     products[:b, :b] += rows.T @ rows
     products[:b, -1] += rows.T @ (rows @ fit.theta[base])
     products[-1, :b] = products[:b, -1]
-    return eliminated(products, blocks, scales, b, len(X))
+    return eliminate_base(products, blocks, scales, b, len(X))
 
 
 def _forms(place: str, table: Table, force: Array) -> Sequence[Form]:

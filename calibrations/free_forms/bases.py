@@ -41,7 +41,7 @@ class Spline:
     @property
     def on_splines(self) -> Array:
         """The columns as sums of cubic B-splines on knots of equal distance, shape (intervals + 3, count)."""
-        return _turned(self.low, self.high, self.intervals, self.order)[1]
+        return _diagonalise_penalty(self.low, self.high, self.intervals, self.order)[1]
 
     def __call__(self, x: Array) -> Array:
         """Columns at x (n,), shape (n, count)."""
@@ -50,7 +50,7 @@ class Spline:
         np.put_along_axis(splines, numbers, weights, axis=1)
         return np.asarray(splines @ self.on_splines)
 
-    def summed(self, x: Array, coefficients: Array) -> Array:
+    def sum_columns(self, x: Array, coefficients: Array) -> Array:
         """The sum of the first columns with these coefficients at x (n,), shape (n,): faster than its columns."""
         numbers, weights = self._weights(x)
         on_splines = self.on_splines[:, : len(coefficients)] @ coefficients
@@ -69,7 +69,7 @@ class Spline:
 
 
 @lru_cache(maxsize=256)
-def _turned(low: float, high: float, intervals: int, order: int) -> tuple[Array, Array]:
+def _diagonalise_penalty(low: float, high: float, intervals: int, order: int) -> tuple[Array, Array]:
     """Knots, and the matrix (B-splines, count) that turns the penalty into the identity."""
     step = (high - low) / intervals
     knots = low + step * np.arange(-DEGREE, intervals + DEGREE + 1)

@@ -111,7 +111,7 @@ def state_at(
     by_alpha = rows @ (at(alpha + SMALL, beta, tilt) - at(alpha - SMALL, beta, tilt)).T / (2 * SMALL)
     by_beta = rows @ (at(alpha, beta + SMALL, tilt) - at(alpha, beta - SMALL, tilt)).T / (2 * SMALL)
     by_tilt = rows @ (at(alpha, beta, tilt + SMALL) - at(alpha, beta, tilt - SMALL)).T / (2 * SMALL)
-    force = a if data.at_rest else a @ _sensing(rows).T
+    force = a if data.at_rest else a @ _find_sensing_axes(rows).T
     unit_gain = np.ones_like(linear)
     undrifted = State(data, force, a, by_alpha, by_beta, by_tilt, linear, linear, unit_gain)
     response, of_force = linear.copy(), np.zeros_like(linear)
@@ -163,7 +163,7 @@ def base_jacobian(state: State, model_effects: ModelEffects) -> Array:
     return jacobian
 
 
-def _sensing(rows: Array) -> Array:
+def _find_sensing_axes(rows: Array) -> Array:
     """Unit vectors of the three sensing axes in the reference frame, (3, 3); unmeasured ones complete the frame."""
     units = rows / np.linalg.norm(rows, axis=1, keepdims=True)
     if len(units) == 3:

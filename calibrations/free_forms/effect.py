@@ -103,7 +103,7 @@ class FreeForm(Effect):
         self.name = f"{PREFIX}{forms[0].place}"
         self.summary = f"{PLACES.get(forms[0].place, 'output over the logged column')}, of unknown form"
         self.needs = tuple(dict.fromkeys(column for form in forms for column in form.needs()))
-        self.left_out = _left_out(forms)
+        self.left_out = _explain_exclusion(forms)
         self.of_force = any(form.of_force for form in forms)
         self.scales = any(form.scales for form in forms)
         self.parameters = tuple(p for form in forms for p in _parameters(form))
@@ -143,10 +143,10 @@ class FreeForm(Effect):
             if form.of_table:
                 total += self._columns_of(i, table, force, k) @ form_coefficients
             else:
-                total += form.summed(table, force, response, k, form_coefficients)
+                total += form.sum_columns(table, force, response, k, form_coefficients)
         return total
 
-    def _kept_columns(self, table: Table, force: Array) -> list[Array]:
+    def _cache_columns(self, table: Table, force: Array) -> list[Array]:
         """Columns of each axis. Those of the last force stay in memory, since a jacobian needs them often."""
         if self._last is None or not self._has_columns(table, force):
             self._last = (table, force, [self._columns(table, force, k) for k in range(len(table.axes))])
@@ -165,14 +165,14 @@ class _OnResponse(FreeForm):
         for k in range(len(table.axes)):
             coefficients = self._coefficients(p, k)
             if has_columns:
-                contribution[:, k] = self._kept_columns(table, a)[k] @ coefficients
+                contribution[:, k] = self._cache_columns(table, a)[k] @ coefficients
             else:
                 contribution[:, k] = self._summed(table, a, no_response, k, coefficients)
         return contribution
 
     def columns(self, a: Array, table: Table) -> dict[str, Array]:
         by_name = {p.name: np.zeros(a.shape) for p in self.parameters}
-        for k, columns in enumerate(self._kept_columns(table, a)):
+        for k, columns in enumerate(self._cache_columns(table, a)):
             names = [_name(form, j) for form in self.forms for j in range(form.count(k))]
             for name, column in zip(names, columns.T, strict=True):
                 by_name[name][:, k] = column
@@ -193,7 +193,7 @@ class _OnAngle(FreeForm):
     """Adds to a stage angle; coefficients are in rad."""
 
     def pose(self, pose: Pose, table: Table, p: Values) -> Pose:
-        error = self._kept_columns(table, linear_force(table))[0] @ self._coefficients(p, 0)
+        error = self._cache_columns(table, linear_force(table))[0] @ self._coefficients(p, 0)
         if self.forms[0].driver == "alpha":
             return replace(pose, alpha=pose.alpha + error)
         return replace(pose, beta=pose.beta + error)
@@ -229,7 +229,7 @@ def _parameters(form: Form) -> list[Parameter]:
     ]
 
 
-def _left_out(forms: tuple[Form, ...]) -> str:
+def _explain_exclusion(forms: tuple[Form, ...]) -> str:
     """Why the sensor's product cannot undo the effect; "" where it can."""
     if forms[0].driver in ANGLES:
         return "it is an error of the stage"

@@ -108,10 +108,10 @@ class Form:
         elif isinstance(basis, Preisach):
             columns = np.asarray(_hysteretic(table, basis, self.approach_deg)[k])
         elif isinstance(basis, Play):
-            lagging = _lagging(table, basis, self.lead_s) if self.driver == "temperature" else None
+            lagging = _lag_by_play(table, basis, self.lead_s) if self.driver == "temperature" else None
             is_pressed = self.factor == "pressed"
             columns = (
-                np.asarray(_slipping(table, basis, self.approach_deg, is_pressed)[k]) if lagging is None else lagging
+                np.asarray(_slip_forces(table, basis, self.approach_deg, is_pressed)[k]) if lagging is None else lagging
             )
         elif self.driver in MODELLED:
             columns = basis(self.drive(table, force, response, k))[:, :count]
@@ -120,11 +120,11 @@ class Form:
         multiplied = self.factor not in ("", "pressed")
         return np.asarray(columns * self._factor(table, force, k)[:, None]) if multiplied else columns
 
-    def summed(self, table: Table, force: Array, response: Array, k: int, coefficients: Array) -> Array:
+    def sum_columns(self, table: Table, force: Array, response: Array, k: int, coefficients: Array) -> Array:
         """The sum of the columns of axis k with these coefficients, shape (n,)."""
         basis = self.basis(k)
         if isinstance(basis, Spline) and self.driver in MODELLED:
-            total = basis.summed(self.drive(table, force, response, k), coefficients)
+            total = basis.sum_columns(self.drive(table, force, response, k), coefficients)
             return total * self._factor(table, force, k) if self.factor else total
         return np.asarray(self.columns(table, force, response, k) @ coefficients)
 
@@ -165,7 +165,7 @@ def _of_table(form: Form, table: Table, k: int) -> Array:
 
 
 @lru_cache(maxsize=32)
-def _lagging(table: Table, basis: Play, lead_s: float) -> Array:
+def _lag_by_play(table: Table, basis: Play, lead_s: float) -> Array:
     """Temperature less its value behind plays of these widths, over the widths, shape (n, widths)."""
     temperature = leading_temperature(table, lead_s)
     return np.column_stack([(temperature - play(temperature, width)) / width for width in basis.widths])
@@ -182,7 +182,7 @@ def _hysteretic(table: Table, basis: Preisach, approach_deg: float) -> Array:
 
 
 @lru_cache(maxsize=32)
-def _slipping(table: Table, basis: Play, approach_deg: float, is_pressed: bool) -> Array:
+def _slip_forces(table: Table, basis: Play, approach_deg: float, is_pressed: bool) -> Array:
     """Forces of the slip elements over their widths, and the decay of their first state, shape (3, n, columns)."""
     widths = np.array(basis.widths)
     driver = specific_force(nominal_pose(table))

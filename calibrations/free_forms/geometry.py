@@ -200,7 +200,7 @@ def _cheapest_effects(
     scored: list[tuple[float, tuple[str, ...], Array, dict[str, Array]]] = []
     for count in range(len(priced_effects) + 1):
         for names in combinations(priced_effects, count):
-            values, residual_angles, rank = _fitted(
+            values, residual_angles, rank = _fit_angles(
                 scaled_angles, {n: effects.parameters[n] for n in (*free_effects, *names)}
             )
             price = CAUSE_PRICE * count + PARAMETER_PRICE * rank
@@ -216,7 +216,7 @@ def _cheapest_effects(
     )
 
 
-def _fitted(
+def _fit_angles(
     remaining_angles: Callable[[Mapping[str, Array]], Array], counts: Mapping[str, int]
 ) -> tuple[dict[str, Array], Array, float]:
     """(values of effects by least squares, remaining angles, number of values that the angles determine)."""

@@ -79,7 +79,8 @@ def places(result: SearchResult) -> list[ActingPlace]:
     base = result.columns[:, :b]
     Q = np.linalg.qr(base / np.maximum(np.linalg.norm(base, axis=0), 1e-300))[0]
     curves = {
-        place: _freed(Q, np.sum([_part(result, n, b) for n in names], axis=0)) for place, names in by_place.items()
+        place: _project_off(Q, np.sum([_part(result, n, b) for n in names], axis=0))
+        for place, names in by_place.items()
     }
     sizes = {place: float(np.sqrt(np.mean(curve**2))) for place, curve in curves.items()}
     largest = max(sizes.values(), default=0.0)
@@ -88,7 +89,7 @@ def places(result: SearchResult) -> list[ActingPlace]:
         causes, share = _name_effects(result, place, names, curves[place], Q, b)
         walks = all("/walk-" in name for name in names)  # they follow anything, the errors of readings too
         curved = walks or not any(result.component(name).cause for name in names)  # no form of the catalogue acts
-        followed = _followed(result, curves, place, Q, 0.0 if walks else share) if curved else None
+        followed = _find_followed_column(result, curves, place, Q, 0.0 if walks else share) if curved else None
         if followed is not None:
             causes, share = (followed[0].cause,), followed[1]
         gain, alternatives = _rivals(
@@ -99,7 +100,7 @@ def places(result: SearchResult) -> list[ActingPlace]:
             least = max(LEAST_UNKNOWN_SHARE * largest, READING_ERRORS * _reading_errors(result, sizes))
         # a place without a form of the catalogue, or smaller than the excess of the residual, is more often a remainder
         least_own = min(LEAST_SIZE, max(LEAST_OWN, _excess(result))) if causes else LEAST_SIZE
-        own_size = _own_size(result, gain)
+        own_size = _size_of_unshared_part(result, gain)
         material = own_size >= least_own and sizes[place] >= max(LEAST_SIZE, least)
         curve = curves[place].reshape(result.white.shape) * result.white
         constants = followed[0].constants if followed else ()
@@ -108,7 +109,7 @@ def places(result: SearchResult) -> list[ActingPlace]:
     return _with_substitutes(result, sorted(acting_places, key=lambda p: -p.size))
 
 
-def _own_size(result: SearchResult, gain: float) -> float:
+def _size_of_unshared_part(result: SearchResult, gain: float) -> float:
     """Size of the part that only this place explains, from its gain in likelihood, in noise floors."""
     return float(np.sqrt(max(gain, 0.0) / len(result.columns)))
 
@@ -126,7 +127,7 @@ def _with_substitutes(result: SearchResult, acting_places: Sequence[ActingPlace]
             continue
         for substitute in (o for o in places_kept[i + 1 :] if not o.material):
             gain = result.cost_without((*place.components, *substitute.components))
-            if _own_size(result, gain) >= LEAST_SIZE:
+            if _size_of_unshared_part(result, gain) >= LEAST_SIZE:
                 names = substitute.causes or (substitute.name,)
                 alternatives = tuple(sorted({*place.inseparable_from, *names} - set(place.causes)))
                 places_kept[i] = replace(place, material=True, gain=gain, inseparable_from=alternatives)
@@ -146,7 +147,7 @@ def _part(result: SearchResult, name: str, b: int) -> Array:
     return np.asarray(result.columns[:, b + block.start : b + block.stop] @ result.sizes.of(result.gram, name))
 
 
-def _freed(Q: Array, x: Array) -> Array:
+def _project_off(Q: Array, x: Array) -> Array:
     return np.asarray(x - Q @ (Q.T @ x))
 
 
@@ -157,7 +158,7 @@ def _name_effects(
     forms: dict[str, list[Component]] = {}
     jumps = any(_jumps(result, name) for name in names if "/walk-" in name)
     for comp in result.components:
-        if comp.place == place and comp.cause and (comp.name in names or not _shaped_out(comp, result, names)):
+        if comp.place == place and comp.cause and (comp.name in names or not _has_better_shape(comp, result, names)):
             smooth = comp.cause == "bias-drift" or (comp.cause == "warm-up-bias" and comp.name not in names)
             if (smooth and jumps) or (_follows_many(comp) and comp.name not in names):
                 continue
@@ -223,7 +224,7 @@ def _one_name(
     return tuple(causes)
 
 
-def _followed(
+def _find_followed_column(
     result: SearchResult, curves: Mapping[str, Array], place: str, Q: Array, share: float
 ) -> tuple[Component, float] | None:
     """The line over a temperature or a logged column that a curve over time follows, and its share of the variance.
@@ -270,7 +271,7 @@ def _at_best_shapes(
 def _columns_of(result: SearchResult, comp: Component, Q: Array) -> Array:
     """Columns of a component over the noise, freed of what the base takes up, (channels * n, m)."""
     X = comp.jacobian(result.state) / result.white[:, :, None]
-    return _freed(Q, X.reshape(-1, X.shape[2]))
+    return _project_off(Q, X.reshape(-1, X.shape[2]))
 
 
 def _necessary(columns: Mapping[str, Array], curve: Array, total: float) -> tuple[tuple[str, ...], float]:
@@ -300,7 +301,7 @@ def _jumps(result: SearchResult, name: str) -> bool:
     return bool(np.mean(squares**2) > (JUMPS + 3) * np.mean(squares) ** 2)
 
 
-def _shaped_out(comp: Component, result: SearchResult, names: Sequence[str]) -> bool:
+def _has_better_shape(comp: Component, result: SearchResult, names: Sequence[str]) -> bool:
     """Whether another member of its family acts, at a better shape."""
     return bool(comp.family) and any(result.component(n).family == comp.family for n in names)
 

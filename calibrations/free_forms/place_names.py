@@ -55,7 +55,7 @@ def place_of_effect(name: str) -> str:
     return next((place for place, effects in EFFECTS_AT.items() if name in effects), "")
 
 
-def shown_at_rest(name: str) -> bool:
+def is_visible_at_rest(name: str) -> bool:
     """Whether data at one orientation can show a catalogue effect, or may show an effect that the user wrote."""
     place = place_of_effect(name)
     return acts_at_rest(place) or name == "quantisation" or (not place and name != "scale-factor")

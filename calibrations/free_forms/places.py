@@ -51,8 +51,8 @@ def components(data: PoseData, first: State, flicker: bool = False) -> list[Comp
     candidates = [
         *slow_noise(data, flicker),
         *_stages(data, first),
-        *_own_response(data, first),
-        *_other_axes(data, first),
+        *_response_components(data, first),
+        *_cross_axis_components(data, first),
         *_history(data, first),
         *over_temperature(data, first),
         *over_time(data, first),
@@ -101,7 +101,7 @@ def _splines_over(forces: Array, count: int, intervals: int) -> tuple[Any, ...]:
     return tuple(spline(forces[:, k], intervals) for k in range(count))
 
 
-def _own_response(data: PoseData, first: State) -> list[Component]:
+def _response_components(data: PoseData, first: State) -> list[Component]:
     place = "own-response"
 
     def form(cause: str, basis: Basis) -> Component:
@@ -138,10 +138,10 @@ def _saturations(data: PoseData, first: State) -> list[Component]:
     ranges = [(float(f.min() + f.max()) / 2, float(np.ptp(f)) / 2) for f in first.force.T]
     price = 2 * np.log(3 * len(ENDS))
 
-    def saturated(name: str, side: int) -> Make:
+    def make_saturation(name: str, side: int) -> Make:
         return lambda shape: Component(
-            name, place, "response", "saturation", f"{place}/saturation", price, _saturated(shape, side),
-            shape=shape, step=(0.02,) * len(shape), reshaped=saturated(name, side),
+            name, place, "response", "saturation", f"{place}/saturation", price, _saturation_columns(shape, side),
+            shape=shape, step=(0.02,) * len(shape), reshaped=make_saturation(name, side),
             starts=lambda loss: (*_levels(first, shape, side), ("loss", "", float(np.clip(-loss[0], 0.01, 1.0)))),
         )  # fmt: skip
 
@@ -154,7 +154,7 @@ def _saturations(data: PoseData, first: State) -> list[Component]:
                 for high, low in levels
                 for level in ((high, low) if side == 0 else (high,) if side > 0 else (low,))
             )
-            components.append(saturated(f"{place}/saturation@{name}{end}", side)(shape))
+            components.append(make_saturation(f"{place}/saturation@{name}{end}", side)(shape))
     return components
 
 
@@ -174,7 +174,7 @@ def _levels(first: State, shape: tuple[float, ...], side: int) -> tuple[tuple[st
     return tuple(start_values)
 
 
-def _saturated(levels: tuple[float, ...], side: int) -> Columns:
+def _saturation_columns(levels: tuple[float, ...], side: int) -> Columns:
     """Loss of output above the high level and below the low one of each channel, g; one share for all levels.
 
     Often a single pose at the end of an axis's range shows a level: so the share of loss is common to all ends.
@@ -195,7 +195,7 @@ def _saturated(levels: tuple[float, ...], side: int) -> Columns:
     return columns
 
 
-def _other_axes(data: PoseData, first: State) -> list[Component]:
+def _cross_axis_components(data: PoseData, first: State) -> list[Component]:
     c = data.channels
     cross, z = first.force[:, list(CROSS)], out_of_plane(first.force)
     inclinations = len(np.unique(np.round(first.force[:, 2], 3)))
@@ -246,8 +246,8 @@ def _history(data: PoseData, first: State) -> list[Component]:
     has_approach = "approach_deg" in data.table.constants
     start_shape = (AS_STATED if has_approach else LOGGED_DEG,)
     components = [
-        _slipping(first, "slip", "", has_approach)(start_shape),
-        _slipping(first, "pressed-slip", "pressed", has_approach)(start_shape),
+        _make_slip(first, "slip", "", has_approach)(start_shape),
+        _make_slip(first, "pressed-slip", "pressed", has_approach)(start_shape),
     ]
     components.append(_loops(first, has_approach)(start_shape))
     cross, own_force = first.force[:, list(CROSS)], first.force
@@ -263,7 +263,7 @@ def _history(data: PoseData, first: State) -> list[Component]:
     return components
 
 
-def _slipping(first: State, name: str, factor: Factor, has_approach: bool) -> Make:
+def _make_slip(first: State, name: str, factor: Factor, has_approach: bool) -> Make:
     """Slip elements; the shape is the angle in degrees before a pose at which its approach starts."""
 
     def at(shape: tuple[float, ...]) -> Component:
@@ -271,7 +271,7 @@ def _slipping(first: State, name: str, factor: Factor, has_approach: bool) -> Ma
         approach = AS_STATED if has_approach else abs(shape[0])
         form = Form("history", name, "way", (widths,), factor, approach_deg=approach)
         return free(form, first, "hysteresis", PRODUCT if factor else 0.0, shape=shape, step=(2.0,),
-                    reshaped=None if has_approach else _slipping(first, name, factor, has_approach),
+                    reshaped=None if has_approach else _make_slip(first, name, factor, has_approach),
                     constants=(("approach_deg", approach),))  # fmt: skip
 
     return at

@@ -37,15 +37,17 @@ def slow_noise(data: PoseData, all_frequencies: bool = False) -> list[Component]
     for k in range(data.channels):
         columns = np.zeros((data.channels, *basis.shape))
         columns[k] = basis
-        components.append(Component(f"noise/{data.axes[k]}", "noise", "response", columns=_fixed(columns), noise=True))
+        components.append(
+            Component(f"noise/{data.axes[k]}", "noise", "response", columns=_fixed_columns(columns), noise=True)
+        )
     return components
 
 
-def _fixed(columns: Array) -> Columns:
+def _fixed_columns(columns: Array) -> Columns:
     return lambda _: columns
 
 
-def _timed(basis: Array) -> Columns:
+def _columns_over_rows(basis: Array) -> Columns:
     """A function of the row alone, one for each axis."""
     return per_axis(lambda *_: basis)
 
@@ -75,7 +77,7 @@ def over_temperature(data: PoseData, first: State) -> list[Component]:
         temperature = leading_temperature(data.table, 0.0)
         for part in PLAYS:
             name = f"temperature-bias/temperature-hysteresis@{part}"
-            components.append(_lagging_by_play(name, temperature)((part * float(np.ptp(temperature)),)))
+            components.append(_make_play(name, temperature)((part * float(np.ptp(temperature)),)))
         widths = tuple(part * float(np.ptp(temperature)) for part in BRANCHES)
         form = Form("temperature-bias", "branches", "temperature", (Play(widths),))
         form_price = {"general": True, "contains": "temperature-bias", "starts": _middle_play(widths)}
@@ -95,15 +97,15 @@ def _middle_play(widths: tuple[float, ...]) -> Callable[[Array], Starts]:
     return starts
 
 
-def _lagging_by_play(name: str, temperature: Array) -> Make:
+def _make_play(name: str, temperature: Array) -> Make:
     """A line over the temperature behind a play, K."""
 
     def at(shape: tuple[float, ...]) -> Component:
         width = abs(shape[0])
         return Component(
             name, "temperature-bias", "response", "temperature-hysteresis", "temperature-bias/play", GENERAL,
-            _timed(play(temperature, width)[:, None]), contains="temperature-bias",
-            shape=shape, step=(0.05 * float(np.ptp(temperature)),), reshaped=_lagging_by_play(name, temperature),
+            _columns_over_rows(play(temperature, width)[:, None]), contains="temperature-bias",
+            shape=shape, step=(0.05 * float(np.ptp(temperature)),), reshaped=_make_play(name, temperature),
             starts=lambda _: (("play", "", width),),
         )  # fmt: skip
 
@@ -117,7 +119,8 @@ def _warmer(data: PoseData, first: State, name: str, place: str, factor: Factor,
         T = leading_temperature(data.table, shape[0])
         basis = (T - T.mean())[:, None]
         return Component(
-            name, place, "response", place, f"{place}/line", price, _times_force(basis) if factor else _timed(basis),
+            name, place, "response", place, f"{place}/line", price,
+            _times_force(basis) if factor else _columns_over_rows(basis),
             shape=shape, step=(30.0,), constants=(("lead_s", shape[0]),),
             reshaped=_warmer(data, first, name, place, factor, price) if data.timed else None,
             error=reading_error(data.table, "temperature_c", lead_s=shape[0]) if data.timed else 0.0,
@@ -161,7 +164,7 @@ def over_time(data: PoseData, first: State) -> list[Component]:
         for tau in WARMING:
             name = f"{place}/{cause}@{tau:.3f}"
             price_with_choice = price + 2 * np.log(len(WARMING))
-            components.append(_warming(data.axes, u, span, name, place, cause, price_with_choice, factor)((tau,)))
+            components.append(_make_warm_up(data.axes, u, span, name, place, cause, price_with_choice, factor)((tau,)))
         line = Form(place, "line", "time", (Line(begin, begin + span),), factor)
         components.append(free(line, first, drift, price))
         components.append(free(Form(place, "curve", "time", (spline(t, 12),), factor), first, price=price))
@@ -183,7 +186,7 @@ def over_time(data: PoseData, first: State) -> list[Component]:
     return components
 
 
-def _warming(
+def _make_warm_up(
     axes: Sequence[str], u: Array, span_s: float, name: str, place: str, cause: str, price: float, factor: Factor
 ) -> Make:
     """An exponential approach by its time constant, as a share of the record."""
@@ -192,8 +195,10 @@ def _warming(
         part = max(shape[0], SHORTEST_PART)
         decay = np.exp(-u / part)[:, None]
         return Component(
-            name, place, "response", cause, f"{place}/{cause}", price, _times_force(decay) if factor else _timed(decay),
-            shape=shape, step=(0.2 * shape[0],), reshaped=_warming(axes, u, span_s, name, place, cause, price, factor),
+            name, place, "response", cause, f"{place}/{cause}", price,
+            _times_force(decay) if factor else _columns_over_rows(decay),
+            shape=shape, step=(0.2 * shape[0],),
+            reshaped=_make_warm_up(axes, u, span_s, name, place, cause, price, factor),
             starts=lambda amplitudes: (
                 *(("amplitude", axis, float(a)) for axis, a in zip(axes, amplitudes, strict=True)),
                 ("time_constant", "", part * span_s),

@@ -81,17 +81,17 @@ def over_columns(data: PoseData, first: State) -> list[Component]:
     components: list[Component] = []
     if "supply_v" in table and np.ptp(table.column("supply_v")) > 0:
         for supply in _readings(table, ("supply_v",)):
-            components += [_supplied(supply), *_over_column("column:supply_v", supply, first)]
+            components += [_supply_component(supply), *_over_column("column:supply_v", supply, first)]
     if data.spread is not None and np.all(np.ptp(data.spread, axis=1) > 0):
         for squares in _readings(table, table.std_names, power=2):
-            components += _vibrating(squares, first)
+            components += _vibration_components(squares, first)
     for name in data.logged:
         for reading in _readings(table, (name,)):
             components += _over_column(f"column:{name}", reading, first)
     return components
 
 
-def _supplied(supply: Reading) -> Component:
+def _supply_component(supply: Reading) -> Component:
     """The output in proportion to the supply."""
     place, cause = "column:supply_v", "supply-sensitivity"
     (volts,) = supply.values
@@ -103,7 +103,7 @@ def _supplied(supply: Reading) -> Component:
     )  # fmt: skip
 
 
-def _vibrating(squares: Reading, first: State) -> list[Component]:
+def _vibration_components(squares: Reading, first: State) -> list[Component]:
     """A bias over the mean square of the samples of each axis."""
     place, cause = "column:std", "vibration-rectification"
     columns = per_axis(lambda _, k: (squares.values[k] - squares.values[k].mean())[:, None])

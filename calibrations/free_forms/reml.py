@@ -55,7 +55,7 @@ class Gram:
         return np.concatenate(parts) if parts else np.zeros(0, dtype=int)
 
 
-def whitened(
+def whiten(
     state: State,
     model_effects: ModelEffects,
     values: Coefficients,
@@ -85,10 +85,10 @@ def whitened(
 
 def gram(X: Array, blocks: Mapping[str, slice], scales: Mapping[str, float], b: int) -> Gram:
     """Products of whitened columns [base (b), components, data], the base eliminated."""
-    return eliminated(X.T @ X, blocks, scales, b, len(X))
+    return eliminate_base(X.T @ X, blocks, scales, b, len(X))
 
 
-def eliminated(G: Array, blocks: Mapping[str, slice], scales: Mapping[str, float], b: int, rows: int) -> Gram:
+def eliminate_base(G: Array, blocks: Mapping[str, slice], scales: Mapping[str, float], b: int, rows: int) -> Gram:
     """The same from the products of all columns."""
     size = np.sqrt(np.maximum(np.diag(G)[:b], 1e-300))
     size = np.where(size > NOTHING * size.max(), size, np.inf)
@@ -104,7 +104,7 @@ def eliminated(G: Array, blocks: Mapping[str, slice], scales: Mapping[str, float
     )  # fmt: skip
 
 
-def beside_base(X: Array, g: Gram, b: int) -> tuple[Array, dict[str, float]]:
+def scale_components(X: Array, g: Gram, b: int) -> tuple[Array, dict[str, float]]:
     """Columns and scales such that the part of each component orthogonal to the base has unit rms."""
     X, scales = X.copy(), dict(g.scales)
     for name, block in g.blocks.items():
@@ -303,7 +303,7 @@ def _gains(M: Array, side: Array) -> tuple[Array, Array]:
     return np.where(acts, np.maximum(value, 0.0), 0.0), np.where(acts, variance, LEAST_VARIANCE)
 
 
-def gain_beside(g: Gram, fit: Sizes, X: Array, b: int) -> Callable[[Array], float]:
+def gain_of_columns(g: Gram, fit: Sizes, X: Array, b: int) -> Callable[[Array], float]:
     """The gain of whitened columns (rows, m) that are not in g; X are the columns that g was made of."""
     active = g.indices(fit.variances)
     active_columns, by_products = X[:, b + active].T, g.base_products[:, active].T  # of all columns that are tried

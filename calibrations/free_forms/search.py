@@ -15,12 +15,12 @@ from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.reml import (
     Gram,
     Sizes,
-    beside_base,
     coefficients,
     estimate,
-    gain_beside,
+    gain_of_columns,
     gram,
-    whitened,
+    scale_components,
+    whiten,
     without,
 )
 from calibrations.free_forms.selection import ENTER, SPILL, pools_of, prices, select
@@ -194,10 +194,10 @@ def _descent(
     beginning += ", loops" * loops + ", flicker" * flicker
     for number in range(first_round, ROUNDS):
         report(f"searching for places ({beginning}), pass {number + 1} of at most {ROUNDS}")
-        X, blocks, scales = whitened(state, model_effects, values, components, scales, white)
+        X, blocks, scales = whiten(state, model_effects, values, components, scales, white)
         g = gram(X, blocks, scales, b)
         if number == first_round:
-            X, scales = beside_base(X, g, b)
+            X, scales = scale_components(X, g, b)
             g = gram(X, blocks, scales, b)
             largest = LARGEST * g.squares / g.rows * floor**2
             most |= {c.name: largest for c in components if not c.noise}
@@ -213,10 +213,12 @@ def _descent(
         path += steps
         variances = dict(sizes.variances)
         exchanged = set(variances) if number >= len(COARSE) else set()
-        values, moved_state = _damped(data, model_effects, previous[0], coefficients(g, sizes), components, white)
-        reshaped = _refined(components, g, sizes, X, b, state, scales, white)
+        values, moved_state = _take_damped_step(
+            data, model_effects, previous[0], coefficients(g, sizes), components, white
+        )
+        reshaped = _refine_shapes(components, g, sizes, X, b, state, scales, white)
         if reshaped is not None:
-            X, blocks, scales = whitened(state, model_effects, previous[0], reshaped, scales, white)
+            X, blocks, scales = whiten(state, model_effects, previous[0], reshaped, scales, white)
             g = gram(X, blocks, scales, b)
             sizes = estimate(g, variances, most)
             reshaped_values = coefficients(g, sizes)
@@ -242,7 +244,7 @@ def _descent(
                 continue
         if number >= len(COARSE) and set(variances) == previous_names and change < CONVERGED:
             break
-    X, blocks, scales = whitened(state, model_effects, values, components, scales, white)
+    X, blocks, scales = whiten(state, model_effects, values, components, scales, white)
     g = gram(X, blocks, scales, b)
     sizes = estimate(g, variances, most)
     values = coefficients(g, sizes)
@@ -276,13 +278,13 @@ def _likelier_without_one(result: SearchResult) -> SearchResult | None:
     for group in sorted(groups, key=result.cost_without):
         if result.cost_without(group) > SPILL * result.gram.squares:
             break
-        without_group = _settled(result, set(result.sizes.variances) - set(group))
+        without_group = _converge(result, set(result.sizes.variances) - set(group))
         if without_group is not None and without_group.criterion < result.criterion - SMALL_GAIN:
             return without_group
     return None
 
 
-def _settled(result: SearchResult, names: Set[str]) -> SearchResult | None:
+def _converge(result: SearchResult, names: Set[str]) -> SearchResult | None:
     """The search with these components alone, after Gauss-Newton steps; None where these do not converge."""
     data, model_effects, white = result.data, result.model_effects, result.white
     components = [c for c in result.components if c.name in names]
@@ -294,11 +296,11 @@ def _settled(result: SearchResult, names: Set[str]) -> SearchResult | None:
     state = state_at(data, model_effects, values, components)
     scales: Mapping[str, float] = result.gram.scales
     for _ in range(SETTLING):
-        X, blocks, scales = whitened(state, model_effects, values, components, scales, white)
+        X, blocks, scales = whiten(state, model_effects, values, components, scales, white)
         g = gram(X, blocks, scales, b)
         sizes = estimate(g, variances, most)
         variances = dict(sizes.variances)
-        values, next_state = _damped(data, model_effects, values, coefficients(g, sizes), components, white)
+        values, next_state = _take_damped_step(data, model_effects, values, coefficients(g, sizes), components, white)
         change = float(np.sqrt(np.mean(((next_state.predicted - state.predicted) / white) ** 2)))
         if not _misfit(next_state, white) <= 1.5 * _misfit(state, white) + 10.0:
             return None
@@ -308,7 +310,7 @@ def _settled(result: SearchResult, names: Set[str]) -> SearchResult | None:
     return None
 
 
-def _damped(
+def _take_damped_step(
     data: PoseData,
     model_effects: ModelEffects,
     origin: Coefficients,
@@ -340,7 +342,7 @@ def _midpoint(origin: Coefficients, end: Coefficients) -> Coefficients:
     return Coefficients((origin.base + end.base) / 2, coefficients_by_name)
 
 
-def _refined(
+def _refine_shapes(
     components: list[Component],
     g: Gram,
     sizes: Sizes,
@@ -356,7 +358,7 @@ def _refined(
     for i, comp in enumerate(components):
         if comp.name not in sizes.variances or comp.reshaped is None:
             continue
-        gain = gain_beside(g, without(g, sizes, comp.name), X, b)
+        gain = gain_of_columns(g, without(g, sizes, comp.name), X, b)
 
         def gained(shape: tuple[float, ...], comp: Component = comp, gain: Callable[[Array], float] = gain) -> float:
             assert comp.reshaped is not None  # noqa: S101 checked above

@@ -63,7 +63,7 @@ def select(
     by_name = {c.name: c for c in components}
     steps: list[str] = []
     visited: set[frozenset[str]] = set()
-    sizes = _pruned(g, sizes, by_name, most, steps)
+    sizes = _prune(g, sizes, by_name, most, steps)
     stale: list[dict[str, float]] = [{} for _ in pools]
     pools = [dict(pool) for pool in pools]
     while len(sizes.variances) < MOST_COMPONENTS:
@@ -77,17 +77,17 @@ def select(
             steps.append(f"+{best[0]}")
             if by_name[best[0]].reshaped is not None:
                 break  # its shape is found first: its misfit looks like other places
-            sizes = _pruned(g, sizes, by_name, most, steps)
+            sizes = _prune(g, sizes, by_name, most, steps)
             if frozenset(sizes.variances) not in visited:
                 visited.add(frozenset(sizes.variances))
                 continue
         if not last:
             break
-        exchanged = _exchanged(g, sizes, by_name, most, steps)
+        exchanged = _exchange(g, sizes, by_name, most, steps)
         if set(exchanged.variances) == set(sizes.variances) or frozenset(exchanged.variances) in visited:
             break
         visited.add(frozenset(exchanged.variances))
-        sizes = _pruned(g, exchanged, by_name, most, steps)
+        sizes = _prune(g, exchanged, by_name, most, steps)
     return estimate(g, sizes.variances, most), steps
 
 
@@ -141,7 +141,7 @@ def _best(
     return best
 
 
-def _pruned(
+def _prune(
     g: Gram, sizes: Sizes, by_name: Mapping[str, Component], most: Mapping[str, float], steps: list[str]
 ) -> Sizes:
     """The sizes without components whose removal costs less than their price, those of least cost first."""
@@ -161,7 +161,7 @@ def _pruned(
         sizes = reduced
 
 
-def _exchanged(
+def _exchange(
     g: Gram, sizes: Sizes, by_name: Mapping[str, Component], most: Mapping[str, float], steps: list[str]
 ) -> Sizes:
     """The sizes with each component replaced by a likelier one, if there is one."""

@@ -71,17 +71,17 @@ def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
     f = np.arange(FEWEST_STEPS / span, highest, 1 / (POINTS * span))
     if not len(f):
         return None
-    excess = _gathered(values, f) - _gathered(linear.ravel(), f)
+    excess = _measure_concentration(values, f) - _measure_concentration(linear.ravel(), f)
     best = int(np.argmax(excess))
     if excess[best] < max(GATHERED, BY_CHANCE * float(np.sqrt(np.log(len(f)) / len(values)))):
         return None
     fine = f[best] + np.linspace(-1, 1, 81) / (POINTS * span)
-    frequency = float(fine[int(np.argmax(_gathered(values, fine)))])
+    frequency = float(fine[int(np.argmax(_measure_concentration(values, fine)))])
     middle = float(values.mean())
     phase = float(np.angle(np.mean(np.exp(2j * np.pi * frequency * (values - middle)))))
     step, offset = _with_every_code(values, 1 / frequency, middle + phase / (2 * np.pi * frequency))
     width = max(3 * float(np.sqrt(np.mean(white**2))), 0.01 * step)
-    step, offset = _sharpened(values, step, offset, middle, width)
+    step, offset = _sharpen_step(values, step, offset, middle, width)
     return Stairs(step, offset, noise or _sample_noise(table.outputs.T, white, step, offset))
 
 
@@ -113,7 +113,7 @@ def _with_every_code(values: Array, step: float, offset: float) -> tuple[float, 
     return step, offset
 
 
-def _sharpened(values: Array, step: float, offset: float, middle: float, width: float) -> tuple[float, float]:
+def _sharpen_step(values: Array, step: float, offset: float, middle: float, width: float) -> tuple[float, float]:
     """Step and offset near those given at which most outputs lie within `width` of a code: on a tread."""
     spread, best = float(np.ptp(values)), (-np.inf, step, offset)
     for frequency in 1 / step + np.linspace(-0.5, 0.5, 41) / spread:
@@ -127,7 +127,7 @@ def _sharpened(values: Array, step: float, offset: float, middle: float, width: 
     return best[1], best[2]
 
 
-def _gathered(values: Array, frequencies: Array) -> Array:
+def _measure_concentration(values: Array, frequencies: Array) -> Array:
     """|mean of exp(2 pi i f V)| at each frequency."""
     parts = [np.exp(2j * np.pi * np.outer(part, values)).mean(axis=1) for part in np.array_split(frequencies, 40)]
     return np.asarray(np.abs(np.concatenate(parts)))
@@ -153,7 +153,7 @@ def before_stairs(table: Table, white: Array, stairs: Stairs) -> Table:
     )
 
 
-def fitted_stairs(table: Table, unrounded: Array, white: Array, stairs: Stairs) -> Stairs:
+def fit_stairs(table: Table, unrounded: Array, white: Array, stairs: Stairs) -> Stairs:
     """Stairs near those given, fitted to the outputs; `unrounded`: the same before the rounding, (channels, n)."""
     outputs, middle = table.outputs.T, float(np.mean(unrounded))
     begins = float(np.round((middle - stairs.offset) / stairs.step))

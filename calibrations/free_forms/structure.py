@@ -68,7 +68,7 @@ class Structure:
         cause_names: list[str] = []
         for place in self.places:
             if place.material and (place.size >= largest or (place.share >= SEEN_FORM and not self._follows(place))):
-                cause_names += [c for c in place.causes if not self._same_as_one_of(c, cause_names)]
+                cause_names += [c for c in place.causes if not self._is_confounded(c, cause_names)]
         visible = [c for c in self.geometry.causes if self.geometry.sizes[c] >= LINEAR_PART * largest]
         return tuple(dict.fromkeys([*cause_names, *visible]))
 
@@ -76,7 +76,7 @@ class Structure:
         """Whether a place acts by components that follow many things: branches, slip elements, a random walk."""
         return place.name == "history" or any("/walk-" in name for name in place.components)
 
-    def _same_as_one_of(self, cause: str, cause_names: list[str]) -> bool:
+    def _is_confounded(self, cause: str, cause_names: list[str]) -> bool:
         """Whether the data cannot separate a cause from one of those that are named, or from its place."""
         alternatives = set(self.alternatives.get(cause, ()))
         places_of_named = {
@@ -252,7 +252,7 @@ def find_structure(
     elif SAW in table.left_out:  # the noise is what the stairs hide of each row: never the same for all
         result = search(data, white, model_effects)
     else:
-        result, source = _searched(data, white, model_effects, source)
+        result, source = _search_with_noise(data, white, model_effects, source)
     white = result.white
     result, factor = _in_larger_noise(result, model_effects)
     acting_places = places(result)
@@ -272,7 +272,7 @@ def _curves(acting_places: Sequence[ActingPlace]) -> dict[str, Array]:
     return curves
 
 
-def _searched(
+def _search_with_noise(
     data: PoseData, white: Array, model_effects: ModelEffects, source: FloorSource
 ) -> tuple[SearchResult, FloorSource]:
     """The search, and where its noise is known from: again with the noise of the residual where that contradicts.
@@ -321,10 +321,10 @@ def _neighbours(data: PoseData) -> Array:
     y = data.outputs - (smooth @ np.linalg.lstsq(smooth, data.outputs.T, rcond=1e-9)[0]).T
     if data.n < 5:
         return np.full(y.shape, float(np.std(y)) or 1.0)
-    return np.asarray(np.maximum(np.tile(neighbour_std(y)[:, None], (1, data.n)), _resolved(data)))
+    return np.asarray(np.maximum(np.tile(neighbour_std(y)[:, None], (1, data.n)), _find_smallest_noise(data)))
 
 
-def _resolved(data: PoseData) -> Array:
+def _find_smallest_noise(data: PoseData) -> Array:
     """The smallest noise that data can show, per channel, (channels, 1)."""
     return np.asarray(RESOLVED * np.ptp(data.outputs, axis=1, keepdims=True))
 
@@ -343,7 +343,7 @@ def _scatter(result: SearchResult, source: FloorSource, uniform: bool) -> Array 
         return None
     r = residual.reshape(result.white.shape) * result.white
     white = np.stack([_rows_noise(result, k, row, uniform) for k, row in enumerate(r)])
-    white = np.maximum(white * np.sqrt(residual.size / result.freedom), _resolved(result.data))
+    white = np.maximum(white * np.sqrt(residual.size / result.freedom), _find_smallest_noise(result.data))
     return white if np.all(white > 0) and not np.array_equal(white, result.white) else None
 
 

@@ -78,7 +78,7 @@ class Calibration:
         return {self.signal.causes[0]: experiment} if experiment and self.alternatives else {}
 
 
-def calibrated(search_before: Search, start: NoiseFit, effects: Mapping[str, Effect]) -> Calibration | None:
+def calibrate(search_before: Search, start: NoiseFit, effects: Mapping[str, Effect]) -> Calibration | None:
     """Effects of temperature on the record of `search_before`; None if there are none beyond the model."""
     model_terms = signal_terms(start.model)
     warm = tuple(
@@ -108,11 +108,11 @@ def _without_costly_curves(
         smaller = [signal.without(name, effects, still)]
         if PLACE not in (*signal.names, *signal.given):  # branches of any form may hold a straight line
             smaller.append(signal.with_line(name, effects, still))
-        signal = max((signal, *smaller), key=lambda candidate: _worth(candidate, model, still))
+        signal = max((signal, *smaller), key=lambda candidate: _penalised_likelihood(candidate, model, still))
     return signal
 
 
-def _worth(signal: SignalSearch, model: Model, still: Still) -> float:
+def _penalised_likelihood(signal: SignalSearch, model: Model, still: Still) -> float:
     """Log-likelihood of the record less these terms, less what their parameters cost."""
     terms = signal.steps[-1]
     count = sum(len(term.estimates) for term in terms)

@@ -19,15 +19,15 @@ from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import ModelError
 from calibrations.model import Model
-from calibrations.noise.calibration import calibrated
+from calibrations.noise.calibration import calibrate
 from calibrations.noise.comparison import compared_deviations, evaluate, mismatch, places
 from calibrations.noise.doubts import (
     alternatives,
     as_disturbance,
     disturbance_document,
     disturbances,
-    disturbed,
     filter_text,
+    has_disturbance,
     next_of,
     possible_corner_hz,
     reason_of,
@@ -104,11 +104,11 @@ class StillRecord(Dataset[NoiseFit]):
 
     def search(self, model: Model, effects: Mapping[str, Effect]) -> NoiseFindings:
         """Effects of temperature, then lines, disturbances and every mixture of processes."""
-        return self._searched(self.fit(model), effects)
+        return self._search(self.fit(model), effects)
 
     def search_on(self, start: NoiseFit, origin: NoiseFit, effects: Mapping[str, Effect]) -> NoiseFindings:
         """The same from a fitted model."""
-        return self._searched(fit(start.model, start.still), effects, origin)
+        return self._search(fit(start.model, start.still), effects, origin)
 
     def candidates(
         self, base: NoiseFit, plan: Findings[NoiseFit], effects: Mapping[str, Effect]
@@ -118,11 +118,9 @@ class StillRecord(Dataset[NoiseFit]):
         planned = tuple(c for c in plan.candidates if not c.effect.is_noise and c.name in plan.names)
         return (*planned, *sorted(processes, key=lambda c: c.name not in plan.names[:1]))
 
-    def _searched(
-        self, start: NoiseFit, effects: Mapping[str, Effect], origin: NoiseFit | None = None
-    ) -> NoiseFindings:
+    def _search(self, start: NoiseFit, effects: Mapping[str, Effect], origin: NoiseFit | None = None) -> NoiseFindings:
         missing = search(start.still, start.model, effects)
-        calibration = calibrated(missing, start, effects)
+        calibration = calibrate(missing, start, effects)
         missing = calibration.after if calibration else missing
         baseline = fit(start.model, without_patterns(start.still, missing.patterns)) if missing.patterns else start
         signal = calibration.steps(baseline, missing.patterns) if calibration else ()
@@ -131,7 +129,7 @@ class StillRecord(Dataset[NoiseFit]):
         names = () if missing.still.hidden else tuple(missing.gains)
         doubts = alternatives(missing, names) | (calibration.alternatives if calibration else {})
         of_noise = {name: rivals for name, rivals in doubts.items() if name in names}
-        is_spoilt = structure is not None and (missing.still.hidden or disturbed(missing))
+        is_spoilt = structure is not None and (missing.still.hidden or has_disturbance(missing))
         result = NoiseFindings(
             data=self,
             start=start,

@@ -219,13 +219,15 @@ def interval(deviation: float, edf: float) -> tuple[float, float]:
 def _autocovariance(t: Array, factor: float, alpha: int, order: int) -> Array:
     """Of differences of the given order, but for a constant factor; t in averaging times."""
     weights = {2: (6, -4, 1), 3: (20, -15, 6, -1)}[order]
-    total = weights[0] * _averaged(t, factor, alpha)
+    total = weights[0] * _average_autocovariance(t, factor, alpha)
     for lag, weight in enumerate(weights[1:], 1):
-        total = total + weight * (_averaged(t - lag, factor, alpha) + _averaged(t + lag, factor, alpha))
+        total = total + weight * (
+            _average_autocovariance(t - lag, factor, alpha) + _average_autocovariance(t + lag, factor, alpha)
+        )
     return np.asarray(total)
 
 
-def _averaged(t: Array, factor: float, alpha: int) -> Array:
+def _average_autocovariance(t: Array, factor: float, alpha: int) -> Array:
     """Generalised autocovariance of the phase, averaged over 1 / factor of an averaging time, each way."""
     if np.isinf(factor):
         return np.asarray(COVARIANCES[alpha + 2](t))

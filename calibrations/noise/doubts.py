@@ -172,7 +172,7 @@ def _round_up_to_tens(seconds: float) -> float:
     return float(10 * np.ceil(seconds / 10))
 
 
-def separating_record(search: Search, names: tuple[str, ...]) -> Experiment | None:
+def design_separating_record(search: Search, names: tuple[str, ...]) -> Experiment | None:
     """The shortest record that separates the first effect in doubt from its rivals with certainty.
 
     None of them certain, the longest that is proposed.
@@ -295,7 +295,7 @@ def next_of(search: Search, doubts: Mapping[str, tuple[str, ...]], structure: st
     if any(hidden_in(channel.oddities) for channel in search.still.channels):
         return None  # the text says what to do, and no run does it
     if any(rival != OUTPUT_FILTER for rivals in doubts.values() for rival in rivals):
-        return separating_record(search, tuple(doubts))
+        return design_separating_record(search, tuple(doubts))
     motions = (
         experiment_for_filter(name, corner)
         for name in doubts
@@ -341,6 +341,6 @@ def _jump(means: Array) -> tuple[float, float] | None:
     return (k + 1) / n, float(-sums[k] / (n - k - 1) - sums[k] / (k + 1))
 
 
-def disturbed(search: Search) -> bool:
+def has_disturbance(search: Search) -> bool:
     """Whether there is a disturbance with a place or a cause of its own: a pattern, or odd samples."""
     return any(disturbance.matters and disturbance.kind not in MISFITS for disturbance in disturbances(search))

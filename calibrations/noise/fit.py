@@ -65,7 +65,7 @@ def _spectrum_estimates(fit: ChannelFit, effect: Effect, unit: str, deviations: 
     strength, values, axis = effect.parameters[0], fit.values[effect.name], fit.channel.axis
     of_power = deviations[effect.name, strength.name]
     if gain_of(fit, effect) <= IDENTIFIED:
-        yield from _unidentified(fit, effect, unit)
+        yield from _estimate_bounds(fit, effect, unit)
         return
     for p in effect.parameters:
         value = values[p.name]
@@ -73,7 +73,7 @@ def _spectrum_estimates(fit: ChannelFit, effect: Effect, unit: str, deviations: 
         yield Estimate(p.name, axis, value, std, p.unit.replace("{out}", unit))
 
 
-def _unidentified(fit: ChannelFit, effect: Effect, unit: str) -> Iterator[Estimate]:
+def _estimate_bounds(fit: ChannelFit, effect: Effect, unit: str) -> Iterator[Estimate]:
     """A process that may be absent: the bound of its strength; its shape means nothing."""
     strength, values, axis = effect.parameters[0], fit.values[effect.name], fit.channel.axis
     value, bound, _ = upper_bound(fit, effect, [e for e in fit.effects if e is not effect])

@@ -64,7 +64,7 @@ def absorb(tree: Tree, samples: Array, offset: float, third: bool) -> None:
         filled = tree.filled[0]
         count = min(TAIL + STEP - filled, len(samples) - place)
         tree.sums[0, filled : filled + count] = samples[place : place + count] - offset
-        _noted(tree, 0, count)
+        _count_bins(tree, 0, count)
         place += count
         level = 0
         while level < LEVELS - 1 and tree.filled[level] >= TAIL + STEP:
@@ -80,7 +80,7 @@ def finish(tree: Tree, third: bool) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _noted(tree: Tree, level: int, count: int) -> None:
+def _count_bins(tree: Tree, level: int, count: int) -> None:
     """Count bins that were put into a buffer, and keep the very first."""
     filled = tree.filled[level]
     count_before = tree.bin_counts[level]
@@ -106,7 +106,7 @@ def _hand_up(tree: Tree, level: int, third: bool) -> None:
     p0, p1 = p[first : first + 2 * pairs : 2], p[first + 1 : first + 2 * pairs : 2]
     tree.sums[level + 1, filled_above : filled_above + pairs] = b0 + b1
     tree.phases[level + 1, filled_above : filled_above + pairs] = p0 + p1 + size * b0
-    _noted(tree, level + 1, pairs)
+    _count_bins(tree, level + 1, pairs)
     tail = min(TAIL, n)
     b[:tail] = b[n - tail : n].copy()
     p[:tail] = p[n - tail : n].copy()

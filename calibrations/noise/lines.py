@@ -205,7 +205,7 @@ def strongest_line(channel: Channel, known_lines: Lines, level: Callable[[Array]
     if isinstance(slow, float):
         return fast[0] if fast else slow
     for line in fast:  # what the means show may be the folded image of a fast line, and tells its frequency best
-        if (true_hz := _unfolded(slow[1].frequency_hz, line, channel)) is not None:
+        if (true_hz := _unfold(slow[1].frequency_hz, line, channel)) is not None:
             return replace(line, frequency_hz=true_hz, std_hz=slow[1].std_hz)
     return max([slow[1], *fast[:1]], key=lambda line: line.amplitude)
 
@@ -216,7 +216,7 @@ def _level_around(power: Array, length_s: float) -> Callable[[Array], Array]:
     return lambda f: np.asarray(np.exp(logs[np.round(f * length_s).astype(int)] + np.euler_gamma))
 
 
-def _unfolded(seen_hz: float, line: Line, channel: Channel) -> float | None:
+def _unfold(seen_hz: float, line: Line, channel: Channel) -> float | None:
     """The frequency that a line of the means really has, where it may be the folded image of this fast one."""
     rate_hz = 1 / channel.sampling.interval_s
     turns = np.round(line.frequency_hz / rate_hz)

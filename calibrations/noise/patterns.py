@@ -94,7 +94,7 @@ class Pattern:
             f"{self.plain} (this record cannot separate it from {names_of_rivals})" if names_of_rivals else self.plain
         )
 
-    def taken_off(self, channel: Channel) -> Channel:
+    def remove_from(self, channel: Channel) -> Channel:
         """The record without it."""
         return replace(channel, means=channel.means - self.size * self.form) if channel.axis == self.axis else channel
 
@@ -106,7 +106,7 @@ def pattern_of(fit: ChannelFit, removed_patterns: Iterable[Pattern] = ()) -> Pat
     spectrum, unit = _Ordinates.of(fit), fit.channel.unit
     candidates = [
         _step(fit.channel, spectrum, unit), *_courses(fit.channel, spectrum, unit),
-        *_followed(fit.channel, spectrum, unit, removed_patterns),
+        *_find_followed_columns(fit.channel, spectrum, unit, removed_patterns),
         *_further(fit.channel, spectrum, unit, removed_patterns),
     ]  # fmt: skip
     kinds = {(pattern.kind, pattern.cause) for pattern in candidates}
@@ -202,7 +202,7 @@ def _courses(channel: Channel, ordinates: _Ordinates, unit: str) -> Iterator[Pat
     best = int(np.argmax(gains[1:]))
     share, price = float(TIMES[best]), PATTERN_AMPLITUDE + 2 * float(np.log(len(TIMES)))
     text = f"{axis} settles by {{}} {unit}, with a time constant of about {share * channel.length_s:.2g} s"
-    make = partial(_settling, n, share)
+    make = partial(_settling_curve, n, share)
     yield Pattern(SETTLING, axis, text, make, sizes[1 + best], stds[1 + best], gains[1 + best], price)
 
 
@@ -210,7 +210,7 @@ def _ramp(n: int, per_mean: float) -> Array:
     return np.asarray((np.arange(n) + 0.5) * per_mean)
 
 
-def _settling(n: int, share: float) -> Array:
+def _settling_curve(n: int, share: float) -> Array:
     return np.asarray(-np.exp(-(np.arange(n) + 0.5) / n / share))
 
 
@@ -232,7 +232,7 @@ def _course_coefficients(n: int, k: int) -> Array:
     return np.asarray(coefficients / np.sqrt(2 * n))
 
 
-def _followed(
+def _find_followed_columns(
     channel: Channel, ordinates: _Ordinates, unit: str, removed_patterns: Iterable[Pattern]
 ) -> Iterator[Pattern]:
     """Outputs that follow a column, as read or without its scatter, at once or with a lag; each column once."""
@@ -245,14 +245,14 @@ def _followed(
             share = _best_lag(values, ordinates)
             lag_words = f", with a lag of {share * channel.length_s:.2g} s" if share else ""
             text = f"{channel.axis} follows {name} by {{}} {unit}/{PER.get(name, name)}{lag_words}"
-            make = partial(_lagged, values, share)
+            make = partial(_lag, values, share)
             lag_s = share * channel.length_s
             yield Pattern(
                 FOLLOWS, channel.axis, text, make, *ordinates.matched(make()), price, name, doubt, lag_s=lag_s
             )
 
 
-def _lagged(values: Array, share: float) -> Array:
+def _lag(values: Array, share: float) -> Array:
     """Values (n,) behind a first-order lag, its time constant a share of the record."""
     return values if share == 0 else np.asarray(first_order_lag(values, share * len(values)))
 
@@ -261,7 +261,7 @@ def _best_lag(values: Array, ordinates: _Ordinates) -> float:
     """The lag with the greatest gain: the best of LAGS, refined; 0 where the data cannot separate it from none."""
 
     def loss(share: float) -> float:
-        return -ordinates.matched(_lagged(values, share))[2]
+        return -ordinates.matched(_lag(values, share))[2]
 
     losses = [loss(share) for share in LAGS]
     best = int(np.argmin(losses))
@@ -290,7 +290,7 @@ def _further(
             yield Pattern(FOLLOWS, channel.axis, text, make, *ordinates.matched(form), price, line.cause, further=True)
 
 
-def refitted(patterns: tuple[Pattern, ...], fit: ChannelFit, channel: Channel) -> tuple[Pattern, ...]:
+def refit_patterns(patterns: tuple[Pattern, ...], fit: ChannelFit, channel: Channel) -> tuple[Pattern, ...]:
     """The patterns of one channel, their sizes fitted together to its whole record with a fit's effects."""
     ordinates = _Ordinates.of(replace(fit, channel=channel))
     forms = (

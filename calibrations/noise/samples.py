@@ -96,7 +96,7 @@ class Steps:
     def hidden(self, curve: Curve, rate_hz: float, corner_hz: float) -> HiddenNoise | None:
         """By the Allan deviations of the samples, behind a first-order low-pass; None where noise is not hidden."""
         limit = LEAST * self._step**2
-        if not np.isfinite(self._step) or _reaching(curve, rate_hz, corner_hz) >= limit:
+        if not np.isfinite(self._step) or _variance_at_converter(curve, rate_hz, corner_hz) >= limit:
             return None
         white_bound = LEAST_DITHER * self._step / float(np.sqrt(min(rate_hz, np.pi * corner_hz)))
         levels = round((self._high - self._low) / self._step) + 1
@@ -110,7 +110,7 @@ def hidden_step(values: Array) -> float | None:
     return step if np.isfinite(step) and np.mean(differences**2) / 2 < LEAST * step**2 else None
 
 
-def _reaching(curve: Curve, rate_hz: float, corner_hz: float) -> float:
+def _variance_at_converter(curve: Curve, rate_hz: float, corner_hz: float) -> float:
     """The variance of noise, as it reaches the converter within some samples, or behind its low-pass."""
     variance = curve.deviation**2
     short_term = float(np.max(variance[curve.tau_s <= SOON / rate_hz]))

@@ -33,7 +33,7 @@ from calibrations.noise.fit import (
 from calibrations.noise.likelihood import ChannelFit
 from calibrations.noise.lines import Lines
 from calibrations.noise.mixtures import Mixture, Mixtures, chance, likelihood, tube
-from calibrations.noise.patterns import FOLLOWS, Pattern, pattern_of, refitted
+from calibrations.noise.patterns import FOLLOWS, Pattern, pattern_of, refit_patterns
 from calibrations.noise.record import Still
 from calibrations.noise.signal import with_cleaned_curves
 from calibrations.noise.telegraph import Telegraph, telegraph_of
@@ -174,7 +174,7 @@ def _with_amounts(
     fitted: list[Pattern] = []
     for channel, present in zip(still.channels, channel_fits, strict=True):
         channel_patterns = tuple(pattern for pattern in patterns if pattern.axis == channel.axis)
-        fitted += refitted(channel_patterns, present, channel) if channel_patterns else ()
+        fitted += refit_patterns(channel_patterns, present, channel) if channel_patterns else ()
     return tuple(fitted)
 
 
@@ -218,7 +218,7 @@ def without_patterns(still: Still, patterns: tuple[Pattern, ...]) -> Still:
     """The record less the patterns; its Allan deviations are still those with them."""
     channels = still.channels
     for pattern in patterns:
-        channels = tuple(pattern.taken_off(channel) for channel in channels)
+        channels = tuple(pattern.remove_from(channel) for channel in channels)
     return replace(still, channels=channels)
 
 

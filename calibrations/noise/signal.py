@@ -129,7 +129,7 @@ class SignalSearch:
         """The same with a straight line in place of one effect; the others are fitted again from their own starts."""
         line = Term(effects[PLACE])
         last = tuple(line if term.name == name else replace(term, estimates=()) for term in self.steps[-1])
-        fit = fit_rows(_biased(last, effects), self.table)
+        fit = fit_rows(_bias_model(last, effects), self.table)
         terms = _terms(fit, {term.name for term in last}, still)
         steps = []
         for step_terms in self.steps:
@@ -142,7 +142,7 @@ class SignalSearch:
         """The same without one effect; the others are fitted again."""
         position = self.names.index(name)
         remaining = [tuple(term for term in terms if term.name != name) for terms in self.steps]
-        fit = fit_rows(_biased(_relabelled(remaining[-1], still.axes, AXES), effects), self.table)
+        fit = fit_rows(_bias_model(_rename_axes(remaining[-1], still.axes, AXES), effects), self.table)
         remaining[-1] = _terms(fit, {term.name for term in remaining[-1]}, still)
         return replace(
             self,
@@ -177,7 +177,7 @@ def search_signal(
     from calibrations.discovery.rows import Rows  # noise alone needs no search in rows
 
     table = table_of_means(without_signal(still, ()))
-    search = Rows(table).search(_biased(_relabelled(model_terms, still.axes, AXES), effects), effects)
+    search = Rows(table).search(_bias_model(_rename_axes(model_terms, still.axes, AXES), effects), effects)
     names_so_far = {term.name for term in model_terms}
     steps: list[tuple[Term, ...]] = []
     for step in search.steps:
@@ -188,7 +188,7 @@ def search_signal(
         steps[-1] = _terms(search.end, names_so_far, still)
     elif not model_terms:
         line = Term(effects[PLACE], constants={"lead_s": -lag_s})
-        steps.append(_terms(fit_rows(_biased((line,), effects), table), {PLACE}, still))
+        steps.append(_terms(fit_rows(_bias_model((line,), effects), table), {PLACE}, still))
     return SignalSearch(tuple(steps), search, table, tuple(term.name for term in model_terms))
 
 
@@ -197,12 +197,14 @@ def fit_signal(model: Model, still: Still, effects: Mapping[str, Effect]) -> Mod
     terms = signal_terms(model)
     if not terms:
         return model
-    fit = fit_rows(_biased(_relabelled(terms, still.axes, AXES), effects), table_of_means(without_signal(still, ())))
+    fit = fit_rows(
+        _bias_model(_rename_axes(terms, still.axes, AXES), effects), table_of_means(without_signal(still, ()))
+    )
     fitted = {term.name: term for term in _terms(fit, {term.name for term in terms}, still)}
     return replace(model, terms=tuple(fitted.get(term.name, term) for term in model.terms))
 
 
-def _biased(terms: tuple[Term, ...], effects: Mapping[str, Effect]) -> Model:
+def _bias_model(terms: tuple[Term, ...], effects: Mapping[str, Effect]) -> Model:
     return Model("at rest", (Term(effects["bias"]), *terms))
 
 
@@ -221,27 +223,27 @@ def _terms(fit: Fit, names: set[str], still: Still) -> tuple[Term, ...]:
 
     return tuple(
         replace(term, estimates=tuple(map(with_record_unit, term.estimates)))
-        for term in _relabelled(selected, AXES, still.axes)
+        for term in _rename_axes(selected, AXES, still.axes)
     )
 
 
-def _relabelled(terms: tuple[Term, ...], old_axes: Sequence[str], new_axes: Sequence[str]) -> tuple[Term, ...]:
+def _rename_axes(terms: tuple[Term, ...], old_axes: Sequence[str], new_axes: Sequence[str]) -> tuple[Term, ...]:
     """Terms with other names of their axes."""
     names = dict(zip(old_axes, new_axes, strict=False))
 
-    def renamed(e: Estimate) -> Estimate:
+    def rename(e: Estimate) -> Estimate:
         return replace(e, axis=names.get(e.axis, e.axis))
 
-    return tuple(replace(term, estimates=tuple(map(renamed, term.estimates))) for term in terms)
+    return tuple(replace(term, estimates=tuple(map(rename, term.estimates))) for term in terms)
 
 
 def with_cleaned_curves(still: Still, axes: set[str]) -> Still:
     """The record with Allan deviations of these axes' means as they are now, from a mean's length on."""
-    curves = {c.axis: _cleaned_curve(still.allan[c.axis], c) for c in still.channels if c.axis in axes}
+    curves = {c.axis: _clean_curve(still.allan[c.axis], c) for c in still.channels if c.axis in axes}
     return replace(still, allan={**still.allan, **curves})
 
 
-def _cleaned_curve(curve: Curve, channel: Channel) -> Curve:
+def _clean_curve(curve: Curve, channel: Channel) -> Curve:
     """The curve of a channel whose means have changed."""
     slow = octaves([channel.means], 1 / channel.sampling.interval_s)
     fast = np.arange(len(curve.tau_s)) < len(curve.tau_s) - len(slow.tau_s)

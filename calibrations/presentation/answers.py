@@ -26,9 +26,9 @@ def comparison_text(result: Comparison[Any]) -> str:
     if result.rejection is not None:
         parts.append(f"This data cannot be used: {result.rejection.verdict}: {result.rejection.text}.")
     elif result.given is not None:
-        parts.append(result.given.text if data.noise_known(result.fit) else f"{SELF_JUDGED} {result.given.text}")
+        parts.append(result.given.text if data.is_noise_known(result.fit) else f"{SELF_JUDGED} {result.given.text}")
     elif result.adequate:
-        parts.append(data.complete if data.noise_known(result.fit) else SELF_JUDGED)
+        parts.append(data.complete if data.is_noise_known(result.fit) else SELF_JUDGED)
     else:
         parts.append("The model fails here, worst first:\n" + "\n".join(f"  {place.text}" for place in result.fails))
     return "\n\n".join(parts)

@@ -187,7 +187,7 @@ class ModelSession(Generic[F]):
             plan = self.plans.get(self.names[:k])
             remaining = self.names[k:]
             if plan is not None and plan.names[: len(remaining)] == remaining:
-                return plan if not remaining else self.data.followed(plan, len(remaining), self.effects)
+                return plan if not remaining else self.data.follow_plan(plan, len(remaining), self.effects)
         return None
 
     @property
@@ -215,7 +215,7 @@ def model_session(request: Request) -> ModelSession[Any]:
     report(f"Reading {request.data}")
     question = loaded(request, notes.append)
     report(f"Fitting {question.model.name} to {question.data.description}")
-    prepared, start = question.data.beginning(question.model)
+    prepared, start = question.data.fit_without_outliers(question.model)
     return ModelSession(
         request, question.model, question.data, prepared, question.effects, tuple(notes), start, content=content
     )

@@ -96,7 +96,7 @@ def test_relays_at_any_place_are_a_sum_of_functions_of_plays() -> None:
 
 def test_columns_of_a_spline_have_unit_roughness_and_are_independent() -> None:
     basis = Spline(-1.0, 1.0, 8)
-    knots, turn = bases._turned(basis.low, basis.high, basis.intervals, basis.order)
+    knots, turn = bases._diagonalise_penalty(basis.low, basis.high, basis.intervals, basis.order)
     x = np.linspace(-1.0, 1.0, 20001)[:-1]
     step = 2.0 / basis.intervals
     second = BSpline(knots, np.eye(len(turn)), DEGREE).derivative(2)(x) @ turn * step**2
@@ -111,7 +111,7 @@ def test_a_basis_has_as_many_columns_as_it_counts(basis: Spline | Harmonics | Wa
 
 def test_columns_of_a_spline_are_cubic_b_splines_that_end_constant() -> None:
     basis = Spline(-1.0, 1.0, 8)
-    knots, turn = bases._turned(basis.low, basis.high, basis.intervals, basis.order)
+    knots, turn = bases._diagonalise_penalty(basis.low, basis.high, basis.intervals, basis.order)
     x = np.linspace(-1.0, 1.0, 401)[:-1]
     np.testing.assert_allclose(basis(x), BSpline(knots, turn, DEGREE)(x), rtol=0, atol=1e-12)
     np.testing.assert_allclose(basis(np.array([-3.0, 3.0])), basis(np.array([-1.0, 1.0])), rtol=0, atol=1e-12)
@@ -137,11 +137,11 @@ def test_a_free_form_adds_the_same_whether_its_columns_are_kept_or_not() -> None
     effect = free_form(forms)
     rng = np.random.default_rng(3)
     p = Values({q.name: np.append(rng.standard_normal(2), 0.0) for q in effect.parameters})
-    summed = effect.transduction(a, table, p)
+    sum_columns = effect.transduction(a, table, p)
     columns = effect.columns(a, table)
     assert columns is not None
-    np.testing.assert_allclose(summed, sum(columns[name] * p[name] for name in p), rtol=0, atol=1e-12)
-    np.testing.assert_allclose(effect.transduction(a, table, p), summed, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(sum_columns, sum(columns[name] * p[name] for name in p), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(effect.transduction(a, table, p), sum_columns, rtol=0, atol=1e-12)
 
 
 def test_the_sum_of_a_spline_is_that_of_its_columns() -> None:
@@ -150,7 +150,7 @@ def test_the_sum_of_a_spline_is_that_of_its_columns() -> None:
     for count in (found.count, 5):
         coefficients = np.random.default_rng(1).standard_normal(count)
         expected = found(x)[:, :count] @ coefficients
-        np.testing.assert_allclose(found.summed(x, coefficients), expected, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(found.sum_columns(x, coefficients), expected, rtol=0, atol=1e-13)
 
 
 def test_settling_follows_exponentials_of_very_different_time_constants() -> None:

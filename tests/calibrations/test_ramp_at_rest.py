@@ -108,7 +108,7 @@ def test_diagnosis_and_discovery_name_the_same() -> None:
 def test_the_rest_of_a_search_proposes_its_next_effect() -> None:
     data = dataset(ramp(line=5e-4, bow=4e-3))
     plan = data.search(read_model("still"), catalogue())
-    rest = data.followed(plan, 1, catalogue())
+    rest = data.follow_plan(plan, 1, catalogue())
     assert rest.candidates[0].name == rest.names[0] == CURVE
 
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import norm
 
 import calibrations as cal
-from calibrations.free_forms.stairs import before_stairs, find_stairs, fitted_stairs
+from calibrations.free_forms.stairs import before_stairs, find_stairs, fit_stairs
 from calibrations.table import Array, Table
 from tests.calibrations.synthetic import components, turns
 
@@ -45,7 +45,7 @@ def test_stairs_are_found_at_their_height_and_place(step: float, noise: float) -
     found = find_stairs(measured, values, white(values, noise))
     assert found is not None
     assert found.step == pytest.approx(step, rel=1e-3)
-    sharp = fitted_stairs(measured, values, white(values, noise), found)
+    sharp = fit_stairs(measured, values, white(values, noise), found)
     assert abs(sharp.offset / step - np.round(sharp.offset / step)) < 0.05
 
 
@@ -74,7 +74,7 @@ def test_outputs_before_their_rounding_are_within_their_stated_uncertainty() -> 
     measured = table(values, step, noise)
     stairs = find_stairs(measured, values, white(values, noise))
     assert stairs is not None
-    made = before_stairs(measured, white(values, noise), fitted_stairs(measured, values, white(values, noise), stairs))
+    made = before_stairs(measured, white(values, noise), fit_stairs(measured, values, white(values, noise), stairs))
     std = np.stack([made.column(f"{name.removesuffix('_v')}_std_v_of_mean") for name in made.output_names])
     pull = (made.outputs.T - values) / std
     assert np.sqrt(np.mean(pull**2)) < 1.5

@@ -25,7 +25,7 @@ import numpy as np
 
 from calibrations.discovery.fit_doubts import fit_doubts, misfit
 from calibrations.discovery.plausibility import doubt, rejection
-from calibrations.discovery.structure import unexplained_scatter
+from calibrations.discovery.structure import find_unexplained_scatter
 from calibrations.errors import ModelError, UnusableData
 from calibrations.fitting.budget import SLOW_NOISE, Budget, make_budget, parameter_correlation, row_gains
 from calibrations.fitting.fit import Fit, cautiously, evaluate
@@ -119,7 +119,7 @@ def figures(fit: Fit, earlier_model: Model | None, limits: Mapping[str, Limit], 
     Raises ModelError for another kind of table, and where nothing is determined; UnusableData.
     """
     require_reference(fit.table.source, fit.table.kind)
-    if (reason := rejection(fit) or unexplained_scatter(fit) or misfit(fit)) is not None:
+    if (reason := rejection(fit) or find_unexplained_scatter(fit) or misfit(fit)) is not None:
         raise UnusableData(f"{fit.table.source}: no certificate: {reason.verdict}: {reason.text}")
     inputs = input_contributions(fit.table)
     budget = make_budget(fit, inputs)
