@@ -104,7 +104,7 @@ def open_text_file(path: Path, garbled: bool = False) -> Source:
     except (OSError, EOFError, zlib.error) as error:
         fault = "cannot be read as text" if _is_packed(path) else "cannot be read"
         raise DataError(f"{path}: {fault}: {_reason(error)}") from None
-    encoding = _encoding(head, path, MOST_GARBLED if garbled else 0.0)
+    encoding = _detect_encoding(head, path, MOST_GARBLED if garbled else 0.0)
     return Source(
         str(path),
         lambda: io.TextIOWrapper(_bytes(path), encoding=encoding),
@@ -161,7 +161,7 @@ class _Unpacked(gzip.GzipFile):
         return data
 
 
-def _encoding(head: bytes, path: Path, most_garbled: float) -> str:
+def _detect_encoding(head: bytes, path: Path, most_garbled: float) -> str:
     """The encoding by its byte-order mark; else UTF-8, then Excel's cp1252. Raises DataError for binary content.
 
     At most a share `most_garbled` of the bytes may be no text, below the first line.

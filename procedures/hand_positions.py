@@ -78,7 +78,7 @@ def hand_positions(
     while not _suffices(course := analysis.course(rig.measured(), noise, skipped), target_g, most_positions):
         rig.host.expect(max(1, FEWEST - course.count))
         rig.host.guide(_guidance(course, target_g))
-        next_rest = _next_rest(rig, analysis, course, noise, rest_s, wait_s)
+        next_rest = _find_next_rest(rig, analysis, course, noise, rest_s, wait_s)
         if next_rest is None:
             skipped.append(course.words)
             continue
@@ -122,7 +122,7 @@ def _learn_noise(rig: Session, analysis: HandAnalysis, wait_s: float) -> NoiseAt
     )
 
 
-def _next_rest(
+def _find_next_rest(
     rig: Session, analysis: HandAnalysis, course: HandCourse, noise: NoiseAtRest, rest_s: float, wait_s: float
 ) -> RestWindows | None:
     """The next rest at a new position. The first window of a rest is left out: the hand has just let go.

@@ -77,20 +77,20 @@ class Series:
     def likeliest(self, k: int) -> tuple[Array, float]:
         """The most likely `k` exponentials, and their -2 log likelihood averaged over the noise."""
         taus_s, point = self._on_grid(k)
-        p = self._descended(self._start(taus_s, point), point)
-        likelihood = [np.log(prior) - self._scored(p, noise)[0] / 2 for noise, prior in self.points.items()]
+        p = self._descend(self._start(taus_s, point), point)
+        likelihood = [np.log(prior) - self._score(p, noise)[0] / 2 for noise, prior in self.points.items()]
         return _slowest_first(p), -2 * float(np.logaddexp.reduce(likelihood))
 
     def averaged(self, p: Array) -> Exponentials:
         """Parameters from the start `p`, covariance and noise, averaged over the noise by restricted likelihood."""
-        p = self._descended(p, min(self.points, key=lambda point: self._scored(p, point)[1]))
-        restricted = np.array([self._scored(p, point)[1] for point in self.points])
+        p = self._descend(p, min(self.points, key=lambda point: self._score(p, point)[1]))
+        restricted = np.array([self._score(p, point)[1] for point in self.points])
         weight = np.exp((restricted.min() - restricted) / 2) * np.array(list(self.points.values()))
         likely_points = np.flatnonzero(weight > LEAST_LIKELIHOOD * weight.sum())
         likely = [list(self.points)[i] for i in likely_points]
         weight = weight[likely_points] / weight[likely_points].sum()
-        fits = np.array([self._descended(p, point) for point in likely])
-        _, _, covariances, noise = zip(*map(self._scored, fits, likely), strict=True)
+        fits = np.array([self._descend(p, point) for point in likely])
+        _, _, covariances, noise = zip(*map(self._score, fits, likely), strict=True)
         mean = weight @ fits
         covariance = np.einsum("i,ijk->jk", weight, np.array(covariances))
         covariance += np.einsum("i,ij,ik->jk", weight, fits - mean, fits - mean)
@@ -123,7 +123,7 @@ class Series:
         """Logarithms of the time constants on the grid, s: from half of the shortest gap to three records."""
         return np.linspace(np.log(float(self.gap_s[1:].min()) / 2), np.log(3 * float(np.sum(self.gap_s))), TAUS)
 
-    def _whitened(self, columns: Array, point: Point) -> tuple[Array, float]:
+    def _whiten(self, columns: Array, point: Point) -> tuple[Array, float]:
         fast = self.stds if self.known else np.ones(len(self.t_s))
         return correlated(columns, self.gap_s, fast, point[0] * float(rms(fast)), point[1])
 
@@ -143,7 +143,7 @@ class Series:
 
     def _deviances(self, columns: Array, point: Point, column_sets: NDArray[np.intp]) -> Array:
         """-2 log likelihood of each choice of columns, shape (choices,); the last column is the values."""
-        whitened, logdet = self._whitened(columns, point)
+        whitened, logdet = self._whiten(columns, point)
         gram, n = whitened.T @ whitened, len(whitened)
         normal, products = gram[column_sets[:, :, None], column_sets[:, None, :]], gram[column_sets, -1]
         ridge = 1e-10 * gram[0, 0] * np.eye(column_sets.shape[1])
@@ -154,24 +154,26 @@ class Series:
 
     def _start(self, taus_s: tuple[float, ...], point: Point) -> Array:
         columns = [np.ones(len(self.t_s)), *(np.exp(-self.t_s / tau) for tau in taus_s), self.values]
-        whitened, _ = self._whitened(np.column_stack(columns), point)
+        whitened, _ = self._whiten(np.column_stack(columns), point)
         return np.concatenate([np.linalg.lstsq(whitened[:, :-1], whitened[:, -1], rcond=None)[0], np.log(taus_s)])
 
-    def _linearised(self, p: Array, point: Point) -> tuple[Array, Array, float]:
+    def _linearise(self, p: Array, point: Point) -> tuple[Array, Array, float]:
         """Whitened derivatives (n, p) and residual (n,) at `p`, and log det of the noise."""
         columns = np.column_stack([model_derivatives(p, self.t_s), self.values - p[0] - remaining_drift(p, self.t_s)])
-        whitened, logdet = self._whitened(columns, point)
+        whitened, logdet = self._whiten(columns, point)
         return whitened[:, :-1], whitened[:, -1], logdet
 
-    def _descended(self, p: Array, point: Point) -> Array:
+    def _descend(self, p: Array, point: Point) -> Array:
         """The best parameters under the noise of `point` from a start nearby (Levenberg and Marquardt)."""
         damping, k = 1e-3, (len(p) - 1) // 2
-        J, r, _ = self._linearised(p, point)
+        J, r, _ = self._linearise(p, point)
         for _ in range(STEPS):
             normal = J.T @ J
             step = np.linalg.lstsq(normal + damping * np.diag(np.diag(normal)), J.T @ r, rcond=None)[0]
-            step[1 + k :] = self._within(p[1 + k :] + np.clip(step[1 + k :], -LONGEST_STEP, LONGEST_STEP)) - p[1 + k :]
-            trial = self._linearised(p + step, point)
+            step[1 + k :] = (
+                self._clip_to_bounds(p[1 + k :] + np.clip(step[1 + k :], -LONGEST_STEP, LONGEST_STEP)) - p[1 + k :]
+            )
+            trial = self._linearise(p + step, point)
             gain = float(r @ r - trial[1] @ trial[1])
             damping = damping / 10 if gain >= 0 else damping * 10
             if gain >= 0:
@@ -180,9 +182,9 @@ class Series:
                 break
         return p
 
-    def _scored(self, p: Array, point: Point) -> tuple[float, float, Array, float]:
+    def _score(self, p: Array, point: Point) -> tuple[float, float, Array, float]:
         """-2 log likelihood, its restricted form, the covariance of `p`, and the noise of a value; to first order."""
-        J, r, logdet = self._linearised(p, point)
+        J, r, logdet = self._linearise(p, point)
         n, free = len(r), len(r) - len(p)
         inverse = np.linalg.pinv(J.T @ J, hermitian=True)
         square = max(float(r @ r - (J.T @ r) @ inverse @ (J.T @ r)), 0.0)
@@ -199,7 +201,7 @@ class Series:
             float(np.sqrt(part) * fast * np.hypot(1.0, point[0])),
         )
 
-    def _within(self, ln_taus: Array) -> Array:
+    def _clip_to_bounds(self, ln_taus: Array) -> Array:
         return np.clip(ln_taus, self._ln_taus[0], self._ln_taus[-1])
 
 

@@ -122,7 +122,7 @@ class SteadyState:
         it is the record's start, at the latest: rectangular since power-on.
         """
         ln_tolerance = np.log(self.tolerance)
-        value = self._last_beyond(self.parameters, ln_tolerance)
+        value = self._last_time_out_of_tolerance(self.parameters, ln_tolerance)
         too_few = not self.terms and self.freedom + 1 < FEWEST_STEADY_VALUES
         if self.wanders or too_few or value > self.span_s[1]:
             return None
@@ -132,16 +132,16 @@ class SteadyState:
         derivatives = np.array(
             [
                 (
-                    self._last_beyond(self.parameters + d, ln_tolerance)
-                    - self._last_beyond(self.parameters - d, ln_tolerance)
+                    self._last_time_out_of_tolerance(self.parameters + d, ln_tolerance)
+                    - self._last_time_out_of_tolerance(self.parameters - d, ln_tolerance)
                 )
                 / (2 * d.sum())
                 for d in nudges
             ]
         )
         by_noise = (
-            self._last_beyond(self.parameters, ln_tolerance + RELATIVE_STEP)
-            - self._last_beyond(self.parameters, ln_tolerance - RELATIVE_STEP)
+            self._last_time_out_of_tolerance(self.parameters, ln_tolerance + RELATIVE_STEP)
+            - self._last_time_out_of_tolerance(self.parameters, ln_tolerance - RELATIVE_STEP)
         ) / (2 * RELATIVE_STEP)
         return value, float(np.sqrt(derivatives @ self.covariance @ derivatives + by_noise**2 / (2 * self.freedom)))
 
@@ -154,7 +154,7 @@ class SteadyState:
         derivatives = model_derivatives(self.parameters, t_s - self.span_s[0])
         return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", derivatives, self.covariance, derivatives)))
 
-    def _last_beyond(self, p: Array, ln_tolerance: float) -> float:
+    def _last_time_out_of_tolerance(self, p: Array, ln_tolerance: float) -> float:
         """The last time at which the remaining drift exceeds the tolerance, else the start of the record."""
         k, (start, end) = (len(p) - 1) // 2, self.span_s
         if not k:
@@ -301,7 +301,7 @@ class Soak:
             np.abs(np.diff(starts) - step[:-1]) > LONGEST_HOLD_GAP / _rate_hz(self.table)
         )
         means = np.split(self.holds.output(axis), np.flatnonzero(new) + 1)
-        return _pooled(means, float(np.median(step)))
+        return _pool_deviations(means, float(np.median(step)))
 
 
 def analyse_soak(table: Table, oven_c: float = 0.0) -> Soak:
@@ -327,7 +327,7 @@ def analyse_soak(table: Table, oven_c: float = 0.0) -> Soak:
     return Soak(table, gaps, courses)
 
 
-def _pooled(stretches: Sequence[Array], step_s: float) -> tuple[Array, Array]:
+def _pool_deviations(stretches: Sequence[Array], step_s: float) -> tuple[Array, Array]:
     """(times, s; Allan deviations) at 1, 2, 4 ... steps of stretches without gaps; empty where all are too short."""
     longest = max((len(stretch) for stretch in stretches), default=0)
     steps = np.array([2**k for k in range(longest.bit_length()) if 2 * 2**k <= longest], dtype=int)

@@ -54,14 +54,14 @@ def estimate_tumbles(table: Table, axis: str) -> list[Tumble]:
     rows_by_name = {name: np.flatnonzero(paths == name) for name in dict.fromkeys(paths.tolist()) if " " in name}
     if not rows_by_name:
         raise DataError(f"{table.source}: no tumble is complete yet; resume the run")
-    missing = {name: _missing(table, rows) for name, rows in rows_by_name.items()}
+    missing = {name: _find_missing_position(table, rows) for name, rows in rows_by_name.items()}
     if all(missing.values()):
         name, missing_words = next(iter(missing.items()))
         raise DataError(f"{table.source}: no tumble is complete: {name!r} lacks {missing_words}; measure it again")
     return [_tumble(table, axis, name, rows) for name, rows in rows_by_name.items() if not missing[name]]
 
 
-def _missing(table: Table, rows: Rows) -> str:
+def _find_missing_position(table: Table, rows: Rows) -> str:
     """The first missing position of a tumble, "" for a complete one."""
     set_deg = table.column("beta_set_deg" if "beta_set_deg" in table else "beta_deg")
     quarters = np.round(set_deg[rows] / QUARTER_DEG) % 4

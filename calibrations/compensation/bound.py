@@ -103,22 +103,22 @@ def evaluate_interval(
         elif node.constant:
             values[node] = point_interval(np.full(n, node.value)), point_interval(np.zeros((len(variables), *n)))
         elif node.table is not None:
-            values[node] = _tabulated(node.table, values[node.inner[0]])
+            values[node] = _bound_table(node.table, values[node.inner[0]])
         else:
-            values[node] = _applied(node.operation, *(values[inner] for inner in node.inner))
+            values[node] = _bound_function(node.operation, *(values[inner] for inner in node.inner))
     return [values[root] for root in roots]
 
 
 Pair = tuple[Interval, Interval]
 
 
-def _tabulated(table: Table, inner: Pair) -> Pair:
+def _bound_table(table: Table, inner: Pair) -> Pair:
     x, dx = inner
     low, high, least, most = table.bounds(x.low, x.high)
     return _outward(low, high), _outward(least, most) * dx
 
 
-def _applied(name: str, *inner: Pair) -> Pair:
+def _bound_function(name: str, *inner: Pair) -> Pair:
     (x, dx), *more = inner
     match name:
         case "+":
@@ -129,7 +129,7 @@ def _applied(name: str, *inner: Pair) -> Pair:
             return x - y, dx - dy
         case "*":
             ((y, dy),) = more
-            return (_squared(x) if inner[0] is inner[1] else x * y), dx * y + x * dy
+            return (_square(x) if inner[0] is inner[1] else x * y), dx * y + x * dy
         case "/":
             ((y, dy),) = more
             ratio = x / y
@@ -147,16 +147,16 @@ def _applied(name: str, *inner: Pair) -> Pair:
             return value, value * dx
         case "log":
             domain = Interval(np.where(x.low > 0, x.low, np.nan), x.high)
-            return _bounded(domain.monotone("log")), dx / x
+            return _without_nan(domain.monotone("log")), dx / x
         case "sqrt":
             domain = Interval(np.where(x.low >= 0, x.low, np.nan), x.high)
-            value = _bounded(domain.monotone("sqrt"))
+            value = _without_nan(domain.monotone("sqrt"))
             return value, dx / (value + value)
         case "sin":
             return _wave(x), _wave(x, np.pi / 2) * dx
         case "cos":
             return _wave(x, np.pi / 2), -_wave(x) * dx
-    return _stepped(name, inner)
+    return _bound_step(name, inner)
 
 
 def _outward(low: Array, high: Array) -> Interval:
@@ -169,7 +169,7 @@ def _next(value: Array, towards: float) -> Array:
     return np.where(value == 0, value, np.nextafter(value, towards))
 
 
-def _squared(x: Interval) -> Interval:
+def _square(x: Interval) -> Interval:
     ends = np.array([x.low**2, x.high**2])
     return _outward(np.where((x.low <= 0) & (x.high >= 0), 0.0, ends.min(axis=0)), ends.max(axis=0))
 
@@ -208,7 +208,7 @@ def _choose(condition: Pair, yes: Pair, no: Pair) -> Pair:
     return value, Interval(np.where(jumps, -np.inf, slopes.low), np.where(jumps, np.inf, slopes.high))
 
 
-def _stepped(name: str, inner: tuple[Pair, ...]) -> Pair:
+def _bound_step(name: str, inner: tuple[Pair, ...]) -> Pair:
     """Comparisons and signs: flat, with a jump where the variables decide."""
     (x, dx), (y, dy) = (
         inner
@@ -238,7 +238,7 @@ def _wave(x: Interval, phase: float = 0.0) -> Interval:
     return Interval(np.where(turns[-1], -1.0, wide.low - 1e-15), np.where(turns[1], 1.0, wide.high + 1e-15))
 
 
-def _bounded(x: Interval) -> Interval:
+def _without_nan(x: Interval) -> Interval:
     """Unbounded where there is no number."""
     is_undefined = np.isnan(x.low) | np.isnan(x.high)
     return Interval(np.where(is_undefined, -np.inf, x.low), np.where(is_undefined, np.inf, x.high))

@@ -61,7 +61,7 @@ def result_uncertainty(
     if not any(e.std and e.identified for e in model.params.values()):
         return None
     inputs = {name: span for name, span in spans.items() if name not in FORCES}
-    covered = {name: _found_in(name, span, model) for name, span in inputs.items()}
+    covered = {name: _measured_span(name, span, model) for name, span in inputs.items()}
     far = reach * a / np.abs(a).max(axis=1, keepdims=True)
     stds = np.concatenate([_stds(model, forward, table, a, point) for point in _corners(covered)])
     point, largest = _largest(lambda place: _stds(model, forward, table, far, place), inputs)
@@ -69,7 +69,7 @@ def result_uncertainty(
     return Uncertainty(covered, rms, float(stds.max()), max(largest, float(stds.max())), point)
 
 
-def _found_in(name: str, stated_span: Span, model: Model) -> Span:
+def _measured_span(name: str, stated_span: Span, model: Model) -> Span:
     """The range of an input during the measurement of the parameters, limited to the stated range.
 
     The range that the data covered, by the model file, or its reference; the whole range if neither is known.
@@ -117,7 +117,7 @@ def _stds(model: Model, forward: Forward, table: Table, a: Array, inputs: Inputs
     h = 1e-5
     J = np.stack([(output(model, a + h * e) - output(model, a - h * e)) / (2 * h) for e in np.eye(3)[k]], axis=2)
     inverse, estimates = np.linalg.inv(J), {key: e for key, e in model.params.items() if e.std and e.identified}
-    sides = [(output(up, a), output(down, a)) for up, down in _perturbed_models(model)]
+    sides = [(output(up, a), output(down, a)) for up, down in _perturb_models(model)]
     changes = np.stack([np.einsum("nij,nj->ni", inverse, up - down) for up, down in sides]) / (2 * PARAMETER_STEP)
     mixed = (
         changes if model.correlations is None else np.tensordot(model.correlations.among(list(estimates)), changes, 1)
@@ -125,7 +125,7 @@ def _stds(model: Model, forward: Forward, table: Table, a: Array, inputs: Inputs
     return np.asarray(np.sqrt(np.maximum(np.sum(changes * mixed, axis=0), 0.0)))
 
 
-def _perturbed_models(model: Model) -> Sequence[tuple[Model, Model]]:
+def _perturb_models(model: Model) -> Sequence[tuple[Model, Model]]:
     """The model with each known parameter moved a little, up and down; in the order of `params`."""
     return [
         (_with(model, i, j, PARAMETER_STEP * e.std), _with(model, i, j, -PARAMETER_STEP * e.std))
@@ -219,7 +219,7 @@ def compensation_costs(
     reduced = replace(model, terms=tuple(term for term in model.terms if term.name in names))
     needs_gravity = unit == "g" and len(forward.axes) == 2 and "az" in program.inputs
     return Cost(
-        {name: _of_left_out(name, model, followed, trial) for name in forward.left_out},
+        {name: _error_of_excluded_effect(name, model, followed, trial) for name in forward.left_out},
         _of_gravity(followed, trial) if needs_gravity else None,
         result_uncertainty(
             reduced, forward, table, a, {name: spans[name] for name in program.inputs if name in spans}, reach
@@ -289,7 +289,7 @@ def _size(errors: Array) -> ErrorSize:
     return ErrorSize(float(np.sqrt(np.mean(errors**2, axis=0)).max()), float(np.abs(errors).max()))
 
 
-def _of_left_out(name: str, model: Model, followed: Sequence[Step], trial: _Trial) -> ErrorSize | None:
+def _error_of_excluded_effect(name: str, model: Model, followed: Sequence[Step], trial: _Trial) -> ErrorSize | None:
     """By the whole model with this effect, compensated without it."""
     steps = [s for s in steps_of(model) if s[0].name == name or any(s[0] is step[0] for step in followed)]
     try:

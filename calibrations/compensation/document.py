@@ -65,7 +65,7 @@ def header_lines(compensation: Compensation, origin: Origin) -> list[str]:
         _uncertainty(compensation),
         _parameters(compensation),
     ]
-    return [line for section in sections for line in [*(w for text in section for w in _wrapped(text)), ""]][:-1]
+    return [line for section in sections for line in [*(w for text in section for w in _wrap(text)), ""]][:-1]
 
 
 def error_text(value: float, unit: str) -> str:
@@ -98,7 +98,7 @@ def operations_text(compensation: Compensation) -> str:
     return f"{', '.join(f'{n} {kind}' for kind, n in count.items())}: {sum(count.values())} a sample"
 
 
-def _wrapped(text: str) -> list[str]:
+def _wrap(text: str) -> list[str]:
     indent = " " * (len(text) - len(text.lstrip()))
     return wrap(
         text.strip(), WIDTH, initial_indent=indent, subsequent_indent=indent + "  ", break_on_hyphens=False
@@ -107,7 +107,8 @@ def _wrapped(text: str) -> list[str]:
 
 def _program_lines(compensation: Compensation, origin: Origin) -> Iterator[str]:
     model = compensation.model
-    yield f"{origin.name}: from outputs to {_sensed(compensation)} along the reference axes, by the model {model.name}."
+    inputs = _input_text(compensation)
+    yield f"{origin.name}: from outputs to {inputs} along the reference axes, by the model {model.name}."
     yield f"  in {UNIT_TEXT[compensation.unit]}"
     yield f"  model file  {origin.model_file}, SHA-256 {origin.sha256}"
     for key, title in PROVENANCE_TITLES.items():
@@ -116,7 +117,7 @@ def _program_lines(compensation: Compensation, origin: Origin) -> Iterator[str]:
     yield f"  written by {origin.program} on {origin.date}"
 
 
-def _sensed(compensation: Compensation) -> str:
+def _input_text(compensation: Compensation) -> str:
     return {
         "g": "specific force",
         "field": "the magnetic field",

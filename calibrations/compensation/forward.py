@@ -134,7 +134,7 @@ def trace_model(model: Model, without: Collection[str] = ()) -> Forward:
     inverted = [step for step, fate in zip(steps, fates, strict=True) if fate.how == INVERTED]
     traced, memories = _outputs(inverted, table)
     outputs = tuple(traced.nodes[0, : len(axes)])
-    return Forward(model, axes, outputs, tuple(fates), _used(outputs, memories))
+    return Forward(model, axes, outputs, tuple(fates), _select_used_values(outputs, memories))
 
 
 def _values(term: Term) -> Values:
@@ -168,7 +168,7 @@ def _fate(step: Step, table: RunTime, without: Collection[str]) -> Fate:
     return Fate(effect.name, INVERTED)
 
 
-def _used(outputs: Sequence[Node], memories: Mapping[str, Node]) -> dict[str, Node]:
+def _select_used_values(outputs: Sequence[Node], memories: Mapping[str, Node]) -> dict[str, Node]:
     """The stored values that the outputs use, directly or through other stored values."""
     stored: dict[str, Node] = {}
     while new := {name for name in variable_names([*outputs, *stored.values()]) if name in memories} - stored.keys():

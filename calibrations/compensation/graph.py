@@ -31,7 +31,7 @@ class Operation:
     counts_as: str
 
 
-def _compared(sign: str, apply: Callable[..., Any]) -> Operation:
+def _comparison(sign: str, apply: Callable[..., Any]) -> Operation:
     text = f"({{0}} {sign} {{1}} ? 1 : 0)"
     return Operation(
         lambda a, b: np.where(apply(a, b), 1.0, 0.0), text, f"(1.0 if {{0}} {sign} {{1}} else 0.0)", "compare"
@@ -61,12 +61,12 @@ OPERATIONS: Mapping[str, Operation] = {
     "log": _function("log", np.log),
     "sin": _function("sin", np.sin),
     "cos": _function("cos", np.cos),
-    "<": _compared("<", np.less),
-    "<=": _compared("<=", np.less_equal),
-    ">": _compared(">", np.greater),
-    ">=": _compared(">=", np.greater_equal),
-    "==": _compared("==", np.equal),
-    "!=": _compared("!=", np.not_equal),
+    "<": _comparison("<", np.less),
+    "<=": _comparison("<=", np.less_equal),
+    ">": _comparison(">", np.greater),
+    ">=": _comparison(">=", np.greater_equal),
+    "==": _comparison("==", np.equal),
+    "!=": _comparison("!=", np.not_equal),
     "table": Operation(lambda x, table: table(x), "{1}({0})", "{1}({0})", "table"),  # {1}: the table's name
 }  # fmt: skip
 
@@ -149,7 +149,7 @@ def apply_operation(operation: str, *inner: Node) -> Node:
     if all(node.constant for node in inner):
         with np.errstate(all="ignore"):
             return number(float(OPERATIONS[operation].apply(*(node.value for node in inner))))
-    return _shortened(operation, inner) or _make_node(operation, inner)
+    return _simplify(operation, inner) or _make_node(operation, inner)
 
 
 @lru_cache(MANY)
@@ -208,7 +208,7 @@ def _make_node(operation: str, inner: tuple[Node, ...]) -> Node:
     return Node(operation, inner)
 
 
-def _shortened(operation: str, inner: tuple[Node, ...]) -> Node | None:
+def _simplify(operation: str, inner: tuple[Node, ...]) -> Node | None:
     """The simplified node; None where the operation is needed."""
     match operation, inner:
         case ("+", (left, right)) if right is ZERO:

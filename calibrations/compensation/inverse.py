@@ -114,7 +114,7 @@ def invert_model(
     forward = trace_model(model, without)
     bound = _bound(forward, input_range, precision)
     if bound is None:
-        raise ModelError(_why_not(model, input_range, without, precision, unit))
+        raise ModelError(_explain_missing_inverse(model, input_range, without, precision, unit))
     program = write_program(forward, bound)
     return Compensation(
         model,
@@ -136,7 +136,9 @@ def _bound(forward: Forward, input_range: Range, precision: str) -> Bound | None
     return prove_bound(forward.outputs, forward.sought, input_range.reach, inputs, want, tuple(forward.memory))
 
 
-def _why_not(model: Model, input_range: Range, without: Collection[str], precision: str, unit: str) -> str:
+def _explain_missing_inverse(
+    model: Model, input_range: Range, without: Collection[str], precision: str, unit: str
+) -> str:
     """The message for a model without a provable inverse; it names a single effect that prevents it."""
     inverted = [fate.effect for fate in trace_model(model, without).fates if fate.how == INVERTED]
     guilty = [n for n in inverted if _bound(trace_model(model, [*without, n]), input_range, precision) is not None]
@@ -203,7 +205,7 @@ def compensated_residual(compensation: Compensation, table: Table) -> Residual:
     table = table.in_order()
     rigs = {fate.effect for fate in compensation.forward.fates if fate.how == OF_THE_RIG}
     a = force(table, [step for step in steps_of(compensation.model) if step[0].name in rigs])
-    result = _compensated(compensation, table, a)
+    result = _compensate(compensation, table, a)
     axes = tuple(axis for axis in compensation.forward.axes if axis in table.axes)
     true = np.column_stack([a[:, AXES.index(axis)] for axis in axes])
     linear = fit(read_model(LINEAR_MODEL), replace(table, source=LINEAR_MODEL)).model
@@ -227,7 +229,7 @@ def _input(name: str, table: Table) -> Array:
     return table.output(name[1]) if name[0] == "v" else table.column(name)
 
 
-def _compensated(compensation: Compensation, table: Table, a: Array) -> dict[str, Array]:
+def _compensate(compensation: Compensation, table: Table, a: Array) -> dict[str, Array]:
     """The program's output; an axis without measurement follows from gravity and the side that is up."""
     program = compensation.program
     inputs = {name: _input(name, table) for name in program.inputs if name not in FORCES}

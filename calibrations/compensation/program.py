@@ -74,7 +74,7 @@ def write_program(forward: Forward, bound: Bound) -> Program:
     outputs = tuple(f"v{axis}" for axis in forward.axes)
     nexts, later = _next(forward, bound, outputs), list(forward.memory.values())
     nodes = sort_nodes([*nexts, *later])
-    iterated = _following(nodes, set(forward.sought))
+    iterated = _find_dependent_nodes(nodes, set(forward.sought))
     own_names = {*forward.sought, *outputs, *forward.memory}
     used = [node.name for node in nodes if node.operation == "given" and node.name not in own_names]
     names = _Names()
@@ -135,7 +135,7 @@ def _next(forward: Forward, bound: Bound, outputs: tuple[str, ...]) -> list[Node
     return nexts
 
 
-def _following(nodes: list[Node], sought: set[str]) -> set[Node]:
+def _find_dependent_nodes(nodes: list[Node], sought: set[str]) -> set[Node]:
     """The nodes that depend on the sought values."""
     dependent: set[Node] = set()
     for node in nodes:

@@ -38,7 +38,7 @@ def c_files(compensation: Compensation, origin: Origin, checks: ReferenceVectors
 
     templates = _templates(literal, expression, comment)
     templates.filters["operand"] = operand
-    templates.tests["used_after"] = lambda output: _used_after(output, compensation.program)
+    templates.tests["used_after"] = lambda output: _is_used_later(output, compensation.program)
     values = _values(compensation, origin, checks) | {
         "suffix": suffix,
         "memory": f", {name}_memory *memory" if compensation.program.remembered else "",
@@ -95,6 +95,6 @@ def _values(compensation: Compensation, origin: Origin, checks: ReferenceVectors
     }
 
 
-def _used_after(output: str, program: Program) -> bool:
+def _is_used_later(output: str, program: Program) -> bool:
     """Whether stored values depend on an output: compilers warn of unused variables."""
     return any(output in line.inner for line in program.after) or output in program.remembered.values()

@@ -114,7 +114,7 @@ def _part(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, k: i
     basis = form.basis(k)
     if isinstance(basis, Products):
         products = [prod(map(power, a, powers), start=ONE) for powers in basis.powers]
-        f = _weighted(u, products)
+        f = _weighted_sum(u, products)
     else:
         x = _driver(form, a, v, table, k)
         if isinstance(basis, Spline):
@@ -124,10 +124,10 @@ def _part(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, k: i
             slope = float(np.sum(u)) / half
             f = number(slope) * x + number(-slope * (basis.low + basis.high) / 2)
         elif isinstance(basis, Ramp):
-            f = _weighted(u, [ONE, abs(x), x])
+            f = _weighted_sum(u, [ONE, abs(x), x])
         elif isinstance(basis, Clips):
             clips = [x.clipped(number(-width), number(width)) for width in basis.widths]
-            f = _weighted([c / width for c, width in zip(u, basis.widths, strict=False)], clips)
+            f = _weighted_sum([c / width for c, width in zip(u, basis.widths, strict=False)], clips)
         else:
             raise NotTraced(f"its basis {basis.kind} cannot be written as code")
     if form.factor == "force":
@@ -153,6 +153,6 @@ def _driver(form: Form, a: Sequence[Node], v: Node, table: RunTime, k: int) -> N
     raise NotTraced(f"the {form.driver} is not known at run time")
 
 
-def _weighted(weights: Iterable[float], nodes: Sequence[Node]) -> Node:
+def _weighted_sum(weights: Iterable[float], nodes: Sequence[Node]) -> Node:
     """The sum of the nodes times their weights; nodes without a weight stay out."""
     return sum((number(float(weight)) * node for weight, node in zip(weights, nodes, strict=False)), start=ZERO)

@@ -208,13 +208,13 @@ def trace_expression(effect: Effect, a: Traced, table: RunTime, p: Values) -> Tr
     contribution = as_nodes(np.zeros((1, 3)))
     for k in target_axes:
         parameters = {q.name: p[q.name][k] if q.per_axis else p[q.name] for q in effect.parameters}
-        contribution[0, k] = as_nodes(_walked(expression.root, {**columns, **forces, **parameters}))[()]
+        contribution[0, k] = as_nodes(_evaluate(expression.root, {**columns, **forces, **parameters}))[()]
     return as_traced(Traced(contribution))
 
 
-def _walked(node: ExpressionNode, values: Mapping[str, Any]) -> Any:
+def _evaluate(node: ExpressionNode, values: Mapping[str, Any]) -> Any:
     if isinstance(node, Name):
         return values[node.name]
     if isinstance(node, Apply):
-        return AS_NUMPY[node.operation.name](*(_walked(inner, values) for inner in node.inner))
+        return AS_NUMPY[node.operation.name](*(_evaluate(inner, values) for inner in node.inner))
     return node.value

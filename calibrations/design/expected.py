@@ -148,7 +148,7 @@ def assume_sensor(
 
     Its residual is 0. Temperature and supply do not change. Raises ModelError and TooFewRows as a fit does.
     """
-    table = _sensed(model, columns, constants, axes)
+    table = _expect_outputs(model, columns, constants, axes)
     problem = Problem.of(model, table)
     theta = _values(problem.layout)
     noise = white_only(problem.white, problem.gap_s, len(problem.channels))
@@ -156,7 +156,7 @@ def assume_sensor(
     return Fit(problem.layout.model, problem, theta, noise, zero_residual, problem.jacobian(theta))
 
 
-def _sensed(
+def _expect_outputs(
     model: Model, columns: Mapping[str, Array], constants: Mapping[str, Constant], axes: Sequence[str]
 ) -> Table:
     """A table of the poses, with outputs of 1 V/g."""

@@ -144,7 +144,7 @@ def exchange_design(rows: Array, poses: int, criterion: Criterion) -> Chosen:
     The same arguments give the same design.
     """
     rng = np.random.default_rng(0)
-    designs = [_improved(rows, rng.integers(0, len(rows), poses), criterion, rng) for _ in range(STARTS)]
+    designs = [_improve(rows, rng.integers(0, len(rows), poses), criterion, rng) for _ in range(STARTS)]
     return min(designs, key=lambda design: criterion.loss(_covariance(rows[design])))
 
 
@@ -175,7 +175,7 @@ def farthest_poses(places: Array, design: Chosen, count: int) -> Chosen:
     return np.array(farthest, dtype=np.intp)
 
 
-def _improved(rows: Array, design: Chosen, criterion: Criterion, rng: np.random.Generator) -> Chosen:
+def _improve(rows: Array, design: Chosen, criterion: Criterion, rng: np.random.Generator) -> Chosen:
     """Exchange pose by pose until a whole pass changes nothing. Among equals the first of a random order is taken."""
     shuffled = rng.permutation(len(rows))
     for _ in range(MOST_PASSES):

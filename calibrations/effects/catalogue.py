@@ -236,10 +236,10 @@ def guarded(hook: Callable[..., Any], path: Path, name: str = "") -> Callable[..
 
 def _check(result: Any, argument: np.ndarray, label: str) -> None:
     if np.shape(result) != argument.shape:
-        raise ModelError(f"{label} must give an array of shape {argument.shape}, and gave {_described(result)}")
+        raise ModelError(f"{label} must give an array of shape {argument.shape}, and gave {_describe(result)}")
     if not np.isfinite(result).all():
         raise ModelError(f"{label} gave numbers that are not finite; check its divisions and roots")
 
 
-def _described(result: Any) -> str:
+def _describe(result: Any) -> str:
     return f"shape {np.shape(result)}" if isinstance(result, np.ndarray) else f"a {type(result).__name__}"

@@ -144,7 +144,7 @@ def evaluate(node: Node, values: Mapping[str, Array]) -> Array:
     Too large numbers are cut off, so that a fit can turn back; what is no number, such as log(-1), stays none.
     """
     with np.errstate(all="ignore"):
-        return np.asarray(_walked(node, values), dtype=np.float64)
+        return np.asarray(_evaluate(node, values), dtype=np.float64)
 
 
 def may_be_column(name: str) -> bool:
@@ -171,12 +171,12 @@ def forces(a: Array) -> dict[str, Array]:
     return dict(zip(FORCES, a.T, strict=True))
 
 
-def _walked(node: Node, values: Mapping[str, Array]) -> Array | float:
+def _evaluate(node: Node, values: Mapping[str, Array]) -> Array | float:
     if isinstance(node, Number):
         return node.value
     if isinstance(node, Name):
         return values[node.name]
-    return node.operation.apply(*[_walked(inner, values) for inner in node.inner])
+    return node.operation.apply(*[_evaluate(inner, values) for inner in node.inner])
 
 
 def _statement(text: str) -> tuple[str, ast.expr]:

@@ -76,14 +76,14 @@ def _without_scatter(table: Table, name: str, power: int) -> tuple[Array, float,
     """
     readings = table.column(name)
     if name in table.std_names and np.all(readings > 0):
-        exponent, error, change = _smoothed(power * np.log(readings))
+        exponent, error, change = _smooth(power * np.log(readings))
         values = np.exp(exponent)
         size = float(np.sqrt(np.mean(values**2)))
         return values, error * size, change * size
-    return _smoothed(readings**power)
+    return _smooth(readings**power)
 
 
-def _smoothed(logged: Array) -> tuple[Array, float, float]:
+def _smooth(logged: Array) -> tuple[Array, float, float]:
     """The level of readings (n,), its rms error and that of its change from row to row.
 
     The straight line is taken off first: the cosine transform continues a record as its mirror image, and the line
@@ -127,7 +127,7 @@ def leading_temperature(table: Table, lead_s: float) -> Array:
     if "t_s" not in table or not np.ptp(table.time_s) > 0:
         return logged
     temperature, t = level(table, "temperature_c"), table.time_s
-    return temperature + lead_s * _rate(temperature, t) if lead_s >= 0 else _lagging(temperature, t, -lead_s)
+    return temperature + lead_s * _rate(temperature, t) if lead_s >= 0 else _lag(temperature, t, -lead_s)
 
 
 def _rate(x: Array, t: Array) -> Array:
@@ -139,7 +139,7 @@ def _rate(x: Array, t: Array) -> Array:
     return np.asarray(np.gradient(mean, times)[row])
 
 
-def _lagging(x: Array, t: Array, time_constant_s: float) -> Array:
+def _lag(x: Array, t: Array, time_constant_s: float) -> Array:
     """x behind a first-order lag, (n,), settled at the first row; straight between the rows."""
     step = np.diff(t)
     memory = np.exp(-step / time_constant_s)

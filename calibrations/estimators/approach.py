@@ -124,7 +124,7 @@ class Bank:
         noise = (std**2 + self.scatter**2)[:, None, None]
         corrected = correct(predicted.belief, np.array([value]), matrix, noise)
         weighed = replace(predicted, belief=corrected.belief, log_weight=self.log_weight + corrected.log_likelihood)
-        return weighed._pruned(self.nis + float(weighed.weight @ corrected.nis))
+        return weighed._prune(self.nis + float(weighed.weight @ corrected.nis))
 
     def drawn(self, n: int, seed: int = 0) -> Array:
         """States that may be the true one, up to SLOW: shape (n, SLOW). The same bank gives the same."""
@@ -136,7 +136,7 @@ class Bank:
         deviations = roots[member] @ random.standard_normal((n, SLOW, 1))
         return np.asarray(self.belief.mean[draws, :SLOW] + deviations[:, :, 0])
 
-    def _pruned(self, nis: float) -> Bank:
+    def _prune(self, nis: float) -> Bank:
         likely = self.weight > LEAST_WEIGHT
         belief = Belief(self.belief.mean[likely], self.belief.covariance[likely])
         members = {name: getattr(self, name)[likely] for name in ("slow", "scatter", "walk", "room", "log_weight")}

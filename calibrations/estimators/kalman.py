@@ -48,22 +48,22 @@ class Correction:
 
 def predict(belief: Belief, transition: Array, noise: Array) -> Belief:
     """One step on: A `transition`, Q `noise`, both (..., n, n)."""
-    covariance = transition @ belief.covariance @ _turned(transition) + noise
-    return Belief((transition @ belief.mean[..., None])[..., 0], (covariance + _turned(covariance)) / 2)
+    covariance = transition @ belief.covariance @ _transpose(transition) + noise
+    return Belief((transition @ belief.mean[..., None])[..., 0], (covariance + _transpose(covariance)) / 2)
 
 
 def correct(belief: Belief, measured: Array, matrix: Array, noise: Array) -> Correction:
     """After `measured` (..., m) = H x + v: H `matrix` (..., m, n), R `noise` (..., m, m)."""
     innovation = measured - (matrix @ belief.mean[..., None])[..., 0]
-    cross = belief.covariance @ _turned(matrix)
+    cross = belief.covariance @ _transpose(matrix)
     covariance = matrix @ cross + noise
-    gain = _turned(np.asarray(np.linalg.solve(covariance, _turned(cross))))
+    gain = _transpose(np.asarray(np.linalg.solve(covariance, _transpose(cross))))
     correction = np.eye(belief.mean.shape[-1]) - gain @ matrix
-    joseph = correction @ belief.covariance @ _turned(correction) + gain @ noise @ _turned(gain)
+    joseph = correction @ belief.covariance @ _transpose(correction) + gain @ noise @ _transpose(gain)
     mean = belief.mean + (gain @ innovation[..., None])[..., 0]
-    return Correction(Belief(mean, (joseph + _turned(joseph)) / 2), innovation, covariance)
+    return Correction(Belief(mean, (joseph + _transpose(joseph)) / 2), innovation, covariance)
 
 
-def _turned(matrix: Array) -> Array:
+def _transpose(matrix: Array) -> Array:
     """Transposed."""
     return np.swapaxes(matrix, -1, -2)

@@ -106,16 +106,16 @@ def fit_form(outputs: Outputs, kind: str, degree: int = 0, t0: float | None = No
     t0, degree = (low + high) / 2 if t0 is None else t0, degree if low < high else 0
     powers = _powers(outputs, degree, t0)
     if kind == OFFSETS:
-        return LinearForm(kind, np.eye(3), _solved(powers, outputs.x - outputs.a), t0)
+        return LinearForm(kind, np.eye(3), _solve(powers, outputs.x - outputs.a), t0)
     if kind == DIAGONAL:
-        rows = [_solved(np.column_stack([outputs.x[:, i], -powers]), outputs.a[:, i]) for i in range(3)]
+        rows = [_solve(np.column_stack([outputs.x[:, i], -powers]), outputs.a[:, i]) for i in range(3)]
         scales = np.array([row[0] for row in rows])
         return LinearForm(kind, np.diag(scales), np.column_stack([row[1:] / row[0] for row in rows]), t0)
-    solution = _solved(np.column_stack([outputs.x, -powers]), outputs.a)
+    solution = _solve(np.column_stack([outputs.x, -powers]), outputs.a)
     matrix = solution[:3].T
     if kind == SYMMETRIC:
         matrix = (matrix + matrix.T) / 2
-    offsets = _solved(powers, outputs.x - np.linalg.solve(matrix, outputs.a.T).T)
+    offsets = _solve(powers, outputs.x - np.linalg.solve(matrix, outputs.a.T).T)
     return LinearForm(kind, matrix, offsets, t0)
 
 
@@ -137,7 +137,7 @@ def losses(form: LinearForm, outputs: Outputs) -> Iterator[Loss]:
         for i in range(3):
             form_columns = {OFFSETS: [], DIAGONAL: [outputs.a[:, i]]}.get(form.kind, [*outputs.a.T])
             basis = np.column_stack([*form_columns, powers])
-            remaining[:, i] -= basis @ _solved(basis, remaining[:, i])
+            remaining[:, i] -= basis @ _solve(basis, remaining[:, i])
         rms, most = _size(remaining / outputs.per)
         if most > NEGLIGIBLE * np.abs(simulated.a).max():
             result.append(Loss(name, CANNOT[form.kind], rms, most, simulated.unit))
@@ -170,7 +170,7 @@ def _powers(outputs: Outputs, degree: int, t0: float) -> Array:
     return np.column_stack([d**k for k in range(degree + 1)])
 
 
-def _solved(basis: Array, values: Array) -> Array:
+def _solve(basis: Array, values: Array) -> Array:
     """Least squares with columns of like size."""
     sizes = np.maximum(np.abs(basis).max(axis=0), 1e-300)
     solution = np.linalg.lstsq(basis / sizes, values, rcond=None)[0]

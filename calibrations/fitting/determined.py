@@ -54,7 +54,7 @@ def undetermined(fit: Fit) -> str | None:
     if variance <= MOST_UNCERTAIN:
         return None
     if lone.any() and not lone.all() and unseen_variance(leverage[~lone]) <= MOST_UNCERTAIN:
-        return _unchecked(fit, lone)
+        return _warn_of_unchecked_rows(fit, lone)
     rows = "positions" if fit.table.type.magnitude else "rows"
     times = f"{np.sqrt(variance):.1f}" if variance < 1e4 else "many"
     return (
@@ -63,7 +63,7 @@ def undetermined(fit: Fit) -> str | None:
     )
 
 
-def _unchecked(fit: Fit, lone: NDArray[np.bool_]) -> str:
+def _warn_of_unchecked_rows(fit: Fit, lone: NDArray[np.bool_]) -> str:
     """That some rows, `lone` in shape (channels, n), have parameters to themselves."""
     rows = np.flatnonzero(lone.any(axis=0))
     paths = fit.table.labels.get("path")

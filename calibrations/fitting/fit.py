@@ -338,7 +338,7 @@ def _wider(cautious: Fit) -> Array:
 def _wider_by_noise(cautious: Fit) -> Array:
     """Factors by the slow noise that the rows allow, or by their number."""
     if not cautious.problem.averages:
-        return _by_few_rows(cautious)
+        return _student_factors(cautious)
     layout = cautious.problem.layout
     wider, free = np.ones(len(cautious.theta)), ~np.isfinite(layout.prior)
     jacobian = _free(cautious.problem, cautious.jacobian)
@@ -355,7 +355,7 @@ def _wider_by_noise(cautious: Fit) -> Array:
     return wider
 
 
-def _by_few_rows(fit: Fit) -> Array:
+def _student_factors(fit: Fit) -> Array:
     """Factors on the standard uncertainties: what Student's t spreads beyond a normal distribution.
 
     Each parameter has the degrees of freedom of its channels' noise, weighted by what each channel tells of it.

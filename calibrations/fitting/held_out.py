@@ -60,7 +60,7 @@ def held_out(
         rows = fold == k
         part = white[:, rows].reshape(-1, p + 1)
         G = total - part.T @ part
-        change = _bounded(G[:p, :p] + ridge, G[:p, p] + pulled, low, high)
+        change = _solve_within_bounds(G[:p, :p] + ridge, G[:p, p] + pulled, low, high)
         error[:, rows] = residual[:, rows] - J[:, rows] @ change
     return float(np.sqrt(np.mean((rms(error) / noise.floor) ** 2)))
 
@@ -77,7 +77,7 @@ def parameters_of_rows(columns: Array, prior: Array) -> float:
     return float(np.trace(np.linalg.solve(products + np.diag(precision + RIDGE), products)))
 
 
-def _bounded(products: Array, side: Array, low: Array, high: Array) -> Array:
+def _solve_within_bounds(products: Array, side: Array, low: Array, high: Array) -> Array:
     """The least-squares change (p,) within its bounds: an entry beyond its bound stays there, the others follow."""
     change = np.linalg.solve(products, side)
     free = np.ones(len(side), dtype=bool)

@@ -72,7 +72,7 @@ def column_derivative(name: str, step: float) -> Derivative:
     """With respect to a column of the table, by central differences."""
 
     def derivative(problem: Problem, theta: Array) -> Array:
-        forward, backward = (_shifted(problem, name, change).residual(theta) for change in (step, -step))
+        forward, backward = (_shift_input(problem, name, change).residual(theta) for change in (step, -step))
         return (forward - backward) / (2 * step)
 
     return derivative
@@ -133,7 +133,7 @@ def _rate_derivative(problem: Problem, theta: Array) -> Array:
     """With respect to the share by which the stage turns faster than it says."""
     share = 1e-4
     change = share * problem.table.column("rate_deg_s")
-    forward, backward = (_shifted(problem, "rate_deg_s", by).residual(theta) for by in (change, -change))
+    forward, backward = (_shift_input(problem, "rate_deg_s", by).residual(theta) for by in (change, -change))
     return (forward - backward) / (2 * share)
 
 
@@ -155,7 +155,7 @@ def _common(source: str, unit: str, derivative: Derivative) -> Contribution:
     return Contribution(source, unit, None, derivative, one_error)
 
 
-def _shifted(problem: Problem, name: str, change: float | Array) -> Problem:
+def _shift_input(problem: Problem, name: str, change: float | Array) -> Problem:
     columns = {**problem.table.columns, name: problem.table.column(name) + change}
     return replace(problem, table=replace(problem.table, columns=MappingProxyType(columns)))
 

@@ -54,18 +54,18 @@ def calibration_matrices(fit: Fit) -> CalibrationMatrices | None:
     """The matrices of a fitted model; None without three axes, and for a motion."""
     if len(fit.table.axes) < 3 or fit.table.type.moving:
         return None
-    M, S, b = _parts(_stacked(fit, fit.theta))
+    M, S, b = _parts(_stack(fit, fit.theta))
     if not np.isfinite(M).all() or not np.isfinite(S).all():
         return None
     typical = STEP * fit.problem.layout.typical
-    forward, backward = ([_stacked(fit, fit.theta + side * step) for step in np.diag(typical)] for side in (1, -1))
+    forward, backward = ([_stack(fit, fit.theta + side * step) for step in np.diag(typical)] for side in (1, -1))
     slopes = (np.array(forward) - np.array(backward)) / (2 * typical[:, None])
     deviations = _parts(_deviation(slopes, _covariance(fit)))
     nonlinear_effects = tuple(name for name in fit.model.effects if name not in LINEAR_EFFECTS)
     return CalibrationMatrices(M, S, b, *deviations, fit.table.input_unit, nonlinear_effects)
 
 
-def _stacked(fit: Fit, theta: Array) -> Array:
+def _stack(fit: Fit, theta: Array) -> Array:
     """M, S and b of the linear effects with the values `theta`, one after another, shape (15,)."""
     steps = [step for step in fit.problem.layout.steps(theta) if step[0].name in LINEAR_EFFECTS]
     axes = sensed(np.eye(3), fit.table, steps).T

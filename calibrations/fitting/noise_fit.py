@@ -217,15 +217,15 @@ class NoiseSearch:
         channels, n = self.residual.shape
         fast = self.noise.fast[:, :, None]
         Q = [np.linalg.qr(self.smooth / fast[c])[0] for c in range(channels)]
-        first = self._freed(self.groups[0], Q, np.zeros((channels * n, 0)))
-        additions = [self._freed(group, Q, first) for group in self.groups[1:]]
+        first = self._extend_basis(self.groups[0], Q, np.zeros((channels * n, 0)))
+        additions = [self._extend_basis(group, Q, first) for group in self.groups[1:]]
         origin = np.repeat(
             np.arange(len(self.groups)), [first.shape[1], *(addition.shape[1] for addition in additions)]
         )
         columns = np.hstack([first, *additions]).reshape(channels, n, -1)
         return columns * fast, tuple(origin.tolist())
 
-    def _freed(self, group: Array, smooth: list[Array], first: Array) -> Array:
+    def _extend_basis(self, group: Array, smooth: list[Array], first: Array) -> Array:
         """Orthonormal columns (channels * n, rank) for what a group adds."""
         free, shape = group / self.noise.fast[:, :, None], (self.residual.size, group.shape[2])
         size = np.linalg.norm(free.reshape(shape), axis=0)

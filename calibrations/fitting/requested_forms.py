@@ -91,15 +91,15 @@ def estimated(smaller: Fit, effect: RequestedForm) -> Effect:
     first = state_at(data, model_effects, start(data, model_effects), ())
     all_components = components(data, first)
     forms = [c for c in all_components if c.place == effect.place and c.form is not None and not c.general]
-    forms = [*_completing(effect.place, data, first), *forms]
+    forms = [*_completing_components(effect.place, data, first), *forms]
     if not forms:
         raise ModelError(f"{effect.name} cannot be estimated from {table.source}: its driver does not change there")
-    result = _estimated(smaller, data, model_effects, [c for c in all_components if c.noise], forms)
+    result = _estimate_forms(smaller, data, model_effects, [c for c in all_components if c.noise], forms)
     structure = Structure(result, (), Geometry(), result.white, FloorSource.SAMPLES)
     return free_form(tuple(structure._sized(name) for name in result.active))
 
 
-def _completing(place: str, data: PoseData, first: State) -> list[Component]:
+def _completing_components(place: str, data: PoseData, first: State) -> list[Component]:
     """Forms whose part in the search belongs to an effect of the catalogue: lines, and the first harmonic of beta."""
     if place == "stage-angle-beta":
         return [free(Form(place, "first", "beta", (Harmonics(1, 1),), shared=True), first)]
@@ -113,14 +113,14 @@ def _completing(place: str, data: PoseData, first: State) -> list[Component]:
     return []
 
 
-def _estimated(
+def _estimate_forms(
     smaller: Fit, data: PoseData, model_effects: ModelEffects, noise: list[Component], forms: list[Component]
 ) -> SearchResult:
     """The forms that act, with their sizes; where the noise is not known, that of the residual."""
     stated_white = smaller.problem.white
     white = np.tile(smaller.noise.floor[:, None], (1, data.n)) if stated_white is None else stated_white
     for _ in range(ROUNDS):
-        result = _sized(data, model_effects, white, noise, forms)
+        result = _size_forms(data, model_effects, white, noise, forms)
         if stated_white is not None:
             break
         scaled = white * result.ratio
@@ -131,7 +131,7 @@ def _estimated(
     return result
 
 
-def _sized(
+def _size_forms(
     data: PoseData, model_effects: ModelEffects, white: Array, noise: list[Component], forms: list[Component]
 ) -> SearchResult:
     """Selection among the forms and Gauss-Newton steps."""

@@ -64,7 +64,7 @@ def find_batch_effects(looks: Sequence[Screening], of_stage: Container[str] = ()
         for score in look.scores:
             scores_by_effect[score.effect, score.start, len(score.score)].append((score, look.rows))
     tests = [scores for scores in scores_by_effect.values() if len(scores) >= max(FEWEST_SENSORS, len(looks) / 2)]
-    tested = [_judged(scores, 2 * len(tests), scores[0][0].effect not in of_stage) for scores in tests]
+    tested = [_judge(scores, 2 * len(tests), scores[0][0].effect not in of_stage) for scores in tests]
     tested = sorted((effect for effect in tested if effect.p_value < SIGNIFICANT), key=lambda e: e.gain, reverse=True)
     best: dict[str, BatchEffect] = {}
     for effect in tested:
@@ -77,7 +77,7 @@ def _with_rivals(effect: BatchEffect, candidates: list[BatchEffect]) -> BatchEff
     return replace(effect, rivals=rivals)
 
 
-def _judged(scores_and_rows: list[tuple[Score, int]], tests: int, may_differ: bool) -> BatchEffect:
+def _judge(scores_and_rows: list[tuple[Score, int]], tests: int, may_differ: bool) -> BatchEffect:
     scores = [score for score, _ in scores_and_rows]
     statistics, ranks = np.array([s.statistic for s in scores]), np.array([s.rank for s in scores])
     price = float(np.median(ranks)) * float(np.median(np.log([rows for _, rows in scores_and_rows])))
@@ -100,7 +100,7 @@ def _judged(scores_and_rows: list[tuple[Score, int]], tests: int, may_differ: bo
 
 def _common(scores: list[Score], rank: int) -> tuple[float, float]:
     """Chance of so much in common without an effect, and the gain by one value for all."""
-    u, weights = _bounded(scores)
+    u, weights = _limit_scores(scores)
     n, total = len(u), u.sum(axis=0)
     values, vectors = np.linalg.eigh(u.T @ u)
     is_determined = values > SMALLEST_EIGENVALUE * values[-1]
@@ -115,7 +115,7 @@ def _common(scores: list[Score], rank: int) -> tuple[float, float]:
     return float(fdtrc(rank, n - rank, f)), gain - rank * float(np.log(n))
 
 
-def _bounded(scores: list[Score]) -> tuple[Array, Array]:
+def _limit_scores(scores: list[Score]) -> tuple[Array, Array]:
     """Scores (n, k), none longer than MOST_OF_ONE times the median, and the factors (n,) that make them so."""
     length = np.sqrt([s.statistic for s in scores])
     weights = np.minimum(1.0, MOST_SCORE_LENGTH * np.median(length) / np.maximum(length, 1e-300))

@@ -80,22 +80,22 @@ class SharedDesigns:
         table = fit.table
         design = _key(table, ())
         can: Key = (*table.columns, *design)
-        effects = _cached(self._asked, can, lambda: _screened_effects(fit, self.effects))
+        effects = _get_cached(self._asked, can, lambda: _screen_effects(fit, self.effects))
         groups = [group for effect in effects for group in self._effect(fit, effect)]
-        shapes: tuple[Group, ...] = _cached(self._groups, design, lambda: tuple(_patterns(fit)))
+        shapes: tuple[Group, ...] = _get_cached(self._groups, design, lambda: tuple(_patterns(fit)))
         groups += shapes
         search: Key = (*(effect.name for effect in effects), *design)
-        return SearchGroups(tuple(groups), _cached(self._trials, search, lambda: _trials(fit, groups)))
+        return SearchGroups(tuple(groups), _get_cached(self._trials, search, lambda: _trials(fit, groups)))
 
     def _effect(self, fit: Fit, effect: Effect) -> tuple[Group, ...]:
         if "output" in effect.places:
             return tuple(_derivatives(fit, effect))
         constants = np.array([float(constant(fit.table)) for constant in effect.constants.values()])
         key = (effect.name, constants.tobytes(), *_key(fit.table, effect.needs))
-        return _cached(self._groups, key, lambda: tuple(_derivatives(fit, effect)))
+        return _get_cached(self._groups, key, lambda: tuple(_derivatives(fit, effect)))
 
 
-def _cached(cache: dict[Key, V], key: Key, make: Callable[[], V]) -> V:
+def _get_cached(cache: dict[Key, V], key: Key, make: Callable[[], V]) -> V:
     """The value for a key, made once. The cache is cleared at MOST values, so that memory stays bounded."""
     value = cache.get(key)
     if value is None:
@@ -106,7 +106,7 @@ def _cached(cache: dict[Key, V], key: Key, make: Callable[[], V]) -> V:
     return value
 
 
-def _screened_effects(fit: Fit, effects: Mapping[str, Effect]) -> tuple[Effect, ...]:
+def _screen_effects(fit: Fit, effects: Mapping[str, Effect]) -> tuple[Effect, ...]:
     return tuple(effect for effect in testable_effects(fit, effects) if effect.searched(fit.table) <= 1)
 
 
@@ -218,7 +218,7 @@ def screen_sensor(table: Table, model: Model, shared: SharedDesigns) -> Screenin
     groups = shared.of(fit)
     columns = [group.of(fit.table) for group in groups.all]
     screen = Screen(fit)
-    scores, chance, gram, scores_of_columns = _weighed(screen, groups, columns)
+    scores, chance, gram, scores_of_columns = _score_effects(screen, groups, columns)
     return Screening(
         unit=table.unit,
         names=tuple((fit.model.terms[s.term].name, s.parameter.name, s.axis, _unit(fit, s.parameter.unit))
@@ -250,7 +250,7 @@ def information(fit: Fit) -> Array:
     return np.asarray((white.T @ white) / np.outer(wider, wider))
 
 
-def _weighed(
+def _score_effects(
     screen: Screen, groups: SearchGroups, columns: list[Array]
 ) -> tuple[tuple[Score, ...], float, Array, Array]:
     """The effects' scores, the chance of the best of all, and Gram matrix and score of all columns freed."""
@@ -265,7 +265,7 @@ def _weighed(
     statistics, ranks = statistics_of([gram[b, b] for b in blocks], [projections[b] for b in blocks])
     free_rows = min(screen.free, fit.noise.freedom)
     single = np.where(ranks > 0, fdtrc(np.maximum(ranks, 1), free_rows, statistics / np.maximum(ranks, 1)), 1.0)
-    single = np.minimum(single, _beside_slow_noise(fit, groups, columns, ranks))
+    single = np.minimum(single, _chance_with_slow_noise(fit, groups, columns, ranks))
     scores = tuple(
         Score(g.effect, g.start, projections[b], gram[b, b], float(s), int(r), float(p))
         for g, b, s, r, p in zip(groups.all, blocks, statistics, ranks, single, strict=True)
@@ -290,7 +290,7 @@ def statistics_of(grams: list[Array], scores: list[Array]) -> tuple[Array, Array
     ), is_determined.sum(axis=1)
 
 
-def _beside_slow_noise(fit: Fit, groups: SearchGroups, columns: list[Array], ranks: Array) -> Array:
+def _chance_with_slow_noise(fit: Fit, groups: SearchGroups, columns: list[Array], ranks: Array) -> Array:
     """How often noise alone gains as much as each effect if the noise is fitted again with it.
 
     1 for patterns, where no slow noise was found, so that there is nothing to weigh an effect against, and for effects

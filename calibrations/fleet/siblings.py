@@ -87,7 +87,7 @@ class Siblings:
         return float(self.weight @ self.tau**2)
 
     @cached_property
-    def _each(self) -> tuple[Array, Array]:
+    def _estimate_each(self) -> tuple[Array, Array]:
         """Mean and standard deviation of every theta given each tau, (grid, n)."""
         mu, variance = (value[:, None] for value in self._means)
         share = self.v / (self.v + self.tau[:, None] ** 2)
@@ -97,12 +97,12 @@ class Siblings:
     @cached_property
     def values(self) -> Array:
         """The mean of every theta, (n,)."""
-        return np.asarray(self.weight @ self._each[0])
+        return np.asarray(self.weight @ self._estimate_each[0])
 
     @cached_property
     def stds(self) -> Array:
         """Standard deviations of every theta, (n,)."""
-        mean, std = self._each
+        mean, std = self._estimate_each
         return np.asarray(np.sqrt(self.weight @ (std**2 + (mean - self.values) ** 2)))
 
     def interval(self, coverage: float = 0.95) -> tuple[Array, Array]:
@@ -111,7 +111,7 @@ class Siblings:
 
     def _quantile(self, share: float) -> Array:
         """Of the mixture over tau, by halving."""
-        mean, std = self._each
+        mean, std = self._estimate_each
         low, high = np.min(mean - 12 * std, axis=0), np.max(mean + 12 * std, axis=0)
         for _ in range(HALVINGS):
             middle = (low + high) / 2
@@ -210,7 +210,7 @@ def pool_siblings(theta: Array, information: Array, typical: Array) -> Pooled:
         previous = prior.copy()
         siblings = []
         for k in range(theta.shape[1]):
-            siblings.append(fit_siblings(*_by_own_data(scaled, weighted, prior, mean, k)))
+            siblings.append(fit_siblings(*_estimate_alone(scaled, weighted, prior, mean, k)))
             mean[:, k], prior[:, k] = _foretold(siblings[-1])
         if np.all(np.abs(prior / previous - 1) < SETTLED):
             break
@@ -219,7 +219,7 @@ def pool_siblings(theta: Array, information: Array, typical: Array) -> Pooled:
     return Pooled(tuple(siblings), typical, np.where(std < WIDE, std, np.inf) * typical)
 
 
-def _by_own_data(scaled: Array, weighted: Array, prior: Array, mean: Array, k: int) -> tuple[Array, Array]:
+def _estimate_alone(scaled: Array, weighted: Array, prior: Array, mean: Array, k: int) -> tuple[Array, Array]:
     """Parameter k and its variance for each sensor, (n,), by its own data and the prior of its other parameters."""
     prior_of_others = prior.copy()
     prior_of_others[:, k] = 0.0

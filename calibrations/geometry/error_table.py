@@ -71,11 +71,11 @@ class ErrorTable:
         """
         angles_set = np.atleast_1d(np.asarray(set_deg, dtype=np.float64))
         angles, errors, stds = self._nodes
-        angles_in_table = self._joined(angles_set % TURN_DEG, angles_set)
+        angles_in_table = self._close_gaps(angles_set % TURN_DEG, angles_set)
         true = scipy.interpolate.PchipInterpolator(angles, angles + errors)(angles_in_table)
         return angles_set + true - angles_in_table, np.interp(angles_in_table, angles, stds)
 
-    def _joined(self, angles_in_turn: Array, stated_angles: Array) -> Array:
+    def _close_gaps(self, angles_in_turn: Array, stated_angles: Array) -> Array:
         """`angles_in_turn`, moved to the nearest point at the edge of a gap. Raises DataError inside a gap."""
         angles = self._nodes[0]
         k = np.searchsorted(angles, angles_in_turn, side="right") - 1

@@ -33,14 +33,14 @@ def turning_points(table: Table) -> Array:
     alpha, beta = np.radians(table.column("alpha_deg")), np.radians(table.column("beta_deg"))
     beta_start = beta - np.radians(_approach_deg(table)) * table.optional("direction", 0.0)
     if "t_s" not in table:  # the order is not known: each pose is reached from its approach alone
-        last = _on_the_way(table, alpha, beta_start, np.zeros(table.n), beta - beta_start)
+        last = _forces_between_poses(table, alpha, beta_start, np.zeros(table.n), beta - beta_start)
         return np.concatenate([_at(table, alpha, beta_start)[:, None], last[:, :-1]], axis=1)
     before_alpha, before_beta = np.append(0.0, alpha[:-1]), np.append(0.0, beta[:-1])
     by_way = np.where(_needs_approach(table, beta - before_beta), beta_start, before_beta)
     moves = (
-        _on_the_way(table, before_alpha, before_beta, alpha - before_alpha, np.zeros(table.n)),
-        _on_the_way(table, alpha, before_beta, np.zeros(table.n), by_way - before_beta),
-        _on_the_way(table, alpha, by_way, np.zeros(table.n), beta - by_way),
+        _forces_between_poses(table, before_alpha, before_beta, alpha - before_alpha, np.zeros(table.n)),
+        _forces_between_poses(table, alpha, before_beta, np.zeros(table.n), by_way - before_beta),
+        _forces_between_poses(table, alpha, by_way, np.zeros(table.n), beta - by_way),
     )
     return np.ascontiguousarray(np.concatenate(moves, axis=1)[:, :-1])  # the last point is the pose itself
 
@@ -71,7 +71,7 @@ def _needs_approach(table: Table, move: Array) -> Array:
     return np.asarray((direction != 0) & (np.degrees(move) * direction < SHORTEST_APPROACH_DEG))
 
 
-def _on_the_way(table: Table, alpha: Array, beta: Array, by_alpha: Array, by_beta: Array) -> Array:
+def _forces_between_poses(table: Table, alpha: Array, beta: Array, by_alpha: Array, by_beta: Array) -> Array:
     """Specific force where it turns round while one of the stages moves, and at the end, shape (n, turns + 1, 3).
 
     Along each axis it is m + A cos s + B sin s, with s the angle gone through: it turns every half turn.

@@ -134,7 +134,7 @@ def _add(group: Group, name: str, value: Any) -> None:
 def npy_topics(path: Path) -> list[Topic]:
     """The array of a NumPy file. Raises DataError."""
     with path.open("rb") as file:
-        values = _loaded(path, lambda: np.load(file, allow_pickle=False))
+        values = _load(path, lambda: np.load(file, allow_pickle=False))
     group = Group("")
     _add(group, "values", values)
     return group.topics()
@@ -146,11 +146,11 @@ def npz_topics(path: Path) -> list[Topic]:
     group = Group("")
     with np.load(path, allow_pickle=False) as archive:
         for name in archive.files:
-            _add(group, name, _loaded(path, lambda name=name: archive[name]))  # type: ignore[misc]
+            _add(group, name, _load(path, lambda name=name: archive[name]))  # type: ignore[misc]
     return group.topics()
 
 
-def _loaded(path: Path, load: Callable[[], Any]) -> Any:
+def _load(path: Path, load: Callable[[], Any]) -> Any:
     try:
         return load()
     except ValueError as error:

@@ -95,9 +95,9 @@ def _unreadable_as_data_error(path: Path) -> Iterator[None]:
     except MemoryError as error:
         if path.is_dir() or path.stat().st_size > SMALL_BYTES:
             raise
-        raise _damaged(path, error) from None  # a wrong length in so small a file
+        raise _damage_error(path, error) from None  # a wrong length in so small a file
     except Exception as error:
-        raise _damaged(path, error) from None
+        raise _damage_error(path, error) from None
 
 
 def _zip_reader(path: Path) -> str:
@@ -110,7 +110,7 @@ def _zip_reader(path: Path) -> str:
         with ZipFile(path) as archive:
             names = archive.namelist()
     except (BadZipFile, OSError, ValueError, NotImplementedError) as error:
-        raise _damaged(path, error) from None
+        raise _damage_error(path, error) from None
     if "xl/workbook.xml" in names:
         return "excel_topics"
     if names and all(name.endswith(".npy") for name in names):
@@ -118,6 +118,6 @@ def _zip_reader(path: Path) -> str:
     raise DataError(f"{path}: is a zip archive, not an Excel workbook or NumPy .npz; unpack it and import a file of it")
 
 
-def _damaged(path: Path, error: Exception) -> DataError:
+def _damage_error(path: Path, error: Exception) -> DataError:
     reason = " ".join(str(error).split())[:200] or type(error).__name__
     return DataError(f"{path}: is damaged or cut short ({reason}); copy it again from where it was recorded")

@@ -80,12 +80,16 @@ def import_sheet(
         from calibrations.importing.suggestion import suggest_import  # a table with its columns needs no proposal
 
         tail = suggest_import(
-            laid, kind, mapping, constants or {}, lambda *meant: _import_with(laid, *_completed(laid, *meant)).table
+            laid,
+            kind,
+            mapping,
+            constants or {},
+            lambda *meant: _import_with(laid, *_complete_mapping(laid, *meant)).table,
         )
         raise MissingColumn(f"{error}{tail}") from None
 
 
-def _completed(
+def _complete_mapping(
     laid: Sheet, kind: str, mapped: Sequence[ColumnMapping], constants: Mapping[str, Constant]
 ) -> tuple[str, list[ColumnMapping], Mapping[str, Constant]]:
     """The given mapping, completed from the header."""
@@ -112,7 +116,7 @@ def _import_with(
     notes: list[str] = []
     words = list(dict.fromkeys([*words, path])) if path in laid.header else words
     numbers, texts = read_cells(laid, words, required, notes.append)
-    columns = {m.name: _converted(numbers[m.file_column], m) for m in mapping if m.name != PATH}
+    columns = {m.name: _convert(numbers[m.file_column], m) for m in mapping if m.name != PATH}
     columns |= {name: numbers[name] for name in unmapped if name in numbers}
     labels = {k: texts[k] for k in unmapped if k in texts} | ({PATH: texts[path]} if path in texts else {})
     if is_session(kind, columns, labels.get(PATH)):
@@ -186,7 +190,7 @@ def _is_text(name: str, cell: str) -> bool:
     return name == "path" or (name not in NUMBERS and not is_number(cell))
 
 
-def _converted(values: Array, m: ColumnMapping) -> Array:
+def _convert(values: Array, m: ColumnMapping) -> Array:
     """Values in the target column's unit."""
     _, factor, offset = UNITS[m.unit] if m.unit else ("", 1.0, 0.0)
     return values if (factor, offset) == (1.0, 0.0) else values * factor + offset

@@ -27,7 +27,7 @@ JSON_FORM = 'give arrays of equal length, {"mag": [[1, 2, 3], ...]}, or [{"mx": 
 def json_as_lines(source: Source) -> Source:
     """The JSON document of `source` as comma-separated lines; another text unchanged. Raises DataError."""
     with source.lines() as lines:
-        text = "".join(_bounded(lines, source.name))
+        text = "".join(_limit_length(lines, source.name))
     try:
         document = json.loads(text)
     except (ValueError, RecursionError):
@@ -47,7 +47,7 @@ def _by_lines(text: str) -> Any:
         return None
 
 
-def _bounded(lines: Iterator[str], name: str) -> Iterator[str]:
+def _limit_length(lines: Iterator[str], name: str) -> Iterator[str]:
     size = 0
     for line in lines:
         size += len(line)

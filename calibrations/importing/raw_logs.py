@@ -225,7 +225,7 @@ def find_dwells(log: Table) -> list[tuple[int, int]]:
         return []
     lengths = np.array([b - a for a, b in stretches])
     typical = np.sort(lengths)[np.searchsorted(np.cumsum(np.sort(lengths)), lengths.sum() / 2)]
-    return _settled(log, [(a, b) for a, b in stretches if b - a >= SHORTEST_DWELL_SHARE * typical])
+    return _select_settled(log, [(a, b) for a, b in stretches if b - a >= SHORTEST_DWELL_SHARE * typical])
 
 
 def _windows(log: Table, width: int) -> list[tuple[int, int]]:
@@ -271,7 +271,7 @@ def _is_moving(log: Table, stretches: list[tuple[int, int]]) -> bool:
     return any(np.ptp(angle[a:b]) > 2 * JITTER_DEG for a, b in stretches for angle in angles)
 
 
-def _settled(log: Table, stretches: list[tuple[int, int]]) -> list[tuple[int, int]]:
+def _select_settled(log: Table, stretches: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """The stretches without rows near a movement; at most a quarter of a dwell is dropped."""
     rate = _rate(log, stretches).get("sample_rate_hz", 0.0)
     rows = round(SETTLE_S * float(rate)) or FEWEST_ROWS_AT_REST // 5

@@ -117,12 +117,14 @@ def read_sheet(source: Source) -> Sheet:
         raise DataError(_another_width(source.name, *rows[1], header))
     columns = width - _empty_behind([cells for _, cells in rows if len(cells) == width])
     header = (
-        _checked(header[:columns], f"{source.name}, line {line}") if has_names else list(map(str, range(1, width + 1)))
+        _check_header(header[:columns], f"{source.name}, line {line}")
+        if has_names
+        else list(map(str, range(1, width + 1)))
     )
     data_rows, units = _units(header, rows[1 if has_names else 0 :], has_names)
     if not data_rows:
         raise DataError(f"{source.name}: there are no rows below the header; export the measurements again")
-    sample = _undamaged([tuple(cells[:columns]) for _, cells in data_rows if len(cells) == width])
+    sample = _remove_damaged_rows([tuple(cells[:columns]) for _, cells in data_rows if len(cells) == width])
     if not sample:
         raise DataError(_another_width(source.name, *data_rows[0], header))
     if not any(is_number(cell) for cells in sample for cell in cells):
@@ -144,7 +146,7 @@ def read_sheet(source: Source) -> Sheet:
     )
 
 
-def _undamaged(rows: list[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
+def _remove_damaged_rows(rows: list[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
     """The rows without damaged ones: those with a word where nearly all others have a number."""
     is_word = [tuple(not is_number(cell) for cell in row) for row in rows]
     numeric = [sum(column) <= MOST_WORDS * len(rows) for column in zip(*is_word, strict=True)]
@@ -229,7 +231,7 @@ def _empty_behind(rows: Sequence[list[str]]) -> int:
     return min(ends, default=0)
 
 
-def _checked(header: list[str], place: str) -> list[str]:
+def _check_header(header: list[str], place: str) -> list[str]:
     if "" in header:
         raise DataError(f"{place}: a column has no name" + _names(header, ": {}") + "; name every column")
     if 2 * sum(map(is_number, header)) > len(header):

@@ -83,7 +83,7 @@ def topic_sheet(path: Path, topics: Sequence[Topic], name: str | None) -> Sheet:
     notes = topic.notes
     if unread and name is None:
         notes = (
-            f"{path}: reading {topic.name}; choose another with --topic: {_listed(t.name for t in unread)}",
+            f"{path}: reading {topic.name}; choose another with --topic: {_list_names(t.name for t in unread)}",
             *notes,
         )
     topic_name = topic.name if unread else ""
@@ -166,7 +166,7 @@ def _choose_topic(path: Path, topics: Sequence[Topic], name: str | None) -> Topi
     )
 
 
-def _listed(names: Any) -> str:
+def _list_names(names: Any) -> str:
     all_names = list(names)
     rest_words = f" and {len(all_names) - MOST_LISTED} more" if len(all_names) > MOST_LISTED else ""
     return ", ".join(all_names[:MOST_LISTED]) + rest_words

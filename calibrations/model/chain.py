@@ -53,7 +53,7 @@ def static_force(table: Table, steps: Sequence[Step]) -> Array:
     if table.type.turning:
         return rate_deg_s(table)
     pose = true_pose(table, steps)
-    a = _reported(table).copy() if pose is nominal_pose(table) else specific_force(pose)
+    a = _reported_force(table).copy() if pose is nominal_pose(table) else specific_force(pose)
     if table.type.moving:  # along the sensor's reference edge x, Ang V
         a[:, 0] += table.column("acceleration_m_s2") / table.gravity_m_s2
     return a
@@ -68,7 +68,7 @@ def true_pose(table: Table, steps: Sequence[Step]) -> Pose:
 
 
 @lru_cache(maxsize=2)
-def _reported(table: Table) -> Array:
+def _reported_force(table: Table) -> Array:
     """Static specific force at the poses that the stages report, g, shape (n, 3)."""
     return specific_force(nominal_pose(table))
 
@@ -92,16 +92,16 @@ def effect_contributions(a: Array, table: Table, steps: Sequence[Step]) -> list[
     """
     if not any(effect.scales for effect, _ in steps):
         return [effect.transduction(a, table, p) for effect, p in steps]
-    return _staged(a, table, steps)[1]
+    return _apply_stages(a, table, steps)[1]
 
 
-def _staged(a: Array, table: Table, steps: Sequence[Step]) -> tuple[list[Array], list[Array]]:
+def _apply_stages(a: Array, table: Table, steps: Sequence[Step]) -> tuple[list[Array], list[Array]]:
     """The force, g, (n, 3), that each stage gets, and the contribution of each effect."""
     parts: dict[int, Array] = {}
     forces = [a]
     for stage in Stage:
         stage_parts = {
-            i: staged_part(stage, partial(_transduced, effect, table, p), a, forces[stage])
+            i: staged_part(stage, partial(_apply_transduction, effect, table, p), a, forces[stage])
             for i, (effect, p) in enumerate(steps)
             if stage_of(effect) == stage
         }
@@ -122,7 +122,7 @@ def staged_part(stage: Stage, part_of: Callable[[Any], Any], a: Any, response: A
     return parts[0] + parts[1] + parts[2]
 
 
-def _transduced(effect: Effect, table: Table, p: Values, a: Array) -> Array:
+def _apply_transduction(effect: Effect, table: Table, p: Values, a: Array) -> Array:
     return effect.transduction(a, table, p)
 
 
@@ -160,14 +160,14 @@ def backward(table: Table, steps: Sequence[Step], tolerance: float = 1e-12) -> A
     a = np.zeros((table.n, 3))
     for _ in range(20):
         error = table.outputs - output(a)
-        step = _solved(_slope(output, a), error)
+        step = _solve(_slope(output, a), error)
         a = a + step
         if not np.max(np.abs(step)) > tolerance:
             break
     return a
 
 
-def _solved(slope: Array, error: Array) -> Array:
+def _solve(slope: Array, error: Array) -> Array:
     """Steps (n, 3) that take off errors (n, 3); none along what a row's slope (3, 3) does not show."""
     try:
         return np.asarray(np.linalg.solve(slope, error[:, :, None])[:, :, 0])
@@ -238,7 +238,7 @@ class LinearisedChain:
     @cached_property
     def _forces(self) -> list[Array]:
         """The force, g, that each stage of the response gets, shape (n, 3)."""
-        return _staged(self._sensed, self.table, self.steps)[0] if self._scales else [self._sensed] * len(Stage)
+        return _apply_stages(self._sensed, self.table, self.steps)[0] if self._scales else [self._sensed] * len(Stage)
 
     @cached_property
     def _gains(self) -> list[Array]:
@@ -254,7 +254,7 @@ class LinearisedChain:
         total = np.zeros((1, 3))
         for effect, p in self.steps:
             if stage_of(effect) == stage:
-                part_of = partial(_transduced, effect, self.table, p)
+                part_of = partial(_apply_transduction, effect, self.table, p)
                 total = total + staged_part(stage, part_of, a, a + unit) - part_of(a)
         return scaled(unit, total, self.steps)
 
@@ -273,7 +273,9 @@ class LinearisedChain:
     def _contribution(self, effect: Effect, values: Values) -> Array:
         """Contribution of one effect, with the others in the model."""
         stage = stage_of(effect)
-        part = staged_part(stage, partial(_transduced, effect, self.table, values), self._sensed, self._forces[stage])
+        part = staged_part(
+            stage, partial(_apply_transduction, effect, self.table, values), self._sensed, self._forces[stage]
+        )
         return np.asarray(part * self._drift_of(effect))
 
     def output(self, term: int, values: Values) -> Array:

@@ -214,7 +214,7 @@ class Model(ReportedResult):
     def with_effect(self, effect: Effect) -> Model:
         """The model with one effect more; a tied effect of that name is untied instead."""
         if any(term.name == effect.name for term in self.terms):
-            terms = tuple(_untied(term) if term.name == effect.name else term for term in self.terms)
+            terms = tuple(_separate_axes(term) if term.name == effect.name else term for term in self.terms)
         else:
             terms = (*self.terms, Term(effect))
         return replace(self, name=f"{self.name}+{effect.name}", terms=terms)
@@ -230,7 +230,7 @@ class Model(ReportedResult):
         return replace(self, terms=terms)
 
 
-def _untied(term: Term) -> Term:
+def _separate_axes(term: Term) -> Term:
     return replace(term, tied=False, estimates=())
 
 

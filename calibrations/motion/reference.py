@@ -75,7 +75,7 @@ def fit_four_parameter(t_s: Array, x: Array, frequency_hz: float | None = None) 
         turn += float(np.clip(step, -1 / np.ptp(t), 1 / np.ptp(t)))
         if abs(step) * np.ptp(t) < 1e-10:
             break
-    density = _density_beside(residual, rate_hz, turn / (2 * np.pi))
+    density = _density_near(residual, rate_hz, turn / (2 * np.pi))
     cov = np.linalg.inv(columns.T @ columns) * density * rate_hz / 2
     return _as_sine(a, b, offset, turn, cov, middle, density)
 
@@ -133,7 +133,7 @@ def _as_sine(a: float, b: float, offset: float, turn: float, cov: Array, middle:
     )
 
 
-def _density_beside(residual: Array, rate_hz: float, frequency_hz: float) -> float:
+def _density_near(residual: Array, rate_hz: float, frequency_hz: float) -> float:
     """One-sided density of the residual around a frequency, the lines that the sine took up left out."""
     f, power = periodogram(residual, rate_hz)
     k = round(frequency_hz / f[1])
@@ -180,15 +180,15 @@ def smooth(x: Array) -> Smoothed:
     penalty = _penalty(len(x))
 
     def deviance(log_ratio: float) -> float:
-        return _solved(x, penalty, float(np.exp(log_ratio)))[2]
+        return _smooth_with(x, penalty, float(np.exp(log_ratio)))[2]
 
     optimum = scipy.optimize.minimize_scalar(deviance, bounds=LOG_RANGE, method="bounded", options={"xatol": 0.05})
     ratio = float(np.exp(optimum.x))
-    values, noise_std, _ = _solved(x, penalty, ratio)
+    values, noise_std, _ = _smooth_with(x, penalty, ratio)
     return Smoothed(values, ratio, noise_std)
 
 
-def _solved(x: Array, penalty: Array, ratio: float) -> tuple[Array, float, float]:
+def _smooth_with(x: Array, penalty: Array, ratio: float) -> tuple[Array, float, float]:
     """(smoothed, noise, -2 log restricted likelihood up to a constant)."""
     bands = ratio * penalty
     bands[-1] += 1.0

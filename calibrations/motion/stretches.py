@@ -157,8 +157,8 @@ def make_stretches(table: Table) -> Stretches:
         reference_acceleration(r.times_s(table.time_s), table.column("displacement_m")[r.rows], r.rate_hz)
         for r in records
     ]
-    samples = _averaged(table, records, references)
-    expected = _expected(samples)
+    samples = _average_blocks(table, records, references)
+    expected = _expected_force(samples)
     slope = _slope(samples, expected)
     length_s = _length_s(records, references)
     cuts = list(_cuts(samples, length_s))
@@ -195,7 +195,7 @@ def _rows(table: Table, samples: Table, lines: Sequence[Line], cuts: list[tuple[
     )
 
 
-def _averaged(table: Table, records: Sequence[Record], references: Sequence[Reference]) -> Table:
+def _average_blocks(table: Table, records: Sequence[Record], references: Sequence[Reference]) -> Table:
     """Block means of all columns and of the reference, as many as the fastest line allows.
 
     Measurement and reference are averaged alike, so that the averaging does not change the comparison.
@@ -215,7 +215,7 @@ def _averaged(table: Table, records: Sequence[Record], references: Sequence[Refe
     return Table("motion", MappingProxyType(columns), table.constants, table.source)
 
 
-def _expected(samples: Table) -> Array:
+def _expected_force(samples: Table) -> Array:
     """The motion's specific force behind x's nominal output filter, g, shape (samples,)."""
     a = samples.column("acceleration_m_s2") / samples.gravity_m_s2
     return sample_output(a[:, None], samples)[:, 0]

@@ -53,7 +53,7 @@ class Inclinometer(Twin):
     def speak(self, now_s: float) -> None:
         """Say what is due by `now_s`."""
         while self._running and self._next_s <= now_s:
-            if listeners := [c for c in self._port.connections.values() if self._heard_all(c)]:
+            if listeners := [c for c in self._port.connections.values() if self._has_sent_all(c)]:
                 lines = self._reading(self._next_s)
                 for connection in listeners:
                     self._send_lines(connection, lines, self._next_s)
@@ -98,7 +98,7 @@ class Inclinometer(Twin):
     def _display_text(self, deg: float) -> str:
         return f"{deg:+07.3f}" if abs(deg) <= self._range_deg else 7 * "+-"[deg < 0]
 
-    def _heard_all(self, connection: Connection) -> bool:
+    def _has_sent_all(self, connection: Connection) -> bool:
         """Whether all earlier bytes are sent."""
         connection.emit(self._next_s)
         return not connection.is_behind(self._next_s)

@@ -75,7 +75,7 @@ class MotorRecord:
         except StageAlarm as error:
             alarm = Check("alarm", False, error.what)
         mode, use = mr.MODES[int(state[mr.MODE].value)], not state[mr.SET].value
-        low, high = self._own_limits_deg(state)
+        low, high = self._record_limits_deg(state)
         limits_text = f"{low:g} .. {high:g} deg" if math.isfinite(high) else "none"
         return [
             alarm,
@@ -201,7 +201,7 @@ class MotorRecord:
     def _start(self, angle_deg: float, speed_deg_s: float) -> None:
         state = self._read(*STATE, mr.TARGET, mr.LOW_LIMIT, mr.HIGH_LIMIT, mr.SPEED, mr.ACCELERATION_TIME)
         self._require_movable(state)
-        low, high = self._own_limits_deg(state)
+        low, high = self._record_limits_deg(state)
         if not low <= angle_deg <= high:
             raise LimitError(
                 f"{self.name}: {angle_deg:g} deg is outside the record's own limits, {low:g} .. {high:g} deg "
@@ -247,7 +247,7 @@ class MotorRecord:
     def _angle_deg(self, state: Mapping[str, Reading]) -> float:
         return state[mr.READBACK].value * self._deg
 
-    def _own_limits_deg(self, state: Mapping[str, Reading]) -> tuple[float, float]:
+    def _record_limits_deg(self, state: Mapping[str, Reading]) -> tuple[float, float]:
         """The record's limits; none where both are equal."""
         low, high = sorted(state[limit].value * self._deg for limit in (mr.LOW_LIMIT, mr.HIGH_LIMIT))
         return (low, high) if low < high else (-math.inf, math.inf)

@@ -64,7 +64,7 @@ class Script:
     def __init__(self, hand: Hand, random: np.random.Generator, up: Floats) -> None:
         self._hand, self._random = hand, random
         self._wanted = up
-        self._table = _perturbed(np.array([0.0, 0.0, 1.0]), hand.table_deg, random)
+        self._table = _perturb(np.array([0.0, 0.0, 1.0]), hand.table_deg, random)
         direction = _as_tuple(self._on_table(up))
         self.segments = [Segment(0.0, math.inf, direction, direction)]
 
@@ -92,7 +92,7 @@ class Script:
         up = np.empty((len(times_s), 3))
         for segment in self.segments:
             in_segment = (times_s >= segment.start_s) & (times_s < segment.end_s)
-            up[in_segment] = _turned(segment, times_s[in_segment])
+            up[in_segment] = _turn_slowly(segment, times_s[in_segment])
         return up
 
     def state(self) -> dict[str, Any]:
@@ -120,7 +120,7 @@ class Script:
         """Pick the sensor up after `reaction_s`, turn it, put it down, let it go, and leave it for a while."""
         hand, random = self._hand, self._random
         chance, size = random.random(3), random.standard_normal(2)
-        target = self._aimed(chance[0])
+        target = self._aim(chance[0])
         turn_s = math.degrees(_angle(direction, target)) / hand.turning_deg_s + 0.5
         self._add(now_s, reaction_s, direction, direction)
         self._add(self._end(now_s), turn_s, direction, target, 1.0)
@@ -130,7 +130,7 @@ class Script:
         patience_s = hand.patience_s * math.exp(0.4 * size[1])
         self._add(self._end(now_s), 1.0 if slips else patience_s, target, target, 0.0, True)
         if slips:
-            slipped = _perturbed(target, hand.slip_deg, random)
+            slipped = _perturb(target, hand.slip_deg, random)
             self._add(self._end(now_s), SLIP_S, target, slipped)
             self._add(self._end(now_s), patience_s, slipped, slipped)
 
@@ -142,7 +142,7 @@ class Script:
     def _end(self, now_s: float) -> float:
         return self.segments[-1].end_s if self.segments else now_s
 
-    def _aimed(self, chance: float) -> Floats:
+    def _aim(self, chance: float) -> Floats:
         """Where the hand puts the sensor: near the wanted orientation, or a wrong one."""
         direction = self._wanted
         if chance < self._hand.errs:
@@ -152,12 +152,12 @@ class Script:
     def _on_table(self, direction: Floats) -> Floats:
         hand = self._hand
         leaning = np.abs(direction).max() < 0.99
-        placed = _perturbed(direction, hand.aim_deg if leaning else hand.side_deg, self._random)
+        placed = _perturb(direction, hand.aim_deg if leaning else hand.side_deg, self._random)
         tilt = self._table - np.array([0.0, 0.0, 1.0])
         return _unit(placed + np.roll(tilt, int(np.argmax(np.abs(direction))) + 1))
 
     def _segment_force(self, segment: Segment, times_s: Floats) -> Floats:
-        hand, force = self._hand, _turned(segment, times_s)
+        hand, force = self._hand, _turn_slowly(segment, times_s)
         if segment.tremor:
             swing = segment.tremor * np.sqrt(2 / len(TREMOR_HZ))
             turns = 2 * np.pi * np.outer(times_s, TREMOR_HZ)
@@ -171,7 +171,7 @@ class Script:
         return force
 
 
-def _turned(segment: Segment, times_s: Floats) -> Floats:
+def _turn_slowly(segment: Segment, times_s: Floats) -> Floats:
     """Directions between both ends of a segment: along the great circle, slowly at both ends."""
     start, end = np.array(segment.before), np.array(segment.after)
     angle = _angle(start, end)
@@ -186,7 +186,7 @@ def _turned(segment: Segment, times_s: Floats) -> Floats:
     return np.asarray(np.outer(np.cos(turned), start) + np.outer(np.sin(turned), perpendicular))
 
 
-def _perturbed(direction: Floats, std_deg: float, random: np.random.Generator) -> Floats:
+def _perturb(direction: Floats, std_deg: float, random: np.random.Generator) -> Floats:
     """A direction turned by a normal angle about two axes."""
     offset = math.radians(std_deg) * random.standard_normal(3)
     return _unit(direction + np.cross(offset, direction))

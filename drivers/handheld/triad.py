@@ -68,11 +68,11 @@ def steady_v(triad: Triad, force_g: Floats) -> Floats:
     for k, mass in enumerate((triad.x, triad.y, triad.z)):
         leans = math.radians(mass.leans_deg)
         load_g = math.cos(leans) * force_g[:, k] + math.sin(leans) * force_g[:, (k + 1) % 3]
-        volts[:, k] = _read_v(mass, _displaced_nm(mass, load_g))
+        volts[:, k] = _read_v(mass, _displacement_nm(mass, load_g))
     return volts
 
 
-def _displaced_nm(mass: Mass, load_g: Floats) -> Floats:
+def _displacement_nm(mass: Mass, load_g: Floats) -> Floats:
     """Where the springs balance the load."""
     load_nm = load_g * per_g_nm(mass.resonance_hz)
     x_nm, hard = load_nm.copy(), 1e-6 * mass.hardening_per_um2

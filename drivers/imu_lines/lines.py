@@ -39,7 +39,7 @@ def fields(line: str, style: str) -> dict[Column, float]:
         value = value_text.partition("|")[0].partition("§")[0].rpartition(":")[2]
         return {name: float(value)} if line.startswith(">") and name else _none(line)
     if style == "nmea":
-        line = _checked(line).partition(",")[2]
+        line = _check_line(line).partition(",")[2]
     values = re.split(r"[,;\t]\s*|\s+", line.strip())
     return {k: number for k, text in enumerate(values, 1) if (number := _number(text)) is not None} or _none(line)
 
@@ -51,7 +51,7 @@ def _number(text: str) -> float | None:
         return None
 
 
-def _checked(line: str) -> str:
+def _check_line(line: str) -> str:
     text, star, checksum_text = line.removeprefix("$").partition("*")
     if not (line.startswith("$") and star and int(checksum_text, 16) == checksum(text)):
         raise ValueError(f"{line!r} has a wrong checksum")

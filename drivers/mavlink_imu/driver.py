@@ -165,7 +165,7 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
         for attempt in range(ATTEMPTS):
             self._link.discard()
             self._command(mav.SET_MESSAGE_INTERVAL, number, interval_us, attempt)
-            result = self._acknowledged(mav.SET_MESSAGE_INTERVAL)
+            result = self._await_result(mav.SET_MESSAGE_INTERVAL)
             if result == 0:
                 self._link.discard()
                 return
@@ -229,7 +229,7 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
         self._sequence += 1
         self._link.write(frame)
 
-    def _acknowledged(self, command: int) -> int | None:
+    def _await_result(self, command: int) -> int | None:
         """The result of a command; None without an answer in time."""
         stream, begun_s = Frames(mav.Mavlink()), self._clock.now()
         while (left_s := begun_s + ACK_S - self._clock.now()) > 0 and (data := self._link.read(left_s)):

@@ -111,7 +111,7 @@ class Drive(Twin):
             self._inputs(self._words[az.INPUTS.address] & ~inputs_before, now_s)
         if az.RESET_ALARM.address in addresses and self._value(az.RESET_ALARM) == 1:
             self._reset()
-        if self._triggered(addresses):
+        if self._has_trigger(addresses):
             self._start(now_s)
 
     def _catch_up(self, now_s: float) -> None:
@@ -162,7 +162,7 @@ class Drive(Twin):
         if self._alarm not in az.RESETTABLE_BY_POWER_ONLY:
             self._alarm = 0
 
-    def _triggered(self, addresses: range) -> bool:
+    def _has_trigger(self, addresses: range) -> bool:
         trigger = int(self._value(az.TRIGGER))
         if trigger == az.TRIGGER_ALL:
             return az.TRIGGER.address in addresses

@@ -70,7 +70,7 @@ class Controller(Twin):
             "HLP?": lambda _a, _: lines(["The following commands are valid:", *sorted(self._handlers), "end of help"]),
             "SPA": lambda a, _: self._refuse_parameter(a),
             "SPA?": lambda a, _: self._parameters(a),
-            "HPA?": lambda _a, _: lines(_described()),
+            "HPA?": lambda _a, _: lines(_describe_parameters()),
         }
 
     def answer(self, command: str, now_s: float) -> str | None:
@@ -131,14 +131,14 @@ class Controller(Twin):
 
     def _parameters(self, arguments: Sequence[str]) -> str:
         """`SPA? item identifier ...`; an identifier is answered as it was sent."""
-        return lines(f"{item} {text}={PARAMETERS[p][0]}" for item, text, p in self._identified(groups(arguments, 2)))
+        return lines(f"{item} {text}={PARAMETERS[p][0]}" for item, text, p in self._identify(groups(arguments, 2)))
 
     def _refuse_parameter(self, arguments: Sequence[str]) -> None:
         """`SPA item identifier value`: none of the simulated parameters can be changed."""
-        self._identified(groups(arguments, 3))
+        self._identify(groups(arguments, 3))
         raise Refusal(OUT_OF_RANGE)
 
-    def _identified(self, requests: Sequence[Sequence[str]]) -> list[tuple[str, str, int]]:
+    def _identify(self, requests: Sequence[Sequence[str]]) -> list[tuple[str, str, int]]:
         items = {"1", *self._axes.ids}  # the controller itself is item 1, whatever its axes are called
         pairs = [(one_of(item, items, e727.BAD_AXIS), text) for item, text, *_ in requests]
         numbered = [(item, text, parse_integer(text, 0, math.inf)) for item, text in pairs]
@@ -147,7 +147,7 @@ class Controller(Twin):
         return numbered
 
 
-def _described() -> Iterable[str]:
+def _describe_parameters() -> Iterable[str]:
     """Lines of HPA?: identifier, command level, number of items, type, group and name of each parameter."""
     return (f"0x{number:X}=\t0\t1\t{kind}\tSystem\t{name}" for number, (_, kind, name) in PARAMETERS.items())
 

@@ -45,14 +45,14 @@ class Recorder:
         return {
             "DRC": self._set_what,
             "DRC?": lambda a, _: table(
-                (k, f"{self._recorded[k][0]} {self._recorded[k][1]}") for k in self._tables_asked(a)
+                (k, f"{self._recorded[k][0]} {self._recorded[k][1]}") for k in self._answer_tables(a)
             ),
             "DRT": self._set_triggers,
-            "DRT?": lambda a, _: table((k, f"{self._triggers[k]} 0") for k in self._tables_asked(a)),
+            "DRT?": lambda a, _: table((k, f"{self._triggers[k]} 0") for k in self._answer_tables(a)),
             "RTR": lambda a, _: self._set_rate(a),
             "RTR?": lambda _a, _: f"{self._rate}\n",
             "TNR?": lambda _a, _: f"{len(TABLES)}\n",
-            "DRL?": lambda a, _: table((k, self._count(k)) for k in self._tables_asked(a)),
+            "DRL?": lambda a, _: table((k, self._count(k)) for k in self._answer_tables(a)),
             "DRR?": self._read,
         }
 
@@ -92,7 +92,7 @@ class Recorder:
     def _count(self, place: str) -> int:
         return sum(len(values) for values in self._data[place])
 
-    def _tables_asked(self, arguments: Sequence[str]) -> list[str]:
+    def _answer_tables(self, arguments: Sequence[str]) -> list[str]:
         return [one_of(place, TABLES, OUT_OF_RANGE) for place in arguments] or TABLES
 
     def _set_what(self, arguments: Sequence[str], _now_s: float) -> None:
@@ -114,7 +114,7 @@ class Recorder:
     def _read(self, arguments: Sequence[str], _now_s: float) -> str:
         """`DRR? offset count tables`: a header, and a row for each sample."""
         groups(arguments[:3], 3)
-        places = self._tables_asked(arguments[2:])
+        places = self._answer_tables(arguments[2:])
         most = min(self._count(place) for place in places)
         offset = parse_integer(arguments[0], 1, most)
         count = parse_integer(arguments[1], 1, most - offset + 1)
@@ -183,15 +183,15 @@ class Waves:
             "WAV?": self._lengths,
             "WCL": self._clear,
             "WSL": lambda a, _: self._selected.update(self._values(a, len(TABLES))),
-            "WSL?": lambda a, _: table((k, self._selected[k]) for k in self._generators_asked(a)),
+            "WSL?": lambda a, _: table((k, self._selected[k]) for k in self._answer_generators(a)),
             "WTR": self._set_rates,
             "WTR?": lambda a, _: table(
-                (k, f"{self._rates[k][0]} {self._rates[k][1]}") for k in self._generators_asked(a)
+                (k, f"{self._rates[k][0]} {self._rates[k][1]}") for k in self._answer_generators(a)
             ),
             "WGC": lambda a, _: self._cycles.update(self._values(a, MOST_CYCLES)),
-            "WGC?": lambda a, _: table((k, self._cycles[k]) for k in self._generators_asked(a)),
+            "WGC?": lambda a, _: table((k, self._cycles[k]) for k in self._answer_generators(a)),
             "WGO": self._play,
-            "WGO?": lambda a, now_s: table((k, int(now_s < self._until_s[k])) for k in self._generators_asked(a)),
+            "WGO?": lambda a, now_s: table((k, int(now_s < self._until_s[k])) for k in self._answer_generators(a)),
             "MOV": self._move,
         }
 
@@ -217,7 +217,7 @@ class Waves:
         """End all waves; where the axes go is not decided here."""
         self._until_s = {generator: min(until_s, now_s) for generator, until_s in self._until_s.items()}
 
-    def _generators_asked(self, arguments: Sequence[str]) -> list[str]:
+    def _answer_generators(self, arguments: Sequence[str]) -> list[str]:
         return [one_of(k, self._axis, e727.ILLEGAL_AXIS) for k in arguments] or list(self._axis)
 
     def _values(self, arguments: Sequence[str], high: float) -> dict[str, int]:

@@ -161,7 +161,7 @@ class Meter(Recorder[Settings]):
 
     def _take(self, scans: range, start_s: float) -> NDArray[np.float64]:
         """The volts of these scans, shape (n, channels), in the order of the channels."""
-        take = self._remembered if self.settings.timer else self._read_each
+        take = self._read_memory if self.settings.timer else self._read_each
         values = take(scans, start_s)
         numbers = list(self.settings.channels.values())
         volts = np.array(values).reshape(len(scans), len(numbers))
@@ -169,7 +169,7 @@ class Meter(Recorder[Settings]):
         self._require_in_range(volts := volts[:, places])
         return volts
 
-    def _remembered(self, scans: range, start_s: float) -> list[float]:
+    def _read_memory(self, scans: range, start_s: float) -> list[float]:
         """The readings of these scans out of the instrument's memory, as it takes them."""
         width, values = len(self.settings.channels), list[float]()
         piece = max(1, MOST_VALUES // width)

@@ -82,18 +82,18 @@ def one_of(text: str, allowed: Iterable[str], code: int) -> str:
 
 def number(text: str) -> float:
     """A decimal number."""
-    return _converted(float, text)
+    return _convert(float, text)
 
 
 def parse_integer(text: str, low: int, high: float) -> int:
     """An integer within its bounds, in decimal or as 0x hexadecimal."""
-    value = _converted(lambda digits: int(digits, 0), text)
+    value = _convert(lambda digits: int(digits, 0), text)
     if not low <= value <= high:
         raise Refusal(OUT_OF_RANGE)
     return value
 
 
-def _converted(convert: Callable[[str], Value], text: str) -> Value:
+def _convert(convert: Callable[[str], Value], text: str) -> Value:
     try:
         return convert(text)
     except ValueError:

@@ -110,7 +110,7 @@ class Bus:
         Raises Refused, or after the retries LinkTimeout, BadFrame or WrongUnit.
         """
         request.dev_id = unit
-        self._let_late_answers_pass(request)
+        self._discard_late_answers(request)
         try:
             for _ in range(retries):
                 try:
@@ -121,7 +121,7 @@ class Bus:
         except LinkRefused as link_error:
             raise LinkRefused(f"{action}: {link_error.what}", link_error.remedy) from link_error
 
-    def _let_late_answers_pass(self, request: ModbusPDU) -> None:
+    def _discard_late_answers(self, request: ModbusPDU) -> None:
         """RTU frames do not identify their request: a late answer must not be taken for that of the next request.
 
         The echo of a write names its register, so a write, which may be a stop, need not wait.

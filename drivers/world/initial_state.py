@@ -73,20 +73,19 @@ def individual(config: WorldConfig, seed: int, place: int = 0) -> WorldConfig:
     random = np.random.default_rng([seed, 0])
     trims = random.standard_normal((2, 2))
     fraction = config.spread.imperfection_fraction
-    stages, base = (_scattered(part, fraction, random) for part in (config.stages, config.base))
+    stages, base = (_scatter(part, fraction, random) for part in (config.stages, config.base))
     if place:
         random = np.random.default_rng([seed, 0, place])
         trims = random.standard_normal((2, 2))
-    sensor = _scattered(config.sensor, fraction, random)
+    sensor = _scatter(config.sensor, fraction, random)
     axes = (sensor.x, sensor.y, sensor.z)
     x, y, z = (
-        _trimmed(axis, config.spread, *trim)
-        for axis, trim in zip(axes, [*trims, random.standard_normal(2)], strict=True)
+        _trim(axis, config.spread, *trim) for axis, trim in zip(axes, [*trims, random.standard_normal(2)], strict=True)
     )
     return replace(config, stages=stages, base=base, sensor=replace(sensor, x=x, y=y, z=z))
 
 
-def _trimmed(axis: Axis, spread: Spread, zero: float, gain: float) -> Axis:
+def _trim(axis: Axis, spread: Spread, zero: float, gain: float) -> Axis:
     plates = replace(
         axis.plates,
         zero_g_v=axis.plates.zero_g_v + spread.zero_g_v * zero,
@@ -95,13 +94,13 @@ def _trimmed(axis: Axis, spread: Spread, zero: float, gain: float) -> Axis:
     return replace(axis, plates=plates)
 
 
-def _scattered(settings: Any, fraction: float, random: np.random.Generator) -> Any:
+def _scatter(settings: Any, fraction: float, random: np.random.Generator) -> Any:
     """Every imperfection times a log-normal number; a number is drawn for absent ones too."""
     new = {}
     for f in fields(settings):
         value = getattr(settings, f.name)
         if is_dataclass(value):
-            new[f.name] = _scattered(value, fraction, random)
+            new[f.name] = _scatter(value, fraction, random)
         elif f.name not in EXACT:
             new[f.name] = value * math.exp(fraction * random.standard_normal())
     return replace(settings, **new)

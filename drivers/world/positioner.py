@@ -79,14 +79,14 @@ def standing(at_um: float, since_s: float = 0.0) -> Command:
 def following(positioner: Positioner, pieces: Floats, command: Command) -> tuple[Floats, float]:
     """The motion from the command's start on, given the motion until then; and when it has decayed, in s."""
     new = np.zeros((PIECES, TERMS))
-    new[0, :6] = _settled(positioner, command)
+    new[0, :6] = _settled_response(positioner, command)
     _begin(positioner, new[0], pieces)
     new[1, :2] = command.end_s, command.um(command.end_s)
     _begin(positioner, new[1], new[:1])
     return new, command.end_s + FORGOTTEN / (2 * math.pi * positioner.servo_hz * positioner.damping_fraction)
 
 
-def _settled(positioner: Positioner, command: Command) -> tuple[float, ...]:
+def _settled_response(positioner: Positioner, command: Command) -> tuple[float, ...]:
     """The settled response of the loop to a command: delayed, weaker, shifted in phase."""
     natural, driven = 2 * math.pi * positioner.servo_hz, 2 * math.pi * command.frequency_hz
     answer = natural**2 / complex(natural**2 - driven**2, 2 * positioner.damping_fraction * natural * driven)
@@ -151,12 +151,12 @@ def read_um(positioner: Positioner, pieces: Floats, times_s: ArrayLike, salt: in
 
 def normal_at(times_ns: Ints, salt: int) -> Floats:
     """Standard normal numbers that belong to instants: asked twice, the same. Box-Muller on mixed bits."""
-    words = times_ns.astype(np.uint64) * np.uint64(2) + _mixed(np.array([salt], dtype=np.uint64))
-    first, second = (1.0 - _mixed(words + np.uint64(k)) / 2.0**64 for k in range(2))
+    words = times_ns.astype(np.uint64) * np.uint64(2) + _mix_bits(np.array([salt], dtype=np.uint64))
+    first, second = (1.0 - _mix_bits(words + np.uint64(k)) / 2.0**64 for k in range(2))
     return np.asarray(np.sqrt(-2 * np.log(first)) * np.cos(2 * math.pi * second))
 
 
-def _mixed(words: Bits) -> Bits:
+def _mix_bits(words: Bits) -> Bits:
     """SplitMix64 (Steele, Lea and Flood 2014): neighbouring numbers become unrelated ones."""
     words = words + np.uint64(0x9E3779B97F4A7C15)
     words = (words ^ (words >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

@@ -121,7 +121,9 @@ class SampleDecoder(FrameDecoder):
         numbered = np.flatnonzero(counter >= 0)
         samples = numbered[np.isfinite(values[numbered]).all(axis=1)]
         gaps = self._numbers.gaps(counter[numbered], np.searchsorted(numbered, samples))
-        return Batch(values[samples], time[samples], gaps, self._clipped(status), np.concatenate(self._warm_c))
+        return Batch(
+            values[samples], time[samples], gaps, self._find_clipped_output(status), np.concatenate(self._warm_c)
+        )
 
     def _numbers_of(self, rows: Bytes, packet: Packet, places: Ints, values: xbus.Floats) -> None:
         """Put the real numbers of a packet in their columns."""
@@ -134,7 +136,7 @@ class SampleDecoder(FrameDecoder):
         elif packet.kind == xbus.TEMPERATURE and (warm_c := xbus.numbers(rows, packet)).size:
             self._warm_c.append(warm_c[:, 0])
 
-    def _clipped(self, status: Ints) -> str:
+    def _find_clipped_output(self, status: Ints) -> str:
         """The first output that the tracker reports at the end of its range."""
         flags = int(np.bitwise_or.reduce(status)) if len(status) else 0
         return next((name for name in self._names if flags >> xbus.CLIPPED + OUTPUTS.index(name) & 1), "")
@@ -150,7 +152,7 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
 
     def identify(self) -> Identity:
         """Product code, device identifier and firmware. It stops the tracker's data until the next record."""
-        self._configuring()
+        self._enter_configuration()
         number = self._asked(xbus.DEVICE_ID).hex().upper()
         product = self._asked(xbus.PRODUCT_CODE).decode("ascii", "replace").strip("\0 ")
         firmware = ".".join(str(part) for part in self._asked(xbus.FIRMWARE)[:3])
@@ -167,7 +169,7 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
         """Let the tracker send. Raises Refused, StreamError for another rate, LinkTimeout, BadFrame."""
         self._link.discard()
         if not self._is_sending():
-            self._configuring()
+            self._enter_configuration()
             self._configure()
             self._asked(xbus.GO_TO_MEASUREMENT)
         self._link.discard()
@@ -194,7 +196,7 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
         steps = self.base.steps(times) * TICK_S * rate_hz
         return bool(len(steps) and (np.abs(steps - 1) < SAME).all())
 
-    def _configuring(self) -> None:
+    def _enter_configuration(self) -> None:
         """Stop the tracker's data. Raises LinkTimeout, BadFrame."""
         self._asked(xbus.GO_TO_CONFIG)
 

@@ -77,7 +77,7 @@ class MotionTracker(FramedTwin):
             self._measure(now_s)
             return xbus.message(number + 1)
         if number == xbus.OUTPUT_CONFIGURATION:
-            return self._configured(data)
+            return self._configure(data)
         replies = {xbus.DEVICE_ID: struct.pack(">I", SERIAL), xbus.PRODUCT_CODE: PRODUCT, xbus.FIRMWARE: FIRMWARE}
         return xbus.message(number + 1, replies[number]) if number in replies else xbus.message(xbus.ERROR, b"\x04")
 
@@ -87,7 +87,7 @@ class MotionTracker(FramedTwin):
         self._change_rate(now_s, float(max(self._rates.values(), default=100)))
         self._first = self._count
 
-    def _configured(self, data: bytes) -> bytes:
+    def _configure(self, data: bytes) -> bytes:
         """Take over the rates that it has, the highest where more is wanted: its answer."""
         try:
             requested = xbus.pairs(data)

@@ -30,10 +30,10 @@ def read_bench(path: Path | None = None) -> Bench:
     Raises BenchError with file, key and suggestion.
     """
     path = path or DEFAULT
-    return _checked(read_mapping(path, "bench file", BenchError, "`rig check --example` prints one"), path)
+    return _check_document(read_mapping(path, "bench file", BenchError, "`rig check --example` prints one"), path)
 
 
-def _checked(document: dict[str, Any], path: Path) -> Bench:
+def _check_document(document: dict[str, Any], path: Path) -> Bench:
     try:
         bench = Bench.model_validate({**document, **_with_curve(document.get("d63"), path)})
     except ValidationError as error:

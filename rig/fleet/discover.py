@@ -79,8 +79,8 @@ def discover_fleet(fleet: Fleet, members: Sequence[Member], start: Question) -> 
     for member in members:
         batches[member.batch].append(member)
     stand = _rigs(fleet, Stand(start, {m: m.fault for m in members if m.fault}), batches)
-    stand = _settled(fleet, _add_missing_effects(fleet, stand, batches), batches)
-    return _population(stand, _diagnosed(fleet, stand, batches), members)
+    stand = _remove_unneeded_effects(fleet, _add_missing_effects(fleet, stand, batches), batches)
+    return _population(stand, _diagnose_members(fleet, stand, batches), members)
 
 
 def errors_of(errors: Iterable[RigError], rig: str) -> StageErrors:
@@ -117,14 +117,14 @@ def _add_missing_effects(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
     """The state with the missing effects of every batch, added one after another."""
     open_ = batches
     for rounds_left in reversed(range(MOST_ROUNDS + 1)):
-        stand, missing = _judged(fleet, stand, open_)
+        stand, missing = _judge_batches(fleet, stand, open_)
         open_ = {batch: batches[batch] for batch, effects in missing.items() if effects and rounds_left}
         for batch in open_:
             stand = stand.judged_beside(batch, (*stand.effects.get(batch, ()), missing[batch][0]))
     return stand
 
 
-def _judged(fleet: Fleet, stand: Stand, batches: Batches) -> tuple[Stand, dict[str, list[BatchEffect]]]:
+def _judge_batches(fleet: Fleet, stand: Stand, batches: Batches) -> tuple[Stand, dict[str, list[BatchEffect]]]:
     """The state with the screened sensors, and the missing effects of each batch, found after its last sensor."""
     stage = {name for name, effect in effects_of(stand.start.own).items() if "pose" in effect.places}
     faults, screened = dict(stand.faults), dict(stand.screening)
@@ -147,7 +147,7 @@ def _judged(fleet: Fleet, stand: Stand, batches: Batches) -> tuple[Stand, dict[s
     return replace(stand, faults=faults, screening=screened), missing
 
 
-def _settled(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
+def _remove_unneeded_effects(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
     """The state without the effects of a batch that are not needed with the others."""
     for batch in [batch for batch, effects in stand.effects.items() if len(effects) > 1]:
         stand = _drop_needless_effects(fleet, stand, batch, batches[batch])
@@ -161,7 +161,7 @@ def _drop_needless_effects(fleet: Fleet, stand: Stand, batch: str, members: Sequ
     if len(significant) == len(tested):
         return stand.judged_beside(batch, significant)
     k, effects = tested.index(None), stand.effects[batch]
-    fewer, _ = _judged(fleet, stand.judged_beside(batch, (*effects[:k], *effects[k + 1 :])), {batch: members})
+    fewer, _ = _judge_batches(fleet, stand.judged_beside(batch, (*effects[:k], *effects[k + 1 :])), {batch: members})
     return _drop_needless_effects(fleet, fewer, batch, members) if len(effects) > 2 else fewer
 
 
@@ -171,12 +171,12 @@ def _test_jointly(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Memb
     tested = []
     for k, effect in enumerate(effects):
         reduced = stand.judged_beside(batch, (*effects[:k], *effects[k + 1 :]))
-        missed = _judged(fleet, reduced, {batch: members})[1].get(batch, [])
+        missed = _judge_batches(fleet, reduced, {batch: members})[1].get(batch, [])
         tested.append(next((candidate for candidate in missed if candidate.effect == effect.effect), None))
     return tested
 
 
-def _diagnosed(fleet: Fleet, stand: Stand, batches: Batches) -> dict[Member, Any]:
+def _diagnose_members(fleet: Fleet, stand: Stand, batches: Batches) -> dict[Member, Any]:
     """The diagnoses of the sensors that differ from their batch."""
     usual = {
         batch: [stand.screening[m].excess for m in members if m in stand.screening]

@@ -119,7 +119,7 @@ def _answer(task: Task) -> Answer:
     question = task.question
     try:
         model, columns = _model_and_designs(question.model, question.effects, question.own)
-        table = correct_stage_errors(_checked(_read_table(task), model), question.errors, columns.effects)
+        table = correct_stage_errors(_check_table(_read_table(task), model), question.errors, columns.effects)
         if question.what == "look":
             return write_look(screen_sensor(table, model, columns))
         return _diagnosis_answer(diagnose(table, model, columns.effects))
@@ -144,7 +144,7 @@ def model_of(question: Question) -> Model:
     return model
 
 
-def _checked(table: Table, model: Model) -> Table:
+def _check_table(table: Table, model: Model) -> Table:
     """The table, if a fleet can test it with the model. Raises DataError, ModelError."""
     if not table.type.means:
         raise DataError(_instead(table.source, table.kind))

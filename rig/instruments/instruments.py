@@ -138,19 +138,19 @@ class Rig:
 
     def look(self) -> None:
         """Raises the error of an open interlock or an alarm."""
-        for driver in self._watched():
+        for driver in self._drivers_with_check():
             driver.look()
 
     def guarded(self, session: Session) -> AbstractContextManager[None]:
         """Inside the context every wait checks interlocks, alarms and the oven, and raises their errors."""
-        checks = [Look(driver.look) for driver in self._watched()]
+        checks = [Look(driver.look) for driver in self._drivers_with_check()]
         if "oven" in self.drivers:
             checks.append(
                 Look(lambda: session.check_temperature(session.oven.temperature_c()), NOW_AND_THEN_S, OVEN_TAKES_S)
             )
         return self.clock.guarded(checks)
 
-    def _watched(self) -> list[Any]:
+    def _drivers_with_check(self) -> list[Any]:
         """Drivers with a check.
 
         Without interlocks there is none in simulated time: there the end of a move is early enough for an alarm.

@@ -79,7 +79,7 @@ def wired(bench: Bench, tap: Tap | None = None) -> Iterator[Wiring]:
         for server in servers.values():
             stack.callback(server.close)
         clock = GuardedClock(SimulatedClock() if bench.simulated else WallClock())
-        stack.enter_context(_pumped(list(servers.values()), clock.inner))
+        stack.enter_context(_pump(list(servers.values()), clock.inner))
         links = Links(clock, tap)
         stack.callback(links.close)
         yield Wiring(bench, clock, links, world, servers)
@@ -122,7 +122,7 @@ def serve(bench: Bench, world: World | Batch) -> dict[str, Server]:
 
 
 @contextmanager
-def _pumped(servers: list[Server], clock: Clock) -> Iterator[None]:
+def _pump(servers: list[Server], clock: Clock) -> Iterator[None]:
     """Let the servers act while the controller waits, or in a thread in real time."""
     if isinstance(clock, SimulatedClock):
         for server in servers:

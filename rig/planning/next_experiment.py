@@ -123,7 +123,7 @@ def choose_experiment(
     """
     predicted = []
     for e, planned in sorted(_plans(menu, bench, bench_file), key=lambda pair: pair[0].duration_s or 0.0):
-        if (prediction := _predicted(dispute, e, planned)) is not None:
+        if (prediction := _predict(dispute, e, planned)) is not None:
             predicted.append(prediction)
             if _certain(prediction, criteria[0]) and len(prediction.separates) == len(dispute.rivals):
                 break  # no longer experiment can be better
@@ -158,7 +158,7 @@ def _per_minute(e: Experiment) -> float:
     return 60 * information / max(e.duration_s or 0.0, 1.0) if information > LEAST else 0.0
 
 
-def _predicted(dispute: Dispute, e: Experiment, planned: Plan) -> Experiment | None:
+def _predict(dispute: Dispute, e: Experiment, planned: Plan) -> Experiment | None:
     """The experiment with its expected result; None if its data cannot be predicted.
 
     The temperature of a room is not known in advance: effects that depend on it are only predicted in an oven.

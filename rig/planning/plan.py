@@ -99,7 +99,7 @@ def rehearsing(bench: Bench, planned: Mapping[str, Any], ledger: Ledger) -> Iter
 
     The limits of temperature and tilt do not apply: the simulated table may be less level than the real one.
     """
-    with connected(_simulated(bench)) as rig:
+    with connected(_simulate_instruments(bench)) as rig:
         parts: dict[str, Any] = {role: absent(role) for role in planned}
         parts |= {role: RecordedTwin(planned[role], driver) for role, driver in rig.drivers.items()}
         level_deg = None if bench.limits.level_deg is None else math.inf
@@ -109,7 +109,7 @@ def rehearsing(bench: Bench, planned: Mapping[str, Any], ledger: Ledger) -> Iter
         yield replace(rig.session(host), **parts, clock=clock, limits=limits)
 
 
-def _simulated(bench: Bench) -> Bench:
+def _simulate_instruments(bench: Bench) -> Bench:
     """The same bench with a simulated instrument without faults in every role."""
     twins = {
         role: part.model_copy(update={"url": SIMULATED, "stream_url": None, "faults": ()})
@@ -164,7 +164,7 @@ def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Pla
     """
     ledger = Ledger()
     parts = _parts(bench, ledger)
-    dry = rehearsing if procedure.adaptive else _counting
+    dry = rehearsing if procedure.adaptive else _plan_session
     with dry(bench, parts, ledger) as session:
         session.reference()
         procedure.function(session, **settings)
@@ -183,7 +183,7 @@ def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Pla
 
 
 @contextmanager
-def _counting(bench: Bench, parts: Mapping[str, Any], ledger: Ledger) -> Iterator[Session]:
+def _plan_session(bench: Bench, parts: Mapping[str, Any], ledger: Ledger) -> Iterator[Session]:
     """A session on planned instruments."""
     limits = replace(bench.limits, temperature_c=(-math.inf, math.inf))  # the temperature is not known yet
     yield Session(**parts, clock=ledger, host=PlanHost(ledger), limits=limits)

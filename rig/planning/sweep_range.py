@@ -176,14 +176,14 @@ class Range:
 
 def _candidates(standard: Sequence[Pose]) -> Iterator[Pose]:
     """The angles of the sweep and angles between them, from both sides, on its faces."""
-    alphas, betas = (_filled(getattr(pose, name) for pose in standard) for name in ("alpha_deg", "beta_deg"))
+    alphas, betas = (_fill_gaps(getattr(pose, name) for pose in standard) for name in ("alpha_deg", "beta_deg"))
     for flip in sorted({pose.flip for pose in standard}):
         for alpha in alphas:
             for beta in (beta for beta in betas if beta < betas[0] + 360):
                 yield from (Pose(alpha, beta, direction, flip=flip) for direction in (1, -1))
 
 
-def _filled(angles_deg: Iterable[float]) -> list[float]:
+def _fill_gaps(angles_deg: Iterable[float]) -> list[float]:
     """Angles in order, with others between those that are farther apart than GRID_DEG."""
     angles = sorted(set(angles_deg))
     steps = [(a, b, max(1, round((b - a) / GRID_DEG))) for a, b in pairwise(angles)]

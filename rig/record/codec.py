@@ -37,12 +37,12 @@ def encode(samples: NDArray[np.float64]) -> bytes:
 def decode(data: bytes) -> NDArray[np.float64]:
     """The samples, bit for bit, shape (n, channels). Raises ValueError for damaged data; uses at most MOST_BYTES."""
     try:
-        return _decode(_inflated(data))
+        return _decode(_inflate(data))
     except (zlib.error, struct.error, IndexError, ValueError) as error:
         raise ValueError(f"damaged sample block: {error}") from None
 
 
-def _inflated(data: bytes) -> bytes:
+def _inflate(data: bytes) -> bytes:
     inflater = zlib.decompressobj()
     raw = inflater.decompress(data, MOST_BYTES)
     if not inflater.eof:

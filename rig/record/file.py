@@ -49,7 +49,7 @@ def open_file(path: Path, notify: Callable[[str], None] = lambda _: None) -> Eng
     is damaged, or belongs to a newer program. Later use of the engine raises it as well. `notify` gets a message if the
     write-ahead log was removed.
     """
-    engine = create_engine(f"sqlite:///{path}", creator=lambda: _connected(path))
+    engine = create_engine(f"sqlite:///{path}", creator=lambda: _connect(path))
     event.listen(engine, "connect", lambda connection, _: give_sha256(connection))
     event.listen(engine, "connect", lambda _, info: info.info.update(sides=_sides(path), inode=_inode(path)))
     event.listen(engine, "checkout", lambda connection, info, _: _require_sides(connection, info.info, path, notify))
@@ -65,7 +65,7 @@ def open_file(path: Path, notify: Callable[[str], None] = lambda _: None) -> Eng
     return engine
 
 
-def _connected(path: Path) -> sqlite3.Connection:
+def _connect(path: Path) -> sqlite3.Connection:
     """A new connection. It waits for a busy file, and a commit reaches the disk."""
     if path.exists() and not os.access(path.parent, os.W_OK):
         connection = sqlite3.connect(

@@ -124,7 +124,7 @@ def _step(source: Connection, target: Connection, parcel: _Parcel) -> Pushed | N
     name, arrived = _arrival(target, parcel)
     if arrived == parcel.head:
         return Pushed(parcel.run, name, "there", parcel.digest)
-    if not _filled(source, target, parcel.run, name):
+    if not _fill(source, target, parcel.run, name):
         return None
     _seal(source, target, parcel, name)
     return Pushed(parcel.run, name, "pushed", parcel.digest)
@@ -143,7 +143,7 @@ def _arrival(target: Connection, parcel: _Parcel) -> tuple[str, str | None]:
     raise RecordError(f"run {parcel.run}: the lab has two other runs with this name; ask the owner of the lab's record")
 
 
-def _filled(source: Connection, target: Connection, run: str, name: str) -> bool:
+def _fill(source: Connection, target: Connection, run: str, name: str) -> bool:
     """Add a batch of rows. Returns whether all rows are in the lab."""
     remaining = MOST_BYTES
     for table, present in count(target, name).items():

@@ -63,7 +63,7 @@ def recover(source: Path, folder: Path) -> Recovered:
         for leftover in folder.glob(f"{file.name}*"):
             leftover.unlink()  # of an attempt that failed
     try:
-        recovered = _recovered(_completed_copy(source, padded), unfinished)
+        recovered = _recover_rows(_complete_copy(source, padded), unfinished)
         unfinished.rename(target)
     finally:
         for leftover in (*folder.glob(f"{unfinished.name}*"), *folder.glob(f"{padded.name}*")):
@@ -71,19 +71,19 @@ def recover(source: Path, folder: Path) -> Recovered:
     return recovered
 
 
-def _recovered(source: Path, target: Path) -> Recovered:
+def _recover_rows(source: Path, target: Path) -> Recovered:
     """Copy the readable rows of the file `source` into the new file `target`."""
     with closing(_open_damaged(source)) as old:
         open_file(target).dispose()
         new = sqlite3.connect(target)
         rows, damaged = {}, []
         for table in metadata.sorted_tables:
-            copied, is_complete = _copied(old, new, table.name)
+            copied, is_complete = _copy_rows(old, new, table.name)
             rows[table.name] = copied
             if not is_complete:
                 damaged.append(table.name)
         new.commit()
-        replaced_runs = tuple(_checked(target))
+        replaced_runs = tuple(_remove_damaged_rows(target))
         damaged_samples = tuple(_spoilt(new))
         for name, other_table in (("poses", "blocks"), ("blocks", "poses"), ("dwells", "poses")):
             match = f"{other_table}.run = {name}.run AND {other_table}.number = {name}.number"
@@ -97,7 +97,7 @@ def _recovered(source: Path, target: Path) -> Recovered:
 _HEADER = struct.Struct(">16x H 10x I")  # of SQLite's file: bytes of a page, number of pages
 
 
-def _completed_copy(source: Path, padded: Path) -> Path:
+def _complete_copy(source: Path, padded: Path) -> Path:
     """The file, or a copy that is filled up with zeros if the end is missing, and has a sound schema."""
     with source.open("rb") as file:
         head = file.read(_HEADER.size)
@@ -120,7 +120,7 @@ def _completed_copy(source: Path, padded: Path) -> Path:
     return padded
 
 
-def _checked(target: Path) -> Iterator[str]:
+def _remove_damaged_rows(target: Path) -> Iterator[str]:
     """Remove rows that changed on the disk, and make a new entry for runs without a sound one. Yields the losses."""
     engine = open_file(target)
     try:
@@ -181,7 +181,7 @@ def _open_damaged(source: Path) -> sqlite3.Connection:
     return old
 
 
-def _copied(old: sqlite3.Connection, new: sqlite3.Connection, table: str) -> tuple[int, bool]:
+def _copy_rows(old: sqlite3.Connection, new: sqlite3.Connection, table: str) -> tuple[int, bool]:
     """The number of copied rows of a table, and whether these are all."""
     columns = {row[1] for row in new.execute(f"PRAGMA table_info({table})")}
     try:

@@ -34,10 +34,10 @@ def judged(record: Record, run: Run) -> tuple[dict[str, Any], str | None]:
     except (CalibrationError, RecordError) as error:
         return {}, f"none: {error}"
     determined = {name: result for name, result in results.items() if isinstance(result, Result)}
-    return documents(determined, Bench.model_validate(run.bench).result_limits), _missing(results)
+    return documents(determined, Bench.model_validate(run.bench).result_limits), _list_missing(results)
 
 
-def _missing(results: Mapping[str, Result | Missing]) -> str | None:
+def _list_missing(results: Mapping[str, Result | Missing]) -> str | None:
     """The missing results, each reason once; None if no result is missing."""
     by_reason: dict[str, list[str]] = {}
     for name, result in results.items():

@@ -129,7 +129,7 @@ class RunningEstimates:
                     yield Value(f"{sensor} {parameter}".strip(), value_text, "from the poses so far")
 
 
-def _loaded(outputs: Collection[str], load: Callable[[Pose], Array]) -> Callable[[Dwell], Iterator[Row]]:
+def _rows_by_load(outputs: Collection[str], load: Callable[[Pose], Array]) -> Callable[[Dwell], Iterator[Row]]:
     """Rows of outputs that are linear in loads."""
 
     def rows(dwell: Dwell) -> Iterator[Row]:
@@ -145,7 +145,7 @@ def _rate_and_force(pose: Pose) -> Array:
     return np.concatenate([rate_deg_s, specific_force_g(pose)])
 
 
-def _levelled(dwell: Dwell) -> Iterator[Row]:
+def _level_rows(dwell: Dwell) -> Iterator[Row]:
     """The two horizontal axes of a magnetometer, for hard iron and the square of the circle of this turn.
 
     Positions by hand have no such turns, and no rows.
@@ -168,9 +168,9 @@ def _line(prefix: str, unit: str) -> Callable[[str], Mapping[str, tuple[int, str
 
 
 LAWS = {
-    "poses": Law(FORCES, _loaded(FORCES, specific_force_g), _line("", "{out}/g")),
-    "rates": Law(RATE, _loaded(RATE, _rate_and_force), _line("gyro-", "{out}/(deg/s)")),
-    "positions": Law(FIELD, _levelled, lambda _: {f"hard-iron-{axis}": (k, "{out}") for k, axis in enumerate(AXES)}),
+    "poses": Law(FORCES, _rows_by_load(FORCES, specific_force_g), _line("", "{out}/g")),
+    "rates": Law(RATE, _rows_by_load(RATE, _rate_and_force), _line("gyro-", "{out}/(deg/s)")),
+    "positions": Law(FIELD, _level_rows, lambda _: {f"hard-iron-{axis}": (k, "{out}") for k, axis in enumerate(AXES)}),
 }
 
 

@@ -66,8 +66,8 @@ class Live:
             run, table = self.measure(following)
             used_s = (measurements[-1].used_s if measurements else 0.0) + (following.duration_s or 0.0)
             measurements.append(Measurement(following, run, discover(table, self.model, self.effects), used_s))
-            telling = self._telling(measurements)
-            following = None if stands(measurements) else self._following(telling, measurements)
+            telling = self._separating_experiment(measurements)
+            following = None if stands(measurements) else self._next_experiment(telling, measurements)
             discovered = replace(measurements[-1].discovery, next_experiment=telling)
             measurements[-1] = replace(measurements[-1], discovery=discovered, following=following)
             yield measurements[-1]
@@ -76,7 +76,7 @@ class Live:
         """The experiment with its duration on the bench."""
         return planned_experiment(experiment, self.bench, self.bench_file)[0]
 
-    def _telling(self, measurements: Sequence[Measurement]) -> Experiment | None:
+    def _separating_experiment(self, measurements: Sequence[Measurement]) -> Experiment | None:
         """The experiment that separates the explanations, with or without time for it; None for one explanation."""
         discovered = measurements[-1].discovery
         if discovered.next_experiment is None:
@@ -85,7 +85,7 @@ class Live:
         menu = _new((*ADDITIONS, *MENU), measurements)
         return choose_experiment(dispute, discovered.next_experiment, self.bench, self.bench_file, menu, (TOGETHER,))
 
-    def _following(self, telling: Experiment | None, measurements: Sequence[Measurement]) -> Experiment | None:
+    def _next_experiment(self, telling: Experiment | None, measurements: Sequence[Measurement]) -> Experiment | None:
         """The next experiment: `telling` if its poses fit the other data, else poses in between; None without time.
 
         A short sweep comes before a much longer experiment: the room may show the same as the oven.

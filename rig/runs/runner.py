@@ -107,10 +107,10 @@ def resume(record: Record, run_id: str, observer: Observer, bench: Bench | None 
     Raises Busy, RunMismatch if `bench` or an instrument is another one, and the errors of connection.
     """
     with stoppable():
-        return _after_decision(record, _resumed(record, run_id, observer, bench, trace), observer, trace)
+        return _after_decision(record, _resume(record, run_id, observer, bench, trace), observer, trace)
 
 
-def _resumed(
+def _resume(
     record: Record, run_id: str, observer: Observer, bench: Bench | None = None, trace: bool = False
 ) -> Outcome:
     run = record.run(run_id)
@@ -124,11 +124,13 @@ def _resumed(
     with stoppable(), _lease_run(record, run_id), connected(own_bench, trail) as rig:
         if trail is not None:
             trail.begin(run_id)
-        _same_instruments(run, rig)
-        return _carry_out(record, rig, run, procedure, observer, _unanswered(record, run, own_bench, procedure))
+        _require_same_instruments(run, rig)
+        return _carry_out(
+            record, rig, run, procedure, observer, _find_unanswered_question(record, run, own_bench, procedure)
+        )
 
 
-def _unanswered(record: Record, run: Run, bench: Bench, procedure: Procedure) -> Confirm | None:
+def _find_unanswered_question(record: Record, run: Run, bench: Bench, procedure: Procedure) -> Confirm | None:
     """The first question of a run that ended before its answer; None if the record has an answer."""
     if any(event.what.startswith("answer ") for event in record.events(run.run)):
         return None
@@ -142,7 +144,7 @@ def _after_decision(record: Record, outcome: Outcome, observer: Observer, trace:
         if wish == "repeat" and outcome.run.rows:
             record.exclude(run, record.next_number(run) - 1, REPEATED)
         try:
-            outcome = _resumed(record, run, observer, trace=trace)
+            outcome = _resume(record, run, observer, trace=trace)
         except (DriverError, RigError) as error:  # such as an instrument that still does not answer
             outcome = Outcome(record.run(run), error, outcome.moving)  # nothing has stopped these since
     return outcome
@@ -191,7 +193,7 @@ def _carry_out(
             record.set_state(run.run, _state(error), str(error))
         if isinstance(failure, Exception) and error is not failure:
             raise  # a defect of the program
-        return _interrupted(record, run, error, complaints)
+        return _interrupted_outcome(record, run, error, complaints)
     log("complete", reason or f"{len(results)} results")
     _complete(record, run.run, reason and f"results: {reason}", results)
     return Outcome(record.run(run.run))
@@ -215,7 +217,7 @@ def _complete(record: Record, run: str, reason: str | None, results: Mapping[str
         record.set_state(run, "complete", "; ".join([*([reason] if reason else []), *remarks]) or None, results)
 
 
-def _interrupted(record: Record, run: Run, error: Exception, complaints: Sequence[str]) -> Outcome:
+def _interrupted_outcome(record: Record, run: Run, error: Exception, complaints: Sequence[str]) -> Outcome:
     """The outcome of an interrupted run, even if the record cannot be read any more."""
     try:
         return Outcome(record.run(run.run), error, tuple(complaints))
@@ -265,7 +267,7 @@ def _perform(
     return {name: returned(name, result) for name, result in results.items()}
 
 
-def _same_instruments(run: Run, rig: Rig) -> None:
+def _require_same_instruments(run: Run, rig: Rig) -> None:
     """Raises RunMismatch if an instrument was exchanged since the begin of the run."""
     for role, identity in rig.identities().items():
         if asdict(identity) != run.identities.get(role):

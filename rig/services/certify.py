@@ -72,7 +72,7 @@ def certified(subject: Certified, number: str = "", customer: str = "") -> Certi
     """
     data = subject.data
     require_reference(subject.table.source, subject.table.kind)
-    with _measured(data) as measured:
+    with _open_run(data) as measured:
         run = measured.run if measured is not None else None
         bench = subject.bench or (_bench(run) if run is not None and run.bench else None)
         fitted, figured, before = _results(subject, bench.result_limits if bench is not None else {})
@@ -108,7 +108,7 @@ def certified(subject: Certified, number: str = "", customer: str = "") -> Certi
         model_sha256=model_digest,
         remarks=(*_remarks(run, lab is not None and lab.name != UNSTATED), *_gravity_remarks(table)),
         reference=_reference(table),
-        simulated=bool(_simulated(run)),
+        simulated=bool(_list_simulated_roles(run)),
     )
 
 
@@ -149,7 +149,7 @@ def _results(subject: Certified, limits: Mapping[str, float | tuple[float, float
 
 
 @contextmanager
-def _measured(data: str) -> Iterator[Measured | None]:
+def _open_run(data: str) -> Iterator[Measured | None]:
     """The run, while its record is open; None for a file."""
     if Path(data).is_file():
         yield None
@@ -237,7 +237,7 @@ def _conditions(table: Table) -> Iterator[Condition]:
             yield Condition(name, unit, float(values.min()), float(values.mean()), float(values.max()))
 
 
-def _simulated(run: Run | None) -> list[str]:
+def _list_simulated_roles(run: Run | None) -> list[str]:
     """The roles of the run's instruments that were simulated."""
     if run is None or not run.bench:
         return []
@@ -245,7 +245,7 @@ def _simulated(run: Run | None) -> list[str]:
 
 
 def _remarks(run: Run | None, is_stated: bool) -> Iterator[str]:
-    if roles := _simulated(run):
+    if roles := _list_simulated_roles(run):
         yield f"These instruments were simulated: {', '.join(roles)}. This document certifies no sensor."
     if run is not None and EXPIRED in run.constants:
         yield f"{run.constants[EXPIRED]}: measurements with it are not traceable."

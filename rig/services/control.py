@@ -54,7 +54,7 @@ def controlled(
     if not charted:
         names = ", ".join(dict.fromkeys(sensor for sensor, _ in keys))
         raise RecordError(f"{names}: {FEWEST_RUNS} check-standard runs are needed for a chart; there is one")
-    return [_controlled(*key, own_points, baseline) for key, own_points in charted.items()]
+    return [_control(*key, own_points, baseline) for key, own_points in charted.items()]
 
 
 # In words, for the command and the page.
@@ -112,7 +112,7 @@ def _points(run: Run) -> Iterator[_Point]:
         yield _Point(sensor.get("serial") or sensor["name"], quantity, run.run, result)
 
 
-def _controlled(sensor: str, quantity: str, points: list[_Point], baseline: int) -> Controlled:
+def _control(sensor: str, quantity: str, points: list[_Point], baseline: int) -> Controlled:
     stds = [point.result["std"] or 0.0 for point in points]
     least_sigma = float(np.sqrt(np.mean(np.square(stds[:baseline]))))
     chart = control_chart([point.result["value"] for point in points], baseline, least_sigma)

@@ -175,7 +175,7 @@ def hidden_faults(bench: Bench, fitted: Fit, start: Fit) -> Faults:
     The poses are those of the fit's table, visited once more in a world without noise. Raises what the world raises.
     """
     config = WorldConfig.from_mapping(bench.world)
-    poses = _visited(config, bench.seed, fitted.table)
+    poses = _simulate_poses(config, bench.seed, fitted.table)
     faults = [_fault(name, settings, config, bench.seed, fitted.table, poses) for name, settings in MECHANISMS.items()]
     start_effects = {term.name for term in start.model.terms}
     effects = [_effect(term.name, fitted, poses) for term in fitted.model.terms if term.name not in start_effects]
@@ -200,7 +200,7 @@ def grouped(
         shared_effects = dict.fromkeys([e.name for g in shared for e in g.effects] + [e.name for e in makers])
         groups = [g for g in groups if g not in shared]
         groups.append(Group(members, tuple(e for e in of_catalogue if e.name in shared_effects)))
-    confirmed = [part for group in groups for part in _judged(group, effects)]
+    confirmed = [part for group in groups for part in _judge_group(group, effects)]
     used = {e.name for group in confirmed for e in group.effects}
     ordered = tuple(sorted(confirmed, key=lambda g: -max(f.size for f in g.faults)))
     return ordered, tuple(e for e in effects if e.name not in used)
@@ -230,7 +230,7 @@ def _remainder_rms(fault: Curve, effects: Sequence[Curve]) -> float:
     return float(rms(curve - columns_ @ np.linalg.lstsq(columns_, curve, rcond=None)[0]))
 
 
-def _judged(group: Group, effects: Sequence[Curve]) -> list[Group]:
+def _judge_group(group: Group, effects: Sequence[Curve]) -> list[Group]:
     """The group with the free forms of its effects, if its effects agree with its faults; else its faults alone."""
     places = {place_of_effect(e.name) for e in group.effects}
     of_place = [e for e in effects if e.span is None and place_of_effect(e.name) in places]
@@ -255,7 +255,7 @@ def _correlation(a: Curve, b: Curve) -> float:
     return float(np.sum(a.curve * b.curve)) / length if length > 0 else 0.0
 
 
-def _visited(config: WorldConfig, seed: int, table: Table) -> Table:
+def _simulate_poses(config: WorldConfig, seed: int, table: Table) -> Table:
     """The poses of a table, visited without noise."""
     columns_visited = World(config, seed).dwell_mean(
         table.column("alpha_deg"),
@@ -280,8 +280,8 @@ def _fault(
         return None
     faultless = config
     for path, value in changes:
-        faultless = faultless.changed(_nested(path, value))
-    return Curve(name, _free(poses, poses.outputs - _visited(faultless, seed, table).outputs))
+        faultless = faultless.changed(_nest(path, value))
+    return Curve(name, _free(poses, poses.outputs - _simulate_poses(faultless, seed, table).outputs))
 
 
 def _value(config: Any, path: str) -> float:
@@ -290,9 +290,9 @@ def _value(config: Any, path: str) -> float:
     return float(config)
 
 
-def _nested(path: str, value: float) -> dict[str, Any]:
+def _nest(path: str, value: float) -> dict[str, Any]:
     head, _, tail = path.partition(".")
-    return {head: _nested(tail, value) if tail else value}
+    return {head: _nest(tail, value) if tail else value}
 
 
 def _effect(name: str, fitted: Fit, poses: Table) -> Curve:

@@ -54,13 +54,15 @@ def compare_rigs(calibrations: Sequence[Calibration], first_rig: str, second_rig
     return Compared(
         first_rig,
         second_rig,
-        _compared(_means_on(first_rig, calibrations), _means_on(second_rig, calibrations), first_rig, second_rig),
+        _compare_parameters(
+            _means_on(first_rig, calibrations), _means_on(second_rig, calibrations), first_rig, second_rig
+        ),
     )
 
 
 def compare(a: Calibration, b: Calibration) -> dict[str, tuple[str, Agreement]]:
     """Two calibrations, by the names that both have: unit and agreement. Raises DataError where there is none."""
-    return _compared(a.values, b.values, a.data, b.data)
+    return _compare_parameters(a.values, b.values, a.data, b.data)
 
 
 def _means_on(rig: str, calibrations: Sequence[Calibration]) -> dict[str, Value]:
@@ -75,7 +77,7 @@ def _means_on(rig: str, calibrations: Sequence[Calibration]) -> dict[str, Value]
     }
 
 
-def _compared(
+def _compare_parameters(
     a: Mapping[str, Value], b: Mapping[str, Value], first_name: str, second_name: str
 ) -> dict[str, tuple[str, Agreement]]:
     shared = [name for name in a if name in b and a[name].unit == b[name].unit]

@@ -211,14 +211,14 @@ def _has_channels_alone(path: Path) -> bool:
 
 def channels_alone(beginning: str) -> bool:
     """Whether the text of a table has times or a rate, outputs of a sensor, and no column of its orientation."""
-    constants, names = _beginning(beginning.splitlines())
+    constants, names = _read_header(beginning.splitlines())
     columns = set(names)
     timed = "t_s" in columns or "sample_rate_hz" in constants
     channels = columns - set(BESIDE)
     return timed and bool(channels) and channels <= CHANNELS and not any(triad <= columns for triad in TRIADS)
 
 
-def _beginning(lines: list[str]) -> tuple[set[str], list[str]]:
+def _read_header(lines: list[str]) -> tuple[set[str], list[str]]:
     """(constants above a table's header, names in the header)."""
     comment_lines = list(takewhile(lambda line: line.startswith("#"), lines))
     header = lines[len(comment_lines)] if len(lines) > len(comment_lines) else ""

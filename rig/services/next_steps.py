@@ -50,15 +50,21 @@ LONGER = 4  # times as long halves a statistical uncertainty
 
 def next_steps(run: Run, excluded: Mapping[int, str]) -> list[str]:
     """The next steps after a run: for each verdict that is not a pass, and with the measured data."""
-    return [*_left_out(excluded), *_failed(run), *_marginal(run), *_unjudged(run.results), *_commands(run)]
+    return [
+        *_advise_on_excluded(excluded),
+        *_advise_on_failures(run),
+        *_marginal(run),
+        *_advise_on_limits(run.results),
+        *_commands(run),
+    ]
 
 
-def _left_out(excluded: Mapping[int, str]) -> Iterator[str]:
+def _advise_on_excluded(excluded: Mapping[int, str]) -> Iterator[str]:
     if excluded:
         yield f"Left out: {'; '.join(f'pose {number} ({reason})' for number, reason in excluded.items())}"
 
 
-def _failed(run: Run) -> Iterator[str]:
+def _advise_on_failures(run: Run) -> Iterator[str]:
     """Results beyond their limits, those of one remedy together."""
     by_remedy: dict[str, list[str]] = {}
     for name in _with_verdict(run.results, "fail"):
@@ -84,7 +90,7 @@ def _with_verdict(results: Mapping[str, Any], verdict: str) -> list[str]:
     return [name for name, result in results.items() if result["verdict"] == verdict]
 
 
-def _unjudged(results: Mapping[str, Any]) -> Iterator[str]:
+def _advise_on_limits(results: Mapping[str, Any]) -> Iterator[str]:
     """A remark that a result without a limit has no verdict, and how to give it one."""
     free = [name.rpartition("/")[2] for name, result in results.items() if result["limit"] is None]
     if free:
@@ -110,7 +116,12 @@ def _commands(run: Run) -> Iterator[str]:
 
 def page_steps(run: Run, excluded: Mapping[int, str]) -> list[PageStep]:
     """`next_steps` for a page."""
-    lines = [*_left_out(excluded), *_failed(run), *_marginal(run), *_unjudged(run.results)]
+    lines = [
+        *_advise_on_excluded(excluded),
+        *_advise_on_failures(run),
+        *_marginal(run),
+        *_advise_on_limits(run.results),
+    ]
     steps = [page_step(line.replace(f" {run.run}", ""), run.run, run.procedure) for line in lines]
     if run.state != "complete":
         steps.append(PageStep("The run is not complete. Resume it on the page Run.", {"Run": "/run"}))

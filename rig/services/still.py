@@ -159,7 +159,7 @@ def of_table(table: Table, channel: str | None, rate_hz: float | None) -> Stream
     samples = Stream(
         table.source, channel_name, rate, unit, iter([table.column(channel_name)]), corner_hz, other_channels,
         constants=table.constants,
-        logged={name: [table.column(name)] for name in _logged(table, channel_name)},
+        logged={name: [table.column(name)] for name in _list_logged_columns(table, channel_name)},
     )  # fmt: skip
     return replace(samples, closed=list(times.gaps), uneven_s=times.uneven_s) if times else samples
 
@@ -172,7 +172,7 @@ def _no_record(subject: str) -> DataError:
     )
 
 
-def _logged(table: Table, channel: str) -> Iterator[str]:
+def _list_logged_columns(table: Table, channel: str) -> Iterator[str]:
     """Columns that an output may follow: temperature, supply, and columns whose names are not those of outputs."""
     for name in table.columns:
         is_channel = name not in BESIDE and AXIS.fullmatch(channel) is not None and AXIS.fullmatch(name) is None

@@ -38,14 +38,14 @@ def averaged(log: Table, notify: Callable[[str], None]) -> Table:
     table, copies = drop_duplicate_rows(table)
     if copies is not None:
         notify(copies)
-    return _included(table, notify)
+    return _without_excluded_rows(table, notify)
 
 
 def _row_count_text(table: Table) -> str:
     return table.type.taken.format(table.n)
 
 
-def _included(table: Table, notify: Callable[[str], None]) -> Table:
+def _without_excluded_rows(table: Table, notify: Callable[[str], None]) -> Table:
     """The table without the rows that its column `excluded` marks; a run has `rig exclude` instead."""
     is_excluded = table.optional(EXCLUDED, 0.0) != 0
     if not is_excluded.any():

@@ -97,7 +97,7 @@ def begin(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> Calculatio
     """Call in a thread. The server does not wait for the thread when it ends."""
     future = Future[R]()
     work = partial(copy_context().run, call, *args, **kwargs)
-    thread = Thread(target=_settled, args=(future, work), name=call.__name__, daemon=True)
+    thread = Thread(target=_settle, args=(future, work), name=call.__name__, daemon=True)
     _CALCULATIONS.add(thread)
     thread.start()
     return Calculation(thread, future)
@@ -127,7 +127,7 @@ def leave_calculations() -> None:
         os._exit(0)
 
 
-def _settled(future: Future[R], work: Callable[[], R]) -> None:
+def _settle(future: Future[R], work: Callable[[], R]) -> None:
     """Set the result or the error of the work, even if no page waits for it."""
     try:
         if future.set_running_or_notify_cancel():

@@ -71,7 +71,7 @@ def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[
     config = uvicorn.Config(
         guarded, log_level="warning", access_log=False, timeout_graceful_shutdown=1, ws_max_size=1 << 24
     )
-    with _ignored_signals(), listener:
+    with _ignore_signals(), listener:
         _Server(config, lambda: ready(place)).run(sockets=[listener])
     atexit.register(leave_calculations)
 
@@ -93,14 +93,14 @@ class _Server(uvicorn.Server):
 def _listen(host: str, port: int | None) -> socket.socket:
     """A socket that listens at the address. Raises RigError."""
     try:
-        return _listening(host, PORT if port is None else port)
+        return _open_listening_socket(host, PORT if port is None else port)
     except OSError as error:
         if port is None:
-            return _listening(host, 0)
+            return _open_listening_socket(host, 0)
         raise RigError(f"cannot listen at {host}:{port}: {error.strerror}; give another --port or --host") from None
 
 
-def _listening(host: str, port: int) -> socket.socket:
+def _open_listening_socket(host: str, port: int) -> socket.socket:
     """A socket that listens from the start: until then another server may take the same port. Raises OSError."""
     listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -114,7 +114,7 @@ def _listening(host: str, port: int) -> socket.socket:
 
 
 @contextmanager
-def _ignored_signals() -> Iterator[None]:
+def _ignore_signals() -> Iterator[None]:
     """Ignore the signals that uvicorn raises again after it has ended the server."""
 
     def ignore(number: int, frame: FrameType | None) -> None: ...

@@ -15,7 +15,7 @@ from calibrations.fitting.inputs import input_contributions
 from calibrations.geometry.earth import normal_gravity
 from calibrations.model.file import read_model
 from calibrations.presentation.certificate.content import decide
-from calibrations.presentation.certificate.results import _why_further, figures, interval, simulate, verdict
+from calibrations.presentation.certificate.results import _explain_wider_interval, figures, interval, simulate, verdict
 from calibrations.presentation.certificate.terms import in_si, name, names, term
 from tests.calibrations import turned
 from tests.calibrations.certified import LIMITS, before, certificate, fitted, table
@@ -108,9 +108,9 @@ def test_a_budget_that_reaches_further_says_why() -> None:
     """Slow noise of which the rows say little: u allows for more of it than was found."""
     drawn = Budget((Line("white noise", "A", "", None, None, np.array([1.0]), 50.0),
                     Line("slow noise", "A", "", None, None, np.array([2.0]), 5.0)))  # fmt: skip
-    assert _why_further(0, 2.36, 2.24, 1.0, drawn) == "slow noise is not well known, few degrees of freedom"
-    assert _why_further(0, 2.36, 0.9, 0.9, drawn) == "few degrees of freedom"
-    assert _why_further(0, 2.0, 2.24, 1.0, Budget(drawn.lines[:1])) == ""
+    assert _explain_wider_interval(0, 2.36, 2.24, 1.0, drawn) == "slow noise is not well known, few degrees of freedom"
+    assert _explain_wider_interval(0, 2.36, 0.9, 0.9, drawn) == "few degrees of freedom"
+    assert _explain_wider_interval(0, 2.0, 2.24, 1.0, Budget(drawn.lines[:1])) == ""
 
 
 def test_what_the_simulation_finds_wider_is_wider() -> None:

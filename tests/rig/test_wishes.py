@@ -126,7 +126,9 @@ def test_an_instrument_that_does_not_come_back_is_told_and_asked_about_again(mon
         raise InstrumentFailed("beta does not answer")
 
     monkeypatch.setattr("rig.runs.runner._stop", lambda _: ["beta may still move"])
-    watch = Disturbed(lambda: (monkeypatch.setattr("rig.runs.runner._same_instruments", gone), alarm()), "resume")
+    watch = Disturbed(
+        lambda: (monkeypatch.setattr("rig.runs.runner._require_same_instruments", gone), alarm()), "resume"
+    )
     with Record() as record:
         outcome = start(record, read_bench(), *small_sweep(), watch)
     assert [str(seen.error) for seen in watch.outcomes][1:] == ["beta does not answer"]

@@ -51,11 +51,11 @@ class Hysteresis(Effect):
         path = turning_points(approached(table, float(p.approach_deg)))
         from calibrations.effects.kernels import slip  # numba is slow to import
 
-        return slip(a, path, _pressed(a, p), _limits(p), p.begin) * p.height
+        return slip(a, path, _limit_factor(a, p), _limits(p), p.begin) * p.height
 
     def follow(self, a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[Array, list[Array]]:
         """`before` and after: the specific force at which each element would be at rest, g."""
-        limits, limit_factor = _limits(p), _pressed(a, p)
+        limits, limit_factor = _limits(p), _limit_factor(a, p)
         forces = [
             np.minimum(limit * limit_factor, np.maximum(-limit * limit_factor, a - rest_point))
             for limit, rest_point in zip(limits, before, strict=True)
@@ -68,6 +68,6 @@ def _limits(p: Values) -> Array:
     return np.asarray(p.reach * (1 + p.spread * ELEMENTS))
 
 
-def _pressed(a: Array, p: Values) -> Array:
+def _limit_factor(a: Array, p: Values) -> Array:
     """Factor on the limits, shape (n, 3)."""
     return 1 + p.pressing * np.abs(other_in_plane(a))

@@ -41,7 +41,7 @@ def dcc(c: Certificate) -> str:
     text = json.dumps(document(c), allow_nan=False, ensure_ascii=False)
     return (
         templates()
-        .overlay(finalize=_collapsed)
+        .overlay(finalize=_collapse_blanks)
         .get_template("dcc.xml")
         .render(
             c=c,
@@ -64,7 +64,7 @@ def dcc(c: Certificate) -> str:
     )
 
 
-def _collapsed(value: Any) -> Any:
+def _collapse_blanks(value: Any) -> Any:
     """A text without blanks at its ends and in a row, as the schema wants it."""
     return " ".join(value.split()) if isinstance(value, str) and not isinstance(value, Markup) else value
 

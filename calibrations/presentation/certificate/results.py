@@ -96,11 +96,13 @@ def _noise(noise: Noise, trials: int, rng: np.random.Generator) -> Array:
     samples = noise.fast * rng.standard_normal((trials, channels, n))
     for c, (taus_s, slow) in enumerate(zip(noise.taus_s, noise.slow, strict=True)):
         for tau_s in taus_s if slow > 0 else ():
-            samples[:, c] += slow / np.sqrt(len(taus_s)) * _wandering(np.exp(-noise.gap_s / tau_s), trials, rng)
+            samples[:, c] += (
+                slow / np.sqrt(len(taus_s)) * _simulate_gauss_markov(np.exp(-noise.gap_s / tau_s), trials, rng)
+            )
     return samples
 
 
-def _wandering(phi: Array, trials: int, rng: np.random.Generator) -> Array:
+def _simulate_gauss_markov(phi: Array, trials: int, rng: np.random.Generator) -> Array:
     """Gauss-Markov processes of unit variance, shape (trials, n), `phi` from each row to the next."""
     x = np.empty((trials, len(phi)))
     x[:, 0] = rng.standard_normal(trials)
@@ -173,7 +175,7 @@ def _outcome(
     std, coverage = float(budget.combined[k]), max(CERTAIN_K, float(budget.coverage[k]))
     low, high = (float(end) for end in interval(trial))
     judgement = verdict(e.value, coverage * std, std, low, high)
-    reason = _why_further(k, coverage, std, float(trial.std()), budget) if judgement == CONSERVATIVE else ""
+    reason = _explain_wider_interval(k, coverage, std, float(trial.std()), budget) if judgement == CONSERVATIVE else ""
     if judgement == WIDENED:
         coverage = max(coverage, (e.value - low) / std, (high - e.value) / std)
     limit = limits.get(parameter_name := name(model_term.effect, e.name, e.axis))
@@ -198,7 +200,7 @@ def _outcome(
     )
 
 
-def _why_further(k: int, coverage: float, std: float, simulated: float, budget: Budget) -> str:
+def _explain_wider_interval(k: int, coverage: float, std: float, simulated: float, budget: Budget) -> str:
     """Why the interval of the budget is wider than that of the simulation, if a reason is known."""
     slow = any(line.source == SLOW_NOISE and line.std is not None and line.std[k] > 0 for line in budget.given)
     reasons = [

@@ -138,7 +138,7 @@ def album(discovery: Discovery[Fit], compared: Comparison[Fit], motion: MotionRe
     The result of a run of the procedure motion comes first, if it is given.
     """
     falling, *effects = steps_album(discovery)
-    return [*(_evaluated(result) for result in (motion,) if result), falling, *fit_album(compared.fit), *effects]
+    return [*(_motion_picture(result) for result in (motion,) if result), falling, *fit_album(compared.fit), *effects]
 
 
 def steps_album(discovery: Discovery[Fit]) -> list[Picture]:
@@ -155,7 +155,7 @@ def steps_album(discovery: Discovery[Fit]) -> list[Picture]:
     ]
 
 
-def _evaluated(motion: MotionResult) -> Picture:
+def _motion_picture(motion: MotionResult) -> Picture:
     """Fig. 12 of the paper."""
     caption = (
         "Above: acceleration along x by the sensor (full line) and by the displacement sensor (dotted), over the first "

@@ -111,7 +111,7 @@ def waveform(fit: Fit, axis: str) -> Waveform:
     c, t = table.axes.index(axis), table.samples.time_s
     start = int(np.searchsorted(t, table.time_s[len(table.time_s) // 2]))
     rows = slice(start, int(np.searchsorted(t, t[start] + SHOWN_S)))
-    model = _predicted(fit)[rows, c]
+    model = _predict(fit)[rows, c]
     return Waveform(t[rows] - t[0], table.samples.outputs[rows, c] - model.mean(), model - model.mean())
 
 
@@ -132,7 +132,7 @@ def over_a_period(fit: Fit, axis: str) -> Period:
     part = np.minimum((phase * BINS / 360).astype(int), BINS - 1)
     count = np.bincount(part, minlength=BINS)
     c, filled = table.axes.index(axis), count > 0
-    residual = table.samples.outputs[:, c] - _predicted(fit)[:, c]
+    residual = table.samples.outputs[:, c] - _predict(fit)[:, c]
     mean = np.bincount(part, residual, minlength=BINS) / np.maximum(count, 1)
     # a part of the period comes once in a period: by then the output filter has forgotten
     floor = float(rms(residual - mean[part])) / np.sqrt(np.median(count))
@@ -143,7 +143,7 @@ def _stretches(fit: Fit) -> Stretches:
     return make_stretches(fit.table)  # itself, by its own kind
 
 
-def _predicted(fit: Fit) -> Array:
+def _predict(fit: Fit) -> Array:
     """The model's output at each sample, shape (samples, axes)."""
     return forward(_stretches(fit).samples, fit.problem.layout.steps(fit.theta))
 

@@ -227,7 +227,7 @@ RATES_DEG_S = np.linspace(-100.0, 100.0, 21)
 def of_field(effect: Effect) -> Part:
     """Residual of the field's magnitude by the effect, parts per thousand, over full turns of a magnetometer."""
     strength = catalogue()["field-strength"]
-    table = _turned_in_a_field()
+    table = _simulate_turns_in_field()
     steps: list[Step] = [] if effect.name == strength.name else [(strength, Values(total=np.asarray(1.0)))]
     steps.append((effect, shown_values(effect, table)))
     output = respond(sensed(table.outputs, table, steps), table, steps)
@@ -239,7 +239,7 @@ def of_field(effect: Effect) -> Part:
 def of_rates(effect: Effect) -> list[Part]:
     """Residual of each output by the effect, deg/s, over the rate of turns of a gyroscope about each edge."""
     ideal = catalogue()["gyro-scale-factor"]
-    table = _turned_at_rates()
+    table = _simulate_turns_at_rates()
     rate = rate_deg_s(table)
     unit_scale = Values({**shown_values(ideal, table), "scale": np.ones(3)})
     steps: list[Step] = [] if effect.name == ideal.name else [(ideal, unit_scale)]
@@ -259,7 +259,7 @@ def _curves(n: int) -> Iterator[Curve]:
         yield Curve(f"about {axis}", colour, "-", np.arange(k * n, (k + 1) * n))
 
 
-def _turned_in_a_field() -> Table:
+def _simulate_turns_in_field() -> Table:
     """Full turns about x, y and z across a field of 1."""
     c, s, zero = np.cos(np.radians(TURN_DEG)), np.sin(np.radians(TURN_DEG)), np.zeros(len(TURN_DEG))
     turns = [np.column_stack(components) for components in ((zero, c, s), (s, zero, c), (c, s, zero))]
@@ -267,7 +267,7 @@ def _turned_in_a_field() -> Table:
     return Table.from_columns("positions", dict(zip(("mx", "my", "mz"), m.T, strict=True)), source="turns")
 
 
-def _turned_at_rates() -> Table:
+def _simulate_turns_at_rates() -> Table:
     """Turns about x, y and z, each upright in its turn."""
     up = np.repeat(np.eye(3), len(RATES_DEG_S), axis=0)
     rate = np.tile(RATES_DEG_S, 3)

@@ -131,7 +131,7 @@ def simulate_command(bench_file: Path | None, as_json: bool) -> None:
     """
     bench = read_bench(bench_file)
     with ExitStack() as stack:
-        stop_signals = stack.enter_context(_signalled())
+        stop_signals = stack.enter_context(_catch_signals())
         clock = WallClock()
         servers = list(serve(bench, world_of(bench)).values())
         for server in servers:
@@ -143,7 +143,7 @@ def simulate_command(bench_file: Path | None, as_json: bool) -> None:
 
 
 @contextmanager
-def _signalled() -> Iterator[list[int]]:
+def _catch_signals() -> Iterator[list[int]]:
     """The stop signals received so far; inside, they do not end the process."""
     received: list[int] = []
 

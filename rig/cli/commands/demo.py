@@ -60,7 +60,7 @@ def demo_command(folder: Path | None, realistic: bool, as_json: bool) -> None:
         else "A simulated sensor has three hidden faults. The analysis does not know them."
     )
     with working("starting; the first time takes a minute", 0.0) as progress:
-        run = _measured(bench, settings, progress)
+        run = _measure(bench, settings, progress)
         progress.share = MEASURING
         table, linear = load(run), read_model("linear")
         discovered = discover(table, linear, progress.searched(effects_of(None)))
@@ -79,7 +79,7 @@ def demo_command(folder: Path | None, realistic: bool, as_json: bool) -> None:
     click.echo("The same in a browser: rig web" + ("" if realistic else "\nThe second act: rig demo --realistic"))
 
 
-def _measured(bench: Bench, settings: Mapping[str, str], progress: Progress) -> str:
+def _measure(bench: Bench, settings: Mapping[str, str], progress: Progress) -> str:
     """The id of a sweep on the bench. Raises the error that ended it."""
     from procedures.catalogue import find
     from procedures.settings import parse

@@ -38,7 +38,7 @@ def doctor_command(
     passwords, tokens or keys of the bench file. Look at it before you send it.
     """
     if folder is not None:
-        return _recovered(folder, as_json)
+        return _recover(folder, as_json)
     checked = findings()
     archive = out or Path(f"rig-doctor-{datetime.now(UTC):%Y%m%d-%H%M%S}.zip")
     require_outputs(archive)
@@ -77,7 +77,7 @@ def _write(archive: Path, parts: Mapping[str, Any]) -> None:
             file.writestr(name, json.dumps(document, indent=1, default=str))
 
 
-def _recovered(folder: Path, as_json: bool) -> int:
+def _recover(folder: Path, as_json: bool) -> int:
     """Recover the record; print the copied and the lost rows."""
     from rig.record.recover import recover
 

@@ -198,7 +198,7 @@ def optimal_lines(optimum: Optimal, out: str | None, bench: str | None = None) -
     yield ""
     yield from map(wrap_text, purpose(optimum))
     yield ""
-    yield from _how_to_run(optimum, out, bench)
+    yield from _explain_run(optimum, out, bench)
 
 
 def optimal_document(optimum: Optimal) -> dict[str, Any]:
@@ -221,7 +221,7 @@ def optimal_document(optimum: Optimal) -> dict[str, Any]:
     }
 
 
-def _how_to_run(optimum: Optimal, out: str | None, bench: str | None) -> Iterator[str]:
+def _explain_run(optimum: Optimal, out: str | None, bench: str | None) -> Iterator[str]:
     settle_s = optimum.equal.plan.settings["settle_s"]
     words = ["rig", "run", "sweep", "--pose-list", out or "poses.csv", "--dwell-s", f"{optimum.equal.dwell_s:g}"]
     words += ["--settle-s", f"{settle_s:g}"] if settle_s != 0.5 else []

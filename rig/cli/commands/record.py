@@ -55,7 +55,14 @@ def show_command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
             for name, count in run_counts.items()
         ]
         history = [_event(event, run_row.message) for event in events]
-        parts = (_head(run_row), result_lines, _columns(ranges), history, _listed(listed or []), _logged(lines))
+        parts = (
+            _head(run_row),
+            result_lines,
+            _columns(ranges),
+            history,
+            _tabulate_poses(listed or []),
+            _iterate_log(lines),
+        )
         click.echo("\n\n".join("\n".join(part) for part in parts if part))
 
 
@@ -77,7 +84,7 @@ def _poses(record: Record, run: Run) -> list[dict[str, Any]]:
     """Every pose as JSON, or every row of an imported table, with the reason if it is excluded."""
     table = Measured(record, run).imported() if not run.bench and run.kind in MEANS else None
     if table is None:
-        return list(_measured(record, run))
+        return list(_iterate_poses(record, run))
     reasons = record.excluded(run.run)
     cells = {**table.labels, **{name: values.tolist() for name, values in table.columns.items()}}
     return [
@@ -86,7 +93,7 @@ def _poses(record: Record, run: Run) -> list[dict[str, Any]]:
     ]
 
 
-def _measured(record: Record, run: Run) -> Iterator[dict[str, Any]]:
+def _iterate_poses(record: Record, run: Run) -> Iterator[dict[str, Any]]:
     """Every measured pose as JSON."""
     units: Mapping[str, str] | None = None
     for number, recorded in enumerate(record.kept(run.run)):
@@ -140,13 +147,13 @@ def _event(event: Event, message: str | None) -> str:
     return f"  {event.at[:19].replace('T', ' ')}  {event.what}{text}"
 
 
-def _logged(lines: Sequence[Line]) -> Iterator[str]:
+def _iterate_log(lines: Sequence[Line]) -> Iterator[str]:
     """Each line with its time of day (UTC) and the clock of the rig."""
     for line in lines:
         yield f"  {line.at[11:23]}  {line.clock_s:10.3f} s  {line.who}  {line.what}: {line.text}"
 
 
-def _listed(poses: Sequence[Mapping[str, Any]]) -> list[str]:
+def _tabulate_poses(poses: Sequence[Mapping[str, Any]]) -> list[str]:
     """The poses as a table."""
     if not poses:
         return []

@@ -46,11 +46,11 @@ def exit_status(call: Callable[[], Any]) -> int:
     except (KeyboardInterrupt, click.Abort):
         return _print("stopped", 4)
     except Exception as error:
-        return _failed(error)
+        return _report_failure(error)
     return returned if isinstance(returned, int) else 0
 
 
-def _failed(error: Exception) -> int:
+def _report_failure(error: Exception) -> int:
     status = status_of(error)
     if os.environ.get("RIG_DEBUG"):
         traceback.print_exc()

@@ -37,14 +37,14 @@ bench_option = click.option("--bench", "bench_file", type=FILE, help="The bench 
 INPUTS = ("data", "model", "models", "noise", "sources", "before", "bench_file", "answers")  # parameters with files
 
 
-def _forced(context: click.Context, _: click.Parameter, force: bool) -> None:
+def _set_force(context: click.Context, _: click.Parameter, force: bool) -> None:
     context.meta[force_option.__name__] = force
 
 
 def force_option(function: Any) -> Any:
     """--force, for a command that calls `require_outputs`."""
     words = "Replace output files that exist."
-    return click.option("--force", is_flag=True, expose_value=False, callback=_forced, help=words)(function)
+    return click.option("--force", is_flag=True, expose_value=False, callback=_set_force, help=words)(function)
 
 
 def require_outputs(*paths: Path | None) -> None:

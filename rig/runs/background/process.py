@@ -98,7 +98,7 @@ def main(text: str) -> None:
     with lease(home(), lock(order.key), f"an order, {order.procedure}"), Record() as record:
         writer = Attendant(order, order.bench())
         try:
-            outcome = _carried_out(order, record, writer)
+            outcome = _carry_out(order, record, writer)
         except KeyboardInterrupt as stop:  # before the run began, or between its parts
             writer.publish(phase="ended", state="stopped", asked=None, error=who_stopped(str(stop)))
             return
@@ -109,7 +109,7 @@ def main(text: str) -> None:
         push_after(record, outcome.run, Bench.model_validate(outcome.run.bench).lab, print)
 
 
-def _carried_out(order: Order, record: Record, writer: Attendant) -> Outcome:
+def _carry_out(order: Order, record: Record, writer: Attendant) -> Outcome:
     if order.resume:
         return resume(record, order.resume, writer)
     bench = order.bench()

@@ -139,14 +139,14 @@ NOT_BEGUN = "it was stopped before the run began"
 
 def read(key: str) -> Status | None:
     """The status of the process `key`; None before its first status. A killed process has ended."""
-    status = _published(key)
+    status = _read_published(key)
     if status is None or status.phase == "ended" or is_held(home(), lock(key)) or _is_starting(status):
         return status
-    status = _published(key) or status  # the process may have ended in the meantime
-    return status if status.phase == "ended" else _killed(status)
+    status = _read_published(key) or status  # the process may have ended in the meantime
+    return status if status.phase == "ended" else _status_of_killed(status)
 
 
-def _published(key: str) -> Status | None:
+def _read_published(key: str) -> Status | None:
     """The last status that the process `key` wrote."""
     try:
         document = json.loads(file(key, "json").read_text(encoding="utf-8"))
@@ -156,7 +156,7 @@ def _published(key: str) -> Status | None:
     return Status(**document, asked=OpenQuestion(**question) if question else None)
 
 
-def _killed(status: Status) -> Status:
+def _status_of_killed(status: Status) -> Status:
     """The last status of a killed process. The record says how many poses it stored and whether it was complete."""
     error = f"its process ended: {_last_words(status.key, status.run)}"
     status = replace(status, phase="ended", state="stopped", asked=None, error=error)
@@ -167,12 +167,12 @@ def _killed(status: Status) -> Status:
             run = record.run(status.run)
         if run.state == "complete":
             status = replace(status, state=run.state, error="")
-        status = replace(status, done=_stored(run, status.done, status.total))
+        status = replace(status, done=_count_stored(run, status.done, status.total))
         status.write()  # later readers need not look into the record
     return status
 
 
-def _stored(run: Run, seen_poses: int, total: int) -> int:
+def _count_stored(run: Run, seen_poses: int, total: int) -> int:
     """The poses of a run that has ended. A signal can come before a stored one is counted."""
     return max(run.rows, seen_poses) if total else 0
 
@@ -257,7 +257,7 @@ class StatusWriter(RunViewer):
 
     def ended(self, run: Run, error: str, **changes: Any) -> None:
         """Write the last status, with the poses of the record."""
-        recorded_poses = _stored(run, self.view.progress.done, self.view.progress.total)
+        recorded_poses = _count_stored(run, self.view.progress.done, self.view.progress.total)
         self.view = replace(self.view, progress=replace(self.view.progress, done=recorded_poses))
         self.publish(phase="ended", state=run.state, asked=None, error=error, **changes)
 

@@ -53,7 +53,7 @@ class CheckStandards:
                 for title in self._panels():
                     with div("picture"):
                         plot = titled_plot(title, CONTROL_LEGENDS[title], "live-plot", f"Check standard: {title}")
-                        self.plots[title] = plot.on("plotly_click", _clicked, js_handler=CLICKED)
+                        self.plots[title] = plot.on("plotly_click", _open_clicked_run, js_handler=CLICKED)
         self.draw()
 
     def draw(self) -> None:
@@ -67,5 +67,5 @@ class CheckStandards:
         return control_panels(standard.quantity, standard.chart, standard.unit, days, list(standard.runs))
 
 
-def _clicked(event: events.GenericEventArguments) -> None:
+def _open_clicked_run(event: events.GenericEventArguments) -> None:
     ui.navigate.to(f"/record/{event.args}")

@@ -130,14 +130,16 @@ class HistoryPage:
                 models(request.model, None), label="Model", value=request.model,
                 on_change=lambda e: self._go(HistoryRequest(self.request.sensor, e.value)),
             ).props("dense options-dense")  # fmt: skip
-            self.quantity = ui.select([], label="Quantity", on_change=self._other_quantity).props("dense options-dense")
-            self.limit = ui.number("Largest change", min=0, on_change=self._other_limit).props("dense debounce=300")
+            self.quantity = ui.select([], label="Quantity", on_change=self._change_quantity).props(
+                "dense options-dense"
+            )
+            self.limit = ui.number("Largest change", min=0, on_change=self._change_limit).props("dense debounce=300")
             self.baseline = ui.number(
                 "Chart baseline",
                 value=request.baseline,
                 min=FEWEST_RUNS,
                 precision=0,
-                on_change=self._other_baseline,
+                on_change=self._change_baseline,
             ).props("dense debounce=300")
         self.fields = (self.quantity, self.limit, self.baseline)
         for field in self.fields:
@@ -177,7 +179,7 @@ class HistoryPage:
             self.summary_box = div("")
             self.pictures = HistoryPictures(self.request.model)
             with div("two beside"):
-                self.closest = ClosestBox(self.request, self._other_day)
+                self.closest = ClosestBox(self.request, self._change_day)
                 CompareBox(history, self.sensors, self.request.model, self._last_of)
             self.tables = div("stack")
             if history.passed_over:
@@ -223,20 +225,20 @@ class HistoryPage:
             ui.navigate.history.replace(request.address)
             self.show()
 
-    def _other_quantity(self) -> None:
+    def _change_quantity(self) -> None:
         if self.quantity.value:
             self._apply(replace(self.request, quantity=self.quantity.value))
 
-    def _other_limit(self) -> None:
+    def _change_limit(self) -> None:
         other_limits = {name: limit for name, limit in self.request.limits.items() if name != self.request.quantity}
         own_limit = {self.request.quantity: float(self.limit.value)} if self.limit.value else {}
         self._apply(replace(self.request, limits=other_limits | own_limit))
 
-    def _other_baseline(self) -> None:
+    def _change_baseline(self) -> None:
         if self.baseline.value and self.baseline.value >= FEWEST_RUNS:
             self._apply(replace(self.request, baseline=int(self.baseline.value)))
 
-    def _other_day(self) -> None:
+    def _change_day(self) -> None:
         if (day := self.closest.day) is not None:
             self._apply(replace(self.request, at=day))
 

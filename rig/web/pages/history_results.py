@@ -139,13 +139,13 @@ class CompareBox:
 
     async def compare(self) -> None:
         """Compare the shared quantities."""
-        work = off_loop(self._compared, [str(field.value) for field in self.two])
+        work = off_loop(self._compare, [str(field.value) for field in self.two])
         compared = await shown(self.result, "Comparing", "Cannot compare these calibrations", work)
         if compared is not None:
             with self.result:
                 _show(compared, self.model)
 
-    def _compared(self, days: Sequence[str]) -> Compared:
+    def _compare(self, days: Sequence[str]) -> Compared:
         if self.kind.value == SENSOR:
             return compare_sensors(self.life, days[0], self.last_of(days[0]))
         if self.kind.value == RIGS:
@@ -220,9 +220,9 @@ class HistoryPictures:
                 draw(self.charts[title], untitled(panel), f"{title} {q.name}")
 
     def _plot(self, title: str, legend: str = "") -> ui.plotly:
-        return titled_plot(title, legend).on("plotly_click", self._clicked, js_handler=CLICKED)
+        return titled_plot(title, legend).on("plotly_click", self._open_clicked, js_handler=CLICKED)
 
-    def _clicked(self, event: events.GenericEventArguments) -> None:
+    def _open_clicked(self, event: events.GenericEventArguments) -> None:
         ui.navigate.to(model_of(str(event.args), self.model))
 
 

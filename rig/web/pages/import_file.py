@@ -161,7 +161,7 @@ class Column:
             with ui.element("td"):
                 words(sample_text, "number small")
             with ui.element("td"):
-                self.name = ui.select({UNUSED: "other"}, value=UNUSED, on_change=self._renamed)
+                self.name = ui.select({UNUSED: "other"}, value=UNUSED, on_change=self._rename_column)
             with ui.element("td"):
                 self.unit = ui.select([], on_change=page.look)
         for field, label in ((self.name, "meaning"), (self.unit, "unit")):
@@ -182,7 +182,7 @@ class Column:
         self.unit.set_options({unit: unit_text(unit) or "as it is" for unit in options}, value=default_unit)
         self.unit.set_visibility(bool(offered))
 
-    def _renamed(self) -> None:
+    def _rename_column(self) -> None:
         self.stated = ""
         self._offer_units("")
         self.page.look()

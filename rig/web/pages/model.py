@@ -141,7 +141,7 @@ class Workbench:
         try:
             session = await self.visit.work(self.desk.open, self.data, self.model, self.requested.added, self.noise)
         except Cancelled:
-            self._cancelled()
+            self._show_cancelled()
             return
         except Exception as error:
             with afresh(self.body):
@@ -163,7 +163,7 @@ class Workbench:
         ui.timer(LOOK_S, self._look_for_changes)
         await self.show(session)
 
-    def _cancelled(self) -> None:
+    def _show_cancelled(self) -> None:
         """The person cancelled the fit: nothing is shown."""
         if self.visit.closed:
             return

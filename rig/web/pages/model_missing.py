@@ -132,7 +132,7 @@ class Missing:
         missing = bool(result.missing)
         with afresh(self.cards):
             if not missing:
-                self._nothing_to_add(result)
+                self._show_nothing_to_add(result)
             if missing and result.judgement.provisional:
                 words("Provisional: may change when further effects are added.", "quiet small")
             if len(result.missing) > 1 and result.findings.steps and not self.page.discovering:
@@ -149,7 +149,7 @@ class Missing:
             with candidate_box:
                 await self._next(result)
 
-    def _nothing_to_add(self, result: Diagnosis[Any]) -> None:
+    def _show_nothing_to_add(self, result: Diagnosis[Any]) -> None:
         is_adequate = result.verdict is Verdict.ADEQUATE
         with box("verdict good" if is_adequate else "verdict doubt"):
             hint = " Write your own effect above." if self.own.box.visible and result.residual_structure else ""

@@ -92,7 +92,7 @@ class Pictures(AxisAndUnit):
             self.legends[name] = words("", "legend quiet")
             plot = self.plots[name] = empty_plot(TITLES[name])
         if name in LINKED:
-            plot.on("plotly_selected", self._brushed, js_handler=POINTS)
+            plot.on("plotly_selected", self._select_brushed, js_handler=POINTS)
             plot.on("plotly_deselect", lambda: self.select([]), js_handler="() => emit()")
 
     def show(self, compared: Comparison[Fit], session: ModelSession[Fit]) -> None:
@@ -215,7 +215,7 @@ class Pictures(AxisAndUnit):
         rows = rows_at(self.fit, place)
         self.select(np.flatnonzero(np.isin(self.shown.rows, rows)).tolist())
 
-    def _brushed(self, event: events.GenericEventArguments) -> None:
+    def _select_brushed(self, event: events.GenericEventArguments) -> None:
         self.select(event.args if isinstance(event.args, list) else [])
 
     def select(self, points: Sequence[int]) -> None:

@@ -55,7 +55,7 @@ class VerdictBox:
                 with div("figure"):
                     words(value, "value")
                     words(name, "quiet small")
-        self.described, self.watched = _failing(compared), None
+        self.described, self.watched = _show_failing(compared), None
         self._show(self.described)
 
     def wait(self, activity: str, visit: Visit | None = None) -> None:
@@ -95,7 +95,7 @@ class VerdictBox:
         self.more.set_visibility(False)
 
 
-def _failing(compared: Comparison[Any]) -> str:
+def _show_failing(compared: Comparison[Any]) -> str:
     """The model and the data; the places where it fails have a row of their own."""
     subject = f"{compared.fit.model.name} on {compared.data.description}."
     text = subject if compared.fails else f"{subject} No place fails."
