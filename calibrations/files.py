@@ -151,8 +151,8 @@ class _Unpacked(gzip.GzipFile):
             raise DataError(f"{self.name}: a line has more than {most} MiB; is it really a CSV file?")
         if self._taken > max(SMALL_BYTES, TIGHTEST * self._packed):
             raise DataError(
-                f"{self.name}: unpacks to more than {TIGHTEST} times its size, which measurements do not; "
-                "is it really a table? If it is, unpack it and import the unpacked file"
+                f"{self.name}: the unpacked file is more than {TIGHTEST} times larger, which is unusual for "
+                "measurements; is it really a table? If it is, unpack it and import the unpacked file"
             )
         if self._taken > LARGEST_BYTES:
             raise DataError(

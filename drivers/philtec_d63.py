@@ -47,7 +47,7 @@ class Curve:
     def from_mapping(cls, values: Mapping[str, Any]) -> Curve:
         """A curve as a bench file gives it: keys serial, date, near, far. Raises ValueError."""
         if unknown := sorted(map(str, set(values) - set(KEYS))):
-            raise ValueError(f"{', '.join(unknown)}: no such key of a D63's curve; known are {', '.join(KEYS)}")
+            raise ValueError(f"{', '.join(unknown)}: not a key of a D63's curve; the keys are {', '.join(KEYS)}")
         if missing := sorted({"serial", "date", "near"} - set(values)):
             raise ValueError(f"{', '.join(missing)}: missing in a D63's curve")
         near, far = (_points(side, values.get(side, ())) for side in ("near", "far"))

@@ -105,7 +105,9 @@ class Recorder(Generic[Settings]):
 
     def power(self, on: bool) -> None:  # noqa: ARG002
         """Raises LimitError: no line of it switches the sensor."""
-        raise LimitError(f"{self.name}: no line switches the power", "Switch the sensor by hand, or use a LabJack T7")
+        raise LimitError(
+            f"{self.name}: the program cannot switch the power", "Switch the sensor by hand, or use a LabJack T7"
+        )
 
     def only(self, *outputs: str) -> Self:
         """The same device with these channels and no others. Raises LimitError for one that is not there."""

@@ -228,7 +228,7 @@ class Dataset(ABC, Generic[F]):
 
     def until(self, findings: Findings[F], enough: Enough) -> Findings[F]:  # noqa: ARG002
         """The findings up to the first model whose error on unseen data is small enough. Raises ModelError."""
-        raise ModelError(f"{self.source}: the search in a still record has no error at which to stop; remove --enough")
+        raise ModelError(f"{self.source}: the search in a still record has no limit for the error; remove --enough")
 
     def add(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> Discovery[F]:
         """The model with one effect more. Raises ModelError where it has the effect, or cannot have it."""

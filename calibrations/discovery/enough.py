@@ -82,7 +82,7 @@ def parse_enough(text: str) -> Enough:
         value = np.nan
     name = match["unit"] if match else ""
     if not value > 0 or not np.isfinite(value) or (name not in UNITS and name not in FLOORS):
-        raise ModelError(f'"{text}" is no error at which to stop; give a number with mg, mV or floors, such as 0.5mg')
+        raise ModelError(f'"{text}" is not a limit for the error; give a number with mg, mV or floors, such as 0.5mg')
     return Enough(value, "floors" if name in FLOORS else name)
 
 

@@ -51,7 +51,7 @@ def effect_for(name: str, text: str, table: Table) -> Effect:
         similar = difflib.get_close_matches(word, column_names | {*FUNCTIONS}, n=1, cutoff=MISSPELT)
         if similar and word not in column_names and len(word) > 3 and not word.startswith(similar[0]):
             raise expression.fault(
-                column_number, f'"{word}" is no column; did you mean "{similar[0]}"? Name a parameter otherwise'
+                column_number, f'"{word}" is not a column; did you mean "{similar[0]}"? If it is a parameter, rename it'
             )
     effect = own_effect(name, expression.text, tuple(w for w in expression.names if w in table and may_be_column(w)))
     for column in effect.needs:
@@ -119,14 +119,14 @@ class _FromExpression(Effect):
         return np.clip(np.broadcast_to(result, shape), -LARGEST, LARGEST)
 
     def _no_number(self, values: Mapping[str, Array]) -> ExpressionError:
-        """Names the innermost part that is no number, and the first row where."""
+        """Names the innermost part that is not a number, and its first row."""
         parts = [n for n in nodes(self._expression.root) if not np.isfinite(evaluate(n, values)).all()]
         row = int(np.argmax(~np.isfinite(np.atleast_2d(evaluate(parts[-1], values))).all(axis=-1)))
         values_text = ", ".join(f"{p.name} = {np.ravel(values[p.name])[0]:.4g}" for p in self.parameters)
         return self._expression.fault(
             getattr(parts[-1], "at", 0),
-            f"{self.name} is no number on row {row + 1}, with {values_text}; keep divisors away from 0, and above 0 "
-            "what log, sqrt or a broken power is taken of",
+            f"{self.name} is not a number on row {row + 1}, with {values_text}; keep divisors away from 0, and above 0 "
+            "the arguments of log, sqrt and powers with fractions",
         )
 
 

@@ -138,7 +138,7 @@ def require_size(path: Path, unpacked: int) -> None:
         )
     if unpacked > max(SMALL_BYTES, TIGHTEST * packed):
         raise DataError(
-            f"{path}: unpacks to more than {TIGHTEST} times its size, which measurements do not; "
+            f"{path}: the unpacked file is more than {TIGHTEST} times larger, which is unusual for measurements; "
             "if it is a table, save it without compression"
         )
 

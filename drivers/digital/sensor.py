@@ -149,8 +149,8 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         return "" if self._warmth.last_c is None else f"; the sensor is at {self._warmth.last_c:.1f} C"
 
     def power(self, on: bool) -> None:  # noqa: ARG002 - as the converter's
-        """Raises LimitError: no line switches its power."""
-        raise LimitError(f"{self.name}: no line switches the power of a digital sensor", "Switch it by hand")
+        """Raises LimitError: the program cannot switch its power."""
+        raise LimitError(f"{self.name}: the program cannot switch the power of a digital sensor", "Switch it by hand")
 
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         """Record for `duration_s` without a gap, in blocks of `block_s`, both rounded to whole samples.
@@ -227,7 +227,8 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         rate_hz = reception.measured_rate_hz if reception.length_s > 1.0 else self.settings.rate_hz
         if abs(rate_hz / self.settings.rate_hz - 1) > RATE_OFF:
             raise StreamError(
-                f"{self.name}: {rate_hz:.4g} samples a second come, and rate_hz is {self.settings.rate_hz:g}",
+                f"{self.name}: the sensor sends {rate_hz:.4g} samples a second, "
+                f"but rate_hz is {self.settings.rate_hz:g}",
                 "Correct rate_hz in the sensor's settings",
             )
 

@@ -97,7 +97,7 @@ class T7(Recorder[Settings]):
     def power(self, on: bool) -> None:
         """Switch the sensor's power by the digital line of the settings."""
         if self.settings.power_dio is None:
-            raise LimitError(f"{self.name}: no line switches the power", "Set power_dio in the bench file")
+            raise LimitError(f"{self.name}: the program cannot switch the power", "Set power_dio in the bench file")
         self._unit.write(t7.dio(self.settings.power_dio), int(on))
 
     def look(self) -> None:

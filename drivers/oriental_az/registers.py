@@ -167,7 +167,7 @@ class Settings:
         require_positive(self, "steps_per_turn", "speed_deg_s", "acceleration_deg_s2", "settle_deg", "current_percent")
         require_range(self, "limits_deg")
         if self.own_limits and not all(map(math.isfinite, self.limits_deg)):
-            raise ValueError("own_limits needs both numbers of limits_deg")
+            raise ValueError("with own_limits, give both numbers of limits_deg")
         if self.speed_deg_s > self.speed_limit_deg_s:
             raise ValueError(f"speed_deg_s must be at most speed_limit_deg_s, {self.speed_limit_deg_s:g}")
         if self.communication_timeout_s and not 0.5 <= self.communication_timeout_s <= 10:

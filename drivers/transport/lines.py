@@ -94,7 +94,7 @@ class VisaLines:
 
     def _session(self) -> Any:
         if self._closed:
-            raise LinkRefused(f"{self._name}: {self._url.text}: is closed", "Connect again")
+            raise LinkRefused(f"{self._name}: {self._url.text}: the connection is closed", "Connect again")
         if self._resource is None:
             self._resource = self._open()
         return self._resource

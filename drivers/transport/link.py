@@ -134,7 +134,7 @@ class Link:
 
     def _connected(self) -> Connected:
         if self._closed:
-            raise LinkRefused(f"{self._place}: is closed", "Connect again")
+            raise LinkRefused(f"{self._place}: the connection is closed", "Connect again")
         if self._line is None:
             self._line = self._connect()
         return self._line

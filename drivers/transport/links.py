@@ -53,7 +53,7 @@ class Links:
         """
         url = Url.parse(address.url)
         if url.scheme != "ca":
-            raise LinkRefused(f"{name}: {address.url} is no address of EPICS", "Write ca:NAME, or ca://host:port/NAME")
+            raise LinkRefused(f"{name}: {address.url} is not an EPICS address", "Write ca:NAME, or ca://host:port/NAME")
         place = (url.host, url.port or CA_PORT) if url.host else found_server(url.record + first, name, timeout_s)
         if place not in self._circuits:
             self._circuits[place] = Circuit(self.link(f"tcp://{place[0]}:{place[1]}", name), place)

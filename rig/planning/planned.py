@@ -179,7 +179,7 @@ class PlannedAdc:
 
     def power(self, on: bool) -> None:
         if self._settings.power_dio is None:
-            raise LimitError(f"{self._name}: no line switches the power", "Set power_dio in the bench file")
+            raise LimitError(f"{self._name}: the program cannot switch the power", "Set power_dio in the bench file")
         if on != self._power:
             self._ledger.add(f"{self._name} switches the sensor {'on' if on else 'off'}", EXCHANGE_S)
         self._power = on

@@ -232,7 +232,7 @@ def _check_gaps(gaps: Sequence[tuple[float, float]], length_s: float, source: st
     if missing > MOST_MISSING * length_s:
         longest = max(gaps, key=lambda gap: gap[1])
         raise DataError(
-            f"{source}: {len(gaps)} gaps, {missing:g} s in all beside {length_s:g} s of samples; the longest, of "
+            f"{source}: {len(gaps)} gaps, {missing:g} s in total, and {length_s:g} s of samples; the longest, of "
             f"{longest[1]:g} s, is at t = {longest[0]:g} s: analyse the parts between the gaps separately"
         )
 

@@ -54,7 +54,7 @@ def _without_excluded_rows(table: Table, notify: Callable[[str], None]) -> Table
         f"{table.source}: {np.count_nonzero(is_excluded)} of {table.n} rows are left out, as its column `{EXCLUDED}`."
     )
     if is_excluded.all():
-        raise DataError(f"{table.source}: its column `{EXCLUDED}` leaves out every row; write 0 for the rows to use")
+        raise DataError(f"{table.source}: its column `{EXCLUDED}` excludes every row; write 0 for the rows to use")
     return table.rows(~is_excluded)
 
 

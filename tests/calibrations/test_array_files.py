@@ -198,7 +198,7 @@ def test_zeros_that_unpack_beyond_measurements_are_refused(tmp_path: Path, monke
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file.create_dataset("acc", data=np.zeros((100_000, 3)), compression="gzip")
     monkeypatch.setattr(topics, "SMALL_BYTES", 1 << 16)
-    with pytest.raises(DataError, match=r"a\.h5: unpacks to more than 50 times its size"):
+    with pytest.raises(DataError, match=r"a\.h5: the unpacked file is more than 50 times larger"):
         open_sheet(tmp_path / "a.h5")
 
 

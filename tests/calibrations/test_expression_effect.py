@@ -119,7 +119,7 @@ def test_a_model_file_with_a_bad_expression_is_refused(content: dict[str, object
         ("a*vx_v", "column 3: vx_v is what is measured"),
         ("beta_deg += a*ax", "column 15: ax follows from the stage angles"),
         ("a*temperature", "column 3: needs the column temperature_c; made has: alpha_deg"),
-        ("a*humidty", 'column 3: "humidty" is no column; did you mean "humidity"?'),
+        ("a*humidty", 'column 3: "humidty" is not a column; did you mean "humidity"?'),
         ("vz += a*t", "needs the output of axis z; made has: vx_v, vy_v"),
         ("+".join(f"p{k}*t**{k}" for k in range(13)), "more than 12 parameters"),
     ],
@@ -130,7 +130,7 @@ def test_what_the_data_cannot_mean_is_refused(text: str, says: str) -> None:
 
 
 def test_what_is_no_number_is_told_with_its_row() -> None:
-    with pytest.raises(ExpressionError, match=r"column 3: own is no number on row 8, with a = .*keep divisors away"):
+    with pytest.raises(ExpressionError, match=r"column 3: own is not a number on row 8, with a = .*keep divisors away"):
         added("a*log(ax)", table(0.0 * X))
 
 

@@ -184,5 +184,5 @@ def test_gzip_that_unpacks_beyond_measurements_is_refused_early(
     packed.write_bytes(gzip.compress(b"alpha_deg,beta_deg,vx_v\n" + b"90,0,2.5\n" * 200_000))
     assert read_csv(packed).n == 200_000  # small enough to be harmless
     monkeypatch.setattr(files, "SMALL_BYTES", 1 << 16)
-    with pytest.raises(DataError, match=r"bomb\.csv\.gz: unpacks to more than 50 times its size"):
+    with pytest.raises(DataError, match=r"bomb\.csv\.gz: the unpacked file is more than 50 times larger"):
         read_csv(packed)

@@ -35,7 +35,7 @@ from drivers.pi_e727 import driver as pi_e727
         (
             oriental_az,
             {"own_limits": True, "limits_deg": (-float("inf"), float("inf"))},
-            "own_limits needs both numbers of limits_deg",
+            "with own_limits, give both numbers of limits_deg",
         ),
         (labjack_t7, {"rate_hz": 40e3}, "at most 100000 samples a second"),
         (labjack_t7, {"rate_hz": 0.0}, "rate_hz"),

@@ -340,7 +340,7 @@ def test_an_address_of_epics_names_its_record() -> None:
     assert Url.parse("ca:XF:23ID1-ES{Dif-Ax:Th}Mtr").record == "XF:23ID1-ES{Dif-Ax:Th}Mtr"
     with pytest.raises(LinkRefused, match="only the drivers epics_motor and epics_adc"):
         Links(WallClock()).link("ca:13IDC:m1", "alpha")
-    with pytest.raises(LinkRefused, match=r"is no address of EPICS.*Write ca:NAME"):
+    with pytest.raises(LinkRefused, match=r"is not an EPICS address.*Write ca:NAME"):
         motor_driver.connect(Address("tcp://127.0.0.1:5064"), Links(WallClock()), motor_driver.Settings(), "alpha")
 
 

@@ -74,7 +74,7 @@ def test_a_side_that_was_not_calibrated() -> None:
         ({"near": [[50, 0.5], [40, 1.5], [150, 2.0], [200, 4.0]]}, "the gap must grow"),
         ({"near": [[50, 0.5], [100, math.nan], [150, 3.0], [200, 4.0]]}, "the output rise"),
         ({"near": [50, 100]}, "near: must be a list of pairs"),
-        ({"neer": []}, "neer: no such key of a D63's curve; known are serial, date, near, far"),
+        ({"neer": []}, "neer: not a key of a D63's curve; the keys are serial, date, near, far"),
     ],
 )
 def test_what_is_no_curve_is_refused(change: dict[str, Any], words: str) -> None:

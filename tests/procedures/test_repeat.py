@@ -18,7 +18,7 @@ class NoLine(Adc):
     """A converter that no power line is wired to."""
 
     def power(self, on: bool) -> None:
-        raise LimitError("adc: no line switches the power", "Set power_dio")
+        raise LimitError("adc: the program cannot switch the power", "Set power_dio")
 
 
 def world() -> World:

@@ -36,7 +36,7 @@ class Streaming(Adc):
 
     def power(self, on: bool) -> None:
         if not self.line:
-            raise LimitError("adc: no line switches the power", "Set power_dio")
+            raise LimitError("adc: the program cannot switch the power", "Set power_dio")
         super().power(on)
 
 

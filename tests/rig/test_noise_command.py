@@ -215,7 +215,7 @@ def test_a_supply_is_coarse_where_noise_does_not_smooth_its_steps(noise_v: float
         (("uneven.csv",), "s; samples must be evenly spaced: record again with every sample"),
         (("means.csv",), "a row is the mean of 500 samples (column n), as in poses"),
         (("one-constant.csv",), "channel vx_v (--channel takes another: vy_v): every sample is the same"),
-        (("torn.csv",), "1 gaps, 200 s in all beside 119.98 s of samples; the longest, of 200 s, is at t = 19.98 s"),
+        (("torn.csv",), "1 gaps, 200 s in total, and 119.98 s of samples; the longest, of 200 s, is at t = 19.98 s"),
         (("back.csv",), "row 501: the time does not increase"),
         (("constant.csv",), "every sample is the same"),
         (("poses.csv",), "a table of poses; a noise analysis needs single samples"),
