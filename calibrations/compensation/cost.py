@@ -16,7 +16,7 @@ import numpy as np
 from calibrations.compensation.forward import FORCES, INVERTED, Forward, steps_of
 from calibrations.compensation.program import Program
 from calibrations.effects.logged import RATE
-from calibrations.errors import CalibrationError
+from calibrations.errors import CalibrationError, ModelError
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.geometry.stage_path import turning_points
 from calibrations.model import Estimate, Model, Term
@@ -116,7 +116,14 @@ def _stds(model: Model, forward: Forward, table: Table, a: Array, inputs: Inputs
 
     h = 1e-5
     J = np.stack([(output(model, a + h * e) - output(model, a - h * e)) / (2 * h) for e in np.eye(3)[k]], axis=2)
-    inverse, estimates = np.linalg.inv(J), {key: e for key, e in model.params.items() if e.std and e.identified}
+    try:
+        inverse = np.linalg.inv(J)
+    except np.linalg.LinAlgError:
+        raise ModelError(
+            f"{model.name}: beside its bias, a change of the input changes no output; correct bias and scale factor "
+            "in the model file"
+        ) from None
+    estimates = {key: e for key, e in model.params.items() if e.std and e.identified}
     sides = [(output(up, a), output(down, a)) for up, down in _perturb_models(model)]
     changes = np.stack([np.einsum("nij,nj->ni", inverse, up - down) for up, down in sides]) / (2 * PARAMETER_STEP)
     mixed = (

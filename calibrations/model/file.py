@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue, find
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 SHIPPED = Path(__file__).parents[1] / "models"
 SCHEMA = "rig.model/1"
+MOST = 1e12  # of a value in any unit: a fit that starts farther away resolves no change of the outputs
 
 
 class _Strict(BaseModel):
@@ -32,8 +33,8 @@ class _Strict(BaseModel):
 class _Parameter(_Strict):
     name: str
     axis: Literal["x", "y", "z"] | None = None
-    value: float = Field(allow_inf_nan=False)
-    std: float | None = Field(default=None, allow_inf_nan=False)
+    value: float = Field(ge=-MOST, le=MOST, allow_inf_nan=False)
+    std: float | None = Field(default=None, ge=0, allow_inf_nan=False)
     unit: str = ""
     identified: bool = True
     why: str | None = None
@@ -45,7 +46,7 @@ class _Effect(_Strict):
     forms: list[dict[str, Any]] | None = None  # of a free form, read by `calibrations.free_forms`
     columns: list[str] = []
     tied: bool = False
-    constants: dict[str, float] = {}
+    constants: dict[str, FiniteFloat] = {}
     parameters: list[_Parameter] = []
 
 
@@ -208,8 +209,8 @@ def _check_parameters(entry: _Effect, effect: Effect, label: str) -> None:
             raise ModelError(f'{label}: "{p.name}" has one value for each axis; it needs `axis: x`, y or z')
         if not declared[p.name] and p.axis is not None:
             raise ModelError(f'{label}: "{p.name}" is one value for all axes; remove the key axis, which is {p.axis}')
-        if (entry.effect, p.name, p.value) == ("scale-factor", "scale", 0.0):
-            raise ModelError(f"{label}: the scale is 0, so the sensor would have no response; give another value")
+        if (entry.effect, p.name) == ("scale-factor", "scale") and abs(p.value) < 1 / MOST:
+            raise ModelError(f"{label}: the scale is {p.value:g}, so the sensor would have no response; give another value")
     keys = [(p.name, p.axis) for p in entry.parameters]
     if duplicate := next((key for key in keys if keys.count(key) > 1), None):
         raise ModelError(f"{label}: {' '.join(filter(None, duplicate))} is given twice")

@@ -259,6 +259,12 @@ def test_what_is_not_contractive_is_refused_with_the_way_out() -> None:
     assert made.bound.q > 0.2
 
 
+def test_a_scale_factor_that_vanishes_beside_the_bias_is_refused() -> None:
+    tiny = model({"bias": {"bias": (1e12, 1e12)}, "scale-factor": {"scale": (1e-6, 1e-6)}}, std=1.0)
+    with pytest.raises(ModelError, match="beside its bias, a change of the input changes no output"):
+        invert_model(tiny)
+
+
 def test_part_of_a_saturation_is_inverted() -> None:
     fitted = model({**LINEAR, "saturation": {"high": (3.2, 3.2), "low": (1.7, 1.7), "loss": 0.2}})
     assert error(invert_model(fitted), fitted) < 1e-9

@@ -15,9 +15,9 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.errors import CalibrationError, ModelError, UnknownName
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.correlations import Correlations
-from calibrations.model.file import SHIPPED, dump_model, parse_model, read_model, shipped_names
+from calibrations.model.file import MOST, SHIPPED, dump_model, parse_model, read_model, shipped_names
 
-numbers = st.floats(allow_nan=False, allow_infinity=False)
+numbers = st.floats(-MOST, MOST)
 words = st.text(st.characters(exclude_categories=("C", "Zl", "Zp")), max_size=20)
 TWICE = "{name: bias, value: 1}"
 HEAD = "schema: rig.model/1\nname: mine\n"
@@ -39,7 +39,7 @@ def terms(draw: st.DrawFn, name: str, unit: str) -> Term:
             std = draw(st.none() | numbers.map(abs))
             why = None if identified else draw(words)
             own = parameter.unit.replace("{out}", unit)
-            estimates.append(Estimate(parameter.name, axis, draw(numbers.filter(bool)), std, own, identified, why))
+            estimates.append(Estimate(parameter.name, axis, draw(numbers.filter(lambda v: abs(v) >= 1 / MOST)), std, own, identified, why))
     constants = {key: draw(numbers) for key in effect.constants if draw(st.booleans())}
     return Term(effect, tied, tuple(estimates), constants)
 
@@ -99,6 +99,13 @@ def test_shipped_models_have_no_values_yet(name: str) -> None:
             "effects.0.parameters.0.value",
         ),
         (f"{HEAD}effects: [{{effect: bias, parameters: [{{name: bias, value: .nan}}]}}]", "should be a finite number"),
+        (f"{HEAD}effects: [{{effect: bias, parameters: [{{name: bias, value: 1e13}}]}}]", "less than or equal to 1000000000000"),
+        (f"{HEAD}effects: [{{effect: bias, parameters: [{{name: bias, value: 1, std: -1}}]}}]", "greater than or equal"),
+        (f"{HEAD}effects: [{{effect: hysteresis, constants: {{height: .inf}}}}]", "should be a finite number"),
+        (
+            f"{HEAD}effects: [{{effect: scale-factor, parameters: [{{name: scale, axis: x, value: 1e-13}}]}}]",
+            "the scale is 1e-13, so the sensor would have no response",
+        ),
         (
             f"{HEAD}effects: [{{effect: bias, parameters: [{{name: bais, value: 1}}]}}]",
             'no parameter "bais"; did you mean',
