@@ -210,7 +210,9 @@ def _check_parameters(entry: _Effect, effect: Effect, label: str) -> None:
         if not declared[p.name] and p.axis is not None:
             raise ModelError(f'{label}: "{p.name}" is one value for all axes; remove the key axis, which is {p.axis}')
         if (entry.effect, p.name) == ("scale-factor", "scale") and abs(p.value) < 1 / MOST:
-            raise ModelError(f"{label}: the scale is {p.value:g}, so the sensor would have no response; give another value")
+            raise ModelError(
+                f"{label}: the scale is {p.value:g}, so the sensor would have no response; give another value"
+            )
     keys = [(p.name, p.axis) for p in entry.parameters]
     if duplicate := next((key for key in keys if keys.count(key) > 1), None):
         raise ModelError(f"{label}: {' '.join(filter(None, duplicate))} is given twice")
