@@ -88,9 +88,8 @@ def test_a_stream_without_its_first_packet_is_refused(afflicted: Callable[..., A
 def test_one_lost_answer_costs_no_record(afflicted: Callable[..., Any], what: str, request_number: int) -> None:
     """The device executed the command: a stream that it started must not be declined as another program's."""
     converter, _ = afflicted("labjack_t7", Fault(what, after=request_number, times=1))
-    for _ in range(2):
+    for _ in range(3):  # a stream that was left running would be found by the next one
         assert converter.acquire(0.5).volts.shape == (500, 1)
-    assert converter.read_volts("supply") == pytest.approx(5.0, abs=1e-3)  # declined while a stream runs
 
 
 def test_a_stream_whose_start_is_never_answered_is_stopped(afflicted: Callable[..., Any]) -> None:
@@ -98,7 +97,7 @@ def test_a_stream_whose_start_is_never_answered_is_stopped(afflicted: Callable[.
     with pytest.raises(LinkTimeout, match=r"no answer within 0\.5 s"):
         converter.acquire(0.5)
     clock.sleep(8.0)
-    assert converter.read_volts("supply") == pytest.approx(5.0, abs=1e-3)
+    assert converter.acquire(0.5).volts.shape == (500, 1)
 
 
 @pytest.mark.parametrize("what", EFFECTS)
