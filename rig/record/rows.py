@@ -61,6 +61,27 @@ def select_runs() -> Select[Any]:
     return select(runs, func.coalesce(imported.scalar_subquery(), pose_count).label("rows")).where(~on_its_way)
 
 
+def listed_rows(connection: Connection) -> tuple[Sequence[Row[Any]], list[str]]:
+    """The rows of all runs, newest first, and the ids of runs whose poses cannot be counted.
+
+    A damaged page hides the runs with rows on it, and no others. Raises RecordError if no run is readable.
+    """
+    order = newest_first(connection)
+    try:
+        return connection.execute(select_runs().order_by(order)).all(), []
+    except RecordError as error:
+        rows: list[Row[Any]] = []
+        unreadable: list[str] = []
+        for run in connection.execute(select(runs.c.run).order_by(order)).scalars().all():
+            try:
+                rows += connection.execute(select_runs().where(runs.c.run == run)).all()
+            except RecordError:
+                unreadable.append(run)
+        if not rows:
+            raise error from None
+        return rows, unreadable
+
+
 def named_rows(connection: Connection, name: str) -> Sequence[Row[Any]]:
     """The run of this id, else all whose id begins so.
 
@@ -231,9 +252,11 @@ def require_rows(connection: Connection, table: SqlTable, run: str) -> None:
         raise RecordError(f"run {run}: a row of its {table.name} is lost on the disk; {RECOVER}")
 
 
-def damage_text(run: str) -> str:
-    """The sentence about a run with a damaged entry."""
-    return f"run {run}: its entry is damaged; `rig doctor --recover FOLDER` copies its poses and the other runs"
+def damage_text(run: str, part: str = "entry") -> str:
+    """The sentence about a run with a damaged entry, or with a damaged table of poses."""
+    return (
+        f"run {run}: its {part} is damaged; `rig doctor --recover FOLDER` copies its readable poses and the other runs"
+    )
 
 
 def dwell_of(row: Row[Any]) -> Dwell:

@@ -39,6 +39,7 @@ from rig.record.rows import (
     insert_or_replace,
     kept_of,
     known_names,
+    listed_rows,
     lost_pose_error,
     lost_rows,
     named_rows,
@@ -49,7 +50,6 @@ from rig.record.rows import (
     require_whole,
     run_of,
     runs_of_sensor,
-    select_runs,
     several_error,
     sound,
     timestamp,
@@ -61,7 +61,6 @@ from rig.record.schema import (
     dwells,
     events,
     log,
-    newest_first,
     poses,
     readings,
     runs,
@@ -237,14 +236,15 @@ class Record:
     def runs(self) -> list[Run]:
         """Every readable run, newest first; `damaged_runs` has the others."""
         with self._reading() as connection:
-            rows = connection.execute(select_runs().order_by(newest_first(connection))).all()
+            rows, _ = listed_rows(connection)
         return [self._with_true_state(run_of(row)) for row in rows if not is_damaged(runs, row._mapping)]
 
     def damaged_runs(self) -> list[str]:
-        """A sentence for each run with a damaged entry, newest first."""
+        """A sentence for each run with a damaged entry, newest first, and for each with a damaged table of poses."""
         with self._reading() as connection:
-            rows = connection.execute(select_runs().order_by(newest_first(connection))).all()
-        return [damage_text(row.run) for row in rows if is_damaged(runs, row._mapping)]
+            rows, unreadable = listed_rows(connection)
+        entries = [damage_text(row.run) for row in rows if is_damaged(runs, row._mapping)]
+        return [*entries, *(damage_text(run, "table of poses") for run in unreadable)]
 
     def damaged_rows(self) -> list[str]:
         """A phrase for each row of a run, except its entry, that changed on the disk or is lost."""

@@ -55,6 +55,48 @@ def two_runs(folder: Path) -> tuple[str, str]:
     return recorded(folder, 3), recorded(folder, 3)
 
 
+def repeat_poses(folder: Path, times: int) -> None:
+    """So many more poses in every run, which fill pages of their own."""
+    with closing(sqlite3.connect(folder / "record.db")) as connection, connection:
+        names = [row[1] for row in connection.execute("PRAGMA table_info(poses)") if row[1] != "number"]
+        for k in range(times):
+            connection.execute(
+                f"INSERT INTO poses (number, {', '.join(names)}) "  # noqa: S608
+                f"SELECT number + {3 * (k + 1)}, {', '.join(names)} FROM poses WHERE number < 3"
+            )
+
+
+def damage_page(folder: Path, bad: str, good: str) -> None:
+    """Change one bit of a page with rows of the one run only, such that SQLite cannot read it."""
+    path = folder / "record.db"
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    whole = path.read_bytes()
+
+    def counts(run: str) -> bool:
+        try:
+            with closing(sqlite3.connect(path)) as connection:
+                return bool(connection.execute("SELECT count(*) FROM poses WHERE run = ?", (run,)).fetchone())
+        except sqlite3.DatabaseError:
+            return False
+
+    for place in range(PAGE, len(whole), PAGE):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 0x80]) + whole[place + 1 :])
+        if counts(good) and not counts(bad):
+            return
+    raise AssertionError("no page belongs to one run alone")
+
+
+def test_a_damaged_page_hides_no_other_run(rig: Callable[..., Any], rig_home: Path) -> None:
+    bad, good = two_runs(rig_home)
+    repeat_poses(rig_home, 200)
+    damage_page(rig_home, bad, good)
+    ended = rig("runs")
+    assert (ended.status, good in ended.out) == (0, True), ended
+    assert f"run {bad}: its table of poses is damaged; `rig doctor --recover" in ended.out + ended.err
+    assert rig("show", good).status == 0
+
+
 def test_one_damaged_run_is_named_and_hides_no_other(rig: Callable[..., Any], rig_home: Path, tmp_path: Path) -> None:
     bad, good = two_runs(rig_home)
     flip(rig_home, "constants", bad)
