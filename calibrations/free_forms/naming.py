@@ -95,6 +95,8 @@ def places(result: SearchResult) -> list[ActingPlace]:
         gain, alternatives = _rivals(
             result, names, {larger_place for larger_place in sizes if sizes[place] < FORM_OF * sizes[larger_place]}
         )
+        replacements = [_replacements(result, names, causes, cause) for cause in causes] if len(names) > 1 else []
+        alternatives = tuple(sorted({*alternatives, *(name for each in replacements for name in each)} - set(causes)))
         least = LEAST_SHARE * largest
         if walks:
             least = max(LEAST_UNKNOWN_SHARE * largest, READING_ERRORS * _reading_errors(result, sizes))
@@ -345,3 +347,27 @@ def _rivals(result: SearchResult, names: Sequence[str], larger: set[str]) -> tup
         if gained[c.name][0] - c.price > (min(limit, most) if c.place in larger and not c.general else limit)
     }
     return cost, tuple(sorted(close - {component.cause for component in acting_components}))
+
+
+def _replacements(result: SearchResult, names: Sequence[str], causes: Sequence[str], cause: str) -> tuple[str, ...]:
+    """Catalogue effects of other places that gain nearly as much as one cause does, or more, beside the other causes.
+
+    Free forms are left out: beside these, no form of the catalogue is needed.
+    """
+    acting_components = [result.component(name) for name in names]
+    other_causes = {c.name for c in acting_components if c.form is None and c.cause in causes and c.cause != cause}
+    reduced = result.sizes_without(name for name in names if name not in other_causes)
+    place = acting_components[0].place
+    trials = [
+        c
+        for c in result.components
+        if c.cause
+        and c.form is None
+        and not c.noise
+        and (c.name in names or c.name not in result.sizes.variances)
+        and (c.cause == cause if c.place == place else c.name not in names)
+    ]
+    gained = gains(result.gram, reduced, [c.name for c in trials])
+    net_gains = {c.name: gained[c.name][0] - c.price for c in trials}
+    least = max((net_gains[c.name] for c in trials if c.place == place), default=np.inf) - CLOSE
+    return tuple({c.cause for c in trials if c.place != place and net_gains[c.name] > least})

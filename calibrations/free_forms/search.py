@@ -37,8 +37,8 @@ SMALL_GAIN = 1.0  # of twice the log-likelihood
 LARGEST = 4.0  # of the mean square of the first misfit: more is two components against each other
 HALVINGS = 6  # of a step that overshoots
 NOISE_ALONE, FEW_COMPONENTS = 1.04, 3  # residual over noise and components of a search that needs no second beginning
-# Flicker is tried where the residual over the noise is between these limits. A smaller residual is explained without
-# flicker. A larger residual contains effects that the search did not find.
+# The residual over the noise: a smaller one is explained without flicker; a larger one contains effects that the search
+# did not find.
 LEAST_MISFIT, MOST_MISFIT = 1.2, 2.0
 SLOW_MOST = 0.5  # slow noise, in noise floors, at most (rms)
 SLOW_FIRST = 0.15  # the same while the first components are found: it would take up part of them
@@ -257,8 +257,11 @@ def _without_remainders(best: SearchResult, descent: Callable[[SearchResult], Se
 
     While the first components are found, what they leave is of second order in large effects, and looks like other
     places. The derivatives at the end rely on these. So each place, and each component, is left out in turn with
-    Gauss-Newton steps of its own; what is then missing is searched for again.
+    Gauss-Newton steps of its own; what is then missing is searched for again. Not where the residual is large: what
+    the search did not find is then in every component.
     """
+    if best.ratio > MOST_MISFIT:
+        return best
     simplified = best
     while (simpler := _likelier_without_one(simplified)) is not None:
         simplified = simpler

@@ -44,6 +44,14 @@ def test_what_no_catalogue_holds_gets_no_name(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_cause_in_another_form_is_not_told_apart_from_what_has_nearly_its_form(tmp_path: Path) -> None:
+    converter, eccentricity = CATALOGUE[41], CATALOGUE[37]
+    found = searched(tmp_path, 303, [converter, eccentricity], 20.0)
+    assert found.answer.alternatives == {"quadratic-nonlinearity": ("adc-nonlinearity",)}
+    assert found.exact
+
+
+@pytest.mark.slow
 def test_where_all_effects_at_once_lead_the_fit_astray_they_are_added_one_by_one(tmp_path: Path) -> None:
     causes, floors = [CATALOGUE[k] for k in [11, 13, 23, 31, 17]], [3.3, 54.6, 53.0, 211.6, 4.7]
     random = np.random.default_rng([23, 200])
