@@ -41,7 +41,7 @@ def join_tables(tables: Sequence[Table]) -> Table:
     return Table.from_columns(first.kind, columns, _constants(tables), " + ".join(t.source for t in tables), labels)
 
 
-def clock_began_anew(tables: Sequence[Table]) -> bool:
+def has_clock_restart(tables: Sequence[Table]) -> bool:
     """Whether a table begins before the one before it ended."""
     spans = [(float(t.time_s.min()), float(t.time_s.max())) for t in tables if "t_s" in t]
     return any(later[0] <= earlier[1] for earlier, later in pairwise(spans))

@@ -65,7 +65,7 @@ def in_prefix(value: float, std: float | None, unit_name: str) -> tuple[float, s
     if unit_name.partition("/")[0] not in ("V", "g"):
         return 1.0, unit_name
     reach = max(abs(value), 10 * (std or 0.0))
-    return (1.0, unit_name) if reach >= 0.1 or reach == 0 else prefixed(unit_name, reach)
+    return (1.0, unit_name) if reach >= 0.1 or reach == 0 else add_prefix(unit_name, reach)
 
 
 def time_text(value: float, std: float | None) -> str:
@@ -75,7 +75,7 @@ def time_text(value: float, std: float | None) -> str:
     return estimate_text(value, std)
 
 
-def expanded_text(value: float, expanded: float) -> str:
+def expand_uncertainty(value: float, expanded: float) -> str:
     """`2.50013 ± 0.00048`, or `(−1.23 ± 0.22) × 10⁻⁸`: a value with its expanded uncertainty."""
     power = _power(value, expanded)
     text = f"{_to_digits(value, expanded, power)} ± {_to_digits(expanded, expanded, power)}"
@@ -206,7 +206,7 @@ def unit(text: str) -> str:
     return "" if text == "1" else head + "".join(p[:1].translate(SUPERSCRIPT) + p[1:] for p in powers)
 
 
-def prefixed(unit_name: str, reach: float) -> tuple[float, str]:
+def add_prefix(unit_name: str, reach: float) -> tuple[float, str]:
     """(factor, unit with prefix) for values up to `reach` in the unit `of`, as `unit` writes it."""
     if not unit_name.startswith(PREFIXED):
         return 1.0, unit_name

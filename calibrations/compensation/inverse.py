@@ -196,7 +196,7 @@ class Residual:
         return {"data": self.table.source, "n": self.table.n, "unit": "mm/s^2", "rmse": rmse}
 
 
-def compensated_residual(compensation: Compensation, table: Table) -> Residual:
+def compensate_residual(compensation: Compensation, table: Table) -> Residual:
     """Errors on a table of poses. Raises DataError for another kind, MissingColumn for a missing input."""
     if not table.type.stage_angles or compensation.unit != "g":
         raise DataError(

@@ -102,7 +102,7 @@ def covered(measured: Array) -> Array:
     return np.asarray((ORIENTATIONS @ measured.T).max(axis=1) >= np.cos(np.radians(CELL_DEG)))
 
 
-def named_orientation(words: str) -> Array | None:
+def name_orientation(words: str) -> Array | None:
     """The orientation of these `words`, (3,); None if they name none."""
     return next((up for up in ORIENTATIONS if orientation_words(up) == words), None)
 

@@ -15,7 +15,7 @@ from calibrations.fitting.sensed import in_milli
 from calibrations.free_forms.place_names import PREFIX
 from calibrations.geometry.orientation import one_orientation
 from calibrations.table import Array
-from calibrations.text import join_words, prefixed, rounded, unit
+from calibrations.text import add_prefix, join_words, rounded, unit
 
 FLOORS = ("floor", "floors", "x")
 OUTPUT, SENSED = "output", "sensed"
@@ -69,7 +69,7 @@ class Enough:
         measures, base, _ = UNITS[self.of]
         floor = fit.noise.floor if measures == OUTPUT else in_milli(fit.noise.floor, fit) / 1e3
         value = fit.held_out_excess * _pool_channels(floor)
-        scale, name = prefixed(base, value)
+        scale, name = add_prefix(base, value)
         return f"{rounded(scale * value)} {name}"
 
 

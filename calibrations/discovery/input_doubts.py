@@ -26,7 +26,7 @@ from calibrations.criteria import (
     VISIBLE_STEP,
 )
 from calibrations.estimators.robust import robust_std
-from calibrations.fitting.table_noise import beyond_ellipsoid, scatter
+from calibrations.fitting.table_noise import excess_over_ellipsoid, scatter
 from calibrations.geometry.sphere import sphere_radius
 from calibrations.importing.plausible import find_time_doubt
 from calibrations.means.noise import norm_std, rms, white_std
@@ -160,7 +160,7 @@ def _check_most_general_model(table: Table) -> Iterator[str]:
     if white is None or not (table.type.widest_form or table.type.magnitude):
         return
     magnitude = table.type.magnitude
-    remainder = beyond_ellipsoid(table)[:, None] if magnitude and table.n > FEWEST_ON_ELLIPSOID else scatter(table)
+    remainder = excess_over_ellipsoid(table)[:, None] if magnitude and table.n > FEWEST_ON_ELLIPSOID else scatter(table)
     if remainder is None:
         return
     floor = rms((norm_std(table, white) / sphere_radius(table)).T) if magnitude else rms(white.T)

@@ -14,7 +14,7 @@ from calibrations.discovery.results import Discovery
 from calibrations.discovery.search import first_order_cost
 from calibrations.discovery.significance import chance
 from calibrations.fitting.fit import Fit
-from calibrations.fitting.sensed import in_milli, milli_unit, pooled_milli
+from calibrations.fitting.sensed import in_milli, milli_unit, pool_in_milli
 from calibrations.free_forms.place_names import PREFIX, place_of_effect
 from calibrations.means.noise import rms
 from calibrations.table import Array
@@ -66,7 +66,7 @@ def summary_lines(discovery: Discovery[Fit]) -> list[Line]:
     if not discovery.steps:
         return []  # an output that does not respond has no scale
     findings, end = discovery.findings, discovery.end
-    floor, unit = pooled_milli(end)[1], milli_unit(end)
+    floor, unit = pool_in_milli(end)[1], milli_unit(end)
     added_effects = {step.name for step in discovery.steps}
     alternatives = discovery.alternatives
     lines, listed = [], set[str]()

@@ -330,9 +330,9 @@ def _wider(cautious: Fit) -> Array:
     by_noise = _wider_by_noise(cautious)
     if not any(term.name.startswith(PREFIX) for term in cautious.model.terms):
         return by_noise
-    from calibrations.fitting.time_curves import widening_by_curves  # few models have a free form
+    from calibrations.fitting.time_curves import widen_by_curves  # few models have a free form
 
-    return by_noise * widening_by_curves(cautious, by_noise)
+    return by_noise * widen_by_curves(cautious, by_noise)
 
 
 def _wider_by_noise(cautious: Fit) -> Array:
@@ -344,12 +344,12 @@ def _wider_by_noise(cautious: Fit) -> Array:
     jacobian = _free(cautious.problem, cautious.jacobian)
     problem, typical = cautious.problem, layout.typical[free]
     if problem.table.type.magnitude:
-        from calibrations.fitting.slow_outputs import widening_of_magnitudes  # positions alone need it
+        from calibrations.fitting.slow_outputs import widen_by_magnitudes  # positions alone need it
 
         axes = problem.table.outputs.shape[1]
         identity = np.broadcast_to(np.eye(axes), (problem.table.n, axes, axes))
         by_output = problem.of_output(cautious.theta, identity)
-        wider[free] = widening_of_magnitudes(cautious.noise, cautious.residual, jacobian, by_output, typical)
+        wider[free] = widen_by_magnitudes(cautious.noise, cautious.residual, jacobian, by_output, typical)
     else:
         wider[free] = widening(cautious.noise, cautious.residual, jacobian, typical)
     return wider

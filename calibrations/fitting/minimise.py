@@ -38,7 +38,7 @@ def minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
     def residual(theta: Array) -> Array:
         return np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
 
-    def descended(start: Array, stairs: bool) -> scipy.optimize.OptimizeResult:
+    def descend(start: Array, stairs: bool) -> scipy.optimize.OptimizeResult:
         def jacobian(theta: Array) -> Array:
             return np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), rows])
 
@@ -54,9 +54,9 @@ def minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
             max_nfev=60,
         )
 
-    answer = descended(start, stairs=False)
+    answer = descend(start, stairs=False)
     if problem.rounds:
-        answer = descended(answer.x, stairs=True)
+        answer = descend(answer.x, stairs=True)
     return answer.x, float(answer.cost)
 
 

@@ -57,7 +57,7 @@ def products(
 
 
 @njit(cache=True, nogil=True)
-def profiled(grams: Array, other_gram: Array, free: int, least: float) -> tuple[Array, Array, Array, Array]:
+def profile(grams: Array, other_gram: Array, free: int, least: float) -> tuple[Array, Array, Array, Array]:
     """Noise levels of one channel by iteration, the sums of squares at these levels, and log-determinants.
 
     grams       (g, p + 1, p + 1) of one channel, its residual last; `other_gram` (p + 1, p + 1) of the other channels
@@ -337,7 +337,7 @@ def scores(g: Grams, other_gram: Array, free: int, least: float) -> tuple[Array,
 
     `free` rows less smooth columns; the parameters that this channel bears, and not the others, are taken off here.
     """
-    scale, own_square, other_square, logdet = profiled(g.gram, other_gram, free, least)
+    scale, own_square, other_square, logdet = profile(g.gram, other_gram, free, least)
     return own_square / scale**2 + other_square + g.logdet + g.information + logdet + 2 * free * np.log(scale), scale
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from calibrations.effects import Effect
 from calibrations.errors import ModelError
-from calibrations.fitting.shown_forms import estimated_by_residual
+from calibrations.fitting.shown_forms import estimate_by_residual
 from calibrations.free_forms.bases import Harmonics, Line
 from calibrations.free_forms.chain import ModelEffects, State, base_size, start, state_at
 from calibrations.free_forms.components import Component, free
@@ -85,7 +85,7 @@ def estimated(smaller: Fit, effect: RequestedForm) -> Effect:
     if (reason := effect.excluded(table)) is not None:
         raise ModelError(f"{effect.name} {reason} ({table.source})")
     if not table.type.stage_angles:
-        return estimated_by_residual(smaller, effect.place)
+        return estimate_by_residual(smaller, effect.place)
     table = replace(table, left_out=())
     data, model_effects = PoseData.of(table), effects_beyond_base(smaller)
     first = state_at(data, model_effects, start(data, model_effects), ())

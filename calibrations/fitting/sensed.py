@@ -38,7 +38,7 @@ def in_milli(values: Array, fit: Fit) -> Array:
     return np.asarray(1e3 * values / scales(fit))
 
 
-def pooled_milli(fit: Fit) -> tuple[float, float]:
+def pool_in_milli(fit: Fit) -> tuple[float, float]:
     """Rms of the residual over all channels, and the noise floor, in the unit of `in_milli`."""
     error, floor = in_milli(fit.rmse, fit), in_milli(fit.noise.floor, fit)
     return float(np.sqrt(np.mean(error**2))), float(np.sqrt(np.mean(floor**2)))

@@ -124,7 +124,7 @@ def forms_at(place: str, fit: Fit) -> dict[str, Form]:
     return {f"{place}/{form.name}": form for form in _forms(place, table, force)}
 
 
-def estimated_by_residual(before: Fit, place: str) -> Effect:
+def estimate_by_residual(before: Fit, place: str) -> Effect:
     """The free form of a place with the sizes that the residual of `before` shows.
 
     One form is always kept, however small: a person asked for it, and at a size near zero it changes nothing.

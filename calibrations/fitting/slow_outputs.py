@@ -27,7 +27,7 @@ from calibrations.table import Array
 MOST_ROWS = 200  # of the matrices; more rows are thinned evenly
 
 
-def widening_of_magnitudes(noise: Noise, residual: Array, jacobian: Array, by_output: Array, typical: Array) -> Array:
+def widen_by_magnitudes(noise: Noise, residual: Array, jacobian: Array, by_output: Array, typical: Array) -> Array:
     """Factor on each standard uncertainty under `noise`, shape (p,).
 
     From residual (1, n), jacobian (1, n, p) and derivatives by the outputs (1, n, axes).

@@ -100,10 +100,10 @@ def _of_field(table: Table) -> Array | None:
     """Of the magnitude, as a share of the field, shape (1,)."""
     if table.n < 9 + FEWEST_FREE_ROWS or coverage_fault(table, SOFT_IRON) is not None:
         return None
-    return beyond_ellipsoid(table)
+    return excess_over_ellipsoid(table)
 
 
-def beyond_ellipsoid(table: Table) -> Array:
+def excess_over_ellipsoid(table: Table) -> Array:
     """Standard deviation of the magnitude about the ellipsoid nearest to the outputs, as a share of it, shape (1,)."""
     m = table.outputs - table.outputs.mean(axis=0)
     m = m / np.abs(m).max()

@@ -24,7 +24,7 @@ LEVELS = {  # what the mean of a curve at a place belongs to
 }
 
 
-def widening_by_curves(fit: Fit, wider: Array) -> Array:
+def widen_by_curves(fit: Fit, wider: Array) -> Array:
     """Factor on each standard uncertainty, shape (p,), beside the factors `wider` (p,) of noise.
 
     The variance of a bias grows by the mean square of its axis's curve over the rows. That of a scale factor grows by

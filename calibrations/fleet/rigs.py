@@ -121,7 +121,7 @@ def find_rig_errors(fleet: Sequence[Measured]) -> list[RigError]:
     return errors
 
 
-def unconnected_rigs(fleet: Sequence[Measured]) -> list[tuple[str, ...]]:
+def find_unconnected_rigs(fleet: Sequence[Measured]) -> list[tuple[str, ...]]:
     """Groups of rigs between which no batch connects; one group where all can be compared."""
     groups: list[set[str]] = []
     for batch in dict.fromkeys(measured.batch for measured in fleet):
@@ -193,7 +193,7 @@ def _parameter(sensors: Sequence[Measured], y: Array, v: Array, name: tuple[str,
     f = (shortest_solution(of_batch, y, total).square - solution.square) / rig_rank / scale
     p_value = float(fdtrc(rig_rank, free, max(f, 0.0)))
     errors = []
-    for group in unconnected_rigs(sensors):
+    for group in find_unconnected_rigs(sensors):
         places = [len(batches) + rigs.index(rig) for rig in group]
         middle = _middle(theta[places])
         for k, rig in enumerate(group if len(group) > 1 else ()):

@@ -16,7 +16,7 @@ from calibrations.fitting.inputs import input_contributions
 from calibrations.model import Estimate, Model, Term
 from calibrations.noise.fit import NoiseFit, power_covariance
 from calibrations.table import Array
-from calibrations.text import minus, prefixed, rounded, unit, value_text
+from calibrations.text import add_prefix, minus, rounded, unit, value_text
 
 HEAD = ("effect", "parameter", "axis", "value", "standard uncertainty", "unit", "last change")
 LEAST_CHANGE = 0.05  # standard uncertainties: a smaller change is none
@@ -107,7 +107,7 @@ def _row(effect: str, e: Estimate, change: str, doc: str) -> ParameterRow:
 
 def _scale(e: Estimate) -> tuple[float, str]:
     """Factor and unit in which value and uncertainty are written."""
-    return prefixed(unit(e.unit), max(abs(e.value), e.std or 0.0) * WHOLE)
+    return add_prefix(unit(e.unit), max(abs(e.value), e.std or 0.0) * WHOLE)
 
 
 def _change(e: Estimate, earlier: Estimate | None) -> str:
@@ -120,7 +120,7 @@ def _change(e: Estimate, earlier: Estimate | None) -> str:
     difference, std = e.value - earlier.value, earlier.std or e.std or 0.0
     if abs(difference) <= LEAST_CHANGE * std:
         return SAME
-    factor, prefixed_unit = prefixed(unit(e.unit), abs(difference))
+    factor, prefixed_unit = add_prefix(unit(e.unit), abs(difference))
     ratio = f" ({rounded(abs(difference) / std, 2)} × its uncertainty)" if std else ""
     return f"{'+' if difference > 0 else ''}{minus(rounded(difference * factor, 2))} {prefixed_unit}".rstrip() + ratio
 

@@ -70,7 +70,7 @@ def _sensed(fit: Fit, letter: str) -> list[Column]:
     return [_column(letter + k, axis_label.format(k), a, n) for k, a in zip(AXES, specific_force(fit).T, strict=True)]
 
 
-def telling_columns(fit: Fit, effect: Effect) -> list[Column]:
+def select_telling_columns(fit: Fit, effect: Effect) -> list[Column]:
     """Columns that an effect may follow: the specific forces, beta, and the columns that it needs.
 
     An effect does not know other columns, such as time. A change over time can come from successive inclinations.

@@ -20,7 +20,7 @@ from drivers.digital.sensor import TEST_S, DigitalSensor
 from drivers.digital.settings import OUTPUTS, TEMPERATURE, VOLTAGES, DigitalSettings
 from drivers.errors import BadFrame, DriverError, LinkTimeout
 from drivers.imu_lines.lines import TIME, Assembly
-from drivers.imu_lines.proposal import proposed_settings
+from drivers.imu_lines.proposal import propose_settings
 from drivers.instrument import Check, Identity, require_positive
 from drivers.transport import Address, Links
 
@@ -127,7 +127,7 @@ class LineSensor(DigitalSensor[Settings, LineDecoder]):
         assembly = decoder.assembly
         while (left_s := begun_s + TEST_S - self._clock.now()) > 0 and (data := self._link.read(left_s)):
             assembly.take(data)
-        proposal = proposed_settings(assembly.shown, max(self._clock.now() - begun_s, 1 / self.settings.rate_hz))
+        proposal = propose_settings(assembly.shown, max(self._clock.now() - begun_s, 1 / self.settings.rate_hz))
         if proposal is None:
             return []
         columns = ", ".join(f"{name}: {column}" for name, column in proposal["columns"].items())

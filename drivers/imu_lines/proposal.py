@@ -32,7 +32,7 @@ NAMES = (  # of a column, in small letters; the first match
 )
 
 
-def proposed_settings(lines: Sequence[str], length_s: float) -> dict[str, Any] | None:
+def propose_settings(lines: Sequence[str], length_s: float) -> dict[str, Any] | None:
     """The settings of a bench file for these whole lines, which came in `length_s`; None where they show none."""
     style = _style(lines)
     values = _columns(lines, style)

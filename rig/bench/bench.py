@@ -47,18 +47,18 @@ class Bench(Strict):
     def channels(self) -> Mapping[str, int]:
         """The converter's channels by name."""
         adc = self.instruments.get("adc")
-        return adc.typed_settings().channels if adc else {}
+        return adc.parse_settings().channels if adc else {}
 
     @property
     def wired(self) -> Mapping[str, int]:
         """All inputs of the converter by name, with those on request."""
         adc = self.instruments.get("adc")
-        return adc.typed_settings().wired if adc else {}
+        return adc.parse_settings().wired if adc else {}
 
     def unit_of(self, channel: str) -> str:
         """Unit of the samples of a channel: V, or that of a digital sensor."""
         adc = self.instruments.get("adc")
-        units: Mapping[str, str] = getattr(adc.typed_settings(), "units", {}) if adc else {}
+        units: Mapping[str, str] = getattr(adc.parse_settings(), "units", {}) if adc else {}
         return units.get(channel, "V")
 
     @property

@@ -100,7 +100,7 @@ def _check_instrument(role: str, instrument: Instrument, path: Path) -> None:
         raise BenchError(f"{key}.driver: no driver {instrument.driver!r}.{did_you_mean(instrument.driver, drivers())}")
     _check_addresses(key, instrument)
     try:
-        instrument.typed_settings()
+        instrument.parse_settings()
     except ValidationError as error:
         kind = importlib.import_module(f"drivers.{instrument.driver}.driver").Settings
         fault = error.errors()[0]

@@ -66,7 +66,7 @@ class Instrument(Strict):
     def address(self) -> Address:
         return Address(self.url, self.unit, self.stream_url)
 
-    def typed_settings(self) -> Any:
+    def parse_settings(self) -> Any:
         """The driver's frozen Settings. Raises ValidationError."""
         kind = importlib.import_module(f"drivers.{self.driver}.driver").Settings
         return _checker(kind)(settings=self.settings).settings

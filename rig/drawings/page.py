@@ -75,7 +75,7 @@ def dial(centre: tuple[float, float], radius: float, clockwise: bool) -> Iterato
         yield svg.text(at, str(signed_deg), 12, svg.QUIET)
 
 
-def marked_angle(
+def mark_angle(
     centre: tuple[float, float], radius: float, deg: float, clockwise: bool, inner: float = 0.84
 ) -> Iterator[str]:
     """From zero to `deg`: a line at each end, and an arc between."""
@@ -118,7 +118,7 @@ def force_view(attitude: Attitude, corner: tuple[float, float], width: float) ->
 def front_view(attitude: Attitude, centre: tuple[float, float], radius: float) -> Iterator[str]:
     """The dial of alpha with the table edge-on: anticlockwise for growing alpha, from the horizontal."""
     yield from dial(centre, radius, clockwise=False)
-    yield from marked_angle(centre, radius, attitude.alpha_deg, clockwise=False)
+    yield from mark_angle(centre, radius, attitude.alpha_deg, clockwise=False)
     yield svg.turned(centre, attitude.alpha_deg, _edge_on(attitude, radius))
     yield svg.circle(centre, 3.0, svg.PAPER, svg.INK, 1.4)
     top = (centre[0] + radius + 34, centre[1] - 26)
@@ -155,7 +155,7 @@ def table_view(attitude: Attitude, centre: tuple[float, float], radius: float) -
     """The dial of beta, clockwise for growing beta; the table with its zero mark; the sensor with pin 1 and axes."""
     yield from dial(centre, radius, clockwise=True)
     yield svg.circle(centre, 0.92 * radius, "#eef1f4", "#b8c2cc", 1.0)
-    yield from marked_angle(centre, radius, attitude.beta_deg, clockwise=True, inner=0.98)
+    yield from mark_angle(centre, radius, attitude.beta_deg, clockwise=True, inner=0.98)
     sensor_deg = -(attitude.beta_deg + attitude.mount_deg)  # of the sensor's x axis, anticlockwise from the right
     yield svg.turned(centre, sensor_deg, _sensor(attitude, radius))
     yield from _mount(attitude, centre, radius)

@@ -52,7 +52,7 @@ class Solid:
             normal = np.cross(face[1] - face[0], face[2] - face[1])
             normal /= np.linalg.norm(normal)
             if normal @ camera.toward > EDGE_ON:
-                fill = shaded(self.colour, float(normal @ LIGHT / np.linalg.norm(LIGHT)))
+                fill = shade(self.colour, float(normal @ LIGHT / np.linalg.norm(LIGHT)))
                 yield svg.polygon(camera.project(face), fill, fill, 0.6, stroke_linejoin="round")
 
 
@@ -82,7 +82,7 @@ def cylinder(radius: float, low: float, high: float, axis: int, axes: Vectors, c
     return Solid(tuple(face @ axes for face in (bottom[::-1], *side_faces, top)), colour)
 
 
-def shaded(colour: str, light: float) -> str:
+def shade(colour: str, light: float) -> str:
     """A colour under light that meets it at the cosine `light`."""
     brightness = AMBIENT + (1 - AMBIENT) * max(0.0, light)
     parts = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]

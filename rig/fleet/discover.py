@@ -29,7 +29,7 @@ from calibrations.fleet.batch import (
     find_batch_effects,
 )
 from calibrations.fleet.look import NOWHERE, Screening
-from calibrations.fleet.rigs import Measured, RigError, StageErrors, find_rig_errors, unconnected_rigs
+from calibrations.fleet.rigs import Measured, RigError, StageErrors, find_rig_errors, find_unconnected_rigs
 from rig.fleet.members import Member
 from rig.fleet.questions import Fleet
 from rig.fleet.worker import Question, effects_of, read_look
@@ -68,7 +68,7 @@ class Stand:
         effects = tuple(effect.effect for effect in self.effects.get(member.batch, ()))
         return replace(self.start, what=kind, effects=effects, errors=errors_of(self.errors, member.rig))
 
-    def judged_beside(self, batch: str, effects: tuple[BatchEffect, ...]) -> Stand:
+    def judge_with_siblings(self, batch: str, effects: tuple[BatchEffect, ...]) -> Stand:
         """This state with other effects of a batch."""
         return replace(self, effects={**self.effects, batch: effects})
 
@@ -120,7 +120,7 @@ def _add_missing_effects(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
         stand, missing = _judge_batches(fleet, stand, open_)
         open_ = {batch: batches[batch] for batch, effects in missing.items() if effects and rounds_left}
         for batch in open_:
-            stand = stand.judged_beside(batch, (*stand.effects.get(batch, ()), missing[batch][0]))
+            stand = stand.judge_with_siblings(batch, (*stand.effects.get(batch, ()), missing[batch][0]))
     return stand
 
 
@@ -159,9 +159,11 @@ def _drop_needless_effects(fleet: Fleet, stand: Stand, batch: str, members: Sequ
     tested = _test_jointly(fleet, stand, batch, members)
     significant = tuple(effect for effect in tested if effect is not None)
     if len(significant) == len(tested):
-        return stand.judged_beside(batch, significant)
+        return stand.judge_with_siblings(batch, significant)
     k, effects = tested.index(None), stand.effects[batch]
-    fewer, _ = _judge_batches(fleet, stand.judged_beside(batch, (*effects[:k], *effects[k + 1 :])), {batch: members})
+    fewer, _ = _judge_batches(
+        fleet, stand.judge_with_siblings(batch, (*effects[:k], *effects[k + 1 :])), {batch: members}
+    )
     return _drop_needless_effects(fleet, fewer, batch, members) if len(effects) > 2 else fewer
 
 
@@ -170,7 +172,7 @@ def _test_jointly(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Memb
     effects = stand.effects[batch]
     tested = []
     for k, effect in enumerate(effects):
-        reduced = stand.judged_beside(batch, (*effects[:k], *effects[k + 1 :]))
+        reduced = stand.judge_with_siblings(batch, (*effects[:k], *effects[k + 1 :]))
         missed = _judge_batches(fleet, reduced, {batch: members})[1].get(batch, [])
         tested.append(next((candidate for candidate in missed if candidate.effect == effect.effect), None))
     return tested
@@ -201,7 +203,7 @@ def _population(stand: Stand, diagnosed: Mapping[Member, Any], members: Sequence
     for batch in dict.fromkeys(member.batch for member in members):
         batch_sensors = tuple(verdict for verdict in sensors if verdict.batch == batch)
         batches.append(batch_verdict(batch, stand.effects.get(batch, ()), batch_sensors))
-    unconnected = unconnected_rigs(
+    unconnected = find_unconnected_rigs(
         [Measured(m.batch, m.rig, NOWHERE) for m, screened in stand.screening.items() if screened.on_stages]
     )
     return Population(sensors, tuple(batches), stand.errors, tuple(unconnected))

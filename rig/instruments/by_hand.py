@@ -35,12 +35,12 @@ class HandAnalysis:
         """
         from calibrations.analyses.hand_positions import HandCourse as Course
         from calibrations.analyses.hand_positions import HandPosition
-        from calibrations.design.orientations import ORIENTATIONS, named_orientation
+        from calibrations.design.orientations import ORIENTATIONS, name_orientation
 
         def position(dwell: Dwell) -> HandPosition:
             mean, std = (np.array([values[name] for name in OUTPUTS]) for values in (dwell.means, dwell.stds))
-            orientation = named_orientation(dwell.pose.path)
+            orientation = name_orientation(dwell.pose.path)
             return HandPosition(mean, std, dwell.n, ORIENTATIONS[0] if orientation is None else orientation, dwell.t_s)
 
-        unwanted = np.array([up for words in skipped if (up := named_orientation(words)) is not None]).reshape(-1, 3)
+        unwanted = np.array([up for words in skipped if (up := name_orientation(words)) is not None]).reshape(-1, 3)
         return Course(tuple(map(position, dwells)), cast(Any, noise), unwanted)

@@ -156,7 +156,7 @@ class Rig:
         Without interlocks there is none in simulated time: there the end of a move is early enough for an alarm.
         """
         adc = self.bench.instruments.get("adc")
-        if self.bench.simulated and not (adc and adc.typed_settings().interlocks):
+        if self.bench.simulated and not (adc and adc.parse_settings().interlocks):
             return []
         return [driver for driver in self.drivers.values() if hasattr(driver, "look")]
 

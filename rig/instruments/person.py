@@ -79,7 +79,7 @@ def _(question: Number, rig: Rig, world: World | Batch) -> str | None:  # noqa: 
 @_do_work.register
 def _(question: Dial, rig: Rig, world: World | Batch) -> str:
     """Turn the stage if needed, which takes time, and read the dial."""
-    settings = rig.bench.instruments[question.stage].typed_settings()
+    settings = rig.bench.instruments[question.stage].parse_settings()
     hand = Hand(world, question.stage, settings, rig.bench.seed)
     turn = None if question.expected is None else hand.turn_to(question.expected)
     if turn is not None:

@@ -51,7 +51,7 @@ class Wiring:
         instrument, address = self.bench.instruments[role], self._address(role)
         module = importlib.import_module(f"drivers.{instrument.driver}.driver")
         try:
-            return cast(Driver, module.connect(address, self.links, instrument.typed_settings(), role))
+            return cast(Driver, module.connect(address, self.links, instrument.parse_settings(), role))
         except LinkRefused as error:
             raise InstrumentFailed(f"{role} ({instrument.driver}) at {address.url}: {error}") from error
 
@@ -113,7 +113,7 @@ def serve(bench: Bench, world: World | Batch) -> dict[str, Server]:
     servers = {}
     for (driver, listen), roles in wires.items():
         twin = importlib.import_module(f"drivers.{driver}.twin")
-        units = {role: (bench.instruments[role].unit, bench.instruments[role].typed_settings()) for role in roles}
+        units = {role: (bench.instruments[role].unit, bench.instruments[role].parse_settings()) for role in roles}
         server = servers[" ".join(roles)] = twin.serve(world, units, listen or twin.LISTEN)
         for role in roles:
             if faults := bench.instruments[role].faults:

@@ -76,11 +76,11 @@ def possible(experiments: Iterable[Experiment], bench: Bench, within_s: float) -
     """The experiments that the bench can do within a time."""
     for e in experiments:
         with suppress(LimitError, ProcedureError, BenchError):
-            if (planned_experiment(e, bench, None)[0].duration_s or 0.0) <= within_s:
+            if (plan_experiment(e, bench, None)[0].duration_s or 0.0) <= within_s:
                 yield e
 
 
-def planned_experiment(experiment: Experiment, bench: Bench, bench_file: Path | None) -> tuple[Experiment, Plan]:
+def plan_experiment(experiment: Experiment, bench: Bench, bench_file: Path | None) -> tuple[Experiment, Plan]:
     """The experiment with command line and duration. Raises the errors of `plan` if the bench cannot do it."""
     procedure = find(experiment.procedure, bench.folders.procedures)
     planned = plan(bench, procedure, parse(procedure, experiment.settings))
@@ -90,7 +90,7 @@ def planned_experiment(experiment: Experiment, bench: Bench, bench_file: Path | 
 
 def gives_poses(e: Experiment, bench: Bench) -> bool:
     """Whether its data are poses, which are analysed together with those of a sweep. Raises the errors of `plan`."""
-    poses = planned_experiment(e, bench, None)[1].poses
+    poses = plan_experiment(e, bench, None)[1].poses
     return bool(poses) and KINDS[find(e.procedure, bench.folders.procedures).kind].stage_angles
 
 
@@ -134,7 +134,7 @@ def _plans(menu: Sequence[Experiment], bench: Bench, bench_file: Path | None) ->
     """The experiments that the bench can do, each with its plan."""
     for e in menu:
         with suppress(LimitError, ProcedureError, BenchError):
-            yield planned_experiment(e, bench, bench_file)
+            yield plan_experiment(e, bench, bench_file)
 
 
 def best_of(experiments: Sequence[Experiment], criteria: Sequence[str]) -> Experiment | None:
@@ -186,6 +186,6 @@ def _predict(dispute: Dispute, e: Experiment, planned: Plan) -> Experiment | Non
 def as_proposed(e: Experiment, bench: Bench, bench_file: Path | None) -> Experiment:
     """The experiment for its physics; with a remark if the bench cannot do it."""
     try:
-        return planned_experiment(e, bench, bench_file)[0]
+        return plan_experiment(e, bench, bench_file)[0]
     except (LimitError, ProcedureError, BenchError) as error:
         return replace(e, command=command_line(e, bench_file), why=f"{e.why}; but not on this bench: {error}")

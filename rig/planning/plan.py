@@ -94,7 +94,7 @@ class RehearsalHost(PlanHost):
 
 
 @contextmanager
-def rehearsing(bench: Bench, planned: Mapping[str, Any], ledger: Ledger) -> Iterator[Session]:
+def rehearse(bench: Bench, planned: Mapping[str, Any], ledger: Ledger) -> Iterator[Session]:
     """A session on simulated instruments of `bench`; `planned` instruments record every step.
 
     The limits of temperature and tilt do not apply: the simulated table may be less level than the real one.
@@ -164,7 +164,7 @@ def plan(bench: Bench, procedure: Procedure, settings: Mapping[str, Any]) -> Pla
     """
     ledger = Ledger()
     parts = _parts(bench, ledger)
-    dry = rehearsing if procedure.adaptive else _plan_session
+    dry = rehearse if procedure.adaptive else _plan_session
     with dry(bench, parts, ledger) as session:
         session.reference()
         procedure.function(session, **settings)
@@ -205,7 +205,7 @@ def _parts(bench: Bench, ledger: Ledger) -> dict[str, Any]:
     """The planned instruments by role, with the settings of the real ones."""
     parts: dict[str, Any] = {role: absent(role) for role in ROLES}
     for role, instrument in bench.instruments.items():
-        parts[role] = PLANNED[role](role, instrument.typed_settings(), ledger)
+        parts[role] = PLANNED[role](role, instrument.parse_settings(), ledger)
     return parts
 
 

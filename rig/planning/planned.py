@@ -261,7 +261,7 @@ class PlannedPositioner:
             require_within(f"{self._name}: {axis} = ", um, self._settings.limits_um, "um", OUTSIDE_POSITION)
 
 
-def planned_answer(question: Question) -> str:
+def plan_answer(question: Question) -> str:
     """A valid answer to a question."""
     if isinstance(question, Number):
         return repr(min(max(0.0, question.low), question.high))
@@ -295,7 +295,7 @@ class PlanHost:
 
     def ask(self, question: Question) -> str:
         self.ledger.asked.append(question)
-        return planned_answer(question)
+        return plan_answer(question)
 
     def doing(self, text: str) -> None:
         """The steps of the plan are enough."""
@@ -332,7 +332,7 @@ class _Moves:
 
     @staticmethod
     def of(bench: Bench) -> _Moves:
-        alpha, beta = (bench.instruments[role].typed_settings().move_s for role in ("alpha", "beta"))
+        alpha, beta = (bench.instruments[role].parse_settings().move_s for role in ("alpha", "beta"))
         return _Moves(cache(alpha), cache(beta), bench.limits.overrun_deg)
 
     def seconds(self, start: Pose, end: Pose) -> float:

@@ -115,7 +115,7 @@ class Range:
     @cached_property
     def fit(self) -> Fit:
         """The model as if it had been fitted to the sweep."""
-        rate_hz = self.bench.instruments["adc"].typed_settings().rate_hz
+        rate_hz = self.bench.instruments["adc"].parse_settings().rate_hz
         constants = self.bench.constants | {"sample_rate_hz": rate_hz}
         return assume_sensor(self.model, _columns(self._plan), constants, self.axes)
 

@@ -39,7 +39,7 @@ def lab_url(text_url: str, source: str = "what was given") -> URL:
     return url.set(drivername="postgresql+psycopg")
 
 
-def masked_url(url: URL) -> str:
+def mask_url(url: URL) -> str:
     """The URL for messages and logs, with stars for a password."""
     return url.set(drivername="postgresql").difference_update_query(SECRET).render_as_string()
 
@@ -132,7 +132,7 @@ def open_server(url: URL) -> Engine:
     """The engine of a record with the tables of this program. Raises LabAway, RecordError."""
     engine = connected(url)
     with engine.connect() as connection:
-        require_current(version(connection), masked_url(url))
+        require_current(version(connection), mask_url(url))
     return engine
 
 
@@ -158,22 +158,22 @@ def _raise_lab_error(context: ExceptionContext, url: URL) -> None:
     error = context.original_exception
     if getattr(error, "sqlstate", None) in (FORBIDDEN, READ_ONLY):
         role = url.username or "this role"
-        raise RecordError(f"{masked_url(url)}: {role} has no permission for this ({_first_line(error)}); the owner can "
+        raise RecordError(f"{mask_url(url)}: {role} has no permission for this ({_first_line(error)}); the owner can "
                           "grant it rig_writer, or rig_reader for reading") from None  # fmt: skip
     if getattr(error, "sqlstate", None) == LOCKED:
         raise RecordError(
-            f"{masked_url(url)}: another push has locked this run for more than {LOCK_S} s; push it again later "
+            f"{mask_url(url)}: another push has locked this run for more than {LOCK_S} s; push it again later "
             f"(the server releases the lock of a stopped program after {IDLE_S} s)"
         ) from None
     if context.connection is None and any(word in (reason := _first_line(error)) for word in TLS):
-        raise RecordError(f"{masked_url(url)}: there is no encrypted connection to a trusted server ({reason}); "
+        raise RecordError(f"{mask_url(url)}: there is no encrypted connection to a trusted server ({reason}); "
                           "nothing was sent. Give the certificate of the server's signer in sslrootcert, and set "
                           "`ssl = on` in the server's postgresql.conf (docs/lab.md)") from None  # fmt: skip
     if context.is_disconnect or isinstance(context.sqlalchemy_exception, OperationalError | InterfaceError):
-        raise LabAway(f"{masked_url(url)}: no connection to the lab's record ({_first_line(error)}); nothing is lost, "
+        raise LabAway(f"{mask_url(url)}: no connection to the lab's record ({_first_line(error)}); nothing is lost, "
                       "the next `rig push` continues") from None  # fmt: skip
     if context.connection is None:  # libpq refuses the URL
-        raise RecordError(f"{masked_url(url)}: {_first_line(error)}; correct the URL") from None
+        raise RecordError(f"{mask_url(url)}: {_first_line(error)}; correct the URL") from None
 
 
 def _first_line(error: BaseException) -> str:
@@ -199,7 +199,7 @@ def prepare(url: URL) -> int:
             connection.execute(text(f"SELECT pg_advisory_xact_lock({ONE_AT_A_TIME})"))
             schema_before = version(connection)
             if schema_before > SCHEMA:
-                require_current(schema_before, masked_url(url))
+                require_current(schema_before, mask_url(url))
             upgrade(connection, schema_before)
             connection.execute(text(f"COMMENT ON TABLE runs IS 'schema {SCHEMA:d}'"))
             _grant(connection)

@@ -82,7 +82,7 @@ def listed_rows(connection: Connection) -> tuple[Sequence[Row[Any]], list[str]]:
         return rows, unreadable
 
 
-def named_rows(connection: Connection, name: str) -> Sequence[Row[Any]]:
+def select_named_rows(connection: Connection, name: str) -> Sequence[Row[Any]]:
     """The run of this id, else all whose id begins so.
 
     The newest one for `last`, or the newest of a procedure for `last PROCEDURE`.
@@ -136,7 +136,7 @@ def run_of(row: Row[Any]) -> Run:
     return Run(**{name: value for name, value in row._mapping.items() if name != "checksum"})
 
 
-def imported_rows(connection: Connection, run: str) -> int:
+def select_imported_rows(connection: Connection, run: str) -> int:
     """The number of rows of an imported table; 0 for a measured run."""
     length = func.max(func.length(columns.c.numbers, type_=Integer) // 8)
     return connection.execute(select(length).where(columns.c.run == run)).scalar_one() or 0
@@ -207,7 +207,7 @@ def lost_rows(connection: Connection) -> list[str]:
     return [_lost_text(run, number) for run in run_ids for number in _incomplete(connection, run)]
 
 
-def changed_rows(connection: Connection) -> Iterator[str]:
+def select_changed_rows(connection: Connection) -> Iterator[str]:
     """A phrase for each row that changed on the disk, except the entries of runs."""
     checked = set(connection.execute(select(runs.c.run).where(runs.c.checksum.is_not(None))).scalars())
     for table in (poses, blocks, dwells, readings, columns):

@@ -30,19 +30,16 @@ from rig.record.rows import (
     BESIDE,
     LAST,
     POSE,
-    changed_rows,
     damage_text,
     dwell_of,
     excluded_rows,
     has_checksums,
-    imported_rows,
     insert_or_replace,
     kept_of,
     known_names,
     listed_rows,
     lost_pose_error,
     lost_rows,
-    named_rows,
     new_run,
     pose_of,
     put_state,
@@ -50,6 +47,9 @@ from rig.record.rows import (
     require_whole,
     run_of,
     runs_of_sensor,
+    select_changed_rows,
+    select_imported_rows,
+    select_named_rows,
     several_error,
     sound,
     timestamp,
@@ -83,9 +83,9 @@ class Record:
         self.path = self.folder / FILE
         self.remarks: list[str] = []  # on the file: it was repaired during this command
         if isinstance(place, URL):
-            from rig.record.lab import masked_url, open_server
+            from rig.record.lab import mask_url, open_server
 
-            self.where, self.engine = masked_url(place), open_server(place)
+            self.where, self.engine = mask_url(place), open_server(place)
         else:
             self.where, self.engine = str(self.path), open_file(self.path, self.remarks.append)
         self._lines: list[dict[str, Any]] = []  # of the log, not written yet
@@ -183,7 +183,7 @@ class Record:
         is_pose = (poses.c.run == run) & (poses.c.number == number)
         with self.engine.begin() as connection:
             updated = connection.execute(update(poses).where(is_pose).values(excluded=reason)).rowcount
-            if not updated and not 0 <= number < imported_rows(connection, run):
+            if not updated and not 0 <= number < select_imported_rows(connection, run):
                 raise RecordError(f"run {run} has no pose {number}; `rig show {run} --poses` lists its poses")
             change = f"pose {number} {'included' if reason is None else 'excluded'}"
             connection.execute(
@@ -249,7 +249,7 @@ class Record:
     def damaged_rows(self) -> list[str]:
         """A phrase for each row of a run, except its entry, that changed on the disk or is lost."""
         with self._reading() as connection:
-            return [*lost_rows(connection), *changed_rows(connection)]
+            return [*lost_rows(connection), *select_changed_rows(connection)]
 
     def run(self, name: str) -> Run:
         """The run with this id, or whose id alone begins so, or the only one of the sensor with this name or serial.
@@ -258,7 +258,7 @@ class Record:
         Raises UnknownRun with a suggestion; RecordError if the entry of the run is damaged.
         """
         with self._reading() as connection:
-            rows, names = named_rows(connection, name), known_names(connection, name)
+            rows, names = select_named_rows(connection, name), known_names(connection, name)
         if len(rows) == 1:
             if is_damaged(runs, rows[0]._mapping):
                 raise RecordError(f"{self.where}: {damage_text(rows[0].run)}")
@@ -283,7 +283,7 @@ class Record:
         is_excluded = (poses.c.run == run) & poses.c.excluded.is_not(None)
         query = select(poses.c.number, poses.c.excluded).where(is_excluded).order_by(poses.c.number)
         with self._reading() as connection:
-            if imported_rows(connection, run):
+            if select_imported_rows(connection, run):
                 return excluded_rows(self.events(run))
             return {row.number: row.excluded for row in connection.execute(query)}
 

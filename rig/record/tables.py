@@ -54,7 +54,7 @@ def correct_angles(run: Run, columns: Columns) -> tuple[dict[str, Array], dict[s
 
 def _resolution_deg(part: Mapping[str, Any]) -> float:
     """Resolution of the dial of a manual stage, deg."""
-    return float(Instrument.model_validate(part).typed_settings().resolution_deg)
+    return float(Instrument.model_validate(part).parse_settings().resolution_deg)
 
 
 # Displacement of the carriage, from the channel d63 and the calibration curve of the run's bench. It is positive
@@ -101,7 +101,7 @@ def constants(run: Run, sensor: str | None) -> dict[str, str | float]:
     bench = Bench.model_validate(run.bench)
     if bench.d63 is None:
         return {}
-    adc, prefix = bench.instruments["adc"].typed_settings(), f"{sensor}." if sensor else ""
+    adc, prefix = bench.instruments["adc"].parse_settings(), f"{sensor}." if sensor else ""
     channels = {axis: f"{prefix}{axis}" for axis in AXES if f"{prefix}{axis}" in adc.channels}
     skews = {f"skew_{axis[1]}_s": round(adc.lag_s(channel) - adc.lag_s(D63), 9) for axis, channel in channels.items()}
     return {"d63_serial": bench.d63.curve.serial, "d63_calibrated": bench.d63.curve.date, **skews}

@@ -62,11 +62,11 @@ def motion(measured: Measured) -> dict[str, Result]:
     Raises SensorFault for a reading outside the curve of the displacement sensor; RecordError or DataError if a part of
     the run is missing.
     """
-    results = beside_displacement(measured).results
+    results = compare_with_displacement(measured).results
     return {name: Result(q.value, "" if q.unit == "1" else q.unit, q.std) for name, q in results.items()}
 
 
-def beside_displacement(measured: Measured) -> MotionResult:
+def compare_with_displacement(measured: Measured) -> MotionResult:
     """Both models compared with the displacement sensor, as in Ang Fig. 12. Raises as `motion`."""
     sweep = measured.part("poses", SWEEP)
     return evaluate_motion(measured.table(), linear_from_turns(sweep), fit_physical(sweep), measured.part("still"))

@@ -19,7 +19,7 @@ from calibrations.loop import discover
 from calibrations.model import Model
 from calibrations.table import Table
 from rig.bench import Bench
-from rig.planning.next_experiment import TOGETHER, Dispute, choose_experiment, gives_poses, planned_experiment, possible
+from rig.planning.next_experiment import TOGETHER, Dispute, choose_experiment, gives_poses, plan_experiment, possible
 
 STANDARD = Experiment("sweep", {}, (), "the sweep with its default settings")
 FIRST = Experiment("sweep", {"step_deg": 45.0, "inclinations_deg": [90.0, 30.0, 150.0]}, (), "a short first sweep")
@@ -74,7 +74,7 @@ class Live:
 
     def planned(self, experiment: Experiment) -> Experiment:
         """The experiment with its duration on the bench."""
-        return planned_experiment(experiment, self.bench, self.bench_file)[0]
+        return plan_experiment(experiment, self.bench, self.bench_file)[0]
 
     def _separating_experiment(self, measurements: Sequence[Measurement]) -> Experiment | None:
         """The experiment that separates the explanations, with or without time for it; None for one explanation."""

@@ -171,7 +171,7 @@ class RunViewer(Observer):
 
     def __init__(self, procedure: str, bench: Bench) -> None:
         adc = bench.instruments.get("adc")
-        settings = adc.typed_settings() if adc else None
+        settings = adc.parse_settings() if adc else None
         end = getattr(settings, "range_v", None) or getattr(settings, "range", None)
         self._name = procedure
         self.view = RunView(procedure, bench.limits, end, bench.simulated, bench.unit_of)

@@ -29,7 +29,7 @@ from calibrations.presentation.charts.history import Life
 from calibrations.presentation.charts.noise import TIME, Scaled, measured_points
 from calibrations.presentation.residual import ChannelResidual, Column
 from calibrations.table import in_time
-from calibrations.text import estimate_in_prefix, estimate_text, labelled, minus, prefixed, unit
+from calibrations.text import add_prefix, estimate_in_prefix, estimate_text, labelled, minus, unit
 from procedures.session import Dwell
 from rig.record import Record, Run
 from rig.record.measured import Measured
@@ -219,7 +219,7 @@ def differences(pairs: Sequence[Pair]) -> Chart:
 
 def _differences(pairs: Sequence[Pair]) -> Panel:
     reach = max(abs(p.difference) + DIFFERENT * (p.std or 0.0) for p in pairs)
-    factor, spelt = prefixed(unit(pairs[0].unit), reach)
+    factor, spelt = add_prefix(unit(pairs[0].unit), reach)
     names = tuple(pair.name for pair in pairs)
     dots = Points(
         np.array([factor * pair.difference for pair in pairs]),

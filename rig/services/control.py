@@ -13,7 +13,7 @@ import numpy as np
 
 from calibrations.analyses.control_chart import Chart, control_chart
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
-from calibrations.text import concise, prefixed
+from calibrations.text import add_prefix, concise
 from drivers.errors import did_you_mean
 from rig.errors import RecordError, UnknownRun
 from rig.record import Run
@@ -71,7 +71,7 @@ def row(quantity: Controlled) -> tuple[str, ...]:
     chart = quantity.chart
     last = concise(float(chart.values[-1]), chart.sigma, quantity.unit)
     progress = f"{len(chart.values)} of {chart.judged}" if chart.verdict == "baseline" else str(len(chart.values))
-    factor, unit = prefixed(quantity.unit, chart.sigma)
+    factor, unit = add_prefix(quantity.unit, chart.sigma)
     centre, sigma = f"{chart.centre:.7g} {quantity.unit}", f"{factor * chart.sigma:.2g} {unit.replace('µ', 'u')}"
     return quantity.sensor, quantity.quantity, progress, centre, sigma, last, chart.verdict
 

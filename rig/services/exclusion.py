@@ -35,7 +35,7 @@ def exclude(record: Record, name: str, numbers: Sequence[int], reason: str | Non
     return record.run(run.run)
 
 
-def numbered_run(data: str) -> str | None:
+def find_numbered_run(data: str) -> str | None:
     """The run that `data` names, where it has poses that can be left out; None of a file, and of samples."""
     if Path(data).exists():
         return None

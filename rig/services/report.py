@@ -13,7 +13,7 @@ from calibrations.errors import UnusableData
 from rig.files import program
 from rig.record import Record
 from rig.record.measured import Measured
-from rig.results.samples import beside_displacement
+from rig.results.samples import compare_with_displacement
 from rig.services.load import Loaded, loaded
 from rig.services.next_experiment import planned
 from rig.services.provenance import today
@@ -34,7 +34,7 @@ def of_run(data: str) -> tuple[MotionResult | None, Mapping[str, Any]]:
         return None, {}
     with Record.to_find(data) as record:
         measured = Measured.named(record, data)
-        motion = beside_displacement(measured) if measured.run.procedure == "motion" else None
+        motion = compare_with_displacement(measured) if measured.run.procedure == "motion" else None
         return motion, measured.run.results
 
 

@@ -106,21 +106,21 @@ def load_all(names: Sequence[str], notify: Callable[[str], None] = lambda _: Non
         raise DataError(f"{duplicate} is given twice; give the same data once")
     if len(tables) == 1:
         return tables[0]
-    return joined_runs(tables, [_begun(name) for name in names], notify)
+    return join_runs(tables, [_begun(name) for name in names], notify)
 
 
-def joined_runs(
+def join_runs(
     tables: Sequence[Table], starts: Sequence[datetime | None], notify: Callable[[str], None] = lambda _: None
 ) -> Table:
     """The tables of runs joined; times count from the beginning of the first, where all say when they were `starts`."""
-    from calibrations.joined import clock_began_anew, join_tables  # a single table needs it not
+    from calibrations.joined import has_clock_restart, join_tables  # a single table needs it not
 
     start_times = [start for start in starts if start is not None]
     if len(start_times) == len(tables):
         tables = [
             _later(t, (start - start_times[0]).total_seconds()) for t, start in zip(tables, start_times, strict=True)
         ]
-    if clock_began_anew(tables):
+    if has_clock_restart(tables):
         notify(
             "The time starts again in each of these; the analysis assumes that one followed directly after the other."
         )

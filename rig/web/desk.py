@@ -138,9 +138,9 @@ def lab_read() -> str | None:
     """The name of the lab's record if the workbench reads it, else None."""
     if not (url := os.environ.get(RECORD)):
         return None
-    from rig.record.lab import lab_url, masked_url
+    from rig.record.lab import lab_url, mask_url
 
-    return masked_url(lab_url(url, RECORD))
+    return mask_url(lab_url(url, RECORD))
 
 
 def models(selected: str = "", default: str | None = "by kind of data") -> dict[str, str]:

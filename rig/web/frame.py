@@ -17,7 +17,7 @@ from rig.errors import RigError
 from rig.runs.background import control
 from rig.runs.background.status import Status
 from rig.web.desk import Desk, lab_read
-from rig.web.parts import button, message, named_dialog
+from rig.web.parts import button, dialog_with_name, message
 
 # The present run in the head of every page: progress, pause and stop.
 
@@ -217,7 +217,7 @@ def _keys(keys: Mapping[str, Key]) -> None:
     """Run the actions of keys, and list the keys under `?`."""
 
     def listed() -> None:
-        with named_dialog("Keys") as dialog, ui.card():
+        with dialog_with_name("Keys") as dialog, ui.card():
             ui.label("Keys").classes("title")
             with ui.element("div").classes("facts"):
                 for name, key in keys.items():

@@ -34,7 +34,7 @@ LINKED = """<q-td :props="props">
 </q-td>"""
 
 
-def named_dialog(title: str) -> ui.dialog:
+def dialog_with_name(title: str) -> ui.dialog:
     """A dialog with the name that a screen reader says; the caller adds its card."""
     return ui.dialog().props(f'aria-label="{html.escape(title)}"')
 

@@ -27,7 +27,7 @@ def empty_plot(title: str, classes: str = "plot") -> ui.plotly:
     return ui.plotly(EMPTY).classes(classes).props(f'role=group aria-label="{title}"')
 
 
-def titled_plot(title: str, legend: str = "", classes: str = "plot", name: str = "") -> ui.plotly:
+def plot_with_title(title: str, legend: str = "", classes: str = "plot", name: str = "") -> ui.plotly:
     """An empty plot below its title, the menu of its downloads, and its legend. `name`: for screen readers."""
     with div("title"):
         words(title, "grow")

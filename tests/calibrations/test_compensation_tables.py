@@ -13,7 +13,7 @@ import pytest
 from calibrations.compensation import document
 from calibrations.compensation.document import header_lines, make_vectors
 from calibrations.compensation.forward import INVERTED, LEFT_OUT, steps_of, trace_model
-from calibrations.compensation.inverse import Range, compensated_residual, invert_model
+from calibrations.compensation.inverse import Range, compensate_residual, invert_model
 from calibrations.compensation.tables import CubicTable, spline_table
 from calibrations.effects.logged import RATE
 from calibrations.free_forms.bases import Basis, Clips, Line, Play, Products, Ramp, Spline, Waves
@@ -156,5 +156,5 @@ def test_a_product_is_told_the_rate_of_the_temperature_where_the_thermometer_lag
     assert np.abs(found["ax"] - a[:, 0])[inside].max() < 1e-6
     assert np.abs(without["ax"] - a[:, 0])[inside].max() == pytest.approx(60 * 0.005 * 0.001 / 1.01, rel=0.01)
     logged = replace(data, columns={**data.columns, "vx_v": v[:, 0], "vy_v": v[:, 1]})
-    residual = compensated_residual(made, logged)
+    residual = compensate_residual(made, logged)
     assert np.abs(residual.compensated)[inside].max() < 0.1  # mm/s^2

@@ -16,7 +16,7 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import fit
 from calibrations.fleet.batch import find_batch_effects
 from calibrations.fleet.look import Score, Screening, SharedDesigns, information, screen_sensor
-from calibrations.fleet.rigs import Measured, RigError, correct_stage_errors, find_rig_errors, unconnected_rigs
+from calibrations.fleet.rigs import Measured, RigError, correct_stage_errors, find_rig_errors, find_unconnected_rigs
 from calibrations.fleet.siblings import pool_siblings
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.model.file import read_model
@@ -179,7 +179,10 @@ def test_rigs_that_are_alike_have_no_error_and_one_rig_alone_tells_none() -> Non
 def test_rigs_are_compared_where_a_batch_connects_them() -> None:
     stage = looks([sensor(1)])[0].stage
     of = [Measured(batch, rig, stage) for batch, rig in ("1a", "1b", "2c", "3b", "3d")]
-    assert unconnected_rigs(of) == [("c",), ("a", "b", "d")] or unconnected_rigs(of) == [("a", "b", "d"), ("c",)]
+    assert find_unconnected_rigs(of) == [("c",), ("a", "b", "d")] or find_unconnected_rigs(of) == [
+        ("a", "b", "d"),
+        ("c",),
+    ]
 
 
 def test_a_corrected_table_stands_where_the_stage_truly_was() -> None:

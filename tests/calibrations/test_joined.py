@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibrations.errors import DataError
-from calibrations.joined import clock_began_anew, join_tables
+from calibrations.joined import has_clock_restart, join_tables
 from calibrations.table import Table
 
 
@@ -25,7 +25,7 @@ def test_times_that_go_on_stay_and_others_follow_at_the_usual_distance() -> None
     on, anew = [table([0.0, 7.0]), table([100.0, 107.0])], [table([5.0, 12.0]), table([5.0, 12.0], "b")]
     assert join_tables(on).time_s.tolist() == [0, 7, 100, 107]
     assert join_tables(anew).time_s.tolist() == [5, 12, 19, 26]
-    assert (clock_began_anew(on), clock_began_anew(anew)) == (False, True)
+    assert (has_clock_restart(on), has_clock_restart(anew)) == (False, True)
     assert join_tables(anew).source == "a + b"
 
 

@@ -11,7 +11,7 @@ from calibrations.design.orientations import (
     directions_up,
     is_other_side,
     is_worth,
-    named_orientation,
+    name_orientation,
     next_orientation,
     orientation_words,
     turn_words,
@@ -61,8 +61,8 @@ def test_a_turn_is_as_short_as_the_information_allows() -> None:
 def test_an_orientation_has_words(up: tuple[float, ...], words: str) -> None:
     direction = np.array(up) / np.linalg.norm(up)
     assert orientation_words(direction) == words
-    assert named_orientation(words) == pytest.approx(direction)
-    assert named_orientation("the blue side up") is None
+    assert name_orientation(words) == pytest.approx(direction)
+    assert name_orientation("the blue side up") is None
 
 
 @pytest.mark.parametrize(

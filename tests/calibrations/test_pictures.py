@@ -15,7 +15,7 @@ from calibrations.discovery.findings import Step
 from calibrations.discovery.results import Discovery
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit, fit
-from calibrations.fitting.sensed import pooled_milli
+from calibrations.fitting.sensed import pool_in_milli
 from calibrations.loop import compare, discover
 from calibrations.model import Model
 from calibrations.model.file import read_model
@@ -33,7 +33,7 @@ from calibrations.presentation.charts.discovery import (
 )
 from calibrations.presentation.charts.noise import ratio
 from calibrations.presentation.interactive import figure
-from calibrations.presentation.residual import ChannelResidual, choices, first_choices, telling_columns
+from calibrations.presentation.residual import ChannelResidual, choices, first_choices, select_telling_columns
 from calibrations.presentation.static import PictureError, compact, draw, inline, png, save, save_all, svg
 from calibrations.table import Array, Table
 from tests.calibrations.synthetic import components, poses, turns
@@ -218,7 +218,7 @@ def test_the_map_of_positions_is_of_equal_area() -> None:
 def test_an_effect_is_drawn_over_what_it_follows() -> None:
     (step,) = warm().steps
     assert step.name == "temperature-bias"
-    assert charts.most_telling(step).name == "temperature_c"
+    assert charts.select_telling_column(step).name == "temperature_c"
     left, right, *_ = panels(effect_chart(step))
     kelvin = step.before.table.column("temperature_c")
     assert drawn(left) == points(kelvin, 1e3 * step.before.residual[0])
@@ -234,7 +234,7 @@ def test_a_quadratic_is_drawn_over_the_axis_itself() -> None:
     table = poses(columns, 2.5 + x + 2e-3 * x**2, 2.5 + y + 1e-3 * y**2)
     before = fit(read_model("linear"), table)
     step = Step("quadratic-nonlinearity", before, fit(with_(before.model, "quadratic-nonlinearity"), table))
-    column = charts.most_telling(step)
+    column = charts.select_telling_column(step)
     assert column.labels == ("specific force along x (g)", "specific force along y (g)")
     np.testing.assert_allclose(column.values[0], x[step.before.table.order], atol=1e-12)
 
@@ -245,7 +245,7 @@ def test_where_no_column_tells_the_change_itself_is_drawn() -> None:
     table = poses(columns, 2.5 + x + 5e-3 * x * z, 2.5 + y - 5e-3 * y * z)
     before = fit(read_model("linear"), table)
     step = Step("z-axis-scale", before, fit(with_(before.model, "z-axis-scale"), table))
-    column = charts.most_telling(step)
+    column = charts.select_telling_column(step)
     assert column.name == "change"
     ((_, along, curve),) = charts.curves(step, column, 0)
     np.testing.assert_allclose(along, 1e3 * curve)  # the diagonal
@@ -254,7 +254,7 @@ def test_where_no_column_tells_the_change_itself_is_drawn() -> None:
 def test_an_effect_is_drawn_over_what_it_needs() -> None:
     effect = copy(catalogue()["bias"])
     effect.needs = ("t_s", "temperature_c", "direction")
-    labels = [column.labels[1] for column in telling_columns(warm().start, effect)]
+    labels = [column.labels[1] for column in select_telling_columns(warm().start, effect)]
     forces = [f"specific force along {axis} (g)" for axis in "yxz"]
     assert labels == [*forces, "β (deg)", "time (min)", "temperature (°C)"]
 
@@ -279,7 +279,7 @@ def test_the_waterfall_falls_from_level_to_level() -> None:
     assert bars.ends.tolist() == [found.start.pooled_excess, found.end.pooled_excess]
     assert dots(panel).x.tolist() == [levels(found)[0].unseen, found.steps[0].held_out_after]
     assert panel.y.names == ("linear", "+ temperature-bias")
-    assert bars.texts[0].endswith(f"× ({pooled_milli(found.start)[0]:.2f} mg)")
+    assert bars.texts[0].endswith(f"× ({pool_in_milli(found.start)[0]:.2f} mg)")
 
 
 def test_the_name_of_a_model_with_many_effects_leaves_room_for_bars() -> None:
@@ -296,7 +296,7 @@ def test_the_ratio_of_deviations_has_marks_on_both_sides_of_1() -> None:
 
 def test_rms_in_mg_is_that_of_the_residual() -> None:
     found = by_hand().start
-    error, floor = pooled_milli(found)
+    error, floor = pool_in_milli(found)
     assert error == pytest.approx(1e3 * np.sqrt(np.mean(found.residual**2)))
     assert error / floor == pytest.approx(found.pooled_excess)
 

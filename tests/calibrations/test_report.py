@@ -16,7 +16,7 @@ from calibrations.design.experiment import Experiment
 from calibrations.discovery.results import Comparison, Discovery
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit
-from calibrations.fitting.sensed import pooled_milli
+from calibrations.fitting.sensed import pool_in_milli
 from calibrations.loop import compare, discover
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.file import read_model
@@ -27,7 +27,7 @@ from calibrations.text import (
     concise_in_prefix,
     estimate_in_prefix,
     estimate_text,
-    expanded_text,
+    expand_uncertainty,
     interval,
     join_words,
     minus,
@@ -146,7 +146,7 @@ def test_it_holds_the_errors_before_and_after() -> None:
     for value in (found.start.pooled_excess, found.end.pooled_excess, step.held_out_before, step.held_out_after):
         assert f" {rounded(value)} " in text
     for fit in (found.start, found.end):
-        assert f"{rounded(pooled_milli(fit)[0], 2)} mg" in text
+        assert f"{rounded(pool_in_milli(fit)[0], 2)} mg" in text
         for c in range(2):
             assert f"{rounded(1e3 * fit.rmse[c])} mV" in text
             assert f"{rounded(1e3 * fit.noise.floor[c])} mV" in text
@@ -338,7 +338,7 @@ def test_outputs_are_in_the_prefix_that_reads_best(value: float, std: float | No
     ],
 )
 def test_a_sign_is_for_expanded_uncertainties(value: float, expanded: float, shown: str) -> None:
-    assert expanded_text(value, expanded) == shown
+    assert expand_uncertainty(value, expanded) == shown
     assert value_text(value, expanded) == re.sub(r" ± [^)]*|[()]", "", shown)
 
 

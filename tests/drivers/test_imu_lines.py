@@ -13,7 +13,7 @@ from drivers.errors import BadFrame, LimitError, LinkTimeout, OverRange, SensorF
 from drivers.imu_lines import driver as imu_lines
 from drivers.imu_lines import twin
 from drivers.imu_lines.lines import Assembly, checksum, fields
-from drivers.imu_lines.proposal import proposed_settings
+from drivers.imu_lines.proposal import propose_settings
 from drivers.transport.faults import Fault
 from tests.drivers.digital import DigitalSensors
 
@@ -176,7 +176,7 @@ def test_the_self_test_proposes_settings_for_lines_that_do_not_fit(
 def test_six_axes_are_proposed_in_the_usual_order() -> None:
     random = np.random.default_rng(4)
     values = random.standard_normal((50, 6)) * 3 + [310, -120, 4050, -20, 14, 7]
-    found = proposed_settings([",".join(f"{v:.0f}" for v in row) for row in values], 0.5)
+    found = propose_settings([",".join(f"{v:.0f}" for v in row) for row in values], 0.5)
     assert found == {
         "format": "csv",
         "columns": {"ax": 1, "ay": 2, "az": 3, "gx": 4, "gy": 5, "gz": 6},
@@ -187,7 +187,7 @@ def test_six_axes_are_proposed_in_the_usual_order() -> None:
 
 @pytest.mark.parametrize("lines", [[], ["boot"] * 20, ["1,2"] * 20, ["5.5,0.1,0.2"] * 20])
 def test_nothing_is_proposed_where_no_accelerometer_is_seen(lines: list[str]) -> None:
-    assert proposed_settings(lines, 1.0) is None
+    assert propose_settings(lines, 1.0) is None
 
 
 def test_a_column_of_the_temperature_is_not_an_output(connect: Connect) -> None:
@@ -201,6 +201,6 @@ def test_a_column_of_the_temperature_is_not_an_output(connect: Connect) -> None:
 
 def test_a_named_column_of_the_temperature_is_proposed() -> None:
     lines = [f"ax:{k % 2} ay:0 az:{1 + k % 2} temp:25.{k % 10}" for k in range(20)]
-    found = proposed_settings(lines, 0.2)
+    found = propose_settings(lines, 0.2)
     assert found is not None
     assert found["columns"] == {"ax": "ax", "ay": "ay", "az": "az", "temperature": "temp"}

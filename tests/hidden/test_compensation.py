@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibrations.compensation.inverse import Compensation, compensated_residual, invert_model
+from calibrations.compensation.inverse import Compensation, compensate_residual, invert_model
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import fit
 from calibrations.geometry.orientation import nominal_pose, specific_force
@@ -50,7 +50,7 @@ def test_the_error_on_unseen_poses_falls_to_a_fiftieth(tmp_path: Path) -> None:
     for name in ("axis-misalignment", "quadratic-nonlinearity", "temperature-bias"):
         model = model.with_effect(catalogue()[name])
     unseen = turned(world, (120.0, 70.0, 40.0), 20.0)
-    left = compensated_residual(invert_model(fit(model, seen).model), unseen)
+    left = compensate_residual(invert_model(fit(model, seen).model), unseen)
     for linear, compensated_ in left.rmse.values():
         assert 30 < linear < 100  # mm/s^2
         assert compensated_ < linear / 50
@@ -86,5 +86,5 @@ def test_hysteresis_that_is_remembered_errs_a_fifth_of_that_which_is_left_out() 
     )
     assert (left_out > 3).all()  # mg
     assert (remembered < left_out / 5).all()
-    for linear, compensated_ in compensated_residual(invert_model(fitted), unseen).rmse.values():
+    for linear, compensated_ in compensate_residual(invert_model(fitted), unseen).rmse.values():
         assert compensated_ < linear / 4

@@ -22,7 +22,7 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli import rig as commands
 from rig.cli.terminal.options import read_settings
-from rig.planning.next_experiment import Dispute, choose_experiment, command_line, planned_experiment, proposed
+from rig.planning.next_experiment import Dispute, choose_experiment, command_line, plan_experiment, proposed
 from rig.planning.sweep_range import columns
 from rig.record import Record
 from rig.services.next_experiment import planned
@@ -51,7 +51,7 @@ def named(e: Experiment) -> str:
 
 @pytest.mark.parametrize("experiment", [*MENU, *ADDITIONS, *BY_PHYSICS], ids=named)
 def test_every_experiment_can_be_planned_and_its_command_line_means_the_same(experiment: Experiment) -> None:
-    e, planned = planned_experiment(experiment, read_bench(None), Path("a bench.yaml"))
+    e, planned = plan_experiment(experiment, read_bench(None), Path("a bench.yaml"))
     name, run, procedure, *rest = shlex.split(e.command)
     assert (name, run, procedure, rest[-2:]) == ("rig", "run", e.procedure, ["--bench", "a bench.yaml"])
     found = find(procedure)
@@ -122,7 +122,7 @@ def test_limits_of_a_stage_rule_experiments_out(bench_file: Callable[..., Path])
 def test_the_oven_warms_over_minutes_and_time_goes_on() -> None:
     bench = read_bench(None)
     _, table = QuickRig(IDEAL, 1, bench).measure(COARSE)
-    _, planned = planned_experiment(
+    _, planned = plan_experiment(
         Experiment("temperature-cycle", {"temperatures_c": [35.0, 50.0], "soak_s": 3600.0}, (), ""), bench, None
     )
     foreseen: dict[str, Any] = dict(columns(planned, table))

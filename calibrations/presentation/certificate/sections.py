@@ -9,7 +9,7 @@ from calibrations.presentation.budget import SOURCE_HEAD
 from calibrations.presentation.certificate.content import RULE, Certificate, Decision, Outcome
 from calibrations.presentation.certificate.results import CONSERVATIVE, WIDENED
 from calibrations.presentation.document import Facts, Section, Table
-from calibrations.text import expanded_text, freedom_text, minus, rounded, unit, value_text
+from calibrations.text import expand_uncertainty, freedom_text, minus, rounded, unit, value_text
 
 END_SCATTER = 2.67  # of a normal's 97.5 % quantile, in its standard deviation, times the root of the trials
 WIDE = 10  # columns of a correlation matrix side by side
@@ -123,7 +123,7 @@ def _environment(c: Certificate) -> Section:
 def results_table(c: Certificate) -> Table:
     """The results as left: what a certificate is asked for first."""
     rows = tuple(
-        (_name(o), expanded_text(o.value, o.expanded), unit(o.unit), _coverage(o), freedom_text(o.freedom),
+        (_name(o), expand_uncertainty(o.value, o.expanded), unit(o.unit), _coverage(o), freedom_text(o.freedom),
          *(("–", "–") if o.decision is None else (_limits(o.decision), _statement(o.decision))))
         for o in c.figures.outcomes
     )  # fmt: skip

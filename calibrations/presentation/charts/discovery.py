@@ -12,7 +12,7 @@ from calibrations.analyses.motion import MotionResult
 from calibrations.discovery.findings import Step
 from calibrations.discovery.results import Comparison, Discovery
 from calibrations.fitting.fit import Fit
-from calibrations.fitting.sensed import milli_unit, pooled_milli
+from calibrations.fitting.sensed import milli_unit, pool_in_milli
 from calibrations.presentation.chart import (
     GOOD,
     MEASURED,
@@ -31,10 +31,10 @@ from calibrations.presentation.charts.fit import (
     change_of,
     drawn_channels,
     fit_album,
-    most_telling,
     residual,
     row_height,
     scale_of,
+    select_telling_column,
 )
 from calibrations.presentation.charts.motion import evaluation
 from calibrations.presentation.charts.places import Falling, place_pictures
@@ -92,7 +92,7 @@ def brief(model: str) -> str:
 
 def error_text(fit: Fit) -> str:
     """The rms error with its unit."""
-    return f"{rounded(pooled_milli(fit)[0], 2)} {milli_unit(fit)}"
+    return f"{rounded(pool_in_milli(fit)[0], 2)} {milli_unit(fit)}"
 
 
 def waterfall(steps: Sequence[Level], words: Measure = Measure()) -> Chart:
@@ -119,7 +119,7 @@ def waterfall(steps: Sequence[Level], words: Measure = Measure()) -> Chart:
 def effect_chart(step: Step[Fit]) -> Chart:
     """A row for each channel: the residual before with the effect's curve through it, and the residual after."""
     columns_of_fit = choices(step.before)
-    colour, x = columns_of_fit[first_choices(list(columns_of_fit), step.before.table)[1]], most_telling(step)
+    colour, x = columns_of_fit[first_choices(list(columns_of_fit), step.before.table)[1]], select_telling_column(step)
     rows = []
     for k, c in enumerate(drawn_channels(step.before, change_of(step))):
         titles = (f"before; line: {step.name}", "after") if k == 0 else ("", "")

@@ -42,8 +42,8 @@ from calibrations.presentation.residual import (
     columns,
     first_choices,
     residual_unit,
+    select_telling_columns,
     specific_force,
-    telling_columns,
     zero,
 )
 from calibrations.table import MILLI, Array
@@ -302,11 +302,11 @@ def change_of(step: Step[Fit]) -> Array:
     return step.before.residual - step.after.residual
 
 
-def most_telling(step: Step[Fit]) -> Column:
+def select_telling_column(step: Step[Fit]) -> Column:
     """The simplest column that explains the change; the change itself if no column explains it."""
     change, sides = change_of(step) / step.before.noise.floor[:, None], _sides(step)
     effect = next(term.effect for term in step.after.model.terms if term.name == step.name)
-    candidates = telling_columns(step.before, effect)
+    candidates = select_telling_columns(step.before, effect)
     shares = np.array([explained(change, column.values, sides) for column in candidates])
     if step.before.table.type.moving:
         return candidates[0]

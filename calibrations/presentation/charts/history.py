@@ -25,7 +25,7 @@ from calibrations.presentation.chart import (
     stacked,
 )
 from calibrations.table import Array
-from calibrations.text import labelled, prefixed, rounded, unit
+from calibrations.text import add_prefix, labelled, rounded, unit
 
 POINTS = 200
 AHEAD = 0.5  # of the time from first to last calibration: length of the drawn drift after the last
@@ -77,7 +77,7 @@ def life(q: Life) -> Panel:
 
     The band is the 95 % interval of the value at that time, without the uncertainty of a calibration.
     """
-    factor, spelt = prefixed(unit(q.unit), max(map(abs, q.values)))
+    factor, spelt = add_prefix(unit(q.unit), max(map(abs, q.values)))
     values, expanded = factor * np.array(q.values), COVERAGE_FACTOR * factor * np.array(q.stds)
     start, end = _ends(q)
     signals = [k in q.signals for k in range(len(values))]
@@ -136,7 +136,7 @@ def control_panels(
     x = Axis("calibration", low=0.5, high=len(chart.values) + 0.5, ticks="integers")
     panels = {}
     for title, (first, values, low, high, signals, baseline_end, label, remark) in parts.items():
-        factor, spelt = prefixed(unit(unit_name), float(np.abs([values, high]).max()))
+        factor, spelt = add_prefix(unit(unit_name), float(np.abs([values, high]).max()))
         numbers = np.arange(first, first + len(values), dtype=float)
         point_keys = None if keys is None else keys[first - 1 :]
         texts = [f"{text}: {rounded(v)} {spelt}" for text, v in zip(hover[first - 1 :], factor * values, strict=False)]

@@ -32,7 +32,7 @@ from calibrations.presentation.chart import (
     stacked,
 )
 from calibrations.table import Array
-from calibrations.text import in_milli, prefixed, rounded, time_text
+from calibrations.text import add_prefix, in_milli, rounded, time_text
 
 COLOURS = {"x": BLUE, "y": VERMILION}
 TIME = "time since power-on (h)"
@@ -140,7 +140,7 @@ def surroundings(soak: Soak) -> Chart:
 
 def allan(soak: Soak) -> Chart:
     """Allan deviation of each axis on logarithmic axes, and the slope of white noise."""
-    lines, (factor, unit) = [], prefixed(soak.table.unit, max(soak.allan(axis)[1].max() for axis in soak.axes))
+    lines, (factor, unit) = [], add_prefix(soak.table.unit, max(soak.allan(axis)[1].max() for axis in soak.axes))
     for axis in soak.axes:
         times_s, deviations = soak.allan(axis)
         lines.append(Line(times_s, factor * deviations, f"axis {axis}", COLOURS[axis], markers=True))

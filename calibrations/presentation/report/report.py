@@ -19,7 +19,7 @@ from calibrations.design.experiment import Experiment
 from calibrations.discovery.findings import Candidate
 from calibrations.discovery.results import Comparison, Discovery
 from calibrations.fitting.fit import Fit
-from calibrations.fitting.sensed import in_milli, milli_unit, pooled_milli
+from calibrations.fitting.sensed import in_milli, milli_unit, pool_in_milli
 from calibrations.model import Model, Term
 from calibrations.presentation.budget import budget_section
 from calibrations.presentation.chart import Picture
@@ -43,7 +43,7 @@ def summary(discovery: Discovery[Fit]) -> str:
 
 def _error(discovery: Discovery[Fit]) -> str:
     start, end, structure = discovery.start, discovery.end, discovery.residual_structure
-    (error, floor), unit = pooled_milli(start), milli_unit(start)
+    (error, floor), unit = pool_in_milli(start), milli_unit(start)
     rows, pattern = f"{start.table.n} {start.table.type.rows}", f" Remaining: {structure}." if structure else ""
     if not discovery.steps:
         return (
@@ -51,7 +51,7 @@ def _error(discovery: Discovery[Fit]) -> str:
             f"of {rounded(floor, 2)} {unit}.{pattern}"
         )
     text = (
-        f"On {rows} the rms error falls from {rounded(error, 2)} {unit} to {rounded(pooled_milli(end)[0], 2)} {unit}; "
+        f"On {rows} the rms error falls from {rounded(error, 2)} {unit} to {rounded(pool_in_milli(end)[0], 2)} {unit}; "
         f"the noise floor is {rounded(floor, 2)} {unit}. The held-out error falls from "
         f"{rounded(start.held_out_excess)} to {rounded(discovery.steps[-1].held_out_after)} × the noise floor."
     )
@@ -62,13 +62,13 @@ def _error(discovery: Discovery[Fit]) -> str:
 
 def key_figures(discovery: Discovery[Fit]) -> list[tuple[str, str, str]]:
     """The few numbers to remember: (what, value, remark)."""
-    start, floor, unit = discovery.start, pooled_milli(discovery.start)[1], milli_unit(discovery.start)
+    start, floor, unit = discovery.start, pool_in_milli(discovery.start)[1], milli_unit(discovery.start)
     first = "error before" if discovery.steps else "rms error"
-    figures = [(first, f"{rounded(pooled_milli(start)[0], 2)} {unit}", _of_floor(start, start.held_out_excess))]
+    figures = [(first, f"{rounded(pool_in_milli(start)[0], 2)} {unit}", _of_floor(start, start.held_out_excess))]
     if discovery.steps:
         held_out = discovery.steps[-1].held_out_after
         figures.append(
-            ("error after", f"{rounded(pooled_milli(discovery.end)[0], 2)} {unit}", _of_floor(discovery.end, held_out))
+            ("error after", f"{rounded(pool_in_milli(discovery.end)[0], 2)} {unit}", _of_floor(discovery.end, held_out))
         )
     kind = "white noise of one mean" if start.noise.known else "from the scatter: the white noise is not known"
     return [*figures, ("noise floor", f"{rounded(floor, 2)} {unit}", kind)]

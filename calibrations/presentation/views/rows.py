@@ -14,7 +14,7 @@ from calibrations.discovery.results import Diagnosis, Discovery
 from calibrations.discovery.summary import step_shares
 from calibrations.discovery.verdict import Verdict
 from calibrations.fitting.fit import Fit
-from calibrations.fitting.sensed import milli_unit, pooled_milli
+from calibrations.fitting.sensed import milli_unit, pool_in_milli
 from calibrations.presentation.views import View
 from calibrations.text import Cells, quantity, rounded
 
@@ -32,7 +32,7 @@ class RowsView(View[Fit]):
 
     def figures(self, fit: Fit) -> dict[str, str]:
         """Error, held-out error and noise floor."""
-        (error, floor), unit = pooled_milli(fit), milli_unit(fit)
+        (error, floor), unit = pool_in_milli(fit), milli_unit(fit)
         return {
             "error": f"{rounded(fit.pooled_excess)} × ({rounded(error, 2)} {unit})",
             f"on {self.data.unseen}": f"{rounded(fit.held_out_excess)} ×",

@@ -65,7 +65,7 @@ def compensate_command(
     The number of steps is fixed, with a proof that it is enough over the whole range.
     """
     from calibrations.compensation.document import summary
-    from calibrations.compensation.inverse import compensated_residual, invert_model
+    from calibrations.compensation.inverse import compensate_residual, invert_model
     from calibrations.model.file import dump_model, read_model
     from rig.files import make_folder, write_whole
     from rig.services.compensation import compensation_lines, how_to_test, origin_of, source_files
@@ -87,7 +87,7 @@ def compensate_command(
             progress.text = f"testing the compensation on {data}"
             table = load(data, notify=note)
             check_unit(source_model, table.unit, table.source)
-            residual = compensated_residual(compensation, table)
+            residual = compensate_residual(compensation, table)
     make_folder(out)
     require_outputs(*(out / file for file in files))
     for file, text in files.items():

@@ -107,7 +107,7 @@ def history_command(
     if as_json:
         emit(document(life, calibration, staleness, compared))
     else:
-        text = [*lines(life), *near_lines(calibration, day, staleness), *compared_lines(compared)]
+        text = [*lines(life), *near_lines(calibration, day, staleness), *format_comparison(compared)]
         click.echo("\n".join([*text, *(f"written: {path}" for path in paths)]))
     return int(staleness is not None or not all(comparison.agree for comparison in compared))
 
@@ -189,7 +189,7 @@ def near_lines(closest: Near, on: date | None, staleness: str | None) -> Iterato
         yield but_stale(staleness)
 
 
-def compared_lines(compared: Sequence[Compared]) -> Iterator[str]:
+def format_comparison(compared: Sequence[Compared]) -> Iterator[str]:
     for comparison in compared:
         yield f"\n{comparison.one} compared with {comparison.other}"
         yield columns(*agreements(comparison, lambda value, digits: f"{value:.{digits}g}"))

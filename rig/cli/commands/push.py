@@ -14,7 +14,7 @@ from rig.cli.terminal.output import bench_option, emit, json_option, note
 from rig.errors import RecordError
 from rig.files import LAB
 from rig.record import Record
-from rig.record.lab import READER, WRITER, lab_url, masked_url, prepare
+from rig.record.lab import READER, WRITER, lab_url, mask_url, prepare
 from rig.record.push import Pushed, push_all, unsent, verify
 
 
@@ -85,13 +85,13 @@ def _push(url: URL, run_names: tuple[str, ...], as_json: bool) -> int:
     if refusals and len(waiting) == 1:
         raise refusals[0]
     if as_json:
-        emit({"schema": "rig.push/1", "to": masked_url(url), "runs": [vars(pushed) for pushed in pushed_runs]})
+        emit({"schema": "rig.push/1", "to": mask_url(url), "runs": [vars(pushed) for pushed in pushed_runs]})
     else:
         count = f", {len(refusals)} refused" if refusals else ""
         click.echo(
-            f"{len(pushed_runs)} runs pushed to {masked_url(url)}{count}"
+            f"{len(pushed_runs)} runs pushed to {mask_url(url)}{count}"
             if waiting
-            else f"{masked_url(url)} has all finished runs"
+            else f"{mask_url(url)} has all finished runs"
         )
     return int(bool(refusals))
 
@@ -103,10 +103,10 @@ def _description(pushed: Pushed) -> str:
 def _prepare(url: URL, as_json: bool) -> None:
     schema_before = prepare(url)
     if as_json:
-        emit({"schema": "rig.prepared/1", "to": masked_url(url), "before": schema_before})
+        emit({"schema": "rig.prepared/1", "to": mask_url(url), "before": schema_before})
         return
     state = f"the record, schema {schema_before}, is up to date" if schema_before else "created the record"
-    click.echo(f"{masked_url(url)}: {state}. Give each rig and each reader its own role:")
+    click.echo(f"{mask_url(url)}: {state}. Give each rig and each reader its own role:")
     click.echo(f"  CREATE ROLE rig7 LOGIN PASSWORD '...' IN ROLE {WRITER};   -- pushes, reads")
     click.echo(f"  CREATE ROLE anna LOGIN PASSWORD '...' IN ROLE {READER};   -- reads")
 
@@ -115,7 +115,7 @@ def _verify(url: URL, as_json: bool) -> int:
     with Record(url) as lab:
         verified = verify(lab)
     if as_json:
-        emit({"schema": "rig.verified/1", "record": masked_url(url), **vars(verified)})
+        emit({"schema": "rig.verified/1", "record": mask_url(url), **vars(verified)})
     else:
         click.echo(f"{len(verified.sound)} runs unchanged, {len(verified.on_their_way)} incomplete")
         for run in verified.changed:

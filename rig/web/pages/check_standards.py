@@ -14,7 +14,7 @@ from rig.services.control import HEAD, OUT, PROCEDURE, controlled, row, signals,
 from rig.services.history import when
 from rig.web.pages.history_results import CLICKED, untitled
 from rig.web.parts import box, button, div, failed, for_page, table, wide_table, words
-from rig.web.pictures import draw, titled_plot
+from rig.web.pictures import draw, plot_with_title
 
 LOOKS = {OUT: "bad", "in control": "good", "baseline": "plain"}
 
@@ -52,7 +52,7 @@ class CheckStandards:
             with div("pictures three"):
                 for title in self._panels():
                     with div("picture"):
-                        plot = titled_plot(title, CONTROL_LEGENDS[title], "live-plot", f"Check standard: {title}")
+                        plot = plot_with_title(title, CONTROL_LEGENDS[title], "live-plot", f"Check standard: {title}")
                         self.plots[title] = plot.on("plotly_click", _open_clicked_run, js_handler=CLICKED)
         self.draw()
 

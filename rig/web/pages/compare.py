@@ -26,7 +26,7 @@ from rig.web.calculations import Visit
 from rig.web.desk import Desk, models
 from rig.web.frame import Key, frame
 from rig.web.parts import afresh, box, button, div, failed, noted, state, table, waiting, wide_table, words
-from rig.web.pictures import AxisAndUnit, draw, titled_plot
+from rig.web.pictures import AxisAndUnit, draw, plot_with_title
 
 # Pictures of one axis: for two tables, or for two still records.
 
@@ -62,7 +62,7 @@ class Pictures(AxisAndUnit):
         with div("two" if len(comparison.titles) > 1 else ""):
             for title in comparison.titles:
                 with box("picture"):
-                    self.plots.append(titled_plot(title, classes="tall-plot"))
+                    self.plots.append(plot_with_title(title, classes="tall-plot"))
         self.draw()
 
     def draw(self) -> None:
@@ -191,7 +191,9 @@ def _parameters(model: str, pairs: list[Pair]) -> None:
     title = f"Differences of the parameters of {model}"
     with div("two beside"):
         with box("picture"):
-            plot = titled_plot(title, "Second minus first, with ± two standard uncertainties; ◆ differs by more.", "")
+            plot = plot_with_title(
+                title, "Second minus first, with ± two standard uncertainties; ◆ differs by more.", ""
+            )
             draw(plot.style(f"height: {height_px(chart)}px; width: 100%"), chart, "differences", False)
         with box("stack"):
             words(f"Parameters of {model}", "title")

@@ -32,7 +32,7 @@ from rig.services.history_words import (
 from rig.services.provenance import today
 from rig.web.calculations import off_loop
 from rig.web.parts import Link, box, button, div, for_page, shown, table, words
-from rig.web.pictures import draw, titled_plot
+from rig.web.pictures import draw, plot_with_title
 
 MODEL = "linear"
 
@@ -220,7 +220,7 @@ class HistoryPictures:
                 draw(self.charts[title], untitled(panel), f"{title} {q.name}")
 
     def _plot(self, title: str, legend: str = "") -> ui.plotly:
-        return titled_plot(title, legend).on("plotly_click", self._open_clicked, js_handler=CLICKED)
+        return plot_with_title(title, legend).on("plotly_click", self._open_clicked, js_handler=CLICKED)
 
     def _open_clicked(self, event: events.GenericEventArguments) -> None:
         ui.navigate.to(model_of(str(event.args), self.model))

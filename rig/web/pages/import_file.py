@@ -28,7 +28,7 @@ from rig.web.calculations import off_loop
 from rig.web.desk import FILES, Desk
 from rig.web.frame import frame
 from rig.web.parts import afresh, box, div, facts, failed, for_page, noted, raw_message, waiting, wide_table, words
-from rig.web.pictures import draw, titled_plot
+from rig.web.pictures import draw, plot_with_title
 
 MOST_BYTES = 200_000_000
 UNUSED = ""
@@ -236,7 +236,7 @@ class ImportPage:
                 self._constants()
             with div("stack"):
                 with box("picture"):
-                    self.plot = titled_plot(PICTURE, classes="tall-plot")
+                    self.plot = plot_with_title(PICTURE, classes="tall-plot")
                 self.result = box("stack")
         self._offer()
 

@@ -14,7 +14,7 @@ from nicegui import ui
 from calibrations.text import rounded
 from rig.errors import RecordError
 from rig.services.content import Content, content_of
-from rig.services.exclusion import numbered_run
+from rig.services.exclusion import find_numbered_run
 from rig.services.page_words import IMPORT, address
 from rig.services.search import Cancelled
 from rig.web.address import ModelState, parse_state
@@ -113,7 +113,7 @@ class Workbench:
 
     def _exclude_dialog(self) -> Callable[[Sequence[int]], None] | None:
         """The dialog that excludes selected poses; None for a file and for samples."""
-        return partial(run_record.ask, self.data, on_done=self.afresh) if numbered_run(self.data) else None
+        return partial(run_record.ask, self.data, on_done=self.afresh) if find_numbered_run(self.data) else None
 
     def afresh(self) -> None:
         """Read the changed data again."""

@@ -16,7 +16,7 @@ from rig.services.page_words import IMPORT, address
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import MODELS, models, noise_models, runs, saved_models
 from rig.web.pages.import_file import upload
-from rig.web.parts import box, button, message, named_dialog, words
+from rig.web.parts import box, button, dialog_with_name, message, words
 
 if TYPE_CHECKING:
     from rig.services.session import ModelSession
@@ -86,7 +86,7 @@ class Choice:
         self.undo.set_text(f"Undo {session.steps[-1].name}" if session.steps else "Undo")
 
     def _ask_file(self) -> None:
-        with named_dialog("Open a file") as dialog, ui.card():
+        with dialog_with_name("Open a file") as dialog, ui.card():
             words("Open a file", "title")
             words("A table with a header. If its columns have other names or units, you choose their meaning next.",
                   "quiet small")  # fmt: skip
@@ -109,7 +109,7 @@ class Choice:
 
     def _ask_name(self) -> None:
         """Ask for a name and save the model for pages and command line."""
-        with named_dialog("Save the present model") as dialog, ui.card().style("min-width: 420px"):
+        with dialog_with_name("Save the present model") as dialog, ui.card().style("min-width: 420px"):
             words("Save the present model", "title")
             name = ui.input("Name", value="complete").props("autofocus").classes("grow")
             if self.page.session is not None:

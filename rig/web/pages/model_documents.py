@@ -11,7 +11,7 @@ from nicegui import ui
 
 from rig.web.calculations import off_loop
 from rig.web.desk import models
-from rig.web.parts import div, for_page, message, named_dialog, words
+from rig.web.parts import dialog_with_name, div, for_page, message, words
 
 if TYPE_CHECKING:
     from calibrations.compensation.inverse import Range
@@ -23,7 +23,7 @@ class Asking:
     """A dialog with questions, a button that makes a document, and the answer or the error below it."""
 
     def __init__(self, title: str, explanation: str) -> None:
-        with named_dialog(title) as self.dialog, ui.card().style("min-width: min(560px, 92vw)"):
+        with dialog_with_name(title) as self.dialog, ui.card().style("min-width: min(560px, 92vw)"):
             words(title, "title")
             words(explanation, "quiet small")
             self.fields = div("settings").style("width: 100%")

@@ -21,7 +21,7 @@ from calibrations.presentation.charts.noise import (
     units,
 )
 from rig.web.parts import box, div, words
-from rig.web.pictures import AxisAndUnit, draw, titled_plot
+from rig.web.pictures import AxisAndUnit, draw, plot_with_title
 
 if TYPE_CHECKING:
     from calibrations.discovery.findings import Place, Step
@@ -62,7 +62,7 @@ class NoisePictures(AxisAndUnit):
             self.plots: dict[str, ui.plotly] = {}
             for name, title in TITLES.items():
                 with box("picture wide" if name == "record" else "picture"):
-                    self.plots[name] = titled_plot(title, LEGENDS[name])
+                    self.plots[name] = plot_with_title(title, LEGENDS[name])
 
     def show(self, compared: Comparison[NoiseFit], session: ModelSession[NoiseFit]) -> None:
         """Show a new fit."""

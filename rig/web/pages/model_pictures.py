@@ -15,7 +15,7 @@ from calibrations.fitting.sensed import axis_of
 from calibrations.presentation.chart import single_chart
 from calibrations.presentation.charts import motion
 from calibrations.presentation.charts.discovery import levels, waterfall
-from calibrations.presentation.charts.fit import failure, is_function, measurement, most_telling, residual
+from calibrations.presentation.charts.fit import failure, is_function, measurement, residual, select_telling_column
 from calibrations.presentation.interactive import figure
 from calibrations.presentation.residual import ChannelResidual, Column, choices, first_choices, residual_units
 from rig.web.parts import box, div, redraw, words
@@ -135,7 +135,7 @@ class Pictures(AxisAndUnit):
         self.columns.pop(FOLLOWED, None)
         same_column: str | None = None
         if step is not None and look:
-            column = most_telling(step)
+            column = select_telling_column(step)
             same_column = next((name for name in self.columns if name == column.name), None)
             if same_column is None:
                 self.columns[FOLLOWED] = column

@@ -13,7 +13,7 @@ from rig.drawings import Attitude, strip
 from rig.files import free_bytes, home
 from rig.planning.plan import Plan
 from rig.planning.preparation import checks, first_question, mounting, stops
-from rig.web.parts import div, facts, for_page, message, named_dialog, words
+from rig.web.parts import dialog_with_name, div, facts, for_page, message, words
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class BeginDialog:
 
     def __init__(self, content: Preparation, begin: Begin) -> None:
         self.content, self.begin = content, begin
-        with named_dialog(content.title).props("no-backdrop-dismiss") as self.dialog, ui.card().classes("begin"):
+        with dialog_with_name(content.title).props("no-backdrop-dismiss") as self.dialog, ui.card().classes("begin"):
             words(content.title, "title")
             with div("attitude"):
                 ui.html(strip(content.attitude), sanitize=False)

@@ -21,7 +21,7 @@ from rig.web.calculations import off_loop
 from rig.web.frame import control_run
 from rig.web.pages.run_begin import BeginDialog, before_resume
 from rig.web.pages.run_record import OverTime
-from rig.web.parts import afresh, box, button, div, failed, for_page, named_dialog, table, words
+from rig.web.parts import afresh, box, button, dialog_with_name, div, failed, for_page, table, words
 
 LOOK_S = 0.4
 PHASES = {
@@ -92,7 +92,7 @@ class Live:
         """Show the drawing in the whole window."""
         if self.status is not None and self.status.attitude:
             with (
-                named_dialog("The present pose") as dialog,
+                dialog_with_name("The present pose") as dialog,
                 ui.card().classes("enlarged attitude").on("click", dialog.close),
             ):
                 ui.html(page(Attitude(**self.status.attitude)), sanitize=False)

@@ -19,7 +19,7 @@ from rig.services.optimal_words import PLANS, plan_rows, purpose, savings
 from rig.services.search import Cancelled
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import FILES, models
-from rig.web.parts import afresh, div, failed, named_dialog, table, waiting, wide_table, words
+from rig.web.parts import afresh, dialog_with_name, div, failed, table, waiting, wide_table, words
 
 CRITERIA = {"I": "I: error of the prediction", "D": "D: joint uncertainty of the parameters"}
 Use = Callable[[Mapping[str, str]], None]
@@ -31,7 +31,10 @@ class OptimalDialog:
     def __init__(self, bench: Bench, sweep: Procedure, settings: Mapping[str, str], use: Use) -> None:
         self.bench, self.sweep, self.settings, self.use = bench, sweep, settings, use
         self.visit = Visit()
-        with named_dialog("Choose poses for a model").props("persistent") as self.dialog, ui.card().classes("optimal"):
+        with (
+            dialog_with_name("Choose poses for a model").props("persistent") as self.dialog,
+            ui.card().classes("optimal"),
+        ):
             words("Choose poses for a model", "title")
             words(
                 "The standard sweep has the present settings. The chosen poses stay in its range and give the same "

@@ -18,7 +18,7 @@ from rig.errors import RecordError
 from rig.record import Event, Record, Run
 from rig.record.tables import units_of
 from rig.services.charts import Course, RunTime, course_chart, kind_of
-from rig.services.exclusion import exclude, numbered_run
+from rig.services.exclusion import exclude, find_numbered_run
 from rig.services.export import export
 from rig.services.history import lives
 from rig.services.next_steps import page_steps, result_rows
@@ -34,12 +34,12 @@ from rig.web.parts import (
     box,
     button,
     complain,
+    dialog_with_name,
     div,
     facts,
     failed,
     for_page,
     message,
-    named_dialog,
     setting_label,
     step_row,
     table,
@@ -52,7 +52,7 @@ MOST_NAMED = 8
 
 def left_out(data: str) -> dict[int, str]:
     """Reasons of excluded poses by number; empty for a file and for samples."""
-    run = numbered_run(data)
+    run = find_numbered_run(data)
     if run is None:
         return {}
     with Record.to_find(run) as record:
@@ -63,7 +63,7 @@ def ask(data: str, numbers: Sequence[int], on_done: Callable[[], None]) -> None:
     """Ask for a reason, exclude the poses, and call `on_done`."""
     pose_list = join_words([str(number) for number in numbers[:MOST_NAMED]])
     rest_text = f" and {len(numbers) - MOST_NAMED} more" if len(numbers) > MOST_NAMED else ""
-    with named_dialog("Exclude poses") as dialog, ui.card().style("min-width: 420px"):
+    with dialog_with_name("Exclude poses") as dialog, ui.card().style("min-width: 420px"):
         words(
             f"Exclude pose {pose_list}{rest_text}" if len(numbers) == 1 else f"Exclude poses {pose_list}{rest_text}",
             "title",
@@ -106,7 +106,7 @@ async def change(data: str, numbers: Sequence[int], reason: str | None, on_done:
 
 
 def _change(data: str, numbers: Sequence[int], reason: str | None) -> None:
-    run = numbered_run(data)
+    run = find_numbered_run(data)
     if run is None:
         raise RecordError(f"{data} is not a table of poses in the record; in a file, add a column `excluded`")
     with Record.to_find(run) as record:
