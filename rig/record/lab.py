@@ -90,11 +90,21 @@ def patient() -> Any:
 
     class PatientConnection(psycopg.Connection[Any]):
         def wait(self, *args: Any, **options_by_name: Any) -> Any:
-            timer = threading.Timer(SILENCE_S, hang_up, (self.pgconn.socket,))
+            silent, fileno = threading.Event(), self.pgconn.socket
+
+            def give_up() -> None:
+                silent.set()
+                hang_up(fileno)
+
+            timer = threading.Timer(SILENCE_S, give_up)
             timer.daemon = True
             timer.start()
             try:
                 return super().wait(*args, **options_by_name)
+            except psycopg.OperationalError:
+                if silent.is_set():  # libpq reports that the server closed the connection
+                    raise psycopg.OperationalError(f"no answer for {SILENCE_S:g} s") from None
+                raise
             finally:
                 timer.cancel()
 
