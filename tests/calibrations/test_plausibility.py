@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from calibrations.discovery.plausibility import doubt, findings, refusal
+from calibrations.discovery.plausibility import _stuck, doubt, findings, refusal
 from calibrations.discovery.verdict import Verdict
 from calibrations.documents import comparison_document, diagnosis_document, discovery_document, fit_document
 from calibrations.effects.catalogue import catalogue
@@ -213,3 +213,12 @@ def test_no_stage_zero_is_off_by_tens_of_degrees() -> None:
     assert found.verdict == "unexplained"
     assert "the zero of alpha_deg is +30 deg off" in (found.residual_structure or "")
     assert "stage-zero-offset" not in found.causes
+
+
+def test_an_output_that_gravity_explains_in_no_row_is_not_stuck() -> None:
+    random = np.random.default_rng(4)
+    a = random.uniform(-1.0, 1.0, (200, 3))
+    driven, unrelated = 2.5 + a[:, 0], 2.5 + random.standard_normal(200)
+    driven[:60] = unrelated[:60] = 2.5
+    assert "stuck at 2.5 V in 60 of 200 rows" in str(_stuck(driven, a, "vx_v"))
+    assert _stuck(unrelated, a, "vx_v") is None

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from calibrations.criteria import MOST_UNSEEN
 from calibrations.discovery.patterns import Pattern
-from calibrations.discovery.structure import structure_of
+from calibrations.discovery.structure import poorly_predicted, structure_of
 from calibrations.effects.expression_effect import effect_for
 from calibrations.fitting.fit import Fit, fit
 from calibrations.model.file import read_model
@@ -93,3 +95,12 @@ def test_a_walk_is_a_drift_and_no_step() -> None:
 
 def test_nothing_is_left_of_noise() -> None:
     assert found(changed(0 * TIME))[1] is None
+
+
+@pytest.mark.parametrize(("moving", "factor", "doubtful"), [(True, 1.1, True), (True, 0.9, False), (False, 1.1, False)])
+def test_only_a_motion_with_a_large_error_on_unseen_stretches_is_doubtful(
+    moving: bool, factor: float, doubtful: bool
+) -> None:
+    table = SimpleNamespace(type=SimpleNamespace(moving=moving))
+    fitted = SimpleNamespace(table=table, held_out_excess=factor * MOST_UNSEEN)
+    assert (poorly_predicted(fitted) is not None) == doubtful
