@@ -7,6 +7,7 @@ nothing.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -16,16 +17,16 @@ from calibrations.effects import Effect
 from calibrations.errors import ModelError
 from calibrations.fitting.shown_forms import estimate_by_residual
 from calibrations.free_forms.bases import Harmonics, Line
-from calibrations.free_forms.chain import ModelEffects, State, base_size, start, state_at
+from calibrations.free_forms.chain import ModelEffects, State, start, state_at
 from calibrations.free_forms.components import Component, free
+from calibrations.free_forms.descent import SLOW_BEGIN, SLOW_MOST, Point, SearchResult, Setting, finish
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.form import Factor, Form
 from calibrations.free_forms.geometry import GEOMETRY, Geometry
 from calibrations.free_forms.places import components
 from calibrations.free_forms.poses import PoseData
-from calibrations.free_forms.reml import coefficients, estimate, gains, gram, scale_components, whiten
+from calibrations.free_forms.reml import coefficients, estimate, gains, gram, scale_components
 from calibrations.free_forms.requested import RequestedForm
-from calibrations.free_forms.search import SearchResult
 from calibrations.free_forms.selection import ENTER, select
 from calibrations.free_forms.structure import FloorSource, Structure
 from calibrations.model import Model
@@ -135,38 +136,32 @@ def _size_forms(
     data: PoseData, model_effects: ModelEffects, white: Array, noise: list[Component], forms: list[Component]
 ) -> SearchResult:
     """Selection among the forms and Gauss-Newton steps."""
-    all_components = [*noise, *forms]
+    setting = Setting(data, white, model_effects)
     values = start(data, model_effects)
-    state = state_at(data, model_effects, values, ())
-    floor = float(np.sqrt(np.mean(white**2)))
-    most = {c.name: (0.5 * floor) ** 2 for c in noise}
-    variances = {c.name: (0.1 * floor) ** 2 for c in noise}
-    scales: dict[str, float] = {}
-    b = base_size(data, model_effects)
+    point = Point(
+        [*noise, *forms],
+        {c.name: (SLOW_BEGIN * setting.floor) ** 2 for c in noise},
+        values,
+        setting.state_at(values, ()),
+    )
+    limits = setting.slow_limits(noise, SLOW_MOST)
     by_name = {c.name: c for c in forms}
-    pools = [by_name]
+    scales: Mapping[str, float] = {}
     for number in range(ROUNDS):
-        X, blocks, scales = whiten(state, model_effects, values, all_components, scales, white)
-        g = gram(X, blocks, scales, b)
+        X, g = setting.linearise(point, scales)
         if number == 0:
-            X, scales = scale_components(X, g, b)
-            g = gram(X, blocks, scales, b)
-        sizes = estimate(g, variances, most)
-        sizes, _ = select(g, sizes, all_components, pools, most, ENTER, number > 0)
+            X, scales = scale_components(X, g, setting.base_size)
+            g = gram(X, g.blocks, scales, setting.base_size)
+        scales = g.scales
+        sizes = select(g, estimate(g, point.variances, limits), point.components, [by_name], limits, ENTER, number > 0)
         if not any(name in sizes.variances for name in by_name) and len(sizes.variances) == len(noise):
             gained = gains(g, sizes, list(by_name))
             best = max(gained, key=lambda name: gained[name][0])
-            least = (SMALLEST * floor) ** 2
-            sizes = estimate(g, {**sizes.variances, best: max(gained[best][1], least)}, most)
-        variances = dict(sizes.variances)
+            least = (SMALLEST * setting.floor) ** 2
+            sizes = estimate(g, {**sizes.variances, best: max(gained[best][1], least)}, limits)
         values = coefficients(g, sizes)
-        updated = state_at(data, model_effects, values, all_components)
-        change = float(np.sqrt(np.mean(((updated.predicted - state.predicted) / white) ** 2)))
-        state = updated
+        moved = Point(point.components, sizes.variances, values, setting.state_at(values, point.components))
+        change, point = setting.change(point.state, moved.state), moved
         if number > 0 and change < FLOOR_KNOWN:
             break
-    X, blocks, scales = whiten(state, model_effects, values, all_components, scales, white)
-    g = gram(X, blocks, scales, b)
-    sizes = estimate(g, variances, most)
-    values = coefficients(g, sizes)
-    return SearchResult(data, model_effects, white, all_components, g, X, sizes, values, state, (), flicker=False)
+    return finish(setting, point, scales, limits)

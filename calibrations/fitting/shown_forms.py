@@ -79,8 +79,7 @@ class Shown:
     def selected(self) -> Sizes:
         """The forms that act, and their sizes."""
         components = [_component(name, form) for name, form in self.forms.items()]
-        sizes, _ = select(self.gram, self.nothing, components, [{c.name: c for c in components}], {}, ENTER, True)
-        return sizes
+        return select(self.gram, self.nothing, components, [{c.name: c for c in components}], {}, ENTER, True)
 
     @property
     def nothing(self) -> Sizes:

@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc  # scipy.stats takes 0.4 s to load
 
-from calibrations.free_forms.chain import base_size
 from calibrations.free_forms.components import Component
+from calibrations.free_forms.descent import SearchResult, climb
 from calibrations.free_forms.reml import gains
-from calibrations.free_forms.search import SearchResult, climb
 from calibrations.table import Array
 
 NEXT_FORM = 0.05  # of a place's variance that a second form must take up: less is the form of the first
@@ -72,7 +71,7 @@ class ActingPlace:
 
 def places(result: SearchResult) -> list[ActingPlace]:
     """Every place that acts, largest first."""
-    b = base_size(result.data, result.model_effects)
+    b = result.setting.base_size
     by_place: dict[str, list[str]] = {}
     for name in result.active:
         by_place.setdefault(result.component(name).place, []).append(name)

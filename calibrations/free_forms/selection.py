@@ -58,12 +58,11 @@ def select(
     most: Mapping[str, float],
     limit: float,
     last: bool,
-) -> tuple[Sizes, list[str]]:
+) -> Sizes:
     """Components added, exchanged and removed until nothing gains more than `limit`."""
     by_name = {c.name: c for c in components}
-    steps: list[str] = []
     visited: set[frozenset[str]] = set()
-    sizes = _prune(g, sizes, by_name, most, steps)
+    sizes = _prune(g, sizes, by_name, most)
     stale: list[dict[str, float]] = [{} for _ in pools]
     pools = [dict(pool) for pool in pools]
     while len(sizes.variances) < MOST_COMPONENTS:
@@ -74,21 +73,20 @@ def select(
                 pools = [{name: c for name, c in pool.items() if name != best[0]} for pool in pools]
                 continue
             sizes = larger
-            steps.append(f"+{best[0]}")
             if by_name[best[0]].reshaped is not None:
                 break  # its shape is found first: its misfit looks like other places
-            sizes = _prune(g, sizes, by_name, most, steps)
+            sizes = _prune(g, sizes, by_name, most)
             if frozenset(sizes.variances) not in visited:
                 visited.add(frozenset(sizes.variances))
                 continue
         if not last:
             break
-        exchanged = _exchange(g, sizes, by_name, most, steps)
+        exchanged = _exchange(g, sizes, by_name, most)
         if set(exchanged.variances) == set(sizes.variances) or frozenset(exchanged.variances) in visited:
             break
         visited.add(frozenset(exchanged.variances))
-        sizes = _prune(g, exchanged, by_name, most, steps)
-    return estimate(g, sizes.variances, most), steps
+        sizes = _prune(g, exchanged, by_name, most)
+    return estimate(g, sizes.variances, most)
 
 
 def _cancels(g: Gram, sizes: Sizes) -> bool:
@@ -141,9 +139,7 @@ def _best(
     return best
 
 
-def _prune(
-    g: Gram, sizes: Sizes, by_name: Mapping[str, Component], most: Mapping[str, float], steps: list[str]
-) -> Sizes:
+def _prune(g: Gram, sizes: Sizes, by_name: Mapping[str, Component], most: Mapping[str, float]) -> Sizes:
     """The sizes without components whose removal costs less than their price, those of least cost first."""
     while True:
         prices_by_name = {n: price(c, acting_places(sizes.variances.keys() - {n}, by_name)) for n, c in by_name.items()}
@@ -157,13 +153,10 @@ def _prune(
         reduced = estimate(g, remaining, most, 12)
         if reduced.deviance - sizes.deviance - prices_by_name[name] > LEAVE:
             return sizes
-        steps.append(f"-{name}")
         sizes = reduced
 
 
-def _exchange(
-    g: Gram, sizes: Sizes, by_name: Mapping[str, Component], most: Mapping[str, float], steps: list[str]
-) -> Sizes:
+def _exchange(g: Gram, sizes: Sizes, by_name: Mapping[str, Component], most: Mapping[str, float]) -> Sizes:
     """The sizes with each component replaced by a likelier one, if there is one."""
     for name in [n for n in sizes.variances if not by_name[n].noise]:
         if name not in sizes.variances:
@@ -173,7 +166,6 @@ def _exchange(
         component_price = price(by_name[name], acting_at)
         replacement = estimate(g, reduced.variances, most, 12, sizes.deviance + component_price + LEAVE)
         if replacement.deviance - sizes.deviance - component_price <= LEAVE:  # the others take its part
-            steps.append(f"-{name}")
             sizes = replacement
             continue
         loss_of_component = reduced.deviance - sizes.deviance - component_price
@@ -185,6 +177,5 @@ def _exchange(
             continue
         improvement = sizes.deviance + component_price - exchanged.deviance - price(by_name[best[0]], acting_at)
         if improvement > 1.0:
-            steps.append(f"{name}>{best[0]}")
             sizes = exchanged
     return sizes

@@ -12,13 +12,14 @@ from scipy.special import chdtri  # scipy.stats takes 0.4 s to load
 
 from calibrations.criteria import LEAST_NOISE, SIGNIFICANT
 from calibrations.free_forms.bases import Line
-from calibrations.free_forms.chain import Coefficients, ModelEffects, state_at
+from calibrations.free_forms.chain import Coefficients, ModelEffects
+from calibrations.free_forms.descent import SearchResult
 from calibrations.free_forms.form import CROSS, Form
 from calibrations.free_forms.geometry import LINEAR_PART, Geometry, GeometryEffects, geometry
 from calibrations.free_forms.naming import ActingPlace, places
 from calibrations.free_forms.place_names import place_of_effect
 from calibrations.free_forms.poses import PoseData
-from calibrations.free_forms.search import NOISE_ALONE, SearchResult, search
+from calibrations.free_forms.search import NOISE_ALONE, search
 from calibrations.free_forms.selection import ENTER
 from calibrations.free_forms.stairs import SAW, Stairs
 from calibrations.geometry.orientation import out_of_plane
@@ -89,7 +90,7 @@ class Structure:
     @property
     def follows_noise(self) -> bool:
         """Whether unseen rows differ by noise over time that no curve predicts: a random walk, or strong flicker."""
-        return self.result.flicker or any("/walk-" in name for name in self.result.active)
+        return self.result.setting.flicker or any("/walk-" in name for name in self.result.active)
 
     @property
     def unknown(self) -> tuple[ActingPlace, ...]:
@@ -126,9 +127,7 @@ class Structure:
         """Contribution of all places but one to the output, (channels, n), in its unit; None: of all places."""
         result = self.result
         coefficients = {name: result.values.of[name] for name in (place.components if place else ())}
-        state = state_at(
-            result.data, result.model_effects, Coefficients(result.values.base, coefficients), result.components
-        )
+        state = result.setting.state_at(Coefficients(result.values.base, coefficients), result.components)
         return result.state.predicted - state.predicted
 
     def refinements(self, place: ActingPlace) -> tuple[str, ...]:
@@ -181,7 +180,7 @@ class Structure:
         assert form is not None  # noqa: S101 the caller asks for forms only
         variance, scale = self.result.sizes.variances[name], self.result.gram.scales[name]
         channels = 1 if form.shared else self.result.data.channels
-        b = self.result.columns.shape[1] - 1 - len(self.result.gram.with_data)
+        b = self.result.setting.base_size
         columns = self.result.columns[:, b + block.start : b + block.stop]
         mean_squares = (
             self.result.sizes.of(self.result.gram, name) ** 2 * np.sum(columns**2, axis=0) / self.result.data.n

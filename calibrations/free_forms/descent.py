@@ -1,0 +1,392 @@
+"""One descent of the search: rounds of selection and Gauss-Newton steps, from a beginning to where nothing changes.
+
+Each round linearises the chain where the descent stands, selects the components that act, and takes a step. The first
+rounds take only large components: what small ones would explain there may be a second-order remainder of large ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibrations.free_forms.chain import Coefficients, ModelEffects, State, base_size, start, state_at
+from calibrations.free_forms.components import Component
+from calibrations.free_forms.places import components as all_components
+from calibrations.free_forms.poses import PoseData
+from calibrations.free_forms.reml import (
+    Gram,
+    Sizes,
+    coefficients,
+    estimate,
+    gain_of_columns,
+    gram,
+    scale_components,
+    whiten,
+    without,
+)
+from calibrations.free_forms.selection import ENTER, pools_of, prices, select
+from calibrations.free_forms.stairs import find_saw
+from calibrations.progress import report
+from calibrations.table import Array
+
+COARSE = (1e-3, 2e-5)  # of the misfit, at each linearisation: less may be a second-order remainder
+ROUNDS = 7
+EXCHANGES_AGAIN = 0.3  # noise floors by which the output changes, rms: exchanges of the same components are tried again
+CONVERGED = 0.03  # noise floors by which the output changes, rms
+LARGEST = 4.0  # of the mean square of the first misfit: more is two components against each other
+HALVINGS = 6  # of a step that overshoots
+SLOW_BEGIN = 0.1  # slow noise, in noise floors (rms): where its estimate starts
+SLOW_FIRST = 0.15  # at most, while the first components are found: it would take up part of them
+SLOW_MOST = 0.5  # at most
+CAUTION = 30.0  # times the gain that a component needs after a step that failed
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What a descent works on.
+
+    white    standard deviation of each mean, (channels, n)
+    flicker  whether slow noise may be of any size
+    """
+
+    data: PoseData
+    white: Array
+    model_effects: ModelEffects
+    flicker: bool = False
+
+    @property
+    def floor(self) -> float:
+        """The noise of a mean, rms."""
+        return float(np.sqrt(np.mean(self.white**2)))
+
+    @property
+    def base_size(self) -> int:
+        """Number of base columns."""
+        return base_size(self.data, self.model_effects)
+
+    def slow_limits(self, components: Iterable[Component], most: float) -> dict[str, float]:
+        """Limits of the variances of slow noise; `most` in noise floors."""
+        return {} if self.flicker else {c.name: (most * self.floor) ** 2 for c in components if c.noise}
+
+    def state_at(self, values: Coefficients, components: Sequence[Component]) -> State:
+        """All signals of the chain."""
+        return state_at(self.data, self.model_effects, values, components)
+
+    def linearise(self, point: Point, scales: Mapping[str, float]) -> tuple[Array, Gram]:
+        """Columns [base, components, data] over the noise, and their products."""
+        X, blocks, all_scales = whiten(
+            point.state, self.model_effects, point.values, point.components, scales, self.white
+        )
+        return X, gram(X, blocks, all_scales, self.base_size)
+
+    def misfit(self, state: State) -> float:
+        """Mean square of the residual over the noise."""
+        return float(np.mean(((self.data.outputs - state.predicted) / self.white) ** 2))
+
+    def change(self, before: State, after: State) -> float:
+        """Change of the output, rms in noise floors."""
+        return float(np.sqrt(np.mean(((after.predicted - before.predicted) / self.white) ** 2)))
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Where a descent stands: all components, the variances of those that act, and the chain at their coefficients."""
+
+    components: Sequence[Component]
+    variances: Mapping[str, float]
+    values: Coefficients
+    state: State
+
+    def without(self, names: Iterable[str]) -> Point:
+        """Without components that have not changed the state yet."""
+        left_out = set(names)
+        return Point(
+            [c for c in self.components if c.name not in left_out],
+            {name: v for name, v in self.variances.items() if name not in left_out},
+            Coefficients(self.values.base, {k: v for k, v in self.values.of.items() if k not in left_out}),
+            self.state,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Progress:
+    """A descent after some rounds.
+
+    limits     of the variances
+    caution    factor on the gain that a component needs
+    rejected   frequencies of saws that failed
+    exchanged  components among which exchanges were tried
+    change     of the output in the last round, rms in noise floors
+    """
+
+    point: Point
+    scales: Mapping[str, float]
+    limits: Mapping[str, float] | None = None
+    caution: float = 1.0
+    rejected: tuple[float, ...] = ()
+    exchanged: frozenset[str] = frozenset()
+    change: float = np.inf
+    converged: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """The end of the search."""
+
+    setting: Setting
+    components: Sequence[Component]
+    gram: Gram
+    columns: Array  # whitened [base, components, data]
+    sizes: Sizes
+    values: Coefficients
+    state: State
+
+    @property
+    def data(self) -> PoseData:
+        """The poses."""
+        return self.setting.data
+
+    @property
+    def white(self) -> Array:
+        """Standard deviation of each mean, (channels, n)."""
+        return self.setting.white
+
+    @property
+    def point(self) -> Point:
+        """Where the descent ended."""
+        return Point(self.components, self.sizes.variances, self.values, self.state)
+
+    def component(self, name: str) -> Component:
+        return next(c for c in self.components if c.name == name)
+
+    @property
+    def residual(self) -> Array:
+        """Whitened residual, (channels * n,)."""
+        b, g = self.setting.base_size, self.gram
+        rows = g.indices(self.sizes.variances)
+        base = g.base_inverse @ (g.base_with_data - g.base_products[:, rows] @ self.sizes.coefficients)
+        fitted = self.columns[:, :b] @ base + self.columns[:, b + rows] @ self.sizes.coefficients
+        return np.asarray(self.columns[:, -1] - fitted)
+
+    @property
+    def error(self) -> float:
+        """Rms of what all components but slow noise leave, in the output's unit."""
+        b = self.setting.base_size
+        slow = np.zeros(len(self.columns))
+        for component in self.components:
+            if component.noise and component.name in self.sizes.variances:
+                block = self.gram.blocks[component.name]
+                slow += self.columns[:, b + block.start : b + block.stop] @ self.sizes.of(self.gram, component.name)
+        return float(np.sqrt(np.mean(((self.residual + slow) * self.white.ravel()) ** 2)))
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom that the residual keeps: rows less those that base and components take."""
+        parameters = sum(
+            self.gram.blocks[name].stop - self.gram.blocks[name].start - self.sizes.shrinkage(self.gram, name)
+            for name in self.sizes.variances
+        )
+        return float(max(len(self.columns) - self.gram.base_rank - parameters, 1.0))
+
+    def sizes_without(self, names: Iterable[str]) -> Sizes:
+        """Sizes without some components, the other variances held."""
+        sizes = self.sizes
+        for name in names:
+            sizes = without(self.gram, sizes, name)
+        return sizes
+
+    def cost_without(self, names: Iterable[str]) -> float:
+        """Loss of twice the log-likelihood without some components, to first order."""
+        return self.sizes_without(names).deviance - self.sizes.deviance
+
+    @property
+    def active(self) -> list[str]:
+        return [name for name in self.sizes.variances if not self.component(name).noise]
+
+    @property
+    def ratio(self) -> float:
+        """The residual over the noise."""
+        return float(np.sqrt(self.residual @ self.residual / self.freedom))
+
+    @property
+    def criterion(self) -> float:
+        """-2 log restricted likelihood, and what each component must gain."""
+        return self.sizes.deviance + ENTER * len(self.active) + prices(self.component(name) for name in self.active)
+
+
+def descend(
+    setting: Setting,
+    general: bool = True,
+    catalogue_first: bool = False,
+    loops: bool = False,
+    origin: SearchResult | None = None,
+) -> SearchResult:
+    """The end of a descent from the base, or from the components of an earlier search.
+
+    general          whether components that can follow almost anything are tried
+    catalogue_first  whether the first rounds prefer forms of the catalogue to free ones
+    loops            whether hysteresis whose loops differ from place to place is tried
+    """
+    point = _begin(setting, general, loops) if origin is None else origin.point
+    progress = _Progress(point, {})
+    beginning = "effects first" if catalogue_first else "all forms together"
+    beginning += ", loops" * loops + ", flicker" * setting.flicker
+    for number in range(0 if origin is None else len(COARSE), ROUNDS):
+        report(f"searching for places ({beginning}), pass {number + 1} of at most {ROUNDS}")
+        progress = _advance(setting, progress, number, catalogue_first)
+        if progress.converged:
+            break
+    return finish(setting, progress.point, progress.scales, progress.limits or {})
+
+
+def finish(setting: Setting, point: Point, scales: Mapping[str, float], limits: Mapping[str, float]) -> SearchResult:
+    """The result at a point, linearised once more."""
+    X, g = setting.linearise(point, scales)
+    sizes = estimate(g, point.variances, limits)
+    values = coefficients(g, sizes)
+    return SearchResult(setting, point.components, g, X, sizes, values, setting.state_at(values, point.components))
+
+
+def _begin(setting: Setting, general: bool, loops: bool) -> Point:
+    """The base, and all components that these poses can show."""
+    data = setting.data
+    values = start(data, setting.model_effects)
+    state = setting.state_at(values, ())
+    components = [
+        c
+        for c in all_components(data, state, setting.flicker)
+        if (general or not c.general) and (loops or not c.has_loops)
+    ]
+    saw = find_saw(data, state, setting.white, data.outputs - state.predicted, (), ENTER)
+    slow = {c.name: (SLOW_BEGIN * setting.floor) ** 2 for c in components if c.noise}
+    return Point([*components, *([saw] if saw else [])], slow, values, state)
+
+
+def _advance(setting: Setting, progress: _Progress, number: int, catalogue_first: bool) -> _Progress:
+    """One round: a linearisation, a selection and a step."""
+    point, is_coarse = progress.point, number < len(COARSE)
+    X, g = setting.linearise(point, progress.scales)
+    if progress.limits is None:
+        X, scales = scale_components(X, g, setting.base_size)
+        g = gram(X, g.blocks, scales, setting.base_size)
+        largest = LARGEST * g.squares / g.rows * setting.floor**2
+        progress = replace(progress, limits={c.name: largest for c in point.components if not c.noise})
+    limits = {
+        **(progress.limits or {}), **setting.slow_limits(point.components, SLOW_FIRST if is_coarse else SLOW_MOST)
+    }  # fmt: skip
+    least_gain = progress.caution * (max(ENTER, COARSE[number] * g.squares) if is_coarse else ENTER)
+    exchanges = not is_coarse and not (set(point.variances) == progress.exchanged and progress.change < EXCHANGES_AGAIN)
+    sizes = select(
+        g, estimate(g, point.variances, limits), point.components,
+        pools_of(point.components, catalogue_first and is_coarse), limits, least_gain, exchanges,
+    )  # fmt: skip
+    moved = _take_step(setting, point, X, g, sizes, limits)
+    progress = replace(
+        progress,
+        scales=g.scales,
+        limits=limits,
+        exchanged=frozenset() if is_coarse else frozenset(sizes.variances),
+        change=setting.change(point.state, moved.state),
+    )
+    if setting.misfit(moved.state) > 1.5 * g.squares / g.rows + 10.0:  # components against each other: no step
+        return _after_failure(progress, moved)
+    progress = replace(progress, point=moved)
+    if not any(c.cause == "quantisation" for c in moved.components):
+        residual = setting.data.outputs - moved.state.predicted
+        saw = find_saw(setting.data, moved.state, setting.white, residual, progress.rejected, ENTER)
+        if saw is not None:
+            return replace(progress, point=replace(moved, components=[*moved.components, saw]))
+    is_same = set(moved.variances) == set(point.variances)
+    return replace(progress, converged=not is_coarse and is_same and progress.change < CONVERGED)
+
+
+def _take_step(setting: Setting, point: Point, X: Array, g: Gram, sizes: Sizes, limits: Mapping[str, float]) -> Point:
+    """The point after a Gauss-Newton step, with the shapes of the active components changed where that leaves less."""
+    target = coefficients(g, sizes)
+    values, state = take_damped_step(setting, point.values, target, point.components)
+    moved = Point(point.components, sizes.variances, values, state)
+    reshaped = _refine_shapes(point, g, sizes, X, setting)
+    if reshaped is None:
+        return moved
+    reshaped_g = setting.linearise(replace(point, components=reshaped), g.scales)[1]
+    reshaped_sizes = estimate(reshaped_g, sizes.variances, limits)
+    reshaped_values = coefficients(reshaped_g, reshaped_sizes)
+    reshaped_state = setting.state_at(reshaped_values, reshaped)
+    if setting.misfit(reshaped_state) < setting.misfit(state):
+        return Point(reshaped, reshaped_sizes.variances, reshaped_values, reshaped_state)
+    return moved
+
+
+def _after_failure(progress: _Progress, failed: Point) -> _Progress:
+    """The descent before a step that failed: without the saws that acted, or else with more caution."""
+    saws = [c for c in failed.components if c.cause == "quantisation" and c.name in failed.variances]
+    rejected = (*progress.rejected, *(saw.shape[0] for saw in saws))
+    caution = progress.caution * (1.0 if saws else CAUTION)
+    return replace(progress, point=progress.point.without(c.name for c in saws), rejected=rejected, caution=caution)
+
+
+def take_damped_step(
+    setting: Setting, origin: Coefficients, target: Coefficients, components: Sequence[Component]
+) -> tuple[Coefficients, State]:
+    """The step from `origin` to `target`, halved as long as half of it leaves less."""
+    state = setting.state_at(target, components)
+    for _ in range(HALVINGS):
+        half = _midpoint(origin, target)
+        half_state = setting.state_at(half, components)
+        if setting.misfit(half_state) >= setting.misfit(state):
+            break
+        target, state = half, half_state
+    return target, state
+
+
+def _midpoint(origin: Coefficients, end: Coefficients) -> Coefficients:
+    """Halfway; a component that only one of them has, begins or ends at zero."""
+    names = {**origin.of, **end.of}
+    zero = np.zeros(1)
+    coefficients_by_name = {name: (origin.of.get(name, zero) + end.of.get(name, zero)) / 2 for name in names}
+    return Coefficients((origin.base + end.base) / 2, coefficients_by_name)
+
+
+def _refine_shapes(point: Point, g: Gram, sizes: Sizes, X: Array, setting: Setting) -> list[Component] | None:
+    """The active components at their likeliest shapes, the others held; None: no change."""
+    reshaped_components = list(point.components)
+    is_reshaped = False
+    for i, comp in enumerate(point.components):
+        if comp.name not in sizes.variances or comp.reshaped is None:
+            continue
+        gain = gain_of_columns(g, without(g, sizes, comp.name), X, setting.base_size)
+
+        def gained(shape: tuple[float, ...], comp: Component = comp, gain: Callable[[Array], float] = gain) -> float:
+            assert comp.reshaped is not None  # noqa: S101 checked above
+            J = comp.reshaped(shape).jacobian(point.state) / g.scales[comp.name] / setting.white[:, :, None]
+            return gain(J.reshape(-1, J.shape[2]))
+
+        best = climb(gained, comp.shape, comp.step)
+        if best != comp.shape:
+            reshaped_components[i] = comp.reshaped(best)
+            is_reshaped = True
+    return reshaped_components if is_reshaped else None
+
+
+def climb(
+    gained: Callable[[tuple[float, ...]], float], shape: tuple[float, ...], step: tuple[float, ...]
+) -> tuple[float, ...]:
+    """The shape of greatest gain nearby: each value in turn, by a parabola through three points, steps halved."""
+    best, top = list(shape), gained(shape)
+    for _ in range(3):
+        for k in range(len(best)):
+            size = step[k]
+            for _ in range(5):
+                sides = []
+                for sign in (-1.0, 1.0):
+                    trial = tuple(v + sign * size if j == k else v for j, v in enumerate(best))
+                    sides.append((gained(trial), trial))
+                value, trial = max(sides)
+                if value > top:
+                    top, best = value, list(trial)
+                else:
+                    size *= 0.4
+        step = tuple(0.2 * s for s in step)
+    return tuple(best)
