@@ -1,0 +1,34 @@
+"""Attitudes and forces in tables of runs, against the simulated rig, which computes them on its own."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.world.gravity import Base, Package, felt_g, mounting, vertical
+from procedures.session import Pose
+from rig.record.measured import sensor_from_base, sensor_from_table, specific_force_g
+
+ANGLES = st.floats(-360.0, 360.0)
+POSES = st.builds(Pose, ANGLES, ANGLES, mount_deg=ANGLES, flip=st.sampled_from([0, 1]), up=st.sampled_from("xyz"))
+
+
+@given(pose=POSES)
+def test_the_force_on_a_sensor_at_rest_is_that_of_the_simulated_rig(pose: Pose) -> None:
+    mount = mounting(Package(), pose.mount_deg, pose.flip, pose.up)
+    force = felt_g(vertical(Base()), mount, math.radians(pose.alpha_deg), math.radians(pose.beta_deg))
+    assert sensor_from_table(pose) == pytest.approx(mount, abs=1e-12)
+    assert specific_force_g(pose) == pytest.approx(force, abs=1e-11)
+    assert sensor_from_base(pose) @ sensor_from_base(pose).T == pytest.approx(np.eye(3), abs=1e-12)
+
+
+@given(pose=POSES)
+def test_the_force_in_a_turn_is_its_mean_over_the_turn(pose: Pose) -> None:
+    turn = Pose(**{**pose.__dict__, "rate_deg_s": 20.0})
+    stops = [Pose(**{**pose.__dict__, "beta_deg": pose.beta_deg + k * 45.0}) for k in range(8)]
+    mean = np.mean([specific_force_g(stop) for stop in stops], axis=0)
+    assert specific_force_g(turn) == pytest.approx(mean, abs=1e-11)
