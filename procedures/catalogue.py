@@ -10,17 +10,19 @@ import ast
 import importlib.util
 import inspect
 import logging
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, wraps
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from drivers.errors import did_you_mean
+from drivers.errors import DriverError, did_you_mean
 from procedures.errors import ProcedureError, UnknownProcedure
 
 SHIPPED = Path(__file__).parent
+PACKAGES = ("calibrations", "drivers", "procedures", "rig")
 LOG = logging.getLogger(__name__)  # without a handler, Python prints warnings to standard error
 
 
@@ -74,7 +76,9 @@ def find(procedure_name: str, folder: Path | None = None) -> Procedure:
         raise UnknownProcedure(f"no procedure {procedure_name!r}.{did_you_mean(procedure_name, paths_by_name)}")
     module = _load(path)
     kind, adaptive = getattr(module, "KIND", "poses"), getattr(module, "ADAPTIVE", False)
-    return Procedure(name(path), getattr(module, path.stem), summary(path), _doc(path), path, kind, adaptive)
+    function = getattr(module, path.stem)
+    function = function if path.parent == SHIPPED else _guarded(function, path)
+    return Procedure(name(path), function, summary(path), _doc(path), path, kind, adaptive)
 
 
 def _is_procedure(path: Path) -> bool:
@@ -110,3 +114,34 @@ def _load(path: Path) -> ModuleType:
     except Exception as error:
         raise ProcedureError(f"{path}: cannot load it: {type(error).__name__}: {error}; correct the file") from error
     return module
+
+
+def _guarded(function: Callable[..., Any], path: Path) -> Callable[..., Any]:
+    """A user's procedure. A fault in its file raises ProcedureError with the line; other errors pass unchanged."""
+
+    @wraps(function)
+    def call(*arguments: Any, **settings: Any) -> Any:
+        try:
+            return function(*arguments, **settings)
+        except (DriverError, ProcedureError, OSError):  # they say what happened
+            raise
+        except Exception as error:
+            line = _faulty_line(error, path)
+            if line is None:
+                raise
+            fault = f"{type(error).__name__}: {error}".rstrip(": ")
+            raise ProcedureError(f"{path}, line {line}: {fault}; correct the procedure") from error
+
+    return call
+
+
+def _faulty_line(error: Exception, path: Path) -> int | None:
+    """The line of the file in which an error arose; None if it arose in a function of this program that it called."""
+    own_folders = [SHIPPED.parent / package for package in PACKAGES]
+    for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
+        file = Path(frame.f_code.co_filename)
+        if file == path:
+            return line
+        if any(folder in file.parents for folder in own_folders):
+            return None
+    return None

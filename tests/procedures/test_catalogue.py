@@ -64,6 +64,28 @@ def test_a_file_that_fails_says_where(tmp_path: Path) -> None:
         find("bad", tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("1 / 0", r"mine\.py, line 3: ZeroDivisionError: division by zero; correct the procedure"),
+        ("np.zeros(2) @ np.zeros(3)", r"mine\.py, line 3: ValueError: matmul.*; correct the procedure"),
+        ("np.linalg.inv(np.zeros((2, 2)))", r"mine\.py, line 3: LinAlgError: Singular matrix; correct the procedure"),
+        ("raise SafetyLimit('too hot')", "^too hot$"),
+    ],
+)
+def test_a_fault_in_ones_own_procedure_names_the_file_and_the_line(tmp_path: Path, body: str, message: str) -> None:
+    imports = "import numpy as np; from procedures.errors import SafetyLimit"
+    (tmp_path / "mine.py").write_text(f"{imports}\ndef mine(rig):\n    {body}\n")
+    with pytest.raises(ProcedureError, match=message):
+        find("mine", tmp_path).function(None)
+
+
+def test_a_fault_of_the_program_in_ones_own_procedure_stays_one(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("from procedures.settings import parse\ndef mine(rig):\n    parse(1, 2)\n")
+    with pytest.raises(AttributeError):
+        find("mine", tmp_path).function(None)
+
+
 def test_settings_are_read_by_their_types(folder: Path) -> None:
     procedure = find("noise-floor", folder)
     texts = {"dwell_s": "2.5", "repeats": "4", "warm": "yes", "side": "down", "angles_deg": "-90,30", "remark": "x"}
