@@ -36,6 +36,7 @@ from rig.record.values import CHANGED, Block, Kept, Run
 
 FIELD, RATE, FORCE = ("mx", "my", "mz"), ("gx", "gy", "gz"), ("ax", "ay", "az")
 NOT_OF_THESE = ("filter_corner_hz", "approach_deg")  # constants of poses only
+PROGRAM_CHANGED = "program_changed"  # a constant: from where on another program or procedure measured
 
 
 def positions_table(run: Run, poses: Iterable[Kept]) -> Table:
@@ -147,7 +148,7 @@ class Measured:
         """The constants of the bench and of the sensor."""
         motion = tables.constants(self.run, self.sensor) if KINDS[self.run.kind].moving else {}
         if changes := [event.text for event in self.record.events(self.run.run) if event.what == CHANGED]:
-            motion["program_changed"] = "; ".join(changes)  # also in every export
+            motion[PROGRAM_CHANGED] = "; ".join(changes)  # also in every export
         if self.sensor is None:
             return {**self.run.constants, **motion}
         sensor = Sensor.model_validate(self.run.bench["sensors"][self.sensor])

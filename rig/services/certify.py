@@ -39,7 +39,7 @@ from rig.bench.certificates import EXPIRED, certificates
 from rig.files import program
 from rig.record import Record, Run
 from rig.record.codec import digest_of
-from rig.record.measured import Measured
+from rig.record.measured import PROGRAM_CHANGED, Measured
 from rig.services.provenance import today
 
 # condition's column -> name and unit
@@ -106,7 +106,11 @@ def certified(subject: Certified, number: str = "", customer: str = "") -> Certi
         data=data if run is not None else Path(data).name,
         data_sha256=table.digest,
         model_sha256=model_digest,
-        remarks=(*_remarks(run, lab is not None and lab.name != UNSTATED), *_gravity_remarks(table)),
+        remarks=(
+            *_remarks(run, lab is not None and lab.name != UNSTATED),
+            *_program_remarks(table),
+            *_gravity_remarks(table),
+        ),
         reference=_reference(table),
         simulated=bool(_list_simulated_roles(run)),
     )
@@ -211,6 +215,12 @@ def _reference(table: Table) -> str:
         return "angular rate of the rate table, deg/s, about the stated axes"
     quantity = "its direction from the stage angles" if table.type.stage_angles else "its magnitude alone"
     return f"local gravity, {table.gravity_m_s2:.6g} m/s²; {quantity}"
+
+
+def _program_remarks(table: Table) -> Iterator[str]:
+    """Whether another program, or another procedure, measured a part of the data."""
+    if PROGRAM_CHANGED in table.constants:
+        yield f"The program or the procedure changed during the run, {table.constants[PROGRAM_CHANGED]}."
 
 
 def _gravity_remarks(table: Table) -> Iterator[str]:

@@ -112,3 +112,10 @@ def test_a_gravity_that_the_place_cannot_have_is_remarked(rig: Rig, work: Path) 
     assert "Check: the stated local gravity" not in said[0]
     assert "differs by +0.026 m/s² from 9.78033 m/s²" in said[1]
     assert "local gravity, 9.80665 m/s²; its direction from the stage angles" in (work / "placed.html").read_text()
+
+
+def test_a_part_that_another_program_measured_is_remarked(rig: Rig, work: Path) -> None:
+    changed = "from pose 5: inertial-rig 2, procedure sweep b; before: inertial-rig 1, procedure sweep a"
+    (work / "changed.csv").write_text(f"# program_changed: {changed}\n{(work / 'good.csv').read_text()}")
+    rig("certificate", "changed.csv", "--model", "linear", "--out", "changed.html", "--force")
+    assert f"The program or the procedure changed during the run, {changed}." in (work / "changed.html").read_text()
