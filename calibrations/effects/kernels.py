@@ -23,11 +23,11 @@ def _move(forces: Array, previous: float, present: float, limits: Array, limit_f
 def slip_elements(a: Array, on_the_way: Array, limit_factors: Array, limits: Array, first_shares: Array) -> Array:
     """Force held by elements of equal stiffness that stick and slip, at each row, shape (n, elements, 3), g.
 
-    a            (n, 3) specific force, g
-    on_the_way   (n, turns, 3) points where it turned round before each row
-    pressed      (n, 3) factor on the limits
-    limits       (elements,) g; an element follows the force and slips at its limit; rows in order of time
-    begun        (3,) share of its limit that each element holds before the first row, from -1 to 1
+    a              (n, 3) specific force, g
+    on_the_way     (n, turns, 3) points where it turned round before each row
+    limit_factors  (n, 3) factor on the limits
+    limits         (elements,) g; an element follows the force and slips at its limit; rows in order of time
+    first_shares   (3,) share of its limit that each element holds before the first row, from -1 to 1
     """
     n, axes = a.shape
     state = np.zeros((n, len(limits), axes))
