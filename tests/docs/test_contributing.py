@@ -33,7 +33,8 @@ def test_the_recipe_for_a_driver(tmp_path: Path) -> None:
     copy_rooms(tmp_path)
     for part in ("wire", "drivers"):
         shutil.copytree(ROOT / "tests" / part, tmp_path / "tests" / part)
-    shutil.copy(ROOT / "tests" / "conftest.py", tmp_path / "tests")
+    for module in (ROOT / "tests").glob("*.py"):  # what the tests of these parts share
+        shutil.copy(module, tmp_path / "tests")
     write_files(recipe, tmp_path)
     for block in commands(recipe):
         output = "\n".join(in_own_process(line, tmp_path) for line in block.lines)

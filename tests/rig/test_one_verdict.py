@@ -126,7 +126,7 @@ def test_all_answers_agree(answers: Answers) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("words", [("noise-floor", "--duration-s", "600"), ("sweep",)], ids=["noise-floor", "sweep"])
+@pytest.mark.parametrize("words", [("noise-floor", "--duration-s", "600"), ("sweep", "--step-deg", "45")])
 def test_all_answers_agree_on_runs_of_the_default_rig(rig: Rig, tmp_path: Path, words: tuple[str, ...]) -> None:
     made = rig("run", *words, "--unattended", "--json")
     agree(Answers(json.loads(made.out)["run"], tmp_path))
