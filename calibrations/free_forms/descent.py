@@ -133,7 +133,7 @@ class _Progress:
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """The end of the search."""
+    """The result of a descent or of a search."""
 
     setting: Setting
     components: Sequence[Component]
@@ -212,7 +212,7 @@ class SearchResult:
 
     @property
     def criterion(self) -> float:
-        """-2 log restricted likelihood, and what each component must gain."""
+        """What a search makes small: -2 log restricted likelihood, plus a price for each component that acts."""
         return self.sizes.deviance + ENTER * len(self.active) + prices(self.component(name) for name in self.active)
 
 

@@ -1,4 +1,6 @@
-"""The search for the components that act: descents from several beginnings, and what the likeliest end can do without.
+"""The search for the components that act: it starts from several beginnings and keeps the likeliest result.
+
+Then it removes the components that this result does not need.
 
 Slow noise is limited in a search, because more of it takes up parts of causes. Flicker beyond that limit is then
 followed by random walks and curves over time. Its spectrum tells it from a random walk: flicker has more power at high

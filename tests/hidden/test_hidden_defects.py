@@ -83,7 +83,7 @@ def test_nothing_is_named_on_a_clean_rig(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("times_noise", [3, 10])
+@pytest.mark.parametrize("times_noise", [3, 10, 30])
 @pytest.mark.parametrize("defect", OUTSIDE)
 def test_what_no_effect_describes_is_called_unexplained(defect: str, times_noise: float) -> None:
     found = diagnose(table(rigs.unexplained_rig(defect, times_noise, seed=4)), linear())

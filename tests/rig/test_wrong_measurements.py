@@ -18,7 +18,8 @@ REMEDIES = (
     *(
         "check",
         "choose",
-        "must be",
+        "must be from",
+        "must be 1 ",
         "correct",
         "exchange",
         "give",
