@@ -6,7 +6,7 @@ a place without a cause: the error falls, and the cause remains open.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -46,7 +46,7 @@ from calibrations.table import Array
 
 STAIRS = "quantisation"
 AS_SEARCHED = 1.1  # times the error of a search that follows noise: a fit of less leaves nothing to a new search
-IDLE = 0.99  # of the error before: a free form that leaves more is tried without
+IDLE = 0.99  # of the error before: what is no cause and leaves more is tried without
 NEARLY = 1.5  # noise floors: with a larger error, the stairs are wrong
 
 
@@ -119,7 +119,7 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
         selected, end = accepted_additions, fits[-1]
     else:
         fits = [base, *fitted(base, end, selected)]
-    selected, fits = _without_idle_forms(selected, fits)
+    selected, fits = _without_idle_additions(selected, fits, places.causes)
     if remarks and stated_white is not None:
         fits[-1] = with_least_white(fits[-1], stated_white)
     end = fits[-1]
@@ -131,16 +131,18 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     return StructuralSearch(start, tuple(steps), places, ranked, causes_alone(end, forms), remarks)
 
 
-def _without_idle_forms(selected: list[Addition], fits: list[Fit]) -> tuple[list[Addition], list[Fit]]:
-    """The additions and fits without free forms that lower neither the error of the fit nor that on unseen rows.
+def _without_idle_additions(
+    selected: list[Addition], fits: list[Fit], causes: Sequence[str]
+) -> tuple[list[Addition], list[Fit]]:
+    """The additions and fits without those, causes apart, that lower neither the error of the fit nor the unseen error.
 
-    Slow noise describes their part as well.
+    Slow noise, or a free form beside them, describes their part as well.
     """
     base, end = fits[0], fits[-1]
     needed = [
         addition
         for addition, (before, after) in zip(selected, pairwise(fits), strict=True)
-        if not addition.effect.name.startswith(PREFIX) or after.pooled_excess < IDLE * before.pooled_excess
+        if addition.effect.name in causes or after.pooled_excess < IDLE * before.pooled_excess
     ]
     if len(needed) == len(selected) or not needed:
         return selected, fits
