@@ -28,6 +28,8 @@ TARGET_S = {
     "diagnose, command: the default rig": 1.5,
     "fit of 20,000 poses": 3.0,
     "discover, command: the night": 15.0,
+    "an hour at 1 kHz: mavlink_imu": 20.0,
+    "an hour at 1 kHz: xsens_mti": 20.0,
     "diagnose, warm: one defect": 2.0,
     "diagnose, warm: the default rig": 2.0,
     "night": 60.0,  # the soak's procedure as a command: reversals, every check, results
@@ -70,6 +72,9 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
     yield "demo", _commands("demo", folder, 1, "demo")
     yield "samples of one dwell", _inside("", subject(folder, "samples"))
     yield "dwell means of 518 poses", _inside("", subject(folder, "dwells"))
+    for driver in ("mavlink_imu", "xsens_mti"):
+        name = f"an hour at 1 kHz: {driver}"
+        yield name, _inside(name, subject(folder, "streams", driver))
     for threads in (1, os.cpu_count() or 1):
         yield f"linear algebra, {threads} threads", json.loads(subject(folder, "screening", threads=threads).out)
     yield "coverage of 95 % intervals", json.loads(subject(folder, "coverage", "200").out)
