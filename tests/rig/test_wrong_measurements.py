@@ -20,6 +20,7 @@ REMEDIES = (
         "choose",
         "must be from",
         "must be 1 ",
+        "must be at least",
         "correct",
         "exchange",
         "give",
