@@ -33,7 +33,10 @@ def result_html(text: str, pictures: Sequence[Picture]) -> str:
     """
     mark = hashlib.sha256(text.encode()).hexdigest()[:8]
     figures = pictures_html([replace(picture, name=f"{picture.name}-{mark}") for picture in pictures])
-    return f'<pre>{escape(text)}</pre><div style="max-width: 60em; background: white; color: black">{figures}</div>'
+    return (
+        f'<pre style="white-space: pre-wrap">{escape(text)}</pre>'
+        f'<div style="max-width: 60em; background: white; color: black">{figures}</div>'
+    )
 
 
 @cache

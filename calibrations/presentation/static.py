@@ -104,7 +104,7 @@ def png(chart: c.Chart) -> bytes:
 
 
 def inline(chart: c.Chart, name: str, words: str) -> str:
-    """The chart as an SVG element for a page: it loads nothing, and its ids begin with `name`.
+    """The chart as an SVG element for a page: it loads nothing, and those ids that it uses begin with `name`.
 
     `words` describe it for screen readers.
     """
@@ -112,8 +112,9 @@ def inline(chart: c.Chart, name: str, words: str) -> str:
     text = text[text.index("<svg") :].strip()
     for pattern in DROPPED:
         text = re.sub(pattern, "", text, flags=re.DOTALL)
-    text = re.sub(r'\bid="', f'id="{name}-', text)
-    text = text.replace("url(#", f"url(#{name}-").replace("xlink:href", "href").replace('href="#', f'href="#{name}-')
+    used = {target: f"{name}-{k}" for k, target in enumerate(dict.fromkeys(REFERENCE.findall(text)))}
+    text = re.sub(r' id="([^"]*)"', lambda match: f' id="{used[match[1]]}"' if match[1] in used else "", text)
+    text = REFERENCE.sub(lambda match: f"#{used[match[1]]}", text).replace("xlink:href", "href")
     return text.replace("<svg", f'<svg role="img" aria-label="{escape(words)}"', 1)
 
 
@@ -337,6 +338,8 @@ def _note(s: c.Note, ax: Axes) -> None:
 
 MARKERS = re.compile(r'<g([^>]*)>\s*((?:<use [^>]*? style="([^"]*)"/>\s*)(?:<use [^>]*? style="\3"/>\s*)*)</g>')
 COORDINATES = re.compile(r' (?:x|y|d|width|height)="[^"]*"')
+POINTS = re.compile(r"(<g[^>]*>)<use [^>]*/>\s*</g>\s*(?:\1<use [^>]*/>\s*</g>\s*)+")
+REFERENCE = re.compile(r'(?:(?<=url\()|(?<=href="))#([\w.-]+)')
 OFTEN = 3  # times the same style
 FINE = re.compile(r"(\.\d\d)\d+")
 
@@ -344,6 +347,7 @@ FINE = re.compile(r"(\.\d\d)\d+")
 def compact(text: str) -> str:
     """The same drawing in about a third of the bytes."""
     text = MARKERS.sub(_hoisted, text)
+    text = POINTS.sub(_in_one_group, text)
     text = COORDINATES.sub(_rounded, text)
     return re.sub(r">\n\s+<", ">\n<", text)
 
@@ -353,6 +357,12 @@ def _hoisted(match: re.Match[str]) -> str:
     attributes, markers, style = match.groups()
     repeated = f' style="{style}"'
     return f"<g{attributes}{repeated}>{markers.replace(repeated, '')}</g>"
+
+
+def _in_one_group(match: re.Match[str]) -> str:
+    """Neighbouring markers of the same style in one group."""
+    opening, markers = match[1], match[0]
+    return f"{opening}{markers.replace(opening, '').replace('</g>', '')}</g>"
 
 
 def _rounded(match: re.Match[str]) -> str:

@@ -39,7 +39,7 @@ def result(question: str, kind: str) -> Result:
 def test_every_answer_has_the_face_of_a_result(question: str, kind: str) -> None:
     answer = result(question, kind)
     assert repr(answer) == answer.report()
-    assert answer._repr_html_().startswith("<pre>")
+    assert answer._repr_html_().startswith("<pre ")
     assert answer.to_dict()["schema"] == SCHEMAS[question]
     assert all(isinstance(row, dict) for row in answer.records())
     assert answer.plot().axes

@@ -336,6 +336,13 @@ def test_compact_cuts_digits_of_places_and_none_of_words() -> None:
     assert ">0.00025</text>" in small
 
 
+def test_markers_of_the_same_style_are_in_one_group() -> None:
+    points = Points(np.arange(500.0), np.arange(500.0), colour="#102030")
+    text = inline(single_chart(Panel((points,))), "cloud", "500 points")
+    assert text.count("<use href=") >= 500
+    assert len(text) < 500 * 60 + 10_000
+
+
 def test_words_of_users_are_not_taken_for_formulas() -> None:
     model = Model("a$b$ & <c>", warm().start.model.terms)
     found = Discovery.of(replace(warm().findings, start=fit(model, warm_table())))
