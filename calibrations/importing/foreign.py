@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibrations.errors import DataError, MissingColumn, nearest
 from calibrations.files import text_source
@@ -266,18 +267,32 @@ def drop_duplicate_rows(table: Table) -> tuple[Table, str | None]:
     """
     if "t_s" not in table:
         return table, None
-    rows = np.column_stack(list(table.columns.values()))
+    among = _rows_at_shared_times(table.column("t_s"))
+    if not len(among):
+        return table, None
+    rows = np.column_stack([values[among] for values in table.columns.values()])
     _, first, group = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    copies = np.setdiff1d(np.arange(table.n), first)
+    copies = np.setdiff1d(np.arange(len(among)), first)
     if not len(copies):
         return table, None
-    pairs = [f"{row + 1} (as {first[group.ravel()[row]] + 1})" for row in copies[:MOST_ROWS_LISTED]]
+    earlier = among[first[group.ravel()]]
+    pairs = [f"{among[k] + 1} (as {earlier[k] + 1})" for k in copies[:MOST_ROWS_LISTED]]
     rest_words = f" and {len(copies) - MOST_ROWS_LISTED} more" if len(copies) > MOST_ROWS_LISTED else ""
     verb = "copies an earlier row" if len(copies) == 1 else "copy earlier rows"
     rows_said = f"row{'s' if len(copies) > 1 else ''} {', '.join(pairs)}{rest_words}"
-    return table.rows(np.sort(first)), (
+    return table.rows(np.delete(np.arange(table.n), among[copies])), (
         f"{table.source}: {rows_said} {verb} (same time, same values); each is used once."
     )
+
+
+def _rows_at_shared_times(t_s: Array) -> NDArray[np.intp]:
+    """Numbers of the rows whose time another row has too."""
+    order = np.argsort(t_s, kind="stable")
+    is_same = np.diff(t_s[order]) == 0
+    is_shared = np.zeros(len(t_s), dtype=bool)
+    is_shared[order[1:]] = is_same
+    is_shared[order[:-1]] |= is_same
+    return np.flatnonzero(is_shared)
 
 
 # Read and write a table as CSV: `# key: value` lines, a header, numbers; text only in columns of text.
