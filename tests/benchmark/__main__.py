@@ -40,6 +40,8 @@ LEAST_TIMES_LESS = 1.8  # rig time of chosen poses, at equal worst standard erro
 NEAR_PLAN = 1.2  # factor within which the parameters' real errors are those of the plan
 ALLAN_TARGETS = "10 and 4 times faster, 50 MB, variance 1.05 x that of every overlap, 1e-9 under a mean of 20000"
 FORECAST_HELD = (0.90, 0.98)  # of 95 % bounds of a soak's final value, at each of eight times
+MOST_READING = 2.0  # times the processor time of the library alone, for an import into the record
+MOST_COPIES = 2.0  # times the file's size, in memory
 MOST_OVERHEAD = 0.02  # of dwells and moves, in real time
 
 Figure = dict[str, Any]
@@ -75,6 +77,8 @@ def _figures(folder: Path) -> Iterator[tuple[str, Figure]]:
     for driver in ("mavlink_imu", "xsens_mti"):
         name = f"an hour at 1 kHz: {driver}"
         yield name, _inside(name, subject(folder, "streams", driver))
+    for form in ("csv", "ulg"):
+        yield f"import of 200 MB: {form}", _import(folder, form)
     for threads in (1, os.cpu_count() or 1):
         yield f"linear algebra, {threads} threads", json.loads(subject(folder, "screening", threads=threads).out)
     yield "coverage of 95 % intervals", json.loads(subject(folder, "coverage", "200").out)
@@ -146,6 +150,29 @@ def _allan(folder: Path) -> Figure:
     met = met and said["variance_ratio"] <= 1.05 and said["error_under_mean"] <= 1e-9
     times = {"times_faster": theirs / ours, "exact_times_faster": theirs / exact}
     return {**said, **times, "targets": ALLAN_TARGETS, "met": met}
+
+
+def _import(folder: Path, form: str) -> Figure:
+    """A large file into the record, beside the library that reads it; processor time, each in a process of its own."""
+    file = folder / f"rest.{form}"
+    subject(folder, "reading", "write", str(file), "200")
+    library = subject(folder, "reading", "read", str(file))
+    ours = rig(folder, "import", str(file), "--kind", "still", "--json")
+    rows = json.loads(ours.out)["rows"]
+    times, peak_mb = ours.processor_s / library.processor_s, ours.peak_mb
+    target_mb = MOST_COPIES * file.stat().st_size / 1e6 + MOST_MB
+    file.unlink()
+    met = times <= MOST_READING and peak_mb <= target_mb
+    seconds = {"seconds": ours.seconds, "library_s": library.seconds, "processor_times": times}
+    rounded = {key: float(f"{value:.4g}") for key, value in seconds.items()}
+    return {
+        **rounded,
+        "rows": rows,
+        "peak_mb": peak_mb,
+        "target_times": MOST_READING,
+        "target_mb": target_mb,
+        "met": met,
+    }
 
 
 def _noise(folder: Path) -> Figure:
