@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from calibrations.compensation.cost import memory_at
 from calibrations.compensation.document import header_lines, make_vectors
 from calibrations.compensation.forward import FORCES, steps_of
 from calibrations.compensation.graph import evaluate_nodes
-from calibrations.compensation.inverse import invert_model
+from calibrations.compensation.inverse import Compensation, invert_model
 from calibrations.effects.kernels import slip
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.model.chain import respond
@@ -25,6 +26,11 @@ from tests.calibrations.fitted import LINEAR, PHYSICAL, model
 SLIPS = {"hysteresis": {"height": (0.003, 0.002), "reach": 0.1, "spread": 0.5, "pressing": 0.4}}
 LAGS = {"temperature-hysteresis": {"slope": (0.001, -0.002), "play": 0.6}}
 BOTH = {**PHYSICAL, **SLIPS, **LAGS}
+
+
+@cache
+def both() -> Compensation:
+    return invert_model(model(BOTH))
 
 
 def test_what_an_effect_remembers_is_what_its_kernel_does() -> None:
@@ -63,7 +69,7 @@ def test_on_the_way_of_the_stages_it_remembers_what_the_model_has() -> None:
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_every_language_follows_the_same_samples(compiler: str, tmp_path: Path) -> None:
-    made = invert_model(model(BOTH))
+    made = both()
     paths = written(made, tmp_path)
     (tmp_path / "driver.c").write_text(FOLLOWING)
     checks = make_vectors(made, 512)
@@ -81,7 +87,7 @@ def test_every_language_follows_the_same_samples(compiler: str, tmp_path: Path) 
 
 
 def test_the_proof_holds_whatever_is_remembered() -> None:
-    made = invert_model(model(BOTH))
+    made = both()
     random = np.random.default_rng(8)
     n = 4000
     at = {name: random.uniform(-1.5, 1.5, n) for name in FORCES}
@@ -116,5 +122,5 @@ def test_gravity_stands_in_for_an_axis_and_what_is_remembered_is_kept_once() -> 
 
 
 def test_the_head_says_that_samples_come_in_order() -> None:
-    head = " ".join(" ".join(header_lines(invert_model(model(BOTH)), ORIGIN)).split())
+    head = " ".join(" ".join(header_lines(both(), ORIGIN)).split())
     assert "With a history: hysteresis, temperature-hysteresis. Give every sample, in order: 14 numbers" in head
