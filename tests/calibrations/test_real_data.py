@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from calibrations.discovery.results import Discovery
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit, fit
@@ -25,11 +28,13 @@ def log(file: str, *mapped: str, rate_hz: float = 100.0, **constants: float) -> 
     return average_still_positions(table, rate_hz)
 
 
+@cache
 def xsens() -> Table:
     columns = ("t_s=1:s", "ax=2:counts", "ay=3:counts", "az=4:counts")
     return log("imu_tk_xsens/xsens_acc.mat.txt.gz", *columns, gravity_m_s2=9.81744)
 
 
+@cache
 def mikoff() -> Table:
     columns = ("ax=1:m/s2", "ay=2:m/s2", "az=3:m/s2")
     return log("mikoff_mpu9150/imu0.log.gz", *columns, gravity_m_s2=9.81)
@@ -37,6 +42,12 @@ def mikoff() -> Table:
 
 def suarez() -> Table:
     return log("suarez_mpu6050/example_data_calibration.csv.gz", "ax=ax:counts", "ay=ay:counts", "az=az:counts")
+
+
+@cache
+def nine(data: Callable[[], Table]) -> Discovery[Fit]:
+    """What is found beside biases and scale factors."""
+    return discover(data(), read_model("linear"))
 
 
 def values(found: Fit, effect: str) -> dict[str, float]:
@@ -61,10 +72,10 @@ def test_the_error_falls_as_published() -> None:
 
 
 def test_nothing_beyond_nine_parameters_is_claimed() -> None:
-    for table in (xsens(), mikoff()):
-        nine = discover(table, read_model("linear"))
-        assert [step.name for step in nine.steps] == ["axis-nonorthogonality"]
-        again = diagnose(table, nine.end.model)
+    for data in (xsens, mikoff):
+        found = nine(data)
+        assert [step.name for step in found.steps] == ["axis-nonorthogonality"]
+        again = diagnose(data(), found.end.model)
         assert again.verdict == "adequate"
         assert all(c.p_value > 0.05 for c in again.candidates)
 
@@ -80,13 +91,13 @@ def test_the_published_calibration_of_an_mpu9150_is_recovered() -> None:
 
 
 def test_ten_positions_do_not_determine_nine_parameters() -> None:
-    nine = read_model("linear").with_effect(effect("axis-nonorthogonality"))
-    found = fit(nine, suarez())
+    model = read_model("linear").with_effect(effect("axis-nonorthogonality"))
+    found = fit(model, suarez())
     doubtful = [e for term in found.model.terms for e in term.estimates if not e.identified]
     assert [e.name for e in doubtful] == ["xy"]
     assert "not identifiable from these positions" in str(doubtful[0].why)
     # the residual is tiny, and on positions that were left out the error is not
-    assert diagnose(suarez(), nine).held_out_before > 5 * found.pooled_excess
+    assert diagnose(suarez(), model).held_out_before > 5 * found.pooled_excess
 
 
 def effect(name: str) -> Effect:
@@ -94,6 +105,6 @@ def effect(name: str) -> Effect:
 
 
 def test_the_noise_floor_of_still_positions_is_that_of_their_samples() -> None:
-    found = fit(discover(xsens(), read_model("linear")).end.model, xsens())
+    found = fit(nine(xsens).end.model, xsens())
     assert 1e3 * found.noise.floor[0] == pytest.approx(0.038, abs=0.01)  # mg
     assert np.all(found.rmse > found.noise.floor)  # hands do not repeat a position to the sensor's noise
