@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import signal
+from html import escape
 from pathlib import Path
 
 import hypothesis
@@ -38,6 +39,12 @@ def rig_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands called in this process say no progress, however slow the machine."""
     monkeypatch.setattr("rig.cli.terminal.progress.EVERY_S", 3600.0)
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests of a page's words: each picture is drawn as its description alone."""
+    monkeypatch.setattr("calibrations.presentation.page.inline", lambda _, name, words: f"<svg>{escape(words)}</svg>")
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

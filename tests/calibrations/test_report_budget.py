@@ -12,12 +12,13 @@ from calibrations.model.file import read_model
 from calibrations.presentation.budget import budget_document, budget_section
 from calibrations.presentation.report.report import report
 from tests.calibrations.test_budget import given, measured
+from tests.calibrations.test_report import blank
 
 
 def test_the_report_shows_sources_and_what_is_not_given() -> None:
     table = given(measured(1), gain_std=2e-4, beta_std_deg=0.01)
     found = discover(table, read_model("linear"))
-    page = report(found, compare(table, read_model("linear")), "2026-01-01", "program 1")
+    page = report(found, compare(table, read_model("linear")), "2026-01-01", "program 1", blank())
     for text in ("Uncertainty budget", "gain of the converter", "white noise of the dwells", "coverage factor"):
         assert text in page
     assert "Not given and not included: gravity at the place" in page
