@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from tests.rig.measurement_files import GOOD
 from tests.rig.wrong_answers import HARMLESS, REFUSED, SILENT, WARNED, answer
 from tests.rig.wrong_measurements import UNSEEN, WRONG
 from tests.rig.wrong_page import PAGE, answers, listed, unseen
+from tests.slow import slow
 
 REMEDIES = (
     *(
@@ -69,17 +71,23 @@ def test_what_a_file_cannot_show_is_listed_as_such(kind: str, name: str, tmp_pat
     assert answer(tmp_path / "wrong.csv", wrong.model).kind == SILENT
 
 
-@pytest.mark.parametrize("command", ["fit", "compare", "diagnose", "discover"])
+SAID = {
+    "beta with wrong steps a turn": "beta_deg is multiplied by 0.8",
+    "time in milliseconds": "in which no stage turns",
+    "both outputs are saturated at the supply": "at its highest value the output or the converter is saturated",
+}
+
+
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("command", "name"),
     [
-        ("beta with wrong steps a turn", "beta_deg is multiplied by 0.8"),
-        ("time in milliseconds", "in which no stage turns"),
-        ("both outputs are saturated at the supply", "at its highest value the output or the converter is saturated"),
+        *product(("fit", "compare"), SAID),
+        *product(("diagnose", "discover"), list(SAID)[:2]),
+        *slow(product(("diagnose", "discover"), list(SAID)[2:])),  # a search of seconds
     ],
 )
-def test_every_command_says_it(rig: Callable[..., Any], tmp_path: Path, command: str, name: str, said: str) -> None:
+def test_every_command_says_it(rig: Callable[..., Any], tmp_path: Path, command: str, name: str) -> None:
     wrong = WRONG["poses"][name](GOOD["poses"]())
     (tmp_path / "wrong.csv").write_text(wrong.text())
     ended = rig(command, str(tmp_path / "wrong.csv"), "--model", "linear", "--json")
-    assert said in ended.err + str(json.loads(ended.out)["residual_structure"])
+    assert SAID[name] in ended.err + str(json.loads(ended.out)["residual_structure"])
