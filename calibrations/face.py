@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from calibrations.errors import DataError, ModelError
+from calibrations.frames import columns_by_name
 from calibrations.result import Result
 from calibrations.table import AXES, Array, Constant, Table
 from calibrations.tables import KINDS
@@ -118,16 +119,17 @@ def add(model: GivenModel, effect: GivenEffect) -> Model:
     return base.with_effect(new_effect)
 
 
-def noise(data: Table | Array, rate_hz: float | None = None) -> NoiseAnalysis:
-    """Allan deviation and noise coefficients of samples at an even rate: an array (n,), or a table of kind still.
+def noise(data: Table | Columns | Array, rate_hz: float | None = None) -> NoiseAnalysis:
+    """Allan deviation and noise coefficients of samples at an even rate.
 
-    A table's columns but time, temperature and supply are its channels. `rate_hz` is needed where neither t_s nor
-    sample_rate_hz gives it. Raises DataError for uneven times, which `rig noise` can close.
+    `data` is an array (n,), or (n, axes) with the axes x, y, z; or a table of kind still, a mapping or a
+    pandas.DataFrame, whose columns but time, temperature and supply are the channels. `rate_hz` is needed where
+    neither t_s nor sample_rate_hz gives it. Raises DataError for uneven times, which `rig noise` can close.
     """
     from calibrations.noise.analysis import analyse
     from calibrations.noise.record import reduce_record
 
-    table = data if isinstance(data, Table) else Table.from_columns("still", {"v": data}, None, "the given samples")
+    table = data if isinstance(data, Table) else _still(data)
     return analyse(reduce_record(_channels(table, rate_hz), table.source, table.constants, every_deviation=True))
 
 
@@ -170,6 +172,19 @@ def _model(source: GivenModel) -> Model:
         f"a model is needed, and a {type(source).__name__} was given; give the name of a model, its file, a model, a "
         f"fit or a discovery{hint}"
     )
+
+
+def _still(data: Any) -> Table:
+    """The still table of samples by name, or of an array. Raises DataError for an array of another shape."""
+    source = "the given samples"
+    columns = columns_by_name(data)
+    if columns is None and np.ndim(data) == 2:
+        samples = np.asarray(data)
+        if samples.shape[1] > len(AXES):
+            hint = "exchange rows and columns, as in data.T" if len(samples) <= len(AXES) else "name the columns"
+            raise DataError(f"{source}: their shape is {samples.shape}; (n,) or (n, axes) is needed: {hint}")
+        columns = dict(zip(AXES, samples.T, strict=False))
+    return Table.from_columns("still", {"v": data} if columns is None else columns, None, source)
 
 
 def _channels(table: Table, rate_hz: float | None) -> Iterator[Samples]:

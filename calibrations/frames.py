@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -18,6 +18,13 @@ def data_frame(data: Any, **layout: Any) -> Any:
             "a data frame needs pandas, which is not installed; run: pip install 'inertial-rig[notebook]'"
         ) from None
     return pandas.DataFrame(data, **layout)
+
+
+def columns_by_name(data: Any) -> Mapping[str, Any] | None:
+    """The columns of a mapping or a pandas.DataFrame by name; None for anything else."""
+    if isinstance(data, Mapping):
+        return data
+    return dict(data.items()) if hasattr(data, "iloc") and hasattr(data, "columns") else None
 
 
 def html_table(head: Sequence[str], rows: Iterable[Sequence[object]], caption: str = "") -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from calibrations.compensation.inverse import Compensation, invert_model
 from calibrations.errors import DataError, MissingColumn, nearest
-from calibrations.frames import data_frame
+from calibrations.frames import columns_by_name, data_frame
 from calibrations.model import Model
 from calibrations.table import AXES, Array, Table
 from calibrations.tables import KINDS
@@ -25,30 +25,19 @@ def compensate(model: Model, samples: Any, columns: Mapping[str, Any]) -> Any:
     compensation = invert_model(model)
     if compensation.program.remembered:
         raise DataError(f"{model.name}: has hysteresis, so its inverse needs earlier samples; use `rig compensate`")
-    columns_by_name = _columns_by_name(samples)
+    given = samples.columns if isinstance(samples, Table) else columns_by_name(samples)
     inputs = dict(columns)
-    if columns_by_name is None:
+    if given is None:
         outputs = _array(samples, compensation.forward.axes)
     else:
-        outputs = _columns(columns_by_name, compensation)
-        inputs = {
-            name: columns_by_name[name] for name in compensation.program.inputs if name in columns_by_name
-        } | inputs
+        outputs = _columns(given, compensation)
+        inputs = {name: given[name] for name in compensation.program.inputs if name in given} | inputs
     result = compensation.program.run(_inputs(compensation, outputs, inputs))
     forces = np.column_stack([result[name] for name in compensation.program.sought])
     if not hasattr(samples, "iloc"):
         return forces
     names = [NAMES[compensation.unit].format(axis) for axis in compensation.forward.axes]
     return data_frame(forces, index=samples.index, columns=names)
-
-
-def _columns_by_name(samples: Any) -> Mapping[str, Any] | None:
-    """The columns of samples by name; None for an array."""
-    if isinstance(samples, Table):
-        return samples.columns
-    if isinstance(samples, Mapping):
-        return samples
-    return dict(samples.items()) if hasattr(samples, "iloc") and hasattr(samples, "columns") else None
 
 
 def _array(samples: Any, axes: tuple[str, ...]) -> Array:
@@ -67,19 +56,20 @@ def _array(samples: Any, axes: tuple[str, ...]) -> Array:
     raise DataError(f"the outputs have shape {np.shape(samples)}; {requirement}: {hint}")
 
 
-def _columns(columns_by_name: Mapping[str, Any], compensation: Compensation) -> Array:
+def _columns(given: Mapping[str, Any], compensation: Compensation) -> Array:
     """Outputs (n, axes) from columns with the names of data files. Raises MissingColumn."""
     kinds = [kind for kind in KINDS.values() if kind.input_unit == compensation.unit]
     sets = list(dict.fromkeys(_outputs(kind.outputs, compensation.forward.axes) for kind in kinds))
     sets = [names for names in sets if len(names) == len(compensation.forward.axes)]
     for names in sets:
-        if all(name in columns_by_name for name in names):
-            return np.column_stack([_numbers(columns_by_name[name], f'the column "{name}"') for name in names])
-    close = max(sets, key=lambda names: sum(name in columns_by_name for name in names))
-    missing = next(name for name in close if name not in columns_by_name)
+        if all(name in given for name in names):
+            return np.column_stack([_numbers(given[name], f'the column "{name}"') for name in names])
+    close = max(sets, key=lambda names: sum(name in given for name in names))
+    missing = next(name for name in close if name not in given)
+    axes = ", ".join(compensation.forward.axes)
     raise MissingColumn(
-        f'the column "{missing}" is missing{nearest(missing, map(str, columns_by_name))}. The model has the axes '
-        f"{', '.join(compensation.forward.axes)}; name the columns of its outputs {' or '.join(map(', '.join, sets))}"
+        f'the column "{missing}" is missing: the model has the axes {axes}; name the '
+        f"columns of its outputs {' or '.join(map(', '.join, sets))}{nearest(missing, map(str, given))}"
     )
 
 

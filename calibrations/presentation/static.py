@@ -71,12 +71,19 @@ class PictureError(CalibrationError):
     """A picture cannot be written: its format, or its place."""
 
 
+class NotebookFigure(Figure):
+    """A figure that a notebook shows, also where nothing has imported pyplot, which tells a notebook how to."""
+
+    def _repr_png_(self) -> bytes:
+        return _saved(self, "png", dpi="figure")
+
+
 def draw(chart: c.Chart) -> Figure:
     """The chart as a matplotlib figure."""
     rows, columns = len(chart.panels), max(map(len, chart.panels))
     heights = [chart.height] * rows if isinstance(chart.height, (int, float)) else list(chart.height)
     with rc_context(RC):
-        figure = Figure(figsize=(chart.width, sum(heights) + 0.5))
+        figure = NotebookFigure(figsize=(chart.width, sum(heights) + 0.5))
         share: Any = {"sharex": "col" if chart.share_x else False, "sharey": "row" if chart.share_y else False}
         axes = figure.subplots(rows, columns, squeeze=False, height_ratios=heights, **share)
         for k, row in enumerate(chart.panels):
@@ -149,9 +156,13 @@ def save_all(charts: Mapping[str, c.Chart], folder: Path, form: str) -> list[Pat
 
 
 def _bytes(chart: c.Chart, form: str, metadata: dict[str, None]) -> bytes:
+    return _saved(draw(chart), form, metadata=metadata)
+
+
+def _saved(figure: Figure, form: str, **layout: Any) -> bytes:
     page = io.BytesIO()
     with rc_context(RC):
-        draw(chart).savefig(page, format=form, metadata=metadata)
+        figure.savefig(page, format=form, **layout)
     return page.getvalue()
 
 

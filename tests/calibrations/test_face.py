@@ -56,7 +56,7 @@ def test_a_fit_compensates_columns_by_name_and_refuses_what_does_not_fit() -> No
         cal.compensate(found, three)
     with pytest.raises(DataError, match=r"outputs\.T"):
         cal.compensate(found, data.outputs.T)
-    with pytest.raises(MissingColumn, match='the column "vy_v" is missing'):
+    with pytest.raises(MissingColumn, match=r'the column "vy_v" is missing: .* or ax, ay; did you mean "vx_v"\?$'):
         cal.compensate(found, {"vx_v": data.column("vx_v")})
     with pytest.raises(ModelError, match="its fit is in its member `fit`"):
         cal.compensate(cal.compare(data, "linear"), data)
@@ -93,3 +93,19 @@ def test_columns_that_are_no_numbers_are_named(columns: Any, said: str) -> None:
 def test_data_that_are_no_table_are_refused_with_the_way_to_make_one(call: Any, data: Any, said: str) -> None:
     with pytest.raises(DataError, match=said):
         call(data, "linear")
+
+
+def test_noise_takes_samples_as_a_series_as_columns_or_as_an_array_of_axes() -> None:
+    pandas = pytest.importorskip("pandas")
+    samples = np.random.default_rng(5).normal(0.0, [1e-3, 2e-3, 3e-3], (2000, 3))
+    expected = {axis: cal.noise(column, 100.0).channels["x"] for axis, column in zip("xyz", samples.T, strict=True)}
+    frame = pandas.DataFrame({"t_s": np.arange(2000) / 100} | dict(zip(("ax", "ay", "az"), samples.T, strict=True)))
+    for found in (cal.noise(samples, 100.0), cal.noise(frame), cal.noise(dict(frame.items()))):
+        for axis, channel in expected.items():
+            same = found.channels[axis].coefficients["white-noise"].value
+            assert same == pytest.approx(channel.coefficients["white-noise"].value, rel=1e-6)
+    assert list(cal.noise(pandas.Series(samples[:, 0]), 100.0).channels) == ["x"]
+    with pytest.raises(DataError, match=r"\(3, 2000\); \(n,\) or \(n, axes\) is needed: .*data\.T"):
+        cal.noise(samples.T, 100.0)
+    with pytest.raises(DataError, match="name the columns"):
+        cal.noise(np.zeros((2000, 4)), 100.0)

@@ -87,3 +87,11 @@ def test_data_frames_of_a_fit_and_of_its_table_have_names() -> None:
     assert cal.table(found().table.to_dataframe(), "poses").digest == found().table.digest
     with pytest.raises(UnknownName, match='did you mean "covariance"'):
         found().to_dataframe("covarience")
+
+
+def test_a_picture_is_shown_also_where_nothing_imported_pyplot() -> None:
+    """A notebook draws a figure by `_repr_png_`, unless pyplot has told it another way."""
+    head = found().plot()._repr_png_()[:24]  # type: ignore[attr-defined]
+    assert head.startswith(b"\x89PNG")
+    width, height = (int.from_bytes(head[at : at + 4], "big") for at in (16, 20))
+    assert [width, height] == (found().plot().get_size_inches() * 100).astype(int).tolist()
