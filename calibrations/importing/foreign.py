@@ -19,7 +19,13 @@ from calibrations.errors import DataError, MissingColumn, nearest
 from calibrations.files import text_source
 from calibrations.importing.binary import open_sheet
 from calibrations.importing.cells import is_number
-from calibrations.importing.plausible import check_at_rest, check_turning, find_log_time_doubt, find_unit_doubts
+from calibrations.importing.plausible import (
+    check_at_rest,
+    check_stated_rate,
+    check_turning,
+    find_log_time_doubt,
+    find_unit_doubts,
+)
 from calibrations.importing.raw_logs import is_raw_log
 from calibrations.importing.sessions import RATE, is_session, sample_rates
 from calibrations.importing.sheet import Sheet, look_like_names, read_cells, read_sheet
@@ -39,7 +45,18 @@ class ImportedTable:
     table: Table
     sheet: Sheet
     mapped: tuple[ColumnMapping, ...]
-    notes: tuple[str, ...] = ()  # on damaged lines
+    damaged: tuple[str, ...] = ()  # remarks on damaged lines
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a person must know of the import: damaged lines, and a second sensor that is not imported."""
+        from calibrations.importing.proposal import second_sensor
+
+        mapping = [*self.mapped, *(ColumnMapping(name, name) for name in self.sheet.header if name in NUMBERS)]
+        others = second_sensor(self.sheet, self.table.kind, mapping)
+        names = ", ".join(m.file_column for m in others)
+        note = f"{self.sheet.name}: {names} look like a second sensor; its outputs are not those of this table."
+        return (*self.damaged, note) if others else self.damaged
 
     @property
     def settings(self) -> dict[str, object]:
@@ -51,7 +68,7 @@ class ImportedTable:
             "separator": names.get(self.sheet.separator, self.sheet.separator),
             "columns": {m.name: m.text.partition("=")[2] for m in self.mapped},
             "constants": dict(self.table.constants),
-            **({"damaged_lines": self.notes[0].partition(": ")[2]} if self.notes else {}),
+            **({"damaged_lines": self.damaged[0].partition(": ")[2]} if self.damaged else {}),
         }
 
 
@@ -222,14 +239,18 @@ def _check_units(table: Table, laid: Sheet, mapping: Sequence[ColumnMapping]) ->
 
 
 def _check_clock(table: Table, laid: Sheet, mapping: Sequence[ColumnMapping]) -> None:
-    """Raises MissingColumn for a log without t_s whose time has another name in the file."""
-    if "t_s" in table or "sample_rate_hz" in table.constants or not is_raw_log(table) or table.type.field:
+    """Raises MissingColumn for a log without t_s whose time has another name in the file, DataError where that time
+    contradicts the stated sample rate.
+    """
+    if "t_s" in table or not is_raw_log(table) or table.type.field:
         return
     from calibrations.importing.proposal import propose_mapping  # as above
 
-    clock_column = _clock(propose_mapping(laid, table.kind, mapping))
-    if clock_column:
-        raise MissingColumn(f'{laid.place}: a raw log needs the column t_s; "{clock_column}" looks like the time')
+    clock = next((m for m in propose_mapping(laid, table.kind, mapping) if m.name == "t_s"), None)
+    if clock is not None and "sample_rate_hz" not in table.constants:
+        raise MissingColumn(f'{laid.place}: a raw log needs the column t_s; "{clock.file_column}" looks like the time')
+    if clock is not None and clock.file_column in table:
+        check_stated_rate(table, replace(clock, unit=laid.units[laid.header.index(clock.file_column)]))
 
 
 def _clock(mapping: Sequence[ColumnMapping]) -> str:

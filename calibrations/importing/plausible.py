@@ -28,7 +28,7 @@ from calibrations.criteria import (
 from calibrations.errors import DataError
 from calibrations.geometry.rate_table import turn_axes
 from calibrations.geometry.sphere import sphere_centre
-from calibrations.importing.units import UNITS, column_unit
+from calibrations.importing.units import UNITS, ColumnMapping, column_unit
 from calibrations.table import NUMBERS, Array, Table
 
 ARC_MINUTE_DEG = 1 / 60
@@ -219,6 +219,26 @@ def log_rate_hz(time_s: Array | None, stated_hz: float, source: str) -> float:
             f"sample_rate_hz={1 / step:.4g}"
         )
     return 1 / step if step else max(stated_hz, 0.0)
+
+
+def check_stated_rate(table: Table, clock: ColumnMapping) -> None:
+    """Check that a log's stated sample rate is that of `clock`, a column that looks like the time and is not used.
+
+    Raises DataError. A column without a unit passes if the rate fits in any unit, or cannot be one in s.
+    """
+    step, stated_hz = _step_s(table.column(clock.file_column)), table.number("sample_rate_hz", 0.0)
+    if not step or stated_hz <= 0:
+        return
+    units = [clock.unit] if clock.unit else ["s", *TIME_UNITS, "us", "ns"]
+    rates_hz = [1 / (step * UNITS[unit][1]) for unit in units]
+    fits = any(abs(rate_hz / stated_hz - 1) <= RATE_AGREES for rate_hz in rates_hz)
+    if fits or rates_hz[0] < SLOWEST_LOG_HZ:
+        return
+    raise DataError(
+        f'{table.source}: the column "{clock.file_column}" looks like the time and gives {rates_hz[0]:.4g} samples a '
+        f"second, and the constant sample_rate_hz is {stated_hz:g}; use the column (in `rig import`, --column "
+        f"{clock.text}), or give --constant sample_rate_hz={rates_hz[0]:.4g}"
+    )
 
 
 def _step_s(time_s: Array) -> float:

@@ -115,6 +115,26 @@ def propose_mapping(laid: Sheet, kind: str | None = None, mapped: Sequence[Colum
     return _with_scatter(_with_time(mapping, laid))
 
 
+def second_sensor(laid: Sheet, kind: str, mapping: Sequence[ColumnMapping]) -> list[ColumnMapping]:
+    """The outputs of a second sensor of the same make in the columns that `mapping` does not use; else none.
+
+    Its names differ from those of the mapped outputs in a number only, such as imu1_acc_x and imu2_acc_x.
+    """
+    outputs = [m for m in mapping if m.name in (*KINDS[kind].outputs, *KINDS[kind].digital)]
+    unmapped = [name for name in laid.header if laid.named and name not in {m.file_column for m in mapping}]
+    twins = [
+        next((name for name in unmapped if _without_digits(name) == _without_digits(m.file_column)), "")
+        for m in outputs
+    ]
+    if len(outputs) < len(AXES) or not all(twins) or len({*twins}) < len(twins):
+        return []
+    return [replace(m, file_column=name) for m, name in zip(outputs, twins, strict=True)]
+
+
+def _without_digits(name: str) -> str:
+    return re.sub(r"\d", "", name)
+
+
 def likely_kinds(laid: Sheet, mapped: Iterable[ColumnMapping] = ()) -> list[str]:
     """The likely kinds, most likely first; samples of a gyroscope in named sections may contain no turn."""
     kind = likely_kind(laid, mapped)

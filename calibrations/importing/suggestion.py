@@ -13,7 +13,13 @@ from dataclasses import dataclass, replace
 from calibrations.criteria import FEWEST_POSITIONS
 from calibrations.errors import DataError, MissingConstant
 from calibrations.importing.plausible import covers_all_directions
-from calibrations.importing.proposal import likely_kinds, missing_columns, propose_mapping, required_columns
+from calibrations.importing.proposal import (
+    likely_kinds,
+    missing_columns,
+    propose_mapping,
+    required_columns,
+    second_sensor,
+)
 from calibrations.importing.raw_logs import average_raw_log
 from calibrations.importing.sheet import Sheet
 from calibrations.importing.units import ColumnMapping, split_unit
@@ -114,7 +120,16 @@ def _suggestion(laid: Sheet, attempt: Attempt) -> str:
     if attempt.refused:
         return f"\nThe most likely import fails: {attempt.refused}{line}"
     fill = f" (put {'; '.join(_placeholders(attempt, free))})" if attempt.lacking or attempt.unknown else ""
-    return f"\nThe names and values suggest this import{fill}:{line}"
+    return f"\nThe names and values suggest this import{fill}:{line}{_other_sensor(laid, attempt.kind, columns, words)}"
+
+
+def _other_sensor(laid: Sheet, kind: str, columns: Sequence[ColumnMapping], constants: Sequence[str]) -> str:
+    """The import of a second sensor in the same columns; "" without one."""
+    others = {m.name: m for m in second_sensor(laid, kind, columns)}
+    if not others:
+        return ""
+    command = import_command(laid, kind, [others.get(m.name, m) for m in columns], constants)
+    return f"\nThe file has a second sensor, {', '.join(m.file_column for m in others.values())}:\n\n    {command}\n"
 
 
 def _placeholders(attempt: Attempt, free: Sequence[str]) -> list[str]:

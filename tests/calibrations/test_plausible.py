@@ -187,6 +187,35 @@ def test_a_stated_sample_rate_that_does_not_fit_is_refused() -> None:
         average_raw_log(read("# sample_rate_hz: 100000\n" + timeless))
 
 
+@pytest.mark.parametrize(
+    ("clock", "stated_hz", "fits"),
+    [
+        ("time (ms)", 200, "t_s=time (ms):ms"),
+        ("t", 10, "t_s=t"),
+        ("time (ms)", 100, ""),
+        ("ticks", 200, ""),  # whose name and unit mean no time
+    ],
+)
+def test_a_stated_sample_rate_is_checked_by_a_time_of_another_name(clock: str, stated_hz: float, fits: str) -> None:
+    step = 10 if "ms" in clock else 0.01
+    content = f"# sample_rate_hz: {stated_hz}\n" + log(step).replace("t_s", clock)
+    if not fits:
+        assert average_raw_log(read(content)).n == 4
+        return
+    with pytest.raises(
+        DataError, match=rf'"{re.escape(clock)}" .* 100 samples a second, .* is {stated_hz:g};'
+    ) as error:
+        read(content)
+    assert f"--column {fits})" in str(error.value)
+    again = content.partition("\n")[2]
+    assert average_raw_log(read(again, fits)).n == average_raw_log(read(f"# sample_rate_hz: 100\n{again}")).n == 4
+
+
+def test_a_clock_without_a_unit_may_have_the_stated_rate_in_any_unit_or_count_unknown_ticks() -> None:
+    for step in (10.0, 1e4, 1e7, 7.0):
+        assert average_raw_log(read("# sample_rate_hz: 100\n" + log(step).replace("t_s", "time"))).n == 4
+
+
 def test_a_clock_that_began_again_does_not_change_the_sample_rate() -> None:
     time_s = np.concatenate([0.01 * np.arange(700), 0.01 * np.arange(500)])
     assert log_rate_hz(time_s, 0.0, "some.csv") == pytest.approx(100.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -280,3 +281,32 @@ def test_a_field_is_not_asked_for_gravity_whatever_unit_the_file_states() -> Non
     rows = "".join(f"{45 * (k == 0)},{45 * (k == 1)},{45 * (k == 2)},1,0,0\n" for k in range(3))
     content = f"# unit: g\n# triad: m\nmx,my,mz,ax,ay,az\n{rows}"
     assert import_sheet(laid(content), None).table.content == "fields"
+
+
+TWO_SENSORS = "time,acc1_x,acc1_y,acc1_z,acc2_x,acc2_y,acc2_z,temp\n" + "".join(
+    f"{0.01 * k:.2f},{x},{y},{z},{1.1 * x:.3f},{1.1 * y:.3f},{1.1 * z:.3f},20\n"
+    for k, (x, y, z) in enumerate(np.repeat([*np.eye(3), *-np.eye(3)], 200, axis=0))
+)
+
+
+def test_a_second_sensor_in_the_same_columns_is_named_with_its_own_import() -> None:
+    with pytest.raises(MissingColumn, match="The file has a second sensor, acc2_x, acc2_y, acc2_z:") as error:
+        import_sheet(laid(TWO_SENSORS), None)
+    commands = [line for line in str(error.value).splitlines() if line.startswith("    rig import")]
+    sensors = []
+    for command in commands:
+        words = shlex.split(command)
+        mapped = [ColumnMapping.parse(word) for before, word in pairwise(words) if before == "--column"]
+        imported = import_sheet(laid(TWO_SENSORS), "positions", mapped)
+        sensors.append(float(np.abs(imported.table.outputs).max()))
+        (note,) = imported.notes
+        assert f"acc{2 if len(sensors) == 1 else 1}_x" in note
+        assert "damaged_lines" not in imported.settings
+    assert sensors == pytest.approx([1.0, 1.1])
+
+
+@pytest.mark.parametrize("others", ["vel1_x,vel1_y,vel1_z", "acc2_x,acc2_y,spare", "acc_raw_x,acc_raw_y,acc_raw_z"])
+def test_other_columns_are_no_second_sensor(others: str) -> None:
+    content = TWO_SENSORS.replace("acc2_x,acc2_y,acc2_z", others)
+    columns = [ColumnMapping.parse(text) for text in ("t_s=time", "ax=acc1_x", "ay=acc1_y", "az=acc1_z")]
+    assert import_sheet(laid(content), "positions", columns).notes == ()
