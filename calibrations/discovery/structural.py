@@ -33,7 +33,7 @@ from calibrations.discovery.significance import chance
 from calibrations.effects import Effect
 from calibrations.fitting.fit import Fit, fit, refit, with_least_white
 from calibrations.fitting.problem import Problem
-from calibrations.fitting.requested_forms import effects_beyond_base
+from calibrations.fitting.requested_forms import BASE, effects_beyond_base
 from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
 from calibrations.free_forms.place_names import PREFIX
 from calibrations.free_forms.stairs import before_stairs, find_stairs, fit_stairs
@@ -187,7 +187,8 @@ def _fit_structure(base: Fit, places: Structure, effects: Mapping[str, Effect]) 
         )
         end = fits[-1]
     reached = places.follows_noise and float(rms(end.residual.ravel())) <= AS_SEARCHED * places.result.error
-    if end.held_out_excess > MATERIAL and not end.problem.rounds and not reached:
+    given = any(a.effect.name not in BASE for a in causes)  # bias, scale factor and geometry are free in every search
+    if given and end.held_out_excess > MATERIAL and not end.problem.rounds and not reached:
         # a new search, given the fitted causes, so that the forms describe the remainder of these
         places_beside = structure(causes_alone(end, forms), effects)
         refined = fit_separately(base, places_beside, additions(places_beside, end.model, effects))
