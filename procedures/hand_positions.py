@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 
 from procedures.errors import NoAnswer, SettingError
 from procedures.instruments import Samples
-from procedures.session import Guidance, HandAnalysis, HandCourse, NoiseAtRest, Pose, Session
+from procedures.session import Guidance, HandAnalysis, HandCourse, NoiseAtRest, Pose, Session, require_possible
 
 KIND = "positions"
 ADAPTIVE = True
 OUTPUTS = ("ax", "ay", "az")
 WINDOW_S = 0.5  # of a test of rest
 LEARNED = 20  # windows of rest that show the noise
+LONGEST_WAIT_S = 86_400.0
 FEWEST = 12  # positions: nine parameters, and three that check them
 TABLE = "Does the sensor lie on a table, and is its cable long enough to turn it upside down? Let it go."
 KNOWN = "this position is known already"
@@ -63,11 +64,12 @@ def hand_positions(
     most_positions  The run ends after this number of positions, also if the uncertainty is not reached.
     wait_s          The run stops after this time without a new position.
     """
-    if min(target_g, wait_s) <= 0 or rest_s < 2 * WINDOW_S or most_positions < FEWEST:
+    if target_g <= 0 or not 0 < wait_s <= LONGEST_WAIT_S or rest_s < 2 * WINDOW_S or most_positions < FEWEST:
         raise SettingError(
-            f"hand-positions: target_g and wait_s must be above 0, rest_s at least {2 * WINDOW_S:g}, most_positions at "
-            f"least {FEWEST}"
+            f"hand-positions: target_g and wait_s must be above 0, wait_s at most {LONGEST_WAIT_S:g}, rest_s at least "
+            f"{2 * WINDOW_S:g}, most_positions at least {FEWEST}"
         )
+    require_possible(most_positions, "a smaller most_positions")
     analysis = rig.by_hand
     if analysis is None:
         raise SettingError("hand-positions: this session has no analysis of positions; run it with `rig run`")

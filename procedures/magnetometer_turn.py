@@ -13,7 +13,7 @@ from dataclasses import replace
 from procedures.errors import SettingError
 from procedures.level_check import prepare
 from procedures.questions import EDGES
-from procedures.session import Pose, Session
+from procedures.session import Pose, Session, count_parts
 
 KIND = "positions"
 OUTPUTS = ("mx", "my", "mz")
@@ -55,6 +55,6 @@ def magnetometer_turn(
 def full_turn(up: str, side: str, step_deg: float) -> Iterator[Pose]:
     """A full turn with the edge `up` upward or downward: beta rises on the side "up" and falls on the side "down"."""
     alpha_deg, direction = (0.0, 1) if side == "up" else (180.0, -1)
-    count = round(360 / step_deg)
+    count = count_parts(360, step_deg)
     for k in range(count)[::direction]:
         yield Pose(alpha_deg, k * step_deg, direction, f"{up} {side}", up=up)

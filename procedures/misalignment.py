@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from procedures.errors import ProcedureError, SettingError
 from procedures.instruments import output_channel
 from procedures.level_check import prepare
-from procedures.session import Dwell, Pose, Session
+from procedures.session import Dwell, Pose, Session, require_possible
 
 ADAPTIVE = True
 COARSE = "coarse"
@@ -34,6 +34,7 @@ TURN = "turn"  # of beta: brackets both axes
 AXES = {"x": 0.0, "y": 90.0}  # beta, deg, at the maximum of an output without misalignment
 QUARTER_DEG = 90.0
 CENTRED_DEG = 1  # plus half for rounding: a cubic term of 0.4 % then gives an error of 0.006 deg
+ROUND_POSES = 16
 FEWEST_ROUNDS = 2  # one round has no scatter
 
 
@@ -55,6 +56,7 @@ def misalignment(
     """
     if min(target_deg, dwell_s, most_rounds) <= 0 or settle_s < 0:
         raise SettingError("misalignment: target_deg, dwell_s, most_rounds must be above 0, settle_s must be 0 or more")
+    require_possible(ROUND_POSES * most_rounds, "a smaller most_rounds")
     prepare(rig)
     _measure(rig, coarse_poses(), dwell_s, settle_s)
     centre = centre_of(extremes(_dwells(rig, COARSE)))

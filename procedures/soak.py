@@ -14,7 +14,7 @@ from itertools import groupby, repeat
 from drivers.errors import LimitError
 from procedures.errors import SettingError
 from procedures.level_check import prepare
-from procedures.session import Pose, Reading, Session
+from procedures.session import MOST_POSES, Pose, Reading, Session, count_parts
 from procedures.tumbles import is_first, tumble
 
 REVERSAL, HOLD = "reversal", "hold"  # first words of the paths; a number follows
@@ -74,8 +74,8 @@ def schedule(duration_s: float, interval_s: float, block_s: float) -> Iterator[P
 
     The sensor is level in the hold, so both axes feel 0 g: the hold shows the drift of the bias between tumbles.
     """
-    remaining, number = max(1, round(duration_s / block_s)), 0
-    longest = max(1, round(interval_s / block_s))
+    remaining, number = count_parts(duration_s, block_s), 0
+    longest = max(1, round(min(interval_s / block_s, MOST_POSES << DOUBLINGS)))
     while remaining > 0:
         blocks = min(remaining, longest, max(1, longest >> max(0, DOUBLINGS - number)))
         yield from tumble(f"{REVERSAL} {number}")

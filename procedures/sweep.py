@@ -14,13 +14,15 @@ from typing import Literal
 from procedures.errors import SettingError
 from procedures.level_check import check_level, prepare
 from procedures.pose_list import parse_poses
-from procedures.session import Pose, Session, bounded
+from procedures.session import Pose, Session, require_possible
 
 HALF_TURN_DEG = 180.0
 INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0, 45.0, 135.0)
 REFERENCE = Pose(90.0, 45.0, 1, "reference")  # both axes feel gravity; beta always rises to it
 Paths = Literal["grid", "ang"]
 Face = Literal["up", "down", "both"]
+FEWER = "a larger step_deg, or fewer inclinations_deg"
+NOT_A_STEP = "sweep: step_deg is {:g}; give a step that divides 180 deg, such as 10"
 FLIPS = {"up": (0,), "down": (1,), "both": (0, 1)}
 
 
@@ -54,9 +56,12 @@ def sweep(
         raise SettingError(f"sweep: reference_every is {reference_every}; give a number of poses, or 0 for none")
     if pose_list and (reference_every or face != "up"):
         raise SettingError("sweep: pose_list has all poses; use reference_every and face without pose_list only")
-    one_face = with_references(bounded(grid(inclinations_deg, step_deg, paths)), reference_every)
-    both_faces = [replace(pose, flip=flip) for flip in FLIPS[face] for pose in one_face]
-    poses = parse_poses(pose_list) if pose_list else both_faces
+    if pose_list:
+        poses = parse_poses(pose_list)
+    else:
+        require_possible(len(FLIPS[face]) * count_poses(inclinations_deg, step_deg, paths), FEWER)
+        one_face = with_references(list(grid(inclinations_deg, step_deg, paths)), reference_every)
+        poses = [replace(pose, flip=flip) for flip in FLIPS[face] for pose in one_face]
     if poses[0].flip:
         check_level(rig)
     else:
@@ -66,22 +71,37 @@ def sweep(
 
 
 def grid(inclinations_deg: Sequence[float], step_deg: float, paths: Paths = "grid") -> Iterator[Pose]:
-    """The poses of a sweep in order. Raises SettingError unless `step_deg` divides half a turn."""
-    if not 0 < step_deg <= 180 or abs(180 / step_deg - round(180 / step_deg)) > 1e-9:
-        raise SettingError(f"sweep: step_deg is {step_deg:g}; give a step that divides 180 deg, such as 10")
+    """The poses of a sweep in order. Raises SettingError unless `step_deg` divides half a turn, or for too many."""
+    require_possible(count_poses(inclinations_deg, step_deg, paths), FEWER)
+    if abs(HALF_TURN_DEG / step_deg - round(HALF_TURN_DEG / step_deg)) > 1e-9:
+        raise SettingError(NOT_A_STEP.format(step_deg))
+    for alpha, from_deg, to_deg, path in turns(inclinations_deg, paths):
+        yield from turn(alpha, from_deg, to_deg, step_deg, path)
+
+
+def turns(inclinations_deg: Sequence[float], paths: Paths = "grid") -> list[tuple[float, float, float, str]]:
+    """Alpha, first and last beta, and path of each turn of a sweep, in order. Raises SettingError."""
     if not inclinations_deg:
         raise SettingError("sweep: inclinations_deg is empty; give at least one angle, such as 90")
     for alpha in inclinations_deg:
         if abs(alpha) > HALF_TURN_DEG:
             raise SettingError(f"sweep: inclinations_deg has {alpha:g}; give angles from -180 to 180, such as 90")
     signed = [(alpha, -alpha) if paths == "ang" else (alpha,) for alpha in inclinations_deg]
+    ordered = []
     for alpha in dict.fromkeys(float(alpha) for pair in signed for alpha in pair):  # -0 is 0
-        yield from turn(alpha, 0, 360, step_deg, "A+ to B-")
-        yield from turn(alpha, 360, 0, step_deg, "B+ to A-")
+        ordered += [(alpha, 0.0, 360.0, "A+ to B-"), (alpha, 360.0, 0.0, "B+ to A-")]
         if paths == "ang" and alpha == 90:
-            for side, path in ((180, "A+ to A-"), (-180, "B+ to B-")):
-                yield from turn(alpha, 0, side, step_deg, path)
-                yield from turn(alpha, side, 0, step_deg, path)
+            ordered += [(alpha, 0.0, 180.0, "A+ to A-"), (alpha, 180.0, 0.0, "A+ to A-")]
+            ordered += [(alpha, 0.0, -180.0, "B+ to B-"), (alpha, -180.0, 0.0, "B+ to B-")]
+    return ordered
+
+
+def count_poses(inclinations_deg: Sequence[float], step_deg: float, paths: Paths = "grid") -> float:
+    """The number of poses of a grid, without making them. Raises SettingError."""
+    if not 0 < step_deg <= HALF_TURN_DEG:
+        raise SettingError(NOT_A_STEP.format(step_deg))
+    ends = ((from_deg, to_deg) for _, from_deg, to_deg, _ in turns(inclinations_deg, paths))
+    return sum(abs(to_deg - from_deg) / step_deg + 1 for from_deg, to_deg in ends)
 
 
 def with_references(poses: Sequence[Pose], every: int) -> list[Pose]:

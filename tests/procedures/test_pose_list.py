@@ -33,7 +33,7 @@ def test_a_hand_written_file_needs_two_columns_only() -> None:
         (["alpha_deg,direction", "1,1"], "give a header"),
         (["alpha_deg,beta_deg,directoin", "1,2,1"], "line 1: a pose has no column 'directoin'. Did you mean"),
         (["alpha_deg,beta_deg", "1,2", "1"], r"line 3: 1 values for 2 columns"),
-        (["alpha_deg,beta_deg", *["1,2"] * 50_001, "no pose"], "the plan has more than 50000 poses"),
+        (["alpha_deg,beta_deg", *["1,2"] * 50_001, "no pose"], "the plan has 50002 poses; the limit is 50000"),
         (["alpha_deg,beta_deg", "1,nan"], "line 2, column beta_deg: the value is 'nan'; give a number"),
         (["alpha_deg,beta_deg,direction", "1,2,2"], "line 2, column direction: the value is '2'; give one of -1, 0, 1"),
     ],

@@ -92,22 +92,30 @@ def test_an_oven_is_planned_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "words",
+    ("words", "said"),
     [
-        ("sweep", "--step-deg", "0.0001"),
-        ("sweep", "--step-deg", "1e-300"),
-        ("noise-floor", "--duration-s", "1e9", "--block-s", "1"),
-        ("motion", "--still-s", "1e9", "--block-s", "1"),
-        ("soak", "--duration-s", "1e9"),
-        ("soak", "--block-s", "1e-9"),
-        ("temperature-cycle", "--soak-s", "1e300"),
-        ("repeat", "--times", "1000000000"),
-        ("temperature-cycle", "--cycles", "1000000000"),
+        (("sweep", "--step-deg", "0.0001"), "50400014 poses; the limit is 50000; give a larger step_deg, or fewer"),
+        (("sweep", "--step-deg", "1e-300"), "at least 1000000000000000 poses; the limit is 50000; give a larger"),
+        (("sweep", "--step-deg", "1e-320"), "at least 1000000000000000 poses"),
+        (("sweep", "--step-deg", "0.2", "--face", "both"), "50428 poses"),
+        (("noise-floor", "--duration-s", "1e9", "--block-s", "1"), "1000000000 poses"),
+        (("noise-floor", "--duration-s", "1e308", "--block-s", "1e-300"), "at least 1000000000000000 poses"),
+        (("motion", "--still-s", "1e9", "--block-s", "1"), "1000000000 poses; the limit is 50000; give a larger step"),
+        (("soak", "--duration-s", "1e9"), "100000000 poses"),
+        (("soak", "--block-s", "1e-9"), "43200000000000 poses"),
+        (("soak", "--duration-s", "49000", "--interval-s", "1", "--block-s", "1"), "at least 200000 poses"),
+        (("temperature-cycle", "--soak-s", "1e300"), "more than"),
+        (("repeat", "--times", "1000000000"), "at least 200000 poses; the limit is 50000; give a larger step"),
+        (("temperature-cycle", "--cycles", "1000000000"), "at least 200000 poses"),
+        (("magnetometer-turn", "--step-deg", "1e-320"), "at least 1000000000000000 poses"),
+        (("misalignment", "--most-rounds", "4000"), "64000 poses; the limit is 50000; give a smaller most_rounds"),
     ],
 )
-def test_a_plan_without_bound_is_refused_before_it_is_built(rig: Callable[..., Any], words: tuple[str, ...]) -> None:
+def test_a_plan_without_bound_is_refused_before_it_is_built(
+    rig: Callable[..., Any], words: tuple[str, ...], said: str
+) -> None:
     ended = rig("plan", *words)
-    assert (ended.status, "the plan has more than" in ended.err) == (2, True), ended.err
+    assert (ended.status, f"the plan has {said}" in ended.err) == (2, True), ended.err
 
 
 @pytest.mark.parametrize("name", ["sweep", "misalignment", "repeat"])

@@ -22,7 +22,7 @@ from rig.errors import RigError
 from rig.instruments.instruments import checked
 from rig.planning.plan import Plan, plan, stretches
 from rig.runs.background import control
-from rig.web.calculations import off_loop
+from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk, lab_read
 from rig.web.frame import Key, frame
 from rig.web.pages.run_begin import BeginDialog, before_start, plan_facts
@@ -140,7 +140,7 @@ class Planning:
         self.bench_file, self.bench = bench_file, bench
         self.given = {name: value for name, value in settings.items() if name != "procedure"}
         self.started: Callable[[], Awaitable[None]] | None = None
-        self.turn, self.address = 0, ""
+        self.turn, self.address, self.visit = 0, "", Visit()
         self.planned: Plan | None = None
         names = {name: f"{name}: {summary(path)}" for name, path in paths(bench.folders.procedures).items()}
         selected = settings.get("procedure", DEFAULT_PROCEDURE)
@@ -218,7 +218,8 @@ class Planning:
         turn, self.planned = self.turn, None
         self.button.disable()
         self._tell_address()
-        work = off_loop(self._plan, self.procedure, self.settings())
+        self.visit.cancel()  # a plan of other settings, which can take minutes
+        work = self.visit.work(self._plan, self.procedure, self.settings())
         title = "This procedure cannot run"
         planned = await shown(self.plan, "Planning; nothing moves", title, work, lambda: turn == self.turn)
         if planned is not None:
