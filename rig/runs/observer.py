@@ -8,8 +8,9 @@ from __future__ import annotations
 import statistics
 import time
 from collections import defaultdict, deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from signal import Signals
 from typing import Any, Literal
 
 import numpy as np
@@ -42,7 +43,12 @@ class Outcome:
 
 
 class Observer:
-    """The observer of a run: a terminal, a page, a test. This one shows nothing, and nobody is there to decide."""
+    """The observer of a run: a terminal, a page, a test. This one shows nothing, and nobody is there to decide.
+
+    `ignored_when_paused`: signals that do not end the question of `interrupted`.
+    """
+
+    ignored_when_paused: Collection[Signals] = ()
 
     def planned(self, plan: Plan) -> None:
         """The plan of a new run, before it begins. Raises Declined if a person does not want it."""

@@ -78,7 +78,7 @@ def _begun(
     trace: Trace | None,
     first: Confirm | None,
 ) -> Outcome:
-    with stoppable(), connected(bench, trace) as rig:
+    with stoppable(inner=True), connected(bench, trace) as rig:
         identities = {role: asdict(identity) for role, identity in rig.identities().items()}
         faults = expired(bench, datetime.now(UTC).date())
         run = record.begin(
@@ -121,7 +121,7 @@ def _resume(
     own_bench = bench or Bench.model_validate(run.bench)  # the same, except for repaired faults
     procedure = find(run.procedure, own_bench.folders.procedures)
     trail = Trace(record) if trace else None
-    with stoppable(), _lease_run(record, run_id), connected(own_bench, trail) as rig:
+    with stoppable(inner=True), _lease_run(record, run_id), connected(own_bench, trail) as rig:
         if trail is not None:
             trail.begin(run_id)
         _require_same_instruments(run, rig)
@@ -141,12 +141,14 @@ def _after_decision(record: Record, outcome: Outcome, observer: Observer, trace:
     """Continue an interrupted run as long as the observer wants it."""
     while outcome.error is not None and (wish := _decision(outcome, observer)) != "end":
         run = outcome.run.run
-        if wish == "repeat" and outcome.run.rows:
-            record.exclude(run, record.next_number(run) - 1, REPEATED)
         try:
+            if wish == "repeat" and outcome.run.rows:
+                record.exclude(run, record.next_number(run) - 1, REPEATED)
             outcome = _resume(record, run, observer, trace=trace)
         except (DriverError, RigError) as error:  # such as an instrument that still does not answer
             outcome = Outcome(record.run(run), error, outcome.moving)  # nothing has stopped these since
+        except KeyboardInterrupt as stop:  # before the run went on
+            outcome = Outcome(record.run(run), _error_of(stop, outcome.run), outcome.moving)
     return outcome
 
 
@@ -155,7 +157,7 @@ def _decision(outcome: Outcome, observer: Observer) -> Decision:
     if isinstance(outcome.error, Stopped) and outcome.error.by != "SIGINT":
         return "end"
     try:
-        with stoppable():
+        with stoppable(observer.ignored_when_paused):
             return observer.interrupted(outcome)
     except KeyboardInterrupt:
         return "end"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Literal
@@ -28,8 +28,11 @@ def who_stopped(name: str) -> str:
 
 
 @contextmanager
-def stoppable() -> Iterator[None]:
+def stoppable(ignored: Collection[signal.Signals] = (), inner: bool = False) -> Iterator[None]:
     """Inside the context the first signal raises KeyboardInterrupt with its name. Later signals are ignored.
+
+    `ignored` signals raise nothing. `inner`: the context lies in another one; after a SIGINT its successors stay ignored
+    there, because a person who presses twice wants one pause. A further context hears them again.
 
     A signal during a computation of the simulated world or a write to the screen waits a moment. If Python discards the
     exception, as in a finaliser, it is raised again.
@@ -37,6 +40,7 @@ def stoppable() -> Iterator[None]:
 
     put_off: list[int] = []
     raised: list[int] = []
+    fired: list[int] = []
 
     def later(number: int) -> None:
         put_off[:] = [number]
@@ -49,6 +53,7 @@ def stoppable() -> Iterator[None]:
         for signal_number in SIGNALS:
             signal.signal(signal_number, signal.SIG_IGN)
         raised[:] = [number]
+        fired.append(number)
         raise KeyboardInterrupt(signal.Signals(number).name)
 
     def again(_: int, frame: FrameType | None) -> None:
@@ -62,11 +67,11 @@ def stoppable() -> Iterator[None]:
             hook(unraisable)
 
     hook, sys.unraisablehook = sys.unraisablehook, lost
-    ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # by nohup: a closed terminal must not stop the run
+    without_terminal = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # by nohup: a closed terminal must not stop the run
     handlers = {
-        signal_number: signal.signal(signal_number, stop)
+        signal_number: signal.signal(signal_number, signal.SIG_IGN if signal_number in ignored else stop)
         for signal_number in SIGNALS
-        if not (ignored and signal_number == signal.SIGHUP)
+        if not (without_terminal and signal_number == signal.SIGHUP)
     }
     handlers[signal.SIGALRM] = signal.signal(signal.SIGALRM, again)
     try:
@@ -74,6 +79,8 @@ def stoppable() -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         sys.unraisablehook = hook
+        if inner and signal.SIGINT in fired:
+            handlers[signal.SIGINT] = signal.SIG_IGN
         for signal_number, handler in handlers.items():
             signal.signal(signal_number, handler)
 

@@ -7,6 +7,7 @@ import signal
 import threading
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -20,6 +21,7 @@ from rig.errors import Busy, RigError
 from rig.files import home
 from rig.lease import lease
 from rig.record import Kept, Record
+from rig.runs import runner
 from rig.runs.background import control, process
 from rig.runs.background import status as status_file
 from rig.runs.background.control import PublishingObserver
@@ -111,6 +113,39 @@ def test_a_second_pause_changes_nothing() -> None:
     status = carried_out("soak", {"duration_s": "43200"}, person)
     # which signal is named depends on whether the run has begun again when the stop comes
     assert "stopped by " in status.error
+
+
+def test_many_wishes_for_a_pause_are_one_pause() -> None:
+    def person() -> None:
+        for _ in range(2):
+            when("running", lambda status: status.now.startswith("holding"))
+            for _ in range(200):  # from the stop of the stages to the question, and while it is open
+                os.kill(os.getpid(), signal.SIGINT)
+                threading.Event().wait(POLL_S)
+            control.answer(when("paused"), "resume")
+        control.stop(when("running", lambda status: status.now.startswith("holding")))
+
+    assert carried_out("soak", {"duration_s": "43200"}, person).error.startswith("stopped by another program")
+
+
+def test_a_wish_for_a_pause_while_the_run_connects_again_pauses_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    carry_out, connections = runner.connected, []
+
+    def interrupted(*arguments: Any) -> Any:
+        connections.append(1)
+        if len(connections) == 2:
+            signal.raise_signal(signal.SIGINT)
+        return carry_out(*arguments)
+
+    monkeypatch.setattr(runner, "connected", interrupted)
+
+    def person() -> None:
+        control.pause(when("running"))
+        control.answer(when("paused"), "resume")
+        control.answer(when("paused", lambda _: len(connections) == 2), "end")
+
+    assert carried_out("soak", {"duration_s": "43200"}, person).state == "stopped"
+    assert len(connections) == 2
 
 
 def test_stopped_while_it_is_paused() -> None:

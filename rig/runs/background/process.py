@@ -32,7 +32,9 @@ WISHES = Choice("interrupted", "What now?", choices=("resume", "repeat", "end"))
 
 
 class Attendant(StatusWriter):
-    """The observer of a background run, which asks through a pipe."""
+    """The observer of a background run, which asks through a pipe. A second wish for a pause changes nothing."""
+
+    ignored_when_paused = (PAUSE,)
 
     def __init__(self, order: Order, bench: Bench) -> None:
         super().__init__(order.key, order.procedure, bench)
@@ -48,13 +50,10 @@ class Attendant(StatusWriter):
         return self._answer(question, instead or "", "asking")
 
     def interrupted(self, outcome: Outcome) -> Decision:
-        """Wait at rest for the decision of a person. A second wish for a pause changes nothing."""
+        """Wait at rest for the decision of a person."""
         by_a_person = isinstance(outcome.error, Stopped)
         self.publish(error="" if by_a_person else str(outcome.error), moving=outcome.moving)
-        handler = signal.signal(PAUSE, signal.SIG_IGN)
-        decision = cast(Decision, self._answer(WISHES, "resume", "paused"))
-        signal.signal(PAUSE, handler)  # after another signal the caller restores all of them
-        return decision
+        return cast(Decision, self._answer(WISHES, "resume", "paused"))
 
     def _answer(self, question: Question, proposed: str, phase: str) -> str:
         """Ask until the question accepts the answer."""
