@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calibrations.errors import UnknownName, nearest
+from calibrations.errors import ModelError, UnknownName, nearest
 from calibrations.fitting.held_out import folds, held_out, parameters_of_rows
 from calibrations.fitting.identifiability import covariance, estimates
 from calibrations.fitting.minimise import minimise
@@ -222,6 +222,9 @@ class Fit(Result):
         return max(1.0, float(np.sqrt(np.sum(self.whitened[:, 0] ** 2) / max(rows - p, 1))))
 
 
+LARGEST_CHANGE = 1e70  # of the output by a unit of a parameter: products of squares stay finite
+
+
 def fit(model: Model, table: Table) -> Fit:
     """The model with parameters estimated from `table`. Raises TooFewRows, ModelError, DataError.
 
@@ -263,7 +266,29 @@ def in_white_noise(before: Fit) -> Fit:
 
 
 def _alternate(problem: Problem, noise: Noise, starts: list[Array]) -> Fit:
-    """Parameters and noise in turn."""
+    """Parameters and noise in turn. Raises ModelError for an effect with values that no fit resolves."""
+    with np.errstate(over="ignore", invalid="ignore"):  # what follows from them is refused
+        try:
+            found = _alternate_unchecked(problem, noise, starts)
+        except np.linalg.LinAlgError:
+            raise _unresolved(problem, starts[0]) from None
+        if not (np.abs(found.jacobian) < LARGEST_CHANGE).all():
+            raise _unresolved(problem, starts[0])
+    return found
+
+
+def _unresolved(problem: Problem, theta: Array) -> ModelError:
+    """Names the parameter that changes the output most."""
+    sizes = np.abs(problem.jacobian(theta)).max(axis=(0, 1))
+    slot = problem.layout.slots[int(np.argmax(sizes))]  # a size that is no number is the largest
+    return ModelError(
+        f"{problem.layout.model.terms[slot.term].name}: the parameter {slot.parameter.name} changes the output by more "
+        "than a fit can resolve; give an effect with smaller values, without nested exp and without huge factors"
+    )
+
+
+def _alternate_unchecked(problem: Problem, noise: Noise, starts: list[Array]) -> Fit:
+    """As `_alternate`; raises LinAlgError."""
     theta = min((minimise(problem, noise, start) for start in starts), key=lambda t: t[1])[0]
     # with smooth columns set aside the noise hardly depends on the parameters, and one round is enough
     for _ in range(1 if problem.smooth.size else ROUNDS):
