@@ -55,7 +55,8 @@ def motion(
     positive = (peak_to_peak_um, *frequency_hz, duration_s, still_s, block_s, dwell_s)
     if not frequency_hz or min(positive) <= 0 or settle_s < 0:
         raise SettingError("motion: amplitude, frequencies and times must be above 0, settle_s must be 0 or more")
-    _require_displacement(rig)
+    if not rig.measured():
+        _require_displacement(rig)
     prepare(
         rig,
         "Is the sensor on the nano-positioner, face up, its x axis along the carriage's x? Is the tip of the "
@@ -63,12 +64,17 @@ def motion(
     )
     calibration, still = list(sweep()), blocks(STILL, still_s, block_s)
     motions = {hz: blocks(f"{KIND} {hz:g} Hz", duration_s, block_s) for hz in frequency_hz}
-    missing = list(rig.missing([*calibration, *still, *chain(*motions.values())]))
-    _centre_carriage(rig, centre_um)
+    later = [*still, *chain(*motions.values())]
+    missing = list(rig.missing([*calibration, *later]))
+    in_sweep = calibration[0] not in missing and _missing_of_part(missing, later) == later
+    if not in_sweep:
+        _centre_carriage(rig, centre_um)
     if calibration[0] in missing:
         _remove_history(rig)
     for pose in _missing_of_part(missing, calibration):
         rig.hold(pose, dwell_s, settle_s)
+    if in_sweep:  # after the sweep, so that a resumed sweep has the same steps as an undisturbed one
+        _centre_carriage(rig, centre_um)
     _remove_hysteresis(rig)
     rig.wait(settle_s)
     if todo := _missing_of_part(missing, still):

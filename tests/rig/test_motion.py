@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -188,6 +188,10 @@ def test_it_goes_on_after_interruptions_with_the_carriage_at_rest(
         outcome = resume(record, outcome.run.run, Onlooker())
         assert (outcome.run.state, outcome.run.rows, outcome.error) == ("complete", 58, None)
         table = Measured.named(record, outcome.run.run).table()
+        whole = shaken(record, bench(QUIET), Onlooker(), **BRIEF).run.run
+        for a, b in islice(zip(record.kept(whole), record.kept(outcome.run.run), strict=True), 54):
+            assert (a.pose, a.t_s) == (b.pose, b.t_s)
+            np.testing.assert_array_equal(a.samples.volts, b.samples.volts)
     assert [round((r.end - r.first) / r.rate_hz) for r in find_records(table)] == lengths_s
     assert outcome.run.results["rmse-linear-x"]["value"] < 3
 
