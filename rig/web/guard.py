@@ -22,6 +22,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from rig.files import home
 
 TOKEN = "token"  # noqa: S105 the name of the query's field
+LASTS_S = 400 * 86_400  # of the cookie: the longest that browsers keep one
 POLICY = "; ".join(
     (
         "default-src 'none'",
@@ -66,7 +67,7 @@ class Guard:
             await _refuse(scope, send, 403, ELSEWHERE)
         elif scope["type"] == "http" and TOKEN in query and self._fits(query.pop(TOKEN)):
             await self._let_in(scope, send, query)
-        elif not self._fits(_cookies(headers).get(self.cookie, "")):
+        elif not any(self._fits(token) for token in _cookies(scope, self.cookie)):
             await _refuse(scope, send, 401, UNKNOWN)
         else:
             await self.app(scope, receive, _with_headers(send))
@@ -87,7 +88,7 @@ class Guard:
     async def _let_in(self, scope: Scope, send: Send, query: Mapping[str, str]) -> None:
         """Move the token from the address to a cookie, because addresses are stored and passed on."""
         place = scope["path"] + (f"?{urlencode(query)}" if query else "")
-        cookie = f"{self.cookie}={self.token}; HttpOnly; SameSite=Strict; Path=/"
+        cookie = f"{self.cookie}={self.token}; HttpOnly; SameSite=Strict; Path=/; Max-Age={LASTS_S}"
         headers = [(b"location", place.encode()), (b"set-cookie", cookie.encode()), (b"content-length", b"0")]
         await send({"type": "http.response.start", "status": 303, "headers": [*headers, *HEADERS]})
         await send({"type": "http.response.body", "body": b""})
@@ -99,10 +100,11 @@ def names(host: str, port: int) -> frozenset[str]:
     return frozenset(f"{name}:{port}" for name in host_names)
 
 
-def _cookies(headers: Mapping[str, str]) -> Mapping[str, str]:
-    """Cookies by name. All programs of this host share them: one that is not well formed must not hide ours."""
-    pairs = (cookie.partition("=") for cookie in headers.get("cookie", "").split(";"))
-    return {name.strip(): value.strip() for name, _, value in pairs}
+def _cookies(scope: Scope, name: str) -> list[str]:
+    """The values of the cookies `name`. All programs of this host share them: no other cookie must hide ours."""
+    texts = [value.decode("latin-1") for header, value in scope["headers"] if header == b"cookie"]
+    pairs = [cookie.partition("=") for cookie in ";".join(texts).split(";")]
+    return [value.strip().strip('"') for found, _, value in pairs if found.strip() == name]
 
 
 def _with_headers(send: Send) -> Send:

@@ -52,7 +52,7 @@ def ask(query: str = "", headers: Mapping[str, str] | None = None, kind: str = "
 def test_the_token_becomes_a_cookie_and_leaves_the_address() -> None:
     answer = ask(f"token={SECRET}&procedure=sweep", path="/run")
     assert (answer.status, answer.headers["location"], answer.let_in) == (303, "/run?procedure=sweep", None)
-    assert answer.headers["set-cookie"] == f"rig-8473={SECRET}; HttpOnly; SameSite=Strict; Path=/"
+    assert answer.headers["set-cookie"] == f"rig-8473={SECRET}; HttpOnly; SameSite=Strict; Path=/; Max-Age=34560000"
     assert ask("procedure=sweep", COOKIE).let_in == "procedure=sweep"
 
 
@@ -72,6 +72,9 @@ def test_the_token_becomes_a_cookie_and_leaves_the_address() -> None:
         (COOKIE | {"origin": "null"}, "", 403),
         (COOKIE | {"host": "localhost:8473", "origin": "http://localhost:8473"}, "", 200),
         (COOKIE, "", 200),
+        ({"cookie": f"rig-8473={SECRET}; rig-8473=stale"}, "", 200),
+        ({"cookie": f"rig-8473=stale; rig-8473={SECRET}"}, "", 200),
+        ({"cookie": f'rig-8473="{SECRET}"'}, "", 200),
     ],
 )
 def test_requests(headers: Mapping[str, str], query: str, status: int) -> None:
