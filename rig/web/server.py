@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import logging
 import signal
 import socket
 from collections.abc import Callable, Iterator
@@ -69,8 +70,9 @@ def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[
     )
     guarded = Guard(app, place.token, names(host, place.port))
     config = uvicorn.Config(
-        guarded, log_level="warning", access_log=False, timeout_graceful_shutdown=1, ws_max_size=1 << 24
-    )
+        guarded, log_level="warning", access_log=False, timeout_graceful_shutdown=0, ws_max_size=1 << 24
+    )  # open pages keep their connections, so there is nothing to wait for
+    logging.getLogger("uvicorn.error").addFilter(lambda entry: "graceful shutdown" not in entry.getMessage())
     with _ignore_signals(), listener:
         _Server(config, lambda: ready(place)).run(sockets=[listener])
     atexit.register(leave_calculations)
