@@ -31,7 +31,7 @@ def who_stopped(name: str) -> str:
 def stoppable(ignored: Collection[signal.Signals] = (), inner: bool = False) -> Iterator[None]:
     """Inside the context the first signal raises KeyboardInterrupt with its name. Later signals are ignored.
 
-    `ignored` signals raise nothing. `inner`: the context lies in another one; after a SIGINT its successors stay ignored
+    `ignored` signals raise nothing. `inner`: the context lies in another one; after a SIGINT the next ones stay ignored
     there, because a person who presses twice wants one pause. A further context hears them again.
 
     A signal during a computation of the simulated world or a write to the screen waits a moment. If Python discards the
@@ -67,11 +67,11 @@ def stoppable(ignored: Collection[signal.Signals] = (), inner: bool = False) -> 
             hook(unraisable)
 
     hook, sys.unraisablehook = sys.unraisablehook, lost
-    without_terminal = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # by nohup: a closed terminal must not stop the run
+    nohup = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # then a closed terminal must not stop the run
     handlers = {
         signal_number: signal.signal(signal_number, signal.SIG_IGN if signal_number in ignored else stop)
         for signal_number in SIGNALS
-        if not (without_terminal and signal_number == signal.SIGHUP)
+        if not (nohup and signal_number == signal.SIGHUP)
     }
     handlers[signal.SIGALRM] = signal.signal(signal.SIGALRM, again)
     try:

@@ -19,7 +19,7 @@ from procedures.session import Guidance, Reading
 from procedures.settings import parse
 from rig.planning.plan import Plan
 from rig.record import Kept
-from rig.runs.runner import Decision, Outcome
+from rig.runs.runner import Decision, Observer, Outcome
 
 SMALL = {"step_deg": "90", "dwell_s": "0.2", "inclinations_deg": "90,45"}
 SMALL_ARGUMENTS = ("--step-deg", "90", "--dwell-s", "0.2", "--inclinations-deg", "90,45")
@@ -34,7 +34,7 @@ def small_sweep() -> tuple[Any, dict[str, Any]]:
 
 
 @dataclass
-class Onlooker:
+class Onlooker(Observer):
     """Remembers what it was shown; leaves every answer to the simulated technician.
 
     What it wishes where the run is interrupted is given in order; then it wishes the end.

@@ -19,9 +19,9 @@ from rig.bench.file import DEMO
 from rig.cli.terminal.watch import Quiet
 from rig.errors import Busy, RigError
 from rig.files import home
+from rig.instruments.instruments import connected
 from rig.lease import lease
 from rig.record import Kept, Record
-from rig.runs import runner
 from rig.runs.background import control, process
 from rig.runs.background import status as status_file
 from rig.runs.background.control import PublishingObserver
@@ -129,15 +129,15 @@ def test_many_wishes_for_a_pause_are_one_pause() -> None:
 
 
 def test_a_wish_for_a_pause_while_the_run_connects_again_pauses_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    carry_out, connections = runner.connected, []
+    connections: list[int] = []
 
     def interrupted(*arguments: Any) -> Any:
         connections.append(1)
         if len(connections) == 2:
             signal.raise_signal(signal.SIGINT)
-        return carry_out(*arguments)
+        return connected(*arguments)
 
-    monkeypatch.setattr(runner, "connected", interrupted)
+    monkeypatch.setattr("rig.runs.runner.connected", interrupted)
 
     def person() -> None:
         control.pause(when("running"))
