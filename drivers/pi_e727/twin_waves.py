@@ -73,10 +73,12 @@ class Recorder:
 
     def advance(self, now_s: float) -> None:
         """Record all that is due; the axes have followed their present commands since the last time."""
+        if now_s < self._start_s:
+            return
         interval_s = self._rate * CYCLE_S
         for place, (axis, option) in self._recorded.items():
             count = self._count(place)
-            if option and now_s >= self._start_s and count < e727.RECORD_POINTS:
+            if option and count < e727.RECORD_POINTS:
                 due = min(math.floor((now_s - self._start_s) / interval_s + 1e-7) + 1, e727.RECORD_POINTS)
                 if due > count:
                     times_s = self._start_s + interval_s * np.arange(count, due, dtype=np.float64)
