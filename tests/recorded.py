@@ -20,8 +20,7 @@ RECORDS: Mapping[str, tuple[tuple[str, ...], ...]] = {
     "sweep": (SWEEP,),
     "noise-floor": (("run", "noise-floor", "--duration-s", "60", "--unattended"),),
     "motion": (("run", "motion", "--unattended", "--duration-s", "20", "--still-s", "10"),),
-    "laboratory": (
-        SWEEP,
+    "laboratory": (  # after those of "sweep"
         ("run", "noise-floor", "--duration-s", "60", "--unattended"),
         ("run", "motion", "--unattended", "--duration-s", "20", "--still-s", "10"),
         ("run", "misalignment", "--unattended", "--dwell-s", "1"),
@@ -31,6 +30,7 @@ RECORDS: Mapping[str, tuple[tuple[str, ...], ...]] = {
         ("run", "level-check", "--unattended"),
     ),
 }
+CONTINUED = {"laboratory": "sweep"}  # the record that another begins with
 
 
 class Dated(datetime):
@@ -69,11 +69,14 @@ def record(factory: pytest.TempPathFactory, name: str) -> Path:
         if not made.exists():
             begun = made.with_suffix(".begun")
             shutil.rmtree(begun, ignore_errors=True)
+            earlier = CONTINUED.get(name)
+            if earlier is not None:
+                shutil.copytree(record(factory, earlier), begun)
             with pytest.MonkeyPatch.context() as patch:
                 patch.setenv("RIG_HOME", str(begun))
                 patch.setattr("rig.record.rows.datetime", Dated)
                 patch.setattr("rig.record.rows.secrets.token_hex", lambda _: "000")
-                for month, words in enumerate(RECORDS[name]):
+                for month, words in enumerate(RECORDS[name], len(RECORDS.get(earlier or "", ()))):
                     patch.setattr(Dated, "today_is", datetime(2026, 1, 1, 12) + timedelta(days=30 * month))  # noqa: DTZ001
                     status, _, err = command(*words)
                     assert status == 0, err
