@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 import yaml
 
+from calibrations.table import Table
 from procedures.catalogue import paths
 from rig.bench.file import DEFAULT
 from rig.record import Record
 from rig.record.measured import table_of
+from tests.recorded import command
 
 Rig = Callable[..., Any]
 OUTPUTS = "time ax ay az gx gy gz mx my mz supply d63 temperature"
@@ -254,21 +256,32 @@ ANALOG = {"channels": {"vx": 0, "vy": 1, "vz": 2}, "rate_hz": 1000}  # the same 
 ATTITUDES = ("--inclinations-deg", "60,150", "--step-deg", "90", "--dwell-s", "0.5")
 
 
+def in_attitudes(folder: Path, driver: str, **settings: Any) -> Table:
+    """The poses of a sweep on an ideal rig with this converter or digital sensor."""
+    document = yaml.safe_load(DEFAULT.read_text(encoding="utf-8")) | {"world": {"preset": "ideal"}}
+    document["instruments"]["adc"] = {"driver": driver, "url": "simulated", "settings": settings}
+    path = folder / f"{driver}.yaml"
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    status, _, problem = command("run", "sweep", "--bench", str(path), "--unattended", *ATTITUDES)
+    assert status == 0, problem
+    with Record() as record:
+        return table_of(record, "last")
+
+
+@pytest.fixture(scope="module")
+def analog(tmp_path_factory: pytest.TempPathFactory) -> Table:
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("analog")
+        patch.setenv("RIG_HOME", str(folder))
+        return in_attitudes(folder, "labjack_t7", **ANALOG)
+
+
 @pytest.mark.sockets
 @pytest.mark.parametrize("driver", ["imu_lines", *FRAMED])
 def test_a_digital_sensor_has_the_specific_force_of_the_analog_one_on_each_axis(
-    rig: Rig, rig_home: Path, tmp_path: Path, driver: str
+    analog: Table, rig_home: Path, tmp_path: Path, driver: str
 ) -> None:
-    tables = []
-    for name, settings in (("labjack_t7", ANALOG), (driver, {"rate_hz": 100})):
-        document = yaml.safe_load(DEFAULT.read_text(encoding="utf-8")) | {"world": {"preset": "ideal"}}
-        document["instruments"]["adc"] = {"driver": name, "url": "simulated", "settings": settings}
-        path = tmp_path / f"{name}.yaml"
-        path.write_text(yaml.safe_dump(document), encoding="utf-8")
-        assert rig("run", "sweep", "--bench", str(path), "--unattended", *ATTITUDES).status == 0
-        with Record() as record:
-            tables.append(table_of(record, "last"))
-    analog, digital = tables
+    digital = in_attitudes(tmp_path, driver, rate_hz=100)
     assert digital.axes == analog.axes == ("x", "y", "z")
     per_g = 1.0 if driver == "imu_lines" else 9.80665
     np.testing.assert_allclose(digital.outputs / per_g, analog.outputs - 2.5, atol=2e-3)

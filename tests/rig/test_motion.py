@@ -53,6 +53,12 @@ def shaken(record: Record, on: Bench, watch: Any = None, **settings: str) -> Out
     return start(record, on, MOTION, parse(MOTION, settings), watch or Onlooker())
 
 
+@pytest.fixture
+def few_swings(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The ideal sensor has no friction whose history swings would remove."""
+    monkeypatch.setattr("procedures.motion.SWINGS_DEG", (90.0,))
+
+
 @pytest.mark.parametrize("seed", first_fast([1, 2, 3]))
 def test_the_physical_model_reaches_the_limit_that_noise_sets(seed: int, rig_home: Path) -> None:
     with Record() as record:
@@ -109,7 +115,7 @@ def test_a_bench_without_its_instruments_is_refused_before_anything_moves() -> N
 
 
 @pytest.mark.parametrize("reversed_channels", first_fast([True, False]))
-def test_a_motion_run_holds_three_tables(rig_home: Path, reversed_channels: bool) -> None:
+def test_a_motion_run_holds_three_tables(rig_home: Path, few_swings: None, reversed_channels: bool) -> None:
     document = bench(QUIET).document()
     channels = document["instruments"]["adc"]["settings"]["channels"]
     if reversed_channels:
@@ -143,7 +149,7 @@ def test_a_probe_in_front_of_the_carriage_counts_the_other_way(rig_home: Path) -
     assert "falls where the sensor's acceleration along x rises" in (run.message or "")
 
 
-def test_a_reading_outside_the_curve_is_an_error_and_no_number(rig_home: Path) -> None:
+def test_a_reading_outside_the_curve_is_an_error_and_no_number(rig_home: Path, few_swings: None) -> None:
     with Record() as record:
         outcome = shaken(record, bench(QUIET | {"d63": {"standoff_um": 290.0}}), **BRIEF)
         kept = list(record.kept(outcome.run.run))
@@ -178,7 +184,7 @@ class StopsAt(Onlooker):
     ],
 )
 def test_it_goes_on_after_interruptions_with_the_carriage_at_rest(
-    rig_home: Path, stops: list[int], lengths_s: list[int]
+    rig_home: Path, few_swings: None, stops: list[int], lengths_s: list[int]
 ) -> None:
     with Record() as record:
         outcome = shaken(record, bench(QUIET), StopsAt(stops[0]), **BRIEF)
@@ -196,7 +202,9 @@ def test_it_goes_on_after_interruptions_with_the_carriage_at_rest(
     assert outcome.run.results["rmse-linear-x"]["value"] < 3
 
 
-def test_the_carriage_is_stopped_whatever_ends_the_motion(rig_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_carriage_is_stopped_whatever_ends_the_motion(
+    rig_home: Path, few_swings: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from drivers.pi_e727.driver import Positioner
 
     stops: list[bool] = []
