@@ -6,12 +6,14 @@ import re
 import signal
 import tempfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from calibrations.table import Table
 from drivers.errors import LimitError, StageAlarm
 from procedures.catalogue import SHIPPED, find
 from procedures.errors import SettingError
@@ -41,6 +43,23 @@ def samples(record: Record, run: str) -> list[Any]:
         (kept.pose, kept.samples.volts.tobytes(), kept.samples.start_s, kept.t_s, kept.temperature_c)
         for kept in record.kept(run)
     ]
+
+
+@dataclass(frozen=True)
+class Undisturbed:
+    """The small sweep on the default rig: its table, and all that was measured."""
+
+    table: Table
+    samples: list[Any]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Undisturbed:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RIG_HOME", str(tmp_path_factory.mktemp("whole")))
+        with Record() as record:
+            run = run_small(record).run.run
+            return Undisturbed(table_of(record, run), samples(record, run))
 
 
 class Interrupting(Onlooker):
@@ -77,34 +96,31 @@ def test_a_sweep_keeps_every_pose_once_in_order() -> None:
     assert np.all(np.diff(table.column("t_s")) > 0)
 
 
-def test_the_sensor_feels_gravity_through_all_the_wires() -> None:
-    with Record() as record:
-        table = table_of(record, run_small(record).run.run)
+def test_the_sensor_feels_gravity_through_all_the_wires(whole: Undisturbed) -> None:
+    table = whole.table
     alpha, beta = np.radians(table.column("alpha_deg")), np.radians(table.column("beta_deg"))
     assert np.allclose(table.column("vx_v"), 2.5 + np.sin(alpha) * np.cos(beta), atol=0.06)
     assert np.allclose(table.column("vy_v"), 2.5 + np.sin(alpha) * np.sin(beta), atol=0.06)
 
 
-def test_time_counts_from_the_sensors_power() -> None:
+def test_time_counts_from_the_sensors_power(whole: Undisturbed) -> None:
     with Record() as record:
-        warm = table_of(record, run_small(record).run.run)
         cold = run_small(record, read_bench().model_copy(update={"world": {"heat": {"powered_for_s": 0.0}}}))
         assert table_of(record, cold.run.run).column("t_s")[0] < 60
-    assert warm.column("t_s")[0] > 12 * 3600
+    assert whole.table.column("t_s")[0] > 12 * 3600
 
 
-def test_the_same_seed_gives_the_same_run_sample_for_sample() -> None:
+def test_the_same_seed_gives_the_same_run_sample_for_sample(whole: Undisturbed) -> None:
     with Record() as record:
-        one, same = (run_small(record).run.run for _ in range(2))
         other = run_small(record, read_bench().model_copy(update={"seed": 2})).run.run
-        assert samples(record, one) == samples(record, same)
-        assert samples(record, one) != samples(record, other)
+        again = run_small(record).run.run
+        assert samples(record, again) == whole.samples
+        assert samples(record, other) != whole.samples
 
 
 @pytest.mark.parametrize("number", first_fast([signal.SIGINT, signal.SIGTERM, signal.SIGHUP]))
-def test_a_signal_stops_and_resume_makes_the_same_run(number: signal.Signals) -> None:
+def test_a_signal_stops_and_resume_makes_the_same_run(number: signal.Signals, whole: Undisturbed) -> None:
     with Record() as record:
-        whole = run_small(record).run.run
         broken = run_small(record, watch=Interrupting(7, lambda: signal.raise_signal(number)))
         assert broken.run.state == "stopped"
         assert broken.run.rows == 7
@@ -112,29 +128,27 @@ def test_a_signal_stops_and_resume_makes_the_same_run(number: signal.Signals) ->
         watch = Onlooker()
         done = resume(record, broken.run.run, watch)
         assert (done.run.state, watch.expected) == ("complete", [(POSES, 7)])
-        assert samples(record, done.run.run) == samples(record, whole)
+        assert samples(record, done.run.run) == whole.samples
 
 
-def test_a_run_may_be_interrupted_again_and_again() -> None:
+def test_a_run_may_be_interrupted_again_and_again(whole: Undisturbed) -> None:
     with Record() as record:
-        whole = run_small(record).run.run
         run = run_small(record, watch=Interrupting(1, raising(KeyboardInterrupt()))).run.run
         for step in (3, 5):
             resume(record, run, Interrupting(step, raising(KeyboardInterrupt())))
         assert record.run(run).rows == 9
         resume(record, run, Onlooker())
-        assert samples(record, run) == samples(record, whole)
+        assert samples(record, run) == whole.samples
 
 
-def test_a_failing_instrument_leaves_a_run_that_can_be_resumed() -> None:
+def test_a_failing_instrument_leaves_a_run_that_can_be_resumed(whole: Undisturbed) -> None:
     with Record() as record:
-        whole = run_small(record).run.run
         alarm = StageAlarm("beta: has stopped with alarm 30", "Look at the stage", 0x30)
         failed = run_small(record, watch=Interrupting(4, raising(alarm)))
         assert (failed.run.state, failed.error) == ("failed", alarm)
         assert "alarm 30" in (failed.run.message or "")
         resume(record, failed.run.run, Onlooker())
-        assert samples(record, failed.run.run) == samples(record, whole)
+        assert samples(record, failed.run.run) == whole.samples
 
 
 def test_a_fault_of_the_program_is_written_down_and_not_hidden() -> None:
