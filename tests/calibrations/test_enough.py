@@ -19,10 +19,11 @@ from tests.calibrations.synthetic import components, poses, turns
 @cache
 def table() -> Table:
     """A square of 5 mg rms over the axis out of the plane, and one of 0.5 mg along each axis."""
-    x, y, z = components(turns())
+    columns = turns((90, 30, 150), step_deg=30)
+    x, y, z = components(columns)
     rng = np.random.default_rng(3)
     outputs = [2.5 + a + k * a**2 + 0.02 * z**2 for a, k in ((x, 5e-4), (y, -8e-4))]
-    return poses(turns(), *(v + 5e-5 * rng.standard_normal(len(v)) for v in outputs))
+    return poses(columns, *(v + 5e-5 * rng.standard_normal(len(v)) for v in outputs))
 
 
 @cache

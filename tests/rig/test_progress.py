@@ -87,7 +87,7 @@ def test_short_work_shows_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     ],
 )
 def test_a_command_says_what_it_does(
-    words: tuple[str, ...], says: str, rig: Rig, work: Path, monkeypatch: pytest.MonkeyPatch
+    words: tuple[str, ...], says: str, rig: Rig, work: Path, undrawn: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     quiet = rig(*words)
     (work / "q.yaml").unlink(missing_ok=True)

@@ -84,7 +84,7 @@ def test_the_name_of_a_removed_effect_is_free_and_its_searches_are_forgotten(tur
     assert again.plans == {names: found for names, found in grown.plans.items() if "mine" not in names}
 
 
-def test_a_report_takes_the_search_that_its_session_has_made(turned: ModelSession) -> None:
+def test_a_report_takes_the_search_that_its_session_has_made(turned: ModelSession, undrawn: None) -> None:
     assert turned.search_made is None
     turned.diagnosed()
     question = Loaded(turned.data, turned.model, turned.effects)
