@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 import signal
+import sys
 from html import escape
 from pathlib import Path
 
@@ -43,8 +45,14 @@ def no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For tests of a page's words: each picture is drawn as its description alone."""
-    monkeypatch.setattr("calibrations.presentation.page.inline", lambda _, name, words: f"<svg>{escape(words)}</svg>")
+    """For tests of a page's words: a picture is its description and a digest of what it would show."""
+    import numpy as np
+
+    def described(chart: object, name: str, words: str) -> str:
+        with np.printoptions(threshold=sys.maxsize):
+            return f'<svg data-shows="{hashlib.sha256(repr(chart).encode()).hexdigest()}">{escape(words)}</svg>'
+
+    monkeypatch.setattr("calibrations.presentation.page.inline", described)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

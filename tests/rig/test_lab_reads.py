@@ -123,7 +123,7 @@ def _undated(text: bytes | None) -> bytes:
 
 @pytest.mark.parametrize(("what", "words"), [(key[0], words) for key, words in ASKED.items()], ids=map(" ".join, ASKED))
 def test_it_says_and_writes_the_same(
-    both: Callable[..., None], laboratory: Laboratory, what: str, words: tuple[str, ...]
+    both: Callable[..., None], laboratory: Laboratory, undrawn: None, what: str, words: tuple[str, ...]
 ) -> None:
     run = laboratory.runs.get(what, "")
     json = () if words[0] == "export" else ("--json",)
