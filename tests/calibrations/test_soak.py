@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 
-from calibrations.analyses.soak import analyse_soak
+from calibrations.analyses.soak import Soak, analyse_soak
 from calibrations.errors import TooFewRows
 from calibrations.presentation.charts.soak import soak_album
 from calibrations.presentation.report.soak import soak_report
@@ -18,12 +19,17 @@ from tests.calibrations.soaks import BLOCK_S, soak_table
 FACTS = {"sensor": "a <sensor>", "run": "a night"}
 
 
+@cache
+def night() -> Soak:
+    return analyse_soak(soak_table())
+
+
 def page(found: Any, results: Any = None) -> str:
     return re.sub(r"\s+", " ", soak_report(found, results or {}, FACTS))
 
 
 def test_bias_and_scale_factor_come_to_rest() -> None:
-    found = analyse_soak(soak_table())
+    found = night()
     assert list(found.courses) == ["bias-x", "scale-x", "bias-y", "scale-y"]
     for course in found.courses.values():
         assert course.state is not None
@@ -47,15 +53,16 @@ def test_times_count_from_power_on() -> None:
     assert times[0][0] == pytest.approx(times[1][0] + 3600)
 
 
-def test_a_gap_is_marked_and_the_fit_goes_by_real_time() -> None:
+def test_a_gap_is_marked_and_the_fit_goes_by_real_time(undrawn: None) -> None:
     found = analyse_soak(soak_table(cut_s=5000.0))
     (gap,) = found.gaps
     assert (gap.path, gap.length_s) == ("hold 10", pytest.approx(5000.0))
     state = found.courses["bias-x"].state
     assert state is not None
     assert state.terms[0].tau_s[0] == pytest.approx(5400, abs=3 * state.terms[0].tau_s[1])
-    assert "1.39 h at" in page(found)
-    assert "1.39 h are lost in 1 gap." in page(found)
+    text = page(found)
+    assert "1.39 h at" in text
+    assert "1.39 h are lost in 1 gap." in text
 
 
 def test_a_reversal_that_was_interrupted_is_left_out() -> None:
@@ -77,12 +84,12 @@ def test_a_reversal_that_is_not_complete_yet_is_left_out() -> None:
 
 
 def test_in_an_oven_the_approach_begins_when_it_is_warm() -> None:
-    whole, warm = analyse_soak(soak_table()), analyse_soak(soak_table(), oven_c=28.0)
+    whole, warm = night(), analyse_soak(soak_table(), oven_c=28.0)
     assert warm.left_out > whole.left_out == 0
     assert warm.courses["bias-x"].t_s[0] > 5400 * np.log(6)
 
 
-def test_a_short_soak_has_courses_and_no_verdict_on_steady_state() -> None:
+def test_a_short_soak_has_courses_and_no_verdict_on_steady_state(undrawn: None) -> None:
     found = analyse_soak(soak_table(120.0))
     assert all(course.state is None for course in found.courses.values())
     assert found.time_s() is None
@@ -97,7 +104,7 @@ def test_without_a_whole_reversal_there_is_nothing() -> None:
 
 
 def test_noise_of_hours_and_allan_deviation_are_those_of_the_still_record() -> None:
-    found = analyse_soak(soak_table())
+    found = night()
     hours_s, rms = found.noise_of_hours("x")
     assert hours_s[0] == 1800.0
     assert rms == pytest.approx(0.8e-3)
@@ -127,7 +134,7 @@ def test_holds_of_one_block_have_no_deviation() -> None:
 
 
 def test_the_page_tells_the_night_without_a_network() -> None:
-    found = analyse_soak(soak_table())
+    found = night()
     rounded = {"value": 0.123456, "std": None, "unit": "K", "limit": 0.3, "verdict": "pass"}
     limited = {"value": 3.0, "std": 0.1, "unit": "h", "limit": [0, 7], "verdict": "pass"}
     results = {"steady-state-time": limited, "gap": {**limited, "limit": None}, "temperature-wander": rounded}
@@ -150,7 +157,7 @@ def test_the_page_says_what_is_not_reached() -> None:
     assert "steady state not reached" in text
 
 
-def test_a_room_that_wandered_is_told() -> None:
+def test_a_room_that_wandered_is_told(undrawn: None) -> None:
     table = soak_table()
     wandering = table.column("temperature_c") + 2 * np.sin(table.time_s / 3000)
     warm = type(table).from_columns(
@@ -160,4 +167,4 @@ def test_a_room_that_wandered_is_told() -> None:
 
 
 def test_pictures_are_named() -> None:
-    assert [picture.name for picture in soak_album(analyse_soak(soak_table()))] == ["drift", "night", "allan"]
+    assert [picture.name for picture in soak_album(night())] == ["drift", "night", "allan"]
