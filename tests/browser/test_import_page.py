@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from urllib.parse import quote
 
@@ -59,6 +60,9 @@ def test_a_file_is_imported_by_drop_downs(workbench: Workbench, tmp_path: Path) 
     expect(page.get_by_text("Still needed: beta_deg")).to_be_visible()
     choose(page, "meaning of table", "beta_deg")
     page.get_by_label("Serial number").fill("17")
+    expect(page).to_have_url(re.compile(r"/import\?file=.*theirs\.csv&serial=17$"))
+    page.reload()  # as a page does by itself whose server has started again
+    expect(page.get_by_label("Serial number")).to_have_value("17")
     expect(button).to_be_enabled()
     workbench.fits(page)
     workbench.shot(page, "import-tablet")

@@ -5,13 +5,14 @@ from __future__ import annotations
 import filecmp
 import re
 import secrets
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from urllib.parse import urlencode
 
 import numpy as np
+from fastapi import Request
 from nicegui import events, ui
 from numpy.typing import NDArray
 
@@ -58,10 +59,10 @@ UNIT_DOUBT = re.compile(  # the end of a message about a unit that does not fit 
 
 
 def register(desk: Desk) -> None:
-    """The page at /import; the file may be part of the address."""
+    """The page at /import; the file, the kind of table and the constants may be part of the address."""
 
     @ui.page("/import", title="Import a file")
-    async def page(file: str = "", topic: str = "") -> None:
+    async def page(request: Request, file: str = "", topic: str = "") -> None:
         with frame(desk, "/record"):
             if not file:
                 _choose()
@@ -80,7 +81,7 @@ def register(desk: Desk) -> None:
                     failed(f"{Path(file).name} cannot be imported", error, addresses={"Another file": "/import"})
             else:
                 with afresh(body):
-                    ImportPage(sheet, Path(file))
+                    ImportPage(sheet, Path(file), request.query_params)
 
 
 def _choose() -> None:
@@ -206,17 +207,21 @@ class Column:
 class ImportPage:
     """The table of columns with proposals, the constants, the picture, and the button that imports."""
 
-    def __init__(self, sheet: Sheet, path: Path) -> None:
-        self.sheet, self.path = sheet, path
-        self.turn, self.quiet = 0, True
+    def __init__(self, sheet: Sheet, path: Path, given: Mapping[str, str]) -> None:
+        """`given`: the fields of the address, as `_tell_address` writes them."""
+        self.sheet, self.path, self.given = sheet, path, given
+        self.turn, self.quiet, self.address = 0, True, ""
         self.asked = False  # the unit of the time is in doubt and no person has stated it
         proposed = proposal(sheet)
+        self.proposed_kind = proposed.kind
         with box("row-of"):
             words(f"Import {path.name}", "title grow")
             if len(sheet.topics) > 1:
                 tables = ui.select(list(sheet.topics), label="Table of the file", value=sheet.topic)
                 tables.props("dense options-dense").on_value_change(lambda event: _go_to(path, event.value))
-            self.kind = ui.select(KINDS, label="Kind of table", value=proposed.kind, on_change=self._offer)
+            kind = given.get("kind", proposed.kind)
+            kind = kind if kind in KINDS else proposed.kind
+            self.kind = ui.select(KINDS, label="Kind of table", value=kind, on_change=self._offer)
             self.kind.props("dense options-dense").style("min-width: 300px")
             self.button = ui.button("Import", icon="download_done", on_click=self._import)
             ui.button("Cancel", on_click=partial(ui.navigate.to, "/record")).props("flat")
@@ -246,7 +251,7 @@ class ImportPage:
             facts({name: str(value) for name, value in self.sheet.constants.items()})
         with div("settings"):
             self.fields = {
-                name: ui.input(label, on_change=self.look).props("dense debounce=400")
+                name: ui.input(label, value=self.given.get(name, ""), on_change=self.look).props("dense debounce=400")
                 for name, label in CONSTANTS.items()
                 if name not in self.sheet.constants
             }
@@ -302,7 +307,19 @@ class ImportPage:
             with self.fault:  # the clicked element may be gone
                 ui.timer(0.0, self._preview, once=True)
 
+    def _tell_address(self) -> None:
+        """Write what a person typed into the address, so that it survives a reload and a lost server."""
+        typed = {name: str(field.value or "").strip() for name, field in self.fields.items()}
+        kind = {"kind": str(self.kind.value)} if self.kind.value != self.proposed_kind else {}
+        topic = {"topic": self.sheet.topic} if len(self.sheet.topics) > 1 else {}
+        query = {"file": str(self.path)} | topic | kind | {name: text for name, text in typed.items() if text}
+        address = f"/import?{urlencode(query)}"
+        if address != self.address:
+            self.address = address
+            ui.navigate.history.replace(address)
+
     async def _preview(self) -> None:
+        self._tell_address()
         self.turn += 1
         turn, kind, mappings = self.turn, str(self.kind.value), self.mappings
         names = [m.name for m in mappings]
