@@ -22,7 +22,7 @@ from calibrations.fitting.table_noise import scatter
 from calibrations.geometry.smooth import smooth_columns
 from calibrations.means.noise import Processes, norm_std, white_std
 from calibrations.model import Model
-from calibrations.model.chain import LinearisedChain, Step, backward, force, forward, sensed
+from calibrations.model.chain import LinearisedChain, Step, backward, force, forward, magnitude_by_output, sensed
 from calibrations.model.parameters import Layout
 from calibrations.table import Array, Table
 from calibrations.tables import FITTED
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from calibrations.motion.stretches import Stretches
 
 STRENGTH = "field-strength"
-SMALL = 1e-6  # of an output's range: the step of a derivative
 
 
 def check_kind(kind: str, source: str) -> None:
@@ -271,15 +270,12 @@ class PositionProblem(Problem):
 
     def of_output(self, theta: Array, changes: Array) -> Array:
         """By how the magnitude follows each output."""
-        outputs, change = self.table.outputs, np.zeros((self.table.n, changes.shape[2]))
-        for k, axis in enumerate(np.eye(outputs.shape[1])):
-            step = SMALL * float(np.ptp(outputs[:, k]))
-            residuals = (
-                self.on(self.table.with_outputs(outputs + s * step * axis)).residual(theta) for s in (1.0, -1.0)
-            )
-            plus, minus = residuals
-            change -= ((plus - minus)[0] / (2 * step))[:, None] * changes[:, k]
-        return change[None]
+        return self._of_output(self._chain_at(self.layout.steps(theta)), changes)
+
+    def _of_output(self, chain: LinearisedChain, changes: Array) -> Array:
+        assert chain.measured is not None  # noqa: S101 `_chain_at` gives it
+        by_output = magnitude_by_output(chain.measured, self.table, chain.steps)
+        return np.asarray(-np.einsum("ni,nim->nm", by_output, changes)[None])
 
     @property
     def adds(self) -> bool:
@@ -287,9 +283,14 @@ class PositionProblem(Problem):
         return False
 
     def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:  # noqa: ARG002
+        """The response at the same specific force changes; the magnitude follows it as it follows the output."""
+        chain = self._chain_at(self.layout.steps(theta))
+        by_response = self._of_output(chain, np.tile(np.eye(3), (self.table.n, 1, 1)))
+
         def change(k: int, upper: float, lower: float) -> Array:
-            theta_upper, theta_lower = (np.where(np.arange(len(theta)) == k, value, theta) for value in (upper, lower))
-            return self.residual(theta_upper) - self.residual(theta_lower)
+            term = self.layout.slots[k].term
+            values = (self.layout.values_with(chain.steps[term][1], k, value) for value in (upper, lower))
+            return np.asarray(np.sum(by_response * chain.change(term, *values), axis=2))
 
         return change
 
@@ -315,8 +316,29 @@ class FieldProblem(PositionProblem):
 
         By its own measure a field without end would leave nothing of any magnitude.
         """
+        return super().residual_by(steps) * self._strength(steps)
+
+    def _strength(self, steps: Sequence[Step]) -> float:
+        """The model's strength of the field over that which the outputs show."""
         strengths = [float(p["total"]) for effect, p in steps if effect.name == STRENGTH]
-        return super().residual_by(steps) * (strengths[0] / self.layout.nominal if strengths else 1.0)
+        return strengths[0] / self.layout.nominal if strengths else 1.0
+
+    def _of_output(self, chain: LinearisedChain, changes: Array) -> Array:
+        return super()._of_output(chain, changes) * self._strength(chain.steps)
+
+    def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:
+        """The strength itself changes the measure of the magnitude as well."""
+        change_by_response = super()._changes_near(theta, stairs)
+        steps = self.layout.steps(theta)
+        error = super().residual_by(steps)
+
+        def change(k: int, upper: float, lower: float) -> Array:
+            by_response = change_by_response(k, upper, lower)
+            if steps[self.layout.slots[k].term][0].name != STRENGTH:
+                return by_response
+            return by_response + error * (upper - lower) / self.layout.nominal
+
+        return change
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,8 @@ from calibrations.geometry.rate_table import rate_deg_s
 from calibrations.table import Array, Table
 
 Step = tuple[Effect, Values]
+MOST_STEPS = 30  # of Newton's method
+SHRINKS = 0.1  # of the step before it: a larger step needs a new slope
 LITTLE = 1e-5  # of the largest force, and rad: steps of derivatives with respect to the force and the stage angles
 
 
@@ -152,19 +154,37 @@ def forward(table: Table, steps: Sequence[Step]) -> Array:
 
 
 def backward(table: Table, steps: Sequence[Step], tolerance: float = 1e-12) -> Array:
-    """Specific force along the reference axes that gives the measured output, g, shape (n, 3): Newton's method."""
+    """Specific force along the reference axes that gives the measured output, g, shape (n, 3): Newton's method.
+
+    The slope is found anew only where the steps shrink slowly: a response that is almost linear needs it once.
+    """
+    a, slope, largest = np.zeros((table.n, 3)), None, np.inf
+    for _ in range(MOST_STEPS):
+        if slope is None:
+            slope = slope_at(a, table, steps)
+        step = _solve(slope, table.outputs - respond(sensed(a, table, steps), table, steps))
+        a = a + step
+        before, largest = largest, float(np.max(np.abs(step)))
+        if not largest > tolerance:
+            break
+        if largest > SHRINKS * before:
+            slope = None
+    return a
+
+
+def slope_at(a: Array, table: Table, steps: Sequence[Step], h: float = 1e-4) -> Array:
+    """d output / d the specific force `a` (n, 3) along the reference axes, shape (n, 3, 3)."""
 
     def output(a: Array) -> Array:
         return respond(sensed(a, table, steps), table, steps)
 
-    a = np.zeros((table.n, 3))
-    for _ in range(20):
-        error = table.outputs - output(a)
-        step = _solve(_slope(output, a), error)
-        a = a + step
-        if not np.max(np.abs(step)) > tolerance:
-            break
-    return a
+    return np.stack([(output(a + h * e) - output(a - h * e)) / (2 * h) for e in np.eye(3)], axis=2)
+
+
+def magnitude_by_output(a: Array, table: Table, steps: Sequence[Step]) -> Array:
+    """d |a| / d the measured output where `a` (n, 3) gives that output, shape (n, 3)."""
+    direction = a / np.maximum(np.linalg.norm(a, axis=1, keepdims=True), np.finfo(float).tiny)
+    return _solve(slope_at(a, table, steps).transpose(0, 2, 1), direction)
 
 
 def _solve(slope: Array, error: Array) -> Array:
@@ -173,12 +193,6 @@ def _solve(slope: Array, error: Array) -> Array:
         return np.asarray(np.linalg.solve(slope, error[:, :, None])[:, :, 0])
     except np.linalg.LinAlgError:
         return np.asarray((np.linalg.pinv(slope) @ error[:, :, None])[:, :, 0])
-
-
-def _slope(output: Callable[[Array], Array], a: Array, h: float = 1e-4) -> Array:
-    """d output / d a at each row, shape (n, 3, 3)."""
-    columns = [(output(a + h * e) - output(a - h * e)) / (2 * h) for e in np.eye(3)]
-    return np.stack(columns, axis=2)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.problem import Problem
 from calibrations.model.chain import LinearisedChain, forward
 from calibrations.model.file import read_model
-from tests.calibrations import synthetic
+from calibrations.table import Table
+from tests.calibrations import synthetic, test_common_floor
 
 COLUMNS = synthetic.turns(inclinations_deg=(90, 30))
 AX, AY, _ = synthetic.components(COLUMNS)
@@ -61,3 +62,28 @@ def test_derivatives_are_those_of_the_whole_chain(stairs: bool) -> None:
     for k, step in enumerate(steps):
         expected = (problem.residual(theta + step) - problem.residual(theta - step)) / (2 * step[k])
         np.testing.assert_allclose(found[:, :, k], expected, rtol=0, atol=1e-5 * max(np.max(np.abs(expected)), 1e-6))
+
+
+SENSOR = ("scale-factor", "axis-misalignment", "quadratic-nonlinearity", "z-axis-scale", "dead-zone")
+
+
+@pytest.mark.parametrize(
+    ("table", "model", "effects"),
+    [
+        (test_common_floor.accelerometer(3), "common-scale", SENSOR),
+        (test_common_floor.magnetometer(), "field", ("hard-iron",)),
+    ],
+    ids=["positions", "fields"],
+)
+def test_derivatives_of_magnitudes_are_those_of_the_way_back(
+    table: Table, model: str, effects: tuple[str, ...]
+) -> None:
+    larger = read_model(model)
+    for each in effects:
+        larger = larger.with_effect(catalogue()[each])
+    problem = Problem.of(larger, table)
+    theta = problem.layout.starts()[0] + problem.layout.typical / 30
+    found, steps = problem.jacobian(theta), 1e-4 * np.diag(problem.layout.typical)
+    for k, step in enumerate(steps):
+        plain = (problem.residual(theta + step) - problem.residual(theta - step)) / (2 * step[k])
+        np.testing.assert_allclose(found[:, :, k], plain, rtol=0, atol=1e-4 * np.max(np.abs(found[:, :, k])))
