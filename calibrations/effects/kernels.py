@@ -12,11 +12,15 @@ from calibrations.table import Array
 
 
 @njit(cache=True, nogil=True)
-def _move(forces: Array, previous: float, present: float, limits: Array, limit_factor: float) -> None:
-    """Move all elements from the force `previous` to `present`, each as far as its limit."""
-    for e in range(len(limits)):
-        limit = limits[e] * limit_factor
-        forces[e] = min(limit, max(-limit, forces[e] + present - previous))
+def _follow(forces: Array, previous: float, points: Array, present: float, limits: Array, limit_factor: float) -> float:
+    """Move all elements from the force `previous` over `points` to `present`, each as far as its limit; `present`."""
+    for j in range(len(points) + 1):
+        point = points[j] if j < len(points) else present
+        for e in range(len(limits)):
+            limit = limits[e] * limit_factor
+            forces[e] = min(limit, max(-limit, forces[e] + point - previous))
+        previous = point
+    return present
 
 
 @njit(cache=True, nogil=True)
@@ -35,10 +39,7 @@ def slip_elements(a: Array, on_the_way: Array, limit_factors: Array, limits: Arr
         forces = first_shares[k] * limits
         previous = 0.0
         for i in range(n):
-            for j in range(on_the_way.shape[1] + 1):
-                present = on_the_way[i, j, k] if j < on_the_way.shape[1] else a[i, k]
-                _move(forces, previous, present, limits, limit_factors[i, k])
-                previous = present
+            previous = _follow(forces, previous, on_the_way[i, :, k], a[i, k], limits, limit_factors[i, k])
             state[i, :, k] = forces
     return state
 
@@ -53,10 +54,7 @@ def slip(a: Array, on_the_way: Array, limit_factors: Array, limits: Array, first
         forces = first_shares[k] * limits
         previous = 0.0
         for i in range(n):
-            for j in range(on_the_way.shape[1] + 1):
-                present = on_the_way[i, j, k] if j < on_the_way.shape[1] else a[i, k]
-                _move(forces, previous, present, limits, limit_factors[i, k])
-                previous = present
+            previous = _follow(forces, previous, on_the_way[i, :, k], a[i, k], limits, limit_factors[i, k])
             total_force = forces[0]
             for e in range(1, len(limits)):
                 total_force += forces[e]
