@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from urllib.parse import quote
 
@@ -12,7 +12,9 @@ import pytest
 from nicegui import Client, ui
 from nicegui.testing import user_simulation
 
-from rig.bench import DEFAULT
+from procedures.catalogue import Procedure
+from rig.bench import DEFAULT, Bench
+from rig.planning.plan import plan
 from rig.services.report import reported
 from rig.services.request import Request
 from rig.services.search import Cancelled, Counted
@@ -58,6 +60,44 @@ def test_a_closed_page_ends_its_search(closed: bool, tmp_path: Path, monkeypatch
     assert not searches()
     (session,) = desk.sessions.values()
     assert bool(session.plans) is not closed
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_plan_ends_with_its_page_and_with_its_settings(
+    closed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RIG_HOME", str(tmp_path / "home"))
+    begun, go = threading.Event(), threading.Event()
+
+    def endless(*_: object) -> None:
+        begun.set()
+        while not go.is_set():
+            pass
+
+    def planned(bench: Bench, procedure: Procedure, settings: Mapping[str, object]) -> object:
+        return endless() if settings["step_deg"] == 45 else plan(bench, procedure, settings)
+
+    monkeypatch.setattr("rig.web.pages.run.plan", planned)
+
+    async def simulated() -> None:
+        async with user_simulation() as user:
+            register(Desk(DEFAULT))
+            try:
+                client = await user.open("/run?procedure=sweep&step_deg=45")
+                assert await asyncio.to_thread(begun.wait, 60)
+                [planning] = [thread for thread in threading.enumerate() if thread.name == "_plan"]
+                if closed:
+                    client.delete()
+                else:
+                    user.find(kind=ui.input, content="step (deg)").clear().type("90")
+                    await user.should_see("70 poses", retries=200)
+                await asyncio.to_thread(planning.join, 60)
+                assert not planning.is_alive()
+            finally:
+                go.set()
+                Client.page_routes.clear()
+
+    asyncio.run(simulated())
 
 
 def test_a_failed_search_leaves_no_page_that_searches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
