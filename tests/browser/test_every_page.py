@@ -35,6 +35,7 @@ PAGES = {  # address: what it shows when it is complete
     "/fleet": "text=Many sensors at once",
     "/history?sensor=simulated": "[aria-label^='Quantit'] .points, .three .points",
     f"/compare?first={SWEEP}&second={SWEEP}": "[aria-label='Residuals of both'] .points",
+    "/compare": "text=Two runs are needed",
     "/import": "text=Choose a file",
 }
 

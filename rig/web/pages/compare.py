@@ -112,8 +112,12 @@ def register(desk: Desk) -> None:
     """The page at /compare."""
 
     @ui.page("/compare")
-    def page(first: str, second: str, model: str = "") -> None:
+    def page(first: str = "", second: str = "", model: str = "") -> None:
         with frame(desk, "/record") as keys:
+            if not first or not second:
+                with state("Two runs are needed", "Select them on the page Record, then Compare."):
+                    button("Record", "list", lambda: ui.navigate.to("/record"))
+                return
             _head(first, second, model)
             fitted = div("stack")
             with box("stack"):

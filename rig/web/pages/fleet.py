@@ -41,7 +41,8 @@ class FleetPage:
         self.desk, self.visit = desk, Visit()
         self.done = ""
         with box("chosen"):
-            self.source = ui.input("Folder or index; empty: the record", value=source).classes("data").props("dense")
+            self.source = ui.input("Folder or index", placeholder="empty: the record", value=source)
+            self.source.classes("data").props("dense")
             self.model = ui.select(models(model, None), label="Model", value=model).props("dense options-dense")
             self.buttons = [
                 button("Find missing effects", "search", partial(self.show, discovered)),

@@ -183,7 +183,8 @@ class HistoryPage:
                 CompareBox(history, self.sensors, self.request.model, self._last_of)
             self.tables = div("stack")
             if history.passed_over:
-                with ui.expansion(f"{len(history.passed_over)} runs not used").props("dense").classes("box"):
+                count = len(history.passed_over)
+                with ui.expansion(f"{count} run{'s' * (count > 1)} not used").props("dense").classes("box"):
                     for data, reason in history.passed_over.items():
                         words(f"{data}: {reason}", "small")
         self.keys["q"] = Key("next quantity", self._next_quantity)
