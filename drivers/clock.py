@@ -186,8 +186,9 @@ def step(peers: Sequence[Peer], now_s: float) -> None:
     for peer in peers:
         peer.advance(now_s)
     for peer in peers:
-        for fileno in ready.intersection(peer.filenos()):
-            peer.receive(fileno, now_s)
+        if ready:
+            for fileno in ready.intersection(peer.filenos()):
+                peer.receive(fileno, now_s)
         peer.emit(now_s)
 
 
