@@ -54,7 +54,8 @@ class RunHost:
         self._answers = {e.what: e.text for e in record.events(run.run) if e.what.startswith("answer ")}
         self._zero_s = state["zero_s"] if state else _zero_s(rig, run)
         self._counted: dict[str, tuple[float, str]] = {}
-        self._before = {reading.name: reading.value for reading in record.readings(run.run)}
+        self._readings: Sequence[Reading] | None = record.readings(run.run)
+        self._before = {reading.name: reading.value for reading in self._readings}
         if state is None:  # a restored clock is right
             _require_rising_time(rig.clock.now() - self._zero_s, record, run)
 
@@ -67,7 +68,9 @@ class RunHost:
         return self._dwells
 
     def readings(self) -> Sequence[Reading]:
-        return self._record.readings(self._run)
+        if self._readings is None:
+            self._readings = self._record.readings(self._run)
+        return self._readings
 
     def expect(self, missing: int) -> None:
         self._observer.expect(missing + len(self._poses), len(self._poses))
@@ -96,6 +99,7 @@ class RunHost:
         for reading in readings:
             self._log("read", f"{reading.name} = {reading.value:g} {reading.unit}".rstrip())
         self._record.keep_readings(self._run, readings, self._state())
+        self._readings = None
         for reading in readings:
             self._observer.read(reading)
 
@@ -115,6 +119,7 @@ class RunHost:
         total = {name: tally[name][0] + self._before.get(name, 0.0) for name in counters}
         readings = [Reading(name, total.get(name, value), unit) for name, (value, unit) in tally.items()]
         self._record.keep_readings(self._run, readings, None)
+        self._readings = None
         losses = {words: total[name] for name, words in LOSSES.items() if name in total}
         if any(losses.values()):
             losses_text = ", ".join(f"{words} {count:.0f}" for words, count in losses.items())
