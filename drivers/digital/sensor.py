@@ -27,6 +27,8 @@ POLL_S = 0.4  # samples that wait in the buffers of the system are read so often
 STUCK = 100  # equal samples of one axis in successive records, while another changes
 RATE_OFF = 0.05  # of the stated rate
 TEST_S = 2.0
+ONE_G = {"g": 1.0, "m/s^2": 9.80665}
+STILL_G = (0.3, 3.0)  # a sensor at rest shows 1 g, its bias and scale factor within reason
 SHOWN = 3  # damaged lines or messages before a share of them can be judged
 
 
@@ -134,7 +136,21 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         if (gain := tally.gain) is not None:
             drift = f"the sensor's time is {tally.offset_s:+.3f} s from the host's and gains {1e6 * gain:+.0f} ppm"
             checks.append(Check("time", abs(gain) < RATE_OFF, drift))
-        return checks
+        return [*checks, *self._gravity(reception.pull(reception.count))]
+
+    def _gravity(self, values: NDArray[np.float64]) -> list[Check]:
+        """A failed check where samples of a whole accelerometer, in a known unit, do not show gravity; else none."""
+        names = tuple(self.settings.channels)
+        one_g = ONE_G.get(self.settings.units.get("ax", ""))
+        if one_g is None or not set(FORCES) <= set(names):
+            return []
+        size = float(np.median(np.linalg.norm(values[:, [names.index(name) for name in FORCES]], axis=1)))
+        if STILL_G[0] <= size / one_g <= STILL_G[1]:
+            return []
+        unit = next((unit for unit, g in ONE_G.items() if STILL_G[0] <= size / g <= STILL_G[1]), "")
+        likely = f"the unit is probably {unit}" if unit else "check the unit in the sensor's settings"
+        shown = f"{', '.join(FORCES)} have the magnitude {size:.4g} {self.settings.units['ax']}"
+        return [Check("gravity", False, f"{shown}; a sensor at rest shows {one_g:g}: {likely}")]
 
     def tally(self) -> dict[str, tuple[float, str]]:
         """Counts of lost, doubled and damaged samples since the connection, and the gain of the sensor's clock.

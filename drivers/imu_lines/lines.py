@@ -40,8 +40,15 @@ def fields(line: str, style: str) -> dict[Column, float]:
         return {name: float(value)} if line.startswith(">") and name else _none(line)
     if style == "nmea":
         line = _check_line(line).partition(",")[2]
-    values = re.split(r"[,;\t]\s*|\s+", line.strip())
-    return {k: number for k, text in enumerate(values, 1) if (number := _number(text)) is not None} or _none(line)
+    return _numbers(_cells(line)) or _none(line)
+
+
+def _cells(line: str) -> list[str]:
+    return re.split(r"[,;\t]\s*|\s+", line.strip())
+
+
+def _numbers(cells: list[str]) -> dict[Column, float]:
+    return {k: number for k, text in enumerate(cells, 1) if (number := _number(text)) is not None}
 
 
 def _number(text: str) -> float | None:
@@ -66,6 +73,9 @@ def _none(line: str) -> dict[Column, float]:
 class Assembly:
     """Makes samples of bytes as they come. The first line may be cut, so it is dropped without being counted.
 
+    A line that lost its end continues with the next one. Without a checksum (csv), a line is damaged if it has not as
+    many columns as the samples before it, unless the next line has as many.
+
     `damaged`: lines that could not be read. `unread`: the first of them. `last_columns`: of the last good line.
     `shown`: the first whole lines.
     """
@@ -79,6 +89,8 @@ class Assembly:
     shown: list[str] = field(default_factory=list)
     remainder: bytes = b""
     _cut: bool = True
+    _width: int = 0  # columns of the samples so far
+    _other_width: int = 0  # of the line before, if it has another number of columns
     _pending: dict[Column, float] = field(default_factory=dict)
 
     def take(self, data: bytes) -> list[dict[str, float]]:
@@ -94,8 +106,9 @@ class Assembly:
             return None
         if len(self.shown) < MOST_SHOWN:
             self.shown.append(line)
+        cells = _cells(line) if self.style == "csv" else []
         try:
-            values = fields(line, self.style)
+            values = _numbers(cells) if cells else fields(line, self.style)
         except ValueError:
             self._count_damaged(line)
             return None
@@ -113,11 +126,20 @@ class Assembly:
             if not columns <= values.keys():
                 return None
             self._pending = {}
-        if not columns <= values.keys() or not all(math.isfinite(values[column]) for column in columns):
+        is_whole = columns <= values.keys() and all(math.isfinite(values[column]) for column in columns)
+        if not is_whole or not self._keeps_width(len(cells)):
             self._count_damaged(line)
             return None
         self.good += 1
         return {name: values[column] for name, column in self.columns.items()}
+
+    def _keeps_width(self, width: int) -> bool:
+        """Whether a line has as many columns as the samples before it, or as the line before it."""
+        if width not in (self._width, self._other_width) and self._width:
+            self._other_width = width
+            return False
+        self._width, self._other_width = width, 0
+        return True
 
     def _count_damaged(self, line: str) -> None:
         self.damaged += 1

@@ -73,6 +73,34 @@ def test_a_cut_line_at_the_start_is_dropped_and_a_damaged_one_counted() -> None:
     assert (lines.good, lines.damaged, lines.unread) == (2, 1, "5.0")
 
 
+def test_a_line_that_lost_its_end_does_not_take_values_of_the_next_one() -> None:
+    lines = Assembly("csv", {"ax": 2, "ay": 3})
+    whole = [f"{k},0.{k},1.{k}\n" for k in range(9)]
+    whole[5] = whole[5][:4]  # goes on with the next line: 5,0.6,0.6,1.6
+    samples = lines.take("".join(["cut\n", *whole]).encode())
+    assert [sample["ay"] for sample in samples] == [1.0, 1.1, 1.2, 1.3, 1.4, 1.7, 1.8]
+    assert (lines.good, lines.damaged, lines.unread) == (7, 1, "5,0.6,0.6,1.6")
+
+
+def test_a_sensor_may_begin_to_send_another_number_of_columns() -> None:
+    lines = Assembly("csv", {"ax": 1, "ay": 2})
+    samples = lines.take(b"cut\n1,2\n3,4\n5,6,7\n8,9,10\n11,12,13\n")
+    assert [sample["ax"] for sample in samples] == [1.0, 3.0, 8.0, 11.0]
+    assert lines.damaged == 1
+
+
+@pytest.mark.parametrize(("unit", "sent"), [("g", "m/s^2"), ("m/s^2", "g"), ("g", "count")])
+def test_the_self_test_names_a_unit_in_which_gravity_cannot_be(connect: Connect, unit: Any, sent: Any) -> None:
+    *others, gravity = connect(unit=unit, sends=imu_lines.Settings(NUMBERED, unit=sent)).self_test()
+    assert [check.name for check in others] == ["lines", "rate", "time"]
+    assert all(check.ok for check in others)
+    assert not gravity.ok
+    advice = "check the unit" if sent == "count" else f"the unit is probably {sent}"
+    assert advice in gravity.detail
+    assert len(connect(unit=unit).self_test()) == 3
+    assert len(connect(unit="count", sends=imu_lines.Settings(NUMBERED, unit=sent)).self_test()) == 3
+
+
 def test_doubled_lines_are_dropped(connect: Connect) -> None:
     samples = connect(Fault("doubled-line")).acquire(0.5)
     assert (np.diff(samples.volts[:, 0]) > 0).all()
