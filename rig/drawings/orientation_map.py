@@ -1,15 +1,20 @@
-"""The orientations of a sensor in a hand, as text: those that it has, those that it lacks, and the next one.
+"""The orientations of a sensor in a hand: those that it has, those that it lacks, and the next one.
 
-Three squares show the sphere of directions from above: its upper part, its equator and its lower part. Each place is a
-side, an edge or a corner of the sensor that points upward.
+As text, three squares show the sphere of directions from above: its upper part, its equator and its lower part. Each
+place is a side, an edge or a corner of the sensor that points upward. As SVG, two discs show the halves of the sphere,
+beside the sensor as it rests in the next orientation.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from calibrations.design.orientations import ORIENTATIONS, covered
+from calibrations.table import AXES, Array
 from procedures.session import Guidance
+from rig.drawings import svg
 
 TAKEN, LACKING, WANTED = "●", "·", "◎"
 LAYERS = ((1, "+z upward"), (0, "z level"), (-1, "-z upward"))
@@ -28,6 +33,85 @@ def orientation_map(guidance: Guidance) -> list[str]:
     lines.append("   " + "   ".join(f"{'-x':<5}{'+x':<8}" for _ in LAYERS).rstrip())
     taken_count = sum(mark == TAKEN for mark in marks.values())
     return [*lines, f"{TAKEN} taken ({taken_count} of {len(marks)})   {WANTED} next   {LACKING} not yet"]
+
+
+# The same as SVG.
+
+WIDTH, HEIGHT = 820, 300
+CUBE, CUBE_PX = (150, 180), 50.0
+DISCS = (((430, 164), 1, "+z half"), ((680, 164), -1, "-z half"))
+DISC_PX = 88.0
+VIEW = np.array([0.5, -0.7, 0.6])  # from the sensor to who looks at it; z is upward
+SIDES = {"x": "#f6d5c6", "y": "#c6e5d9", "z": "#c9dff0"}
+
+
+def orientation_drawing(guidance: Guidance) -> str:
+    """The sensor in the next orientation, and the halves of the sphere, as SVG."""
+    return svg.document(WIDTH, HEIGHT, guidance.text, _content(guidance))
+
+
+def _content(guidance: Guidance) -> Iterator[str]:
+    yield svg.text((16, 20), guidance.text, 17, anchor="start", bold=True)
+    if guidance.moves:
+        yield from _resting_cube(np.array(guidance.up))
+    marks = _marks(guidance)
+    for centre, half, name in DISCS:
+        yield svg.text((centre[0] - 92, 66), name.replace("-", "−"), 14, svg.QUIET, bold=True)
+        yield from _disc(centre, half, marks)
+    counts = f"{TAKEN} taken ({sum(mark == TAKEN for mark in marks.values())} of {len(marks)})   {WANTED} next"
+    yield svg.text((555, 287), f"{counts}   ○ not yet", 13, svg.QUIET)
+
+
+def _disc(centre: tuple[int, int], half: int, marks: dict[tuple[int, int, int], str]) -> Iterator[str]:
+    """Half of the sphere, by equal areas; x points to the right and y upward on the page."""
+    yield svg.circle(centre, DISC_PX, "#fafbfc", svg.FAINT)
+    for name, (x, y) in {"+x": (1, 0), "−x": (-1, 0), "+y": (0, 1), "−y": (0, -1)}.items():
+        yield svg.text((centre[0] + 1.2 * DISC_PX * x, centre[1] - 1.17 * DISC_PX * y), name, 12, svg.QUIET)
+    for signs, mark in marks.items():
+        up = np.array(signs) / np.linalg.norm(signs)
+        if half * up[2] < 0:
+            continue
+        flat = up[:2] / np.sqrt(1 + abs(up[2])) * DISC_PX
+        at = (centre[0] + float(flat[0]), centre[1] - float(flat[1]))
+        if mark == WANTED:
+            yield svg.circle(at, 10.0, "none", svg.ORANGE, 2.5) + svg.circle(at, 4.0, svg.ORANGE, svg.ORANGE)
+        else:
+            yield svg.circle(
+                at, 6.5, svg.GREEN if mark == TAKEN else svg.PAPER, svg.GREEN if mark == TAKEN else svg.QUIET
+            )
+
+
+def _resting_cube(up: Array) -> Iterator[str]:
+    """The sensor as a cube with names on its sides, turned so that `up` points upward."""
+    turn = _turn_upward(up)
+    right = np.cross([0.0, 0.0, 1.0], VIEW) / np.hypot(VIEW[0], VIEW[1])
+    above = np.cross(VIEW, right) / np.linalg.norm(VIEW)
+
+    def seen(place: Array) -> tuple[float, float]:
+        x, y = float(right @ turn @ place), float(above @ turn @ place)
+        return CUBE[0] + CUBE_PX * x, CUBE[1] - CUBE_PX * y
+
+    for k, axis in enumerate(AXES):
+        for sign in (1.0, -1.0):
+            normal = sign * np.eye(3)[k]
+            if VIEW @ turn @ normal <= 1e-9:
+                continue
+            first, second = np.eye(3)[(k + 1) % 3], np.eye(3)[(k + 2) % 3]
+            corners = [normal + a * first + b * second for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+            yield svg.polygon([seen(corner) for corner in corners], SIDES[axis], svg.INK, 1.2)
+            yield svg.text(seen(normal), f"{'+' if sign > 0 else '−'}{axis}", 15, bold=True)
+    x, y = seen(np.sign(np.round(up, 6)))
+    yield svg.arrow((x, y), (x, y - 44), svg.ORANGE)
+    yield svg.text((x + 9, y - 40), "up", 13, svg.ORANGE, "start", bold=True)
+
+
+def _turn_upward(up: Array) -> Array:
+    """The smallest turn of `up` to +z, as a matrix."""
+    x, y, z = up
+    if z < -1 + 1e-9:
+        return np.diag([1.0, -1.0, -1.0])
+    cross = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
+    return np.asarray(np.eye(3) + cross + cross @ cross / (1 + z))
 
 
 def _marks(guidance: Guidance) -> dict[tuple[int, int, int], str]:

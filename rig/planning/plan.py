@@ -221,16 +221,22 @@ LONG_WAIT_S = 30.0
 
 @dataclass(frozen=True)
 class Stretch:
-    """Consecutive poses, the first dwell of which begins at `start_s`; `also` lists other steps before them."""
+    """Consecutive poses, the first dwell of which begins at `start_s`; `also` lists other steps before them.
+
+    `by_hand`: no stage gives them their angles.
+    """
 
     start_s: float
     poses: tuple[Pose, ...]
     also: tuple[str, ...]
+    by_hand: bool = False
 
     @property
     def words(self) -> str:
         """The stretch in one line."""
         number = f"{len(self.poses)} pose{'s' * (len(self.poses) > 1)}"
+        if self.by_hand:
+            return "  ".join([f"by hand: {number}", *_path_words(self.poses)])
         alpha, beta = _range([p.alpha_deg for p in self.poses]), _range([p.beta_deg for p in self.poses])
         return "  ".join([f"alpha {alpha}, beta {beta} deg: {number}", *_path_words(self.poses)])
 
@@ -241,7 +247,8 @@ def stretches(plan: Plan) -> list[Stretch]:
     for _, group in groupby(plan.held, lambda dwells: _kind(dwells.pose)):
         dwells = list(group)
         other_steps = tuple(_other_steps(plan, before_s, dwells[-1].start_s))
-        parts.append(Stretch(dwells[0].start_s, tuple(dwell.pose for dwell in dwells), other_steps))
+        poses = tuple(dwell.pose for dwell in dwells)
+        parts.append(Stretch(dwells[0].start_s, poses, other_steps, by_hand=not plan.reach))
         before_s = dwells[-1].start_s
     return parts
 

@@ -16,12 +16,18 @@ def stops(bench: Bench) -> list[str]:
     return [f"if the sensor is not at {low:g} to {high:g} C", *tilt]
 
 
+HAND_CHECKS = (
+    "the sensor's cable is long enough to turn it upside down",
+    "the table is firm, and no motor shakes it",
+)
+
+
 def checks(plan: Plan) -> list[str]:
     """Checks that only a person can do, before anything moves."""
     actions = [step.what for step in plan.steps]
     level = any("level" in question.name for question in plan.asked)
     if not plan.reach:
-        return ["the sensor's cable is long enough to turn it upside down", "the table is firm, and no motor shakes it"]
+        return list(HAND_CHECKS)
     lines = [
         "the cables can follow the stages over the whole range, and nothing and nobody is within their reach",
         "the sensor is fastened as in the drawing, with pin 1 at the drawn place",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,14 +22,16 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.bench.file import HAND
 from rig.cli.terminal.guide import Guide
-from rig.drawings import orientation_map
+from rig.drawings import orientation_drawing, orientation_map
 from rig.errors import BenchError
 from rig.instruments.wiring import world_of
 from rig.planning.plan import plan
 from rig.planning.preparation import checks
 from rig.record import Record
 from rig.record.measured import table_of
+from rig.runs.background import status
 from rig.runs.runner import resume, start
+from rig.web.pages.run_begin import before_resume, before_start
 from tests.rig.rigging import Onlooker
 
 Rig = Callable[..., Any]
@@ -171,6 +174,36 @@ def test_the_map_shows_taken_lacking_and_next() -> None:
     assert sum(line.count("·") for line in lines[1:4]) == 23
     ended = orientation_map(Guidance("", (1.0, 0.0, 0.0), (UP,), moves=False))
     assert not any("◎" in line for line in ended[:-1])
+
+
+def test_the_drawing_shows_the_next_orientation_and_both_halves() -> None:
+    guidance = Guidance("position 3: +x side up", (1.0, 0.0, 0.0), (UP, (0.0, -1.0, 0.0)))
+    drawn = orientation_drawing(guidance)
+    assert "position 3: +x side up" in drawn
+    assert "taken (2 of 26)" in drawn
+    assert drawn.count("<circle") == 2 + 2 * 17 + 2  # discs, 26 orientations of which both show 8, the next one twice
+    height = {name: float(y) for y, name in re.findall(r'y="([\d.]+)"[^>]*font-size="15.*?>(..)</text>', drawn)}
+    assert len(height) == 3
+    assert height["+x"] == min(height.values())  # the page counts downward
+    ended = orientation_drawing(Guidance("12 positions taken", (1.0, 0.0, 0.0), (UP,), moves=False))
+    assert "<polygon" not in ended
+
+
+def test_the_status_of_a_run_by_hand_has_the_guidance_and_no_stage(rig_home: Path) -> None:
+    planned = plan(read_bench(HAND), find("hand-positions"), parse(find("hand-positions"), {}))
+    writer = status.StatusWriter("20261121-093012-000000-ab12", "hand-positions", read_bench(HAND))
+    writer.planned(planned)
+    status.folder().mkdir(parents=True)
+    writer.guide(Guidance("position 2: +x side up", (1.0, 0.0, 0.0), (UP,)))
+    writer.publish()
+    shown = json.loads(status.file("20261121-093012-000000-ab12", "json").read_text("utf-8"))
+    assert shown["attitude"] == {}
+    guidance = Guidance(**shown["guidance"])
+    assert (guidance.text, len(guidance.taken), guidance.moves) == ("position 2: +x side up", 1, True)
+    assert orientation_drawing(guidance) == orientation_drawing(Guidance(guidance.text, (1.0, 0.0, 0.0), (UP,)))
+    prepared = (before_start(planned, read_bench(HAND)), before_resume("a run", "hand-positions", None))
+    assert all(each.attitude is None for each in prepared)
+    assert all("upside down" in each.checks[0] for each in prepared)
 
 
 def test_without_stages_the_checks_are_those_of_a_hand() -> None:

@@ -107,7 +107,8 @@ class Status:
     """`values` are keywords of `rig.runs.estimates.Value`, with `near`. `state` is the state of the run after its end.
 
     `seat`: where a person answers: a page, the terminal of the run, or nobody: then it cannot pause. `error`: why it is
-    paused or not complete. `moving`: instruments that did not stop.
+    paused or not complete. `moving`: instruments that did not stop. `guidance`: keywords of
+    `procedures.session.Guidance`, of a procedure with the sensor in a hand; it has no `attitude`.
     """
 
     key: str
@@ -127,6 +128,7 @@ class Status:
     state: str = ""
     attitude: Mapping[str, Any] = field(default_factory=dict)
     seat: Seat = "page"
+    guidance: Mapping[str, Any] = field(default_factory=dict)
 
     def write(self) -> None:
         """Write the status into its file."""
@@ -242,7 +244,8 @@ class StatusWriter(RunViewer):
         view, self._written_s = self.view, time.monotonic()
         progress, remaining = view.progress, view.left(self._written_s)
         values_now = [{**asdict(value), "near": value.near} for value in values(view)]
-        attitude = {name: getattr(view.kept.pose, name) for name in ATTITUDE} if view.kept else {}
+        guidance = asdict(view.guidance) if view.guidance else {}
+        attitude = {name: getattr(view.kept.pose, name) for name in ATTITUDE} if view.kept and not guidance else {}
         self._status = replace(
             self._status,
             now=view.now,
@@ -251,6 +254,7 @@ class StatusWriter(RunViewer):
             left=remaining,
             values=values_now,
             attitude=attitude,
+            guidance=guidance,
             **changes,
         )
         self._status.write()

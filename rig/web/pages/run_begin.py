@@ -12,7 +12,7 @@ from rig.bench import Bench
 from rig.drawings import Attitude, strip
 from rig.files import free_bytes, home
 from rig.planning.plan import Plan
-from rig.planning.preparation import checks, first_question, mounting, stops
+from rig.planning.preparation import HAND_CHECKS, checks, first_question, mounting, stops
 from rig.web.parts import dialog_with_name, div, facts, for_page, message, words
 
 
@@ -23,7 +23,7 @@ class Preparation:
     title: str
     facts: Mapping[str, str]
     checks: Sequence[str]
-    attitude: Attitude
+    attitude: Attitude | None  # None: the sensor is in a hand
     sensor: Mapping[str, str] | None = None  # name and serial number; None: they cannot be changed
     answers: Mapping[str, str] = field(default_factory=dict)
 
@@ -38,19 +38,20 @@ def before_start(plan: Plan, bench: Bench) -> Preparation:
         f"{plan.procedure} on {bench.name}",
         batch | plan_facts(plan, bench),
         [*by_hand, *([question.text] if question is not None else [])],
-        mounting(plan),
+        mounting(plan) if plan.reach else None,
         sensor,
         {question.name: "yes"} if question is not None else {},
     )
 
 
-def before_resume(run: str, procedure: str, attitude: Attitude) -> Preparation:
-    """The preparation of a stopped run that continues."""
-    by_hand = (
+def before_resume(run: str, procedure: str, attitude: Attitude | None) -> Preparation:
+    """The preparation of a stopped run that continues; `attitude` is None if the sensor is in a hand."""
+    by_stages = (
         "The cables can follow the stages over the whole range, and nothing and nobody is within their reach",
         "The sensor is fastened as before, as in the drawing",
     )
-    return Preparation(f"Resume {procedure} {run}", {}, by_hand, attitude)
+    by_hand = [capital(line) for line in HAND_CHECKS]
+    return Preparation(f"Resume {procedure} {run}", {}, by_hand if attitude is None else by_stages, attitude)
 
 
 def plan_facts(plan: Plan, bench: Bench) -> dict[str, str]:
@@ -80,8 +81,9 @@ class BeginDialog:
         self.content, self.begin = content, begin
         with dialog_with_name(content.title).props("no-backdrop-dismiss") as self.dialog, ui.card().classes("begin"):
             words(content.title, "title")
-            with div("attitude"):
-                ui.html(strip(content.attitude), sanitize=False)
+            if content.attitude is not None:
+                with div("attitude"):
+                    ui.html(strip(content.attitude), sanitize=False)
             with div("two"):
                 with div("stack"):
                     self._sensor()

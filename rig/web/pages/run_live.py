@@ -13,7 +13,8 @@ from urllib.parse import urlencode
 
 from nicegui import ui
 
-from rig.drawings import Attitude, page, strip
+from procedures.session import Guidance
+from rig.drawings import Attitude, orientation_drawing, page, strip
 from rig.runs.background import control
 from rig.runs.background.status import NOT_BEGUN, OpenQuestion, Status
 from rig.runs.signals import STOPPED_BY
@@ -38,6 +39,14 @@ SEATS = {
 STOPPED = "Stopped by a person. Resume continues at the same pose."
 STOPPED_EARLY = "Stopped before the run began."
 RESUME = re.compile(r"`rig resume[^`]*`")  # a button of this page does it
+TONE = """(() => {
+  const sound = new AudioContext(), tone = sound.createOscillator();
+  tone.frequency.value = 880;
+  tone.connect(sound.destination);
+  tone.onended = () => sound.close();
+  tone.start();
+  tone.stop(sound.currentTime + 0.2);
+})()"""
 ENDS = {"complete": "good", "stopped": "doubt", "failed": "bad"}
 
 
@@ -64,6 +73,7 @@ class Live:
             with div("stack") as self.details:
                 self.tiles = div("tiles").props('role=group aria-label="Live values and their limits"')
                 self.attitude = div("attitude").on("click", self._enlarge)
+                self.hand = div("stack attitude").on("click", self._enlarge)
                 self.values = div("")
                 self.over_time = OverTime()
         self.box.set_visibility(False)  # until the first look: no button of a run that is not there
@@ -90,12 +100,14 @@ class Live:
 
     def _enlarge(self) -> None:
         """Show the drawing in the whole window."""
-        if self.status is not None and self.status.attitude:
+        status = self.status
+        if status is not None and (status.attitude or status.guidance):
             with (
-                dialog_with_name("The present pose") as dialog,
+                dialog_with_name("The next position" if status.guidance else "The present pose") as dialog,
                 ui.card().classes("enlarged attitude").on("click", dialog.close),
             ):
-                ui.html(page(Attitude(**self.status.attitude)), sanitize=False)
+                drawing = _hand_drawing(status.guidance) if status.guidance else page(Attitude(**status.attitude))
+                ui.html(drawing, sanitize=False)
             dialog.open()
 
     def _see(self) -> None:
@@ -112,7 +124,7 @@ class Live:
             await off_loop(control.go_on, status.run, status.procedure, None, False)
             await self.look()
 
-        attitude = Attitude(**status.attitude) if status.attitude else Attitude()
+        attitude = None if status.guidance else Attitude(**status.attitude) if status.attitude else Attitude()
         BeginDialog(before_resume(status.run, status.procedure, attitude), begin)
 
     async def look(self) -> None:
@@ -156,6 +168,8 @@ class Live:
             self._show_question(status.asked if status.phase == "asking" else None, status.seat == "page")
         if _differ(previous, status, "values"):
             self._values(status)
+        if _differ(previous, status, "guidance"):
+            self._guide(status.guidance, previous.guidance if previous is not None else None)
 
     def _links(self, status: Status) -> None:
         self.to_record.set_text(status.run)
@@ -211,6 +225,22 @@ class Live:
         if status.attitude:
             with self.attitude:
                 ui.html(_drawing(status.attitude), sanitize=False)
+
+    def _guide(self, guidance: Mapping[str, Any], previous: Mapping[str, Any] | None) -> None:
+        """Show the next orientation. A sound and a tick mark a position that was taken: the person looks elsewhere."""
+        taken_count = len(guidance.get("taken", ()))
+        with afresh(self.hand):
+            if not guidance:
+                return
+            ui.html(_hand_drawing(guidance), sanitize=False)
+            if taken_count:
+                words(f"✓ position {taken_count} taken", "chip good big-state").props("role=status")
+        if previous is not None and taken_count > len(previous.get("taken", ())):
+            ui.run_javascript(TONE)
+
+
+def _hand_drawing(guidance: Mapping[str, Any]) -> str:
+    return orientation_drawing(Guidance(**guidance))
 
 
 def _differ(previous: Status | None, present: Status, *names: str) -> bool:
