@@ -56,7 +56,8 @@ def hand_positions(measured: Measured) -> dict[str, Result | Missing]:
     target_g = float(measured.run.settings.get("target_g", math.inf))
     if worst_g > target_g:
         reason = (
-            f"{parameter} is known to {worst_g:.2g} g only, wanted {target_g:g} g; take more positions, or longer rests"
+            f"{parameter} is known to {1e3 * worst_g:.3g} mg only, wanted {1e3 * target_g:g} mg; take more positions, "
+            "or longer rests"
         )
         return results | {"uncertainty": Missing(reason)}
     return results | {"uncertainty": Result(worst_g, "g")}

@@ -15,6 +15,7 @@ from tests.browser.test_run_page import begin
 
 pytestmark = pytest.mark.slow
 
+LONG = "/run?procedure=hand-positions&target_g=0.00001&rest_s=10&wait_s=1000"
 COUNT_TONES = """window.tones = 0;
 const start = OscillatorNode.prototype.start;
 OscillatorNode.prototype.start = function (...when) { window.tones += 1; return start.apply(this, when); };"""
@@ -34,7 +35,7 @@ def test_a_tablet_shows_and_sounds_each_position(
     context.request.get(address[0]["url"])
     page = context.new_page()
     page.set_viewport_size(TABLET)
-    page.goto(address[0]["url"].partition("/?")[0] + "/run?procedure=hand-positions&target_g=0.00001&rest_s=10&wait_s=1000")
+    page.goto(address[0]["url"].partition("/?")[0] + LONG)
     expect(page.get_by_text("Takes", exact=True)).to_be_visible()
     begin(page)
     hand = page.locator(".live .attitude")
