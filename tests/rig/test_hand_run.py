@@ -98,7 +98,7 @@ def test_a_stopped_run_goes_on_with_its_positions(rig_home: Path) -> None:
 def test_an_accuracy_that_was_not_reached_is_a_result_that_is_missing(rig: Rig, rig_home: Path) -> None:
     ended = rig(*RUN, "--target-g", "1e-6", "--most-positions", "12")
     assert ended.status == 1
-    assert "wanted 1e-06 g; take more positions, or longer rests" in ended.err
+    assert "mg only, wanted 0.001 mg; take more positions, or longer rests" in ended.err
     assert "uncertainty" not in json.loads(ended.out)["results"]
 
 
