@@ -280,9 +280,12 @@ def cost(end: Fit, name: str) -> tuple[float, int]:
     return float(residual_without @ residual_without - present @ present), int(end.problem.layout.of_effect(name).sum())
 
 
-def first_order_cost(end: Fit, name: str, shared: bool = False) -> tuple[float, int]:
-    """The same to first order. `shared`: growth if the axes share one value of each parameter, instead of without."""
-    white, mask = end.whitened[:, 1:], end.problem.layout.of_effect(name)
+def first_order_cost(end: Fit, *names: str, shared: bool = False) -> tuple[float, int]:
+    """The same to first order, of one or more effects together.
+
+    shared  growth if the axes share one value of each parameter, instead of without
+    """
+    white, mask = end.whitened[:, 1:], np.any([end.problem.layout.of_effect(name) for name in names], axis=0)
     size = np.linalg.norm(white, axis=0)
     white = white / np.where(size > 0, size, 1.0)
     value = end.theta[mask] - (end.theta[mask].mean() if shared else 0.0)

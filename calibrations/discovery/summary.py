@@ -27,6 +27,7 @@ NO_VARIANCE = 0.1  # of the noise's: with less excess variance there are no shar
 class Line:
     """One cause. `size`: rms in thousandths of the sensed unit; `certainty`: 1 minus the chance of it by noise alone.
 
+    The certainty is that of the effect or of the added effects that the data cannot separate from it.
     `effects`: () if the form is unknown. `in_another_form`: a free form describes the remainder of the effects.
     """
 
@@ -82,12 +83,11 @@ def summary_lines(discovery: Discovery[Fit]) -> list[Line]:
         if step.name in listed or (step.name in discovery.refinements and not step.name.startswith(PREFIX)):
             continue
         change = rms(in_milli_rows(step.after.residual - step.before.residual, end))
-        p = chance(*first_order_cost(end, step.name))
+        rivals_of_step = tuple(alternatives.get(step.name, ()))
+        p = chance(*first_order_cost(end, step.name, *added_effects.intersection(rivals_of_step)))
         effects = () if step.name.startswith(PREFIX) else (step.name,)
         place_name = place_of_effect(step.name) or "-"
-        lines.append(
-            (place_name, effects, float(np.sqrt(np.mean(change**2))), 1 - p, tuple(alternatives.get(step.name, ())))
-        )
+        lines.append((place_name, effects, float(np.sqrt(np.mean(change**2))), 1 - p, rivals_of_step))
     total = sum(size**2 for _, _, size, _, _ in lines) or 1.0
     summary = [
         Line(

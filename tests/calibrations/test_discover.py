@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from calibrations.discovery.results import Discovery
-from calibrations.discovery.search import find_path
+from calibrations.discovery.search import find_path, first_order_cost
 from calibrations.effects.catalogue import catalogue
+from calibrations.fitting.fit import fit
 from calibrations.loop import add, diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
@@ -153,3 +154,16 @@ def test_a_drift_may_be_an_unlogged_temperature() -> None:
     best = diagnose(poses(columns, 2.5 + x + drift, 2.5 + y - drift), LINEAR).candidates[0]
     assert best.name in ("bias-drift", "warm-up-bias")
     assert "temperature-bias" in best.indistinguishable_from
+
+
+def test_effects_that_the_data_cannot_separate_are_tested_together() -> None:
+    columns = turns((90, 30, 150), step_deg=20.0)
+    x, y, _ = components(columns)
+    table = poses(columns, 2.5 + x - 2e-3 * y, 2.5 + y + 2e-3 * x)  # the sensor, or the stage, is turned
+    names = ("stage-zero-offset", "axis-misalignment")
+    model = read_model("linear")
+    for name in names:
+        model = model.with_effect(catalogue()[name])
+    end = fit(model, table)
+    alone, together = first_order_cost(end, "stage-zero-offset")[0], first_order_cost(end, *names)[0]
+    assert alone < 10 < 1000 < together
