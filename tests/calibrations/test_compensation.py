@@ -101,7 +101,9 @@ def test_it_gives_back_what_the_model_was_given(values: Any) -> None:
     st.tuples(*[st.floats(-3, 3)] * 3),
     st.integers(0, 1000),
 )
-def test_whatever_the_sensor(bent: list[float], turned: tuple[float, float, float], seed: int) -> None:
+def test_the_inverse_is_exact_for_random_parameters(
+    bent: list[float], turned: tuple[float, float, float], seed: int
+) -> None:
     shapes = ("quadratic-nonlinearity", "cross-axis-bias", "z-axis-bias", "odd-quadratic-nonlinearity")
     values: dict[str, Any] = {name: {"square": tuple(bent[2 * k : 2 * k + 2])} for k, name in enumerate(shapes)}
     values |= {
@@ -113,7 +115,7 @@ def test_whatever_the_sensor(bent: list[float], turned: tuple[float, float, floa
     assert error(made, fitted, 50, seed) < 1e-9
 
 
-def test_three_axes_need_nothing_beside() -> None:
+def test_the_inverse_of_three_axes_needs_no_other_input() -> None:
     bias, scale = (0.1, -0.2, 0.3), (1.0, 1.1, 0.9)
     bent = {"axis-nonorthogonality": {"xy": 1.0, "xz": -0.5, "yz": 2.0}, "z-axis-bias": {"square": (0.01, 0.02, 0.01)}}
     fitted = model({"bias": {"bias": bias}, "scale-factor": {"scale": scale}, **bent})
@@ -122,7 +124,7 @@ def test_three_axes_need_nothing_beside() -> None:
     assert error(made, fitted) < 1e-9
 
 
-def test_one_axis_is_told_the_others() -> None:
+def test_the_inverse_of_one_axis_takes_the_other_axes_as_inputs() -> None:
     fitted = model(
         {"bias": {"bias": (2.5,)}, "scale-factor": {"scale": (1.0,)}, "axis-misalignment": {"x": 0, "y": 1, "z": 1}}
     )
@@ -189,7 +191,7 @@ def test_an_axis_found_out_of_gravity_costs_little() -> None:
     assert invert_model(model(LINEAR)).costs.out_of_gravity is None
 
 
-def test_uncertainties_reach_the_result() -> None:
+def test_the_result_has_the_uncertainty_of_its_parameters() -> None:
     size = invert_model(model(LINEAR, std=1e-3)).costs.parameters
     assert size is not None
     assert size.most == pytest.approx(1e-3 * np.sqrt(2) / 0.98, rel=0.02)  # bias and scale factor, at 1 g

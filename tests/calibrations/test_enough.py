@@ -55,7 +55,7 @@ def test_a_model_whose_error_is_small_enough_gets_no_effect() -> None:
     assert result.judgement.text.startswith("The model linear needs no further effect.")
 
 
-def test_an_error_that_no_model_reaches_is_told() -> None:
+def test_the_text_says_that_no_model_reaches_the_requested_error() -> None:
     result = found("0.5 floors")
     assert names(result) == ["z-axis-bias", "quadratic-nonlinearity"]
     assert "more than asked (0.5 noise floors)" in result.judgement.text
@@ -68,7 +68,7 @@ def test_equal_errors_in_other_units_are_one_limit() -> None:
 
 
 @pytest.mark.parametrize("text", ["abc", "0mg", "-1mg", "1e999mg", "5", "1.2.3mg", "2 parsec", "nanmg"])
-def test_what_is_no_error_is_refused_with_an_example(text: str) -> None:
+def test_a_text_that_is_not_an_error_is_refused_with_an_example(text: str) -> None:
     with pytest.raises(ModelError, match=r"such as 0\.5mg"):
         parse_enough(text)
 

@@ -282,7 +282,7 @@ def test_the_next_experiment_stands_with_its_command_and_what_it_brings() -> Non
     assert brings in Page(page).text
 
 
-def test_what_is_not_explained_is_said_so() -> None:
+def test_the_page_names_the_pattern_of_an_unexplained_residual() -> None:
     dropped = warm().findings.without_steps()
     found = Discovery.of(replace(dropped, left="step at t = 3120 s"))
     assert found.judgement.text == "No effect of the catalogue explains the residual: step at t = 3120 s."

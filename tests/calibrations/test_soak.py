@@ -97,7 +97,7 @@ def test_a_short_soak_has_courses_and_no_verdict_on_steady_state(undrawn: None) 
     assert "Too few reversals" in page(found)
 
 
-def test_without_a_whole_reversal_there_is_nothing() -> None:
+def test_a_table_without_a_whole_reversal_is_refused() -> None:
     table = soak_table()
     with pytest.raises(TooFewRows, match="has no reversal"):
         analyse_soak(table.rows(np.char.startswith(np.array(table.labels["path"]), "hold")))
@@ -133,7 +133,7 @@ def test_holds_of_one_block_have_no_deviation() -> None:
     assert len(times_s) == len(deviations) == 0
 
 
-def test_the_page_tells_the_night_without_a_network() -> None:
+def test_the_page_shows_results_limits_and_facts_and_loads_nothing() -> None:
     found = night()
     rounded = {"value": 0.123456, "std": None, "unit": "K", "limit": 0.3, "verdict": "pass"}
     limited = {"value": 3.0, "std": 0.1, "unit": "h", "limit": [0, 7], "verdict": "pass"}
@@ -157,7 +157,7 @@ def test_the_page_says_what_is_not_reached() -> None:
     assert "steady state not reached" in text
 
 
-def test_a_room_that_wandered_is_told(undrawn: None) -> None:
+def test_the_page_says_that_the_ambient_temperature_changed(undrawn: None) -> None:
     table = soak_table()
     wandering = table.column("temperature_c") + 2 * np.sin(table.time_s / 3000)
     warm = type(table).from_columns(

@@ -122,7 +122,7 @@ def _undated(text: bytes | None) -> bytes:
 
 
 @pytest.mark.parametrize(("what", "words"), [(key[0], words) for key, words in ASKED.items()], ids=map(" ".join, ASKED))
-def test_it_says_and_writes_the_same(
+def test_a_command_prints_and_writes_the_same_from_either_record(
     both: Callable[..., None], laboratory: Laboratory, undrawn: None, what: str, words: tuple[str, ...]
 ) -> None:
     run = laboratory.runs.get(what, "")

@@ -75,7 +75,7 @@ def test_the_physical_model_reaches_the_limit_that_noise_sets(seed: int, rig_hom
 
 
 @pytest.mark.slow
-def test_its_plan_takes_as_long_as_the_run(rig_home: Path) -> None:
+def test_the_plan_of_a_motion_takes_as_long_as_the_run(rig_home: Path) -> None:
     planned = plan(read_bench(), MOTION, parse(MOTION, BRIEF))
     with Record() as record:
         outcome = shaken(record, read_bench(), **BRIEF)
@@ -149,7 +149,9 @@ def test_a_probe_in_front_of_the_carriage_counts_the_other_way(rig_home: Path) -
     assert "falls where the sensor's acceleration along x rises" in (run.message or "")
 
 
-def test_a_reading_outside_the_curve_is_an_error_and_no_number(rig_home: Path, few_swings: None) -> None:
+def test_a_reading_outside_the_calibration_curve_fails_the_run_and_gives_no_result(
+    rig_home: Path, few_swings: None
+) -> None:
     with Record() as record:
         outcome = shaken(record, bench(QUIET | {"d63": {"standoff_um": 290.0}}), **BRIEF)
         kept = list(record.kept(outcome.run.run))
@@ -183,7 +185,7 @@ class StopsAt(Onlooker):
         ([56], [4, 8]),  # in the motion: a gap parts the records, and the longest is judged
     ],
 )
-def test_it_goes_on_after_interruptions_with_the_carriage_at_rest(
+def test_an_interrupted_motion_resumes_and_the_longest_record_is_judged(
     rig_home: Path, few_swings: None, stops: list[int], lengths_s: list[int]
 ) -> None:
     with Record() as record:

@@ -84,7 +84,7 @@ def written(folder: Path, columns: Mapping[str, Array]) -> str:
 
 
 @pytest.mark.parametrize("name", RECORDS)
-def test_of_every_process(rig: Rig, tmp_path: Path, name: str) -> None:
+def test_three_commands_name_the_same_processes(rig: Rig, tmp_path: Path, name: str) -> None:
     make, truth = RECORDS[name]
     np.save(tmp_path / "still.npy", make(np.random.default_rng(5)))
     found = answers(rig, str(tmp_path / "still.npy"), "--rate", str(RATE_HZ))
@@ -93,7 +93,7 @@ def test_of_every_process(rig: Rig, tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [*slow(["two axes"]), *(name for name in DISTURBED if name != "two axes")])
-def test_of_every_disturbance(rig: Rig, tmp_path: Path, name: str) -> None:
+def test_three_commands_name_the_same_disturbances(rig: Rig, tmp_path: Path, name: str) -> None:
     make, kinds, processes = DISTURBED[name]
     found = answers(rig, written(tmp_path, make(np.random.default_rng(5))))
     agree(found)

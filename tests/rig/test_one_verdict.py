@@ -158,7 +158,7 @@ def agree(answers: Answers) -> None:
     assert comparison["rmse"].keys() == comparison["noise_floor"].keys()
 
 
-def test_every_text_gives_the_same_sentences(answers: Answers, undrawn: None) -> None:
+def test_commands_and_report_print_the_same_verdict(answers: Answers, undrawn: None) -> None:
     diagnosis = answers.session[1][0].judgement
     assert diagnosis.text in answers.text("diagnose")
     assert answers.document("diagnose")["text"] == diagnosis.text

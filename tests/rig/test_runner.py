@@ -151,7 +151,7 @@ def test_a_failing_instrument_leaves_a_run_that_can_be_resumed(whole: Undisturbe
         assert samples(record, failed.run.run) == whole.samples
 
 
-def test_a_fault_of_the_program_is_written_down_and_not_hidden() -> None:
+def test_a_fault_of_the_program_is_recorded_and_raised() -> None:
     with Record() as record:
         with pytest.raises(ZeroDivisionError):
             run_small(record, watch=Interrupting(2, raising(ZeroDivisionError("x"))))
@@ -167,7 +167,7 @@ def test_a_temperature_outside_the_limits_stops_the_run() -> None:
     assert "outside the limits of 0 to 10 C" in str(outcome.error)
 
 
-def test_a_complete_run_is_not_begun_again() -> None:
+def test_resuming_a_complete_run_measures_nothing() -> None:
     with Record() as record:
         run = run_small(record).run
         watch = Onlooker()
@@ -252,7 +252,7 @@ def test_results_of_a_procedure_are_kept(tmp_path: Path) -> None:
     assert outcome.run.results["mass"] == {"value": 2.0, "std": 0.1, "unit": "g", "limit": None, "verdict": None}
 
 
-def test_a_part_that_another_procedure_measured_is_marked(tmp_path: Path) -> None:
+def test_a_run_marks_the_pose_from_which_the_program_changed(tmp_path: Path) -> None:
     own = tmp_path / "procedures"
     own.mkdir()
     (own / "sweep.py").write_text((SHIPPED / "sweep.py").read_text())
@@ -271,7 +271,7 @@ def test_a_part_that_another_procedure_measured_is_marked(tmp_path: Path) -> Non
         assert str(table_of(record, run).constants["program_changed"]).startswith("from pose 5: ")
 
 
-def test_two_folders_of_records_do_not_share_a_wire(
+def test_a_wire_is_busy_for_runs_of_another_record(
     tmp_path: Path, bench_file: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "tty").touch()

@@ -119,7 +119,7 @@ LIMITS = [  # a fault of an instrument, the exit status, and what is said
 
 
 @pytest.mark.parametrize(("procedure", "role", "fault", "status", "said"), LIMITS)
-def test_a_limit_that_is_passed(
+def test_a_passed_limit_stops_the_run_and_says_what_to_do(
     procedure: str, role: str, fault: Fault, status: int, said: str, aftermath: Aftermath
 ) -> None:
     with Record() as record:

@@ -53,7 +53,7 @@ def test_where_no_column_tells_the_noise_the_error_falls_and_rises_again(tmp_pat
     assert grown.undone().end.pooled_excess == begun.end.pooled_excess == pytest.approx(1.0, abs=0.1)
 
 
-def test_what_says_nothing_new_is_refused(turned: ModelSession) -> None:
+def test_an_effect_that_cannot_be_added_is_refused(turned: ModelSession) -> None:
     with pytest.raises(ModelError, match="bias is already in the model"):
         turned.tried(turned.effects["bias"])
     with pytest.raises(ModelError, match="hard-iron is not defined for poses"):
@@ -93,7 +93,7 @@ def test_a_report_takes_the_search_that_its_session_has_made(turned: ModelSessio
     assert "misses axis-misalignment" in page()
 
 
-def test_a_noise_model_grows_as_well(tmp_path: Path) -> None:
+def test_a_process_is_added_to_a_noise_model_and_undone(tmp_path: Path) -> None:
     request = Request(wandering(tmp_path))
     found = model_session(request)
     result = found.diagnosed()

@@ -84,7 +84,7 @@ def test_with_nothing_kept_there_is_nothing_to_repeat() -> None:
         assert (outcome.run.state, outcome.run.rows) == ("complete", POSES)
 
 
-def test_it_stands_still_and_says_so_before_anybody_is_asked() -> None:
+def test_the_stages_stand_still_before_a_person_is_asked() -> None:
     watch = Disturbed(interrupt)
     with Record() as record:
         outcome = start(record, read_bench(), *small_sweep(), watch)

@@ -86,7 +86,7 @@ SAID = {
         *slow(product(("diagnose", "discover"), list(SAID)[2:])),  # a search of seconds
     ],
 )
-def test_every_command_says_it(rig: Callable[..., Any], tmp_path: Path, command: str, name: str) -> None:
+def test_every_command_names_a_wrong_input(rig: Callable[..., Any], tmp_path: Path, command: str, name: str) -> None:
     wrong = WRONG["poses"][name](GOOD["poses"]())
     (tmp_path / "wrong.csv").write_text(wrong.text())
     ended = rig(command, str(tmp_path / "wrong.csv"), "--model", "linear", "--json")
