@@ -37,6 +37,7 @@ from calibrations.discovery.search import (
 from calibrations.discovery.structure import find_competing_pattern, poorly_predicted, structure_of
 from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.effects import Effect
+from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.determined import undetermined
 from calibrations.fitting.fit import Fit, refit
 from calibrations.free_forms.place_names import is_visible_at_rest, place_of_effect
@@ -115,6 +116,9 @@ class RowSearch:
         path = find_path(start, outliers, effects, max_steps=1 if self._shows_places or is_motion else MOST_EFFECTS)
         if is_motion and find_competing_pattern(path.start, path.end) is None:
             path = continue_path(path, effects)
+        if self._shows_places and (own_names := effects.keys() - catalogue().keys()):
+            further = continue_path(path, effects)  # the structural search knows no place for the user's effects
+            path = further if own_names & {step.selected.name for step in further.steps} else path
         if not self._shows_places or _is_explained(path):
             return self._path_findings(path, effects, origin)
         from calibrations.discovery.structural import search_structure  # only this search needs it

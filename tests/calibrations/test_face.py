@@ -109,3 +109,24 @@ def test_noise_takes_samples_as_a_series_as_columns_or_as_an_array_of_axes() -> 
         cal.noise(samples.T, 100.0)
     with pytest.raises(DataError, match="name the columns"):
         cal.noise(np.zeros((2000, 4)), 100.0)
+
+
+@pytest.mark.parametrize(("square", "larger"), [(0.004, "wave"), (0.06, "quadratic-nonlinearity")])
+def test_an_effect_of_ones_own_is_found_beside_one_of_the_catalogue(square: float, larger: str) -> None:
+    class Wave(cal.Effect):
+        """wave: five waves in a turn of beta."""
+
+        height = cal.Parameter("{out}", typical=0.01)
+
+        def transduction(self, a: Array, table: Table, p: Values) -> Array:
+            return np.asarray(np.cos(5 * np.radians(table.column("beta_deg")))[:, None] * p.height)
+
+    columns = synthetic.turns((90, 30, 150, 60), step_deg=20)
+    x, y, _ = synthetic.components(columns)
+    wave = 0.01 * np.cos(5 * np.radians(columns["beta_deg"]))
+    data = synthetic.poses(columns, 2.5 + x + square * x**2 + wave, 2.5 + 1.02 * y)
+    found = cal.discover(data, "linear", effects=[Wave])
+    assert found.causes == (larger, *({"wave", "quadratic-nonlinearity"} - {larger}))
+    assert found.verdict.value == "adequate"
+    assert found.model["wave.x"].value == pytest.approx(0.01, abs=1e-4)
+    assert found.model["quadratic-nonlinearity.x"].value == pytest.approx(square, abs=2e-4)
