@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -78,8 +79,14 @@ def test_how_the_sensor_is_mounted_is_said_where_it_is_not_as_usual() -> None:
     assert other.words == "alpha 0, beta 0 deg: 1 pose  mounted face down, rotated by 90 deg"
 
 
+def test_a_pose_without_a_stage_is_one_by_hand() -> None:
+    (by_hand,) = stretches(replace(of((PlannedDwell(0.0, Pose(0, 0, path="+x side up")),)), reach={}))
+    assert by_hand.words == "by hand: 1 pose  +x side up"
+
+
 def of(held: tuple[PlannedDwell, ...]) -> Plan:
-    return Plan("any", {}, (Step(0.0, 1.0, "wait 1 s"),), {}, (), held, 10.0, 0)
+    reach = {"alpha": ((0.0, 90.0), (-180.0, 180.0))}
+    return Plan("any", {}, (Step(0.0, 1.0, "wait 1 s"),), reach, (), held, 10.0, 0)
 
 
 def test_the_range_of_angles_is_said_whatever_their_order() -> None:
