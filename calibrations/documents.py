@@ -34,7 +34,7 @@ def fit_document(data: Dataset[F], fitted: F, path: str | None) -> Document:
         "parameters": parameters_document(fitted.model),
         "n": data.n,
         **data.errors_document(fitted),
-        **_rejected(data.rejection(fitted)),
+        **_reason_document(data.rejection(fitted)),
         "model": path,
     }
 
@@ -70,12 +70,12 @@ def comparison_document(result: Comparison[F], model: str) -> Document:
             {"where": p.where, "from": p.low, "to": p.high, "axis": p.axis, "excess": p.excess, "text": p.text}
             for p in result.fails
         ],
-        **_rejected(result.rejection),
+        **_reason_document(result.rejection),
         "missing": list(result.given.missing) if result.given is not None else None,
     }
 
 
-def _rejected(reason: Finding | None) -> Document:
+def _reason_document(reason: Finding | None) -> Document:
     """A verdict and its reason on data that cannot be used; both null where they can be."""
     return {
         "verdict": reason.verdict if reason else None,
@@ -249,11 +249,11 @@ def experiment_document(e: Experiment | None) -> Document | None:
         "why": e.why,
         "command": e.command or None,
         "duration_s": e.duration_s,
-        "expected": _expected(e.expected),
+        "expected": _expected_document(e.expected),
     }
 
 
-def _expected(expected: Expected | None) -> Document | None:
+def _expected_document(expected: Expected | None) -> Document | None:
     """Distances in standard deviations; null where they are not computed."""
     if expected is None:
         return None

@@ -129,7 +129,7 @@ def noise(data: Table | Columns | Array, rate_hz: float | None = None) -> NoiseA
     from calibrations.noise.analysis import analyse
     from calibrations.noise.record import reduce_record
 
-    table = data if isinstance(data, Table) else _still(data)
+    table = data if isinstance(data, Table) else _make_still(data)
     return analyse(reduce_record(_channels(table, rate_hz), table.source, table.constants, every_deviation=True))
 
 
@@ -174,7 +174,7 @@ def _model(source: GivenModel) -> Model:
     )
 
 
-def _still(data: Any) -> Table:
+def _make_still(data: Any) -> Table:
     """The still table of samples by name, or of an array. Raises DataError for an array of another shape."""
     source = "the given samples"
     columns = columns_by_name(data)

@@ -219,7 +219,7 @@ def prefix(size: float) -> tuple[float, str]:
     return next(((factor, letter) for factor, letter in PREFIXES if abs(size) * factor >= 1), PREFIXES[0])
 
 
-def labelled(name: str, unit_name: str) -> str:
+def axis_label(name: str, unit_name: str) -> str:
     """An axis label: the name with its unit, where it has one."""
     return f"{name} ({unit_name})" if unit_name else name
 
@@ -238,7 +238,7 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def unbroken(text: str) -> str:
+def keep_units_together(text: str) -> str:
     """The text with no line break between a number and its unit."""
     return re.sub(r"(?<=\d) (?=mg|×|±)|(?<=[×±]) (?=\d)", "\u00a0", text)
 

@@ -77,7 +77,7 @@ def find(procedure_name: str, folder: Path | None = None) -> Procedure:
     module = _load(path)
     kind, adaptive = getattr(module, "KIND", "poses"), getattr(module, "ADAPTIVE", False)
     function = getattr(module, path.stem)
-    function = function if path.parent == SHIPPED else _guarded(function, path)
+    function = function if path.parent == SHIPPED else _guard(function, path)
     return Procedure(name(path), function, summary(path), _doc(path), path, kind, adaptive)
 
 
@@ -116,7 +116,7 @@ def _load(path: Path) -> ModuleType:
     return module
 
 
-def _guarded(function: Callable[..., Any], path: Path) -> Callable[..., Any]:
+def _guard(function: Callable[..., Any], path: Path) -> Callable[..., Any]:
     """A user's procedure. A fault in its file raises ProcedureError with the line; other errors pass unchanged."""
 
     @wraps(function)

@@ -18,7 +18,7 @@ from itertools import chain
 from procedures.errors import ProcedureError, SettingError
 from procedures.instruments import Stage
 from procedures.level_check import prepare
-from procedures.session import Pose, Session, bounded, count_parts
+from procedures.session import Pose, Session, count_parts, require_bounded
 from procedures.sweep import turn
 
 KIND = "motion"
@@ -95,7 +95,7 @@ def sweep() -> Iterator[Pose]:
 
 def blocks(path: str, duration_s: float, block_s: float) -> list[Pose]:
     """The blocks of a record at the attitude of the motion."""
-    return bounded(Pose(ALPHA_DEG, BETA_DEG, 0, f"{path} {k}") for k in range(count_parts(duration_s, block_s)))
+    return require_bounded(Pose(ALPHA_DEG, BETA_DEG, 0, f"{path} {k}") for k in range(count_parts(duration_s, block_s)))
 
 
 def _missing_of_part(missing: Sequence[Pose], part: Sequence[Pose]) -> list[Pose]:

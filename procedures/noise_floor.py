@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from procedures.errors import SettingError
 from procedures.level_check import check_level
-from procedures.session import Pose, Session, bounded, count_parts
+from procedures.session import Pose, Session, count_parts, require_bounded
 
 KIND = "still"
 STILL = "still"  # path of the record
@@ -28,7 +28,7 @@ def noise_floor(
     check_level(rig)
     for pose in rig.missing(SCALE_POSES):
         rig.hold(pose, dwell_s, settle_s)
-    still = bounded(Pose(0.0, 0.0, 0, f"{STILL} {k}") for k in range(count_parts(duration_s, block_s)))
+    still = require_bounded(Pose(0.0, 0.0, 0, f"{STILL} {k}") for k in range(count_parts(duration_s, block_s)))
     if missing := list(rig.missing(still)):
         rig.move_to(missing[0])
         rig.wait(settle_s)

@@ -16,7 +16,7 @@ from typing import Any
 
 from drivers.errors import did_you_mean
 from procedures.errors import SettingError
-from procedures.session import Pose, bounded
+from procedures.session import Pose, require_bounded
 
 # `up` and `rate_deg_s` belong to positions and rates, not to poses.
 NAMES = tuple(field.name for field in fields(Pose) if field.name not in ("up", "rate_deg_s"))
@@ -28,7 +28,7 @@ def parse_poses(lines: Sequence[str]) -> list[Pose]:
     Raises SettingError with line and column.
     """
     numbered = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
-    bounded(numbered[1:])
+    require_bounded(numbered[1:])
     rows = [(number, [cell.strip() for cell in row]) for number, line in numbered for row in csv.reader([line])]
     (first, head), *data_rows = rows or [(1, [])]
     for name in head:

@@ -28,7 +28,7 @@ LARGEST_NUMBER = 1e15  # in a message
 FEWER = "a larger step, a shorter duration, or fewer angles and repetitions"
 
 
-def bounded(poses: Iterable[Read]) -> list[Read]:
+def require_bounded(poses: Iterable[Read]) -> list[Read]:
     """All `poses`, or their paths. Raises SettingError above MOST_POSES; the others are counted, not stored."""
     remaining = iter(poses)
     listed = list(islice(remaining, MOST_POSES))
@@ -250,7 +250,7 @@ class Session:
         """
         counts = Counter(self.host.kept())
         missing = []
-        for pose in bounded(poses):
+        for pose in require_bounded(poses):
             if counts[pose] > 0:
                 counts[pose] -= 1
             else:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from procedures.errors import SettingError
 from procedures.level_check import prepare
-from procedures.session import Session, bounded
+from procedures.session import Session, require_bounded
 from procedures.tumbles import is_first, tumble
 
 SLICE_S = 60.0  # interval of the temperature checks in a soak
@@ -56,7 +56,7 @@ def staircase(temperatures_c: tuple[float, ...], cycles: int) -> list[tuple[str,
             f"temperature-cycle: cycles is {cycles}; give 1 or more, 2 to separate hysteresis from drift"
         )
     steps = [*(("up", c) for c in rising), *(("down", c) for c in rising[-2::-1])]
-    return bounded((f"{branch} {c:g} cycle {k}", c) for k in range(1, cycles + 1) for branch, c in steps)
+    return require_bounded((f"{branch} {c:g} cycle {k}", c) for k in range(1, cycles + 1) for branch, c in steps)
 
 
 def _warm(rig: Session, set_c: float, soak_s: float, begins: bool) -> None:

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.criteria import LEAST_TAU_RATIO, WALK_RATIO
-from calibrations.means.noise import correlated, rms
+from calibrations.means.noise import rms, whiten_columns
 from calibrations.table import Array
 
 TAUS = 40  # time constants on the grid
@@ -125,7 +125,7 @@ class Series:
 
     def _whiten(self, columns: Array, point: Point) -> tuple[Array, float]:
         fast = self.stds if self.known else np.ones(len(self.t_s))
-        return correlated(columns, self.gap_s, fast, point[0] * float(rms(fast)), point[1])
+        return whiten_columns(columns, self.gap_s, fast, point[0] * float(rms(fast)), point[1])
 
     def _factor(self, square: float | Array, free: int) -> Array:
         """Variance of the noise over that of the grid point."""

@@ -108,16 +108,16 @@ class TemperatureCoefficients:
 
 def bias_coefficients(steps: Sequence[Tumble]) -> TemperatureCoefficients:
     """Slope in V/K, hysteresis in V. Raises DataError without temperatures up and down."""
-    return _fitted(steps, np.array([s.bias_v for s in steps]), np.array([s.bias_std_v for s in steps]))
+    return _fit_coefficients(steps, np.array([s.bias_v for s in steps]), np.array([s.bias_std_v for s in steps]))
 
 
 def scale_coefficients(steps: Sequence[Tumble]) -> TemperatureCoefficients:
     """Slope in 1/K and hysteresis, as fractions of the mean scale factor. Raises DataError as `bias_coefficients`."""
     scale = np.array([s.scale_v_per_g for s in steps])
-    return _fitted(steps, scale / scale.mean() - 1, np.array([s.scale_std for s in steps]))
+    return _fit_coefficients(steps, scale / scale.mean() - 1, np.array([s.scale_std for s in steps]))
 
 
-def _fitted(steps: Sequence[Tumble], y: Array, std: Array) -> TemperatureCoefficients:
+def _fit_coefficients(steps: Sequence[Tumble], y: Array, std: Array) -> TemperatureCoefficients:
     temperature_c, t_s = (np.array([getattr(s, name) for s in steps]) for name in ("temperature_c", "t_s"))
     direction = np.array([DIRECTIONS[s.path.partition(" ")[0]] for s in steps])
     columns = np.column_stack([temperature_c - temperature_c.mean(), direction, np.ones(len(steps))])

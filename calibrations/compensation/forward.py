@@ -26,7 +26,7 @@ from calibrations.effects.logged import RATE
 from calibrations.errors import ModelError
 from calibrations.free_forms.effect import FreeForm
 from calibrations.model import Model, Term
-from calibrations.model.chain import Stage, Step, scaled, stage_of, staged_part
+from calibrations.model.chain import Stage, Step, add_response, stage_of, staged_part
 from calibrations.table import AXES, NUMBERS
 from calibrations.tables import KINDS
 
@@ -201,14 +201,14 @@ def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str,
             v = v + _response(effect, a, table, p)
         if effect.of_force:
             of_force = of_force + (v - before_v)
-    force = scaled(a, of_force, steps) if any(effect.of_force and not effect.scales for effect, _ in steps) else a
+    force = add_response(a, of_force, steps) if any(effect.of_force and not effect.scales for effect, _ in steps) else a
     for stage in (Stage.SCALE, Stage.DRIFT):
         response = force
         for effect, p in steps:
             if stage_of(effect) == stage:
                 part = staged_part(stage, partial(_response, effect, table=table, p=p), a, response)
                 v = v + part
-                force = scaled(force, part, steps) if effect.of_force else force
+                force = add_response(force, part, steps) if effect.of_force else force
     for effect, p in steps:
         if isinstance(effect, FreeForm) and "output" in effect.places:
             v = v + trace_free_form(effect, a, v, table, p)

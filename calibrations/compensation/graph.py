@@ -153,7 +153,7 @@ def apply_operation(operation: str, *inner: Node) -> Node:
 
 
 @lru_cache(MANY)
-def tabulated(table: Table, x: Node) -> Node:
+def look_up(table: Table, x: Node) -> Node:
     """The table at x."""
     return number(float(table(x.value))) if x.constant else Node("table", (x,), table=table)
 

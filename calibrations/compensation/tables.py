@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.compensation.graph import ONE, ZERO, Node, number, power, tabulated
+from calibrations.compensation.graph import ONE, ZERO, Node, look_up, number, power
 from calibrations.compensation.trace import NotTraced, RunTime, Traced, as_nodes, as_traced
 from calibrations.effects import Values
 from calibrations.effects.logged import sensor_temperature_c
@@ -118,7 +118,7 @@ def _part(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, k: i
     else:
         x = _driver(form, a, v, table, k)
         if isinstance(basis, Spline):
-            f = tabulated(spline_table(basis, u), x) if len(u) else number(0.0)
+            f = look_up(spline_table(basis, u), x) if len(u) else number(0.0)
         elif isinstance(basis, Line):
             half = (basis.high - basis.low) / 2 or 1.0
             slope = float(np.sum(u)) / half

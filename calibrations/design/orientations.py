@@ -95,7 +95,7 @@ def is_other_side(mean: Array, outputs: Array, noise_std: float) -> bool:
     return bool(np.min(np.linalg.norm(outputs - mean, axis=1)) > least)
 
 
-def covered(measured: Array) -> Array:
+def find_covered(measured: Array) -> Array:
     """Which of ORIENTATIONS have a position within CELL_DEG, shape (26,)."""
     if not len(measured):
         return np.zeros(len(ORIENTATIONS), dtype=bool)

@@ -100,7 +100,7 @@ def _start_values(base: Fit, model: Model) -> Array:
     return theta
 
 
-def fitted(base: Fit, end: Fit, added: list[Addition]) -> list[Fit]:
+def fit_successively(base: Fit, end: Fit, added: list[Addition]) -> list[Fit]:
     """The fits with the first, the first two ... additions; the last is `end`."""
     fits: list[Fit] = []
     present = base

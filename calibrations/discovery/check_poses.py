@@ -59,7 +59,7 @@ class Check:
         return self.again >= CHECK_SIGNIFICANT
 
 
-def unseen(model: Model, table: Table) -> Check | None:
+def judge_check_poses(model: Model, table: Table) -> Check | None:
     """Test of `model` on the check poses of `table`.
 
     None if they are too few, if the other poses do not determine the model, or if the noise is not known.

@@ -38,7 +38,7 @@ from calibrations.discovery.structure import find_competing_pattern, poorly_pred
 from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
-from calibrations.fitting.determined import undetermined
+from calibrations.fitting.determined import explain_undetermined
 from calibrations.fitting.fit import Fit, refit
 from calibrations.free_forms.place_names import is_visible_at_rest, place_of_effect
 from calibrations.geometry.orientation import one_orientation
@@ -220,7 +220,7 @@ class RowSearch:
             "origin": start,
             "left": remainder.text if remainder else None,
             "pattern": remainder,
-            "undetermined": (undetermined(start), undetermined(end)),
+            "undetermined": (explain_undetermined(start), explain_undetermined(end)),
             "set_aside": caution(outliers),
             "outliers": outliers,
         }

@@ -21,7 +21,7 @@ from calibrations.discovery.verdict import Finding
 from calibrations.effects import Effect
 from calibrations.effects.expression_effect import effect_for
 from calibrations.errors import ModelError, nearest
-from calibrations.fitting.determined import blind_to, undetermined
+from calibrations.fitting.determined import blind_to, explain_undetermined
 from calibrations.fitting.fit import Fit, evaluate, fit, refit
 from calibrations.fitting.sensed import axis_of
 from calibrations.free_forms.place_names import PREFIX
@@ -181,7 +181,7 @@ class Rows(Dataset[Fit]):
 
     def undetermined(self, fit: Fit) -> str | None:
         """The reason why a small residual proves nothing on these data."""
-        return undetermined(fit)
+        return explain_undetermined(fit)
 
     def untestable(self, fit: Fit, effects: Mapping[str, Effect]) -> str | None:
         """The effects that these data cannot show together with the model."""
@@ -271,7 +271,10 @@ class Rows(Dataset[Fit]):
     def cautions(self, fit: Fit) -> list[str]:
         """Reasons why a fit of all rows may mislead: an undetermined model, outliers."""
         one_orientation_text = ONE_ORIENTATION if self.at_rest else None
-        return [*filter(None, (one_orientation_text, undetermined(fit), outliers_in_fit(fit))), *self.doubts(fit)]
+        return [
+            *filter(None, (one_orientation_text, explain_undetermined(fit), outliers_in_fit(fit))),
+            *self.doubts(fit),
+        ]
 
     def doubts(self, fit: Fit) -> list[str]:
         """Doubts about the stated noise, and about parameters that no sensor has."""

@@ -20,8 +20,8 @@ from calibrations.discovery.additions import (
     causes_alone,
     fit_gradually,
     fit_separately,
+    fit_successively,
     fit_together,
-    fitted,
     free_additions,
     largest_first,
     start_small_at_forms,
@@ -118,7 +118,7 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     if fits[-1].pooled_excess < NO_WORSE * end.pooled_excess:
         selected, end = accepted_additions, fits[-1]
     else:
-        fits = [base, *fitted(base, end, selected)]
+        fits = [base, *fit_successively(base, end, selected)]
     selected, fits = _without_idle_additions(selected, fits, places.causes)
     if remarks and stated_white is not None:
         fits[-1] = with_least_white(fits[-1], stated_white)
@@ -149,7 +149,7 @@ def _without_idle_additions(
     without = fit_together(base, needed)
     if without.held_out_excess > NO_WORSE * end.held_out_excess:
         return selected, fits
-    return needed, [base, *fitted(base, without, needed)]
+    return needed, [base, *fit_successively(base, without, needed)]
 
 
 @dataclass(frozen=True)

@@ -99,7 +99,7 @@ def _of_class(cls: type[Effect]) -> Effect:
         "symptom": effect.symptom or "not described",
     }
     guards = {
-        method: MethodType(guarded(getattr(cls, method), Path(_file(cls, method)), cls.__name__), effect)
+        method: MethodType(guard(getattr(cls, method), Path(_file(cls, method)), cls.__name__), effect)
         for method in (*effect.places, *(["follow"] if effect.memory else []))
     }
     vars(effect).update(described | guards | {CHOSEN: True})
@@ -131,7 +131,7 @@ def _user_effect(path: Path) -> Effect:
     effect = _of_module(_load(path), path)
     for method in (*HOOKS, "follow"):
         if method in vars(type(effect)):
-            setattr(type(effect), method, guarded(vars(type(effect))[method], path))
+            setattr(type(effect), method, guard(vars(type(effect))[method], path))
     return effect
 
 
@@ -216,7 +216,7 @@ def fault(path: Path, error: BaseException, name: str = "") -> ModelError:
     return ModelError(f"{place}: {type(error).__name__}: {message}")
 
 
-def guarded(hook: Callable[..., Any], path: Path, name: str = "") -> Callable[..., Any]:
+def guard(hook: Callable[..., Any], path: Path, name: str = "") -> Callable[..., Any]:
     """The method `hook` of a user's effect. It raises ModelError where it fails, and where its result is not an array
     of finite numbers with the shape of its first argument. A pose is not checked. Messages name the file, or `name`.
     """

@@ -29,7 +29,7 @@ from calibrations.effects.expression import (
     parse,
     variables,
 )
-from calibrations.effects.expression_start import best_start, linear, scales
+from calibrations.effects.expression_start import best_start, find_linear_parameters, scales
 from calibrations.errors import ExpressionError, ModelError
 from calibrations.geometry.orientation import Pose
 from calibrations.table import AXES, LARGEST, Array, Table
@@ -91,7 +91,7 @@ class _FromExpression(Effect):
     def __init__(self, name: str, expression: Expression, parameters: tuple[str, ...]) -> None:
         """Sizes of the parameters come from the data, and starts where the expression is not linear in them."""
         target = expression.target
-        bent = linear(expression.root, parameters) != parameters
+        bent = find_linear_parameters(expression.root, parameters) != parameters
         self._expression = expression
         self.name, self.expression = name, expression.text
         self.formula = expression.text if "+=" in expression.text else f"v += {expression.text}"

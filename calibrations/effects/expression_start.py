@@ -38,7 +38,7 @@ def best_start(expression: Expression, parameters: Names, table: Table) -> Mappi
     """The best start of each parameter, shape (axes,): the same for all axes unless the output of all is added to."""
     axes = len(table.axes)
     sizes = scales(expression, parameters, table)
-    linear_names = linear(expression.root, parameters)
+    linear_names = find_linear_parameters(expression.root, parameters)
     if table.type.magnitude:  # the forces are not known before the fit
         return {p: np.full(axes, sizes[p] * (FAINT if p in linear_names else 1.0)) for p in parameters}
     groups = [(k,) for k in range(axes)] if expression.target == "v" else [tuple(range(axes))]
@@ -49,7 +49,7 @@ def best_start(expression: Expression, parameters: Names, table: Table) -> Mappi
 @lru_cache(maxsize=32)
 def scales(expression: Expression, parameters: Names, table: Table) -> Mapping[str, float]:
     """The largest plausible size of each parameter; a linear one of this size moves the output over its range."""
-    linear_names, root = linear(expression.root, parameters), expression.root
+    linear_names, root = find_linear_parameters(expression.root, parameters), expression.root
     values = {**dict.fromkeys(parameters, np.zeros(1)), **_variables(expression, table)}
     sizes = {p: float(np.median(np.abs(trials(root, p, values)))) or 1.0 for p in parameters if p not in linear_names}
     values |= {p: np.full(1, scale) for p, scale in sizes.items()}
@@ -86,7 +86,7 @@ class _Search:
     @cached_property
     def straight(self) -> Names:
         """Parameters that follow by least squares."""
-        return linear(self.expression.root, self.parameters)
+        return find_linear_parameters(self.expression.root, self.parameters)
 
     @cached_property
     def values(self) -> dict[str, Array]:
@@ -238,7 +238,7 @@ def _both_signs(positive: Array) -> Array:
     return np.concatenate([-positive[::-1], positive])
 
 
-def linear(root: Node, parameters: Sequence[str]) -> tuple[str, ...]:
+def find_linear_parameters(root: Node, parameters: Sequence[str]) -> tuple[str, ...]:
     """The longest list of leading parameters in which together the expression is of the first degree."""
     linear_names: list[str] = []
     for name in parameters:

@@ -24,7 +24,7 @@ def level(table: Table, name: str, power: int = 1) -> Array:
 
     As logged where no time changes, as in a single row: the scatter is known from the neighbours.
     """
-    if not timed(table):
+    if not has_times(table):
         return table.column(name) if power == 1 else table.column(name) ** power
     return _without_scatter(table, name, power)[0]
 
@@ -38,10 +38,10 @@ def reading_error(table: Table, name: str, power: int = 1, lead_s: float = 0.0) 
 
 def level_is_known(table: Table, name: str, power: int = 1) -> bool:
     """Whether the readings show a level beneath their scatter, and not scatter alone."""
-    return timed(table) and reading_error(table, name, power) < UNKNOWN_LEVEL
+    return has_times(table) and reading_error(table, name, power) < UNKNOWN_LEVEL
 
 
-def timed(table: Table) -> bool:
+def has_times(table: Table) -> bool:
     """Whether the rows have a time that changes."""
     return table.n > 1 and "t_s" in table and bool(np.ptp(table.time_s) > 0)
 

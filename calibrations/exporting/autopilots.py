@@ -25,7 +25,7 @@ from calibrations.exporting.linear_form import (
     SYMMETRIC,
     LinearForm,
     Outputs,
-    exported,
+    export_form,
     fit_form,
     outputs_in,
 )
@@ -55,7 +55,7 @@ class Slot:
 
 def px4(sensors: Sequence[Simulated], slot: Slot) -> Exported:
     """A file of parameters for QGroundControl: tab-separated vehicle, component, name, value, type."""
-    sensor_parts = [_px4_sensor(_fitted(sensor, "PX4", None), slot) for sensor in sensors]
+    sensor_parts = [_px4_sensor(_fit_form(sensor, "PX4", None), slot) for sensor in sensors]
     lines = ["# Onboard parameters: sensor calibration", "# Vehicle-Id Component-Id Name Value Type"]
     for values, _ in sensor_parts:
         for name, value in values.items():
@@ -67,13 +67,13 @@ def px4(sensors: Sequence[Simulated], slot: Slot) -> Exported:
 
 def ardupilot(sensors: Sequence[Simulated], slot: Slot) -> Exported:
     """A file of parameters for Mission Planner, QGroundControl and MAVProxy: NAME,VALUE."""
-    sensor_parts = [_ardupilot_sensor(_fitted(sensor, "ArduPilot", ARDUPILOT_T0), slot) for sensor in sensors]
+    sensor_parts = [_ardupilot_sensor(_fit_form(sensor, "ArduPilot", ARDUPILOT_T0), slot) for sensor in sensors]
     lines = [f"{name},{_value_text(value)}" for values, _ in sensor_parts for name, value in values.items()]
     parts = [part for _, part in sensor_parts]
     return Exported.of_parts("\n".join(lines) + "\n", parts, _identity_notes(slot, "ArduPilot"))
 
 
-def _fitted(sensor: Simulated, program: str, t0: float | None) -> tuple[Outputs, LinearForm]:
+def _fit_form(sensor: Simulated, program: str, t0: float | None) -> tuple[Outputs, LinearForm]:
     outputs = outputs_in(sensor, UNIT[sensor.unit], program)
     degree = 0 if program == "ArduPilot" and sensor.unit == "field" else CUBIC
     return outputs, fit_form(outputs, KIND[sensor.unit], degree, t0).rounded()
@@ -94,7 +94,7 @@ def _px4_sensor(fitted: tuple[Outputs, LinearForm], slot: Slot) -> tuple[Mapping
         values |= {f"CAL_MAG{n}_{axis}ODIAG": form.matrix[pair] for axis, pair in pairs}
     if form.degree:
         values |= _px4_thermal(form, outputs.simulated, {"g": "A", "deg/s": "G", "field": "M"}[unit], slot)
-    return values, exported(outputs, form, ignored=list(_px4_ignored(outputs, form)))
+    return values, export_form(outputs, form, ignored=list(_px4_ignored(outputs, form)))
 
 
 def _px4_thermal(form: LinearForm, simulated: Simulated, letter: str, slot: Slot) -> Iterator[tuple[str, Value]]:
@@ -127,7 +127,7 @@ def _ardupilot_sensor(fitted: tuple[Outputs, LinearForm], slot: Slot) -> tuple[M
     outputs, form = fitted
     unit, k = outputs.simulated.unit, slot.number + 1
     if unit == "field":
-        return _ardupilot_compass(form, slot), exported(outputs, form)
+        return _ardupilot_compass(form, slot), export_form(outputs, form)
     sensor, number = ("ACC" if unit == "g" else "GYR"), (str(k) if k > 1 else "")
     prefix = f"INS_{sensor}{number}"
     caltemp = float(np.mean(outputs.simulated.spans["temperature_c"])) if form.degree else None
@@ -146,7 +146,7 @@ def _ardupilot_sensor(fitted: tuple[Outputs, LinearForm], slot: Slot) -> tuple[M
         for order in range(1, CUBIC + 1):
             for i, axis in enumerate(AXIS_NAMES):
                 values[f"INS_TCAL{k}_{sensor}{order}_{axis}"] = 1e6 * form.offsets[order, i]
-    return values, exported(outputs, form, notes=_gyroscope_note(unit))
+    return values, export_form(outputs, form, notes=_gyroscope_note(unit))
 
 
 def _gyroscope_note(unit: str) -> tuple[str, ...]:

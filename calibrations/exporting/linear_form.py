@@ -145,7 +145,7 @@ def losses(form: LinearForm, outputs: Outputs) -> Iterator[Loss]:
     yield from simulated.lost
 
 
-def exported(
+def export_form(
     outputs: Outputs,
     form: LinearForm,
     text: str = "",

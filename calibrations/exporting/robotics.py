@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibrations.errors import ModelError
-from calibrations.exporting.linear_form import FULL, LinearForm, Outputs, exported, fit_form, outputs_in
+from calibrations.exporting.linear_form import FULL, LinearForm, Outputs, export_form, fit_form, outputs_in
 from calibrations.exporting.simulated import Exported, Simulated
 from calibrations.table import AXES, Array
 
@@ -29,7 +29,7 @@ def imu_calib(sensors: Sequence[Simulated], comment: str) -> Exported:
     outputs, form = _accelerometer(sensors, "imu_calib")
     bias = form.matrix @ form.offsets[0]
     text = f"# {comment}\nSM: {_row(form.matrix.ravel())}\nbias: {_row(bias)}\n"
-    return exported(outputs, form, text, (GYROSCOPE_OFFSET,))
+    return export_form(outputs, form, text, (GYROSCOPE_OFFSET,))
 
 
 def imu_tk(sensors: Sequence[Simulated], comment: str) -> Exported:  # noqa: ARG001 the format has no comments
@@ -39,7 +39,7 @@ def imu_tk(sensors: Sequence[Simulated], comment: str) -> Exported:  # noqa: ARG
     blocks = [form.matrix / gains, np.diag(gains)]
     rows = ["\n".join(" ".join(map(_number, row)) for row in block) for block in blocks]
     text = "\n\n".join([*rows, "\n".join(map(_number, form.offsets[0]))]) + "\n"
-    return exported(outputs, form, text)
+    return export_form(outputs, form, text)
 
 
 def imucal(sensors: Sequence[Simulated], comment: str) -> Exported:
@@ -58,7 +58,7 @@ def imucal(sensors: Sequence[Simulated], comment: str) -> Exported:
         document |= {f"K_{letter}": np.diag(gains).tolist(), f"R_{letter}": (forward / gains[:, None]).tolist()}
         document[f"b_{letter}"] = form.offsets[0].tolist()
     document["K_ga"] = _of_acceleration(rate).tolist()
-    parts = [exported(acceleration, forms[0]), exported(rate, forms[1], held_effects=(G_SENSITIVITY,))]
+    parts = [export_form(acceleration, forms[0]), export_form(rate, forms[1], held_effects=(G_SENSITIVITY,))]
     return Exported.of_parts(json.dumps(document, indent=1) + "\n", parts)
 
 

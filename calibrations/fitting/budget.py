@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from calibrations.criteria import COVERAGE
-from calibrations.fitting.fit import Fit, cautiously
+from calibrations.fitting.fit import Fit, in_all_noise
 from calibrations.fitting.identifiability import covariance, gain
 from calibrations.fitting.inputs import Contribution
 from calibrations.means.noise import MOST_CORRELATED_ROWS, Noise
@@ -97,7 +97,7 @@ class Budget:
 
 def make_budget(fit: Fit, inputs: Iterable[Contribution]) -> Budget:
     """The budget of a fit to poses or positions, from its own noise and from `inputs` that were not fitted."""
-    cautious = cautiously(fit)
+    cautious = in_all_noise(fit)
     G = row_gains(cautious)
     of_inputs = [_of_type_b(fit, G, c) for c in inputs]
     type_a = _of_type_a(cautious, G, sum(square for _, square in of_inputs))
@@ -196,21 +196,21 @@ def slow_freedom(noise: Noise) -> float:
 
 def parameter_correlation(fit: Fit, budget: Budget, inputs: Iterable[Contribution]) -> Array:
     """Shape (p, p), 1 on the diagonal, for the `budget` of `fit`; NaN where a parameter is not determined."""
-    cautious = cautiously(fit)
+    cautious = in_all_noise(fit)
     G = row_gains(cautious)
     by_noise, _ = covariance(cautious.information, fit.problem.layout.typical)
     type_a_std = np.sqrt(
         sum((line.std**2 for line in budget.given if line.kind == "A" and line.std is not None), np.zeros(1))
     )
-    joint = normalised(by_noise) * np.outer(type_a_std, type_a_std)
+    joint = correlation_matrix(by_noise) * np.outer(type_a_std, type_a_std)
     for c in inputs:
         if c.std:
             by_error = input_effects(fit, G, c)
             joint = joint + c.std**2 * by_error.T @ by_error
-    return normalised(joint)
+    return correlation_matrix(joint)
 
 
-def normalised(covariance: Array) -> Array:
+def correlation_matrix(covariance: Array) -> Array:
     """The correlation matrix of a covariance matrix (p, p); NaN where a variance is 0."""
     std = np.sqrt(np.diag(covariance))
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -45,7 +45,7 @@ def unseen_variance(leverage: Array) -> float:
     return float(np.mean(1 / np.maximum(1 - leverage, 1e-12)))
 
 
-def undetermined(fit: Fit) -> str | None:
+def explain_undetermined(fit: Fit) -> str | None:
     """Why a small residual is no proof on this data, in words; None where the data determine the model."""
     if reason := magnetometer_coverage_warning(fit.table):
         return reason

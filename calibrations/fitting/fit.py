@@ -41,7 +41,7 @@ LEAST_FREEDOM = 3.0  # degrees: below, Student's t has no variance
 class Fit(Result):
     """A model fitted to a table. `residual` has shape (channels, n), rows in order of time.
 
-    `all_noise`: what standard uncertainties were taken from (`cautiously`); None where none were.
+    `all_noise`: what standard uncertainties were taken from (`in_all_noise`); None where none were.
     """
 
     model: Model
@@ -97,7 +97,7 @@ class Fit(Result):
 
         NaN in the rows and columns of parameters that the data do not determine.
         """
-        cautious = cautiously(self)
+        cautious = in_all_noise(self)
         matrix = covariance(cautious.information, self.problem.layout.typical)[0]
         wider = _wider(cautious)
         known = np.array([e.std is not None for e in self.params.values()])
@@ -271,13 +271,13 @@ def _alternate(problem: Problem, noise: Noise, starts: list[Array]) -> Fit:
         try:
             found = _alternate_unchecked(problem, noise, starts)
         except np.linalg.LinAlgError:
-            raise _unresolved(problem, starts[0]) from None
+            raise _unresolved_error(problem, starts[0]) from None
         if not (np.abs(found.jacobian) < LARGEST_CHANGE).all():
-            raise _unresolved(problem, starts[0])
+            raise _unresolved_error(problem, starts[0])
     return found
 
 
-def _unresolved(problem: Problem, theta: Array) -> ModelError:
+def _unresolved_error(problem: Problem, theta: Array) -> ModelError:
     """Names the parameter that changes the output most."""
     sizes = np.abs(problem.jacobian(theta)).max(axis=(0, 1))
     slot = problem.layout.slots[int(np.argmax(sizes))]  # a size that is no number is the largest
@@ -318,9 +318,9 @@ def _requests(model: Model) -> bool:
     """Whether a free form of the model has no sizes yet. Few models have a free form, and its modules load slowly."""
     if not any(term.name.startswith(PREFIX) for term in model.terms):
         return False
-    from calibrations.fitting.requested_forms import requested
+    from calibrations.fitting.requested_forms import find_requested
 
-    return bool(requested(model))
+    return bool(find_requested(model))
 
 
 def _free(problem: Problem, jacobian: Array) -> Array:
@@ -335,7 +335,7 @@ def _result(problem: Problem, theta: Array, noise: Noise) -> Fit:
 
 
 def _with_uncertainties(result: Fit) -> Fit:
-    cautious = cautiously(result)
+    cautious = in_all_noise(result)
     model = estimates(result.model, result.problem.layout, result.theta, cautious.information, _wider(cautious))
     return replace(result, model=model, all_noise=cautious.noise)
 
@@ -396,7 +396,7 @@ def _student_factors(fit: Fit) -> Array:
     return np.asarray(np.sqrt(freedom / (freedom - 2)))
 
 
-def cautiously(result: Fit) -> Fit:
+def in_all_noise(result: Fit) -> Fit:
     """The fit under all the noise that its residual shows, from which standard uncertainties are taken.
 
     Here nothing is set aside: where inclinations follow each other in time, smooth functions of the angles take up slow

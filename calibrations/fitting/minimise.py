@@ -28,7 +28,7 @@ def minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
     if not len(start):
         return start, 0.0
     if problem.keeps_starts or len(problem.layout.prior_rows):
-        return _determined(problem, noise, start)
+        return _minimise_determined(problem, noise, start)
     at_once = _at_once(problem, noise, start) if problem.adds else None
     if at_once is not None:
         return at_once
@@ -86,7 +86,7 @@ def _at_once(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
     return theta, float(end_residual @ end_residual) / 2
 
 
-def _determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
+def _minimise_determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
     """As `minimise`, by the shortest steps of Gauss and Newton, damped where they fail (Levenberg and Marquardt).
 
     What the data do not determine stays as it began.

@@ -74,7 +74,7 @@ def profile(grams: Array, other_gram: Array, free: int, least: float) -> tuple[A
             scaled = gram / levels[g] ** 2
             normal = scaled[:p, :p] + other_gram[:p, :p]
             sides = np.hstack((scaled[:p, p:] + other_gram[:p, p:], scaled[:p, :p]))
-            solved, logdets[g] = eliminated(normal, sides)
+            solved, logdets[g] = eliminate(normal, sides)
             theta = np.append(-solved[:, 0], 1.0)
             own_left[g], other_left[g] = theta @ gram @ theta, theta @ other_gram @ theta
             variance = max(own_left[g], 0.0) / max(free - np.trace(solved[:, 1:]), 1.0)
@@ -83,7 +83,7 @@ def profile(grams: Array, other_gram: Array, free: int, least: float) -> tuple[A
 
 
 @njit(cache=True, nogil=True)
-def eliminated(A: Array, B: Array) -> tuple[Array, float]:
+def eliminate(A: Array, B: Array) -> tuple[Array, float]:
     """A^-1 B (p, k) and log |det A| of a positive definite A (p, p), which needs no pivots.
 
     Rows and columns are brought to one size first: channels may differ in noise by as much as numbers can tell.
@@ -349,7 +349,7 @@ LEAST_WEIGHT = 1e-4
 
 def widening(noise: Noise, residual: Array, jacobian: Array, typical: Array) -> Array:
     """Factor on each standard uncertainty under `noise`, shape (p,), from residual (channels, n), jacobian (.., p)."""
-    points = [NO_SLOW] if noise.given else allowed(noise.gap_s)
+    points = [NO_SLOW] if noise.given else possible_slow_noise(noise.gap_s)
     if len(points) == 1 or not jacobian.shape[2]:
         return np.ones(jacobian.shape[2])
     search = NoiseSearch(noise, residual, (jacobian,), np.zeros((residual.shape[1], 0)), points)
@@ -362,7 +362,7 @@ def widening(noise: Noise, residual: Array, jacobian: Array, typical: Array) -> 
     return np.sqrt(np.where(wider > 0, wider, 1.0))  # what the data hardly determine has no variance to speak of
 
 
-def allowed(gap_s: Array) -> list[Point]:
+def possible_slow_noise(gap_s: Array) -> list[Point]:
     """Slow noise that rows so far apart may have."""
     if not long_enough(gap_s):
         return [NO_SLOW]

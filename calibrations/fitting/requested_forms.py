@@ -42,14 +42,14 @@ FLOOR_KNOWN = 0.02  # of the noise: a smaller change of a noise that only the re
 SMALLEST = 1e-3  # noise floors: what a form adds that the data do not show
 
 
-def requested(model: Model) -> tuple[RequestedForm, ...]:
+def find_requested(model: Model) -> tuple[RequestedForm, ...]:
     """The free forms of a model that have no sizes yet."""
     return tuple(term.effect for term in model.terms if isinstance(term.effect, RequestedForm))
 
 
 def without_requested(model: Model) -> Model:
     """The model without the free forms that have no sizes yet."""
-    for effect in requested(model):
+    for effect in find_requested(model):
         model = replace(model, terms=tuple(term for term in model.terms if term.effect is not effect))
     return model
 
@@ -59,8 +59,8 @@ def with_sizes(model: Model, smaller: Fit) -> Model:
 
     Raises ModelError with the data that would be needed.
     """
-    for effect in requested(model):
-        sized = estimated(smaller, effect)
+    for effect in find_requested(model):
+        sized = estimate_form(smaller, effect)
         terms = tuple(replace(term, effect=sized) if term.effect is effect else term for term in model.terms)
         model = replace(model, terms=terms)
     return model
@@ -80,7 +80,7 @@ def effects_beyond_base(fit: Fit) -> ModelEffects:
     return ModelEffects(contribution, -fit.jacobian[:, :, mask])
 
 
-def estimated(smaller: Fit, effect: RequestedForm) -> Effect:
+def estimate_form(smaller: Fit, effect: RequestedForm) -> Effect:
     """The free form with the sizes that the data of `smaller` show. Raises ModelError."""
     table = smaller.table
     if (reason := effect.excluded(table)) is not None:

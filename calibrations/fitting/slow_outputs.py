@@ -20,7 +20,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from calibrations.fitting.identifiability import gain
-from calibrations.fitting.noise_fit import NO_SLOW, allowed
+from calibrations.fitting.noise_fit import NO_SLOW, possible_slow_noise
 from calibrations.means.noise import Noise
 from calibrations.table import Array
 
@@ -32,7 +32,7 @@ def widen_by_magnitudes(noise: Noise, residual: Array, jacobian: Array, by_outpu
 
     From residual (1, n), jacobian (1, n, p) and derivatives by the outputs (1, n, axes).
     """
-    points = [NO_SLOW] if noise.given else allowed(noise.gap_s)
+    points = [NO_SLOW] if noise.given else possible_slow_noise(noise.gap_s)
     n, p = jacobian.shape[1:]
     if len(points) == 1 or not p or n <= p + 1:
         return np.ones(p)

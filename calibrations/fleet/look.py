@@ -27,7 +27,7 @@ from calibrations.discovery.patterns import patterns
 from calibrations.discovery.significance import Screen, Search, of_search
 from calibrations.discovery.structure import without_slow
 from calibrations.effects import Effect
-from calibrations.fitting.fit import Fit, cautiously
+from calibrations.fitting.fit import Fit, in_all_noise
 from calibrations.fitting.identifiability import covariance
 from calibrations.fitting.noise_fit import gains
 from calibrations.fitting.problem import Problem
@@ -242,7 +242,7 @@ def _unit(fit: Fit, unit: str) -> str:
 
 def information(fit: Fit) -> Array:
     """Inverse covariance (p, p) of the parameters, with the standard uncertainties that the fit states."""
-    cautious = cautiously(fit)
+    cautious = in_all_noise(fit)
     white = cautious.information
     white_std = np.sqrt(np.diag(covariance(white, fit.problem.layout.typical)[0]))
     stated_std = np.array([e.std or 0.0 for e in fit.params.values()])

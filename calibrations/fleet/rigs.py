@@ -175,7 +175,7 @@ def _effect(
 
 def _parameter(sensors: Sequence[Measured], y: Array, v: Array, name: tuple[str, str, str]) -> list[RigError]:
     """One parameter of every rig; nothing where the rigs cannot be compared."""
-    is_consistent = ~_far(sensors, y, v)
+    is_consistent = ~_are_far(sensors, y, v)
     sensors = [measured for measured, is_alike in zip(sensors, is_consistent, strict=True) if is_alike]
     y, v = y[is_consistent], v[is_consistent]
     batches, rigs = sorted({measured.batch for measured in sensors}), sorted({measured.rig for measured in sensors})
@@ -215,7 +215,7 @@ def _middle(values: Array) -> Array:
     return weights
 
 
-def _far(sensors: Sequence[Measured], y: Array, v: Array) -> NDArray[np.bool_]:
+def _are_far(sensors: Sequence[Measured], y: Array, v: Array) -> NDArray[np.bool_]:
     """Sensors far off the others of their batch on their rig, (n,)."""
     far = np.zeros(len(y), dtype=bool)
     places: dict[tuple[str, str], list[int]] = {}

@@ -211,7 +211,7 @@ def pool_siblings(theta: Array, information: Array, typical: Array) -> Pooled:
         siblings = []
         for k in range(theta.shape[1]):
             siblings.append(fit_siblings(*_estimate_alone(scaled, weighted, prior, mean, k)))
-            mean[:, k], prior[:, k] = _foretold(siblings[-1])
+            mean[:, k], prior[:, k] = _prior(siblings[-1])
         if np.all(np.abs(prior / previous - 1) < SETTLED):
             break
     own_covariance = np.linalg.inv(scaled)
@@ -228,7 +228,7 @@ def _estimate_alone(scaled: Array, weighted: Array, prior: Array, mean: Array, k
     return np.einsum("nj,nj->n", inverse, weighted + prior_of_others * mean), np.asarray(inverse[:, k])
 
 
-def _foretold(siblings: Siblings) -> tuple[Array | float, Array | float]:
+def _prior(siblings: Siblings) -> tuple[Array | float, Array | float]:
     """Prior of each sensor from its batch: mean and inverse variance; none for outliers."""
     if not siblings.pooled:
         return 0.0, WIDE**-2.0

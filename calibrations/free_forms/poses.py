@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from calibrations.geometry.orientation import one_orientation
-from calibrations.geometry.stage_path import AS_STATED, approached, last_turn, turning_points
+from calibrations.geometry.stage_path import AS_STATED, last_turn, turning_points, with_approach
 from calibrations.table import Array, Table
 
 USED = {"alpha_deg", "beta_deg", "mount_deg", "flip", "t_s", "direction", "temperature_c", "supply_v", "n", "path",
@@ -98,7 +98,7 @@ def _sides(table: Table) -> dict[float, Array]:
         return {}
     if "approach_deg" in table.constants:
         return {AS_STATED: last_turn(table)}
-    approach_side = last_turn(approached(table, 0.0))
+    approach_side = last_turn(with_approach(table, 0.0))
     if "direction" not in table or not table.column("direction").any():
         return {0.0: approach_side}
     logged = np.where(table.column("direction") != 0, table.column("direction"), approach_side)
@@ -107,9 +107,9 @@ def _sides(table: Table) -> dict[float, Array]:
 
 def turning_forces(table: Table, by_deg: float) -> Array:
     """Specific force where it turns round before each pose, g, shape (n, points, 3)."""
-    return turning_points(approached(table, by_deg))
+    return turning_points(with_approach(table, by_deg))
 
 
 def side(table: Table, by_deg: float) -> Array:
     """Side of the last move of beta, +-1, shape (n,): that of `direction` where the approach has a length."""
-    return last_turn(approached(table, by_deg))
+    return last_turn(with_approach(table, by_deg))

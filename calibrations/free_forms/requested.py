@@ -16,7 +16,7 @@ from calibrations.errors import nearest
 from calibrations.free_forms.effect import FreeForm, place_of
 from calibrations.free_forms.form import ANGLES
 from calibrations.free_forms.place_names import PLACES, PREFIX
-from calibrations.geometry.stage_path import approached, last_turn
+from calibrations.geometry.stage_path import last_turn, with_approach
 from calibrations.table import Table
 
 FEWEST_VALUES = 8  # of what drives a curve
@@ -136,7 +136,7 @@ def _short_sides(table: Table) -> str | None:
     if "direction" not in table and "t_s" not in table:
         return "needs the column direction, or t_s, to know from which side each pose was approached"
     logged = table.column("direction") if "direction" in table else np.zeros(table.n)
-    turn = np.where(logged != 0, logged, last_turn(approached(table, 0.0)))
+    turn = np.where(logged != 0, logged, last_turn(with_approach(table, 0.0)))
     if np.ptp(turn) > 0:
         return None
     return "needs poses that beta approaches from both sides, and here it comes from one only; turn both ways"

@@ -19,7 +19,7 @@ AS_STATED = -1.0  # an approach as the table states it
 
 
 @lru_cache(maxsize=64)
-def approached(table: Table, by_deg: float) -> Table:
+def with_approach(table: Table, by_deg: float) -> Table:
     """The table with an approach that begins so many degrees before each pose; the table itself for `AS_STATED`."""
     return table if by_deg < 0 else replace(table, constants={**table.constants, "approach_deg": by_deg})
 

@@ -61,7 +61,7 @@ def _on_grid(values: Array, step: float, rounding: float) -> bool:
 
 def likely_unit(name: str, values: Array) -> str:
     """The unit that fits numbers that are unlikely in V, deg, degC or m; "" where they are likely."""
-    doubt = _unlikely(name, values)
+    doubt = _doubt_about(name, values)
     return doubt[1] if doubt else ""
 
 
@@ -93,7 +93,7 @@ def covers_all_directions(outputs: Array) -> bool:
 
 
 def _doubt(name: str, values: Array, has_unit: bool) -> Doubt | None:
-    return _impossible(name, values) or (None if has_unit else _unlikely(name, values))
+    return _impossible(name, values) or (None if has_unit else _doubt_about(name, values))
 
 
 def _impossible(name: str, values: Array) -> Doubt | None:
@@ -104,7 +104,7 @@ def _impossible(name: str, values: Array) -> Doubt | None:
     return None
 
 
-def _unlikely(name: str, values: Array) -> Doubt | None:
+def _doubt_about(name: str, values: Array) -> Doubt | None:
     check = UNIT_CHECKS.get(column_unit(name)) if name in NUMBERS else None
     return check(values) if check else None
 

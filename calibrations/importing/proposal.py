@@ -204,11 +204,11 @@ def guess_by_values(values: Mapping[str, Array], kind: str) -> list[tuple[str, s
         guesses += list(zip(angles[:2], ("alpha_deg", "beta_deg"), strict=False))
         remaining = {name: v for name, v in remaining.items() if name not in angles[:2]}
         outputs = list(remaining.values())[:1]
-        remaining = {name: v for name, v in remaining.items() if _alike(v, outputs[0])}
+        remaining = {name: v for name, v in remaining.items() if _resembles_output(v, outputs[0])}
     return [*guesses, *zip(remaining, KINDS[kind].outputs, strict=False)]
 
 
-def _alike(values: Array, output: Array) -> bool:
+def _resembles_output(values: Array, output: Array) -> bool:
     """Whether numbers come near the range of an output; a temperature beside voltages does not."""
     margin = max(float(np.ptp(output)), float(np.ptp(values)), float(np.abs(output).max()))
     return bool(values.min() <= output.max() + margin and values.max() >= output.min() - margin)

@@ -144,7 +144,7 @@ class Noise:
 
     def _whiten_channel(self, c: int, columns: Array) -> tuple[Array, float]:
         known_processes = self.given[c] if self.given else ()
-        return correlated(columns, self.gap_s, self.fast[c], float(self.slow[c]), self.taus_s[c], known_processes)
+        return whiten_columns(columns, self.gap_s, self.fast[c], float(self.slow[c]), self.taus_s[c], known_processes)
 
     def _processes(self, c: int) -> Processes:
         return processes(float(self.slow[c]), self.taus_s[c], self.given[c] if self.given else ())
@@ -156,7 +156,7 @@ class Noise:
         return sum(self._whiten_channel(c, no_columns)[1] for c in range(len(self.white)))
 
 
-def correlated(
+def whiten_columns(
     columns: Array, gap_s: Array, fast: Array, slow: float, taus_s: tuple[float, ...], known_noise: Processes = ()
 ) -> tuple[Array, float]:
     """Columns (n, k) of one channel made white, and log det Sigma."""
@@ -292,7 +292,7 @@ def measured_inflation(blocks: Array) -> tuple[Array, Array]:
     n = blocks.shape[1]
     lags = n // 4 + 1
     covariance = np.mean([autocovariance(block.T, lags) for block in blocks], axis=0) * n / (n - np.arange(lags))
-    factor, last = (np.array(values) for values in zip(*(_summed(c, n) for c in covariance), strict=True))
+    factor, last = (np.array(values) for values in zip(*(_sum_autocovariance(c, n) for c in covariance), strict=True))
     return factor, factor * np.sqrt(2 * (2 * last + 1) / (len(blocks) * n))
 
 
@@ -304,7 +304,7 @@ def autocovariance(x: Array, lags: int) -> Array:
     return np.asarray(np.fft.irfft(spectrum.real**2 + spectrum.imag**2, size)[..., :lags] / n)
 
 
-def _summed(covariance: Array, n: int) -> tuple[float, int]:
+def _sum_autocovariance(covariance: Array, n: int) -> tuple[float, int]:
     """Inflation from one channel's autocovariance, and the last lag that is in it."""
     if not covariance[0] > 0:
         return float("nan"), 0

@@ -84,7 +84,7 @@ def sensed(a: Array, table: Table, steps: Sequence[Step]) -> Array:
 
 def respond(a: Array, table: Table, steps: Sequence[Step]) -> Array:
     """Output of all three axes to the specific force `a` along the sensing axes, shape (n, 3)."""
-    return converted(effect_contributions(a, table, steps), len(a), table, steps)
+    return convert_output(effect_contributions(a, table, steps), len(a), table, steps)
 
 
 def effect_contributions(a: Array, table: Table, steps: Sequence[Step]) -> list[Array]:
@@ -108,7 +108,9 @@ def _apply_stages(a: Array, table: Table, steps: Sequence[Step]) -> tuple[list[A
             if stage_of(effect) == stage
         }
         of_force = [part for i, part in stage_parts.items() if steps[i][0].of_force]
-        forces.append(scaled(forces[stage], sum(of_force, np.zeros((1, 3))), steps) if of_force else forces[stage])
+        forces.append(
+            add_response(forces[stage], sum(of_force, np.zeros((1, 3))), steps) if of_force else forces[stage]
+        )
         parts |= stage_parts
     return forces, [parts[i] for i in range(len(steps))]
 
@@ -128,13 +130,13 @@ def _apply_transduction(effect: Effect, table: Table, p: Values, a: Array) -> Ar
     return effect.transduction(a, table, p)
 
 
-def scaled(a: Array, response: Array, steps: Sequence[Step]) -> Array:
+def add_response(a: Array, response: Array, steps: Sequence[Step]) -> Array:
     """The force `a` and the force, g, that would give a response (n, 3) in the output's unit; `a` without a scale."""
     scale = next((np.asarray(p["scale"]) for effect, p in steps if effect.name == "scale-factor"), np.zeros(3))
     return a + response * (1 / np.where(scale == 0, np.inf, scale))
 
 
-def converted(parts: Sequence[Array], n: int, table: Table, steps: Sequence[Step]) -> Array:
+def convert_output(parts: Sequence[Array], n: int, table: Table, steps: Sequence[Step]) -> Array:
     """The output after converter and filter for the sum of the parts, shape (n, 3)."""
     v = np.zeros((n, 3))
     for part in parts:
@@ -234,7 +236,7 @@ class LinearisedChain:
         if not self._has_output_stage:
             return np.ones((self.table.n, axes))
         h = 1e-6 * (float(np.ptp(total)) or 1.0)
-        plus, minus = (converted([total + s * h], self.table.n, self.table, self.steps) for s in (1.0, -1.0))
+        plus, minus = (convert_output([total + s * h], self.table.n, self.table, self.steps) for s in (1.0, -1.0))
         return np.asarray((plus - minus)[:, :axes] / (2 * h))
 
     @cached_property
@@ -270,7 +272,7 @@ class LinearisedChain:
             if stage_of(effect) == stage:
                 part_of = partial(_apply_transduction, effect, self.table, p)
                 total = total + staged_part(stage, part_of, a, a + unit) - part_of(a)
-        return scaled(unit, total, self.steps)
+        return add_response(unit, total, self.steps)
 
     def _columns_of(self, effect: Effect) -> Mapping[str, Array] | None:
         """d contribution / d each parameter of an effect that is linear in them, shape (n, 3) each; else None."""
@@ -306,7 +308,7 @@ class LinearisedChain:
             parts = [self._contribution(effect, values)]
         else:
             parts = [*self._added[:term], self._contribution(effect, values), *self._added[term + 1 :]]
-        return converted(parts, self.table.n, self.table, steps)[:, : len(self.table.axes)]
+        return convert_output(parts, self.table.n, self.table, steps)[:, : len(self.table.axes)]
 
     def change(self, term: int, upper: Values, lower: Values) -> Array:
         """Output with the `upper` values of one effect less the output with the `lower` ones, first order, (n, axes).
@@ -382,6 +384,8 @@ class LinearisedChain:
         """Change of the output, shape (n, axes), by a small change of the sum of all parts, (n, 3)."""
         axes, n = len(self.table.axes), self.table.n
         if self.table.type.moving or any(effect.rounds for effect, _ in self.steps):
-            plus, minus = (converted([self._total + s * change / 2], n, self.table, self.steps) for s in (1.0, -1.0))
+            plus, minus = (
+                convert_output([self._total + s * change / 2], n, self.table, self.steps) for s in (1.0, -1.0)
+            )
             return np.asarray((plus - minus)[:, :axes])
         return np.asarray(self._slope * change[:, :axes])

@@ -65,10 +65,10 @@ def find_records(table: Table) -> tuple[Record, ...]:
             f"{table.source}: no record lasts {SHORTEST_MOTION_S:g} s at one attitude without a gap; "
             "record the motion longer"
         )
-    return tuple(_checked(table, t, a, b) for a, b in long)
+    return tuple(_check_record(table, t, a, b) for a, b in long)
 
 
-def _checked(table: Table, t: Array, first: int, end: int) -> Record:
+def _check_record(table: Table, t: Array, first: int, end: int) -> Record:
     part = t[first:end]
     rate_hz = (len(part) - 1) / float(part[-1] - part[0])
     lateness = np.abs(part - part[0] - np.arange(len(part)) / rate_hz)

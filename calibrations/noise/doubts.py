@@ -214,7 +214,7 @@ def _information(search: Search, name: str, rivals: tuple[str, ...], length_s: f
 def _deviance_of_wrong(true_fit: ChannelFit, rival_fit: ChannelFit, length_s: float) -> float:
     """Deviance of the wrong effects on what the right ones expect of a record of this length."""
     channel = longer_channel(true_fit.channel, length_s)
-    truth = replace(true_fit, channel=channel, parts=(_slow(channel),), lines=(), fits={})
+    truth = replace(true_fit, channel=channel, parts=(_slow_bands(channel),), lines=(), fits={})
     bands = replace(truth.parts[0], density=truth.expected)
     return fit_effects(replace(truth, parts=(bands,), fits={}), rival_fit.effects).deviance
 
@@ -226,7 +226,7 @@ def longer_channel(channel: Channel, length_s: float) -> Channel:
     return replace(channel, n=n, size=size, means=np.zeros(n // size))
 
 
-def _slow(channel: Channel) -> Bands:
+def _slow_bands(channel: Channel) -> Bands:
     return slow_bands(channel.means, channel.sampling, channel.corner_hz)
 
 

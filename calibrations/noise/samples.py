@@ -317,7 +317,7 @@ def oddities(
     if stuck is not None and hidden_noise is None:  # below a step, samples are the same for long
         start_s, length_s = stuck.start / rate_hz, stuck.length / rate_hz
         text = f"{stuck.length} samples from t = {start_s:.6g} s on are equal, for {length_s:.4g} s"
-        result.append(Oddity(CONSTANT, text, stuck.length / n > _uncertain(n)))
+        result.append(Oddity(CONSTANT, text, stuck.length / n > _relative_uncertainty(n)))
     if hidden_noise is not None:
         result.append(Oddity(COARSE, hidden_noise.text, True, hidden_noise))
     return tuple(result)
@@ -330,9 +330,9 @@ def _wild(wild: Wild, n: int, rate_hz: float, variance: float) -> Oddity:
         f"{count_words} far from the neighbours: by up to {wild.deviations:.3g} standard deviations at "
         f"t = {wild.wildest / rate_hz:.6g} s (sample {wild.wildest + 1}): {100 * share:.2g} % of the noise's power"
     )
-    return Oddity(WILD, text, share > _uncertain(n))
+    return Oddity(WILD, text, share > _relative_uncertainty(n))
 
 
-def _uncertain(n: int) -> float:
+def _relative_uncertainty(n: int) -> float:
     """Relative standard uncertainty of the power of white noise, of n samples."""
     return float(np.sqrt(2 / n))

@@ -215,7 +215,7 @@ def single_chart(panel: Panel, height: float = 3.8) -> Chart:
     return Chart(((panel,),), height)
 
 
-def stacked(panels: Sequence[Panel], height: float, share_x: bool = True, bar: Scale | None = None) -> Chart:
+def stack_panels(panels: Sequence[Panel], height: float, share_x: bool = True, bar: Scale | None = None) -> Chart:
     """Panels below each other."""
     return Chart(tuple((panel,) for panel in panels), height, share_x=share_x, bar=bar)
 

@@ -61,7 +61,9 @@ def figure(chart: c.Chart, keep: str, drag: Literal["select", "zoom", False] = "
         _panel(panel, "" if number == 1 else str(number), x_domain, y_domain, data, layout)
         if len(places) > 1 and (panel.title or panel.remark):
             layout["margin"]["t"] = TITLE_PX + LEGEND_PX
-            layout["annotations"] += [_referred(title, str(number) if number > 1 else "") for title in _titles(panel)]
+            layout["annotations"] += [
+                _refer_to_panel(title, str(number) if number > 1 else "") for title in _titles(panel)
+            ]
     _share_axes(chart, layout)
     _one_bar_a_scale(data)
     return {"data": data, "layout": layout, "config": CONFIG}
@@ -122,8 +124,8 @@ def _panel(panel: c.Panel, number: str, x: Any, y: Any, data: list[Trace], layou
     for series in panel.series:
         traces, shapes, notes = _series(series, panel)
         data += [{**trace, **axes, "legend": f"legend{number}"} if number else trace for trace in traces]
-        layout["shapes"] += [_referred(shape, number) for shape in shapes]
-        layout["annotations"] += [_referred(note, number) for note in notes]
+        layout["shapes"] += [_refer_to_panel(shape, number) for shape in shapes]
+        layout["annotations"] += [_refer_to_panel(note, number) for note in notes]
     for side, axis, domain, other in (("x", panel.x, x, "y"), ("y", panel.y, y, "x")):
         settings = _axis(axis) | ({"domain": domain} if domain else {})
         layout[f"{side}axis{number}"] = settings | ({"anchor": f"{other}{number}"} if number else {})
@@ -137,7 +139,7 @@ def _panel(panel: c.Panel, number: str, x: Any, y: Any, data: list[Trace], layou
         layout["margin"] |= {"t": 20, "b": 24}
 
 
-def _referred(shape: dict[str, Any], number: str) -> dict[str, Any]:
+def _refer_to_panel(shape: dict[str, Any], number: str) -> dict[str, Any]:
     """The shape or annotation on the axes of its panel."""
     return {
         name: f"{value}{number}" if value in ("x", "y") else f"{value[0]}{number} domain" if value in DOMAINS else value

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from calibrations.discovery.findings import FittedModel
-from calibrations.fitting.budget import make_budget, normalised, parameter_correlation
-from calibrations.fitting.fit import Fit, cautiously
+from calibrations.fitting.budget import correlation_matrix, make_budget, parameter_correlation
+from calibrations.fitting.fit import Fit, in_all_noise
 from calibrations.fitting.identifiability import covariance
 from calibrations.fitting.inputs import input_contributions
 from calibrations.model import Estimate, Model, Term
@@ -137,14 +137,14 @@ def _matrices(fit: FittedModel) -> Iterator[tuple[list[str], Array]]:
         for channel in fit.channels:
             if channel.effects:
                 keys, matrix = power_covariance(channel)
-                yield [_name(effect, name, channel.channel.axis) for effect, name in keys], normalised(matrix)
+                yield [_name(effect, name, channel.channel.axis) for effect, name in keys], correlation_matrix(matrix)
 
 
 def _of_rows(fit: Fit) -> Array:
     inputs: Any = input_contributions(fit.table) if fit.table.type.budget else ()
     if inputs and (budget := make_budget(fit, inputs)).given:
         return parameter_correlation(fit, budget, inputs)
-    return normalised(covariance(cautiously(fit).information, fit.problem.layout.typical)[0])
+    return correlation_matrix(covariance(in_all_noise(fit).information, fit.problem.layout.typical)[0])
 
 
 def _name(effect: str, parameter: str, axis: str) -> str:

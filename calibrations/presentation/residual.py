@@ -60,11 +60,11 @@ def columns(fit: Fit) -> list[Column]:
         name, label, column = table.type.drawn_over
         first = [_column(name, label, table.column(column), n)]
     elif table.type.magnitude:
-        first = _sensed(fit, "a")
+        first = _sensed_column(fit, "a")
     return first + _logged_columns(table, n)
 
 
-def _sensed(fit: Fit, letter: str) -> list[Column]:
+def _sensed_column(fit: Fit, letter: str) -> list[Column]:
     """The sensed quantity along each axis, named by a letter and the axis."""
     axis_label, n = fit.table.type.sensed_along, len(fit.channels)
     return [_column(letter + k, axis_label.format(k), a, n) for k, a in zip(AXES, specific_force(fit).T, strict=True)]
@@ -80,7 +80,7 @@ def select_telling_columns(fit: Fit, effect: Effect) -> list[Column]:
     if table.type.moving:  # the explained part repeats in every stretch
         return columns(fit)[:1] + drivers
     if table.type.turning:
-        return _sensed(fit, "w") + drivers
+        return _sensed_column(fit, "w") + drivers
     if not table.type.stage_angles:
         return columns(fit)[:3] + drivers
     a = specific_force(fit)
@@ -124,7 +124,7 @@ def choices(fit: Fit) -> dict[str, Column]:
     table, n = fit.table, len(fit.channels)
     by_name = {column.name: column for column in columns(fit)}
     if table.type.stage_angles:
-        by_name |= {column.name: column for column in _sensed(fit, "a")}
+        by_name |= {column.name: column for column in _sensed_column(fit, "a")}
     elif not table.type.moving:
         by_name["axis"] = nearest_axis(fit)
     driver_columns = {"beta_deg" if name == "beta" else name for name in by_name}

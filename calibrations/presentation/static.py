@@ -75,7 +75,7 @@ class NotebookFigure(Figure):
     """A figure that a notebook shows, also where nothing has imported pyplot, which tells a notebook how to."""
 
     def _repr_png_(self) -> bytes:
-        return _saved(self, "png", dpi="figure")
+        return _savefig(self, "png", dpi="figure")
 
 
 def draw(chart: c.Chart) -> Figure:
@@ -156,10 +156,10 @@ def save_all(charts: Mapping[str, c.Chart], folder: Path, form: str) -> list[Pat
 
 
 def _bytes(chart: c.Chart, form: str, metadata: dict[str, None]) -> bytes:
-    return _saved(draw(chart), form, metadata=metadata)
+    return _savefig(draw(chart), form, metadata=metadata)
 
 
-def _saved(figure: Figure, form: str, **layout: Any) -> bytes:
+def _savefig(figure: Figure, form: str, **layout: Any) -> bytes:
     page = io.BytesIO()
     with rc_context(RC):
         figure.savefig(page, format=form, **layout)
@@ -357,26 +357,26 @@ FINE = re.compile(r"(\.\d\d)\d+")
 
 def compact(text: str) -> str:
     """The same drawing in about a third of the bytes."""
-    text = MARKERS.sub(_hoisted, text)
-    text = POINTS.sub(_in_one_group, text)
-    text = COORDINATES.sub(_rounded, text)
+    text = MARKERS.sub(_hoist_style, text)
+    text = POINTS.sub(_merge_groups, text)
+    text = COORDINATES.sub(_round_attribute, text)
     return re.sub(r">\n\s+<", ">\n<", text)
 
 
-def _hoisted(match: re.Match[str]) -> str:
+def _hoist_style(match: re.Match[str]) -> str:
     """The markers of one line, their common style given once."""
     attributes, markers, style = match.groups()
     repeated = f' style="{style}"'
     return f"<g{attributes}{repeated}>{markers.replace(repeated, '')}</g>"
 
 
-def _in_one_group(match: re.Match[str]) -> str:
+def _merge_groups(match: re.Match[str]) -> str:
     """Neighbouring markers of the same style in one group."""
     opening, markers = match[1], match[0]
     return f"{opening}{markers.replace(opening, '').replace('</g>', '')}</g>"
 
 
-def _rounded(match: re.Match[str]) -> str:
+def _round_attribute(match: re.Match[str]) -> str:
     """One attribute with its numbers cut to two decimals, on one line."""
     return " " + " ".join(FINE.sub(r"\1", match[0]).split())
 

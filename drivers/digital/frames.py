@@ -116,7 +116,7 @@ class Frames:
             if length == 0:
                 gap, start = True, start + 1
                 continue
-            if length is None or not (n := _alike(array[start:], length, self.framing.head)):
+            if length is None or not (n := _count_alike(array[start:], length, self.framing.head)):
                 break
             starts.append(start + length * np.arange(n))
             lengths.append(np.full(n, length))
@@ -172,7 +172,7 @@ class FrameDecoder:
 _NONE = np.empty(0, dtype=np.int64)
 
 
-def _alike(array: Bytes, length: int, head: int) -> int:
+def _count_alike(array: Bytes, length: int, head: int) -> int:
     """How many whole frames with the head of the first one follow each other."""
     rows = array[: len(array) // length * length].reshape(-1, length)
     if not len(rows):

@@ -261,7 +261,7 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
             )
         end = self.settings.range
         if end is not None and (
-            saturated := [n for k, n in enumerate(names) if n in FORCES and _most(values[:, k]) >= end]
+            saturated := [n for k, n in enumerate(names) if n in FORCES and _largest(values[:, k]) >= end]
         ):
             raise OverRange(
                 f"{self.name}: {saturated[0]} reached the end of its range, "
@@ -287,7 +287,7 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         return next((name for name in names if self._equal[name][1] >= STUCK), "")
 
 
-def _most(values: NDArray[np.float64]) -> float:
+def _largest(values: NDArray[np.float64]) -> float:
     return float(np.abs(values).max())
 
 

@@ -33,14 +33,14 @@ def checksum(text: str) -> int:
 def fields(line: str, style: str) -> dict[Column, float]:
     """The numbers of a line by column: its number from 1, or its name. Raises ValueError for a damaged line."""
     if style == "named":
-        return {name: float(value) for name, value in PAIR.findall(line)} or _none(line)
+        return {name: float(value) for name, value in PAIR.findall(line)} or _refuse_line(line)
     if style == "teleplot":
         name, _, value_text = line.removeprefix(">").partition(":")
         value = value_text.partition("|")[0].partition("§")[0].rpartition(":")[2]
-        return {name: float(value)} if line.startswith(">") and name else _none(line)
+        return {name: float(value)} if line.startswith(">") and name else _refuse_line(line)
     if style == "nmea":
         line = _check_line(line).partition(",")[2]
-    return _numbers(_cells(line)) or _none(line)
+    return _numbers(_cells(line)) or _refuse_line(line)
 
 
 def _cells(line: str) -> list[str]:
@@ -65,7 +65,7 @@ def _check_line(line: str) -> str:
     return text
 
 
-def _none(line: str) -> dict[Column, float]:
+def _refuse_line(line: str) -> dict[Column, float]:
     raise ValueError(f"{line!r} has no number")
 
 

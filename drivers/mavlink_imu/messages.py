@@ -56,7 +56,7 @@ class Message:
         return np.dtype([*self.fields])
 
 
-def _scaled(name: str, number: int, extra: int) -> Message:
+def _scaled_message(name: str, number: int, extra: int) -> Message:
     return Message(name, number, extra, 22, [("time", "<u4"), *_TRIADS, ("temperature", "<i2")])
 
 
@@ -81,9 +81,9 @@ IMU = {
     for message in (
         HIGHRES_IMU,
         RAW_IMU,
-        _scaled("SCALED_IMU", 26, 170),
-        _scaled("SCALED_IMU2", 116, 76),
-        _scaled("SCALED_IMU3", 129, 46),
+        _scaled_message("SCALED_IMU", 26, 170),
+        _scaled_message("SCALED_IMU2", 116, 76),
+        _scaled_message("SCALED_IMU3", 129, 46),
     )
 }
 HEARTBEAT = Message(

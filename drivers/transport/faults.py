@@ -204,17 +204,17 @@ def babble(sent: Message, size: float, wire: Wire) -> list[Message]:
     return [Message(long.data[k : k + 1], sent.due_s + k * size) for k in range(len(long.data))]
 
 
-def truncated(sent: Message, size: float, _wire: Wire) -> list[Message]:
+def truncate(sent: Message, size: float, _wire: Wire) -> list[Message]:
     """The first `size` bytes of it."""
     return [Message(sent.data[: int(size)], sent.due_s)]
 
 
-def merged(sent: Message, _size: float, _wire: Wire) -> list[Message]:
+def join_copy(sent: Message, _size: float, _wire: Wire) -> list[Message]:
     """The message and its copy in one piece."""
     return [Message(2 * sent.data, sent.due_s)]
 
 
-def trickled(sent: Message, size: float, _wire: Wire) -> list[Message]:
+def trickle(sent: Message, size: float, _wire: Wire) -> list[Message]:
     """Byte by byte, one every `size` s; a long one in MOST_PIECES equal pieces."""
     step = -(-len(sent.data) // MOST_PIECES)
     starts = range(0, len(sent.data), step)
@@ -261,9 +261,9 @@ EFFECTS: dict[str, tuple[Kind, Effect]] = {
         Kind("sends random bytes for a minute instead of an answer, one each interval", 0.01, "s", least=0.001),
         babble,
     ),
-    "truncated": (Kind("only the first bytes of its answer arrive", 4, "byte", least=1), truncated),
-    "merged": (Kind("its answer arrives twice in one piece"), merged),
-    "trickle": (Kind("its answer arrives byte by byte, at this interval", 0.002, "s", least=0), trickled),
+    "truncated": (Kind("only the first bytes of its answer arrive", 4, "byte", least=1), truncate),
+    "merged": (Kind("its answer arrives twice in one piece"), join_copy),
+    "trickle": (Kind("its answer arrives byte by byte, at this interval", 0.002, "s", least=0), trickle),
     "flipped-bit": (Kind("this bit of every answer is inverted; TCP corrects it", 13, "bit", least=0), flip_bit),
     "wrong-unit": (Kind("another unit answers; its number is larger by this", 1), other_unit),
 }

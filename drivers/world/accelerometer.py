@@ -136,7 +136,7 @@ class OutOfPlane:
 
 
 @kernel
-def divided(plates: Plates, overlap: float, u: float) -> float:
+def divide_voltage(plates: Plates, overlap: float, u: float) -> float:
     """Share of the voltage at a finger displaced by u (of the gap), with a relative overlap."""
     nearer = overlap * (1 + plates.plate_mismatch_fraction) / (1 - u)
     farther = overlap * (1 - plates.plate_mismatch_fraction) / (1 + u)
@@ -145,7 +145,7 @@ def divided(plates: Plates, overlap: float, u: float) -> float:
 
 @kernel
 def slope(plates: Plates) -> float:
-    """Slope of `divided` at rest, which the factory trims."""
+    """Slope of `divide_voltage` at rest, which the factory trims."""
     plate_sum = 2 + plates.stray_fraction
     return 2 / plate_sum - (2 * plates.plate_mismatch_fraction / plate_sum) ** 2
 
@@ -160,7 +160,7 @@ def read_v(
     overlap = (
         1 - 1e-6 * plates.overlap_loss_per_um2 * height_change_nm2 + 1e-3 * plates.overlap_slide_per_um * neighbour_nm
     )
-    change = divided(plates, overlap, x_nm / gap_nm) - divided(plates, 1.0, 0.0)
+    change = divide_voltage(plates, overlap, x_nm / gap_nm) - divide_voltage(plates, 1.0, 0.0)
     seen_nm = gap_nm * change / slope(plates)
     seen_nm = math.copysign(max(0.0, abs(seen_nm) - plates.dead_band_nm), seen_nm)
     volts = plates.zero_g_v + plates.sensitivity_v_per_g * seen_nm / per_g_nm(resonance_hz)

@@ -37,6 +37,6 @@ def trims(names: Sequence[str], trims_by_name: Mapping[str, Trim]) -> list[Trim]
     return [trims_by_name[name] for name in names]
 
 
-def trimmed(volts: Floats, trims: Sequence[Trim]) -> Floats:
+def trim_outputs(volts: Floats, trims: Sequence[Trim]) -> Floats:
     """Outputs in g, deg/s, uT and V, shape (n, outputs)."""
     return np.asarray((volts - [trim.zero_v for trim in trims]) / [trim.gain_v for trim in trims])

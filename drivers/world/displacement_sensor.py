@@ -58,7 +58,7 @@ READINGS = 1000  # that are averaged at each
 FOOT_SHARE, PEAK_SHARE = 0.02, 0.95  # of the highest reading: only what is between them is used
 
 
-def measured(probe: FibreProbe, random: np.random.Generator) -> tuple[Floats, Floats]:
+def measure_curve(probe: FibreProbe, random: np.random.Generator) -> tuple[Floats, Floats]:
     """Gaps in um and volts, rounded as in the certificate."""
     gaps = GAPS_UM + WANDER_UM * random.standard_normal(len(GAPS_UM))
     numbers = record(probe)
@@ -69,7 +69,7 @@ def measured(probe: FibreProbe, random: np.random.Generator) -> tuple[Floats, Fl
 
 def certificate(probe: FibreProbe, seed: int = 63) -> str:
     """The curve as a YAML document that `philtec_d63.Curve` reads."""
-    gaps, volts = measured(probe, np.random.Generator(np.random.PCG64(seed)))
+    gaps, volts = measure_curve(probe, np.random.Generator(np.random.PCG64(seed)))
     highest = int(np.argmax(volts))
     used = (volts > FOOT_SHARE * volts[highest]) & (volts < PEAK_SHARE * volts[highest])
     points = [f"  - [{gap:.2f}, {volt:.4f}]" for gap, volt in zip(gaps, volts, strict=True)]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from drivers.world.kernel import kernel, wandered
+from drivers.world.kernel import kernel, step_wander
 from drivers.world.state import State
 
 
@@ -85,6 +85,6 @@ class Supply:
 @kernel
 def supply_tick(world: State, supply: Supply, t_s: float, step_s: float, normal: float) -> None:
     """Advance the supply by one tick that ends at `t_s`."""
-    world.supply_wander_v = wandered(world.supply_wander_v, supply.wander_v, supply.wander_s, step_s, normal)
+    world.supply_wander_v = step_wander(world.supply_wander_v, supply.wander_v, supply.wander_s, step_s, normal)
     cycle = supply.cycle_v * math.sin(2 * math.pi * t_s / supply.cycle_s)
     world.supply_v = supply.nominal_v + supply.drift_v_per_h * t_s / 3600 + cycle + world.supply_wander_v

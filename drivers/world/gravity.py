@@ -131,7 +131,7 @@ class Seating:
     grip_pm: float = 0.0  # displacement of the mass along each sensing axis
 
 
-def seated(seating: Seating, seed: int, place: int, now_ns: int) -> tuple[Floats, Floats]:
+def seat_mounting(seating: Seating, seed: int, place: int, now_ns: int) -> tuple[Floats, Floats]:
     """(rotation of the plate, displacement in nm) of a mounting at `now_ns`; time and seed alone settle it."""
     tilts_deg = seating.tilt_deg * np.random.default_rng([seed, TILT, now_ns]).standard_normal(3)
     grips_pm = seating.grip_pm * np.random.default_rng([seed, GRIP, now_ns, place]).standard_normal(2)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from drivers.world.kernel import kernel, lagged, wandered
+from drivers.world.kernel import follow_lag, kernel, step_wander
 
 
 @dataclass(frozen=True)
@@ -82,14 +82,14 @@ def heater_power(warmth: Warmth, oven: Oven, step_s: float) -> float:
 @kernel
 def tick(warmth: Warmth, heat: Heat, oven: Oven, powered: int, t_s: float, step_s: float, normal: float) -> None:
     """Advance all temperatures by one tick that ends at `t_s`, during which the sensor was `powered` or not."""
-    warmth.wander_k = wandered(warmth.wander_k, heat.ambient_wander_k, heat.ambient_wander_s, step_s, normal)
+    warmth.wander_k = step_wander(warmth.wander_k, heat.ambient_wander_k, heat.ambient_wander_s, step_s, normal)
     heated = ambient_c(heat, t_s, warmth.wander_k) + oven.heater_k * heater_power(warmth, oven, step_s)
-    warmth.chamber_c = lagged(warmth.chamber_c, heated, step_s, heat.chamber_lag_s)
-    warmth.body_c = lagged(warmth.body_c, warmth.chamber_c, step_s, heat.body_lag_s)
-    warmth.board_k = lagged(warmth.board_k, powered * heat.board_rise_k, step_s, heat.board_rise_s)
-    warmth.package_k = lagged(warmth.package_k, powered * heat.package_rise_k, step_s, heat.package_rise_s)
+    warmth.chamber_c = follow_lag(warmth.chamber_c, heated, step_s, heat.chamber_lag_s)
+    warmth.body_c = follow_lag(warmth.body_c, warmth.chamber_c, step_s, heat.body_lag_s)
+    warmth.board_k = follow_lag(warmth.board_k, powered * heat.board_rise_k, step_s, heat.board_rise_s)
+    warmth.package_k = follow_lag(warmth.package_k, powered * heat.package_rise_k, step_s, heat.package_rise_s)
     case_c = warmth.body_c + warmth.board_k + heat.thermocouple_offset_k
-    warmth.thermocouple_c = lagged(warmth.thermocouple_c, case_c, step_s, heat.thermocouple_lag_s)
+    warmth.thermocouple_c = follow_lag(warmth.thermocouple_c, case_c, step_s, heat.thermocouple_lag_s)
     warmth.glue_c = min(max(warmth.glue_c, die_c(warmth) - heat.glue_play_k / 2), die_c(warmth) + heat.glue_play_k / 2)
 
 

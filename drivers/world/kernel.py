@@ -39,7 +39,7 @@ def kernel(function: Function) -> Function:
         settings.CACHE_DIR = folder  # type: ignore[attr-defined]
 
 
-def shared(function: Function) -> Function:
+def share_with_kernels(function: Function) -> Function:
     """A function that kernels compile as a part of them, and that Python runs as it is: on settings and on records."""
     return register_jitable(function)
 
@@ -75,13 +75,13 @@ def _contents(values: Any) -> Any:
 
 
 @kernel
-def lagged(value: float, target: float, step_s: float, lag_s: float) -> float:
+def follow_lag(value: float, target: float, step_s: float, lag_s: float) -> float:
     """`value` after following a constant `target` for `step_s`."""
     return target if lag_s <= 0 else target + (value - target) * math.exp(-step_s / lag_s)
 
 
 @kernel
-def wandered(value: float, rms: float, time_s: float, step_s: float, normal: float) -> float:
+def step_wander(value: float, rms: float, time_s: float, step_s: float, normal: float) -> float:
     """An Ornstein-Uhlenbeck process, one exact step on: correlation time `time_s`, stationary `rms`."""
     memory = math.exp(-step_s / time_s)
     return memory * value + rms * math.sqrt(1 - memory * memory) * normal

@@ -18,8 +18,8 @@ from numpy.random import Generator
 
 from drivers.world import accelerometer, disturbances, gravity, heat, noise, positioner, stage, turned_sensors
 from drivers.world.config import SensingAxis, Stages, WorldConfig
-from drivers.world.kernel import Floats, kernel, lagged
-from drivers.world.pickup import acceleration_g, passed, shakes
+from drivers.world.kernel import Floats, follow_lag, kernel
+from drivers.world.pickup import acceleration_g, low_pass, shakes
 from drivers.world.state import State
 
 TICK_NS = 100_000_000
@@ -78,7 +78,7 @@ def tick(world: State, config: WorldConfig, room: Generator, slow: Generator) ->
     t_s = world.ticks * TICK_S
     heat.tick(world.warmth, config.heat, config.oven, world.powered, t_s, TICK_S, room.standard_normal())
     disturbances.supply_tick(world, config.supply, t_s, TICK_S, room.standard_normal())
-    world.charged = lagged(world.charged, world.powered, TICK_S, config.sensor.charging_s)
+    world.charged = follow_lag(world.charged, world.powered, TICK_S, config.sensor.charging_s)
     disturbances.oddities_tick(world, config.oddities, TICK_S, slow.standard_normal())
     noise.tick(world.x, world.y, config.noise, t_s, TICK_S, slow)
 
@@ -147,8 +147,8 @@ def shake(world: State, config: WorldConfig) -> None:
     """Floor vibration at both outputs, at the present orientation of the sensor."""
     alpha, beta = true_angles_rad(world, config.stages)
     gx, gy, _ = gravity.felt_g(acceleration_g(config.floor), world.mount, alpha, beta)
-    gain_x, _ = passed(config.floor, noise.filter_s(config.noise.x))
-    gain_y, _ = passed(config.floor, noise.filter_s(config.noise.y))
+    gain_x, _ = low_pass(config.floor, noise.filter_s(config.noise.x))
+    gain_y, _ = low_pass(config.floor, noise.filter_s(config.noise.y))
     world.pickup_x.shaken_v = world.powered * gain_x * config.sensor.x.plates.sensitivity_v_per_g * gx
     world.pickup_y.shaken_v = world.powered * gain_y * config.sensor.y.plates.sensitivity_v_per_g * gy
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from drivers.world.kernel import Floats, kernel, shared, wandered
+from drivers.world.kernel import Floats, kernel, share_with_kernels, step_wander
 
 FLICKER_S = (1.0, 10.0, 100.0, 1e3, 1e4)  # release times of traps
 TICKED_S = 0.5  # a wander of a longer memory advances in ticks
@@ -77,19 +77,19 @@ class Fluctuation:
     fresh: float = 0.0  # share of new white noise, in rms
 
 
-@shared
+@share_with_kernels
 def filter_s(noise: Noise) -> float:
     """Time constant of the filter."""
     return noise.filter_ohm * noise.filter_farad
 
 
-@shared
+@share_with_kernels
 def trap_v(noise: Noise, release_s: float) -> float:
     """Rms of the traps of one release time."""
     return noise.flicker_v if release_s > NEARLY * noise.flicker_fastest_s else 0.0
 
 
-@shared
+@share_with_kernels
 def ticked_v(noise: Noise) -> float:
     """Rms of the wander where it advances in ticks, else 0."""
     return noise.wander_v if noise.wander_s >= TICKED_S else 0.0
@@ -120,7 +120,7 @@ def release(state: Fluctuation, noise: Noise, step_s: float, random: Generator) 
     """Advance the slow traps by one step."""
     for k in range(len(FLICKER_S)):
         rms, release_s = trap_v(noise, FLICKER_S[k]), FLICKER_S[k]
-        state.flicker_v[k] = wandered(state.flicker_v[k], rms, release_s, step_s, random.standard_normal())
+        state.flicker_v[k] = step_wander(state.flicker_v[k], rms, release_s, step_s, random.standard_normal())
 
 
 @kernel
@@ -128,7 +128,7 @@ def stray(state: Fluctuation, noise: Noise, step_s: float, random: Generator) ->
     """Advance the random walk and the wander by one step."""
     state.walk_v += noise.walk_v_per_sqrt_h * math.sqrt(step_s / HOUR_S) * random.standard_normal()
     if ticked_v(noise) != 0:
-        state.wander_v = wandered(state.wander_v, noise.wander_v, noise.wander_s, step_s, random.standard_normal())
+        state.wander_v = step_wander(state.wander_v, noise.wander_v, noise.wander_s, step_s, random.standard_normal())
 
 
 @kernel

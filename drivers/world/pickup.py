@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.random import Generator
 
-from drivers.world.kernel import Floats, kernel, mean_variance, shared
+from drivers.world.kernel import Floats, kernel, mean_variance, share_with_kernels
 from drivers.world.noise import TICKED_S, Noise, filter_s, trap_v, zeros
 
 
@@ -37,8 +37,8 @@ def shakes(floor: Floor) -> bool:
     return floor.shaking_up_g != 0 or floor.shaking_along_g != 0
 
 
-@shared
-def passed(floor: Floor, filter_s: float) -> tuple[float, float]:
+@share_with_kernels
+def low_pass(floor: Floor, filter_s: float) -> tuple[float, float]:
     """Gain of a low-pass of time constant `filter_s` at the floor's frequency, and its lag, rad."""
     turn = 2 * math.pi * floor.shaking_hz * filter_s
     return 1 / math.hypot(1.0, turn), math.atan(turn)
@@ -71,7 +71,7 @@ class Pickup:
     fresh_v: Floats = field(default_factory=zeros(FAST))
 
 
-@shared
+@share_with_kernels
 def process(noise: Noise, k: int) -> tuple[float, float]:
     """Rms in V and correlation time in s of the `k`-th fast process; 0 V where it is off."""
     if k < len(FAST_S):
@@ -123,7 +123,7 @@ def shaken_v(state: Pickup, noise: Noise, shaking: Floor, t_ns: int) -> float:
     """Effect of the floor's shaking on the output."""
     if state.shaken_v == 0:
         return 0.0
-    lag = passed(shaking, filter_s(noise))[1]
+    lag = low_pass(shaking, filter_s(noise))[1]
     return state.shaken_v * math.sin(2 * math.pi * shaking.shaking_hz * 1e-9 * t_ns - lag)
 
 

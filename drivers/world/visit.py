@@ -198,7 +198,7 @@ def sinusoids(
 ) -> tuple[Floats, Floats]:
     """Mean and variance of the hum, and of the floor's shaking of amplitude `shaken_v`, over each dwell."""
     samples = middle_s, timing.interval_s, timing.samples
-    floors = shaking.shaking_hz, pickup.passed(shaking, filter_s(noise))[1], *samples
+    floors = shaking.shaking_hz, pickup.low_pass(shaking, filter_s(noise))[1], *samples
     hums = noise.hum_hz, 0.0, *samples
     mean = noise.hum_v * pickup.sinusoid_mean(*hums) + shaken_v * pickup.sinusoid_mean(*floors)
     square = noise.hum_v**2 * pickup.sinusoid_variance(*hums) + shaken_v**2 * pickup.sinusoid_variance(*floors)

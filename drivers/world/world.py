@@ -86,7 +86,7 @@ class World:
 
         Like `power`, it shows in the outputs from the next tick on, within 0.1 s.
         """
-        tilt, grip_nm = gravity.seated(self.config.seating, self._seed, self._number, int(self._world.now_ns))
+        tilt, grip_nm = gravity.seat_mounting(self.config.seating, self._seed, self._number, int(self._world.now_ns))
         self._world.mount = gravity.mounting(self.config.sensor.package, mount_deg, flip, up) @ tilt
         self._world.board = gravity.mounting(gravity.Package(), mount_deg, flip, up) @ tilt
         self._world.grip_nm = grip_nm
@@ -149,7 +149,7 @@ class World:
         """
         trims = digital.trims(outputs, self.trims)
         volts = self.adc_volts([trim.analog for trim in trims], start_s, interval_s, n, [0] * len(trims))
-        return digital.trimmed(volts, trims)
+        return digital.trim_outputs(volts, trims)
 
     def dwell_mean(
         self,

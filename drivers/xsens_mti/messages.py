@@ -114,7 +114,7 @@ def layout(row: bytes) -> list[Packet] | None:
     return packets if start == end else None
 
 
-def alike(rows: Bytes, packets: Sequence[Packet]) -> NDArray[np.bool_]:
+def find_alike(rows: Bytes, packets: Sequence[Packet]) -> NDArray[np.bool_]:
     """Which messages of the same length have the layout of the first one."""
     places = np.array([packet.place - k for packet in packets for k in (1, 2, 3)], dtype=np.int64)
     return np.asarray((rows[:, places] == rows[0, places]).all(axis=1))
@@ -168,7 +168,7 @@ def of_one_layout(frames: Found) -> Iterator[tuple[Ints, Bytes, list[Packet]]]:
         while len(remaining):
             rows = frames.data[frames.starts[remaining, None] + np.arange(length)]
             packets = layout(rows[0].tobytes())
-            is_alike = alike(rows, packets) if packets else np.arange(len(rows)) == 0
+            is_alike = find_alike(rows, packets) if packets else np.arange(len(rows)) == 0
             if packets:
                 yield remaining[is_alike], rows[is_alike], packets
             remaining = remaining[~is_alike]

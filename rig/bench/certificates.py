@@ -19,7 +19,7 @@ def certificates(bench: Bench) -> dict[str, Certificate]:
     return {**by_role, **bench.certificates}
 
 
-def expired(bench: Bench, on: date) -> list[str]:
+def find_expired(bench: Bench, on: date) -> list[str]:
     """A sentence for each certificate that expired before the day `on`."""
     return [
         f"{name}'s certificate {certificate.number} expired on {certificate.due}"

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from calibrations.design.orientations import ORIENTATIONS, covered
+from calibrations.design.orientations import ORIENTATIONS, find_covered
 from calibrations.table import AXES, Array
 from procedures.session import Guidance
 from rig.drawings import svg
@@ -116,7 +116,7 @@ def _turn_upward(up: Array) -> Array:
 
 def _marks(guidance: Guidance) -> dict[tuple[int, int, int], str]:
     """The mark of each orientation by the signs of its three parts."""
-    is_taken = covered(np.array(guidance.taken).reshape(-1, 3))
+    is_taken = find_covered(np.array(guidance.taken).reshape(-1, 3))
     marks = {}
     for up, is_covered in zip(ORIENTATIONS, is_taken, strict=True):
         x, y, z = (int(part) for part in np.sign(np.round(up, 6)))

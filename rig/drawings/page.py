@@ -119,7 +119,7 @@ def front_view(attitude: Attitude, centre: tuple[float, float], radius: float) -
     """The dial of alpha with the table edge-on: anticlockwise for growing alpha, from the horizontal."""
     yield from dial(centre, radius, clockwise=False)
     yield from mark_angle(centre, radius, attitude.alpha_deg, clockwise=False)
-    yield svg.turned(centre, attitude.alpha_deg, _edge_on(attitude, radius))
+    yield svg.rotate(centre, attitude.alpha_deg, _edge_on(attitude, radius))
     yield svg.circle(centre, 3.0, svg.PAPER, svg.INK, 1.4)
     top = (centre[0] + radius + 34, centre[1] - 26)
     yield svg.arrow(top, (top[0], top[1] + 46), svg.INK) + svg.text((top[0], top[1] + 60), "gravity", 12)
@@ -157,7 +157,7 @@ def table_view(attitude: Attitude, centre: tuple[float, float], radius: float) -
     yield svg.circle(centre, 0.92 * radius, "#eef1f4", "#b8c2cc", 1.0)
     yield from mark_angle(centre, radius, attitude.beta_deg, clockwise=True, inner=0.98)
     sensor_deg = -(attitude.beta_deg + attitude.mount_deg)  # of the sensor's x axis, anticlockwise from the right
-    yield svg.turned(centre, sensor_deg, _sensor(attitude, radius))
+    yield svg.rotate(centre, sensor_deg, _sensor(attitude, radius))
     yield from _mount(attitude, centre, radius)
     yield from _axes(attitude, centre, radius, sensor_deg)
 

@@ -80,7 +80,7 @@ def on_circle(centre: Point, radius: float, deg: float) -> tuple[float, float]:
     return float(centre[0] + radius * np.cos(phi)), float(centre[1] - radius * np.sin(phi))
 
 
-def turned(centre: Point, deg: float, content: Iterable[str]) -> str:
+def rotate(centre: Point, deg: float, content: Iterable[str]) -> str:
     """A drawing about the origin, turned anticlockwise by `deg` about `centre`."""
     return element(
         "g", "".join(content), transform=f"translate({centre[0]:.2f} {centre[1]:.2f}) rotate({0.0 - deg:.4f})"

@@ -127,7 +127,7 @@ def calibration_page(calibration: Calibration, model: str) -> str:
     quantities: dict[str, list[Spread]] = {}
     for batch in calibration.batches:
         for k, name in enumerate(batch.names):
-            quantities.setdefault(_titled(batch, name), []).append(_spread(batch, k))
+            quantities.setdefault(_parameter_title(batch, name), []).append(_spread(batch, k))
     rows = [row for batch in calibration.batches for row in _rows(batch)]
     head = ("batch", "sensors", "parameter", "mean", "spread", "standard uncertainty / alone", "unlike the rest")
     failed = [f"{member.sensor}: {reason}" for member, reason in calibration.faults.items()]
@@ -141,7 +141,7 @@ def _facts(model: str) -> dict[str, str]:
     return {"model": model, "program": program(), "made": today()}
 
 
-def _titled(batch: Calibrated, name: tuple[str, str, str, str]) -> str:
+def _parameter_title(batch: Calibrated, name: tuple[str, str, str, str]) -> str:
     effect, parameter, axis, unit = name
     return f"{result_name(effects_of(batch.question.own)[effect], parameter, axis)} in {unit}"
 
@@ -162,7 +162,7 @@ def _rows(batch: Calibrated) -> list[tuple[object, ...]]:
         (
             batch.batch or "no batch",
             len(batch.members),
-            _titled(batch, name),
+            _parameter_title(batch, name),
             estimate_text(parameter.mean * size, parameter.mean_std * size),
             rounded(parameter.spread * size, 2),
             rounded(float(gain), 2),

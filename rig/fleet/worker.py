@@ -33,7 +33,7 @@ from calibrations.text import join_words
 from rig.errors import RigError
 from rig.services.load import LONGEST_BEGINNING, channels_alone, check_unit
 from rig.services.request import effects_of as checked
-from rig.services.tables import averaged
+from rig.services.tables import average_log
 
 # A screening as a document of plain values, and back.
 
@@ -170,12 +170,12 @@ def _read_table(task: Task) -> Table:
     if task.text is not None:
         if channels_alone(task.text[:LONGEST_BEGINNING]):
             raise DataError(_instead(task.data, "still"))
-        return averaged(parse_csv(task.text, task.data), _nobody)
+        return average_log(parse_csv(task.text, task.data), _nobody)
     from rig.record.measured import table_of
     from rig.record.store import Record
 
     with Record(Path(task.home)) if task.home else Record.to_read() as record:
-        return averaged(table_of(record, task.data), _nobody)
+        return average_log(table_of(record, task.data), _nobody)
 
 
 def _nobody(_: str) -> None:

@@ -27,7 +27,7 @@ from rig.bench import ROLES, Bench
 from rig.errors import InstrumentFailed
 from rig.instruments.by_hand import HandAnalysis
 from rig.instruments.guard import NOW_AND_THEN_S, GuardedClock, Look
-from rig.instruments.wiring import Wiring, wired
+from rig.instruments.wiring import Wiring, open_wires
 
 
 @dataclass(frozen=True)
@@ -208,26 +208,26 @@ def _at_rest(dwells: Sequence[Dwell], oven_c: float) -> bool:
 
 
 @contextmanager
-def connected(bench: Bench, tap: Tap | None = None) -> Iterator[Rig]:
+def connect_all(bench: Bench, tap: Tap | None = None) -> Iterator[Rig]:
     """The bench with every instrument connected. All wires and servers are closed at the end.
 
     `tap` is called for every message.
     Raises InstrumentFailed with role, address and remedy; Busy if another process uses a real instrument.
     """
-    with wired(bench, tap) as wiring:
+    with open_wires(bench, tap) as wiring:
         drivers = {role: wiring.connect(role) for role in bench.instruments}
         servers = tuple(wiring.servers.values())
         yield Rig(bench, drivers, wiring.clock, wiring.world if servers else None, servers, wiring.links.person)
 
 
-def checked(
+def check_all(
     bench: Bench, prepare: Callable[[Driver], object] | None = None
 ) -> dict[str, tuple[Identity | None, list[Check]]]:
     """Identity and self-test of every instrument. One that does not answer has no identity and a failed check.
 
     `prepare`, if given, is called with each driver before its self-test.
     """
-    with wired(bench) as wiring:
+    with open_wires(bench) as wiring:
         return {role: _check(wiring, role, prepare) for role in bench.instruments}
 
 

@@ -62,7 +62,7 @@ class Wiring:
 
 
 @contextmanager
-def wired(bench: Bench, tap: Tap | None = None) -> Iterator[Wiring]:
+def open_wires(bench: Bench, tap: Tap | None = None) -> Iterator[Wiring]:
     """The wires of the bench, before any instrument is connected. All wires and servers are closed at the end.
 
     `tap` is called for every message. Raises BenchError for two roles on one unit of one line, and Busy if another

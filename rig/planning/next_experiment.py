@@ -59,7 +59,9 @@ class Dispute:
         )
 
 
-def proposed(result: Answer, effects: Mapping[str, Effect], bench: Bench, bench_file: Path | None) -> Answer:
+def with_next_experiment(
+    result: Answer, effects: Mapping[str, Effect], bench: Bench, bench_file: Path | None
+) -> Answer:
     """The result with the next experiment for the bench; unchanged without a dispute."""
     e = result.next_experiment
     if e is None:
@@ -125,7 +127,7 @@ def choose_experiment(
     for e, planned in sorted(_plans(menu, bench, bench_file), key=lambda pair: pair[0].duration_s or 0.0):
         if (prediction := _predict(dispute, e, planned)) is not None:
             predicted.append(prediction)
-            if _certain(prediction, criteria[0]) and len(prediction.separates) == len(dispute.rivals):
+            if _will_separate(prediction, criteria[0]) and len(prediction.separates) == len(dispute.rivals):
                 break  # no longer experiment can be better
     return best_of(predicted, criteria) or as_proposed(by_physics, bench, bench_file)
 
@@ -140,15 +142,15 @@ def _plans(menu: Sequence[Experiment], bench: Bench, bench_file: Path | None) ->
 def best_of(experiments: Sequence[Experiment], criteria: Sequence[str]) -> Experiment | None:
     """The shortest experiment that certainly separates most pairs; else that with most information per minute."""
     for probability in criteria:
-        enough = [e for e in experiments if _certain(e, probability)]
+        enough = [e for e in experiments if _will_separate(e, probability)]
         if enough:
             return min(enough, key=lambda e: (-len(e.separates), e.duration_s or 0.0))
     telling = [e for e in experiments if _per_minute(e) > 0]
     return max(telling, key=_per_minute, default=None)
 
 
-def _certain(e: Experiment, probability: str) -> bool:
-    """Whether it separates the explanations; `probability` as in `judged`."""
+def _will_separate(e: Experiment, probability: str) -> bool:
+    """Whether it separates the explanations; `probability` names the attribute of what is expected."""
     return bool(getattr(e.expected, probability) >= CERTAIN_PROBABILITY)
 
 

@@ -24,7 +24,7 @@ from procedures.questions import Dial, Question
 from procedures.session import Dwell, Guidance, Pose, Session
 from rig.bench import ROLES, SIMULATED, TURNING, Bench
 from rig.errors import BenchError
-from rig.instruments.instruments import Rig, absent, connected
+from rig.instruments.instruments import Rig, absent, connect_all
 from rig.instruments.person import answer, follow
 from rig.planning.planned import (
     Ledger,
@@ -99,7 +99,7 @@ def rehearse(bench: Bench, planned: Mapping[str, Any], ledger: Ledger) -> Iterat
 
     The limits of temperature and tilt do not apply: the simulated table may be less level than the real one.
     """
-    with connected(_simulate_instruments(bench)) as rig:
+    with connect_all(_simulate_instruments(bench)) as rig:
         parts: dict[str, Any] = {role: absent(role) for role in planned}
         parts |= {role: RecordedTwin(planned[role], driver) for role, driver in rig.drivers.items()}
         level_deg = None if bench.limits.level_deg is None else math.inf

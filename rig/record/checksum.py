@@ -68,5 +68,5 @@ def _stored_value(column: Column[Any], value: Any) -> Any:
 
 
 def _is_text(value: str) -> bool:
-    """Whether all bytes of a text were readable, see `decoded`."""
+    """Whether all bytes of a text were readable, see `decode_text`."""
     return not any("\ud800" <= letter <= "\udfff" for letter in value) if not value.isascii() else True

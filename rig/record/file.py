@@ -71,10 +71,10 @@ def _connect(path: Path) -> sqlite3.Connection:
         connection = sqlite3.connect(
             f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True, check_same_thread=False
         )
-        connection.text_factory = decoded
+        connection.text_factory = decode_text
         return connection
     connection = sqlite3.connect(path, check_same_thread=False)
-    connection.text_factory = decoded
+    connection.text_factory = decode_text
     try:
         _prepare(connection)
     except (UnicodeDecodeError, sqlite3.OperationalError) as error:  # SQLite quotes unreadable bytes
@@ -84,7 +84,7 @@ def _connect(path: Path) -> sqlite3.Connection:
     return connection
 
 
-def decoded(data: bytes) -> str:
+def decode_text(data: bytes) -> str:
     """The text; unreadable bytes become surrogates, so that the other rows of a query stay readable."""
     return data.decode("utf-8", "surrogateescape")
 

@@ -70,7 +70,7 @@ for _name in ("psycopg", "sqlalchemy"):  # our own message reports a lost connec
     logging.getLogger(_name).addHandler(logging.NullHandler())
 
 
-def connected(url: URL) -> Engine:
+def make_engine(url: URL) -> Engine:
     """The engine of the server. It does not connect yet."""
     engine = create_engine(url, connect_args=options(url))
     event.listen(
@@ -140,7 +140,7 @@ def _is_here(url: URL) -> bool:
 
 def open_server(url: URL) -> Engine:
     """The engine of a record with the tables of this program. Raises LabAway, RecordError."""
-    engine = connected(url)
+    engine = make_engine(url)
     with engine.connect() as connection:
         require_current(version(connection), mask_url(url))
     return engine
@@ -203,7 +203,7 @@ def prepare(url: URL) -> int:
     Existing rows stay, so it can be repeated. Raises LabAway; RecordError if the role in `url` has no permission, or
     the record belongs to a newer program.
     """
-    engine = connected(url)
+    engine = make_engine(url)
     try:
         with engine.begin() as connection:
             connection.execute(text(f"SELECT pg_advisory_xact_lock({ONE_AT_A_TIME})"))

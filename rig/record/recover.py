@@ -27,7 +27,7 @@ from sqlalchemy.dialects import sqlite as dialect
 from rig.errors import RecordError
 from rig.record import codec
 from rig.record.checksum import COVERED, is_damaged
-from rig.record.file import FILE, decoded, open_file
+from rig.record.file import FILE, decode_text, open_file
 from rig.record.schema import DAMAGED, blocks, metadata, poses, readings, runs
 
 KNOWN = frozenset(metadata.tables)
@@ -174,7 +174,7 @@ def _open_damaged(source: Path) -> sqlite3.Connection:
     """The damaged file with its log, read-only."""
     try:
         old = sqlite3.connect(f"{source.resolve().as_uri()}?mode=ro", uri=True)
-        old.text_factory = decoded
+        old.text_factory = decode_text
         old.execute("SELECT count(*) FROM sqlite_master").fetchone()
     except UNREADABLE as error:
         raise RecordError(f"{source}: no row is readable ({error}); restore a copy of the record") from None

@@ -164,7 +164,7 @@ def has_checksums(connection: Connection, run: str) -> bool:
     return connection.execute(select(runs.c.checksum).where(runs.c.run == run)).scalar_one_or_none() is not None
 
 
-def sound(row: Row[Any], *tables: SqlTable, required: bool) -> Row[Any]:
+def require_sound(row: Row[Any], *tables: SqlTable, required: bool) -> Row[Any]:
     """The row of `tables`. Raises RecordError if it changed on the disk. `required`: it has a checksum."""
     damaged = next((table for table in tables if is_damaged(table, row._mapping, required)), None)
     if damaged is None:

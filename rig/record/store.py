@@ -44,6 +44,7 @@ from rig.record.rows import (
     pose_of,
     put_state,
     require_rows,
+    require_sound,
     require_whole,
     run_of,
     runs_of_sensor,
@@ -51,7 +52,6 @@ from rig.record.rows import (
     select_imported_rows,
     select_named_rows,
     several_error,
-    sound,
     timestamp,
     unknown_error,
 )
@@ -276,7 +276,7 @@ class Record:
         query = select(poses).where(is_included).order_by(poses.c.number)
         with self._reading() as connection:
             required = has_checksums(connection, run)
-            return [pose_of(sound(row, poses, required=required)) for row in connection.execute(query)]
+            return [pose_of(require_sound(row, poses, required=required)) for row in connection.execute(query)]
 
     def excluded(self, run: str) -> dict[int, str]:
         """The reason of each excluded pose, or row of an imported table, by its number."""
@@ -314,7 +314,7 @@ class Record:
                 excluded.discard(row.number)
                 damaged = any(is_damaged(table, row._mapping, required) for table in (poses, blocks))
                 if row.excluded is None or not damaged:
-                    yield kept_of(sound(row, poses, blocks, required=required))
+                    yield kept_of(require_sound(row, poses, blocks, required=required))
             for number in sorted(excluded):
                 raise lost_pose_error(run, number)
 
@@ -330,7 +330,7 @@ class Record:
             excluded = require_whole(connection, run) if after_number < 0 else set()
             required = has_checksums(connection, run)
             selected = connection.execute(query.where(is_later).order_by(poses.c.number))
-            rows = [sound(row, poses, dwells, required=required) for row in selected]
+            rows = [require_sound(row, poses, dwells, required=required) for row in selected]
         for number in sorted(excluded - {row.number for row in rows}):
             raise lost_pose_error(run, number)
         is_old = any(row.n is None for row in rows)
@@ -382,7 +382,7 @@ class Record:
             require_rows(connection, table, run)
             required = has_checksums(connection, run)
             query = select(table).where(table.c.run == run).order_by(order)
-            return [sound(row, table, required=required) for row in connection.execute(query)]
+            return [require_sound(row, table, required=required) for row in connection.execute(query)]
 
     def _put_lines(self, connection: Connection) -> None:
         """Write the lines of the log. After a failure they are dropped."""

@@ -4,7 +4,7 @@
 Result, or the reason why it is Missing, for each name. A user's procedure can return such a mapping itself instead.
 """
 
-from rig.results.evaluate import judged
-from rig.results.result import Result, documents, returned
+from rig.results.evaluate import judge_results
+from rig.results.result import Result, documents, read_returned
 
-__all__ = ["Result", "documents", "judged", "returned"]
+__all__ = ["Result", "documents", "judge_results", "read_returned"]

@@ -24,13 +24,13 @@ MODULES = {  # with the evaluation of each procedure, imported when it is needed
 }
 
 
-def judged(record: Record, run: Run) -> tuple[dict[str, Any], str | None]:
+def judge_results(record: Record, run: Run) -> tuple[dict[str, Any], str | None]:
     """The run's results as documents with the verdicts by the limits of its bench, and a text on the missing results.
 
     Raises SensorFault if the samples show a fault of an instrument.
     """
     try:
-        results = evaluated(record, record.run(run.run))  # read again: the number of its rows bounds the memory
+        results = evaluate_results(record, record.run(run.run))  # read again: the number of its rows bounds the memory
     except (CalibrationError, RecordError) as error:
         return {}, f"none: {error}"
     determined = {name: result for name, result in results.items() if isinstance(result, Result)}
@@ -46,7 +46,7 @@ def _list_missing(results: Mapping[str, Result | Missing]) -> str | None:
     return "; ".join(f"no {join_words(names, 'or')}: {reason}" for reason, names in by_reason.items()) or None
 
 
-def evaluated(record: Record, run: Run) -> dict[str, Result | Missing]:
+def evaluate_results(record: Record, run: Run) -> dict[str, Result | Missing]:
     """The run's results by name; empty for a procedure without results.
 
     In a batch the names begin with that of the sensor: `a1/bias-drift-x`. Results of the bench are given once. Raises

@@ -79,7 +79,7 @@ def evaluates(procedure: str, *names: str, of_bench: bool = False) -> Callable[[
 # Results that a procedure returns itself, and results as documents.
 
 
-def returned(name: str, document: Any) -> Result:
+def read_returned(name: str, document: Any) -> Result:
     """A result that a procedure returns itself: {"value": 2.0, "unit": "g", "std": 0.1}. Raises ProcedureError."""
     try:
         std = document.get("std")
@@ -106,7 +106,7 @@ def documents(results: Mapping[str, Result], limits: Mapping[str, Limit]) -> dic
 # Parameters of a fitted model as results, for magnetometers and gyroscopes.
 
 
-def fitted(table: Table, model: str, *effect_names: str) -> Fit:
+def fit_shipped(table: Table, model: str, *effect_names: str) -> Fit:
     """The fit of a shipped model with those of the effects `effect_names` that suit the table. Raises as `fit`."""
     effects, start = catalogue(), read_model(model)
     for name in effect_names:

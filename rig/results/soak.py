@@ -63,7 +63,7 @@ def soak(measured: Measured) -> dict[str, Result]:
             results |= _drift(course, course.state, soak.table.unit)
     if (wander_k := soak.temperature_wander_k) is not None:
         results["temperature-wander"] = Result(wander_k, "K")
-    results |= _foreseen(forecasts, soak.table.unit)
+    results |= _forecast_results(forecasts, soak.table.unit)
     return results | {"gap": Result(sum(gap.length_s for gap in soak.gaps), "s")}
 
 
@@ -140,7 +140,7 @@ def _steady(soak: Soak, forecasts: Mapping[str, ForecastHistory], axis: str) -> 
     return results | {f"steady-state-{name}{end}": Result(s / HOUR_S, "h") for name, s in times.items()}
 
 
-def _foreseen(forecasts: Mapping[str, ForecastHistory], output_unit: str) -> dict[str, Result]:
+def _forecast_results(forecasts: Mapping[str, ForecastHistory], output_unit: str) -> dict[str, Result]:
     """The final values at the end of the soak, and the times from which they were known."""
     results: dict[str, Result] = {}
     for name, course in forecasts.items():

@@ -25,7 +25,7 @@ from calibrations.table import Array, Table
 from procedures.questions import EDGES
 from procedures.session import Pose
 from rig.record.measured import Measured, sensor_from_base
-from rig.results.result import Missing, Result, evaluates, fitted, result
+from rig.results.result import Missing, Result, evaluates, fit_shipped, result
 
 AXES = "xyz"
 ANGLE_PAIRS = ("xy", "xz", "yz")
@@ -85,7 +85,7 @@ def rate_turn(measured: Measured) -> dict[str, Result | Missing]:
     factor, and the other axes have no misalignment towards it.
     """
     table = measured.table()
-    fit = fitted(table, "gyroscope", "gyro-misalignment", "gyro-g-sensitivity")
+    fit = fit_shipped(table, "gyroscope", "gyro-misalignment", "gyro-g-sensitivity")
     results = {f"gyro-bias-{e.axis}": result(e) for e in fit.model.estimates("gyro-bias")}
     scales = {e.axis: e for e in fit.model.estimates("gyro-scale-factor")}
     results |= {f"gyro-scale-{axis}": result(scale) for axis, scale in scales.items()}
@@ -173,7 +173,7 @@ def _all_missing(reason: str) -> dict[str, Result | Missing]:
 
 
 def _by_ellipsoid(table: Table, poses: list[Pose]) -> dict[str, Result | Missing]:
-    fit = fitted(table, "magnetometer")
+    fit = fit_shipped(table, "magnetometer")
     results = {f"hard-iron-{e.axis}": result(e) for e in fit.model.estimates("hard-iron")}
     results |= {f"soft-iron-{e.name}": result(e) for e in fit.model.estimates("soft-iron")}
     results["left-by-ellipsoid"] = Result(float(1e3 * rms(fit.residual)[0]), "per mille")

@@ -23,16 +23,16 @@ from procedures.errors import Declined, NoAnswer, ProcedureError, SafetyLimit
 from procedures.questions import Confirm
 from procedures.settings import parse
 from rig.bench import Bench
-from rig.bench.certificates import EXPIRED, expired
+from rig.bench.certificates import EXPIRED, find_expired
 from rig.errors import RecordError, RigError, RunMismatch, Stopped
 from rig.files import program
-from rig.instruments.instruments import Rig, connected
+from rig.instruments.instruments import Rig, connect_all
 from rig.lease import lease
 from rig.planning.plan import plan
 from rig.planning.preparation import first_question
 from rig.record import Record, Run
 from rig.record.values import CHANGED
-from rig.results import Result, documents, judged, returned
+from rig.results import Result, documents, judge_results, read_returned
 from rig.runs.host import RunHost, leave_as
 from rig.runs.observer import Decision, Observer, Outcome
 from rig.runs.signals import Trace, stoppable, who_stopped
@@ -64,11 +64,11 @@ def start(
         observer.planned(planned)
         trail = Trace(record) if trace else None
         first = first_question(planned)
-        started_run = _begun(record, bench, procedure, settings, observer, after_run, trail, first)
+        started_run = _begin_run(record, bench, procedure, settings, observer, after_run, trail, first)
         return _after_decision(record, started_run, observer, trace)
 
 
-def _begun(
+def _begin_run(
     record: Record,
     bench: Bench,
     procedure: Procedure,
@@ -78,9 +78,9 @@ def _begun(
     trace: Trace | None,
     first: Confirm | None,
 ) -> Outcome:
-    with stoppable(inner=True), connected(bench, trace) as rig:
+    with stoppable(inner=True), connect_all(bench, trace) as rig:
         identities = {role: asdict(identity) for role, identity in rig.identities().items()}
-        faults = expired(bench, datetime.now(UTC).date())
+        faults = find_expired(bench, datetime.now(UTC).date())
         run = record.begin(
             procedure.name,
             _as_json(settings),
@@ -121,7 +121,7 @@ def _resume(
     own_bench = bench or Bench.model_validate(run.bench)  # the same, except for repaired faults
     procedure = find(run.procedure, own_bench.folders.procedures)
     trail = Trace(record) if trace else None
-    with stoppable(inner=True), _lease_run(record, run_id), connected(own_bench, trail) as rig:
+    with stoppable(inner=True), _lease_run(record, run_id), connect_all(own_bench, trail) as rig:
         if trail is not None:
             trail.begin(run_id)
         _require_same_instruments(run, rig)
@@ -182,7 +182,7 @@ def _carry_out(
         observer.begun(run.run)  # a person may end it from now on
         own_results = _perform(record, rig, run, procedure, observer, first)
         results, reason = (
-            (documents(own_results, rig.bench.result_limits), None) if own_results else judged(record, run)
+            (documents(own_results, rig.bench.result_limits), None) if own_results else judge_results(record, run)
         )
     except BaseException as failure:
         error = _error_of(failure, run)
@@ -266,7 +266,7 @@ def _perform(
             host.keep_tally()
         raise
     host.keep_tally()
-    return {name: returned(name, result) for name, result in results.items()}
+    return {name: read_returned(name, result) for name, result in results.items()}
 
 
 def _require_same_instruments(run: Run, rig: Rig) -> None:

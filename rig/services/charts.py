@@ -29,7 +29,7 @@ from calibrations.presentation.charts.history import Life
 from calibrations.presentation.charts.noise import TIME, Scaled, measured_points
 from calibrations.presentation.residual import ChannelResidual, Column
 from calibrations.table import in_time
-from calibrations.text import add_prefix, estimate_in_prefix, estimate_text, labelled, minus, unit
+from calibrations.text import add_prefix, axis_label, estimate_in_prefix, estimate_text, minus, unit
 from procedures.session import Dwell
 from rig.record import Record, Run
 from rig.record.measured import Measured
@@ -231,7 +231,7 @@ def _differences(pairs: Sequence[Pair]) -> Panel:
         hover=[f"{pair.name}: {estimate_in_prefix(pair.difference, pair.std, pair.unit)}" for pair in pairs],
     )
     y = Axis(low=-0.5, high=len(pairs) - 0.5, names=names, reverse=True)
-    return Panel((Rule(0.0, "x", width=1.2), dots), Axis(labelled("difference", spelt)), y)
+    return Panel((Rule(0.0, "x", width=1.2), dots), Axis(axis_label("difference", spelt)), y)
 
 
 def residuals(first: ChannelResidual, second: ChannelResidual, x: Column, other_x: Column) -> Chart:

@@ -34,7 +34,7 @@ class Controlled:
     chart: Chart
 
 
-def controlled(
+def make_charts(
     runs: Iterable[Run], sensor: str | None = None, baseline: int = BASELINE_RUNS, since: str | None = None
 ) -> list[Controlled]:
     """The charts of `runs` (newest first, as the record gives them), of one `sensor` or of all; from run `since` on.

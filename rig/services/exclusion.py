@@ -10,7 +10,7 @@ from calibrations.tables import MEANS
 from rig.errors import RecordError, UnknownRun
 from rig.lease import lease
 from rig.record import Record, Run
-from rig.results import judged
+from rig.results import judge_results
 
 RESULTS = "results"  # the event that says how they were made anew
 
@@ -47,7 +47,7 @@ def find_numbered_run(data: str) -> str | None:
 
 def _evaluate_again(record: Record, run: Run) -> None:
     """Evaluate the remaining poses. If they do not determine every result, an event gives the reason."""
-    results, reason = judged(record, run)
+    results, reason = judge_results(record, run)
     if results or reason:
         record.set_results(run.run, results)
         record.note(run.run, RESULTS, reason or "evaluated again")

@@ -83,7 +83,7 @@ def package_faults() -> Iterator[str]:
                     yield f"{name} {number} cannot be imported ({type(error).__name__}: {error}); install it again"
 
 
-def collected(part: Callable[[], Any]) -> Any:
+def collect_part(part: Callable[[], Any]) -> Any:
     """The result of `part`, or the error that it raises, as a document."""
     try:
         return part()

@@ -181,12 +181,12 @@ def hidden_faults(bench: Bench, fitted: Fit, start: Fit) -> Faults:
     effects = [_effect(term.name, fitted, poses) for term in fitted.model.terms if term.name not in start_effects]
     floor = float(rms(fitted.noise.floor))
     present_faults = [f for f in faults if f is not None and f.size > 0]
-    groups, extra = grouped(present_faults, effects, floor)
+    groups, extra = group_steps(present_faults, effects, floor)
     sized = tuple(replace(g, std=_uncertainty([e.name for e in g.effects], fitted, poses)) for g in groups)
     return Faults(sized, extra, floor, poses.unit)
 
 
-def grouped(
+def group_steps(
     faults: Sequence[Curve], effects: Sequence[Curve], floor: float
 ) -> tuple[tuple[Group, ...], tuple[Curve, ...]]:
     """The groups, the largest first, and the effects of none. Free forms join the effects at their place."""
@@ -236,7 +236,7 @@ def _judge_group(group: Group, effects: Sequence[Curve]) -> list[Group]:
     of_place = [e for e in effects if e.span is None and place_of_effect(e.name) in places]
     extended = replace(group, effects=(*group.effects, *of_place))
     for candidate in (extended, group):
-        if candidate.effects and _alike(_sum_curves(candidate.faults), _sum_curves(candidate.effects)):
+        if candidate.effects and _are_alike(_sum_curves(candidate.faults), _sum_curves(candidate.effects)):
             return [candidate]
     return [Group((fault,)) for fault in group.faults]
 
@@ -245,7 +245,7 @@ def _sum_curves(curves: Sequence[Curve]) -> Curve:
     return Curve(", ".join(c.name for c in curves), np.sum([c.curve for c in curves], axis=0))
 
 
-def _alike(fault: Curve, effect: Curve) -> bool:
+def _are_alike(fault: Curve, effect: Curve) -> bool:
     same_size = effect.size < OF_A_SIZE * fault.size and fault.size < OF_A_SIZE * effect.size
     return same_size and _correlation(fault, effect) >= ALIKE
 

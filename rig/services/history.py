@@ -163,7 +163,7 @@ def history(
     baseline: int = BASELINE_RUNS,
     notify: Callable[[str], None] = lambda _: None,
 ) -> History:
-    """The history of `sensor` by `model`, see `judged`; `notify` receives the run that is calibrated.
+    """The history of `sensor` by `model`, see `judge_history`; `notify` receives the run that is calibrated.
 
     Raises RecordError where the record has no calibration of it, naming the nearest sensor.
     """
@@ -177,10 +177,10 @@ def history(
         except (CalibrationError, RecordError) as error:
             passed_over[data] = str(error)
     if not calibrations:
-        raise _none(record, sensor, passed_over)
+        raise _no_calibration_error(record, sensor, passed_over)
     calibrations, excluded = _of_one_kind(calibrations)
     passed_over |= excluded
-    return judged(History(sensor, model.name, tuple(calibrations), (), passed_over), limits, baseline)
+    return judge_history(History(sensor, model.name, tuple(calibrations), (), passed_over), limits, baseline)
 
 
 def _of_one_kind(calibrations: list[Calibration]) -> tuple[list[Calibration], dict[str, str]]:
@@ -204,10 +204,10 @@ def latest(record: Record, sensor: str, model: Model) -> Calibration:
             return _calibration(record, data, run, model)
         except (CalibrationError, RecordError) as error:
             passed_over[data] = str(error)
-    raise _none(record, sensor, passed_over)
+    raise _no_calibration_error(record, sensor, passed_over)
 
 
-def judged(life: History, limits: Mapping[str, Limit], baseline: int = BASELINE_RUNS) -> History:
+def judge_history(life: History, limits: Mapping[str, Limit], baseline: int = BASELINE_RUNS) -> History:
     """The same calibrations by other limits, and charts of another baseline. `limits` by result's name: a number is the
     greatest change since the last calibration, a pair the lowest and highest value."""
     calibrations = life.calibrations
@@ -243,7 +243,7 @@ def _runs(record: Record, sensor: str) -> list[tuple[str, Run]]:
     ]
 
 
-def _none(record: Record, sensor: str, passed_over: Mapping[str, str]) -> RecordError:
+def _no_calibration_error(record: Record, sensor: str, passed_over: Mapping[str, str]) -> RecordError:
     reasons = f" This model cannot use its runs: {next(iter(passed_over.values()))}" if passed_over else ""
     sensor_names = sensors(record.runs())
     nearest = "" if sensor in sensor_names else did_you_mean(sensor, sensor_names)

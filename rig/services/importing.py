@@ -25,7 +25,7 @@ from calibrations.importing.units import UNITS, ColumnMapping, column_unit
 from calibrations.presentation.chart import CANDIDATE, MEASURED, QUIET, Axis, Chart, Panel, Points, single_chart
 from calibrations.table import AXES, NUMBERS, Constant, Table, guess_kind
 from rig.record import Record
-from rig.services.tables import averaged
+from rig.services.tables import average_log
 
 MOST_DRAWN = 4000
 COLOURS = (MEASURED, CANDIDATE, QUIET)
@@ -49,7 +49,7 @@ class Preview:
     notes: tuple[str, ...]
 
 
-def opened(path: Path, topic: str | None = None, bad_lines: Policy = "few") -> Sheet:
+def open_file(path: Path, topic: str | None = None, bad_lines: Policy = "few") -> Sheet:
     """The sheet in a file, of the topic `topic` where it has several.
 
     `bad_lines` says what to do with damaged lines of a text: skip a few, skip them, or refuse them. Raises DataError,
@@ -96,11 +96,11 @@ def preview(sheet: Sheet, kind: str, columns: Sequence[ColumnMapping], constants
     notes = list(sheet.notes)
     imported = import_sheet(sheet, kind, columns, constants)
     notes += imported.notes
-    table = averaged(imported.table, notes.append)
+    table = average_log(imported.table, notes.append)
     return Preview(table, tuple(notes))
 
 
-def stored(
+def store_sheet(
     sheet: Sheet,
     kind: str | None,
     columns: Sequence[ColumnMapping],
@@ -111,7 +111,7 @@ def stored(
     imported = import_sheet(sheet, kind, columns, constants)
     for remark in (*sheet.notes, *imported.notes):
         notify(remark)
-    table = averaged(imported.table, notify)
+    table = average_log(imported.table, notify)
     with Record.to_read() as record:
         return record.add_table(table, imported.settings), table
 

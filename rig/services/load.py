@@ -49,7 +49,7 @@ class Loaded:
     effects: Mapping[str, Effect]
 
 
-def loaded(request: Request, notify: Tell) -> Loaded:
+def load_request(request: Request, notify: Tell) -> Loaded:
     """Data, model (by default that of the kind of data) and effects; `notify` receives remarks for a person.
 
     The data are a still record if their kind is still, if they are an array, or if a noise model is named.
@@ -58,7 +58,9 @@ def loaded(request: Request, notify: Tell) -> Loaded:
     effects = effects_of(request.bench_file)
     model = read_model(request.model, effects) if request.model is not None else None
     data = (
-        _still(request, model, notify) if is_noise(model) or is_still(request.data) else _rows(request, effects, notify)
+        _load_still(request, model, notify)
+        if is_noise(model) or is_still(request.data)
+        else _rows(request, effects, notify)
     )
     if model is not None:
         check_unit(model, data.unit, data.source)
@@ -103,7 +105,7 @@ def _rows(request: Request, effects: Mapping[str, Effect], notify: Tell) -> Rows
     return Rows(rows_of(request, effects, notify))
 
 
-def _still(request: Request, model: Model | None, notify: Tell) -> Dataset[Any]:
+def _load_still(request: Request, model: Model | None, notify: Tell) -> Dataset[Any]:
     from calibrations.noise.dataset import StillRecord  # a table needs no noise engine
     from calibrations.noise.fit import noise_terms
 

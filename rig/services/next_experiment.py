@@ -21,7 +21,7 @@ def planned(result: Answer, request: Request, effects: Mapping[str, Effect], not
     if result.next_experiment is None:
         return result
     from rig.bench import read_bench  # planning loads procedures, drivers and the simulated bench
-    from rig.planning.next_experiment import proposed
+    from rig.planning.next_experiment import with_next_experiment
 
     bench = read_bench(request.bench_file)
     if (source_bench := _bench_of(request.data)) not in (None, bench.name):
@@ -29,7 +29,7 @@ def planned(result: Answer, request: Request, effects: Mapping[str, Effect], not
             f'{request.data} was measured on the bench "{source_bench}", but the next experiment is planned for '
             f'"{bench.name}"; give the file of that bench with --bench.'
         )
-    return proposed(result, effects, bench, request.bench_file)
+    return with_next_experiment(result, effects, bench, request.bench_file)
 
 
 def _bench_of(data: str) -> str | None:

@@ -14,7 +14,7 @@ from rig.files import program
 from rig.record import Record
 from rig.record.measured import Measured
 from rig.results.samples import compare_with_displacement
-from rig.services.load import Loaded, loaded
+from rig.services.load import Loaded, load_request
 from rig.services.next_experiment import planned
 from rig.services.provenance import today
 from rig.services.request import Request
@@ -88,14 +88,16 @@ def _facts(measured: Measured, date: str, program: str) -> Mapping[str, str]:
 Searched = Callable[[Mapping[str, "Effect"]], Mapping[str, "Effect"]]
 
 
-def reported(
+def make_report(
     request: Request,
     notify: Callable[[str], None],
     searched: Searched,
     question: Loaded | None = None,
     found: Findings[Any] | None = None,
 ) -> Page:
-    """On a model, or on the night of a soak where none is named. Raises what `loaded` and `fit` raise, UnusableData.
+    """On a model, or on the night of a soak where none is named.
+
+    Raises what `load_request` and `fit` raise, UnusableData.
 
     `searched` makes the effects of the search, which report its progress and may end it. `question`: data and model in
     memory, so that the page and its report show the same rows. `found`: the search on these that the page has made.
@@ -103,7 +105,7 @@ def reported(
     night = night_of(request.data, today(), program()) if request.model is None and request.channel is None else None
     if night is not None:
         return night
-    question = question or loaded(request, notify)
+    question = question or load_request(request, notify)
     return _on_a_model(
         request, question, notify, lambda: found or question.data.search(question.model, searched(question.effects))
     )

@@ -23,7 +23,7 @@ from calibrations.model import Model
 from calibrations.progress import report
 from rig.errors import RecordError
 from rig.services.content import Content, content_of
-from rig.services.load import loaded
+from rig.services.load import load_request
 from rig.services.next_experiment import planned
 from rig.services.provenance import with_provenance
 from rig.services.request import Request
@@ -207,13 +207,13 @@ class ModelSession(Generic[F]):
 
 
 def model_session(request: Request) -> ModelSession[Any]:
-    """The beginning: data (a file or a run) and a model by name or file. Raises what `loaded` and `fit` raise."""
+    """The beginning: data (a file or a run) and a model by name or file. Raises what `load_request` and `fit` raise."""
     notes: list[str] = []
     content = Content("")
     with suppress(RecordError, OSError):  # `loaded` says better what is wrong
         content = content_of(request.data, request.model)  # before the data: a later row makes the session old
     report(f"Reading {request.data}")
-    question = loaded(request, notes.append)
+    question = load_request(request, notes.append)
     report(f"Fitting {question.model.name} to {question.data.description}")
     prepared, start = question.data.fit_without_outliers(question.model)
     return ModelSession(

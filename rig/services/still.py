@@ -116,7 +116,7 @@ def channel_of(channels: tuple[str, ...], channel: str | None, source: str) -> s
     return name_there
 
 
-def agreed(measured: float | None, stated_hz: float, source: str) -> float:
+def agree_on_rate(measured: float | None, stated_hz: float, source: str) -> float:
     """The rate, Hz. Raises DataError where two disagree, or there is none."""
     if measured is None and not stated_hz > 0:
         raise DataError(
@@ -152,7 +152,7 @@ def of_table(table: Table, channel: str | None, rate_hz: float | None) -> Stream
     channel_name = channel_of(channels, channel, table.source)
     stated_hz = rate_hz or table.number("sample_rate_hz", 0.0)
     times = _times(table)
-    rate = agreed(times.rate_hz if times else None, stated_hz, table.source)
+    rate = agree_on_rate(times.rate_hz if times else None, stated_hz, table.source)
     unit = "V" if channel_name.endswith("_v") else str(table.constants.get("unit", "count"))
     corner_hz = table.number("filter_corner_hz", np.inf)
     other_channels = tuple(name for name in channels if name != channel_name)
@@ -249,7 +249,7 @@ def of_run(measured: Measured, channel: str | None, rate_hz: float | None) -> St
         raise RecordError(f"run {measured.name} has no still record; `rig run noise-floor` or `rig run soak` makes one")
     names = first.samples.channels
     channel_name = channel_of(tuple(names), (channel or "").removesuffix("_v") or None, f"run {measured.name}")
-    rate = agreed(first.samples.rate_hz, rate_hz or 0.0, f"run {measured.name}")
+    rate = agree_on_rate(first.samples.rate_hz, rate_hz or 0.0, f"run {measured.name}")
     corner = float(measured.constants.get("filter_corner_hz", np.inf))
     outputs = tuple(name for name in names if name in SENSOR and name != channel_name)
     unit = units_of(measured.run, [channel_name]).get(channel_name, "V")

@@ -27,7 +27,7 @@ FOLLOWED = ("temperature_c", "supply_v")  # columns that an output may follow
 BESIDE = ("t_s", *FOLLOWED, "n", "direction", "path")  # columns that are not channels
 
 
-def averaged(log: Table, notify: Callable[[str], None]) -> Table:
+def average_log(log: Table, notify: Callable[[str], None]) -> Table:
     """The table; a raw log is averaged over its still intervals, with a remark to `notify`.
 
     Duplicate rows count once. Raises DataError without any still interval.
@@ -68,7 +68,7 @@ def load(data: str, kind: str | None = None, notify: Callable[[str], None] = lam
     if Path(data).is_dir():
         raise DataError(f"{data}: this is a folder; give a file in it, or a run (`rig runs` lists them)")
     if Path(data).is_file():
-        return averaged(read_csv(Path(data), kind), notify)
+        return average_log(read_csv(Path(data), kind), notify)
     table = _of_run(data)
     if kind is not None and table.kind != kind:
         raise RecordError(f"run {data} is a table of {table.kind}, not of {kind}")
@@ -106,7 +106,7 @@ def load_all(names: Sequence[str], notify: Callable[[str], None] = lambda _: Non
         raise DataError(f"{duplicate} is given twice; give the same data once")
     if len(tables) == 1:
         return tables[0]
-    return join_runs(tables, [_begun(name) for name in names], notify)
+    return join_runs(tables, [_begin_time(name) for name in names], notify)
 
 
 def join_runs(
@@ -127,18 +127,18 @@ def join_runs(
     return join_tables(tables)
 
 
-def _begun(name: str) -> datetime | None:
+def _begin_time(name: str) -> datetime | None:
     """The start of a run on real instruments, whose times count from it."""
     if Path(name).is_file():
         return None
     from rig.record.store import Record
 
     with suppress(UnknownRun), Record.to_find(name) as record:
-        return begun(record, name.partition("/")[0])
+        return begin_time(record, name.partition("/")[0])
     return None
 
 
-def begun(record: Record, run: str) -> datetime | None:
+def begin_time(record: Record, run: str) -> datetime | None:
     """The start of a run; None on a simulated bench, whose times count from power-on."""
     from rig.bench import Bench
 

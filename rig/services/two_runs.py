@@ -21,7 +21,7 @@ from calibrations.model import Estimate
 from calibrations.table import Array, Table
 from rig.errors import RecordError
 from rig.record import Run
-from rig.services.load import loaded
+from rig.services.load import load_request
 from rig.services.request import Request
 
 DIFFERENT = 2.0  # standard uncertainties
@@ -118,9 +118,9 @@ class RepeatedPoses:
 def fit_both(first: Request, second: Request, notify: Callable[[str], None]) -> tuple[Dataset[Any], Any, Any]:
     """(the data of the first, and one model fitted to both: that of the first request, or of its kind of data).
 
-    Raises RecordError where they are of two kinds, and what `loaded` and `fit` raise.
+    Raises RecordError where they are of two kinds, and what `load_request` and `fit` raise.
     """
-    first_loaded, second_loaded = loaded(first, notify), loaded(second, notify)
+    first_loaded, second_loaded = load_request(first, notify), load_request(second, notify)
     if first_loaded.data.content != second_loaded.data.content:
         raise RecordError(
             f"{first.data} is of {first_loaded.data.content}, {second.data} of {second_loaded.data.content}: "

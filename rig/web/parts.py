@@ -114,7 +114,7 @@ async def shown(
     except Exception as error:
         if current():
             with afresh(place):
-                failed(title, error, data)
+                show_error(title, error, data)
         return None
     if not current():
         return None
@@ -122,7 +122,7 @@ async def shown(
     return result
 
 
-def failed(title: str, reason: str | Exception, data: str = "", addresses: Mapping[str, str] | None = None) -> None:
+def show_error(title: str, reason: str | Exception, data: str = "", addresses: Mapping[str, str] | None = None) -> None:
     """An error message. `data`: the run or file that it is about; `addresses`: further buttons by their labels."""
     step = page_step(reason if isinstance(reason, str) else raw_message(reason), data)
     with box("error").props("role=alert"):
@@ -131,7 +131,7 @@ def failed(title: str, reason: str | Exception, data: str = "", addresses: Mappi
         buttons({**step.to, **(addresses or {})})
 
 
-def noted(text: str, data: str = "") -> None:
+def show_remark(text: str, data: str = "") -> None:
     """A box with a remark on `data`; what a command does, its buttons do."""
     with box("note"):
         step_row(page_step(text, data), "small")
@@ -211,7 +211,7 @@ def message(error: Exception) -> str:
     return for_page(page_step(raw_message(error)).text)
 
 
-def complain(error: Exception, stays: bool = False) -> None:
+def notify_error(error: Exception, stays: bool = False) -> None:
     """Show an error as a notification, for some seconds or, with `stays`, until a person closes it."""
     lasting: dict[str, Any] = {"timeout": 0, "close_button": "Close"} if stays else {}
     ui.notify(message(error), type="negative", multi_line=True, **lasting)

@@ -13,7 +13,7 @@ from nicegui import ui
 from calibrations.presentation.chart import Chart
 from calibrations.presentation.interactive import figure
 from rig.web.calculations import off_loop
-from rig.web.parts import complain, div, redraw, words
+from rig.web.parts import div, notify_error, redraw, words
 
 _CHARTS: WeakKeyDictionary[ui.plotly, Chart] = WeakKeyDictionary()
 
@@ -85,6 +85,6 @@ async def _download(plot: Callable[[], ui.plotly | None], name: str, form: str) 
     try:
         content = await off_loop({"svg": static.svg, "png": static.png}[form], chart)
     except Exception as error:
-        complain(error)
+        notify_error(error)
         return
     ui.download.content(content, f"{re.sub(r'[^a-z0-9]+', '-', name.lower()).strip('-')}.{form}")

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from calibrations.discovery.check_poses import MARK, unseen
+from calibrations.discovery.check_poses import MARK, judge_check_poses
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import fit
 from calibrations.loop import diagnose
@@ -82,7 +82,9 @@ def in_truth(found: Optimal, model: Model, seeds: int) -> float:
 def false_alarms(found: Optimal, model: Model, seeds: int) -> int:
     """Rigs with nothing missing that the check poses fail."""
     tables = (measured(rigs.IDEAL, seed, found.equal.poses, found.equal.dwell_s) for seed in range(seeds))
-    return sum(check is not None and not check.passed for check in (unseen(model, table) for table in tables))
+    return sum(
+        check is not None and not check.passed for check in (judge_check_poses(model, table) for table in tables)
+    )
 
 
 def named(found: Optimal, model: Model) -> dict[str, bool]:

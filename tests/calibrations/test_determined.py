@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from calibrations.effects.catalogue import catalogue
-from calibrations.fitting.determined import leverages, undetermined, unseen_variance
+from calibrations.fitting.determined import explain_undetermined, leverages, unseen_variance
 from calibrations.fitting.fit import fit
 from calibrations.loop import add, diagnose, discover
 from calibrations.model import Model
@@ -42,8 +42,8 @@ def test_the_variance_on_an_unseen_row_is_that_of_leaving_it_out() -> None:
 
 
 def test_many_rows_determine_a_model_and_few_do_not() -> None:
-    assert undetermined(fit(read_model("linear"), turned(list(range(0, 360, 10)), 1))) is None
-    few = undetermined(fit(read_model("linear"), turned([0.0, 10.0, 20.0], 1)))
+    assert explain_undetermined(fit(read_model("linear"), turned(list(range(0, 360, 10)), 1))) is None
+    few = explain_undetermined(fit(read_model("linear"), turned([0.0, 10.0, 20.0], 1)))
     assert few is not None
     assert "the 2 parameters are not identifiable from 3 rows" in few
 
@@ -57,17 +57,17 @@ def test_a_parameter_that_one_row_alone_tells_is_known_and_unchecked() -> None:
     columns |= {f"g{axis}_std": np.full(9, 1.0) for axis in "xyz"}
     table = Table.from_columns("rates", columns | {"rate_deg_s": rates, "n": np.full(9, 100.0)})
     found = fit(read_model("gyroscope"), table)
-    told = undetermined(found)
+    told = explain_undetermined(found)
     assert told is not None
     assert "the fit cannot check all of the 6 parameters: 3 of the 27 measured values (row 6, row 7, row 8)" in told
     assert "not identifiable" not in told
     assert leverages(found).sum() == pytest.approx(6)
-    again = undetermined(fit(read_model("gyroscope"), table.rows(np.array([*range(9), 6, 7, 8]))))
+    again = explain_undetermined(fit(read_model("gyroscope"), table.rows(np.array([*range(9), 6, 7, 8]))))
     assert again is None
 
 
 def test_published_sets_of_many_positions_determine_nine_parameters() -> None:
-    assert [undetermined(fit(nine(), table)) for table in (xsens(), mikoff())] == [None, None]
+    assert [explain_undetermined(fit(nine(), table)) for table in (xsens(), mikoff())] == [None, None]
 
 
 @pytest.mark.parametrize("model", [nine(), read_model("linear")])

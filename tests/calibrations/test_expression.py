@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from calibrations.effects.expression import FUNCTIONS, Apply, Name, Number, evaluate, nodes, parse
-from calibrations.effects.expression_start import linear
+from calibrations.effects.expression_start import find_linear_parameters
 from calibrations.errors import ExpressionError
 
 T = np.array([-2.0, 0.0, 0.5, 3.0])
@@ -164,4 +164,4 @@ SHAPES = [
 def test_which_parameters_it_is_straight_in(text: str, straight: tuple[str, ...]) -> None:
     expression = parse(text)
     parameters = tuple(sorted(set(expression.names) - {"t"}))
-    assert set(linear(expression.root, parameters)) == set(straight)
+    assert set(find_linear_parameters(expression.root, parameters)) == set(straight)

@@ -10,7 +10,7 @@ from calibrations.errors import DataError, ModelError
 from calibrations.fitting.fit import fit
 from calibrations.fitting.table_noise import slow_processes, with_noise
 from calibrations.loop import compare, diagnose
-from calibrations.means.noise import Noise, correlated
+from calibrations.means.noise import Noise, whiten_columns
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.file import read_model
 from calibrations.table import Table
@@ -86,7 +86,7 @@ def test_known_processes_whiten_what_they_make() -> None:
     apart = 5.0 * np.abs(np.subtract.outer(np.arange(400), np.arange(400)))
     covariance = np.eye(400) + 4 * np.exp(-apart / 50.0) + 9 * np.exp(-apart / 700.0)
     x = np.linalg.cholesky(covariance) @ random.standard_normal(400)
-    out, logdet = correlated(x[:, None], gaps, np.ones(400), 0.0, (1.0,), ((2.0, 50.0), (3.0, 700.0)))
+    out, logdet = whiten_columns(x[:, None], gaps, np.ones(400), 0.0, (1.0,), ((2.0, 50.0), (3.0, 700.0)))
     assert logdet == pytest.approx(np.linalg.slogdet(covariance)[1])
     assert float(out[:, 0] @ out[:, 0]) == pytest.approx(x @ np.linalg.solve(covariance, x))
     noise = Noise(np.ones((1, 400)), gaps, np.zeros(1), np.zeros(1), ((1.0,),), (((2.0, 50.0), (3.0, 700.0)),))

@@ -7,8 +7,8 @@ import pytest
 
 from calibrations.design.orientations import (
     ORIENTATIONS,
-    covered,
     directions_up,
+    find_covered,
     is_other_side,
     is_worth,
     name_orientation,
@@ -105,6 +105,6 @@ def test_directions_come_from_the_outputs_once_these_determine_the_zero() -> Non
 
 
 def test_coverage_counts_the_named_orientations() -> None:
-    assert covered(np.zeros((0, 3))).sum() == 0
-    assert covered(ORIENTATIONS).all()
-    assert covered(ORIENTATIONS[:1]).sum() == 1
+    assert find_covered(np.zeros((0, 3))).sum() == 0
+    assert find_covered(ORIENTATIONS).all()
+    assert find_covered(ORIENTATIONS[:1]).sum() == 1

@@ -267,9 +267,9 @@ def test_a_function_of_a_column_is_explained_by_it_and_noise_is_not() -> None:
     x = np.linspace(0, 10, 500)[None]
     noise = np.random.default_rng(0).standard_normal((1, 500))
     sides = np.where(np.arange(500) % 2, 1.0, -1.0)
-    assert charts.explained(np.sin(x) * sides, x, sides) > 0.95
-    assert charts.explained(noise, x, sides) < 0.3
-    assert charts.explained(0 * x, x, sides) == 0
+    assert charts.explained_share(np.sin(x) * sides, x, sides) > 0.95
+    assert charts.explained_share(noise, x, sides) < 0.3
+    assert charts.explained_share(0 * x, x, sides) == 0
 
 
 def test_the_waterfall_falls_from_level_to_level() -> None:

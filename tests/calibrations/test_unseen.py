@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibrations.discovery.check_poses import unseen
+from calibrations.discovery.check_poses import judge_check_poses
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations.synthetic import NOISE_V, components, poses, turns
@@ -26,7 +26,7 @@ def measured(seed: int, missing: float = 0.0, jump_v: float = 0.0, checks: int =
 
 
 def test_chances_are_even_where_nothing_is_missing() -> None:
-    found = [unseen(LINEAR, measured(seed)) for seed in range(40)]
+    found = [judge_check_poses(LINEAR, measured(seed)) for seed in range(40)]
     chances = np.sort([check.chance for check in found if check is not None])
     assert np.max(np.abs(chances - (np.arange(40) + 0.5) / 40)) < 1.36 / np.sqrt(40)  # Kolmogorov and Smirnov, 5 %
     errors = [check.error for check in found if check is not None]
@@ -34,31 +34,31 @@ def test_chances_are_even_where_nothing_is_missing() -> None:
 
 
 def test_a_missing_effect_fails_the_check() -> None:
-    check = unseen(LINEAR, measured(1, missing=10 * NOISE_V))
+    check = judge_check_poses(LINEAR, measured(1, missing=10 * NOISE_V))
     assert check is not None
     assert (check.poses, check.passed, check.steady) == (6, False, True)
     assert check.error > 2.5
 
 
 def test_what_changes_between_visits_is_no_misfit() -> None:
-    check = unseen(LINEAR, measured(2, jump_v=5 * NOISE_V))
+    check = judge_check_poses(LINEAR, measured(2, jump_v=5 * NOISE_V))
     assert check is not None
     assert check.pure_error == pytest.approx(5, rel=0.3)
     assert (check.passed, check.steady) == (True, False)
 
 
 def test_repeats_are_counted() -> None:
-    check = unseen(LINEAR, measured(3))
+    check = judge_check_poses(LINEAR, measured(3))
     assert check is not None
     assert check.repeats == 72 - 36 - 6  # 36 poses, each twice, but for the six check poses
 
 
 @pytest.mark.parametrize("checks", [0, 2])
 def test_too_few_poses_are_no_check(checks: int) -> None:
-    assert unseen(LINEAR, measured(4, checks=checks)) is None
+    assert judge_check_poses(LINEAR, measured(4, checks=checks)) is None
 
 
 def test_without_the_noise_of_means_there_is_none_either() -> None:
     table = measured(5)
     columns = {name: values for name, values in table.columns.items() if "std" not in name}
-    assert unseen(LINEAR, Table.from_columns("poses", columns, {}, "made", table.labels)) is None
+    assert judge_check_poses(LINEAR, Table.from_columns("poses", columns, {}, "made", table.labels)) is None

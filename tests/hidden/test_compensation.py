@@ -13,7 +13,7 @@ from calibrations.fitting.fit import fit
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.means.noise import rms
 from calibrations.model.file import read_model
-from calibrations.presentation.charts.motion import compensated
+from calibrations.presentation.charts.motion import compensated_chart
 from calibrations.presentation.static import save
 from calibrations.table import Array, Table
 from drivers.world.config import WorldConfig
@@ -54,7 +54,7 @@ def test_the_error_on_unseen_poses_falls_to_a_fiftieth(tmp_path: Path) -> None:
     for linear, compensated_ in left.rmse.values():
         assert 30 < linear < 100  # mm/s^2
         assert compensated_ < linear / 50
-    save(compensated(left), tmp_path / "residual.png")
+    save(compensated_chart(left), tmp_path / "residual.png")
     assert (tmp_path / "residual.png").stat().st_size > 10_000
 
 

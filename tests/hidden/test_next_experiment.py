@@ -15,7 +15,7 @@ from calibrations.loop import discover
 from calibrations.model.file import read_model
 from drivers.world.config import WorldConfig
 from rig.bench import read_bench
-from rig.planning.next_experiment import proposed
+from rig.planning.next_experiment import with_next_experiment
 from tests.hidden.defects import DEFECTS
 from tests.hidden.quick_rig import QuickRig
 from tests.slow import first_fast
@@ -56,7 +56,7 @@ def test_the_proposed_experiment_tells_which_it_is(case: str) -> None:
     config, first, truth, procedure = CASES[case]
     bench, effects = read_bench(None), catalogue()
     rig = QuickRig(config, 1, bench)
-    before = proposed(discover(rig.measure(first)[1], read_model("linear")), effects, bench, None)
+    before = with_next_experiment(discover(rig.measure(first)[1], read_model("linear")), effects, bench, None)
     assert before.verdict == "ambiguous"
     (cause,) = before.causes
     assert truth in {cause, *before.alternatives[cause]}

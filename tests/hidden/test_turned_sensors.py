@@ -21,7 +21,7 @@ from procedures.magnetometer_turn import magnetometer_turn
 from procedures.rate_turn import rate_turn
 from rig.record.measured import positions_table, rates_table
 from rig.record.values import Run
-from rig.results.result import fitted
+from rig.results.result import fit_shipped
 from tests.procedures.bench import session
 
 SQUARE = {"turn_x_deg": 0.5, "turn_y_deg": -0.8, "turn_z_deg": 0.3}
@@ -79,7 +79,7 @@ def test_what_is_fitted_is_what_the_mechanism_has() -> None:
 
     The pick-up gives 0.11 V for the Coriolis displacement of 1 deg/s, 0.055 nm.
     """
-    found = fitted(turned(**SQUARE), "gyroscope", "gyro-misalignment", "gyro-g-sensitivity")
+    found = fit_shipped(turned(**SQUARE), "gyroscope", "gyro-misalignment", "gyro-g-sensitivity")
     lean = {e.name: e for e in found.model.estimates("gyro-misalignment")}
     expected = {"xy": -0.3, "yx": 0.3, "xz": -0.8, "zx": 0.8, "yz": -0.5, "zy": 0.5}
     for pair, deg in expected.items():
@@ -95,8 +95,8 @@ def test_what_is_fitted_is_what_the_mechanism_has() -> None:
 def test_the_earths_rotation_is_in_the_bias_unless_the_latitude_is_known() -> None:
     """At the pole, where it is all vertical, it follows gravity on six faces, along each edge alike."""
     at_the_pole = {"laboratory": {"latitude_deg": 90.0}}
-    unknown = fitted(turned(latitude_deg=None, world=at_the_pole, noise_v=1e-4), "gyroscope", "gyro-g-sensitivity")
-    known = fitted(turned(latitude_deg=90.0, world=at_the_pole, noise_v=1e-4), "gyroscope", "gyro-g-sensitivity")
+    unknown = fit_shipped(turned(latitude_deg=None, world=at_the_pole, noise_v=1e-4), "gyroscope", "gyro-g-sensitivity")
+    known = fit_shipped(turned(latitude_deg=90.0, world=at_the_pole, noise_v=1e-4), "gyroscope", "gyro-g-sensitivity")
     along = {e.axis: e for e in unknown.model.estimates("gyro-g-sensitivity") if e.axis == e.name}
     for axis, e in along.items():
         assert e.value / 6.05e-3 == pytest.approx(0.00418, abs=0.0008), axis
@@ -128,7 +128,7 @@ def test_iron_that_stands_with_the_rig_is_a_part_of_the_field_and_no_fault() -> 
 
 def test_a_ball_of_iron_comes_back_as_its_dipole() -> None:
     """1 + k (3 r r' - 1), k = (a/r)^3 (mu - 1)/(mu + 2): symmetric and without trace, as the mechanism has it."""
-    found = fitted(field(magnet=True, iron=True), "magnetometer")
+    found = fit_shipped(field(magnet=True, iron=True), "magnetometer")
     r = np.array([9.0, 17.0, -4.0])
     k = (7.0 / np.linalg.norm(r)) ** 3 * 999 / 1002
     expected = k * (3 * np.outer(r, r) / (r @ r) - np.eye(3))

@@ -19,7 +19,7 @@ from rig.bench.file import DEMO
 from rig.cli.terminal.watch import Quiet
 from rig.errors import Busy, RigError
 from rig.files import home
-from rig.instruments.instruments import connected
+from rig.instruments.instruments import connect_all
 from rig.lease import lease
 from rig.record import Kept, Record
 from rig.runs.background import control, process
@@ -138,7 +138,7 @@ def test_a_wish_for_a_pause_while_the_run_connects_again_pauses_it(monkeypatch: 
         connections.append(1)
         if len(connections) == 2:
             signal.raise_signal(signal.SIGINT)
-        return connected(*arguments)
+        return connect_all(*arguments)
 
     monkeypatch.setattr("rig.runs.runner.connected", interrupted)
 

@@ -10,7 +10,7 @@ import yaml
 from drivers.transport import Address
 from rig.bench import DEFAULT, Bench, drivers, read_bench
 from rig.errors import BenchError
-from rig.instruments.wiring import on_a_network, wired
+from rig.instruments.wiring import on_a_network, open_wires
 
 ONE_INPUT = {"vx": 1, "vy": 1}
 ALPHA = {"driver": "oriental_az", "url": "simulated"}
@@ -227,7 +227,7 @@ def test_a_recorded_bench_with_two_roles_on_one_unit_is_not_connected() -> None:
     twice = {role: part.model_copy(update={"unit": 1}) for role, part in read_bench().instruments.items()}
     with (
         pytest.raises(BenchError, match=r"bench 'simulated rig', key instruments\.beta\.unit: alpha and beta are both"),
-        wired(read_bench().model_copy(update={"instruments": twice})),
+        open_wires(read_bench().model_copy(update={"instruments": twice})),
     ):
         pass
 

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from rig.bench import DEFAULT, Bench
-from rig.bench.certificates import certificates, expired
+from rig.bench.certificates import certificates, find_expired
 
 Rig = Callable[..., Any]
 OLD, GOOD = {"number": "CAL-17", "due": "2001-03-01"}, {"number": 42, "due": "2999-12-31"}
@@ -38,9 +38,9 @@ def file(tmp_path: Path) -> Callable[..., str]:
 def test_a_certificate_is_good_until_the_end_of_its_day() -> None:
     made = Bench.model_validate(bench({"number": "CAL-17", "due": "2027-03-01"}, GOOD))
     assert list(certificates(made)) == ["beta", "d63 curve"]
-    assert expired(made, date(2027, 3, 1)) == []
-    assert expired(made, date(2027, 3, 2)) == ["beta's certificate CAL-17 expired on 2027-03-01"]
-    assert len(expired(made, date(3000, 1, 1))) == 2
+    assert find_expired(made, date(2027, 3, 1)) == []
+    assert find_expired(made, date(2027, 3, 2)) == ["beta's certificate CAL-17 expired on 2027-03-01"]
+    assert len(find_expired(made, date(3000, 1, 1))) == 2
 
 
 @pytest.mark.sockets

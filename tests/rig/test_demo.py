@@ -20,7 +20,7 @@ from drivers.world.world import World
 from procedures.sweep import grid
 from rig.bench import read_bench
 from rig.bench.file import DEMO
-from rig.services.hidden_faults import MATERIAL, MECHANISMS, Curve, Faults, Group, grouped, hidden_faults
+from rig.services.hidden_faults import MATERIAL, MECHANISMS, Curve, Faults, Group, group_steps, hidden_faults
 
 SAME = {
     "unequal or uneven plates": "quadratic-nonlinearity",
@@ -61,7 +61,7 @@ def effect(name: str, curve: Array, *span: Array) -> Curve:
 def test_a_fault_that_no_effect_follows_is_not_found() -> None:
     curves = np.eye(4)[:, :, None]
     hidden, other = Curve("friction", curves[0]), effect("own", curves[1])
-    groups, extra = grouped([hidden], [other], 0.01)
+    groups, extra = group_steps([hidden], [other], 0.01)
     assert [g.effects for g in groups] == [()]
     assert extra == (other,)
     assert "not found" in Faults(groups, extra, 0.01, "V").text()
@@ -71,12 +71,12 @@ def test_faults_that_share_an_effect_are_one_group_if_they_agree_together() -> N
     x, y, z = np.eye(8)[:3, :, None]
     hidden = [Curve("tilt", 2 * x), Curve("turn", x + y), Curve("friction", z)]
     angle, zero = effect("angle", 2.9 * x, y), effect("zero", y)
-    groups, extra = grouped(hidden, [angle, zero], 0.01)
+    groups, extra = group_steps(hidden, [angle, zero], 0.01)
     assert [[f.name for f in g.faults] for g in groups if g.effects] == [["tilt", "turn"]]
     assert [e.name for g in groups for e in g.effects] == ["angle"]
     assert extra == (zero,)
     opposite = effect("angle", -2.9 * x, y)
-    assert not any(g.effects for g in grouped(hidden, [opposite, zero], 0.01)[0])
+    assert not any(g.effects for g in group_steps(hidden, [opposite, zero], 0.01)[0])
 
 
 def test_many_effects_of_a_group_stand_in_several_lines() -> None:

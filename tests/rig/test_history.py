@@ -17,7 +17,7 @@ from calibrations.model.file import read_model
 from calibrations.table import Table
 from rig.errors import RecordError
 from rig.record import Record
-from rig.services.history import Calibration, History, Value, _of_one_kind, history, judged, latest
+from rig.services.history import Calibration, History, Value, _of_one_kind, history, judge_history, latest
 from rig.services.history_comparison import compare_rigs
 from tests.rig.lives import COLUMNS, calibrated
 
@@ -190,10 +190,10 @@ def test_calibrations_of_another_kind_or_by_an_incomplete_model_are_not_compared
     found, others = _of_one_kind(of)
     assert [each.data for each in found] == ["r0", "r2", "r3"]
     assert list(others) == ["r1"]
-    life = judged(History("17", "linear", tuple(found), (), others), {})
+    life = judge_history(History("17", "linear", tuple(found), (), others), {})
     assert life.quantities[0].line is not None
     assert life.warnings == ()
     found[1] = replace(found[1], excess=6.6)
-    life = judged(History("17", "linear", tuple(found), (), others), {})
+    life = judge_history(History("17", "linear", tuple(found), (), others), {})
     assert life.quantities[0].line is None
     assert "not complete for 1 of 3" in life.warnings[0]

@@ -22,7 +22,7 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli import rig as commands
 from rig.cli.terminal.options import read_settings
-from rig.planning.next_experiment import Dispute, choose_experiment, command_line, plan_experiment, proposed
+from rig.planning.next_experiment import Dispute, choose_experiment, command_line, plan_experiment, with_next_experiment
 from rig.planning.sweep_range import columns
 from rig.record import Record
 from rig.services.next_experiment import planned
@@ -68,7 +68,7 @@ def turned() -> Any:
 
 
 def test_a_turned_sensor_is_to_be_mounted_face_down() -> None:
-    e = proposed(turned(), catalogue(), read_bench(None), None).next_experiment
+    e = with_next_experiment(turned(), catalogue(), read_bench(None), None).next_experiment
     assert e.procedure == "sweep"
     assert e.settings["face"] == "both"
     assert e.separates == (("stage-zero-offset", "axis-misalignment"),)
@@ -80,7 +80,7 @@ def test_a_turned_sensor_is_to_be_mounted_face_down() -> None:
 def test_what_is_not_computed_is_null() -> None:
     bench = read_bench(None)
     _, table = QuickRig(IDEAL.changed({"base": {"tilt_y_deg": 0.05}}), 8, bench).measure(COARSE)
-    found = proposed(diagnose(table, read_model("linear")), catalogue(), bench, Path("b.yaml"))
+    found = with_next_experiment(diagnose(table, read_model("linear")), catalogue(), bench, Path("b.yaml"))
     e = diagnosis_document(found, "linear")["next_experiment"]
     assert (e["procedure"], e["settings"], e["expected"]) == ("level-check", {"on": "base"}, None)
     assert e["command"] == "rig run level-check --on base --bench b.yaml"

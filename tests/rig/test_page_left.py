@@ -15,7 +15,7 @@ from nicegui.testing import user_simulation
 from procedures.catalogue import Procedure
 from rig.bench import DEFAULT, Bench
 from rig.planning.plan import plan
-from rig.services.report import reported
+from rig.services.report import make_report
 from rig.services.request import Request
 from rig.services.search import Cancelled, Counted
 from rig.services.session import ModelSession
@@ -203,4 +203,4 @@ def test_a_visit_ends_its_searches_and_its_steps(tmp_path: Path, monkeypatch: py
     with pytest.raises(Cancelled):
         visits[0].check()
     with pytest.raises(Cancelled):  # a report fits the model, and is left before the search
-        reported(Request(two_faults(tmp_path), "linear"), print, visits[0].searched)
+        make_report(Request(two_faults(tmp_path), "linear"), print, visits[0].searched)

@@ -60,7 +60,7 @@ def test_nothing_is_touched(rig_home: Path, monkeypatch: pytest.MonkeyPatch) -> 
         raise AssertionError("a plan connected to something")
 
     monkeypatch.setattr("socket.socket.connect", refuse)
-    monkeypatch.setattr("rig.instruments.instruments.connected", refuse)
+    monkeypatch.setattr("rig.instruments.instruments.connect_all", refuse)
     plan(read_bench(), *small_sweep())
     assert not rig_home.exists()
 

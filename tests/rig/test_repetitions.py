@@ -13,7 +13,7 @@ import yaml
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import DEFAULT, Bench
-from rig.instruments.instruments import connected
+from rig.instruments.instruments import connect_all
 from rig.planning.plan import plan
 from rig.record import Record
 from rig.results.evaluate import names
@@ -64,7 +64,7 @@ def states(state: Any, key: str) -> list[Any]:
 
 @pytest.mark.sockets
 def test_what_stops_a_run_switches_the_oven_off() -> None:
-    with connected(Bench.model_validate(bench({}))) as rig:
+    with connect_all(Bench.model_validate(bench({}))) as rig:
         oven: Any = rig.drivers["oven"]
         oven.set_temperature(60.0)
         oven.run(True)

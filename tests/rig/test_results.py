@@ -15,7 +15,7 @@ from procedures.errors import ProcedureError
 from rig.bench import DEFAULT
 from rig.record import Record
 from rig.record.measured import table_of
-from rig.results import Result, documents, returned
+from rig.results import Result, documents, read_returned
 from rig.results.evaluate import MODULES, names
 from rig.results.result import EVALUATIONS
 from rig.services.result_meaning import meaning
@@ -51,7 +51,7 @@ def test_a_result_without_a_limit_has_no_verdict() -> None:
 @pytest.mark.parametrize("given", [3.0, {"value": 3.0}, {"value": "much", "unit": "g"}])
 def test_what_is_no_result_is_said_to_be_none(given: Any) -> None:
     with pytest.raises(ProcedureError, match=r"the procedure returned mass = .*a result is a mapping such as"):
-        returned("mass", given)
+        read_returned("mass", given)
 
 
 def bench_with(folder: Path, **changes: Any) -> str:

@@ -22,7 +22,7 @@ from procedures.session import Limits
 from procedures.sweep import grid
 from rig.bench import Bench, read_bench
 from rig.errors import Busy, InstrumentFailed, RunMismatch
-from rig.instruments.wiring import wired
+from rig.instruments.wiring import open_wires
 from rig.lease import lease
 from rig.record import Kept, Record
 from rig.record.measured import table_of
@@ -277,9 +277,9 @@ def test_a_wire_is_busy_for_runs_of_another_record(
     (tmp_path / "tty").touch()
     parts = {"alpha": {"driver": "oriental_az", "url": f"serial:{tmp_path}/tty", "unit": 1}}
     bench = read_bench(bench_file({"instruments": parts}))
-    with wired(bench):
+    with open_wires(bench):
         monkeypatch.setenv("RIG_HOME", str(tmp_path / "another"))
         monkeypatch.setenv("TMPDIR", str(tmp_path))
         monkeypatch.setattr(tempfile, "tempdir", None)  # as in another process
-        with pytest.raises(Busy, match="uses serial:"), wired(bench):
+        with pytest.raises(Busy, match="uses serial:"), open_wires(bench):
             pass

@@ -19,7 +19,7 @@ from drivers.oriental_az import driver as oriental_az
 from drivers.transport import Address, Links
 from rig.bench import DEFAULT, read_bench
 from rig.errors import Busy
-from rig.instruments.instruments import connected
+from rig.instruments.instruments import connect_all
 
 pytestmark = pytest.mark.sockets
 
@@ -85,8 +85,8 @@ def test_a_bench_of_which_a_part_is_real_runs_in_real_time(
         instruments[role]["settings"] |= {"speed_deg_s": 1200, "acceleration_deg_s2": 36000}
     instruments["oven"]["url"] = document["instruments"]["oven"]["url"]  # elsewhere, so real for this bench
     path = bench_file({"instruments": instruments})
-    with connected(read_bench(path)) as mixed:
-        with pytest.raises(Busy, match=r"another process .* uses "), connected(read_bench(path)):
+    with connect_all(read_bench(path)) as mixed:
+        with pytest.raises(Busy, match=r"another process .* uses "), connect_all(read_bench(path)):
             pass  # its connecting would disturb who measures
         assert mixed.state() is None
         assert mixed.power_on_s() is None
@@ -108,6 +108,6 @@ def test_pseudo_terminals_are_served_where_the_bench_asks(bench_file: Callable[.
     instruments = {role: instruments[role] for role in (*roles, "adc")}
     for role in roles:
         instruments[role]["url"] = "simulated:pty:"
-    with connected(read_bench(bench_file({"instruments": instruments}))) as rig:
+    with connect_all(read_bench(bench_file({"instruments": instruments}))) as rig:
         assert sorted(server.url.partition(":")[0] for server in rig.servers) == ["serial", "serial", "tcp"]
         assert set(rig.identities()) == set(instruments)

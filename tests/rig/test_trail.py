@@ -10,7 +10,7 @@ from calibrations.errors import ExpressionError, ModelError
 from calibrations.importing.foreign import write_csv
 from calibrations.presentation.charts.discovery import levels
 from rig.services.load import Loaded
-from rig.services.report import reported
+from rig.services.report import make_report
 from rig.services.request import Request
 from rig.services.session import ModelSession, model_session
 from tests.browser.measured import hidden, wandering
@@ -89,7 +89,7 @@ def test_a_report_takes_the_search_that_its_session_has_made(turned: ModelSessio
     turned.diagnosed()
     question = Loaded(turned.data, turned.model, turned.effects)
     assert turned.search_made is not None
-    _, page = reported(turned.request, pytest.fail, pytest.fail, question, turned.search_made)
+    _, page = make_report(turned.request, pytest.fail, pytest.fail, question, turned.search_made)
     assert "misses axis-misalignment" in page()
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from calibrations.errors import CalibrationError
-from rig.services.load import loaded
+from rig.services.load import load_request
 from rig.services.request import Request
 
 REFUSED, WARNED, HARMLESS, SILENT = "refused", "warned", "harmless", "silent"
@@ -26,7 +26,7 @@ def answer(path: Path, model: str, good: Answer | None = None) -> Answer:
     """The answer of `rig fit PATH --model MODEL`, beside that to the good file."""
     notes: list[str] = []
     try:
-        found = loaded(Request(str(path), model), notes.append)
+        found = load_request(Request(str(path), model), notes.append)
         fitted = found.data.fit(found.model)
         rejection = found.data.rejection(fitted)
         notes += found.data.cautions(fitted)

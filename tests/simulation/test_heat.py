@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drivers.world.config import WorldConfig
-from drivers.world.kernel import wandered
+from drivers.world.kernel import step_wander
 from drivers.world.world import World
 
 
@@ -70,7 +70,7 @@ def test_a_wander_has_its_rms_and_correlation() -> None:
     random = np.random.default_rng(5)
     values = [0.0]
     for normal in random.standard_normal(50_000):
-        values.append(wandered(values[-1], 2.0, 1.0, 0.1, normal))
+        values.append(step_wander(values[-1], 2.0, 1.0, 0.1, normal))
     series = np.array(values[100:])
     assert series.std() == pytest.approx(2.0, rel=0.05)
     assert np.corrcoef(series[:-10], series[10:])[0, 1] == pytest.approx(exp(-1), abs=0.05)

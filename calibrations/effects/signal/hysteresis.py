@@ -4,7 +4,7 @@ import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
 from calibrations.geometry.orientation import other_in_plane
-from calibrations.geometry.stage_path import AS_STATED, approached, turning_points
+from calibrations.geometry.stage_path import AS_STATED, turning_points, with_approach
 from calibrations.table import Array, Table
 
 ELEMENTS = (np.arange(6) + 0.5) / 3 - 1  # midpoints of six equal parts of -1 .. 1
@@ -48,7 +48,7 @@ class Hysteresis(Effect):
     approach_deg = Constant(lambda _: AS_STATED)  # from where beta comes; a search may find it
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
-        path = turning_points(approached(table, float(p.approach_deg)))
+        path = turning_points(with_approach(table, float(p.approach_deg)))
         from calibrations.effects.kernels import slip  # numba is slow to import
 
         return slip(a, path, _limit_factor(a, p), _limits(p), p.begin) * p.height

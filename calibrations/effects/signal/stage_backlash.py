@@ -4,7 +4,7 @@ import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
 from calibrations.geometry.orientation import Pose
-from calibrations.geometry.stage_path import AS_STATED, approached, last_turn
+from calibrations.geometry.stage_path import AS_STATED, last_turn, with_approach
 from calibrations.table import Table
 
 
@@ -27,5 +27,5 @@ class StageBacklash(Effect):
     approach_deg = Constant(lambda _: AS_STATED)  # from where beta comes; a search may find it
 
     def pose(self, pose: Pose, table: Table, p: Values) -> Pose:
-        side = last_turn(approached(table, float(p.approach_deg)))
+        side = last_turn(with_approach(table, float(p.approach_deg)))
         return replace(pose, beta=pose.beta - np.radians(p.half_play) * side)

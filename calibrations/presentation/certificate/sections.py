@@ -177,7 +177,7 @@ def _uncertainty(c: Certificate) -> Section:
     trials = tuple(
         (_name(o), rounded(o.std, 2), rounded(o.simulated.std, 2), rounded(o.expanded, 2),
          f"{value_text(o.simulated.low, o.expanded)} to {value_text(o.simulated.high, o.expanded)}", unit(o.unit),
-         _checked(o))
+         _check_text(o))
         for o in c.figures.outcomes
     )  # fmt: skip
     check = ("quantity", "u by the budget", "u simulated", "U", "95 % simulated", "unit", "budget")
@@ -241,7 +241,7 @@ def _coverage(o: Outcome) -> str:
     return f"{WIDENED}, {o.coverage:.2f}" if o.simulated.verdict == WIDENED else f"{o.coverage:.2f}"
 
 
-def _checked(o: Outcome) -> str:
+def _check_text(o: Outcome) -> str:
     if o.simulated.verdict == CONSERVATIVE and o.simulated.why:
         return f"{CONSERVATIVE}: {o.simulated.why}"
     return f"{WIDENED} to the simulation" if o.simulated.verdict == WIDENED else o.simulated.verdict

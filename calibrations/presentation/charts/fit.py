@@ -32,7 +32,7 @@ from calibrations.presentation.chart import (
     Symbol,
     floor_band,
     side_by_side,
-    stacked,
+    stack_panels,
 )
 from calibrations.presentation.charts import motion
 from calibrations.presentation.residual import (
@@ -78,14 +78,14 @@ def fit_album(fit: Fit) -> list[Picture]:
 def measurement_chart(fit: Fit) -> Chart:
     """A panel for each output, or one for the magnitude of positions."""
     if fit.table.type.moving:
-        return stacked([motion.measurement(ChannelResidual(fit, c, False)) for c in motion.firsts(fit)], 2.6)
+        return stack_panels([motion.measurement(ChannelResidual(fit, c, False)) for c in motion.firsts(fit)], 2.6)
     columns_of_fit, n = choices(fit), 1 if fit.table.type.magnitude else len(fit.channels)
     x, colour = (columns_of_fit[name] for name in first_choices(list(columns_of_fit), fit.table))
     if fit.table.type.magnitude:
         x = columns(fit)[3]
     panels = [measurement(ChannelResidual(fit, c, False), x, colour) for c in range(n)]
     bar = scale_of(colour, 0)
-    return side_by_side(panels, 4.2, bar=bar) if n < 3 else stacked(panels, ROW, bar=bar)
+    return side_by_side(panels, 4.2, bar=bar) if n < 3 else stack_panels(panels, ROW, bar=bar)
 
 
 def residual_chart(fit: Fit) -> Chart:
@@ -107,10 +107,10 @@ def residual_chart(fit: Fit) -> Chart:
 def failure_chart(fit: Fit) -> Chart:
     """A map for each channel; for a motion the residual over one period."""
     if fit.table.type.moving:
-        return stacked([motion.failure(ChannelResidual(fit, c, False)) for c in motion.firsts(fit)], 2.6)
+        return stack_panels([motion.failure(ChannelResidual(fit, c, False)) for c in motion.firsts(fit)], 2.6)
     panels = [failure(ChannelResidual(fit, c, False)) for c in range(len(fit.channels))]
     reach = max(PALE, float(np.abs(fit.residual / fit.noise.floor[:, None]).max()))
-    return stacked(panels, 4.2 if len(panels) == 1 else ROW, bar=_signed(reach))
+    return stack_panels(panels, 4.2 if len(panels) == 1 else ROW, bar=_signed_scale(reach))
 
 
 def drawn_channels(fit: Fit, values: Array) -> list[int]:
@@ -166,7 +166,7 @@ def residual(
     """
     c, rows = channel.c, channel.rows
     dots = _dots(channel, x.values[c, rows], channel.residual, colour, channel.hover)
-    lines = tuple(_explained(step, x, channel)) if step else ()
+    lines = tuple(_mark_explained(step, x, channel)) if step else ()
     second_axis = None
     if second and not channel.fit.table.type.magnitude and not channel.in_g:
         second_axis = Second(channel.scale, 0.0, MILLI[channel.fit.table.input_unit])
@@ -182,7 +182,7 @@ def failure(channel: ChannelResidual) -> Panel:
     x, y, axes = _map(channel)
     relative = channel.residual / channel.floor
     dots = Points(x[rows], y[rows], symbol=[PLACES[int(s)] for s in channel.side], size=_marker_px(channel),
-                  values=relative, scale=_signed(max(PALE, float(np.abs(relative).max(initial=0.0)))),
+                  values=relative, scale=_signed_scale(max(PALE, float(np.abs(relative).max(initial=0.0)))),
                   hover=channel.hover, keys=range(len(rows)))  # fmt: skip
     circles: tuple[Line, ...] = ()
     if fit.table.type.magnitude:
@@ -211,7 +211,7 @@ def scale_of(colour: Column, c: int) -> Scale:
     return Scale(colour.labels[c], float(values.min()), float(values.max()))
 
 
-def _signed(reach: float) -> Scale:
+def _signed_scale(reach: float) -> Scale:
     return Scale("residual / noise floor", -reach, reach, signed=True)
 
 
@@ -252,7 +252,7 @@ def _stretches(channel: ChannelResidual, x: Array, model: Array) -> tuple[Array,
     return np.array(abscissas), np.array(values)
 
 
-def _explained(step: Step[Fit], x: Column, channel: ChannelResidual) -> Iterator[Line | Points]:
+def _mark_explained(step: Step[Fit], x: Column, channel: ChannelResidual) -> Iterator[Line | Points]:
     """A line where the change is a function of `x`, else a cross for each row."""
     if not is_function(step, x, channel.c):
         change, rows = change_of(step)[channel.c], channel.rows
@@ -307,7 +307,7 @@ def select_telling_column(step: Step[Fit]) -> Column:
     change, sides = change_of(step) / step.before.noise.floor[:, None], _sides(step)
     effect = next(term.effect for term in step.after.model.terms if term.name == step.name)
     candidates = select_telling_columns(step.before, effect)
-    shares = np.array([explained(change, column.values, sides) for column in candidates])
+    shares = np.array([explained_share(change, column.values, sides) for column in candidates])
     if step.before.table.type.moving:
         return candidates[0]
     if shares.max() < TELLING:
@@ -316,7 +316,7 @@ def select_telling_column(step: Step[Fit]) -> Column:
     return candidates[int(np.argmax(shares >= shares.max() - EQUAL))]
 
 
-def explained(change: Array, values: Array, sides: Array) -> float:
+def explained_share(change: Array, values: Array, sides: Array) -> float:
     """Part of the change's variance that is a function of the column, for each side apart; shapes (channels, n)."""
     unexplained = 0.0
     for y, x in zip(change, values, strict=True):

@@ -22,7 +22,7 @@ from calibrations.presentation.chart import (
     Points,
     Rule,
     single_chart,
-    stacked,
+    stack_panels,
 )
 from calibrations.table import Array
 from calibrations.text import percent
@@ -56,7 +56,7 @@ def rigs(errors: Sequence[RigError]) -> Chart:
         dots = Points(value, place, colour=colours, reach=np.array([2 * e.std for e in rig_errors]))
         y = Axis(low=-0.5, high=len(rig_names) - 0.5, names=tuple(rig_names), reverse=True)
         panels.append(Panel((Rule(0.0, "x", width=0.7), dots), Axis(), y, f"{effect}, {parameter} in {unit}"))
-    return stacked(panels, max(0.16 * len(rig_names), 0.9) + 0.4, share_x=False)
+    return stack_panels(panels, max(0.16 * len(rig_names), 0.9) + 0.4, share_x=False)
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def spreads(quantities: Mapping[str, Sequence[Spread]]) -> Chart:
         )
         for name, batch_spreads in quantities.items()
     ]
-    return stacked(panels, 1.7)
+    return stack_panels(panels, 1.7)
 
 
 def _spread(place: int, spread: Spread) -> Iterator[Band | Points | Note]:

@@ -22,10 +22,10 @@ from calibrations.presentation.chart import (
     Points,
     Rule,
     Symbol,
-    stacked,
+    stack_panels,
 )
 from calibrations.table import Array
-from calibrations.text import add_prefix, labelled, rounded, unit
+from calibrations.text import add_prefix, axis_label, rounded, unit
 
 POINTS = 200
 AHEAD = 0.5  # of the time from first to last calibration: length of the drawn drift after the last
@@ -64,7 +64,7 @@ def lives(quantities: Sequence[Life]) -> Chart:
     """A panel for each quantity, over the time of all of them."""
     ends = [_ends(quantity) for quantity in quantities]
     x = _dates(min(start for start, _ in ends), max(end for _, end in ends))
-    return stacked([replace(life(quantity), x=x) for quantity in quantities], 2.2)
+    return stack_panels([replace(life(quantity), x=x) for quantity in quantities], 2.2)
 
 
 def _dates(start: float, end: float) -> Axis:
@@ -93,7 +93,7 @@ def life(q: Life) -> Panel:
                symbol=["diamond" if s else "circle" for s in signals], size=8, low=values - expanded,
                high=values + expanded, hover=q.hover, keys=q.keys)
     )  # fmt: skip
-    return Panel(tuple(series), _dates(start, end), Axis(labelled(q.name, spelt)), q.name)
+    return Panel(tuple(series), _dates(start, end), Axis(axis_label(q.name, spelt)), q.name)
 
 
 def _ends(q: Life) -> tuple[float, float]:
@@ -143,7 +143,7 @@ def control_panels(
         dots = _control_points(numbers, factor * values, signals, baseline_end, texts, point_keys)
         band = Band(numbers, factor * low, factor * high, steps=True)
         series = (band, Rule(0.0, width=0.7), Line(numbers, factor * values, colour=MEASURED, width=1), dots)
-        panels[title] = Panel(series, x, Axis(labelled(label, spelt)), title, remark)
+        panels[title] = Panel(series, x, Axis(axis_label(label, spelt)), title, remark)
     return panels
 
 

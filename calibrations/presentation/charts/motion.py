@@ -154,7 +154,7 @@ def _phase(table: Stretches) -> tuple[Array, str]:
     return np.degrees(np.arctan2(-line.in_quadrature, line.in_phase)) % 360, line.name
 
 
-def compensated(residual: Residual) -> Chart:
+def compensated_chart(residual: Residual) -> Chart:
     """A row for each axis: the linear model's error on the left, the compensated one on the same scale."""
     poses = np.arange(residual.table.n, dtype=float)
     rows = []

@@ -84,7 +84,7 @@ class ModelCurve:
     dash: Dash = "solid"
 
 
-def scaled(still: Still, axis: str, in_sensed: bool) -> Scaled:
+def choose_scale(still: Still, axis: str, in_sensed: bool) -> Scaled:
     """The output's own unit; or thousandths of the sensed quantity, because noise is small."""
     sensed = still.sensed.get(axis)
     if sensed is None or not in_sensed:
@@ -169,7 +169,7 @@ def spectrum(
         series.append(
             _model(curve, curve.fit.frequency_hz[by_frequency], factor * root(curve.fit.expected[by_frequency]))
         )
-    series += [mark for line in fit.lines for mark in _marked(line.frequency_hz)]
+    series += [mark for line in fit.lines for mark in _mark_frequency(line.frequency_hz)]
     expected = factor * root(fit.expected)
     bottom = min(float(expected.min()) / ROOM, float(density.min()) / 2)  # no measured point is cut off
     top = max(ROOM * float(expected.max()), 2 * float(density.max()))
@@ -230,7 +230,7 @@ def still_album(end: NoiseFit, start: NoiseFit) -> list[Picture]:
     name, cleaned = end.model.name, end.still is not start.still
     line = f"The broken grey line is the model {start.model.name}, the full line {name}; thin lines are its parts."
     dashed = f", the broken grey line is the model {start.model.name}"
-    if _alike(end, start):
+    if _are_one_curve(end, start):
         line, dashed = f"The full line is the model {name}; thin lines are its parts.", ""
     averaging = (
         "Difference of neighbouring means over the time of a mean. Dots are measured, bars are intervals of 95 %. "
@@ -247,7 +247,7 @@ def still_album(end: NoiseFit, start: NoiseFit) -> list[Picture]:
     for end_fit, start_fit in zip(end.channels, start.channels, strict=True):
         axis = end_fit.channel.axis
         models = [ModelCurve(end_fit, _name(end, start), INK)]
-        if not _alike(end, start):
+        if not _are_one_curve(end, start):
             models.append(ModelCurve(start_fit, start.model.name, dash="dash"))
         raw = start.still.allan[axis] if cleaned else None
         curves.append(allan(end.still.allan[axis], scaled, models, raw))
@@ -265,7 +265,7 @@ def _with_axis_titles(panels: Sequence[Panel], end: NoiseFit) -> Chart:
     return side_by_side([replace(panel, title=title) for panel, title in zip(panels, titles, strict=True)], HEIGHT)
 
 
-def _alike(end: NoiseFit, start: NoiseFit) -> bool:
+def _are_one_curve(end: NoiseFit, start: NoiseFit) -> bool:
     """Whether both are one curve: the same effects with the same values, on the same record."""
     unchanged = [
         end_fit.values == start_fit.values for end_fit, start_fit in zip(end.channels, start.channels, strict=True)
@@ -275,7 +275,7 @@ def _alike(end: NoiseFit, start: NoiseFit) -> bool:
 
 def _name(end: NoiseFit, start: NoiseFit) -> str:
     """Of the final model: the given one may have its name and other values, or another record."""
-    if end.model.name != start.model.name or _alike(end, start):
+    if end.model.name != start.model.name or _are_one_curve(end, start):
         return end.model.name
     return f"{end.model.name}, {LESS if end.still is not start.still else 'fitted'}"
 
@@ -330,7 +330,7 @@ def _other_deviation(curve: Curve, name: str, colour: str) -> tuple[Band, Line]:
     return band, Line(curve.tau_s, curve.deviation, name, colour, markers=True)
 
 
-def _marked(frequency_hz: float) -> Iterator[Rule | Note]:
+def _mark_frequency(frequency_hz: float) -> Iterator[Rule | Note]:
     yield Rule(frequency_hz, "x", VERMILION, 0.9, "dot")
     yield Note(f"{frequency_hz:.4g} Hz", frequency_hz, 1, "y", "right", "top", upright=True)
 

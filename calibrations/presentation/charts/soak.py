@@ -29,7 +29,7 @@ from calibrations.presentation.chart import (
     Series,
     Span,
     single_chart,
-    stacked,
+    stack_panels,
 )
 from calibrations.table import Array
 from calibrations.text import add_prefix, in_milli, rounded, time_text
@@ -128,14 +128,14 @@ def surroundings(soak: Soak) -> Chart:
     panels = []
     for name, label, colour in (("temperature_c", "sensor (°C)", AMBER), ("supply_v", "supply (V)", GREEN)):
         if name in still_table:
-            line = Line(*_thinned(still_table.time_s / HOUR_S, still_table.column(name)), colour=colour)
+            line = Line(*_thin(still_table.time_s / HOUR_S, still_table.column(name)), colour=colour)
             panels.append(Panel((*_gaps(soak), line), begin, Axis(label)))
     lines, (factor, unit) = [], in_milli(soak.table.unit)
     for axis in soak.axes:
         times_s, rms = soak.noise_of_hours(axis)
         lines.append(Line(times_s / HOUR_S, factor * rms, f"axis {axis}", COLOURS[axis], markers=True))
     panels.append(Panel((*_gaps(soak), *lines), begin, Axis(f"noise, rms ({unit})"), legend="best"))
-    return stacked(panels, 1.7)
+    return stack_panels(panels, 1.7)
 
 
 def allan(soak: Soak) -> Chart:
@@ -155,7 +155,7 @@ def _course(soak: Soak, course: Course, factor: float, label: str, title: str = 
     state, final, colour = course.state, _final(course), COLOURS[course.axis]
     series: list[Series] = list(_gaps(soak))
     if course.quantity == "bias":
-        t_s, volts = _still(soak, course)
+        t_s, volts = _shift_still(soak, course)
         series.append(Line(t_s / HOUR_S, factor * (volts - final), colour=BAND, width=0.8))
     if state is not None:
         series.append(Span(-factor * state.tolerance, factor * state.tolerance))
@@ -207,13 +207,13 @@ def _final(course: Course) -> float:
     return course.state.final[0] if course.state else float(course.values[-1])
 
 
-def _still(soak: Soak, course: Course) -> tuple[Array, Array]:
+def _shift_still(soak: Soak, course: Course) -> tuple[Array, Array]:
     """The still record at 0 g, shifted onto the bias: the difference is load along z."""
-    t_s, volts = _thinned(soak.holds.time_s, soak.holds.output(course.axis))
+    t_s, volts = _thin(soak.holds.time_s, soak.holds.output(course.axis))
     return t_s, volts - np.median(volts - np.interp(t_s, course.t_s, course.values))
 
 
-def _thinned(t: Array, values: Array) -> tuple[Array, Array]:
+def _thin(t: Array, values: Array) -> tuple[Array, Array]:
     """Means of neighbours, SHOWN at most."""
     step = 1 + len(t) // SHOWN
     n = len(t) // step * step

@@ -11,7 +11,7 @@ from calibrations.analyses.motion import MotionResult, Quantity
 from calibrations.motion.reference import Bias
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.document import Page, Remark, Section, Table
-from calibrations.text import estimate_text, rounded, unbroken, unit
+from calibrations.text import estimate_text, keep_units_together, rounded, unit
 
 NAMES = {
     "rmse-linear-x": "rms error of the linear model",
@@ -44,7 +44,7 @@ def motion_page(page: Page, motion: MotionResult, evaluation: Picture) -> Page:
         verdict="measured",
         state="found",
         subject=f"Calibration report, motion at {motion.frequency.value:.4g} Hz",
-        summary=unbroken(_motion_summary(motion)),
+        summary=keep_units_together(_motion_summary(motion)),
         figures=[
             ("linear model of the sweep", linear, "rms error against the displacement sensor"),
             ("physical model of the sweep", physical, f"{rounded(motion.excess)} × the noise limit"),

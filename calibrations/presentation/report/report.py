@@ -30,7 +30,7 @@ from calibrations.presentation.page import html
 from calibrations.presentation.report.motion import motion_page
 from calibrations.presentation.report.parameters import estimate_cells, matrices_section, name_of_file, verdicts
 from calibrations.table import Array
-from calibrations.text import capital, estimate_text, join_words, minus, probability, rounded, unbroken
+from calibrations.text import capital, estimate_text, join_words, keep_units_together, minus, probability, rounded
 
 LONG_MIN = 120  # longer durations are given in hours
 
@@ -161,7 +161,7 @@ def report(
         verdict=discovery.outcome.label,
         state=discovery.outcome.value,
         subject=f"Calibration report, model {comparison.fit.model.name}",
-        summary=unbroken(summary(discovery)),
+        summary=keep_units_together(summary(discovery)),
         figures=key_figures(discovery),
         sections=[*verdicts(results), *_sections(discovery, comparison, by_name)],
         provenance=_provenance(discovery, date, program),

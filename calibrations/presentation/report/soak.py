@@ -135,7 +135,7 @@ def _figures(soak: Soak) -> list[tuple[str, str, str]]:
         time, bias = soak.time_s(axis), soak.courses[f"bias-{axis}"]
         if bias.state is not None:
             factor, unit = in_milli(soak.table.unit)
-            change = f"{_signed(factor * bias.state.drift[0])} {unit}"
+            change = f"{_signed_text(factor * bias.state.drift[0])} {unit}"
             drift = f"bias drifts by {change}" if bias.state.terms else "no drift of the bias beyond the noise"
             reached = "from the start" if soak.from_start(axis) else f"{_hours(time)} h" if time else "not reached"
             figures.append((f"steady state, axis {axis}", reached, drift))
@@ -204,5 +204,5 @@ def _length(seconds: float) -> str:
     return f"{rounded(seconds)} s"
 
 
-def _signed(value: float) -> str:
+def _signed_text(value: float) -> str:
     return minus(f"{value:+.2f}")

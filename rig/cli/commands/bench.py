@@ -22,12 +22,12 @@ from drivers.manual_stage.person import PERSON
 from drivers.transport import Address
 from drivers.transport.server import Server
 from rig.bench import DEFAULT, Bench, read_bench
-from rig.bench.certificates import EXPIRED, certificates, expired
+from rig.bench.certificates import EXPIRED, certificates, find_expired
 from rig.bench.file import HAND
 from rig.cli.terminal.output import bench_option, emit, json_option, note, notes, out_option
 from rig.cli.terminal.progress import working
 from rig.errors import BenchError
-from rig.instruments.instruments import checked
+from rig.instruments.instruments import check_all
 from rig.instruments.wiring import on_a_network, serve, world_of
 
 NOT_MET, FAILED = 1, 3
@@ -55,9 +55,9 @@ def check_command(bench_file: Path | None, example: bool, example_hand: bool, re
         raise click.UsageError("--reset asks a person; leave out --json")
     bench = read_bench(bench_file)
     with nullcontext() if reset else working("testing the instruments"):  # a reset asks a person
-        tests_by_role = checked(bench, _reset if reset else None)
+        tests_by_role = check_all(bench, _reset if reset else None)
     due = certificates(bench)
-    expired_papers = expired(bench, datetime.now(UTC).date())
+    expired_papers = find_expired(bench, datetime.now(UTC).date())
     if as_json:
         papers = {
             name: {"number": certificate.number, "due": certificate.due.isoformat()}

@@ -105,10 +105,10 @@ def compensate_command(
 def _draw(residual: Residual | None, picture: Path | None) -> None:
     """The picture of the test, where both are given."""
     if picture is not None and residual is not None:
-        from calibrations.presentation.charts.motion import compensated
+        from calibrations.presentation.charts.motion import compensated_chart
         from calibrations.presentation.static import save
 
-        save(compensated(residual), picture)
+        save(compensated_chart(residual), picture)
 
 
 def _range(model: Model, reach: float | None, ranges: Sequence[str]) -> Range:

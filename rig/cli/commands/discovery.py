@@ -42,10 +42,10 @@ def compare_command(request: Request, check: bool, as_json: bool) -> int:
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import comparison_document
     from rig.cli.terminal.words import warning
-    from rig.services.load import loaded
+    from rig.services.load import load_request
 
     with working("fitting the model"):
-        question = loaded(request, note)
+        question = load_request(request, note)
         result = question.data.compare(question.model, question.effects)
         name, cautions = request.model or question.model.name, question.data.cautions(result.fit)
     if as_json:
@@ -71,14 +71,14 @@ def diagnose_command(request: Request, check: bool, as_json: bool) -> int:
     """Find the physical effect that a model misses on DATA (a file or a run)."""
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import diagnosis_document
-    from rig.cli.terminal.words import own_effect, pattern_advice, planned, warning
-    from rig.services.load import loaded
+    from rig.cli.terminal.words import own_effect, pattern_advice, warning, with_planned_experiment
+    from rig.services.load import load_request
 
     with working("fitting the model") as progress:
-        question = loaded(request, note)
+        question = load_request(request, note)
         result = question.data.diagnose(question.model, progress.searched(question.effects))
         progress.text = "planning the next experiment"
-        result = planned(result, request, question.effects)
+        result = with_planned_experiment(result, request, question.effects)
     if (untestable := question.data.untestable(result.fit, question.effects)) is not None:
         note(untestable)
     if result.verdict is not Verdict.NO_RESPONSE:
@@ -131,17 +131,17 @@ def add_command(request: Request, effect: str, name: str | None, out: Path, as_j
     own names; every other name is a parameter. The model file contains the expression.
     """
     from calibrations.documents import discovery_document
-    from rig.cli.terminal.words import addition, parameters, planned, warning
-    from rig.services.load import loaded
+    from rig.cli.terminal.words import addition, parameters, warning, with_planned_experiment
+    from rig.services.load import load_request
     from rig.services.provenance import write_model
 
     with working("fitting both models") as progress:
-        question = loaded(request, note)
+        question = load_request(request, note)
         new_effect = _find_effect(effect, name, question)
         effects = question.effects if effect.startswith("free:") else {**question.effects, new_effect.name: new_effect}
         result = question.data.add(new_effect, question.model, progress.searched(effects))
         progress.text = "planning the next experiment"
-        result = planned(result, request, question.effects)
+        result = with_planned_experiment(result, request, question.effects)
     path = write_model(question.data, result.end, question.model, out, note)
     if as_json:
         emit(discovery_document(result, str(path) if path else None))
@@ -272,8 +272,8 @@ class _Answer:
 def _discover(
     request: Request, several: tuple[str, ...], out: Path | None, left_out: tuple[str, ...], enough: str | None
 ) -> _Answer:
-    from rig.cli.terminal.words import planned
-    from rig.services.load import loaded
+    from rig.cli.terminal.words import with_planned_experiment
+    from rig.services.load import load_request
 
     small = None
     if enough:
@@ -281,12 +281,12 @@ def _discover(
 
         small = parse_enough(enough)
     with working("fitting the model") as progress:
-        question = loaded(request, note)
+        question = load_request(request, note)
         data = question.data if len(several) == 1 else _join_data(several, request, question)
         data = data.without(left_out)
         discovered = data.discover(question.model, progress.searched(question.effects), small)
         progress.text = "planning the next experiment"
-        result = planned(discovered, request, question.effects)
+        result = with_planned_experiment(discovered, request, question.effects)
     path = None
     if out is not None:
         from rig.services.provenance import write_model

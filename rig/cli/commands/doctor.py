@@ -15,7 +15,7 @@ from click.shell_completion import get_completion_class
 from rig.cli import COMPLETE, rig
 from rig.cli.terminal.output import FOLDER, bench_option, emit, json_option, out_option, require_outputs
 from rig.files import draft_of, home
-from rig.services.health import Finding, collected, findings, last_run, list_runs, versions, without_secrets
+from rig.services.health import Finding, collect_part, findings, last_run, list_runs, versions, without_secrets
 
 
 @click.command("doctor")
@@ -58,10 +58,10 @@ def doctor_command(
 def _parts(checked: list[Finding], run: str | None, bench_file: Path | None) -> Mapping[str, Any]:
     """The files of the archive: JSON documents by name."""
     parts: dict[str, Any] = {"versions.json": versions(), "checks.json": [vars(finding) for finding in checked]}
-    parts["runs.json"] = collected(list_runs)
-    parts["run.json"] = last_run(run) if run is not None else collected(last_run)
+    parts["runs.json"] = collect_part(list_runs)
+    parts["run.json"] = last_run(run) if run is not None else collect_part(last_run)
     if bench_file is not None:
-        parts["bench.json"] = collected(lambda: _bench_document(bench_file))
+        parts["bench.json"] = collect_part(lambda: _bench_document(bench_file))
     return parts
 
 

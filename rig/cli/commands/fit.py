@@ -40,11 +40,11 @@ def fit_command(request: Request, out: Path | None, check: bool, as_json: bool) 
     from calibrations.documents import fit_document
     from calibrations.presentation.views import view_of
     from rig.cli.terminal.words import parameters, table, warning
-    from rig.services.load import loaded
+    from rig.services.load import load_request
     from rig.services.provenance import write_model
 
     with working("fitting the model"):
-        question = loaded(request, note)
+        question = load_request(request, note)
         data = question.data
         fitted = data.fit(question.model)
         path, reason = write_model(data, fitted, question.model, out, note), data.rejection(fitted)
@@ -82,11 +82,11 @@ class _Further:
 def _further(data: Dataset[Any], model: Model, fitted: Any) -> _Further:
     if data.form != "rows":
         return _Further({})
-    from calibrations.discovery.check_poses import unseen
+    from calibrations.discovery.check_poses import judge_check_poses
     from calibrations.presentation.budget import budget_document as budget_of
     from rig.cli.terminal.words import paper
 
-    checked = unseen(model, fitted.table)
+    checked = judge_check_poses(model, fitted.table)
     stepwise = "cross-axis-bias" in model.effects and fitted.table.type.stage_angles
     return _Further(
         check_document(checked) | calibration_document(fitted) | {"budget": budget_of(fitted)},

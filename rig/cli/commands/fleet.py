@@ -165,7 +165,7 @@ def population(result: Population, model: str) -> Iterator[str]:
     counts = ", ".join(f"{result.verdicts[v]} {v}" for v in VERDICTS if result.verdicts[v])
     yield f"{model} on {len(result.sensors)} sensors: {counts}"
     rows = [
-        (b.batch or "-", b.sensors, _shared(b.effects), _shares(b.shares, {e.effect for e in b.effects}))
+        (b.batch or "-", b.sensors, _list_shared(b.effects), _shares(b.shares, {e.effect for e in b.effects}))
         for b in result.batches
     ]
     yield ""
@@ -174,7 +174,7 @@ def population(result: Population, model: str) -> Iterator[str]:
     yield from _persons([sensor for sensor in result.sensors if sensor.needs_a_person])
 
 
-def _shared(effects: Iterable[BatchEffect]) -> str:
+def _list_shared(effects: Iterable[BatchEffect]) -> str:
     return ", ".join(_with_rivals(effect.effect, effect.rivals) for effect in effects) or "nothing"
 
 

@@ -17,7 +17,7 @@ from rig.cli.terminal.complete import complete_model, complete_sensor
 from rig.cli.terminal.output import bench_option, emit, json_option, note, picture_options
 from rig.cli.terminal.progress import working
 from rig.record import Record
-from rig.services.control import HEAD, OUT, Controlled, controlled, row, signals, worst
+from rig.services.control import HEAD, OUT, Controlled, make_charts, row, signals, worst
 from rig.services.history import Calibration, History, Quantity, changes, closest, history, latest, limits_of, stale
 from rig.services.history_comparison import Compared, compare_days, compare_rigs, compare_sensors
 from rig.services.history_words import (
@@ -258,7 +258,7 @@ def control_command(
     Exit status 1: out of control.
     """
     with Record.to_read() as record:
-        quantities = controlled(record.runs(), sensor, baseline, since)
+        quantities = make_charts(record.runs(), sensor, baseline, since)
     paths = _draw_charts(quantities, folder, form) if folder else []
     if as_json:
         emit(

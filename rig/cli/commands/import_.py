@@ -67,24 +67,24 @@ def import_command(
     from calibrations.importing.foreign import needs_mapping
     from calibrations.importing.topics import SeveralTopics
     from calibrations.importing.units import ColumnMapping
-    from rig.services.importing import opened, stored
+    from rig.services.importing import open_file, store_sheet
 
     attended = sys.stdin.isatty() and sys.stderr.isatty()
     try:
         with working(f"reading {file}"):
-            sheet = opened(file, topic, bad_lines or "few")
+            sheet = open_file(file, topic, bad_lines or "few")
     except SeveralTopics as several:
         if not attended:
             raise
         note(str(several))
         choice = click.Choice(list(several.topics))
         topic = str(click.prompt("Topic", default=several.proposed or None, type=choice, err=True))
-        sheet = opened(file, topic, bad_lines or "few")
+        sheet = open_file(file, topic, bad_lines or "few")
     columns, constants = [ColumnMapping.parse(text) for text in mapped], _constants(constant_texts)
     if attended and needs_mapping(sheet, kind, columns):
         kind, columns = ask_mapping(sheet, kind, columns, constant_texts)
     with working(f"storing {file}"):
-        run, table = stored(sheet, kind, columns, constants, note)
+        run, table = store_sheet(sheet, kind, columns, constants, note)
     if table.content == "positions" and {"ax", "mx"} <= set(table.columns):
         note("The run has the accelerometer; with --constant triad=m it has the magnetometer.")
     if as_json:

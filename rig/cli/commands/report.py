@@ -45,10 +45,10 @@ def report_command(request: Request, out: Path | None, folder: Path | None, form
         raise click.UsageError("nothing to write: give --out FILE.html, --pictures FOLDER, or both")
     from calibrations.presentation.static import save_all
     from rig.files import write_whole
-    from rig.services.report import reported
+    from rig.services.report import make_report
 
     with working("fitting the model and searching for missing effects") as progress:
-        pictures, page = reported(request, note, progress.searched)
+        pictures, page = make_report(request, note, progress.searched)
         progress.text = "drawing the pictures"
         if out is not None:
             write_whole(out, page())

@@ -25,7 +25,7 @@ from rig.runs.live import FIRST, STANDARD, Live, Measurement, stands
 from rig.runs.runner import start
 from rig.services.provenance import write_model
 from rig.services.request import Request, effects_of
-from rig.services.tables import begun, join_runs
+from rig.services.tables import begin_time, join_runs
 
 
 @dataclass
@@ -60,7 +60,7 @@ class Experiments:
 
     def _joined_table(self) -> Table:
         measured = [Measured(self.record, self.record.run(run), self.bench.first_sensor) for run in self.runs]
-        return join_runs([m.part("poses") for m in measured], [begun(self.record, run) for run in self.runs])
+        return join_runs([m.part("poses") for m in measured], [begin_time(self.record, run) for run in self.runs])
 
     def _advise(self, interrupted: str) -> None:
         note(f"The record has the measurements: {join_words([*self.runs, interrupted])}.")

@@ -18,7 +18,7 @@ from rich.text import Text
 from calibrations.text import duration, size
 from procedures.catalogue import Procedure
 from rig.bench import Bench
-from rig.bench.certificates import expired
+from rig.bench.certificates import find_expired
 from rig.drawings import Attitude, orientation_map, sketch
 from rig.planning.plan import Plan, stretches
 from rig.planning.preparation import checks, stops
@@ -99,7 +99,7 @@ def screen_before_run(plan: Plan, procedure: Procedure, bench: Bench, free_bytes
     facts = Table.grid(padding=(0, 2))
     for name, text in _facts(plan, procedure, bench, free_bytes):
         facts.add_row(Text(name, style="bold"), text)
-    for text in expired(bench, today):
+    for text in find_expired(bench, today):
         facts.add_row(Text("Expired", style="bold yellow"), f"{text}: the run will carry a remark")
     summary = Text(procedure.summary[:1].upper() + procedure.summary[1:] + ".")
     check = Text("\n".join(f"[ ] {line}" for line in checks(plan)))

@@ -64,7 +64,7 @@ def table(cells: Cells) -> str:
     return columns(*cells)
 
 
-def planned(result: Answer, request: Request, effects: Mapping[str, Effect]) -> Answer:
+def with_planned_experiment(result: Answer, request: Request, effects: Mapping[str, Effect]) -> Answer:
     """The result with its next experiment as a command; remarks go to standard error."""
     return next_experiment.planned(result, request, effects, note)
 

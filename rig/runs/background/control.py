@@ -157,7 +157,9 @@ def _begin(order: Order) -> str:
     file(order.key, "log").parent.mkdir(parents=True, exist_ok=True)
     with lease(home(), STARTING, "the start of a run"):
         if (current := latest()) is not None and current.phase != "ended":
-            raise Busy(f"{current.procedure} is in progress since {begun(current)}; stop it, or wait until it ends")
+            raise Busy(
+                f"{current.procedure} is in progress since {begin_time(current)}; stop it, or wait until it ends"
+            )
         bench = order.bench().name
         tidy()
         os.mkfifo(file(order.key, "answers"))
@@ -170,7 +172,7 @@ def _begin(order: Order) -> str:
     return order.key
 
 
-def begun(status: Status) -> str:
+def begin_time(status: Status) -> str:
     """The time of day, local, at which a background run began."""
     start_time = datetime.strptime(status.key.rpartition("-")[0], KEY_TIME).replace(tzinfo=UTC)
     return f"{start_time.astimezone():%H:%M:%S}"

@@ -10,10 +10,10 @@ from calibrations.presentation.chart import Panel
 from calibrations.presentation.charts.history import CONTROL_LEGENDS, control_panels
 from rig.errors import RecordError
 from rig.record import Run
-from rig.services.control import HEAD, OUT, PROCEDURE, controlled, row, signals, worst
+from rig.services.control import HEAD, OUT, PROCEDURE, make_charts, row, signals, worst
 from rig.services.history import when
-from rig.web.pages.history_results import CLICKED, untitled
-from rig.web.parts import box, button, div, failed, for_page, table, wide_table, words
+from rig.web.pages.history_results import CLICKED, without_title
+from rig.web.parts import box, button, div, for_page, show_error, table, wide_table, words
 from rig.web.pictures import draw, plot_with_title
 
 LOOKS = {OUT: "bad", "in control": "good", "baseline": "plain"}
@@ -33,10 +33,10 @@ class CheckStandards:
                 measure = partial(ui.navigate.to, f"/run?procedure={PROCEDURE}")
                 button("Measure the check standard", "play_arrow", measure)
             try:
-                self.standards = controlled(runs)
+                self.standards = make_charts(runs)
             except RecordError as error:  # one run so far
                 verdict.set_visibility(False)
-                failed("There is no chart yet", error)
+                show_error("There is no chart yet", error)
                 return
             verdict.set_text(worst(self.standards))
             verdict.classes(LOOKS[worst(self.standards)])
@@ -59,7 +59,7 @@ class CheckStandards:
     def draw(self) -> None:
         """Draw the charts of the chosen quantity."""
         for title, panel in self._panels().items():
-            draw(self.plots[title], untitled(panel), f"{title} {self.chosen.value}")
+            draw(self.plots[title], without_title(panel), f"{title} {self.chosen.value}")
 
     def _panels(self) -> dict[str, Panel]:
         standard = self.standards[int(self.chosen.value or 0)]

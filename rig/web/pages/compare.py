@@ -13,7 +13,7 @@ from calibrations.fitting.fit import Fit
 from calibrations.noise.comparison import compared_deviations
 from calibrations.noise.fit import NoiseFit
 from calibrations.presentation.chart import Chart
-from calibrations.presentation.charts.noise import scaled, units
+from calibrations.presentation.charts.noise import choose_scale, units
 from calibrations.presentation.interactive import height_px
 from calibrations.presentation.residual import ChannelResidual, choices, first_choices, residual_units
 from calibrations.text import estimate_in_prefix, rounded
@@ -25,7 +25,7 @@ from rig.services.two_runs import Pair, fit_both, match_poses, parameters_of, re
 from rig.web.calculations import Visit
 from rig.web.desk import Desk, models
 from rig.web.frame import Key, frame
-from rig.web.parts import afresh, box, button, div, failed, noted, state, table, waiting, wide_table, words
+from rig.web.parts import afresh, box, button, div, show_error, show_remark, state, table, waiting, wide_table, words
 from rig.web.pictures import AxisAndUnit, draw, plot_with_title
 
 # Pictures of one axis: for two tables, or for two still records.
@@ -96,7 +96,7 @@ def _of_noise(first: NoiseFit, second: NoiseFit) -> Comparison:
 
     def draw(c: int, in_sensed: bool) -> Sequence[Chart]:
         axis = axes[c]
-        units = (scaled(first.still, axis, in_sensed), scaled(second.still, axis, in_sensed))
+        units = (choose_scale(first.still, axis, in_sensed), choose_scale(second.still, axis, in_sensed))
         return [deviations([by_axis[axis] for by_axis in curves], units)]
 
     return Comparison(axes, offered, [ALLAN], draw)
@@ -139,13 +139,13 @@ def register(desk: Desk) -> None:
                 return
             except Exception as error:
                 with afresh(fitted):
-                    failed("Cannot fit one model to both", error)
+                    show_error("Cannot fit one model to both", error)
                 return
             with afresh(fitted):
                 _parameters(fits[0].model.name, parameters_of(*fits))
                 pictures = Pictures(PICTURES[data.form](*fits))
                 for note in dict.fromkeys(notes):
-                    noted(note)
+                    show_remark(note)
             keys["x"] = Key("next axis", pictures.next_axis)
             keys["g"] = Key("switch between V and g", pictures.other_unit)
 
@@ -180,7 +180,7 @@ def _results(first: str, second: str) -> None:
             first_run, second_run = (record.run(run) for run, _, _ in names)
         pairs = results_of(first_run, second_run, (names[0][2], names[1][2]))
     except Exception as error:
-        failed("Cannot compare the results", error)
+        show_error("Cannot compare the results", error)
         return
     if pairs:
         with wide_table():

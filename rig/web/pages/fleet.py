@@ -15,7 +15,7 @@ from rig.record import Record
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk, models
 from rig.web.frame import frame
-from rig.web.pages.run_report import framed
+from rig.web.pages.run_report import frame_html
 from rig.web.parts import box, button, div, shown, state, words
 
 WHY = (
@@ -45,7 +45,7 @@ class FleetPage:
             self.source.classes("data").props("dense")
             self.model = ui.select(models(model, None), label="Model", value=model).props("dense options-dense")
             self.buttons = [
-                button("Find missing effects", "search", partial(self.show, discovered)),
+                button("Find missing effects", "search", partial(self.show, discovery_page)),
                 button("Calibrate", "straighten", partial(self.show, calibrated)),
             ]
         self.place = div("stack")
@@ -70,14 +70,14 @@ class FleetPage:
             with div("row-of"):
                 words("Report", "title grow")
                 button("Download", "download", lambda: ui.download.content(text, "fleet.html"))
-            ui.html(framed("Report on the fleet", text), sanitize=False)
+            ui.html(frame_html("Report on the fleet", text), sanitize=False)
 
     def _show_progress(self, count: int, total: int) -> None:
         self.visit.check()
         self.done = f"{count} of {total} sensors analysed"
 
 
-def discovered(sources: list[str], model: str, bench_file: Any, notify: Tell) -> str:
+def discovery_page(sources: list[str], model: str, bench_file: Any, notify: Tell) -> str:
     """The report of `rig fleet discover`."""
     from rig.fleet.discover import discover_fleet
     from rig.fleet.documents import population_page

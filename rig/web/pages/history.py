@@ -18,7 +18,7 @@ from rig.services.history import (
     Quantity,
     calibrating,
     history,
-    judged,
+    judge_history,
     latest,
     limits_of,
     when,
@@ -38,7 +38,7 @@ from rig.web.pages.history_results import (
     quantities_table,
     summary_of,
 )
-from rig.web.parts import LINKED, afresh, box, button, div, failed, shown, sortable, state, words
+from rig.web.parts import LINKED, afresh, box, button, div, show_error, shown, sortable, state, words
 
 # The list of sensors.
 
@@ -95,7 +95,7 @@ def register(desk: Desk) -> None:
                 all_runs = runs()
                 history_request, runs_by_sensor = parse_request(request.query_params), calibrating(all_runs)
             except Exception as error:
-                failed("Cannot show this page", error)
+                show_error("Cannot show this page", error)
                 return
             if not history_request.sensor:
                 sensor_table(runs_by_sensor)
@@ -203,7 +203,7 @@ class HistoryPage:
     def show(self) -> None:
         """Show the calibrations with the present limits and quantity."""
         assert self.found is not None  # noqa: S101 the fields are disabled before
-        history = judged(self.found, {**self.limits, **self.request.limits}, self.request.baseline)
+        history = judge_history(self.found, {**self.limits, **self.request.limits}, self.request.baseline)
         q = next(quantity for quantity in history.quantities if quantity.name == self.request.quantity)
         self._label(q)
         self.pictures.show(q)

@@ -206,7 +206,7 @@ class HistoryPictures:
 
     def show(self, q: Quantity) -> None:
         """Draw all pictures again."""
-        draw(self.life, untitled(life(life_of(q))), f"life {q.name}")
+        draw(self.life, without_title(life(life_of(q))), f"life {q.name}")
         self.text_box.set_text(_legend(q))
         self.few.set_visibility(q.chart is None)
         for place in self.boxes:
@@ -217,7 +217,7 @@ class HistoryPictures:
                 [calibration.data for calibration in q.calibrations],
             )
             for title, panel in control_panels(q.name, q.chart, q.unit, days, keys).items():
-                draw(self.charts[title], untitled(panel), f"{title} {q.name}")
+                draw(self.charts[title], without_title(panel), f"{title} {q.name}")
 
     def _plot(self, title: str, legend: str = "") -> ui.plotly:
         return plot_with_title(title, legend).on("plotly_click", self._open_clicked, js_handler=CLICKED)
@@ -226,7 +226,7 @@ class HistoryPictures:
         ui.navigate.to(model_of(str(event.args), self.model))
 
 
-def untitled(panel: Panel) -> Chart:
+def without_title(panel: Panel) -> Chart:
     """The panel without its title, which the page shows above the picture."""
     return single_chart(replace(panel, title="", remark=""))
 

@@ -23,12 +23,24 @@ from calibrations.importing.units import ColumnMapping, column_unit
 from calibrations.table import Constant
 from calibrations.text import unit as unit_text
 from rig.files import home
-from rig.services.importing import Preview, data_chart, lacking, opened, preview, proposal, stored, units_for
+from rig.services.importing import Preview, data_chart, lacking, open_file, preview, proposal, store_sheet, units_for
 from rig.services.page_words import IMPORT, address, page_step
 from rig.web.calculations import off_loop
 from rig.web.desk import FILES, Desk
 from rig.web.frame import frame
-from rig.web.parts import afresh, box, div, facts, failed, for_page, noted, raw_message, waiting, wide_table, words
+from rig.web.parts import (
+    afresh,
+    box,
+    div,
+    facts,
+    for_page,
+    raw_message,
+    show_error,
+    show_remark,
+    waiting,
+    wide_table,
+    words,
+)
 from rig.web.pictures import draw, plot_with_title
 
 MOST_BYTES = 200_000_000
@@ -72,13 +84,13 @@ def register(desk: Desk) -> None:
             with body:
                 waiting(f"Reading {Path(file).name}")
             try:
-                sheet = await off_loop(opened, Path(file), topic or None)
+                sheet = await off_loop(open_file, Path(file), topic or None)
             except SeveralTopics as several:
                 with afresh(body):
                     _choose_topic(Path(file), several)
             except Exception as error:
                 with afresh(body):
-                    failed(f"{Path(file).name} cannot be imported", error, addresses={"Another file": "/import"})
+                    show_error(f"{Path(file).name} cannot be imported", error, addresses={"Another file": "/import"})
             else:
                 with afresh(body):
                     ImportPage(sheet, Path(file), request.query_params)
@@ -343,11 +355,11 @@ class ImportPage:
         self.result.clear()
         with afresh(self.fault):
             if isinstance(reason, str):
-                noted(reason)
+                show_remark(reason)
             else:
                 text = raw_message(reason)
                 doubt = UNIT_DOUBT.search(text)
-                failed(title, page_step(text[: doubt.start()] if doubt else text).text)
+                show_error(title, page_step(text[: doubt.start()] if doubt else text).text)
                 if doubt:
                     self._offer_doubted_units(doubt["name"], (doubt["likely"], doubt["stated"]))
 
@@ -373,7 +385,7 @@ class ImportPage:
                       for name, values in table.columns.items()}  # fmt: skip
             facts(ranges)
             for note in preview_of.notes:
-                noted(note)
+                show_remark(note)
         self.button.set_enabled(not self.asked)
 
     async def _import(self) -> None:
@@ -381,7 +393,7 @@ class ImportPage:
         self.button.props("loading")
         try:
             kind, mappings = str(self.kind.value), self.mappings
-            run, _ = await off_loop(stored, self.sheet, kind, mappings, self.constants, lambda _: None)
+            run, _ = await off_loop(store_sheet, self.sheet, kind, mappings, self.constants, lambda _: None)
         except Exception as error:
             self.button.props(remove="loading")
             self.button.enable()

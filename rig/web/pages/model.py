@@ -28,7 +28,7 @@ from rig.web.pages.model_noise import NoisePictures
 from rig.web.pages.model_parameters import ParametersBox
 from rig.web.pages.model_pictures import Pictures
 from rig.web.pages.model_verdict import VerdictBox
-from rig.web.parts import afresh, box, complain, div, failed, for_page, message, noted, state, words
+from rig.web.parts import afresh, box, div, for_page, message, notify_error, show_error, show_remark, state, words
 
 if TYPE_CHECKING:
     from calibrations.discovery.findings import Step
@@ -68,7 +68,7 @@ class Workbench:
             self.data = self.data or _newest()
         except RecordError as error:  # for example a lab that does not answer
             with frame(self.desk, "/"):
-                failed("The record cannot be read", error)
+                show_error("The record cannot be read", error)
             return
         with frame(self.desk, "/") as keys:
             self.chosen = Choice(self)
@@ -146,20 +146,20 @@ class Workbench:
         except Exception as error:
             with afresh(self.body):
                 addresses = {IMPORT: address(IMPORT, self.data)} if Path(self.data).is_file() else {}
-                failed(f"Cannot analyse {self.data}", error, self.data, addresses)
+                show_error(f"Cannot analyse {self.data}", error, self.data, addresses)
             return
         if session.data.form != "rows":  # the present layout may hold text that a person wrote
             self._lay_out(session.data.form)
         self.chosen.opened(session)
         for note in session.notes:
             with self.notes:
-                noted(note, self.data)
+                show_remark(note, self.data)
         if excluded := run_record.left_out(self.data):
             with (
                 self.notes,
                 ui.expansion(f"{len(excluded)} excluded from every analysis").props("dense").classes("box"),
             ):
-                run_record.listed(self.data, self.afresh)
+                run_record.list_excluded(self.data, self.afresh)
         ui.timer(LOOK_S, self._look_for_changes)
         await self.show(session)
 
@@ -298,11 +298,11 @@ class Workbench:
         except Cancelled:
             return
         except Exception as error:
-            complain(error)
+            notify_error(error)
             return
         for note in session.notes[len(self.session.notes) :]:
             with self.notes:
-                noted(note, self.data)
+                show_remark(note, self.data)
         self.diagnoses = {key: diagnosis for key, diagnosis in self.diagnoses.items() if name not in key}
         await self.show(session)
 

@@ -11,7 +11,7 @@ from calibrations.errors import CalibrationError
 from calibrations.importing.topics import SeveralTopics
 from rig.errors import RigError
 from rig.files import home
-from rig.services.importing import needs_person, opened
+from rig.services.importing import needs_person, open_file
 from rig.services.page_words import IMPORT, address
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import MODELS, models, noise_models, runs, saved_models
@@ -97,7 +97,7 @@ class Choice:
         """Open the file, or go to the page that asks for its columns."""
         self.page.desk.forget(str(path))
         try:
-            unknown = await off_loop(lambda: needs_person(opened(path)))
+            unknown = await off_loop(lambda: needs_person(open_file(path)))
         except SeveralTopics:
             unknown = True
         except CalibrationError:  # the page says what is wrong

@@ -24,12 +24,12 @@ from rig.web.parts import (
     box,
     button,
     buttons,
-    complain,
     div,
     facts,
-    failed,
     message,
+    notify_error,
     setting_label,
+    show_error,
     waiting,
     words,
 )
@@ -122,7 +122,7 @@ class Missing:
     def fail(self, reason: str) -> None:
         """The search ended in an error."""
         with afresh(self.cards):
-            failed("The search for effects failed", reason)
+            show_error("The search for effects failed", reason)
 
     async def show(self, result: Diagnosis[Any]) -> None:
         """Show the candidates, best first, and the curve of the best if an effect is missing."""
@@ -206,7 +206,7 @@ class Missing:
             try:
                 self.tried[c.name] = await off_loop(session.tried, c.effect)
             except Exception as error:
-                complain(error)
+                notify_error(error)
         return self.tried.get(c.name)
 
     async def add_shown(self) -> None:

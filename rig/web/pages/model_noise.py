@@ -13,9 +13,9 @@ from calibrations.presentation.charts.noise import (
     ModelCurve,
     allan,
     candidate,
+    choose_scale,
     ratio,
     record,
-    scaled,
     spectrum,
     steps_chart,
     units,
@@ -89,7 +89,7 @@ class NoisePictures(AxisAndUnit):
         c, still = int(self.axis.value or 0), self.compared.fit.still
         channel = self.compared.fit.channels[c]
         curve = compared_deviations(self.compared.fit)[channel.channel.axis]
-        units = scaled(still, channel.channel.axis, bool(self.unit.value))
+        units = choose_scale(still, channel.channel.axis, bool(self.unit.value))
         models = [ModelCurve(channel, "model")]
         if self.step is not None:
             models.append(candidate(self.step.after.channels[c], self.step.name))

@@ -18,7 +18,7 @@ from calibrations.presentation.parameter_table import HEAD, STRONG, correlations
 from calibrations.text import minus, unit
 from rig.web.calculations import off_loop
 from rig.web.pages.model_documents import CertificateDialog, CompensationDialog
-from rig.web.parts import afresh, box, button, complain, div, for_page, message, table, wide_table, words
+from rig.web.parts import afresh, box, button, div, for_page, message, notify_error, table, wide_table, words
 
 if TYPE_CHECKING:
     from calibrations.discovery.results import Diagnosis
@@ -110,7 +110,7 @@ class ParametersBox:
         try:
             text = dump_model(session.complete_model())
         except Exception as error:
-            complain(error)
+            notify_error(error)
             return
         ui.download.content(text, f"{Path(self.page.data).stem}-model.yaml")
 

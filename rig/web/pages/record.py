@@ -14,7 +14,7 @@ from rig.services.tables import AND
 from rig.web.desk import Desk, runs
 from rig.web.frame import frame
 from rig.web.pages.history_results import HistoryRequest
-from rig.web.parts import LINKED, box, button, div, failed, sortable, state, words
+from rig.web.parts import LINKED, box, button, div, show_error, sortable, state, words
 
 COLUMNS = sortable(
     {
@@ -37,7 +37,7 @@ def register(desk: Desk) -> None:
             try:
                 all_runs = runs()
             except Exception as error:
-                failed("The record cannot be read", error)
+                show_error("The record cannot be read", error)
                 return
             if all_runs:
                 Runs(all_runs)

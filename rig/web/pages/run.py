@@ -16,10 +16,10 @@ from calibrations.text import duration
 from procedures.catalogue import Procedure, find, paths, summary
 from procedures.settings import choices, meaning, parse, setting_text
 from rig.bench import Bench, read_bench
-from rig.bench.certificates import expired
+from rig.bench.certificates import find_expired
 from rig.bench.file import DEMO
 from rig.errors import RigError
-from rig.instruments.instruments import checked
+from rig.instruments.instruments import check_all
 from rig.planning.plan import Plan, plan, stretches
 from rig.runs.background import control
 from rig.web.calculations import Visit, off_loop
@@ -28,7 +28,7 @@ from rig.web.frame import Key, frame
 from rig.web.pages.run_begin import BeginDialog, before_start, plan_facts
 from rig.web.pages.run_live import Live
 from rig.web.pages.run_optimal import OptimalDialog
-from rig.web.parts import box, button, div, facts, failed, message, setting_label, shown, table, words
+from rig.web.parts import box, button, div, facts, message, setting_label, show_error, shown, table, words
 
 MOST_STRETCHES = 12
 DEFAULT_PROCEDURE = "sweep"
@@ -44,7 +44,7 @@ def register(desk: Desk) -> None:
             try:
                 bench = read_bench(bench_file)
             except Exception as error:
-                failed("The bench file cannot be used", error)
+                show_error("The bench file cannot be used", error)
                 if len(desk.benches) > 1:
                     BenchChoice(desk)
                 return
@@ -105,7 +105,7 @@ class Instruments:
                 BenchChoice(desk)
             else:
                 words(bench.name, "quiet small")
-            for fault in expired(bench, datetime.now(UTC).date()):
+            for fault in find_expired(bench, datetime.now(UTC).date()):
                 words(f"{fault}; have it calibrated again", "fault")
             self.rows = div("")
             with self.rows:
@@ -117,7 +117,7 @@ class Instruments:
 
     async def check(self) -> None:
         """Identify and self-test every instrument."""
-        work = off_loop(checked, self.bench)
+        work = off_loop(check_all, self.bench)
         results = await shown(self.rows, "Connecting; nothing moves", "The bench cannot be checked", work)
         rows = [
             (role, f"{'✓' if test.ok else '✗ FAILED'} {test.name}", test.detail)

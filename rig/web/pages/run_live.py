@@ -22,7 +22,7 @@ from rig.web.calculations import off_loop
 from rig.web.frame import control_run
 from rig.web.pages.run_begin import BeginDialog, before_resume
 from rig.web.pages.run_record import OverTime
-from rig.web.parts import afresh, box, button, dialog_with_name, div, failed, for_page, table, words
+from rig.web.parts import afresh, box, button, dialog_with_name, div, for_page, show_error, table, words
 
 LOOK_S = 0.4
 PHASES = {
@@ -178,13 +178,13 @@ class Live:
     def _alarm(self, status: Status) -> None:
         with afresh(self.alarm):
             if status.moving:
-                failed("Not at rest", "\n".join(status.moving))
+                show_error("Not at rest", "\n".join(status.moving))
             if stop_text := stop_words(status):
                 words(stop_text, "quiet")
             elif status.phase == "paused" and status.error:
-                failed("Reason for the pause", RESUME.sub("Continue", status.error))
+                show_error("Reason for the pause", RESUME.sub("Continue", status.error))
             elif status.error:
-                failed("Reason for the end", RESUME.sub("Resume", status.error))
+                show_error("Reason for the end", RESUME.sub("Resume", status.error))
 
     def _show_question(self, question: OpenQuestion | None, can_answer: bool) -> None:
         self.question.clear()

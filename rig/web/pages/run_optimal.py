@@ -19,7 +19,7 @@ from rig.services.optimal_words import PLANS, plan_rows, purpose, savings
 from rig.services.search import Cancelled
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import FILES, models
-from rig.web.parts import afresh, dialog_with_name, div, failed, table, waiting, wide_table, words
+from rig.web.parts import afresh, dialog_with_name, div, show_error, table, waiting, wide_table, words
 
 CRITERIA = {"I": "I: error of the prediction", "D": "D: joint uncertainty of the parameters"}
 Use = Callable[[Mapping[str, str]], None]
@@ -68,7 +68,7 @@ class OptimalDialog:
                 words("Stopped; no poses are chosen.", "quiet")
         except Exception as error:
             with afresh(self.place):
-                failed("No poses can be chosen", error)
+                show_error("No poses can be chosen", error)
         else:
             with afresh(self.place):
                 self._show(choice)
@@ -93,7 +93,7 @@ class OptimalDialog:
             path = await off_loop(_write_file, choice)
         except OSError as error:  # for example a full disk
             with self.place:
-                failed("The poses cannot be stored", error)
+                show_error("The poses cannot be stored", error)
             return
         settings: Mapping[str, Any] = choice.equal.plan.settings
         fixed = {name: setting_text(settings[name]) for name in ("dwell_s", "settle_s")}

@@ -33,14 +33,14 @@ from rig.web.parts import (
     afresh,
     box,
     button,
-    complain,
     dialog_with_name,
     div,
     facts,
-    failed,
     for_page,
     message,
+    notify_error,
     setting_label,
+    show_error,
     step_row,
     table,
     words,
@@ -86,7 +86,7 @@ def ask(data: str, numbers: Sequence[int], on_done: Callable[[], None]) -> None:
     dialog.open()
 
 
-def listed(data: str, on_done: Callable[[], None]) -> None:
+def list_excluded(data: str, on_done: Callable[[], None]) -> None:
     """The excluded poses with their reasons, each with a button to include it again."""
     for number, reason in left_out(data).items():
         with div("row-of"):
@@ -100,7 +100,7 @@ async def change(data: str, numbers: Sequence[int], reason: str | None, on_done:
     try:
         await off_loop(_change, data, numbers, reason)
     except Exception as error:
-        complain(error)
+        notify_error(error)
         return
     on_done()
 
@@ -216,7 +216,7 @@ def register(desk: Desk) -> None:
                     recorded_run, excluded = record.run(run), record.excluded(run)
                     run_counts = lives(recorded_run, record.runs())
             except Exception as error:
-                failed("There is no such run", error)
+                show_error("There is no such run", error)
                 ui.link("All runs", "/record")
                 return
             OneRun(desk, recorded_run, excluded, run_counts)
@@ -245,7 +245,7 @@ class OneRun:
                 if excluded:
                     with box("stack"):
                         words("Excluded poses", "title")
-                        listed(run.run, ui.navigate.reload)
+                        list_excluded(run.run, ui.navigate.reload)
                 with box("stack"):
                     self._notes()
         if run.state == "complete" and run.rows:
@@ -314,7 +314,7 @@ class OneRun:
                 await off_loop(export, self.run.run, kind, path)
                 ui.download.content(path.read_bytes(), path.name)
         except Exception as error:
-            complain(error)
+            notify_error(error)
 
     async def _report(self, data: str) -> None:
         request = Request(data, None, self.desk.bench_file)

@@ -13,12 +13,12 @@ from calibrations.discovery.findings import Findings
 from rig.record import Run
 from rig.services.content import content_of
 from rig.services.load import Loaded
-from rig.services.report import reported
+from rig.services.report import make_report
 from rig.services.request import Request
 from rig.services.search import Cancelled
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk
-from rig.web.parts import box, button, complain, div, shown, words
+from rig.web.parts import box, button, div, notify_error, shown, words
 
 # the frame is as high as the report; a report has no scripts, and the page's policy lets it load nothing
 FITTED = (
@@ -57,7 +57,7 @@ class RunReport:
         if text is None:
             return
         with self.place:
-            ui.html(framed(f"Report on {data}", text), sanitize=False)
+            ui.html(frame_html(f"Report on {data}", text), sanitize=False)
         self.headline.clear()
         if headline := HEADLINE.search(text):
             with self.headline, box("row-of verdict").props("role=status"):
@@ -69,10 +69,10 @@ class RunReport:
         ui.run_javascript("document.querySelector('.report')?.scrollIntoView({block: 'start'})")
 
     def text(self, data: str) -> str:
-        """The report as HTML. Raises what `reported` raises, Cancelled."""
+        """The report as HTML. Raises what `make_report` raises, Cancelled."""
         key = content_of(data, None).key
         if key not in self.desk.reports:
-            _, make = reported(Request(data, None, self.desk.bench_file), lambda _: None, self.visit.searched)
+            _, make = make_report(Request(data, None, self.desk.bench_file), lambda _: None, self.visit.searched)
             self.desk.keep_report(key, make())
         return self.desk.reports[key]
 
@@ -84,19 +84,19 @@ async def download_report(
     question: Loaded | None = None,
     found: Findings[Any] | None = None,
 ) -> None:
-    """Make a report as `rig report` does, and download it as the file `name`; `found` as in `reported`."""
+    """Make a report as `rig report` does, and download it as the file `name`; `found` as in `make_report`."""
     hint = ui.notification("Making the report", spinner=True, timeout=None)
     try:
-        _, page = await off_loop(reported, request, lambda _: None, visit.searched, question, found)
+        _, page = await off_loop(make_report, request, lambda _: None, visit.searched, question, found)
         ui.download.content(await off_loop(page), name)
     except Cancelled:
         return
     except Exception as error:
-        complain(error, stays=True)
+        notify_error(error, stays=True)
     finally:
         hint.dismiss()
 
 
-def framed(title: str, text: str) -> str:
+def frame_html(title: str, text: str) -> str:
     """A frame that shows an HTML text, as high as it needs."""
     return f'<iframe title="{html.escape(title)}" onload="{FITTED}" srcdoc="{html.escape(text)}"></iframe>'
