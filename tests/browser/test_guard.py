@@ -77,7 +77,7 @@ def test_the_token_becomes_a_cookie_and_leaves_the_address() -> None:
         ({"cookie": f'rig-8473="{SECRET}"'}, "", 200),
     ],
 )
-def test_requests(headers: Mapping[str, str], query: str, status: int) -> None:
+def test_only_requests_of_the_own_page_are_let_in(headers: Mapping[str, str], query: str, status: int) -> None:
     answer = ask(query, headers)
     assert (answer.status, answer.let_in is not None) == (status, status == 200)
 

@@ -164,7 +164,7 @@ def test_procedure_and_settings_are_in_the_address(workbench: Workbench) -> None
     expect(page).to_have_url(re.compile("/run$"))
 
 
-def test_the_bench_is_checked(workbench: Workbench) -> None:
+def test_a_check_of_the_instruments_lists_each_of_them(workbench: Workbench) -> None:
     page = workbench.visit("/run")
     page.get_by_role("button", name="Check the instruments").click()
     expect(page.get_by_text("✓ alarm").first).to_be_visible()

@@ -166,7 +166,7 @@ def test_two_sensors_in_one_file_have_to_be_chosen(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_foreign(tmp_path / "a.h5", None, MAPPED, topic="imu1").outputs, -ACC)
 
 
-def test_worksheets_are_topics(tmp_path: Path) -> None:
+def test_worksheets_of_a_workbook_are_topics(tmp_path: Path) -> None:
     excel(tmp_path / "a.xlsx")
     book = openpyxl.load_workbook(tmp_path / "a.xlsx")
     book.create_sheet("Notes").append(["nothing", "to", "see"])

@@ -58,7 +58,7 @@ def search(centre: Centre = Centre(), rounds: int = 2, *, acts: float = 0.0, ran
 
 
 @pytest.mark.parametrize("centre", [Centre(), Centre(3, (-2, 4)), Centre(-170)])
-def test_exact_without_noise(centre: Centre) -> None:
+def test_directions_are_exact_without_noise(centre: Centre) -> None:
     found = estimate_directions(search(centre))
     np.testing.assert_allclose(found["x"].theta, X, atol=1e-9)
     np.testing.assert_allclose(found["y"].theta, Y, atol=1e-9)
@@ -77,7 +77,7 @@ def test_the_angles_are_those_of_ang() -> None:
         np.testing.assert_allclose(found[axis].angles_deg, angles(alpha_deg, beta_deg), atol=1e-6)
 
 
-def test_standard_errors_are_true() -> None:
+def test_errors_of_directions_are_as_large_as_their_standard_errors() -> None:
     """300 searches with white noise: errors over standard errors, of all 10 numbers."""
     random = np.random.default_rng(3)
     ratios = []

@@ -148,7 +148,7 @@ def test_repeats_at_one_angle_share_the_error_of_that_angle() -> None:
         np.testing.assert_allclose(line_of(often, source), factor * line_of(once, source), rtol=0.1)
 
 
-def test_the_sign_of_a_sensitivity() -> None:
+def test_a_converter_that_shows_too_much_has_a_negative_sensitivity() -> None:
     """A converter that is known to show too much leaves less to the sensor."""
     table = given(measured(1), gain_std=1e-4, offset_std_v=1e-4)
     lines = make_budget(fit(read_model("linear"), table), input_contributions(table)).given

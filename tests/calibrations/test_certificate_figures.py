@@ -30,7 +30,7 @@ def test_results_are_the_truth_within_their_uncertainty() -> None:
     assert all(o.coverage >= 2 for o in BY_NAME.values())
 
 
-def test_the_budget_adds_up() -> None:
+def test_contributions_of_a_budget_add_up_to_the_standard_uncertainty() -> None:
     for o in BY_NAME.values():
         assert np.sqrt(sum(s.contribution**2 for s in o.sources)) == pytest.approx(o.std)
         gain = next(s for s in o.sources if s.name == "gain of the converter")
@@ -125,7 +125,7 @@ def test_what_the_simulation_finds_wider_is_wider() -> None:
     ("value", "statement", "probability"),
     [(0.5, "pass", 1.0), (0.95, "conditionalPass", 0.8413), (1.05, "conditionalFail", 0.1587), (1.2, "fail", 3.2e-5)],
 )
-def test_guarded_acceptance(value: float, statement: str, probability: float) -> None:
+def test_conformity_is_decided_by_guarded_acceptance(value: float, statement: str, probability: float) -> None:
     found = decide(value, 0.05, 0.1, 1.0)
     assert (found.low, found.high, found.statement) == (-1.0, 1.0, statement)
     assert found.probability == pytest.approx(probability, rel=0.02)
@@ -170,7 +170,7 @@ def test_every_result_names_the_rows_behind_it() -> None:
      ("V/h", 1 / 3600, r"\volt\second\tothe{-1}"), ("1", 1.0, r"\one"), ("deg", 1.0, r"\degree"), ("", 1.0, r"\one"),
      ("V/(deg/s)", 1.0, r"\volt\degree\tothe{-1}\second")],
 )  # fmt: skip
-def test_units_in_si(unit: str, factor: float, si: str) -> None:
+def test_units_are_converted_to_si(unit: str, factor: float, si: str) -> None:
     assert in_si(unit, 9.81) == (pytest.approx(factor), si)
 
 

@@ -26,13 +26,13 @@ def table(more_x: Array | float = 0.0, seed: int = 0) -> Table:
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_fails_nowhere_on_noise(seed: int) -> None:
+def test_a_comparison_fails_nowhere_on_noise(seed: int) -> None:
     found = compare(table(seed=seed), read_model("linear"))
     assert found.adequate
     assert found.fails == ()
 
 
-def test_names_the_inclinations() -> None:
+def test_a_comparison_names_the_inclinations_at_which_it_fails() -> None:
     found = compare(table(0.004 * A_Z**2), read_model("linear"))
     (place,) = (p for p in found.fails if p.where == "alpha")
     assert (place.axis, place.low) == ("x", 90.0)
@@ -51,7 +51,7 @@ def test_times_of_a_run_begin_at_its_first_pose() -> None:
     assert place.text.startswith(f"time {first:.1f} to {last:.1f} min since the first pose: x is off by")
 
 
-def test_counts_in_mg_of_its_axis() -> None:
+def test_errors_in_mg_use_the_scale_factor_of_their_axis() -> None:
     model = fit(read_model("linear"), table()).model
     found = compare(table(0.002), model)
     np.testing.assert_allclose(scales(found.fit), [2.0, 1.0], rtol=1e-3)
@@ -62,13 +62,13 @@ def test_counts_in_mg_of_its_axis() -> None:
 
 
 @pytest.mark.parametrize(("side", "words"), [(1.0, "turning clockwise"), (-1.0, "turning anticlockwise")])
-def test_names_the_direction(side: float, words: str) -> None:
+def test_a_comparison_names_the_direction_in_which_it_fails(side: float, words: str) -> None:
     model = fit(read_model("linear"), table()).model
     found = compare(table(0.002 * (COLUMNS["direction"] == side)), model)
     assert any(p.text.startswith(words) for p in found.fails)
 
 
-def test_worst_first() -> None:
+def test_failures_are_listed_largest_first() -> None:
     found = compare(table(0.004 * A_Z**2 + 0.001 * COLUMNS["direction"]), read_model("linear"))
     excesses = [p.excess for p in found.fails]
     assert excesses == sorted(excesses, reverse=True)

@@ -325,7 +325,7 @@ def test_an_effect_of_the_users_own_file(tmp_path: Path) -> None:
     assert made["bad"].forward.fates[-1].why == "its function uses np.round"
 
 
-def test_noise_has_no_inverse() -> None:
+def test_a_model_of_noise_alone_has_no_inverse() -> None:
     with pytest.raises(ModelError, match="by-hand: a model of noise alone has no inverse"):
         invert_model(model({"white-noise": {p.name: 0.1 for p in catalogue()["white-noise"].parameters}}))
 

@@ -87,7 +87,7 @@ def test_bounds_of_a_table_hold_every_value_and_slope(seed: int) -> None:
 
 
 @pytest.mark.parametrize("form", [*FORMS.values(), THRESHOLDS], ids=lambda form: f"{form.place}/{form.name}")
-def test_a_form_is_inverted(form: Form) -> None:
+def test_a_free_form_is_inverted(form: Form) -> None:
     fitted = with_forms(form)
     made = invert_model(fitted)
     assert made.forward.fates[-1].how == INVERTED, made.forward.fates[-1].why

@@ -41,7 +41,7 @@ def test_the_individuals_of_a_textbook() -> None:
     assert (chart.verdict, chart.jumps) == ("baseline", [])
 
 
-def test_the_ewma_is_its_recursion() -> None:
+def test_the_ewma_follows_its_recursion() -> None:
     chart = control_chart(FLOWRATE, baseline=4)
     z, expected = chart.centre, []
     for value in FLOWRATE:
@@ -97,6 +97,6 @@ def test_runs_that_agree_better_than_their_noise_set_no_narrower_limits() -> Non
     assert chart(same, least_sigma=1e-6).verdict == "in control"
 
 
-def test_one_run_is_no_chart() -> None:
+def test_a_chart_of_one_run_is_refused() -> None:
     with pytest.raises(TooFewRows, match="needs at least 2 runs; there are 1"):
         control_chart([1.0])

@@ -45,7 +45,7 @@ def log(
 
 @pytest.mark.parametrize("jitter_deg", [0.0, 0.02])
 @pytest.mark.parametrize("speed_deg_s", [0.0, 0.5, 5.0, 20.0])
-def test_every_dwell_becomes_a_row(speed_deg_s: float, jitter_deg: float) -> None:
+def test_each_dwell_of_a_log_becomes_a_row(speed_deg_s: float, jitter_deg: float) -> None:
     samples = log(speed_deg_s=speed_deg_s, jitter_deg=jitter_deg)
     assert is_pose_log(samples)
     table = average_dwells(samples)

@@ -245,7 +245,7 @@ def _quantisation(columns: Columns, a: Array) -> Array:
 
 
 @pytest.mark.parametrize("name", MADE)
-def test_parameters_come_back(name: str) -> None:
+def test_a_fit_recovers_the_parameters_of_an_effect(name: str) -> None:
     columns = synthetic.turns((90, 30, 150, 60, 120), step_deg=10)
     columns["temperature_c"] = 22 + 3 * np.sin(columns["t_s"] / 400)
     columns["supply_v"] = 5 + 0.01 * np.sin(columns["t_s"] / 300)

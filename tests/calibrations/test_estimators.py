@@ -112,7 +112,7 @@ PUBLISHED = ((49.69, 22.5), (48.47, 11.84), (50.57, 8.04), (51.68, 6.08), (51.33
              (49.21, 3.52), (49.31, 3.08), (49.53, 2.74), (49.57, 2.47))  # fmt: skip
 
 
-def test_a_published_example() -> None:
+def test_a_kalman_filter_gives_the_numbers_of_a_published_example() -> None:
     belief, one = Belief(np.array([60.0]), np.array([[225.0]])), np.eye(1)
     for measured, (mean, variance) in zip(HEIGHTS_M, PUBLISHED, strict=True):
         belief = correct(predict(belief, one, 0 * one), np.array([measured]), one, 25.0 * one).belief

@@ -45,7 +45,7 @@ def test_the_nine_points_of_nbs_monograph_140(kind: str) -> None:
 
 
 @pytest.mark.parametrize("name", STABLE32)
-def test_stable32_on_phase_dat(name: str) -> None:
+def test_deviations_of_phase_dat_are_those_of_stable32(name: str) -> None:
     """Its example PHASE.DAT is the sum of the thousand points, less their mean."""
     published = np.loadtxt(DATA / f"phase_dat_{name}_octave.txt")
     agree(exact_deviations(nbs14(), published[:, 0].astype(int), STABLE32[name]), published[:, 5])
@@ -65,7 +65,7 @@ def agree(found: np.ndarray, published: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize(("kind", "weights", "divisor"), [("overlapping", (-1, 1), 2), ("hadamard", (1, -2, 1), 6)])
-def test_the_definition(kind: str, weights: tuple[int, ...], divisor: int) -> None:
+def test_deviations_follow_their_definition(kind: str, weights: tuple[int, ...], divisor: int) -> None:
     values, m = np.random.default_rng(1).standard_normal(60) + 7.0, 5
     means = np.convolve(values, np.full(m, 1 / m), "valid")
     last = len(means) - (len(weights) - 1) * m
@@ -83,7 +83,7 @@ def test_a_time_that_is_too_long_has_none() -> None:
     assert np.isfinite(found).tolist() == [True, False, False]
 
 
-def test_what_cannot_be_is_refused() -> None:
+def test_samples_that_are_no_numbers_and_a_time_of_zero_are_refused() -> None:
     with pytest.raises(DataError, match="row 3 is nan"):
         deviations(np.array([1.0, 2.0, np.nan]), [1])
     with pytest.raises(DataError, match="an averaging time of 0 samples"):

@@ -226,7 +226,7 @@ def test_imucal_corrects_rates_for_axes_that_lean_and_specific_force(unit: str) 
 
 @pytest.mark.parametrize("unit", ["gauss", "uT", "mgauss"])
 @pytest.mark.parametrize("form", ["px4", "ardupilot"])
-def test_a_file_corrects_the_field(form: str, unit: str) -> None:
+def test_an_exported_file_corrects_a_magnetometer_by_its_own_formula(form: str, unit: str) -> None:
     per = {"gauss": 1.0, "uT": 100.0, "mgauss": 1e3}[unit]
     m, _ = forces(300)
     bent = np.array([[1.05, 0.03, -0.01], [0.03, 0.98, 0.02], [-0.01, 0.02, 0.97]])

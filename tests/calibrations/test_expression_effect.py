@@ -43,12 +43,12 @@ def test_each_axis_has_parameters_of_its_own() -> None:
     assert values(found) == pytest.approx(expected, abs=0.03 * SIZE)
 
 
-def test_one_axis_alone() -> None:
+def test_an_expression_may_act_on_one_axis() -> None:
     found = added("vy += a*(humidity - 45)", table(0.0 * X, SIZE / 10 * (COLUMNS["humidity"] - 45)))
     assert values(found) == pytest.approx({("a", ""): SIZE / 10}, rel=0.02)
 
 
-def test_a_stage_angle() -> None:
+def test_an_expression_may_change_a_stage_angle() -> None:
     turn = np.radians(0.1) * np.sin(3 * BETA)
     found = added("beta_deg += a*sin(3*beta)", table(-Y * turn, X * turn))
     assert values(found) == pytest.approx({("a", ""): 0.1}, rel=0.02)

@@ -197,7 +197,7 @@ def test_a_corrected_table_stands_where_the_stage_truly_was() -> None:
     assert correct_stage_errors(table, {}, EFFECTS) is table
 
 
-def test_siblings_save_poses() -> None:
+def test_sensors_of_a_batch_need_fewer_poses_together() -> None:
     """A third of the poses, pooled, know a batch's bend better than all of them alone; and the intervals hold."""
     bent = LINEAR.with_effect(EFFECTS["quadratic-nonlinearity"])
     rng, truth, few, alone = np.random.default_rng(3), [], [], []

@@ -27,7 +27,7 @@ def read(tmp_path: Path, text: str, *columns: str, kind: str | None = None, **co
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t", " ", "   ", ", "])
-def test_any_separator(tmp_path: Path, separator: str) -> None:
+def test_files_with_any_separator_are_read(tmp_path: Path, separator: str) -> None:
     text = "\n".join(separator.join(row) for row in (("ax", "ay", "az"), ("1", "-2.5", "3e-3"), ("4", "5", "6")))
     table = read(tmp_path, text)
     assert table.kind == "positions"
@@ -35,7 +35,7 @@ def test_any_separator(tmp_path: Path, separator: str) -> None:
 
 
 @pytest.mark.parametrize(("separator", "header"), [(";", True), (";", False), ("\t", True), ("\t", False)])
-def test_decimal_commas(tmp_path: Path, separator: str, header: bool) -> None:
+def test_files_with_decimal_commas_are_read(tmp_path: Path, separator: str, header: bool) -> None:
     rows = [("ax", "ay", "az")] * header + [("1,5", "-2,25", "3"), ("1,5e2", "0,5", "1")]
     mapped = () if header else ("ax=1", "ay=2", "az=3")
     table = read(tmp_path, "\n".join(separator.join(row) for row in rows), *mapped)
@@ -72,7 +72,7 @@ def test_constants_stand_above_as_comments_or_as_pairs(tmp_path: Path) -> None:
         ("t_s=Vout:h", 2, 7200),
     ],
 )
-def test_units_become_ours(tmp_path: Path, column: str, given: float, expected: float) -> None:
+def test_units_of_a_file_are_converted(tmp_path: Path, column: str, given: float, expected: float) -> None:
     names = [name for name in ("alpha_deg", "beta_deg", "vx_v") if not column.startswith(name)]
     head = ",".join([*names, "Vout"])
     table = read(tmp_path, f"{head}\n{'1,' * len(names)}{given}\n", column)

@@ -258,6 +258,6 @@ def test_a_date_or_a_time_of_day_is_seconds(cell: str, seconds: float) -> None:
 
 
 @pytest.mark.parametrize("cell", ["24:00:00", "12:60:00", "2026-13-01 00:00:00", "12:00", "1:2:3:4"])
-def test_another_text_is_no_time(cell: str) -> None:
+def test_a_text_that_is_no_time_is_refused(cell: str) -> None:
     with pytest.raises(ValueError, match=r"."):
         parse_cell(cell)

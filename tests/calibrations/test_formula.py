@@ -25,7 +25,7 @@ TAG = re.compile(r"</?(?:sub|sup)>|<br>")
         ("a < 3 <script>", "a &lt; 3 &lt;script&gt;"),
     ],
 )
-def test_a_formula_is_typeset(formula: str, typeset: str) -> None:
+def test_formulas_are_typeset(formula: str, typeset: str) -> None:
     assert formula_html(formula, "mV") == typeset
 
 

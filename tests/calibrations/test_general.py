@@ -84,7 +84,7 @@ def test_a_magnetometer_and_a_gyroscope_have_one_each() -> None:
     assert (magnetic.unit, found.unit) == ("field", "deg/s")
 
 
-def test_two_axes_have_none() -> None:
+def test_two_axes_have_no_calibration_matrices() -> None:
     columns = synthetic.turns((90,))
     x, y, _ = synthetic.components(columns)
     assert calibration_matrices(fit(read_model("linear"), synthetic.poses(columns, x + 2.5, y + 2.5))) is None

@@ -28,7 +28,9 @@ def step(name: str, **values: float | list[float]) -> Step:
 
 
 @given(angles, angles, angles, st.booleans(), small, small)
-def test_specific_force(alpha: float, beta: float, mount: float, flip: bool, lean_x: float, lean_y: float) -> None:
+def test_the_specific_force_is_that_of_explicit_rotations(
+    alpha: float, beta: float, mount: float, flip: bool, lean_x: float, lean_y: float
+) -> None:
     up = about("x", lean_x) @ about("y", lean_y) @ [0.0, 0.0, 1.0]
     F = np.diag([1.0, -1.0, -1.0]) if flip else np.eye(3)
     explicit = F @ about("z", mount) @ about("z", beta) @ about("y", alpha) @ up
@@ -39,7 +41,7 @@ def test_specific_force(alpha: float, beta: float, mount: float, flip: bool, lea
     assert np.linalg.norm(a) == pytest.approx(1.0, abs=1e-14)
 
 
-def test_the_papers_components() -> None:
+def test_the_specific_force_has_the_components_of_the_paper() -> None:
     columns = synthetic.turns()
     table = synthetic.poses(columns, columns["beta_deg"], columns["beta_deg"])
     a = specific_force(nominal_pose(table))
@@ -83,7 +85,7 @@ def test_backward_undoes_forward(seed: int, scale: float) -> None:
     np.testing.assert_allclose(backward(table, steps), a, atol=1e-10)
 
 
-def test_the_other_axes() -> None:
+def test_each_axis_has_its_in_plane_and_out_of_plane_axis() -> None:
     a = np.array([[1.0, 2.0, 3.0]])
     assert other_in_plane(a).tolist() == [[2.0, 1.0, 1.0]]
     assert out_of_plane(a).tolist() == [[3.0, 3.0, 2.0]]

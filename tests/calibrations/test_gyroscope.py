@@ -67,7 +67,9 @@ def test_what_others_found_misaligned_is_found_by_name() -> None:
         (0.4, 0.5, ("gyro-misalignment", "gyro-g-sensitivity")),
     ],
 )
-def test_what_is_missing_is_found(lean_deg: float, per_g: float, causes: tuple[str, ...]) -> None:
+def test_effects_that_a_gyroscope_model_misses_are_found(
+    lean_deg: float, per_g: float, causes: tuple[str, ...]
+) -> None:
     found = discover(turned.gyroscope(seed=5, lean_deg=lean_deg, per_g=per_g), GYROSCOPE)
     assert set(found.causes) == set(causes)
     assert found.verdict == "adequate"

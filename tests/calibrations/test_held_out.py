@@ -51,7 +51,7 @@ def test_extra_columns_join_the_fit() -> None:
     assert found.held_out_with(column) == pytest.approx(1.0, abs=0.1)
 
 
-def test_a_useless_column_costs() -> None:
+def test_useless_columns_raise_the_unseen_error() -> None:
     found = fit(read_model("linear"), table())
     useless = np.random.default_rng(3).standard_normal((2, found.table.n, 20))
     assert found.held_out_with(useless) > found.held_out_excess

@@ -141,7 +141,7 @@ def test_a_step_between_blocks_is_one() -> None:
     assert hidden(np.repeat(np.arange(40) % 2, 500).astype(float), blocks=40) is not None
 
 
-def test_a_step_of_a_few_readings() -> None:
+def test_a_hidden_step_is_found_in_few_readings() -> None:
     random = np.random.default_rng(5)
     assert hidden_step(read(random, 0.15, 0.4)) == pytest.approx(STEP)
     assert hidden_step(read(random, 1.0, 0.4)) is None

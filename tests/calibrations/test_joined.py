@@ -16,7 +16,7 @@ def table(t_s: list[float], source: str = "a", constants: dict[str, float] | Non
     return Table.from_columns("poses", columns | more, constants, source)
 
 
-def test_one_table_is_itself() -> None:
+def test_a_single_table_is_joined_to_itself() -> None:
     one = table([0.0, 7.0])
     assert join_tables([one]) is one
 

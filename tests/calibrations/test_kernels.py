@@ -90,7 +90,7 @@ def play(way: Array, limit: float) -> float:
 
 
 @given(st.integers(0, 10_000))
-def test_slip_is_what_play_leaves(seed: int) -> None:
+def test_elements_that_slip_hold_what_a_play_leaves(seed: int) -> None:
     rng = np.random.default_rng(seed)
     n, turns = 15, 4
     a, on_the_way = rng.uniform(-1, 1, (n, 3)), rng.uniform(-1, 1, (n, turns, 3))

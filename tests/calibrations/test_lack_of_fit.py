@@ -33,7 +33,7 @@ def test_holds_every_smooth_law_of_gravity_and_its_side() -> None:
 
 @pytest.mark.parametrize("inclinations", [(90,), (90, 30), (90, 30, 150, 60, 120)])
 @pytest.mark.parametrize("step_deg", [10.0, 30.0, 90.0])
-def test_leaves_rows_enough(inclinations: tuple[float, ...], step_deg: float) -> None:
+def test_smooth_columns_leave_enough_rows(inclinations: tuple[float, ...], step_deg: float) -> None:
     data = table(inclinations, step_deg)
     assert smooth_columns(data).shape[1] <= data.n / ROWS_PER_COLUMN
 

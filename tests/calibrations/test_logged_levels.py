@@ -139,6 +139,6 @@ def test_a_lead_makes_the_error_of_a_level_larger(lead_s: float) -> None:
     assert reading_error(table, "vx_std_v", 2, lead_s) >= reading_error(table, "vx_std_v", 2)
 
 
-def test_a_single_row_is_as_logged() -> None:
+def test_the_level_of_a_single_row_is_its_logged_value() -> None:
     one = vibrating(0.0).rows(np.array([5]))
     assert level(one, "vx_std_v", 2) == pytest.approx(one.column("vx_std_v") ** 2, abs=0)

@@ -168,7 +168,7 @@ def test_beside_an_accelerometer_a_constant_says_which_is_meant() -> None:
     assert Table.from_columns("positions", columns, {"triad": "m"}).output_names == ("mx", "my", "mz")
 
 
-def test_elements_of_the_field() -> None:
+def test_components_of_a_field_give_its_elements() -> None:
     # Potsdam, 2020, as the IGRF gives it: F 49,600 nT, D 4.5, I 67.9 deg
     x, y, z = components(np.array(49600.0), np.array(4.5), np.array(67.9))
     assert (float(x), float(y), float(z)) == pytest.approx((18603.0, 1464.1, 45955.0), rel=1e-3)

@@ -64,7 +64,7 @@ def test_a_person_sees_values_with_uncertainties() -> None:
     assert repr(Estimate("slope", "x", 1.0, None, "V", False, "no change")) == "<slope x: not identified: no change>"
 
 
-def test_the_parameters_of_a_fit() -> None:
+def test_parameters_of_a_fit_have_value_uncertainty_and_unit() -> None:
     columns = synthetic.turns(step_deg=30)
     x, y, _ = synthetic.components(columns)
     found = fit(read_model("linear"), synthetic.poses(columns, 2.5 + x, 2.5 + 1.1 * y))

@@ -61,7 +61,7 @@ def models(draw: st.DrawFn) -> Model:
 
 
 @given(models())
-def test_round_trip(model: Model) -> None:
+def test_a_model_survives_writing_and_reading(model: Model) -> None:
     assert parse_model(dump_model(model), "again.yaml") == model
 
 
@@ -146,12 +146,12 @@ def test_shipped_models_have_no_values_yet(name: str) -> None:
         (f"{HEAD}effects: [{{effect: bias}}, {{effect: bias}}]", 'the effect "bias" occurs twice in the model'),
     ],
 )
-def test_names_the_key(text: str, says: str) -> None:
+def test_an_error_of_a_model_file_names_the_key(text: str, says: str) -> None:
     with pytest.raises(ModelError, match=re.escape(says)):
         parse_model(text, "bad.yaml")
 
 
-def test_unknown_names(tmp_path: Path) -> None:
+def test_unknown_effects_and_models_are_refused_with_a_suggestion(tmp_path: Path) -> None:
     with pytest.raises(UnknownName, match=r'bad\.yaml: unknown effect "hysterisis"; did you mean "hysteresis"\?'):
         parse_model(f"{HEAD}effects: [{{effect: hysterisis}}]", "bad.yaml")
     with pytest.raises(UnknownName, match='no file is called "phisical"; did you mean "physical"'):

@@ -132,7 +132,7 @@ def test_one_attitude_cannot_tell_a_lean_from_a_bias() -> None:
     assert "axis-misalignment" not in {c.name for c in found.candidates}
 
 
-def test_a_known_skew_is_no_delay() -> None:
+def test_a_known_skew_of_the_converter_is_no_delay_of_the_sensor() -> None:
     table = shaken.record(shaken.TWO, 20.0, delay_s=-1e-3, constants={"skew_x_s": 1e-3, "skew_y_s": 1e-3})
     assert diagnose(table, LINEAR).verdict == "adequate"
 

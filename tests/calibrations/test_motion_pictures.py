@@ -24,7 +24,7 @@ def found() -> Discovery:
 
 
 @pytest.mark.slow
-def test_album_of_a_motion() -> None:
+def test_the_album_of_a_motion_has_its_pictures() -> None:
     pictures = album(found(), compare(found().start.table, read_model("linear")))
     assert [p.name for p in pictures] == ["waterfall", "measurement", "residual", "failure", "effect-output-filter"]
     assert all(png(p.chart).startswith(b"\x89PNG") for p in pictures)

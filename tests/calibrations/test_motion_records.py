@@ -43,7 +43,7 @@ def test_rounded_times_are_even_again() -> None:
     ],
     ids=["falls", "stands", "short", "uneven"],
 )
-def test_what_is_no_record_is_said(t: Array, error: type[Exception], says: str) -> None:
+def test_a_table_without_a_record_is_refused_with_the_reason(t: Array, error: type[Exception], says: str) -> None:
     with pytest.raises(error, match=says):
         find_records(table(t))
 

@@ -63,11 +63,11 @@ def test_lines_are_found_beside_each_other() -> None:
         assert abs(line.amplitude - amplitude) < 5 * line.amplitude_std
 
 
-def test_noise_alone_holds_no_line() -> None:
+def test_no_line_is_found_in_noise() -> None:
     assert sum(len(find_sines(T, np.random.default_rng(seed).standard_normal(len(T)))) for seed in range(60)) == 0
     assert strongest_line(T, made(0))[0] == pytest.approx(10.03, abs=0.01)
 
 
-def test_too_few_samples_are_said() -> None:
+def test_a_sine_fit_of_too_few_samples_is_refused() -> None:
     with pytest.raises(DataError, match="5 samples are too few for a sine fit; at least 8 are needed"):
         fit_four_parameter(T[:5], T[:5], 10.0)

@@ -138,7 +138,7 @@ def test_of_a_long_record_what_is_fast_is_known_too() -> None:
     assert known["sinusoidal-noise"].frequency_hz == pytest.approx(0.3123, abs=2e-4)
 
 
-def test_units_go_with_the_rate() -> None:
+def test_coefficients_are_scaled_by_the_sample_rate() -> None:
     """A record of 100 Hz: what is 1 per sample is 0.1 per root hertz."""
     known = analysed(record({WHITE: 1.0, WALK: 0.05}, 3), rate_hz=100.0).coefficients
     assert known[WHITE].value == pytest.approx(0.1, rel=0.03)
@@ -175,7 +175,7 @@ def test_a_spectrum_of_another_shape_is_a_misfit() -> None:
         (np.array(["a"] * 100), "not real numbers"),
     ],
 )
-def test_records_that_tell_nothing(samples: np.ndarray, says: str) -> None:
+def test_records_without_noise_to_analyse_are_refused(samples: np.ndarray, says: str) -> None:
     with pytest.raises(DataError, match=says):
         analysed(samples)
 

@@ -103,7 +103,7 @@ def dense(gaps: Array, X: Array, r: Array, ratio: float, taus_s: tuple[float, ..
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_against_dense_matrices(seed: int) -> None:
+def test_the_likelihood_is_that_of_dense_matrices(seed: int) -> None:
     rng = np.random.default_rng(seed)
     n = 60
     gaps = rng.uniform(3, 12, n)

@@ -57,7 +57,7 @@ def test_bins_hold_the_phase_within_them() -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(2, 20_000), st.lists(st.integers(0, 20_000), max_size=6), st.integers(0, 99))
-def test_blocks_do_not_matter(n: int, cuts: list[int], seed: int) -> None:
+def test_deviations_do_not_depend_on_the_blocks(n: int, cuts: list[int], seed: int) -> None:
     samples = np.random.default_rng(seed).standard_normal(n)
     whole, parts = Octaves(1.0), Octaves(1.0)
     whole.add(samples)
@@ -87,7 +87,7 @@ def test_a_mean_of_20000_under_the_noise_costs_no_digits(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["i2", "i4", "f4", ">f8"])
-def test_samples_of_any_type(kind: str) -> None:
+def test_samples_of_any_number_type_are_taken(kind: str) -> None:
     counts = np.rint(100 * np.random.default_rng(1).standard_normal(3000))
     assert octaves([counts.astype(kind)], 1.0).deviation == pytest.approx(octaves([counts], 1.0).deviation)
 
@@ -105,7 +105,7 @@ def test_the_windows_that_are_left_out_would_tell_nothing() -> None:
 
 
 @pytest.mark.parametrize("alpha", NOISES)
-def test_the_noise_type_is_told(alpha: int) -> None:
+def test_the_type_of_the_noise_is_identified(alpha: int) -> None:
     made = [NOISES[alpha](np.random.default_rng(seed), 4096) for seed in range(20)]
     told = [noise_type(len(each), moments_of(each - each.mean())) for each in made]
     assert told.count(alpha) >= 18

@@ -45,7 +45,7 @@ def stuck(x: Array, blocks: int = 1) -> Run | None:
 
 
 @pytest.mark.parametrize("name", HARMLESS)
-def test_noise_has_neither(name: str) -> None:
+def test_noise_has_no_wild_and_no_stuck_samples(name: str) -> None:
     for seed in range(5):
         x = HARMLESS[name](np.random.default_rng(seed))
         assert wild(x) == Wild()

@@ -81,7 +81,7 @@ def test_the_same_question_has_the_same_answer() -> None:
     assert np.array_equal(first, second)
 
 
-def test_units_do_not_matter() -> None:
+def test_a_design_does_not_depend_on_units() -> None:
     in_other_units = scale_rows(polynomial(2) * np.array([1.0, 1e6, 1e-9]))
     assert np.allclose(in_other_units, scale_rows(polynomial(2)))
 

@@ -58,7 +58,7 @@ def test_a_turn_is_as_short_as_the_information_allows() -> None:
     ("up", "words"),
     [((0, 0, 1), "+z side up"), ((1, 0, -1), "edge +x -z up"), ((-1, 1, 1), "corner -x +y +z up")],
 )
-def test_an_orientation_has_words(up: tuple[float, ...], words: str) -> None:
+def test_orientations_are_described_in_words(up: tuple[float, ...], words: str) -> None:
     direction = np.array(up) / np.linalg.norm(up)
     assert orientation_words(direction) == words
     assert name_orientation(words) == pytest.approx(direction)
@@ -74,7 +74,7 @@ def test_an_orientation_has_words(up: tuple[float, ...], words: str) -> None:
         ((0, 1, 0), (0, 1, 0), "leave it as it is"),
     ],
 )
-def test_a_turn_has_words(last: tuple[float, ...], up: tuple[float, ...], words: str) -> None:
+def test_turns_are_described_in_words(last: tuple[float, ...], up: tuple[float, ...], words: str) -> None:
     one, other = (np.array(v) / np.linalg.norm(v) for v in (last, up))
     assert turn_words(one, other) == words
 

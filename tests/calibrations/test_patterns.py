@@ -32,13 +32,13 @@ def table(misfit: Array) -> Table:
         (COLUMNS["humidity"] / 10 - 4.5, "follows humidity"),
     ],
 )
-def test_names_what_is_left(misfit: Array, says: str) -> None:
+def test_the_pattern_of_a_residual_is_named(misfit: Array, says: str) -> None:
     found = structure_of(fit(read_model("linear"), table(misfit)))
     assert found is not None
     assert says in found.text
 
 
-def test_names_nothing_on_noise() -> None:
+def test_noise_has_no_pattern() -> None:
     assert structure_of(fit(read_model("linear"), table(0 * BETA))) is None
 
 

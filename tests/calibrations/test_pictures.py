@@ -361,7 +361,7 @@ def test_an_inline_picture_reaches_nowhere_and_owns_its_names() -> None:
     assert used <= names
 
 
-def test_save_writes_whole_files(tmp_path: Path) -> None:
+def test_pictures_are_saved_as_svg_and_png(tmp_path: Path) -> None:
     chart = waterfall(levels(warm()))
     save(chart, tmp_path / "a.svg")
     save(chart, tmp_path / "b.PNG")
@@ -370,7 +370,7 @@ def test_save_writes_whole_files(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == ["a.svg", "b.PNG"]
 
 
-def test_save_says_what_is_wrong(tmp_path: Path) -> None:
+def test_a_picture_that_cannot_be_saved_gives_the_reason(tmp_path: Path) -> None:
     chart = Chart(((Panel(()),),))
     with pytest.raises(PictureError, match=r'a\.pdf: pictures end in \.png or \.svg, not in "\.pdf"'):
         save(chart, tmp_path / "a.pdf")

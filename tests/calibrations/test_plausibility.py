@@ -115,7 +115,7 @@ MIRRORED = {
 }
 
 
-def test_healthy_data_show_nothing() -> None:
+def test_healthy_data_get_no_finding() -> None:
     assert findings(healthy().table()) == ()
     assert findings(replace(healthy(), samples=False).table()) == ()
 
@@ -129,7 +129,7 @@ def test_an_output_without_response(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_a_wrong_assignment(name: str) -> None:
+def test_wrongly_assigned_channels_are_refused(name: str) -> None:
     spoil, reason = WRONG[name]
     found = refusal(spoil(healthy()).table())
     assert found is not None

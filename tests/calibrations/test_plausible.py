@@ -44,7 +44,9 @@ def read(content: str, *columns: str, kind: str | None = None) -> Table:
         (poses(temperature_c=295.0), "temperature_c", "from 295 to 295 degC", "temperature_c=temperature_c:K"),
     ],
 )
-def test_a_unit_that_can_hardly_be(content: str, name: str, says: str, fits: str) -> None:
+def test_an_implausible_unit_is_refused_with_the_command_that_corrects_it(
+    content: str, name: str, says: str, fits: str
+) -> None:
     with pytest.raises(DataError, match=re.escape(f'some.csv: the column "{name}" ')) as error:
         read(content)
     assert says in str(error.value)
@@ -67,7 +69,7 @@ def test_a_unit_that_can_hardly_be(content: str, name: str, says: str, fits: str
         ("beta_deg=beta_deg:rad", "reaches 20626.5 deg; no stage turns beyond 3600 deg; state its unit"),
     ],
 )
-def test_degrees_taken_for_radians(column: str, says: str) -> None:
+def test_degrees_in_a_column_of_radians_are_refused(column: str, says: str) -> None:
     with pytest.raises(DataError, match=re.escape(says)):
         read(poses(), column)
 
@@ -224,7 +226,7 @@ def test_a_clock_that_began_again_does_not_change_the_sample_rate() -> None:
     assert log_rate_hz(np.zeros(5), 0.0, "some.csv") == 0.0
 
 
-def test_rows_that_are_there_twice() -> None:
+def test_rows_that_occur_twice_are_used_once() -> None:
     columns = {"t_s": [0.0, 1, 2, 0, 1], "alpha_deg": [90.0] * 5, "beta_deg": [0.0, 30, 60, 0, 30], "vx_v": [1.0] * 5}
     kept, said = drop_duplicate_rows(Table.from_columns("poses", columns, source="made"))
     assert kept.n == 3

@@ -47,7 +47,7 @@ ROWS = "90;0;3500\n90;30;3400\n30;0;3000\n"
         ("inclinaison;plateau;Ux", {"alpha_deg=inclinaison", "beta_deg=plateau", "vx_v=Ux:mV"}),
     ],
 )
-def test_names_and_values(header: str, expected: set[str]) -> None:
+def test_columns_are_proposed_by_their_names_and_values(header: str, expected: set[str]) -> None:
     assert proposed(f"{header}\n{ROWS}") == expected
 
 
@@ -71,7 +71,7 @@ def test_names_and_values(header: str, expected: set[str]) -> None:
         ("humidity", 40, None),
     ],
 )
-def test_further_columns(name: str, value: float, expected: str | None) -> None:
+def test_further_columns_are_proposed(name: str, value: float, expected: str | None) -> None:
     rows = "".join(f"90;{k};3500;{value}\n" for k in (0, 30, 60))
     found = proposed(f"alpha_deg;beta_deg;Vx;{name}\n{rows}")
     assert found == {"vx_v=Vx:mV"} | ({expected} if expected else set())
@@ -165,7 +165,7 @@ def test_the_command_holds_all_that_was_said() -> None:
     ]
 
 
-def test_how_units_are_spelt() -> None:
+def test_spellings_of_units_are_understood() -> None:
     assert [parse_unit(u) for u in ("mV", "°", "[°C]", "m/s²", "Volts", "µV", "k", "kPa", "")] == [
         "mV", "deg", "degC", "m/s2", "V", "uV", "", "", "",
     ]  # fmt: skip

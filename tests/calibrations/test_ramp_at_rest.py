@@ -71,7 +71,7 @@ def test_a_lag_is_that_of_the_sensor() -> None:
 
 
 @pytest.mark.parametrize("seed", [0, 5])
-def test_branches_have_their_width(seed: int) -> None:
+def test_the_width_of_the_branches_is_estimated(seed: int) -> None:
     result = found_of(seed, line=5e-4, glue=4e-3)
     assert result.refinements == (BIAS,)
     assert result.model.params[f"{HYSTERESIS}.play"].value == pytest.approx(2.0, abs=0.2)

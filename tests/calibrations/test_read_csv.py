@@ -46,7 +46,7 @@ def tables(draw: st.DrawFn) -> Table:
 
 
 @given(tables())
-def test_round_trip(tmp_path_factory: pytest.TempPathFactory, table: Table) -> None:
+def test_a_table_survives_writing_and_reading(tmp_path_factory: pytest.TempPathFactory, table: Table) -> None:
     path = tmp_path_factory.getbasetemp() / "table.csv"
     write_csv(table, path)
     again = read_csv(path)
@@ -118,7 +118,7 @@ def test_any_text_is_a_table_or_one_clear_error(text: str) -> None:
         (f"{HEADER}\n90,0,1e999\n", 'column "vx_v": "1e999" is not a finite number'),
     ],
 )
-def test_names_the_place(text: str, says: str) -> None:
+def test_an_error_of_a_file_names_the_place(text: str, says: str) -> None:
     with pytest.raises(DataError, match=re.escape(says)):
         parse_csv(text, "bad.csv")
 
@@ -143,7 +143,7 @@ def test_unknown_columns_are_kept() -> None:
     assert table.labels["operator"] == ("Ann", "Bo")
 
 
-def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+def test_unreadable_files_are_refused_with_the_reason(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"nowhere\.csv: cannot be read: No such file"):
         read_csv(tmp_path / "nowhere.csv")
     with pytest.raises(DataError, match="cannot be read: Is a directory"):
@@ -154,7 +154,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         read_csv(binary)
 
 
-def test_requires_a_kind() -> None:
+def test_a_table_of_another_kind_is_refused() -> None:
     table = parse_csv(GOOD, "good.csv")
     assert require_kind(table, "poses", "positions") is table
     with pytest.raises(DataError, match=r"good\.csv: a table of poses; this needs positions"):

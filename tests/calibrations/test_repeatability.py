@@ -89,7 +89,7 @@ def steps(cycles: int, drift_v: float = 0.0, curve: float = 0.0) -> list[Tumble]
     return made
 
 
-def test_coefficients_are_exact() -> None:
+def test_temperature_coefficients_are_exact_without_noise() -> None:
     bias, scale = bias_coefficients(steps(1)), scale_coefficients(steps(1))
     assert (bias.slope[0], bias.hysteresis[0]) == pytest.approx((1e-3, 4e-4), abs=1e-9)
     assert scale.slope[0] == pytest.approx(1e-4, rel=1e-6)

@@ -113,7 +113,7 @@ def changed(found: Discovery[Fit], **values: Any) -> Discovery[Fit]:
 
 
 @pytest.mark.parametrize("make", [page, hand_page])
-def test_the_page_is_valid(make: object) -> None:
+def test_a_report_is_valid_html(make: object) -> None:
     read = Page(make())
     assert not read.open
     assert set(read.ids.values()) == {1}
@@ -122,7 +122,7 @@ def test_the_page_is_valid(make: object) -> None:
 
 
 @pytest.mark.parametrize("make", [page, hand_page])
-def test_the_page_reaches_nowhere(make: object) -> None:
+def test_a_report_loads_nothing_from_the_network(make: object) -> None:
     text = make()
     read = Page(text)
     assert "http" not in text
@@ -160,7 +160,7 @@ def test_it_holds_every_place_where_the_model_fails() -> None:
         assert words[1:] in text
 
 
-def test_it_holds_every_candidate() -> None:
+def test_a_report_lists_every_candidate() -> None:
     text = Page(page()).text
     for c in warm().findings.candidates:
         assert f"{c.name} {rounded(c.excess_after)} {rounded(c.held_out_after)} {probability(c.p_value)}" in text
@@ -213,7 +213,7 @@ def test_it_holds_the_results_that_have_a_limit() -> None:
     assert "Verdicts" not in page()
 
 
-def test_it_holds_the_noise() -> None:
+def test_a_report_states_the_noise() -> None:
     text = Page(page()).text
     noise = warm().end.noise
     for c in range(2):
@@ -291,7 +291,7 @@ def test_the_page_names_the_pattern_of_an_unexplained_residual() -> None:
     assert "This effect was tried and not kept" in text
 
 
-def test_names_are_joined() -> None:
+def test_names_are_joined_by_commas_and_and() -> None:
     assert join_words(["a", "b", "c"]) == "a, b and c"
 
 
@@ -349,7 +349,7 @@ def test_rounded_numbers_have_three_digits(value: float, shown: str) -> None:
     assert rounded(value) == shown
 
 
-def test_probabilities_and_units() -> None:
+def test_probabilities_and_units_are_formatted() -> None:
     assert [probability(p) for p in (1.0, 0.0187, 9.7e-12, 0.0)] == ["1", "0.019", "1 × 10⁻¹¹", "below 10⁻³⁰⁰"]
     assert [unit(u) for u in ("V/g^2", "V*s", "1", "degC", "V")] == ["V/g²", "V·s", "", "°C", "V"]
 

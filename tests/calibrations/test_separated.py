@@ -116,7 +116,7 @@ def sparse(path: Path) -> None:
     ],
     ids=["2-GiB", "xlsx", "utf-16-without-mark", "bytes", "bytes-far-down", "folder", "nowhere"],
 )
-def test_what_is_no_text(tmp_path: Path, make: Callable[[Path], object], says: str) -> None:
+def test_files_that_are_no_text_are_refused(tmp_path: Path, make: Callable[[Path], object], says: str) -> None:
     make(tmp_path / "bad.csv")
     with pytest.raises(DataError, match=re.escape(f"bad.csv: {says}")):
         read_csv(tmp_path / "bad.csv")

@@ -62,14 +62,14 @@ def test_two_calibrations_tell_no_drift() -> None:
             fit_stability(days, [1.0] * len(days), [0.1] * len(days))
 
 
-def test_agreement_by_e_n() -> None:
+def test_two_values_agree_by_the_e_n_number() -> None:
     found = compare_values((2.5, 3e-4), (2.501, 4e-4))
     assert (found.difference, found.expanded) == (pytest.approx(-1e-3), pytest.approx(1e-3))
     assert found.e_n == pytest.approx(-1.0)
     assert not compare_values((2.5, 1e-4), (2.501, 1e-4)).agrees
 
 
-def test_a_life_is_drawn() -> None:
+def test_the_history_of_a_sensor_is_drawn() -> None:
     values, stds = drawn(1)
     line = fit_stability(DAYS, values, stds)
     one = Life("bias-x", "V", DAYS.tolist(), values.tolist(), stds.tolist(), line, (2.49, 2.51), 4000.0, "due then")

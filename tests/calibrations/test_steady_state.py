@@ -99,6 +99,6 @@ def test_without_known_white_noise_it_is_found_too() -> None:
     assert state.terms[0].tau_s[0] == pytest.approx(TAU_S, rel=1e-3)
 
 
-def test_few_values_are_refused() -> None:
+def test_a_steady_state_of_few_values_is_refused() -> None:
     with pytest.raises(TooFewRows, match="at least 8"):
         found(1, "white", n=7)

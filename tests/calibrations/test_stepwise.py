@@ -46,7 +46,7 @@ def test_all_coefficients_of_an_axis_beside_a_linear_one(own: str) -> None:
     np.testing.assert_allclose(found.acceleration[:, "xy".index(own)], a, atol=1e-11)
 
 
-def test_both_axes_crossed_at_once() -> None:
+def test_stepwise_estimates_hold_where_both_axes_bend_with_each_other() -> None:
     """Each axis bends with the other's output; the roots of each quadratic lie where (2) looks, found by iteration."""
     columns = synthetic.turns()
     square = {"x": 0.013, "y": -0.009}
@@ -71,7 +71,7 @@ def test_both_axes_crossed_at_once() -> None:
     np.testing.assert_allclose(found.predicted[upright], np.column_stack([vx, vy])[upright], atol=1e-12)
 
 
-def test_linear_sensor() -> None:
+def test_stepwise_estimates_of_a_linear_sensor_leave_nothing() -> None:
     columns = synthetic.turns()
     a_x, a_y, _ = synthetic.components(columns)
     found = estimate_stepwise(table(SF["x"] * a_x + B["x"], SF["y"] * a_y + B["y"], columns))

@@ -79,7 +79,7 @@ def test_poses_keep_their_numbers_when_others_are_left_out() -> None:
     assert (pattern.text, pattern.poses) == ("3 poses stand out: #12, #140, #377", (12, 140, 377))
 
 
-def test_one_pose_and_many() -> None:
+def test_poses_that_stand_out_are_listed_in_part() -> None:
     off = np.zeros(len(BETA))
     off[7] = 60.0
     assert found(changed(off))[1].text == "1 pose stands out: #7"  # type: ignore[union-attr]
@@ -93,7 +93,7 @@ def test_a_walk_is_a_drift_and_no_step() -> None:
     assert pattern.text.startswith("slow drift without a pattern")
 
 
-def test_nothing_is_left_of_noise() -> None:
+def test_noise_has_no_structure() -> None:
     assert found(changed(0 * TIME))[1] is None
 
 

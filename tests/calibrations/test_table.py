@@ -31,7 +31,7 @@ def poses(**more: list[float]) -> Table:
         ("positions", {"mx": [1.0], "my": [1.0], "m_z": [1.0]}, 'the column "mz"; did you mean "m_z"?'),
     ],
 )
-def test_refuses(kind: str, columns: dict[str, list[float]], says: str) -> None:
+def test_impossible_tables_are_refused(kind: str, columns: dict[str, list[float]], says: str) -> None:
     with pytest.raises(DataError, match=re.escape(says)):
         Table.from_columns(kind, columns, source="made.csv")
 
@@ -54,7 +54,7 @@ def test_a_constant_must_be_a_number() -> None:
 @pytest.mark.parametrize(
     ("value", "says"), [("ten", "'ten', not a number"), (0.0, "0.0; it must be above 0"), (-1.0, "-1")]
 )
-def test_a_constant_that_cannot_be(name: str, value: str | float, says: str) -> None:
+def test_impossible_constants_are_refused(name: str, value: str | float, says: str) -> None:
     with pytest.raises(DataError, match=f'made.csv: the constant "{name}" is {says}'):
         Table.from_columns("poses", POSES, {name: value}, "made.csv")
 
@@ -90,7 +90,7 @@ def test_a_gravity_that_is_not_of_this_earth_is_refused(value: str | float, says
         ("flip", -1.0, r"is -1; it must be 1 \(face down, turned by 180 deg about x\) or 0 \(face up\)"),
     ],
 )
-def test_a_number_that_cannot_be(name: str, value: float, says: str) -> None:
+def test_impossible_numbers_are_refused_with_their_row(name: str, value: float, says: str) -> None:
     rows = len(next(iter(POSES.values())))
     column = np.ones(rows)
     column[1] = value
@@ -98,7 +98,7 @@ def test_a_number_that_cannot_be(name: str, value: float, says: str) -> None:
         Table.from_columns("poses", {**POSES, name: column}, source="made.csv")
 
 
-def test_columns_cannot_be_changed() -> None:
+def test_columns_of_a_table_are_read_only() -> None:
     table = poses()
     with pytest.raises(ValueError, match="read-only"):
         table.column("vx_v")[0] = 1.0
@@ -106,7 +106,7 @@ def test_columns_cannot_be_changed() -> None:
         table.columns["vx_v"] = np.zeros(3)
 
 
-def test_axes_unit_and_outputs() -> None:
+def test_a_table_knows_its_axes_unit_and_outputs() -> None:
     table = poses(vy_v=[1.0, 2.0, 3.0])
     assert (table.axes, table.unit, table.outputs.shape) == (("x", "y"), "V", (3, 2))
     raw = Table.from_columns("positions", {"ax": [1.0], "ay": [2.0], "az": [3.0]}, {"unit": "m/s^2"})
@@ -133,7 +133,7 @@ def test_digest_is_that_of_names_and_values() -> None:
     assert poses().digest != Table.from_columns("poses", {**POSES, "vx_v": [3.5, 2.5, 3.1]}).digest
 
 
-def test_guesses_the_kind() -> None:
+def test_the_kind_of_a_table_is_guessed_from_its_columns() -> None:
     assert guess_kind(POSES) == "poses"
     assert guess_kind(["t_s", "vx_v", "displacement_m", "vy_v"]) == "motion"
     assert guess_kind(["ax", "ay", "az", "gx", "gy", "gz"]) == "positions"

@@ -62,7 +62,7 @@ def test_two_levels_are_found_with_how_far_they_are_apart_and_how_often_it_goes(
         assert found.upper_s + found.lower_s == pytest.approx(4 * N / RATE_HZ / times, rel=0.5)
 
 
-def test_two_levels_beside_flicker() -> None:
+def test_two_levels_are_found_beside_flicker() -> None:
     random = np.random.default_rng(1)
     x = white(random, 2 * N) + 1.5 * telegraph(random, 2 * N, 500.0) + 0.3 * traps(random, 2 * N)
     found = told(x, *SLOW[:2])
@@ -95,7 +95,7 @@ def test_two_levels_without_any_noise_are_no_fault() -> None:
     assert told(alternating, SLOW[0]) is None
 
 
-def test_beside_coefficients() -> None:
+def test_two_levels_are_a_disturbance_beside_the_noise_coefficients() -> None:
     random = np.random.default_rng(7)
     x = white(random, 2 * N) + 2.5 * telegraph(random, 2 * N, 500.0)
     analysis = analyse(still(x))

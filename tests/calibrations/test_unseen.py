@@ -47,7 +47,7 @@ def test_what_changes_between_visits_is_no_misfit() -> None:
     assert (check.passed, check.steady) == (True, False)
 
 
-def test_repeats_are_counted() -> None:
+def test_repeated_check_poses_are_counted() -> None:
     check = judge_check_poses(LINEAR, measured(3))
     assert check is not None
     assert check.repeats == 72 - 36 - 6  # 36 poses, each twice, but for the six check poses

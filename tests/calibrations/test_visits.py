@@ -22,7 +22,7 @@ def felt(table: Table, row: int, axis: int) -> Array:
     return values[np.append(True, np.abs(np.diff(values)) > 1e-9)]
 
 
-def test_over_the_top_and_down() -> None:
+def test_the_way_between_poses_passes_the_extremes() -> None:
     """beta 0 -> 180 at alpha = 90: y rises to 1 g and comes back, x falls all the way."""
     table = way([90, 90], [0, 180], t_s=[0, 7])
     np.testing.assert_allclose(felt(table, 1, 1), [0.0, 1.0, 0.0], atol=1e-12)

@@ -28,7 +28,7 @@ def test_a_recipe_for_a_folder_of_your_own(title: str, tmp_path: Path, follow: C
 
 
 @pytest.mark.slow
-def test_the_recipe_for_a_driver(tmp_path: Path) -> None:
+def test_the_recipe_for_a_driver_works_as_written(tmp_path: Path) -> None:
     recipe = section(PAGE, "A driver")
     copy_rooms(tmp_path)
     for part in ("wire", "drivers"):

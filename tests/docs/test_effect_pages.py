@@ -21,7 +21,7 @@ def test_there_is_a_page_for_each_effect_and_no_other() -> None:
 
 
 @pytest.mark.parametrize("name", pages(catalogue()))
-def test_the_page_is_up_to_date(name: str) -> None:
+def test_pages_of_effects_are_up_to_date(name: str) -> None:
     assert (FOLDER / name).read_text(encoding="utf-8") == pages(catalogue())[name], REMEDY
 
 

@@ -23,7 +23,7 @@ def test_every_option_is_there_with_its_default_and_no_other(title: str, options
     assert rows == {field.name: str(field.default) for field in fields(options)}
 
 
-def test_the_example_is_a_world() -> None:
+def test_the_example_is_a_valid_simulated_world() -> None:
     said = yaml.safe_load(re.findall(r"```yaml\n(.*?)```", TEXT, re.DOTALL)[0])["world"]
     world = WorldConfig.from_mapping(said)
     assert (world.noise.x.hum_v, world.noise.y.hum_v, world.noise.y.wander_s) == (2e-4, 0.0, 20.0)

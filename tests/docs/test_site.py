@@ -78,7 +78,7 @@ def test_the_site_needs_nothing_from_the_network(site: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("notebook", TUTORIALS, ids=lambda path: path.stem)
-def test_a_notebook_shows_results(site: Path, notebook: Path) -> None:
+def test_notebooks_of_the_site_show_their_results(site: Path, notebook: Path) -> None:
     text = notebook.read_text("utf-8")
     cells = text.count("```{code-cell}") - text.count("remove-input")
     pictures = text.count(".plot()\n") + text.count("plt.subplots(")

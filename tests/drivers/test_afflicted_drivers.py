@@ -102,7 +102,7 @@ def test_a_stream_whose_start_is_never_answered_is_stopped(afflicted: Callable[.
 
 @pytest.mark.parametrize("what", EFFECTS)
 @pytest.mark.parametrize("name", DRIVERS)
-def test_no_driver_hangs_on_a_wire(afflicted: Callable[..., Any], name: str, what: str) -> None:
+def test_no_driver_waits_for_ever_at_a_faulty_wire(afflicted: Callable[..., Any], name: str, what: str) -> None:
     instrument, clock = afflicted(name, Fault(what))
     for use in (instrument.identify, instrument.self_test):
         try:
@@ -191,7 +191,7 @@ def test_a_level_that_never_stops_talking(afflicted: Callable[..., Any], what: s
     assert clock.now() < LONGEST_S
 
 
-def test_a_stream_that_never_ends(afflicted: Callable[..., Any]) -> None:
+def test_a_stream_that_cannot_be_stopped_is_an_error(afflicted: Callable[..., Any]) -> None:
     converter, _ = afflicted("labjack_t7", Fault("endless"))
     converter.acquire(0.1)
     with pytest.raises(Refused, match="a stream is running already"):

@@ -59,7 +59,7 @@ def test_lost_and_doubled_datagrams_are_counted(sensor: Start) -> None:
     assert counts["samples-doubled"] > 10
 
 
-def test_nobody_sends(sensor: Start) -> None:
+def test_silence_on_a_udp_port_is_a_timeout(sensor: Start) -> None:
     adc = sensor(Fault("silence"))
     with pytest.raises(LinkTimeout, match="no line came on udpin://"):
         adc.acquire(1.0)

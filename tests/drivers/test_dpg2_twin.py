@@ -117,7 +117,9 @@ def test_while_it_talks_it_hears_nothing_but_the_stop(link: Link) -> None:
     ("deg", "shown"),
     [(29.9994, "+29.999"), (-0.0004, "-00.000"), (-4.25, "-04.250"), (30.01, "+++++++"), (-171.0, "-------")],
 )
-def test_what_it_shows(serve: Callable[..., LevelServer], clock: SimulatedClock, deg: float, shown: str) -> None:
+def test_the_twin_shows_its_tilt_as_the_manual_says(
+    serve: Callable[..., LevelServer], clock: SimulatedClock, deg: float, shown: str
+) -> None:
     link = open_link(serve(Plate(deg), "rtu+tcp://127.0.0.1:0").url, clock)
     assert heard(link, 0.09) == f"X={shown}\r\nY=-00.007\r\n"
     link.close()

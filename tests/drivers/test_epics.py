@@ -101,7 +101,7 @@ def test_units_of_the_record_are_converted(bench: Bench) -> None:
     assert motor.angle_deg() == pytest.approx(10.0)
 
 
-def test_a_turn_has_its_rate(bench: Bench) -> None:
+def test_a_motor_turns_at_the_wanted_rate(bench: Bench) -> None:
     motor = bench.motor()
     with motor.turning(5.0, 0.0, 60.0) as turn:
         rates = []

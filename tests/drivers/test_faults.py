@@ -27,7 +27,7 @@ ANSWER = bytes.fromhex("01030400000000FA33")
         (Fault("x", at_s=5.0, after=3), [(5.0, 4)], [(5.0, 3), (4.0, 4)]),
     ],
 )
-def test_a_fault_has_its_time(fault: Fault, there: list[Any], not_there: list[Any]) -> None:
+def test_a_fault_begins_and_ends_when_told(fault: Fault, there: list[Any], not_there: list[Any]) -> None:
     for now_s, asked in [*there, *not_there]:
         is_there = fault.has_begun(now_s, asked) and not fault.has_ended(now_s, asked)
         assert is_there == ((now_s, asked) in there), (now_s, asked)
@@ -142,7 +142,7 @@ def test_a_long_message_trickles_in_at_most_a_thousand_pieces() -> None:
     assert b"".join(piece.data for piece in pieces) == bytes(32768)
 
 
-def test_faults_add_up() -> None:
+def test_several_faults_act_together() -> None:
     faults = faults_of("oriental_az", [Fault("delay", size=0.5), Fault("garbage", size=3)])
     (said,) = disturb(Message(ANSWER, 1.0), faults, RTU)
     assert (len(said.data), said.due_s) == (3, 1.5)

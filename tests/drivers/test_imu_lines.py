@@ -118,7 +118,7 @@ def test_doubled_lines_are_dropped(connect: Connect) -> None:
         (None, {"rate_hz": 50.0, "columns": {"ax": 3}, "sends": imu_lines.Settings(NUMBERED)}, StreamError, "100 sam"),
     ],
 )
-def test_what_is_wrong_is_named(
+def test_faults_of_a_text_sensor_are_named(
     connect: Connect, fault: Fault | None, keys: dict[str, Any], kind: type[Exception], said: str
 ) -> None:
     with pytest.raises(kind, match=said):

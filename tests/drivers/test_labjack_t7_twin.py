@@ -159,7 +159,7 @@ def test_a_digital_line_switches_the_sensors_power(bench: Any) -> None:
     assert bench.world.powered
 
 
-def test_who_it_is(bench: Any) -> None:
+def test_the_twin_identifies_itself_and_passes_its_test(bench: Any) -> None:
     identity = bench.adc.identify()
     assert (identity.model, identity.serial) == ("LabJack T7", str(labjack_t7_twin.SERIAL))
     assert all(check.ok for check in bench.adc.self_test())

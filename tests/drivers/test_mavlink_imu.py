@@ -89,7 +89,7 @@ def test_the_self_test_shows_messages_rate_time_and_temperature(connect: Connect
         (None, {"sends": mavlink_imu.Settings("SCALED_IMU")}, Refused, "unsupported"),
     ],
 )
-def test_what_is_wrong_is_named(
+def test_faults_of_a_mavlink_sensor_are_named(
     connect: Connect, fault: Fault | None, keys: dict[str, Any], kind: type[DriverError], said: str
 ) -> None:
     adc = connect(*([fault] if fault else []), **keys)

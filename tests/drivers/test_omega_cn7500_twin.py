@@ -33,7 +33,7 @@ def test_the_thermometer_counts_tenths(ask: Callable[[str], str]) -> None:
     assert ask("01 03 10 00 00 01 80 CA").startswith("01 03 02 00 D7")  # 21.5 C
 
 
-def test_set_point_and_run_bit(ask: Callable[[str], str], small_world: Any) -> None:
+def test_set_point_and_run_bit_are_written_and_read(ask: Callable[[str], str], small_world: Any) -> None:
     for exchange in ("01 06 10 01 01 90 DD 36", "01 05 08 14 FF 00 CE 5E"):
         assert ask(exchange) == exchange
     assert ask("01 02 08 14 00 01 FB AE") == "01 02 01 01 60 48"
@@ -56,6 +56,6 @@ def test_the_oven_heats_when_it_runs(bench: Any) -> None:
     assert bench.oven.temperature_c() == pytest.approx(31.5)
 
 
-def test_who_it_is(bench: Any) -> None:
+def test_the_twin_identifies_itself_and_passes_its_test(bench: Any) -> None:
     assert bench.oven.identify().model == "Omega CN7500"
     assert all(check.ok for check in bench.oven.self_test())

@@ -50,7 +50,7 @@ def ask(small_world: Any, clock: SimulatedClock) -> Iterator[Ask]:
     server.close()
 
 
-def test_position_in_steps(ask: Ask) -> None:
+def test_the_position_register_counts_steps(ask: Ask) -> None:
     assert ask("01 03 00 CC 00 02 04 34").startswith("01 03 04 00 00 02 BC")
 
 
@@ -87,7 +87,7 @@ def test_a_function_it_does_not_know_is_exception_1(ask: Ask) -> None:
     assert ask("01 04 00 7F 00 01 00 12") == "01 84 01 82 C0"
 
 
-def test_an_absent_unit_is_silent(ask: Ask) -> None:
+def test_an_absent_unit_does_not_answer(ask: Ask) -> None:
     assert ask("09 03 00 7F 00 01 B4 9A") == ""
 
 

@@ -88,7 +88,7 @@ def test_a_curve_without_a_date_is_refused() -> None:
 
 
 @pytest.mark.parametrize("text", ["- 1", "serial: [", "serial: 3\ndate: x\nnear: 5"])
-def test_a_bad_file_is_named(tmp_path: Path, text: str) -> None:
+def test_an_unusable_curve_file_is_named(tmp_path: Path, text: str) -> None:
     path = tmp_path / "curve.yaml"
     path.write_text(text)
     with pytest.raises(ValueError, match=r"curve\.yaml: "):
@@ -97,5 +97,5 @@ def test_a_bad_file_is_named(tmp_path: Path, text: str) -> None:
         Curve.from_file(tmp_path / "none.yaml")
 
 
-def test_the_shipped_curve_is_one() -> None:
+def test_the_shipped_curve_is_read() -> None:
     assert Curve.from_file(SIMULATED).serial == "SIM-0063"

@@ -88,7 +88,7 @@ def error(ask: Ask, *commands: str) -> int:
         ("ERR?", "0\n"),
     ],
 )
-def test_answers(ask: Ask, question: str, answer: str) -> None:
+def test_the_twin_answers_as_the_manual_says(ask: Ask, question: str, answer: str) -> None:
     assert ask(question) == answer
 
 
@@ -131,7 +131,7 @@ def test_errors_have_the_controller_s_numbers_and_are_told_once(ask: Ask, comman
     assert ask("ERR?") == "0\n"
 
 
-def test_all_axes_move_or_none(ask: Ask, clock: SimulatedClock) -> None:
+def test_a_move_beyond_the_range_moves_no_axis(ask: Ask, clock: SimulatedClock) -> None:
     assert error(ask, "SVO 1 1 2 1", "MOV 1 10 2 120") == 7
     clock.sleep(1)
     assert float(ask("POS? 1").partition("=")[2]) == pytest.approx(0.5, abs=0.01)
@@ -166,7 +166,7 @@ WORDS = ["0", "1", "2", "3", "X", "SIN_P", "2000", "1000", "-5", "1e400", "nan",
 
 
 @given(st.lists(st.tuples(st.sampled_from(VERBS), st.lists(st.sampled_from(WORDS), max_size=9)), max_size=12))
-def test_no_command_upsets_it(commands: list[tuple[str, list[str]]]) -> None:
+def test_any_sequence_of_commands_gets_whole_answers(commands: list[tuple[str, list[str]]]) -> None:
     controller = pi_e727_twin.Controller(SmallWorld(), Settings())
     for k, (verb, words) in enumerate([("SVO", ["1", "1", "2", "1"]), *commands]):
         controller.advance(0.01 * k)

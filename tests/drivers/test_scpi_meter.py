@@ -91,7 +91,7 @@ def test_only_some_outputs_are_measured(make: Make) -> None:
         make().only("mx")
 
 
-def test_one_input_needs_no_list(make: Make) -> None:
+def test_one_input_needs_no_channel_list(make: Make) -> None:
     settings = driver.Settings(channels={"vx": 0}, rate_hz=10)
     assert settings.commands(7) == [
         "CONF:VOLT:DC 10", "VOLT:DC:NPLC 1", "TRIG:SOUR IMM", "TRIG:COUN 1",

@@ -88,7 +88,7 @@ def test_a_tracker_that_already_sends_is_not_configured(connect: Connect) -> Non
         (None, {"rate_hz": 2000.0}, StreamError, "sends AccelerationHR at 1000 Hz"),
     ],
 )
-def test_what_is_wrong_is_named(
+def test_faults_of_an_xsens_sensor_are_named(
     connect: Connect, fault: Fault | None, keys: dict[str, Any], kind: type[DriverError], said: str
 ) -> None:
     adc = connect(*([fault] if fault else []), **keys)

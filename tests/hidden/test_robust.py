@@ -95,7 +95,7 @@ def test_a_diagnosis_lists_outliers_too() -> None:
 
 
 @pytest.mark.parametrize("defect", ["slipping contacts", "blind amplifier", "gear play", "creeping charge"])
-def test_an_effect_is_no_accident(defect: str) -> None:
+def test_poses_of_a_large_effect_are_no_outliers(defect: str) -> None:
     columns = rigs.rig_with(defect, 100.0, 1)
     table = Table.from_columns("poses", {k: v for k, v in columns.items() if v.dtype.kind in "fi"}, KNOWN)
     assert not len(gross(fit(read_model("linear"), table)))

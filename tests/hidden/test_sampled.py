@@ -42,7 +42,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("name", "k"), CASES)
-def test_the_cause_is_named(name: str, k: int) -> None:
+def test_the_cause_is_named_from_sampled_records(name: str, k: int) -> None:
     for seed in (1, 2)[: 1 + (k == 0)]:  # chance matters where the cause is weak
         found = diagnose(sampled.measured(seed, **CAUSES[name][k]), read_model("linear"))
         told = f"{name} {k}, seed {seed}: {found.verdict}, {found.missing}"

@@ -63,6 +63,6 @@ def test_a_clumsy_hand_takes_longer_and_is_not_worse() -> None:
     assert np.abs(calm.errors(truth(world_of(1)))["bias_mg"]).max() < 1
 
 
-def test_a_stage_finds_the_truth() -> None:
+def test_a_calibration_on_a_stage_finds_the_true_values() -> None:
     errors = on_stage(1).errors(truth(world_of(1)))
     assert max(np.abs(errors["bias_mg"]).max(), np.abs(errors["scale_per_mille"]).max()) < 0.3

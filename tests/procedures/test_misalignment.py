@@ -114,7 +114,7 @@ def test_it_goes_on_where_it_was_interrupted() -> None:
         assert [d.pose for d in again.dwells] == [d.pose for d in book.dwells]
 
 
-def test_what_it_needs_is_said() -> None:
+def test_unusable_settings_and_channels_are_refused() -> None:
     rig, _ = session(world({}))
     with pytest.raises(SettingError, match="target_deg"):
         misalignment(rig, target_deg=0.0)

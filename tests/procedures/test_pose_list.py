@@ -38,7 +38,7 @@ def test_a_hand_written_file_needs_two_columns_only() -> None:
         (["alpha_deg,beta_deg,direction", "1,2,2"], "line 2, column direction: the value is '2'; give one of -1, 0, 1"),
     ],
 )
-def test_what_is_wrong_is_named(lines: list[str], complaint: str) -> None:
+def test_faults_of_a_pose_list_are_named(lines: list[str], complaint: str) -> None:
     with pytest.raises(SettingError, match=complaint):
         parse_poses(lines)
 
@@ -59,7 +59,7 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
         parse(find("sweep"), {"pose_list": str(tmp_path / "none.csv")})
 
 
-def test_a_list_is_whole() -> None:
+def test_a_pose_list_is_not_combined_with_other_poses() -> None:
     sweep = find("sweep")
     with pytest.raises(SettingError, match="pose_list has all poses"):
         plan(read_bench(), sweep, parse(sweep, {"pose_list": format_poses(POSES), "face": "both"}))

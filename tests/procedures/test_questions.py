@@ -16,7 +16,7 @@ SIDE = Choice("side", "Which side?", choices=("front", "back"))
 
 
 @pytest.mark.parametrize(("said", "kept"), [("yes", "yes"), (" Y ", "yes"), ("TRUE", "yes"), ("n", "no"), ("No", "no")])
-def test_yes_and_no_in_many_words(said: str, kept: str) -> None:
+def test_several_words_for_yes_and_no_are_understood(said: str, kept: str) -> None:
     assert MOUNTED.checked(said) == kept
 
 

@@ -38,7 +38,7 @@ def test_each_edge_is_turned_about_both_ways_up_and_down_and_rests_at_both_headi
     assert turns.asked == ["mounting", "mount-0-x-up", "mount-0-y-up"]
 
 
-def test_a_turn_is_kept_whole(turns: Book) -> None:
+def test_all_samples_of_a_turn_are_kept(turns: Book) -> None:
     """360 deg at 60 deg/s are 6 s; all of it at the rate, whatever the edge and the side."""
     whole = [kept for kept in turns.blocks if kept.pose.rate_deg_s]
     assert {len(kept.samples.volts) for kept in whole} == {6000}

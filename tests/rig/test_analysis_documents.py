@@ -93,7 +93,7 @@ def check(value: Any, kind: Any, where: str = "document") -> None:
         assert not isinstance(value, float) or math.isfinite(value)
 
 
-def test_fit(rig: Rig, clean: str, tmp_path: Path) -> None:
+def test_the_document_of_a_fit_has_its_keys(rig: Rig, clean: str, tmp_path: Path) -> None:
     out = tmp_path / "fitted.yaml"
     found = document(rig("fit", clean, "--model", "linear", "--out", str(out), "--json"), "rig.fit/1")
     check(found["parameters"], [PARAMETER])
@@ -118,7 +118,7 @@ def test_a_parameter_that_the_data_does_not_determine_has_no_uncertainty(rig: Ri
     assert found["model"] is None
 
 
-def test_compare(rig: Rig, clean: str, bent: str) -> None:
+def test_the_document_of_a_comparison_has_its_keys(rig: Rig, clean: str, bent: str) -> None:
     found = document(rig("compare", bent, "--model", "linear", "--json"), "rig.comparison/1")
     place = {"where": str, "from": NUMBER, "to": NUMBER, "axis": str, "excess": float, "text": str}
     both = dict.fromkeys(("rmse", "noise_floor", "slow_noise", "excess"), BOTH)
@@ -146,7 +146,7 @@ def test_positions_have_one_residual(rig: Rig, tmp_path: Path) -> None:
     assert found["model"] == "common-scale"
 
 
-def test_diagnose(rig: Rig, clean: str, bent: str) -> None:
+def test_the_document_of_a_diagnosis_has_its_keys(rig: Rig, clean: str, bent: str) -> None:
     kinds = {"schema": str, "data": str, "model": str, "verdict": str, "candidates": [CANDIDATE]}
     kinds |= dict.fromkeys(("next_experiment", "own_effect"), (dict, type(None))) | {
         "residual_structure": (str, type(None)),
@@ -185,7 +185,7 @@ def test_rivals_come_with_the_experiment_that_separates_them(rig: Rig, tmp_path:
 
 
 @pytest.mark.parametrize("command", ["add", "discover"])
-def test_add_and_discover(rig: Rig, bent: str, tmp_path: Path, command: str) -> None:
+def test_the_documents_of_add_and_discover_have_their_keys(rig: Rig, bent: str, tmp_path: Path, command: str) -> None:
     out = tmp_path / "model.yaml"
     ways = {
         "add": ("add", "z-axis-bias", "--data", bent, "--model", "linear"),
@@ -218,7 +218,7 @@ def test_import_and_the_run_as_data(rig: Rig, bent: str) -> None:
     assert from_run["data"] == imported["run"]
 
 
-def test_effects_and_models(rig: Rig) -> None:
+def test_the_documents_of_effects_and_models_have_their_keys(rig: Rig) -> None:
     effects = document(rig("effects", "--json"), "rig.effects/1")["effects"]
     assert {"bias", "hysteresis", "temperature-bias", "axis-misalignment"} <= {e["effect"] for e in effects}
     assert all(e["summary"] and e["symptom"] and e["parameters"] for e in effects)

@@ -49,7 +49,7 @@ import pytest
         ),
     ],
 )
-def test_an_import_that_cannot_be(
+def test_files_that_cannot_be_imported_are_refused(
     refused: Callable[..., str], work: Path, text: str, arguments: tuple[str, ...], says: str
 ) -> None:
     (work / "empty.csv").write_text("")

@@ -69,13 +69,15 @@ def test_a_file_that_may_not_be_read(refused: Callable[..., str], monkeypatch: p
         (MODEL, "", "bad.yaml: is not a model"),
     ],
 )
-def test_a_model_file_with_a_fault(refused: Callable[..., str], work: Path, old: str, new: str, says: str) -> None:
+def test_faults_of_a_model_file_are_named(
+    refused: Callable[..., str], work: Path, old: str, new: str, says: str
+) -> None:
     assert old in MODEL
     (work / "bad.yaml").write_text(MODEL.replace(old, new, 1))
     assert says in refused("compare", "good.csv", "--model", "bad.yaml", "--json")
 
 
-def test_a_binary_model_file(refused: Callable[..., str], work: Path) -> None:
+def test_a_binary_model_file_is_refused(refused: Callable[..., str], work: Path) -> None:
     (work / "bad.yaml").write_bytes(bytes(range(256)))
     assert "bad.yaml: is not text (byte 128); is it really a model file?" in refused(
         "diagnose", "good.csv", "--model", "bad.yaml"
@@ -121,7 +123,7 @@ def test_a_result_that_cannot_be_written(
         ({"folders": {"effects": "nowhere"}}, "bench.yaml, key folders.effects: there is no folder"),
     ],
 )
-def test_a_bench_file_with_a_fault(
+def test_faults_of_a_bench_file_are_named(
     refused: Callable[..., str], bench_file: Callable[..., Path], content: Any, says: str
 ) -> None:
     bench = str(bench_file(content))

@@ -38,7 +38,7 @@ def line(text: str, number: int, old: str, new: str) -> str:
         (4, "60.0", '"' + "x" * 200_000 + '"', "bad.csv: cannot be split into columns: field larger than field limit"),
     ],
 )
-def test_a_table_with_a_fault(
+def test_faults_of_a_table_are_named(
     refused: Callable[..., str], work: Path, text: str, number: int, old: str, new: str, says: str
 ) -> None:
     (work / "bad.csv").write_text(line(text, number, old, new))
@@ -67,7 +67,9 @@ def test_a_table_with_a_fault(
         (b"# filter_corner_hz: low\n# sample_rate_hz: 1000\nGOOD", "the constant \"filter_corner_hz\" is 'low', not a"),
     ],
 )
-def test_a_file_that_is_no_table(refused: Callable[..., str], work: Path, text: str, content: bytes, says: str) -> None:
+def test_files_that_are_no_table_are_refused(
+    refused: Callable[..., str], work: Path, text: str, content: bytes, says: str
+) -> None:
     (work / "bad.csv").write_bytes(content.replace(b"GOOD", text.encode()))
     assert says in refused("fit", "bad.csv", "--model", "linear", "--out", "out.yaml", "--json")
 
@@ -84,7 +86,7 @@ def test_a_file_that_is_no_table(refused: Callable[..., str], work: Path, text: 
         ("ax,ay,az,n", (1, 2, 3, 0), 'bad.csv: row 1, column "n" is 0; it must be at least 1'),
     ],
 )
-def test_positions_that_cannot_be(
+def test_impossible_positions_are_refused(
     refused: Callable[..., str], work: Path, head: str, row: tuple[int, ...], says: str
 ) -> None:
     rows = "\n".join(",".join(str(k * factor) for factor in row) for k in range(20))

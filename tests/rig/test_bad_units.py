@@ -33,7 +33,7 @@ def poses(*more: str, alpha: float = 90.0, scale: float = 1.0, volts: float = 1.
     ],
     ids=["radians", "millivolts", "kelvin", "no-supply", "astronomic", "m/s2"],
 )
-def test_numbers_that_cannot_be(refused: Refused, work: Path, content: str, says: str) -> None:
+def test_numbers_in_wrong_units_are_refused(refused: Refused, work: Path, content: str, says: str) -> None:
     (work / "bad.csv").write_text(content)
     for command in (("fit", "bad.csv", "--out", "out.yaml"), ("diagnose", "bad.csv"), ("import", "bad.csv")):
         assert says in refused(*command)

@@ -74,7 +74,7 @@ def test_each_sensor_gets_its_own_calibration(rig: Call, run: str, tmp_path: Pat
     assert turned["value"] == pytest.approx(-TURNED_DEG[name], abs=4 * turned["std"] + 0.01)
 
 
-def test_a_table_says_whose_it_is(run: str) -> None:
+def test_each_sensor_of_a_batch_has_a_table_with_its_serial_number(run: str) -> None:
     with Record() as record:
         tables = [table_of(record, f"{run}/{name}") for name in NAMES]
     assert [table.constants["serial"] for table in tables] == ["S0", "S1", "S2", "S3"]

@@ -68,7 +68,7 @@ def test_a_drive_without_an_alarm_is_left_alone(check: Callable[..., Any]) -> No
     assert (ended.status, ended.err) == (0, "alpha: no alarm\n")
 
 
-def test_a_document_asks_nobody(check: Callable[..., Any]) -> None:
+def test_a_reset_is_not_asked_for_with_json(check: Callable[..., Any]) -> None:
     assert check("--reset", "--json", alarm=TIME_OUT).status == 2
 
 

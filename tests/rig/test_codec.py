@@ -41,7 +41,7 @@ def test_negative_zero_stays_negative() -> None:
     assert np.signbit(decode(encode(np.array([[-0.0], [0.0]])))).ravel().tolist() == [True, False]
 
 
-def test_no_samples_are_no_samples() -> None:
+def test_an_empty_array_survives_the_codec() -> None:
     assert decode(encode(np.empty((0, 3)))).shape == (0, 3)
 
 

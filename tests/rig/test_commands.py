@@ -24,7 +24,7 @@ def the_run(rig: Rig) -> str:
 
 
 @pytest.mark.sockets
-def test_run_then_runs_then_show(rig: Rig) -> None:
+def test_a_run_is_listed_and_shown(rig: Rig) -> None:
     ended = rig(*RUN, "--json")
     document = json.loads(ended.out)
     assert ended.status == 0

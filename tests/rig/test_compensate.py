@@ -37,7 +37,7 @@ def test_each_language_has_its_files(rig: Rig, physical: Path) -> None:
     assert done.stdout == "0 of 16 reference vectors fail\n"
 
 
-def test_json_tells_the_same(rig: Rig, physical: Path) -> None:
+def test_the_document_of_a_compensation_has_its_facts(rig: Rig, physical: Path) -> None:
     said = json.loads(
         rig("compensate", str(physical), "--language", "c", "--out", "c", "--precision", "float", "--json").out
     )

@@ -15,7 +15,7 @@ from rig.services.session import model_session
 from tests.browser.measured import hidden, two_faults
 
 
-def test_it_tells_what_is_tried() -> None:
+def test_a_counted_search_tells_what_it_tries() -> None:
     counted = Counted({name: catalogue()[name] for name in ("bias", "hysteresis")})
     assert (counted.text, counted.share) == ("Fitting the model", 0.0)
     effects = iter(counted.values())
@@ -45,7 +45,7 @@ def test_an_analysis_says_what_it_does(tmp_path: Path) -> None:
     assert texts[-1] == "searching for places (effects first), pass 1 of at most 7"
 
 
-def test_what_is_cancelled_ends(tmp_path: Path) -> None:
+def test_a_cancelled_search_ends(tmp_path: Path) -> None:
     found = model_session(Request(hidden(tmp_path, "package turned")))
     counted = Counted(found.effects)
     counted.cancelled = True

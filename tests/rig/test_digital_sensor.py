@@ -195,7 +195,7 @@ def test_the_bench_files_of_the_how_to_page_are_checked(rig: Rig, rig_home: Path
     assert "100 samples a second" in ended.out
 
 
-def test_every_procedure_is_tried() -> None:
+def test_every_procedure_is_tried_with_a_digital_sensor() -> None:
     assert {*SHORT, "hand-positions"} == set(paths())  # hand-positions: tests/rig/test_hand_run.py
 
 

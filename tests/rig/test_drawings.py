@@ -58,14 +58,14 @@ def words(attitude: Attitude) -> list[str]:
     return [str(e.text) for e in root.iter(f"{SVG}text")]
 
 
-def test_it_says_what_it_shows() -> None:
+def test_a_drawing_describes_itself_in_words() -> None:
     shown = words(Attitude(45, 90, 30, 1))
     assert shown[0] == "alpha 45 deg, beta 90 deg, sensor face down, turned by 30 deg on the table"
     assert {"Alpha 45°, from the front", "Beta 90°, sensor turned by 30°", "gravity", "x", "y", "z"} <= set(shown)
     assert minus(f"{np.sin(np.pi / 4) * np.cos(np.radians(120)):+.3f} g") in shown
 
 
-def test_words_are_escaped() -> None:
+def test_words_in_a_drawing_are_escaped() -> None:
     assert ElementTree.fromstring(svg.text((0, 0), "a <b> & c")).text == "a <b> & c"  # noqa: S314 our own text
 
 

@@ -57,7 +57,7 @@ def test_results_are_those_of_the_other_poses_and_come_back(rig: Rig, run: str) 
     assert results(run) == before
 
 
-def test_it_is_said_in_words(rig: Rig, run: str) -> None:
+def test_an_exclusion_is_confirmed_in_words(rig: Rig, run: str) -> None:
     text = rig("exclude", run, "5", "--reason", "a lorry passed").out
     assert f"{run}: pose 5 excluded: a lorry passed\nresults: evaluated again" in text
     assert "noise-rms-x" in text
@@ -138,7 +138,7 @@ def test_what_the_procedure_gave_itself_stays(tmp_path: Path) -> None:
         (("one", "--reason", "x"), "'one' is not a valid integer"),
     ],
 )
-def test_what_cannot_be_is_refused(rig: Rig, run: str, words: tuple[str, ...], why: str) -> None:
+def test_impossible_exclusions_are_refused(rig: Rig, run: str, words: tuple[str, ...], why: str) -> None:
     import re
 
     before = events(run)

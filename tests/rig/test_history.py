@@ -32,11 +32,11 @@ def years() -> None:
     calibrated("18", "2024-03-02", 2.52, seed=9)
 
 
-def test_one_calibration_is_one(rig: Rig, years: None) -> None:
+def test_a_single_calibration_is_stated_as_such(rig: Rig, years: None) -> None:
     assert rig("history", "18").out.startswith("18: one calibration, 2024-03-02, model linear\n")
 
 
-def test_a_life_in_words(rig: Rig, years: None, tmp_path: Path) -> None:
+def test_the_history_of_a_sensor_is_printed(rig: Rig, years: None, tmp_path: Path) -> None:
     words = ("--limit", "bias-x=0.005", "--quantity", "bias-x", "--pictures", str(tmp_path / "life"))
     ended = rig("history", "17", *words)
     assert ended.status == 0, ended.err
@@ -47,7 +47,7 @@ def test_a_life_in_words(rig: Rig, years: None, tmp_path: Path) -> None:
     assert {path.name for path in (tmp_path / "life").iterdir()} == {"life.png", "charts.png"}
 
 
-def test_a_life_as_json(rig: Rig, years: None) -> None:
+def test_the_document_of_a_history_has_its_figures(rig: Rig, years: None) -> None:
     said = json.loads(rig("history", "17", "--limit", "bias-x=0.005", "--baseline", "3", "--json").out)
     assert said["schema"] == "rig.history/1"
     bias = next(q for q in said["quantities"] if q["name"] == "bias-x")

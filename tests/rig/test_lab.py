@@ -88,14 +88,14 @@ def denied(url: str, statement: str) -> str:
     return str(error.value)
 
 
-def test_an_empty_password_is_none() -> None:
+def test_an_empty_password_counts_as_none() -> None:
     assert not has_password(lab_url("postgresql://postgres:@lab.example/rigs"))
     assert has_password(lab_url("postgresql://postgres:word@lab.example/rigs"))
     assert has_password(lab_url("postgresql://postgres@lab.example/rigs?sslpassword=word"))
 
 
 @pytest.mark.usefixtures("work")
-def test_a_reader_writes_nothing(reader: str, writer: str, rig: Rig) -> None:
+def test_a_user_with_read_permission_writes_nothing(reader: str, writer: str, rig: Rig) -> None:
     with Record() as own:
         run = a_run(own)
     refused = rig("push", "--to", reader)
@@ -142,7 +142,7 @@ def test_a_run_of_another_lab_is_resumed_at_home(rig: Rig, writer: str, monkeypa
     assert said(rig("runs", "--json"))["runs"] == []
 
 
-def test_a_password_is_nowhere(
+def test_a_password_is_stored_and_printed_nowhere(
     rig: Rig, people: Server, database: str, bench_file: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with Record() as own:

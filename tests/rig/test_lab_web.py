@@ -116,7 +116,9 @@ def visiting(path: str, visit: Callable[[User], Coroutine[Any, Any, None]]) -> N
     asyncio.run(simulated())
 
 
-def test_a_life_is_that_in_the_lab(run: str, reader: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_page_shows_the_history_in_the_laboratory(
+    run: str, reader: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv(RECORD, reader)
     monkeypatch.setenv("RIG_HOME", str(tmp_path / "elsewhere"))
 

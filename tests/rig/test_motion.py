@@ -273,7 +273,7 @@ def test_a_sensor_turned_on_its_mount_is_found_by_the_axis_that_should_not_move(
 
 
 @pytest.mark.slow
-def test_all_commands_take_the_run(rig: Callable[..., Any], tmp_path: Path) -> None:
+def test_every_command_takes_a_motion_run(rig: Callable[..., Any], tmp_path: Path) -> None:
     arguments = [part for name, value in BRIEF.items() for part in (f"--{name.replace('_', '-')}", value)]
     ended = rig("run", "motion", *arguments, "--unattended", "--json")
     document = json.loads(ended.out)

@@ -133,7 +133,7 @@ def test_the_oven_warms_over_minutes_and_time_goes_on() -> None:
     assert set(foreseen["dwell_s"]) == {5.0}
 
 
-def test_the_commands_print_it(rig: Callable[..., Ended], tmp_path: Path) -> None:
+def test_commands_print_the_next_experiment(rig: Callable[..., Ended], tmp_path: Path) -> None:
     from calibrations.importing.foreign import write_csv
 
     data = str(tmp_path / "turned.csv")
@@ -159,7 +159,7 @@ def test_another_bench_than_that_of_the_run_is_named(bench: dict[str, str], told
     assert (f'{run} was measured on the bench "ours", but the next' in " ".join(heard)) == told
 
 
-def test_the_same_data_counts_once(refused: Callable[..., str]) -> None:
+def test_the_same_data_given_twice_is_refused(refused: Callable[..., str]) -> None:
     assert "good.csv is given twice; give the same data once" in refused("discover", "good.csv", "good.csv")
 
 

@@ -144,7 +144,7 @@ def test_a_table_with_its_rate_in_its_times(rig: Rig, folder: Path) -> None:
     assert '"vq"' in rig("noise", file, "--channel", "vq").err
 
 
-def test_words_and_pictures(rig: Rig, folder: Path) -> None:
+def test_the_noise_command_prints_a_text_and_saves_pictures(rig: Rig, folder: Path) -> None:
     ended = rig("noise", "still.npy", "--rate", "50", "--pictures", "pictures", "--format", "svg")
     assert ended.status == 0, ended.err
     assert "still.npy: 6000 samples at 50 Hz, 2:00" in ended.out
@@ -221,7 +221,9 @@ def test_a_supply_is_coarse_where_noise_does_not_smooth_its_steps(noise_v: float
         (("poses.csv",), "a table of poses; a noise analysis needs single samples"),
     ],
 )
-def test_bad_input_is_one_message(rig: Rig, folder: Path, words: tuple[str, ...], says: str) -> None:
+def test_bad_input_of_the_noise_command_is_one_message(
+    rig: Rig, folder: Path, words: tuple[str, ...], says: str
+) -> None:
     t_s = np.arange(6000) / 50
     hole = samples()
     hole[4000] = np.nan
@@ -262,7 +264,7 @@ def test_times_of_a_computer_that_samples_reach_in_bursts(rig: Rig, folder: Path
     assert "Times are uneven" in ended.err
 
 
-def test_times_that_are_asked_for(rig: Rig, folder: Path) -> None:
+def test_deviations_are_given_at_the_wanted_times(rig: Rig, folder: Path) -> None:
     said = document(rig("noise", "still.npy", "--rate", "50", "--tau", "0.1", "--tau", "3", "--json"))["allan"]
     assert said["tau_s"] == [0.1, 3.0]
     assert said["deviation"] == pytest.approx(deviations(samples(), (5, 150)).tolist())

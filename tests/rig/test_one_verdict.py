@@ -120,7 +120,7 @@ def answers(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     return Answers(str(path), folder)
 
 
-def test_all_answers_agree(answers: Answers) -> None:
+def test_all_commands_and_the_page_agree_on_a_file(answers: Answers) -> None:
     agree(answers)
     assert (answers.document("diagnose")["verdict"] == "unexplained") is ("unexplained" in answers.data)
 

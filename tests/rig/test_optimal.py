@@ -84,7 +84,7 @@ def test_what_check_poses_tell_is_not_counted() -> None:
     assert judged.errors == pytest.approx(found.equal.errors)
 
 
-def test_no_repeat_follows_at_once() -> None:
+def test_repeated_poses_do_not_follow_each_other() -> None:
     places = [(pose.alpha_deg, pose.beta_deg, pose.direction) for pose in chosen().equal.poses]
     assert sum(a == b for a, b in pairwise(places)) <= 2 < len(places) - len(set(places))
 

@@ -55,7 +55,7 @@ def test_duration_and_room_are_those_of_the_run() -> None:
     assert stored < planned.bytes < 3 * stored
 
 
-def test_nothing_is_touched(rig_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_plan_connects_to_nothing(rig_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*arguments: object) -> None:
         raise AssertionError("a plan connected to something")
 
@@ -79,7 +79,7 @@ def test_an_instrument_that_the_bench_lacks_is_named() -> None:
         plan(Bench.model_validate(document), *small_sweep())
 
 
-def test_an_oven_is_planned_too(tmp_path: Path) -> None:
+def test_a_plan_includes_the_oven(tmp_path: Path) -> None:
     (tmp_path / "bake.py").write_text(
         '"""bake: warm."""\n\ndef bake(rig, *, to_c: float = 40.0):\n'
         "    rig.oven.set_temperature(to_c)\n    rig.oven.run(True)\n    rig.wait(60)\n    rig.oven.temperature_c()\n"

@@ -63,7 +63,7 @@ def test_a_terminal_shows_one_line_that_a_remark_replaces(monkeypatch: pytest.Mo
     assert not text.partition("a remark")[2].strip()
 
 
-def test_short_work_shows_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+def test_short_work_shows_no_progress(capsys: pytest.CaptureFixture[str]) -> None:
     with progress.working("searching"):
         pass
     assert capsys.readouterr().err == ""

@@ -29,7 +29,7 @@ def data(tmp_path: Path) -> str:
     return str(tmp_path / "warm.csv")
 
 
-def test_page_and_pictures(rig: Callable[..., Any], data: str, tmp_path: Path) -> None:
+def test_the_report_command_writes_a_page_and_pictures(rig: Callable[..., Any], data: str, tmp_path: Path) -> None:
     out, folder = tmp_path / "page.html", tmp_path / "pictures"
     ended = rig("report", data, "--model", "linear", "--out", str(out), "--pictures", str(folder), "--json")
     assert ended.status == 0, ended.err
@@ -43,7 +43,7 @@ def test_page_and_pictures(rig: Callable[..., Any], data: str, tmp_path: Path) -
 
 
 @pytest.mark.slow
-def test_pictures_alone_as_svg(rig: Callable[..., Any], data: str, tmp_path: Path) -> None:
+def test_the_report_command_writes_pictures_alone(rig: Callable[..., Any], data: str, tmp_path: Path) -> None:
     ended = rig("report", data, "--pictures", str(tmp_path / "p"), "--format", "svg")
     assert ended.status == 0, ended.err
     assert ended.out.count("written: ") == len(NAMES)

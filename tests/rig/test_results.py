@@ -156,7 +156,7 @@ def test_each_result_of_a_procedure_has_a_meaning(procedure: str) -> None:
         assert meaning(f"a1/{name}") == meaning(name)
 
 
-def test_a_meaning_names_the_axes() -> None:
+def test_the_meaning_of_a_result_names_its_axes() -> None:
     assert meaning("theta-xz") == "Component of sensing axis x along reference axis z."
     assert meaning("bias-x") != meaning("bias-drift-x")
 

@@ -35,7 +35,7 @@ def test_the_first_signal_interrupts_and_further_ones_are_quiet(number: signal.S
     assert [signal.getsignal(each) for each in SIGNALS] == before
 
 
-def test_nohup_is_respected() -> None:
+def test_a_signal_that_nohup_ignores_stays_ignored() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
         with stoppable():
@@ -110,5 +110,5 @@ def test_a_computing_world_and_a_screen_half_written_are_not_interrupted(module:
 @pytest.mark.parametrize(
     ("module", "name"), [("rich.console", "input"), ("richer", "print"), ("rig.runs.runner", "run")]
 )
-def test_who_waits_for_a_person_is(module: str, name: str) -> None:
+def test_every_wait_for_a_person_can_be_stopped(module: str, name: str) -> None:
     assert signalled_in(module, name) == []

@@ -100,7 +100,7 @@ def test_compare_sets_both_curves_side_by_side(rig: Rig, folder: Path) -> None:
     assert "fails nowhere" in shown.out
 
 
-def test_an_array_and_its_rate(rig: Rig, folder: Path) -> None:
+def test_an_array_is_analysed_with_a_stated_rate(rig: Rig, folder: Path) -> None:
     said = document(rig("fit", "x.npy", "--rate", "10", "--model", "still", "--json"))
     assert said["parameters"][0]["unit"] == "count/sqrt(Hz)"
     ended = rig("discover", "x.npy", "--rate", "10", "--all")
@@ -185,7 +185,7 @@ def bad(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_bad_input_is_one_message(rig: Rig, folder: Path, command: str) -> None:
+def test_bad_still_records_give_one_message(rig: Rig, folder: Path, command: str) -> None:
     bad(folder)
     before = set(folder.iterdir())
     for data, says in {

@@ -113,7 +113,7 @@ def test_a_run_without_poses_is_no_table_yet() -> None:
         table_of(record, begin(record))
 
 
-def test_events_are_told_in_order() -> None:
+def test_events_are_listed_in_order() -> None:
     with Record() as record:
         run = begin(record)
         record.note(run, "answer mounting", "yes")

@@ -135,7 +135,9 @@ def test_the_table_of_a_run_is_a_table_of_rates_that_a_file_gives_back(rig: Rig,
 
 
 @pytest.mark.sockets
-def test_every_command_takes_a_run(rig: Rig, folder: Path, tmp_path: Path, undrawn: None) -> None:
+def test_every_command_takes_runs_of_gyroscopes_and_magnetometers(
+    rig: Rig, folder: Path, tmp_path: Path, undrawn: None
+) -> None:
     field, rates = run(rig, folder, FIELD)["run"], run(rig, folder, (*RATES, *ONE))["run"]
     model, page = str(tmp_path / "hard.yaml"), tmp_path / "page.html"
     assert json.loads(rig("diagnose", field, "--json").out)["candidates"][0]["effect"] == "hard-iron"

@@ -36,7 +36,7 @@ def test_exit_status_and_verdict_without_check(rig: Callable[..., Any], dead: st
     assert REASON in rig(command, dead).out
 
 
-def test_nothing_is_written(rig: Callable[..., Any], dead: str, tmp_path: Path) -> None:
+def test_unusable_data_write_no_file(rig: Callable[..., Any], dead: str, tmp_path: Path) -> None:
     out = str(tmp_path / "out")
     for arguments in (
         ("fit", dead, "--out", f"{out}.yaml"),

@@ -82,7 +82,7 @@ def test_hum_and_bow_have_the_means_of_their_samples() -> None:
     assert World(config, seed=1).dwell_mean([0.0], 0.0, noise_free=True)["vx_v"][0] != pytest.approx(averages, abs=0.01)
 
 
-def test_columns() -> None:
+def test_a_simulated_table_has_the_columns_of_a_measured_one() -> None:
     world = World(WorldConfig.adxl203().changed({"heat": {"powered_for_s": 100.0}}), seed=1)
     table = world.dwell_mean([0.0, 30.0], [0.0, 40.0], mount_deg=[0.0, 90.0], flip=1)
     assert set(table) == {

@@ -15,7 +15,7 @@ def drags(friction: Friction, path: np.ndarray, neighbour_g: float = 0.0) -> np.
 CYCLE = np.concatenate([np.linspace(0, 8, 81), np.linspace(8, -8, 161), np.linspace(-8, 8, 161)])
 
 
-def test_no_friction_no_drag() -> None:
+def test_a_stage_without_friction_has_no_drag() -> None:
     assert not drags(Friction(), CYCLE).any()
 
 

@@ -26,7 +26,9 @@ def test_a_perfect_rig_gives_the_convention(alpha: float, beta: float) -> None:
 
 
 @given(alpha=angle, beta=angle, tilt=angle, turn=angle, mount=angle, flip=st.integers(0, 1))
-def test_rotations_keep_one_g(alpha: float, beta: float, tilt: float, turn: float, mount: float, flip: int) -> None:
+def test_rotations_keep_the_magnitude_of_gravity(
+    alpha: float, beta: float, tilt: float, turn: float, mount: float, flip: int
+) -> None:
     g = felt(alpha, beta, Base(tilt, turn), Package(turn, tilt, turn), mount, flip)
     assert np.linalg.norm(g) == pytest.approx(1.0)
 
@@ -35,11 +37,11 @@ def test_face_down_turns_about_x() -> None:
     assert felt(50, 20, flip=1) == pytest.approx(felt(50, 20) * [1, -1, -1])
 
 
-def test_mount_adds_to_beta() -> None:
+def test_the_mount_angle_adds_to_beta() -> None:
     assert felt(70, 20, mount=15) == pytest.approx(felt(70, 35))
 
 
-def test_the_package_turns_last() -> None:
+def test_the_rotation_of_the_package_is_the_last() -> None:
     package = Package(turn_x_deg=1.0, turn_y_deg=2.0, turn_z_deg=3.0)
     assert felt(70, 20, package=package, flip=1) == pytest.approx(rotation(1, 2, 3) @ felt(70, 20, flip=1))
 

@@ -14,7 +14,7 @@ def world(**heat: float) -> World:
     return World(WorldConfig.ideal().changed({"heat": heat}), seed=1)
 
 
-def test_a_steady_room_stays() -> None:
+def test_a_steady_room_keeps_its_temperature() -> None:
     steady = world(ambient_c=20.0)
     steady.advance(1000.0)
     assert steady.thermometer_c() == pytest.approx(20.0)
@@ -59,7 +59,7 @@ def test_the_oven_reaches_and_holds_its_set_point() -> None:
     assert oven.thermometer_c() == pytest.approx(22.0, abs=0.1)
 
 
-def test_the_thermocouple_lags() -> None:
+def test_the_thermocouple_lags_behind_a_ramp() -> None:
     ramps = [world(ambient_ramp_k_per_h=36.0, thermocouple_lag_s=lag) for lag in (0.0, 20.0)]
     for each in ramps:
         each.advance(3600.0)

@@ -78,7 +78,7 @@ def test_a_random_walk_spreads_with_the_square_root_of_time() -> None:
     assert np.std(spreads, axis=(0, 2, 3)) == pytest.approx([0.5e-3, 1e-3], rel=0.2)
 
 
-def test_hum_is_a_line() -> None:
+def test_hum_is_one_line_of_the_spectrum() -> None:
     x = samples(1000, white_v=0.0, hum_v=1e-3, hum_hz=50.0)[:, 0]
     spectrum = np.abs(np.fft.rfft(x - x.mean())) / 500
     assert spectrum.argmax() == 50

@@ -109,7 +109,7 @@ def test_a_wander_is_gauss_markov_slow_or_fast(time_s: float, interval_s: float,
     assert bands(f, density / expected, edges) == pytest.approx(np.ones(3), rel=0.12)
 
 
-def test_a_ramp_is_straight() -> None:
+def test_a_simulated_ramp_is_straight() -> None:
     volts = world(1, QUIET | {"ramp_v_per_h": 5e-3}).adc_volts(["vx"], 0.0, 1.0, 3000)[:, 0]
     assert 3600 * np.polyfit(np.arange(3000.0), volts, 1)[0] == pytest.approx(5e-3, rel=1e-3)
 

@@ -72,6 +72,6 @@ def test_a_dead_band_is_blind_near_zero() -> None:
     assert read(plates, 1.0) == pytest.approx(read(Plates(), 1.0) - 0.1 / G_NM)
 
 
-def test_the_rails_clip() -> None:
+def test_the_output_is_clipped_at_the_rails() -> None:
     assert read(Plates(), 3.0) == 4.95
     assert read(Plates(), -3.0) == 0.05

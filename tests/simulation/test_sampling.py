@@ -76,7 +76,7 @@ def test_time_ends_at_the_last_scan_and_does_not_run_back() -> None:
         world.adc_volts(["vx"], 0.5, 1e-3, 1)
 
 
-def test_no_scans_take_no_time() -> None:
+def test_a_stream_of_no_scans_takes_no_time() -> None:
     world = turning()
     assert world.adc_volts(["vx", "vy"], 1.0, 1e-3, 0).shape == (0, 2)
     assert world.now_s == 0.0

@@ -24,7 +24,7 @@ def test_plain_springs_are_linear() -> None:
 
 
 @given(gx=load, gy=load, hard=st.floats(-50, 50), side=st.floats(-0.01, 0.01), pull=st.floats(-0.02, 0.02))
-def test_forces_balance(gx: float, gy: float, hard: float, side: float, pull: float) -> None:
+def test_forces_of_springs_and_load_balance(gx: float, gy: float, hard: float, side: float, pull: float) -> None:
     springs = Springs(
         hardening_per_um2=hard, one_sided_fraction=side, coupling_fraction=pull, stiffening_ppm_per_k=-100.0
     )
@@ -41,7 +41,7 @@ def test_hardening_bends_less_and_one_sided_bends_unevenly() -> None:
     assert balanced(uneven, -1.0)[0] == pytest.approx(-per_g_nm(5500.0) / 0.99)
 
 
-def test_warmth_softens() -> None:
+def test_springs_soften_with_temperature() -> None:
     warm = balanced(Springs(stiffening_ppm_per_k=-100.0), 1.0, warmer_k=10.0)[0]
     assert warm == pytest.approx(per_g_nm(5500.0) / 0.999)
 

@@ -38,7 +38,7 @@ def turning(world: World, axis: str, rate_deg_s: float, at_s: float) -> np.ndarr
     return found
 
 
-def test_a_magnet_is_a_dipole() -> None:
+def test_the_field_of_a_magnet_is_that_of_a_dipole() -> None:
     """Twice as strong along its axis as beside it, and the other way round there; 1 mA m^2 at 10 mm: 200 uT."""
     along = near_magnet_ut(record(Magnet(x_mm=10.0, moment_x_ma_m2=1.0)))
     beside = near_magnet_ut(record(Magnet(x_mm=0.0, y_mm=10.0, moment_x_ma_m2=1.0)))

@@ -157,7 +157,7 @@ def test_it_waits_until_the_level_is_at_rest(level: Levels) -> None:
     assert shown(level({b"R": swinging + PAIRS}, Settings(readings=2))) == pytest.approx((1.001, 0.001))
 
 
-def test_a_level_that_never_rests(level: Levels, clock: SimulatedClock) -> None:
+def test_a_level_whose_readings_scatter_is_an_error(level: Levels, clock: SimulatedClock) -> None:
     swinging = [b"X=+0%d.000\r\nY=+00.000\r\n" % (k % 2) for k in range(300)]
     found = level({b"R": swinging}, Settings(readings=5))
     began_s = clock.now()
@@ -166,7 +166,7 @@ def test_a_level_that_never_rests(level: Levels, clock: SimulatedClock) -> None:
     assert clock.now() - began_s < 11.0
 
 
-def test_a_reading_that_has_stuck(level: Levels) -> None:
+def test_a_repeated_reading_of_the_level_is_an_error(level: Levels) -> None:
     with pytest.raises(
         InstrumentError, match=r"x \+1.000, y -0.000 deg was received 30 times in a row. Switch the level off"
     ):
@@ -185,6 +185,6 @@ def test_a_reading_that_has_stuck(level: Levels) -> None:
         ({"interval_s": 0.0, "range_deg": float("nan")}, "interval_s, range_deg must be positive"),
     ],
 )
-def test_settings_that_cannot_be(settings: dict[str, float], words: str) -> None:
+def test_impossible_settings_are_refused(settings: dict[str, float], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         Settings(**settings)

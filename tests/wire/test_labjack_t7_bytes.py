@@ -123,7 +123,7 @@ def test_without_a_line_for_it_the_power_is_not_switched(converter: Converters) 
         converter([]).power(True)
 
 
-def test_identity(converter: Converters) -> None:
+def test_the_converter_identifies_itself(converter: Converters) -> None:
     exchanges = [
         ("00 06 00 00 00 06 01 03 EA 60 00 02", "00 06 00 00 00 07 01 03 04 40 E0 00 00"),
         ("00 07 00 00 00 06 01 03 EA 7C 00 02", "00 07 00 00 00 07 01 03 04 1C 03 A1 80"),

@@ -27,7 +27,7 @@ def test_two_packets_and_the_number_turning_over() -> None:
     assert Packets(2, "adc", first=0xFFFF).codes(FIRST + SECOND).tolist() == [1, 0x8000, 0xFFFF, 2]
 
 
-def test_half_a_packet_is_left() -> None:
+def test_half_a_packet_is_left_for_later() -> None:
     assert Packets(2, "adc", first=0xFFFF).codes(FIRST + SECOND[:7]).tolist() == [1, 0x8000]
 
 
@@ -82,7 +82,7 @@ def test_the_end_of_a_burst_is_no_loss() -> None:
 
 @settings(derandomize=True, deadline=None)
 @given(st.lists(st.lists(st.integers(0, 65535), min_size=3, max_size=3), max_size=20), st.integers(0, 65535))
-def test_every_record_survives(blocks: list[list[int]], first: int) -> None:
+def test_every_block_survives_the_packets(blocks: list[list[int]], first: int) -> None:
     data = b"".join(packet((first + k) % 65536, block) for k, block in enumerate(blocks))
     assert Packets(3, "adc", first).codes(data).tolist() == [code for block in blocks for code in block]
 

@@ -40,7 +40,7 @@ def test_two_words_are_written_by_function_16(unit: Units) -> None:
     unit([("01 10 01 80 00 02 04 00 00 00 01 37 9F", "01 10 01 80 00 02 41 DC")]).write(reset, 1)
 
 
-def test_bits(unit: Units) -> None:
+def test_bits_are_written_and_read(unit: Units) -> None:
     oven = unit(
         [
             ("01 05 08 14 FF 00 CE 5E", "01 05 08 14 FF 00 CE 5E"),
@@ -51,7 +51,7 @@ def test_bits(unit: Units) -> None:
     assert oven.read_bit(0x0814, "run") is True
 
 
-def test_tcp_frames_carry_a_number(unit: Units) -> None:
+def test_frames_over_tcp_carry_a_number(unit: Units) -> None:
     device = unit(
         [
             ("00 01 00 00 00 06 01 03 0F A2 00 02", "00 01 00 00 00 07 01 03 04 44 7A 00 00"),
@@ -100,7 +100,7 @@ def test_an_answer_to_another_request_is_a_bad_frame(unit: Units) -> None:
         unit([(ASK_ALARM, "01 03 02 40 30 89 90")] * 3).read(ALARM)
 
 
-def test_another_unit_is_named(unit: Units) -> None:
+def test_an_answer_of_another_unit_is_an_error(unit: Units) -> None:
     with pytest.raises(WrongUnit, match="unit 2 answered instead of unit 1"):
         unit([(ASK_ALARM, "02 03 04 00 00 00 00 C9 33")] * 3).read(ALARM)
 

@@ -28,7 +28,7 @@ def test_the_process_value_counts_tenths(oven: Ovens) -> None:
     assert oven([(ASK_PV, "01 03 02 00 FD 79 C5")]).temperature_c() == pytest.approx(25.3)
 
 
-def test_below_zero(oven: Ovens) -> None:
+def test_temperatures_below_zero_are_read(oven: Ovens) -> None:
     assert oven([(ASK_PV, "01 03 02 FF 9C F9 DD")]).temperature_c() == pytest.approx(-10.0)
 
 
@@ -50,7 +50,7 @@ def test_outside_its_limits_nothing_is_sent(oven: Ovens, temperature: float) -> 
         oven([]).set_temperature(temperature)
 
 
-def test_run_and_stop(oven: Ovens) -> None:
+def test_the_oven_runs_and_stops(oven: Ovens) -> None:
     start, stop = "01 05 08 14 FF 00 CE 5E", "01 05 08 14 00 00 8F AE"
     ask = "01 02 08 14 00 01 FB AE"
     heater = oven([(start, start), (ask, "01 02 01 01 60 48"), (stop, stop), (ask, "01 02 01 00 A1 88")])

@@ -140,7 +140,7 @@ def test_an_alarm_is_reset_by_0_then_1(stage: Stages) -> None:
     ).reset_alarm()
 
 
-def test_whether_it_is_referenced(stage: Stages) -> None:
+def test_the_drive_tells_whether_it_is_referenced(stage: Stages) -> None:
     ask = "01 03 00 7F 00 01 B5 D2"
     drive = stage([(ask, "01 03 02 40 30 89 90"), (ask, "01 03 02 00 20 B9 9C")])
     assert drive.referenced()

@@ -131,7 +131,7 @@ def test_silence_ends_and_names_the_instrument(positioner: Positioners, clock: S
     ("answer", "words"),
     [("1=4", r"the answer to POS\? 1 breaks off after 3 bytes"), ("1=4O.0\n", r"'4O.0' is not an answer to POS\? 1")],
 )
-def test_an_answer_that_is_none(positioner: Positioners, answer: str, words: str) -> None:
+def test_answers_that_are_no_number_are_refused(positioner: Positioners, answer: str, words: str) -> None:
     exchanges = [("POS? 1\n", answer)] if answer == "1=4" else told("POS? 1\n", answer)
     with pytest.raises(BadFrame, match=f"positioner: {words}"):
         positioner(*exchanges).position_um("x")
@@ -212,7 +212,7 @@ def test_a_record_has_a_header_and_rows(positioner: Positioners) -> None:
     assert record.interval_s == 0.001
 
 
-def test_a_record_of_nothing(positioner: Positioners) -> None:
+def test_an_empty_record_is_an_error(positioner: Positioners) -> None:
     with pytest.raises(StreamError, match=r"positioner: the recorder has no values of x. Let the axis oscillate first"):
         positioner(*told("DRL? 1\n", "1=0\n")).recorded("x")
 

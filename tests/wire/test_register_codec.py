@@ -24,7 +24,7 @@ from drivers.transport.modbus import CODES, Kind, Register
         ("uint16", 1.0, [0xC350], 50000),
     ],
 )
-def test_words_of_known_values(kind: Kind, scale: float, words: list[int], value: float) -> None:
+def test_known_values_have_known_words(kind: Kind, scale: float, words: list[int], value: float) -> None:
     register = Register(0, kind, "", scale=scale)
     assert register.decode(words) == pytest.approx(value, rel=1e-12)
     assert register.encode(value) == words
@@ -32,7 +32,7 @@ def test_words_of_known_values(kind: Kind, scale: float, words: list[int], value
 
 @settings(derandomize=True, deadline=None)
 @given(st.sampled_from(list(CODES)), st.data())
-def test_every_word_survives(kind: Kind, data: st.DataObject) -> None:
+def test_every_word_survives_decoding_and_encoding(kind: Kind, data: st.DataObject) -> None:
     register = Register(0, kind, "")
     words = data.draw(st.lists(st.integers(0, 0xFFFF), min_size=register.count, max_size=register.count))
     value = register.decode(words)
@@ -42,7 +42,7 @@ def test_every_word_survives(kind: Kind, data: st.DataObject) -> None:
 
 @settings(derandomize=True, deadline=None)
 @given(st.integers(-32768, 32767))
-def test_a_scaled_count_survives(count: int) -> None:
+def test_a_scaled_count_survives_decoding_and_encoding(count: int) -> None:
     register = Register(0, "int16", "", scale=0.1)
     assert register.encode(register.decode(struct.unpack(">H", struct.pack(">h", count)))) == [count & 0xFFFF]
 

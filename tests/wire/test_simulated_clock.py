@@ -61,7 +61,7 @@ def test_twelve_hours_of_sleep_take_no_time() -> None:
     assert time.monotonic() - started < 1
 
 
-def test_sleep_does_not_go_back() -> None:
+def test_a_negative_sleep_does_not_move_the_clock() -> None:
     clock = SimulatedClock(5.0)
     clock.sleep(-1.0)
     assert clock.now() == 5.0
@@ -93,7 +93,7 @@ def test_a_time_out_elapses_on_the_simulated_clock_only() -> None:
     assert clock.now() == 3600.0
 
 
-def test_a_zero_wait_moves_no_time() -> None:
+def test_a_read_without_waiting_moves_no_time() -> None:
     clock = SimulatedClock()
     link = echoing(clock, 0.25)
     link.write(b"hello")

@@ -18,7 +18,7 @@ def test_a_serial_line_is_taken_apart() -> None:
     assert url.rtu
 
 
-def test_a_socket_is_taken_apart() -> None:
+def test_an_address_of_a_socket_is_parsed() -> None:
     url = Url.parse("tcp://10.0.0.7:502")
     assert (url.host, url.port, url.rtu) == ("10.0.0.7", 502, False)
     assert Url.parse("rtu+tcp://10.0.0.7:4001").rtu

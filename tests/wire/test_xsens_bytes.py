@@ -122,7 +122,7 @@ def test_each_format_of_numbers_is_read(values: list[float], kind: int, frame: i
 
 
 @given(st.binary(max_size=2048))
-def test_a_message_comes_back(data: bytes) -> None:
+def test_a_message_survives_framing(data: bytes) -> None:
     stream = Frames(xbus.Xbus())
     assert list(xbus.messages(stream.take(b"noise" + xbus.message(0x12, data) + b"\xfa"))) == [(0x12, data)]
     assert stream.remainder == b"\xfa"
