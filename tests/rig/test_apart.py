@@ -140,7 +140,7 @@ def test_a_wish_for_a_pause_while_the_run_connects_again_pauses_it(monkeypatch: 
             signal.raise_signal(signal.SIGINT)
         return connect_all(*arguments)
 
-    monkeypatch.setattr("rig.runs.runner.connected", interrupted)
+    monkeypatch.setattr("rig.runs.runner.connect_all", interrupted)
 
     def person() -> None:
         control.pause(when("running"))
