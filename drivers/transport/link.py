@@ -66,6 +66,16 @@ class Connected(Wire):
     def fileno(self) -> int:
         return self.port.fileno()
 
+    def put(self, data: bytes) -> None:
+        """Send all of `data`, and count it."""
+        self.sent += self.port.write(data)
+
+    def take(self) -> bytes:
+        """The bytes that have arrived, counted; empty at the end."""
+        data = self.port.read()
+        self.received += len(data)
+        return data
+
 
 class Link:
     """The controller's end of a wire.
@@ -85,7 +95,7 @@ class Link:
         """Send all of `data`; raises LinkRefused when the connection is gone."""
         line = self._connected()
         try:
-            line.sent += line.port.write(data)
+            line.put(data)
         except LOST as error:
             raise self._connection_lost(error) from error
         if self._tap:
@@ -97,14 +107,13 @@ class Link:
         if not self.clock.wait_readable(line, timeout_s):
             return b""
         try:
-            data = line.port.read()
+            data = line.take()
         except LOST as error:
             raise self._connection_lost(error) from error
         if not data and line.lossy:  # an empty datagram, or a damaged one
             return b""
         if not data:
             raise self._connection_lost("the instrument closed it")
-        line.received += len(data)
         if self._tap:
             self._tap(self.clock.now(), self._names, "heard", data)
         return data

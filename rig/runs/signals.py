@@ -18,6 +18,8 @@ STOPPED_BY = {
     "SIGHUP": "stopped because its terminal was closed (SIGHUP)",
 }
 COMPILED = "drivers.world"  # its compiled code calls Python generators; an exception there would break it
+# Between bytes and their count: the simulated clock would wait for bytes that have come already.
+COUNTING = (("drivers.clock", "step"), ("drivers.transport.link", "put"), ("drivers.transport.link", "take"))
 SCREEN = "rich"  # an exception while its console writes would block the console
 AGAIN_S = 0.001
 
@@ -34,8 +36,8 @@ def stoppable(ignored: Collection[signal.Signals] = (), inner: bool = False) -> 
     `ignored` signals raise nothing. `inner`: the context lies in another one; after a SIGINT the next ones stay ignored
     there, because a person who presses twice wants one pause. A further context hears them again.
 
-    A signal during a computation of the simulated world or a write to the screen waits a moment. If Python discards the
-    exception, as in a finaliser, it is raised again.
+    A signal during a computation of the simulated world, a count of bytes or a write to the screen waits a moment. If
+    Python discards the exception, as in a finaliser, it is raised again.
     """
 
     put_off: list[int] = []
@@ -89,7 +91,7 @@ def _indivisible(frame: FrameType | None) -> bool:
     """Whether an exception here would break the interrupted code."""
     while frame is not None:
         module = str(frame.f_globals.get("__name__"))
-        if module.startswith(COMPILED):
+        if module.startswith(COMPILED) or (module, frame.f_code.co_name) in COUNTING:
             return True
         if module.partition(".")[0] == SCREEN:
             return frame.f_code.co_name != "input"  # here it waits for a person

@@ -3,12 +3,13 @@
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from threading import Event
 from types import FunctionType
 
 import pytest
 
+from drivers.transport.link import Connected
 from rig.runs.signals import SIGNALS, stoppable
 
 
@@ -42,6 +43,38 @@ def test_a_signal_that_nohup_ignores_stays_ignored() -> None:
             signal.raise_signal(signal.SIGHUP)
     finally:
         signal.signal(signal.SIGHUP, before)
+
+
+class Interrupted:
+    """A port whose bytes come with a signal."""
+
+    chunk, lossy, key = 1, False, "port"
+
+    def fileno(self) -> int:
+        return 0
+
+    def read(self) -> bytes:
+        signal.raise_signal(signal.SIGINT)
+        return b"abc"
+
+    def write(self, data: bytes) -> int:
+        signal.raise_signal(signal.SIGINT)
+        return len(data)
+
+    def close(self) -> None: ...
+
+
+@pytest.mark.parametrize("use", [Connected.take, lambda line: line.put(b"abc")], ids=["read", "write"])
+def test_a_signal_waits_until_bytes_are_counted(use: Callable[[Connected], object]) -> None:
+    line = Connected(Interrupted())
+
+    def use_and_wait() -> None:
+        use(line)
+        Event().wait(30)  # the signal ends it
+
+    with pytest.raises(KeyboardInterrupt), stoppable():
+        use_and_wait()
+    assert line.received + line.sent == 3
 
 
 class Forgotten:
