@@ -118,7 +118,7 @@ class RepeatedPoses:
 def fit_both(first: Request, second: Request, notify: Callable[[str], None]) -> tuple[Dataset[Any], Any, Any]:
     """(the data of the first, and one model fitted to both: that of the first request, or of its kind of data).
 
-    Raises RecordError where they are of two kinds, and what `load_request` and `fit` raise.
+    Raises RecordError if the two runs have different kinds of data. Errors of `load_request` and `fit` pass through.
     """
     first_loaded, second_loaded = load_request(first, notify), load_request(second, notify)
     if first_loaded.data.content != second_loaded.data.content:

@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rig.record import Record
-from rig.web.pages.import_file import MOST_BYTES, given_name
+from rig.web.upload import MOST_BYTES, given_name
 from tests.browser.conftest import Workbench
 
 pytestmark = pytest.mark.slow

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import filecmp
 import re
-import secrets
-from collections.abc import Awaitable, Callable, Mapping
-from contextlib import suppress
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from urllib.parse import urlencode
 
 import numpy as np
 from fastapi import Request
-from nicegui import events, ui
+from nicegui import ui
 from numpy.typing import NDArray
 
 from calibrations.importing.proposal import column_names, sample_values
@@ -22,11 +19,10 @@ from calibrations.importing.topics import SeveralTopics
 from calibrations.importing.units import ColumnMapping, column_unit
 from calibrations.table import Constant
 from calibrations.text import unit as unit_text
-from rig.files import home
 from rig.services.importing import Preview, data_chart, lacking, open_file, preview, proposal, store_sheet, units_for
 from rig.services.page_words import IMPORT, address, page_step
 from rig.web.calculations import off_loop
-from rig.web.desk import FILES, Desk
+from rig.web.desk import Desk
 from rig.web.frame import frame
 from rig.web.parts import (
     afresh,
@@ -42,8 +38,8 @@ from rig.web.parts import (
     words,
 )
 from rig.web.pictures import draw, plot_with_title
+from rig.web.upload import upload
 
-MOST_BYTES = 200_000_000
 UNUSED = ""
 KINDS = {
     "poses": "Poses: the stage angles are known",
@@ -119,47 +115,6 @@ def _go_to(path: Path, topic: str) -> None:
 
 async def _go(path: Path) -> None:
     ui.navigate.to(address(IMPORT, str(path)))
-
-
-def given_name(draft: Path, path: Path) -> Path:
-    """Give an uploaded file its name. With another content than the file of that name, it has a number as well."""
-    number, place = 1, path
-    while place.exists() and not filecmp.cmp(place, draft, shallow=False):
-        number += 1
-        place = path.with_stem(f"{path.stem}-{number}")
-    return draft.replace(place)
-
-
-def upload(on_upload: Callable[[Path], Awaitable[None]]) -> None:
-    """A field that takes a file from this computer; `on_upload` receives its path on the server."""
-
-    async def received(event: events.UploadEventArguments) -> None:
-        folder, name = home() / FILES, Path(event.file.name).name
-        draft = folder / f".{secrets.token_hex(4)}"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            await event.file.save(draft)
-            path = given_name(draft, folder / name)
-        except OSError as error:  # for example a full disk
-            with suppress(OSError):
-                draft.unlink(missing_ok=True)
-            text = f"{name}: cannot be stored: {(error.strerror or str(error)).lower()}"
-            ui.notify(text, type="negative", multi_line=True, timeout=0, close_button="Close")
-            return
-        await on_upload(path)
-
-    def rejected() -> None:
-        text = (
-            f"The file was not opened: it is larger than {MOST_BYTES / 1e6:g} MB. Copy it to the computer of the "
-            "workbench, and write its path in the field Data of the page Model."
-        )
-        ui.notify(text, type="negative", multi_line=True, timeout=0, close_button="Close")
-
-    field = ui.upload(on_upload=received, on_rejected=rejected, auto_upload=True, max_file_size=MOST_BYTES)
-    field.props("flat bordered").classes("upload")
-    with field.add_slot("list"), div("stack"):
-        ui.button("Choose a file", icon="upload_file", on_click=lambda: field.run_method("pickFiles"))
-        words("or drop it here", "quiet small")
 
 
 class Column:

@@ -15,8 +15,8 @@ from rig.services.importing import needs_person, open_file
 from rig.services.page_words import IMPORT, address
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import MODELS, models, noise_models, runs, saved_models
-from rig.web.pages.import_file import upload
 from rig.web.parts import box, button, dialog_with_name, message, words
+from rig.web.upload import upload
 
 if TYPE_CHECKING:
     from rig.services.session import ModelSession
