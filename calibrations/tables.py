@@ -1,6 +1,6 @@
 """The kinds of measured data: a class for each, which says how the kind differs from the others.
 
-The residual of each kind is in `calibrations.fitting.problem`, its charts are in `calibrations.presentation.charts`.
+The residual of each kind is in `calibrations.fitting.problem_kinds`, its charts in `calibrations.presentation.charts`.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from calibrations.design.optimal_design import noise_on_rows
 from calibrations.errors import DataError, MissingColumn
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.minimise import newton_step
-from calibrations.fitting.problem import Problem
+from calibrations.fitting.problem_kinds import make_problem
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.joined import join_tables
 from calibrations.means.noise import white_only
@@ -149,11 +149,11 @@ def assume_sensor(
     Its residual is 0. Temperature and supply do not change. Raises ModelError and TooFewRows as a fit does.
     """
     table = _expect_outputs(model, columns, constants, axes)
-    problem = Problem.of(model, table)
+    problem = make_problem(model, table)
     theta = _values(problem.layout)
     noise = white_only(problem.white, problem.gap_s, len(problem.channels))
     zero_residual = np.zeros((len(problem.channels), table.n))
-    return Fit(problem.layout.model, problem, theta, noise, zero_residual, problem.jacobian(theta))
+    return Fit(problem, theta, noise, zero_residual, problem.jacobian(theta), problem.layout.model)
 
 
 def _expect_outputs(

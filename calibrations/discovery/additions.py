@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from calibrations.effects import Effect
-from calibrations.fitting.fit import Fit, evaluate, fit, in_white_noise, refit
-from calibrations.fitting.problem import Problem
+from calibrations.fitting.fit import Fit, evaluate, fit, refit
+from calibrations.fitting.problem_kinds import make_problem
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.geometry import GEOMETRY
 from calibrations.free_forms.place_names import PREFIX, place_of_effect
@@ -91,7 +91,7 @@ def _start_values(base: Fit, model: Model) -> Array:
 
     The fit of a single addition has its own bias and scale factor.
     """
-    problem, noise = Problem.of(model, base.table), in_white_noise(base).noise
+    problem, noise = make_problem(model, base.table), base.in_white_noise().noise
     theta = problem.layout.starts()[0]
     base_mask = np.any([problem.layout.of_effect(term.name) for term in base.model.terms], axis=0)
     for _ in range(BASE_STEPS):

@@ -25,6 +25,7 @@ from calibrations.effects import Effect
 from calibrations.fitting.fit import Fit, refit
 from calibrations.fitting.noise_fit import gains
 from calibrations.fitting.problem import Problem
+from calibrations.fitting.problem_kinds import make_problem
 from calibrations.geometry.sphere import magnetometer_coverage_warning
 from calibrations.means.noise import rms
 from calibrations.model.parameters import Layout
@@ -163,7 +164,7 @@ def _columns(screen: Screen, effect: Effect) -> tuple[Array, Array, Array]:
     """The best start, derivatives of the residual with respect to the effect's parameters there, and their basis."""
     base = screen.fit
     model = base.model.with_effect(effect)
-    problem = Problem.of(model, base.table)
+    problem = make_problem(model, base.table)
     mask = problem.layout.of_effect(effect.name)
     best = (np.zeros(0), np.zeros((*base.residual.shape, 0)), np.zeros((base.residual.size, 0)))
     for theta in _starts(base, problem, effect):

@@ -17,7 +17,7 @@ from calibrations.criteria import FORM_PART, REFINEMENT, SIGNIFICANT
 from calibrations.discovery.findings import Step
 from calibrations.discovery.search import cost, first_order_cost
 from calibrations.discovery.significance import chance, of_search
-from calibrations.fitting.fit import Fit, in_white_noise
+from calibrations.fitting.fit import Fit
 from calibrations.fitting.shown_forms import Shown, form_columns, forms_at
 from calibrations.free_forms.bases import Basis, Line, Spline, spline
 from calibrations.free_forms.form import Factor, Form
@@ -88,7 +88,7 @@ def _one_of_slow_pair(end: Fit, names: list[str]) -> list[str]:
         if not all(place in at for place in pair):
             continue
         shown_forms = [
-            Shown.of(in_white_noise(end), forms_at(place, end), apart=at[rival]) for place, rival in (pair, pair[::-1])
+            Shown.of(end.in_white_noise(), forms_at(place, end), apart=at[rival]) for place, rival in (pair, pair[::-1])
         ]
         likelier = min(shown_forms, key=lambda shown: shown.selected.deviance)
         if _takes_up(likelier):
@@ -111,7 +111,7 @@ def _follows(end: Fit, name: str, larger: list[str]) -> bool:
     forms = {key: form for place in places if place in DRIVERS for key, form in forms_at(place, end).items()}
     if not forms:
         return False
-    return _takes_up(Shown.of(in_white_noise(end), forms, apart=name))
+    return _takes_up(Shown.of(end.in_white_noise(), forms, apart=name))
 
 
 def _cost_of_removal(end: Fit, name: str, forms: Array) -> tuple[float, int]:

@@ -32,7 +32,7 @@ from calibrations.discovery.search import first_order_cost
 from calibrations.discovery.significance import chance
 from calibrations.effects import Effect
 from calibrations.fitting.fit import Fit, fit, refit, with_least_white
-from calibrations.fitting.problem import Problem
+from calibrations.fitting.problem_kinds import make_problem
 from calibrations.fitting.requested_forms import BASE, effects_beyond_base
 from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
 from calibrations.free_forms.place_names import PREFIX
@@ -271,7 +271,7 @@ def _geometry_effects(start: Fit, effects: Mapping[str, Effect]) -> GeometryEffe
     for name in GEOMETRY:
         if name in effects and not model.holds(name):
             model = model.with_effect(effects[name])
-    layout = Problem.of(model, start.table).layout
+    layout = make_problem(model, start.table).layout
     masks = {name: layout.of_effect(name) for name in GEOMETRY if model.holds(name)}
     masks_used = {name: mask for name, mask in masks.items() if mask.any()}  # one axis has no angle to another
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from calibrations.criteria import COVERAGE
-from calibrations.fitting.fit import Fit, in_all_noise
+from calibrations.fitting.fit import Fit
 from calibrations.fitting.identifiability import covariance, gain
 from calibrations.fitting.inputs import Contribution
 from calibrations.means.noise import MOST_CORRELATED_ROWS, Noise
@@ -97,7 +97,7 @@ class Budget:
 
 def make_budget(fit: Fit, inputs: Iterable[Contribution]) -> Budget:
     """The budget of a fit to poses or positions, from its own noise and from `inputs` that were not fitted."""
-    cautious = in_all_noise(fit)
+    cautious = fit.in_all_noise()
     G = row_gains(cautious)
     of_inputs = [_of_type_b(fit, G, c) for c in inputs]
     type_a = _of_type_a(cautious, G, sum(square for _, square in of_inputs))
@@ -196,7 +196,7 @@ def slow_freedom(noise: Noise) -> float:
 
 def parameter_correlation(fit: Fit, budget: Budget, inputs: Iterable[Contribution]) -> Array:
     """Shape (p, p), 1 on the diagonal, for the `budget` of `fit`; NaN where a parameter is not determined."""
-    cautious = in_all_noise(fit)
+    cautious = fit.in_all_noise()
     G = row_gains(cautious)
     by_noise, _ = covariance(cautious.information, fit.problem.layout.typical)
     type_a_std = np.sqrt(

@@ -22,7 +22,7 @@ from calibrations.criteria import MOST_UNCERTAIN
 from calibrations.effects import Effect
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.identifiability import UNDETERMINED, covariance
-from calibrations.fitting.problem import Problem
+from calibrations.fitting.problem_kinds import make_problem
 from calibrations.geometry.sphere import magnetometer_coverage_warning
 from calibrations.model.parameters import Layout
 from calibrations.table import Array
@@ -109,7 +109,7 @@ def _has_enough_data(fit: Fit, effect: Effect) -> bool:
 def _is_determined(fit: Fit, effect: Effect) -> bool:
     """Whether a parameter of the effect is determined, from any of its starts."""
     model = fit.model if fit.model.holds(effect.name) else fit.model.with_effect(effect)
-    problem = Problem.of(model, fit.table)
+    problem = make_problem(model, fit.table)
     own_columns, typical = problem.layout.of_effect(effect.name), problem.layout.typical
     starts = [fit.theta] if model is fit.model else problem.layout.starts()
     return any(_determined(fit, problem.jacobian(theta), own_columns, typical) for theta in starts)

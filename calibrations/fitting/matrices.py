@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibrations.fitting.fit import Fit, in_all_noise
+from calibrations.fitting.fit import Fit
 from calibrations.fitting.identifiability import covariance
 from calibrations.model.chain import respond, sensed
 from calibrations.table import Array
@@ -81,7 +81,7 @@ def _parts(stacked: Array) -> tuple[Array, Array, Array]:
 
 def _covariance(fit: Fit) -> Array:
     """Covariance of the parameters with the standard uncertainties that the model states; NaN where it has none."""
-    cautious = in_all_noise(fit)
+    cautious = fit.in_all_noise()
     cov, _ = covariance(cautious.information, fit.problem.layout.typical)
     std = np.array([np.nan if e.std is None else e.std for e in fit.params.values()])
     size = np.sqrt(np.diag(cov))

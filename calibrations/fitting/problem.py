@@ -1,80 +1,37 @@
-"""A model and a table as a least-squares problem: residuals and their derivatives, a class for each kind of table.
+"""A model and a table as a least-squares problem: residuals and their derivatives by the parameters.
 
-poses, rates   measured minus predicted output, one block of rows per axis, in the output's unit
-positions      |a| - 1, where a is the specific force that the model makes of the output, in g
-fields         the same of the field, as a share of its strength (that of the sphere nearest to the outputs)
-motion         what each stretch of the record holds of measured minus predicted output, part by part
+`Problem` is for rows of known specific force or rate: measured minus predicted output, one block of rows per axis, in
+the output's unit. `problem_kinds` has the problems of the other kinds of table.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.errors import DataError, ModelError, TooFewRows
 from calibrations.fitting.table_noise import scatter
 from calibrations.geometry.smooth import smooth_columns
-from calibrations.means.noise import Processes, norm_std, white_std
+from calibrations.means.noise import Processes, white_std
 from calibrations.model import Model
-from calibrations.model.chain import LinearisedChain, Step, backward, force, forward, magnitude_by_output, sensed
+from calibrations.model.chain import LinearisedChain, Step, force, forward
 from calibrations.model.parameters import Layout
 from calibrations.table import Array, Table
-from calibrations.tables import FITTED
-
-if TYPE_CHECKING:
-    from calibrations.motion.stretches import Stretches
-
-STRENGTH = "field-strength"
-
-
-def check_kind(kind: str, source: str) -> None:
-    """Raises ModelError for tables to which no model is fitted; known before any sample of theirs is read."""
-    if kind not in FITTED:
-        raise ModelError(f"{source}: models are fitted to poses, positions, motion or rates, not to a table of {kind}")
 
 
 @dataclass(frozen=True)
 class Problem:
-    """Residuals of a model on a table, as functions of the parameter vector. Rows stand in order of time.
-
-    This class is for rows of known specific force or rate.
-    """
+    """Residuals of a model on a table, as functions of the parameter vector. Rows are in order of time."""
 
     table: Table
     layout: Layout
 
     keeps_starts: ClassVar[bool] = False  # whether a parameter that the data do not determine keeps its start
     averages: ClassVar[bool] = True  # whether uncertainties are averaged over the slow noise that the data allow
-
-    @staticmethod
-    def of(model: Model, table: Table) -> Problem:
-        """The problem. Raises ModelError and TooFewRows where there is none to solve."""
-        check_kind(table.kind, table.source)
-        problem = PROBLEMS[table.content]
-        table = problem.prepared(table)
-        problem.check(model, table)
-        _check_effects(model, table)
-        model = model.for_table(table)
-        if not model.terms:
-            raise ModelError(
-                f"{table.source}: no effect of the model {model.name} exists for {table.content}; `rig models` "
-                "lists others"
-            )
-        layout = Layout.of(model, table)
-        instance = problem(table, layout)
-        free = int(np.sum(~np.isfinite(layout.prior)))
-        if table.n * len(instance.channels) <= free:
-            raise TooFewRows(
-                f"{table.source}: {table.n} rows cannot determine the {free} parameters of {model.name}; "
-                "measure more poses, or take a smaller model"
-            )
-        return instance
 
     def on(self, table: Table) -> Problem:
         """The same model on another table of this kind."""
@@ -104,7 +61,7 @@ class Problem:
         return self.residual_by(self.layout.steps(theta))
 
     def residual_by(self, steps: Sequence[Step]) -> Array:
-        """As `residual`, of effects with their values: those of the model, and what else one wants to try."""
+        """As `residual`, from effects with their values: those of the model, or others."""
         return self._reduced(self.samples.outputs - forward(self.samples, steps))
 
     @property
@@ -136,10 +93,10 @@ class Problem:
         return not any(e.places & {"pose", "force", "output"} for e in effects)
 
     def jacobian(self, theta: Array, of: NDArray[np.bool_] | None = None, stairs: bool = False) -> Array:
-        """d residual / d theta by central differences, shape (channels, n, p); only the entries `of` where given.
+        """d residual / d theta by central differences, shape (channels, n, p); only the entries `of` if given.
 
-        A staircase that an effect makes of the output is taken for the slope of one that it has in the mean, unless
-        `stairs` are to be climbed: beside what else is missing, where edges lie tells nothing of what comes before.
+        The derivative of a staircase, such as that of quantisation, is its mean slope of 1. With `stairs` it is the
+        exact one, which is useful only near the solution: elsewhere the model errors move the edges.
         """
         low, high = self.layout.bounds
         steps = 1e-3 * self.layout.typical
@@ -155,10 +112,10 @@ class Problem:
         return np.stack(columns, axis=2) if columns else np.zeros((len(self.channels), self.table.n, 0))
 
     def _known_columns(self, theta: Array) -> dict[int, Array]:
-        """d residual / d the entries of effects that say how they enter linearly, (channels, n) each."""
+        """d residual / d theta for the entries of effects that give linear columns, (channels, n) each."""
         layout = self.layout
         even = [i for i, term in enumerate(layout.model.terms) if not term.effect.rounds]
-        if not np.isfinite(layout.prior).any():
+        if layout.free.all():
             return {}
         steps = layout.steps(theta)
         columns = self._chain_at([steps[i] for i in even]).columns
@@ -220,192 +177,3 @@ class Problem:
     def smooth(self) -> Array:
         """Columns set aside when noise is estimated, shape (n, k)."""
         return smooth_columns(self.table)
-
-
-class RateProblem(Problem):
-    """Outputs of a gyroscope at known rates."""
-
-    @staticmethod
-    def check(model: Model, table: Table) -> None:  # noqa: ARG004
-        """Raises DataError for an output that never changes."""
-        _check_changes(table, "each gyroscope output must change when the table turns; check its channel and its cable")
-
-
-class PositionProblem(Problem):
-    """Magnitudes of what is sensed, of which only the strength is known."""
-
-    @staticmethod
-    def check(model: Model, table: Table) -> None:  # noqa: ARG004
-        """Positions turn each of three axes. Raises DataError."""
-        if len(table.axes) < 3:
-            raise DataError(
-                f"{table.source}: models of positions need the columns ax, ay, az, or mx, my, mz; "
-                f"it has: {', '.join(table.columns)}"
-            )
-        _check_changes(table, "each axis must point up and down in the positions; check its channel and its cable")
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """The magnitude."""
-        return ("norm",)
-
-    @property
-    def unit(self) -> str:
-        """The unit of the sensed quantity."""
-        return self.table.input_unit
-
-    def residual_by(self, steps: Sequence[Step]) -> Array:
-        """The magnitude less the known one, shape (1, n)."""
-        error: Array = np.linalg.norm(backward(self.table, steps), axis=1)[:, None] - 1.0
-        return error.T
-
-    def sensed(self, theta: Array) -> Array:
-        """As the model has it from the outputs."""
-        steps = self.layout.steps(theta)
-        return sensed(backward(self.table, steps), self.table, steps)
-
-    def _chain_at(self, steps: Sequence[Step]) -> LinearisedChain:
-        """From the outputs back to what is sensed."""
-        return LinearisedChain(self.table, steps, backward(self.table, steps))
-
-    def of_output(self, theta: Array, changes: Array) -> Array:
-        """By how the magnitude follows each output."""
-        return self._of_output(self._chain_at(self.layout.steps(theta)), changes)
-
-    def _of_output(self, chain: LinearisedChain, changes: Array) -> Array:
-        assert chain.measured is not None  # noqa: S101 `_chain_at` gives it
-        by_output = magnitude_by_output(chain.measured, self.table, chain.steps)
-        return np.asarray(-np.einsum("ni,nim->nm", by_output, changes)[None])
-
-    @property
-    def adds(self) -> bool:
-        """A magnitude is not linear in any parameter."""
-        return False
-
-    def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:  # noqa: ARG002
-        """The response at the same specific force changes; the magnitude follows it as it follows the output."""
-        chain = self._chain_at(self.layout.steps(theta))
-        by_response = self._of_output(chain, np.tile(np.eye(3), (self.table.n, 1, 1)))
-
-        def change(k: int, upper: float, lower: float) -> Array:
-            term = self.layout.slots[k].term
-            values = (self.layout.values_with(chain.steps[term][1], k, value) for value in (upper, lower))
-            return np.asarray(np.sum(by_response * chain.change(term, *values), axis=2))
-
-        return change
-
-    def _white(self, std: Array) -> Array:
-        return norm_std(self.table, std).T / self.layout.nominal
-
-
-class FieldProblem(PositionProblem):
-    """Magnitudes of a field, whose strength is a parameter."""
-
-    @staticmethod
-    def check(model: Model, table: Table) -> None:
-        """As for positions; raises ModelError for a model without a field."""
-        PositionProblem.check(model, table)
-        if STRENGTH not in model.effects:
-            raise ModelError(
-                f"{table.source}: a model of magnetometers needs the effect {STRENGTH}, and {model.name} has "
-                f"{', '.join(model.effects)}; take the model field or magnetometer"
-            )
-
-    def residual_by(self, steps: Sequence[Step]) -> Array:
-        """In the field's strength as the outputs show it, whatever the model makes of it.
-
-        By its own measure a field without end would leave nothing of any magnitude.
-        """
-        return super().residual_by(steps) * self._strength(steps)
-
-    def _strength(self, steps: Sequence[Step]) -> float:
-        """The model's strength of the field over that which the outputs show."""
-        strengths = [float(p["total"]) for effect, p in steps if effect.name == STRENGTH]
-        return strengths[0] / self.layout.nominal if strengths else 1.0
-
-    def _of_output(self, chain: LinearisedChain, changes: Array) -> Array:
-        return super()._of_output(chain, changes) * self._strength(chain.steps)
-
-    def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:
-        """The strength itself changes the measure of the magnitude as well."""
-        change_by_response = super()._changes_near(theta, stairs)
-        steps = self.layout.steps(theta)
-        error = super().residual_by(steps)
-
-        def change(k: int, upper: float, lower: float) -> Array:
-            by_response = change_by_response(k, upper, lower)
-            if steps[self.layout.slots[k].term][0].name != STRENGTH:
-                return by_response
-            return by_response + error * (upper - lower) / self.layout.nominal
-
-        return change
-
-
-@dataclass(frozen=True)
-class MotionProblem(Problem):
-    """The motion of a record, as its stretches represent it."""
-
-    table: Stretches
-
-    keeps_starts = True  # at one attitude an axis that does not move cannot tell its scale factor from its bias
-    averages = False  # some tens of stretches allow nearly any: Student's t of the noise found stands in its place
-
-    @staticmethod
-    def prepared(table: Table) -> Table:
-        """A row for each stretch."""
-        from calibrations.motion.stretches import make_stretches  # other kinds need no spectra
-
-        return make_stretches(table)
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Axis and part, such as "x in phase at 10 Hz"."""
-        return self.table.channels
-
-    @property
-    def adds(self) -> bool:
-        """The parts are fitted by their own steps (`keeps_starts`)."""
-        return False
-
-    @cached_property
-    def white(self) -> Array | None:
-        """From the spectral density near each line."""
-        return self.table.white
-
-    @property
-    def samples(self) -> Table:
-        return self.table.samples
-
-    def of_output(self, theta: Array, changes: Array) -> Array:
-        """Behind the output filter."""
-        from calibrations.motion.spectrum import sample_output  # other kinds need no spectra
-
-        filtered = [sample_output(change, self.samples) for change in np.moveaxis(changes, 2, 0)]
-        return super().of_output(theta, np.stack(filtered, axis=2))
-
-    def _reduced(self, error: Array) -> Array:
-        return self.table.parts(error)
-
-
-PROBLEMS: Mapping[str, type[Problem]] = MappingProxyType(
-    {
-        "poses": Problem,
-        "rates": RateProblem,
-        "positions": PositionProblem,
-        "fields": FieldProblem,
-        "motion": MotionProblem,
-    }
-)
-
-
-def _check_effects(model: Model, table: Table) -> None:
-    """Raises DataError where the rows cannot show an effect of the model."""
-    for effect in (term.effect for term in model.terms if table.content in term.effect.kinds):
-        if reason := effect.lacks(table):
-            raise DataError(f"{table.source}: {effect.name} is not fitted: {reason}")
-
-
-def _check_changes(table: Table, but: str) -> None:
-    still = [name for name, spread in zip(table.output_names, np.ptp(table.outputs, axis=0), strict=True) if not spread]
-    if still:
-        raise DataError(f'{table.source}: the column "{still[0]}" never changes; {but}')

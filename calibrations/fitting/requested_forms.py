@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calibrations.effects import Effect
 from calibrations.errors import ModelError
 from calibrations.fitting.shown_forms import estimate_by_residual
+from calibrations.fitting.solution import Solution
 from calibrations.free_forms.bases import Harmonics, Line
 from calibrations.free_forms.chain import ModelEffects, State, start, state_at
 from calibrations.free_forms.components import Component, free
@@ -32,9 +32,6 @@ from calibrations.free_forms.structure import FloorSource, Structure
 from calibrations.model import Model
 from calibrations.model.chain import forward
 from calibrations.table import Array
-
-if TYPE_CHECKING:
-    from calibrations.fitting.fit import Fit
 
 BASE = ("bias", "scale-factor", *GEOMETRY)  # effects whose linear parts the search has in its base
 ROUNDS = 6
@@ -54,7 +51,7 @@ def without_requested(model: Model) -> Model:
     return model
 
 
-def with_sizes(model: Model, smaller: Fit) -> Model:
+def with_sizes(model: Model, smaller: Solution) -> Model:
     """The model with sizes for its free forms, from the data of `smaller`, which is the model without them.
 
     Raises ModelError with the data that would be needed.
@@ -66,10 +63,10 @@ def with_sizes(model: Model, smaller: Fit) -> Model:
     return model
 
 
-def effects_beyond_base(fit: Fit) -> ModelEffects:
+def effects_beyond_base(fit: Solution) -> ModelEffects:
     """Contribution of the effects other than bias, scale factor and geometry."""
     problem = fit.problem
-    names = [term.name for term in fit.model.terms if term.name not in BASE]
+    names = [term.name for term in fit.problem.layout.model.terms if term.name not in BASE]
     shape = fit.residual.shape
     if not names:
         return ModelEffects(np.zeros(shape), np.zeros((*shape, 0)))
@@ -80,7 +77,7 @@ def effects_beyond_base(fit: Fit) -> ModelEffects:
     return ModelEffects(contribution, -fit.jacobian[:, :, mask])
 
 
-def estimate_form(smaller: Fit, effect: RequestedForm) -> Effect:
+def estimate_form(smaller: Solution, effect: RequestedForm) -> Effect:
     """The free form with the sizes that the data of `smaller` show. Raises ModelError."""
     table = smaller.table
     if (reason := effect.excluded(table)) is not None:
@@ -115,7 +112,7 @@ def _completing_components(place: str, data: PoseData, first: State) -> list[Com
 
 
 def _estimate_forms(
-    smaller: Fit, data: PoseData, model_effects: ModelEffects, noise: list[Component], forms: list[Component]
+    smaller: Solution, data: PoseData, model_effects: ModelEffects, noise: list[Component], forms: list[Component]
 ) -> SearchResult:
     """The forms that act, with their sizes; where the noise is not known, that of the residual."""
     stated_white = smaller.problem.white

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.effects import Effect
-from calibrations.fitting.fit import Fit, in_white_noise
+from calibrations.fitting.solution import Solution
 from calibrations.free_forms.bases import Clips, Line, Products, Settling, spline
 from calibrations.free_forms.components import GENERAL, PRODUCT, Component
 from calibrations.free_forms.effect import free_form
@@ -55,14 +55,14 @@ class Shown:
     apart    an effect of the model whose parameters are no part of the base
     """
 
-    fit: Fit
+    fit: Solution
     forms: Mapping[str, Form]
     gram: Gram
     columns: Array
     apart: str = ""
 
     @staticmethod
-    def of(fit: Fit, forms: Mapping[str, Form], apart: str = "") -> Shown:
+    def of(fit: Solution, forms: Mapping[str, Form], apart: str = "") -> Shown:
         """The forms by name, and an effect of the model, beside the other parameters of a fit."""
         J, own = fit.whitened[:, 1:], fit.problem.layout.of_effect(apart)
         parts = {name: fit.noise.whiten(form_columns(fit, form)) for name, form in forms.items()}
@@ -101,7 +101,7 @@ class Shown:
         return with_size(form, size, added, channels)
 
 
-def form_columns(fit: Fit, form: Form) -> Array:
+def form_columns(fit: Solution, form: Form) -> Array:
     """d residual / d the coefficients of a form, of every axis in turn or shared by all, (channels, rows, m)."""
     problem = fit.problem
     samples, force = problem.samples, problem.sensed(fit.theta)
@@ -117,18 +117,18 @@ def form_columns(fit: Fit, form: Form) -> Array:
     return problem.of_output(fit.theta, changes)
 
 
-def forms_at(place: str, fit: Fit) -> dict[str, Form]:
+def forms_at(place: str, fit: Solution) -> dict[str, Form]:
     """The free forms of a place over the range of the fit's samples, by the names that they have in a search."""
     table, force = fit.problem.samples, fit.problem.sensed(fit.theta)
     return {f"{place}/{form.name}": form for form in _forms(place, table, force)}
 
 
-def estimate_by_residual(before: Fit, place: str) -> Effect:
+def estimate_by_residual(before: Solution, place: str) -> Effect:
     """The free form of a place with the sizes that the residual of `before` shows.
 
     One form is always kept, however small: a person asked for it, and at a size near zero it changes nothing.
     """
-    shown = Shown.of(in_white_noise(before), forms_at(place, before))
+    shown = Shown.of(before.in_white_noise(), forms_at(place, before))
     sizes = shown.selected
     if not sizes.variances:
         gained = gains(shown.gram, sizes, list(shown.forms))
@@ -143,7 +143,7 @@ def _component(name: str, form: Form) -> Component:
 
 
 def _gram(
-    fit: Fit, X: Array, base: NDArray[np.bool_], blocks: Mapping[str, slice], scales: Mapping[str, float]
+    fit: Solution, X: Array, base: NDArray[np.bool_], blocks: Mapping[str, slice], scales: Mapping[str, float]
 ) -> Gram:
     """Products of the columns, with the priors of the model's own free forms; `base`: parameters that stand first."""
     b, rows = int(base.sum()), fit.problem.layout.prior_rows[:, base]

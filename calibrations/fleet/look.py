@@ -27,10 +27,10 @@ from calibrations.discovery.patterns import patterns
 from calibrations.discovery.significance import Screen, Search, of_search
 from calibrations.discovery.structure import without_slow
 from calibrations.effects import Effect
-from calibrations.fitting.fit import Fit, in_all_noise
+from calibrations.fitting.fit import Fit
 from calibrations.fitting.identifiability import covariance
 from calibrations.fitting.noise_fit import gains
-from calibrations.fitting.problem import Problem
+from calibrations.fitting.problem_kinds import make_problem
 from calibrations.model import Model
 from calibrations.table import Array, Table
 
@@ -125,7 +125,7 @@ def _ranges(table: Table, channels: int) -> Array:
 
 def _derivatives(fit: Fit, effect: Effect) -> Iterator[Group]:
     """Of the residual with respect to the effect's parameters, from each of its starts."""
-    problem = Problem.of(fit.model.with_effect(effect), fit.table)
+    problem = make_problem(fit.model.with_effect(effect), fit.table)
     own_columns = problem.layout.of_effect(effect.name)
     scaled = bool(effect.places & {"pose", "force"})
     for start, theta in enumerate(problem.layout.starts()):
@@ -242,7 +242,7 @@ def _unit(fit: Fit, unit: str) -> str:
 
 def information(fit: Fit) -> Array:
     """Inverse covariance (p, p) of the parameters, with the standard uncertainties that the fit states."""
-    cautious = in_all_noise(fit)
+    cautious = fit.in_all_noise()
     white = cautious.information
     white_std = np.sqrt(np.diag(covariance(white, fit.problem.layout.typical)[0]))
     stated_std = np.array([e.std or 0.0 for e in fit.params.values()])

@@ -209,12 +209,13 @@ class LinearisedChain:
     measured: Array | None = None
 
     @cached_property
-    def _static(self) -> Array:
+    def static(self) -> Array:
+        """Specific force along the reference axes, g, shape (n, 3)."""
         return static_force(self.table, self.steps) if self.measured is None else self.measured
 
     @cached_property
     def _sensed(self) -> Array:
-        return sensed(self._static, self.table, self.steps)
+        return sensed(self.static, self.table, self.steps)
 
     @cached_property
     def _added(self) -> list[Array]:
@@ -302,7 +303,7 @@ class LinearisedChain:
         effect = self.steps[term][0]
         steps = [*self.steps[:term], (effect, values), *self.steps[term + 1 :]]
         if effect.places & {"pose", "force"}:
-            static = static_force(self.table, steps) if "pose" in effect.places else self._static
+            static = static_force(self.table, steps) if "pose" in effect.places else self.static
             parts = effect_contributions(sensed(static, self.table, steps), self.table, steps)
         elif not self._has_output_stage:
             parts = [self._contribution(effect, values)]
@@ -332,10 +333,10 @@ class LinearisedChain:
         effect = self.steps[term][0]
         steps = [*self.steps[:term], (effect, values), *self.steps[term + 1 :]]
         if "pose" not in effect.places:
-            return sensed(self._static, self.table, steps)
+            return sensed(self.static, self.table, steps)
         pose, by_angle, by_up = self._pose, self._by_angle, self._by_up
         pose_changed = true_pose(self.table, steps)
-        static = self._static + by_up @ (pose_changed.up - pose.up)
+        static = self.static + by_up @ (pose_changed.up - pose.up)
         for change, derivative in zip(
             (pose_changed.alpha - pose.alpha, pose_changed.beta - pose.beta), by_angle, strict=True
         ):

@@ -49,17 +49,22 @@ class Layout:
     def typical(self) -> Array:
         """Typical magnitude of each entry, in its own unit, shape (p,)."""
         sizes = np.array([self._size(s.parameter) * s.parameter.typical * self._scale(s) for s in self.slots])
-        return np.where(np.isfinite(self.prior), self.prior, sizes)
+        return np.where(self.free, sizes, self.prior)
 
     @cached_property
     def prior(self) -> Array:
         """Standard deviation of each entry's Gaussian prior, shape (p,); inf where it has none."""
         return np.array([s.parameter.prior[s.axis] if s.parameter.prior else np.inf for s in self.slots])
 
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Mask of the entries without a prior, shape (p,)."""
+        return ~np.isfinite(self.prior)
+
     @cached_property
     def prior_rows(self) -> Array:
         """The priors as whitened rows of a jacobian, shape (entries with a prior, p)."""
-        return np.asarray(np.diag(1 / self.prior)[np.isfinite(self.prior)])
+        return np.asarray(np.diag(1 / self.prior)[~self.free])
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from calibrations.discovery.findings import FittedModel
 from calibrations.fitting.budget import correlation_matrix, make_budget, parameter_correlation
-from calibrations.fitting.fit import Fit, in_all_noise
+from calibrations.fitting.fit import Fit
 from calibrations.fitting.identifiability import covariance
 from calibrations.fitting.inputs import input_contributions
 from calibrations.model import Estimate, Model, Term
@@ -144,7 +144,7 @@ def _of_rows(fit: Fit) -> Array:
     inputs: Any = input_contributions(fit.table) if fit.table.type.budget else ()
     if inputs and (budget := make_budget(fit, inputs)).given:
         return parameter_correlation(fit, budget, inputs)
-    return correlation_matrix(covariance(in_all_noise(fit).information, fit.problem.layout.typical)[0])
+    return correlation_matrix(covariance(fit.in_all_noise().information, fit.problem.layout.typical)[0])
 
 
 def _name(effect: str, parameter: str, axis: str) -> str:

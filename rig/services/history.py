@@ -19,7 +19,7 @@ from calibrations.analyses.stability import Stability, fit_stability
 from calibrations.criteria import BASELINE_RUNS, FEWEST_FOR_DRIFT, FEWEST_RUNS, MATERIAL, SHORTEST_FOR_DRIFT_DAYS
 from calibrations.errors import CalibrationError, DataError
 from calibrations.fitting.fit import fit
-from calibrations.fitting.problem import check_kind
+from calibrations.fitting.problem_kinds import check_kind
 from calibrations.means.noise import rms
 from calibrations.model import Model
 from calibrations.presentation.certificate.terms import name as result_name

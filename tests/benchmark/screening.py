@@ -15,7 +15,7 @@ import numpy as np
 from calibrations.discovery.significance import reductions
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit, fit
-from calibrations.fitting.problem import Problem
+from calibrations.fitting.problem_kinds import make_problem
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.benchmark.timed import seconds
@@ -58,7 +58,7 @@ def candidates(before: Fit) -> list[Array]:
     for effect in catalogue().values():
         if before.model.holds(effect.name) or effect.excluded(before.table) or effect.searched(before.table) > 1:
             continue
-        problem = Problem.of(before.model.with_effect(effect), before.table)
+        problem = make_problem(before.model.with_effect(effect), before.table)
         mine = problem.layout.of_effect(effect.name)
         plain += [before.noise.whiten(problem.jacobian(theta, mine)) for theta in problem.layout.starts()[:3]]
     plain = [columns for columns in plain if _adds(columns, before.whitened[:, 1:])][: CANDIDATES - NEAR]

@@ -12,7 +12,7 @@ from calibrations.effects import HOOKS, Effect, Parameter, Values
 from calibrations.effects.catalogue import catalogue, find
 from calibrations.errors import ModelError, UnknownName
 from calibrations.fitting.fit import fit
-from calibrations.fitting.problem import Problem
+from calibrations.fitting.problem_kinds import make_problem
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations import shaken, synthetic
@@ -64,7 +64,7 @@ def test_every_parameter_changes_the_residual_smoothly(effect: Effect) -> None:
         model = fit(read_model(STARTS.get(kind, "linear")), table).model
         if kind == "motion":  # turned, so that y moves as well
             model = model.with_effect(catalogue()["axis-misalignment"])
-        problem = Problem.of(model.with_effect(effect), table)
+        problem = make_problem(model.with_effect(effect), table)
         mine = problem.layout.of_effect(effect.name)
         assert mine.any()
         start = problem.layout.starts()[-1]
@@ -79,7 +79,7 @@ def test_every_parameter_changes_the_residual_smoothly(effect: Effect) -> None:
 @EFFECTS_ON_SAMPLES
 def test_an_effect_without_memory_follows_the_force_of_its_own_row(effect: Effect) -> None:
     kind = effect.kinds[0]
-    problem = Problem.of(read_model(STARTS.get(kind, "linear")).with_effect(effect), table_for(effect, kind))
+    problem = make_problem(read_model(STARTS.get(kind, "linear")).with_effect(effect), table_for(effect, kind))
     table, layout = problem.samples, problem.layout
     steps = dict(layout.steps(layout.starts()[-1] + 0.1 * layout.typical))
     a, moved = (np.random.default_rng(0).uniform(-1, 1, (table.n, 3)) for _ in range(2))

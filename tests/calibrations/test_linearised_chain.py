@@ -7,7 +7,7 @@ import pytest
 
 from calibrations.effects import Values
 from calibrations.effects.catalogue import catalogue
-from calibrations.fitting.problem import Problem
+from calibrations.fitting.problem_kinds import make_problem
 from calibrations.model.chain import LinearisedChain, forward
 from calibrations.model.file import read_model
 from calibrations.table import Table
@@ -25,7 +25,7 @@ def test_one_effect_changes_as_in_the_whole_chain(name: str) -> None:
     model = read_model("linear")
     for each in EVERY:
         model = model.with_effect(catalogue()[each])
-    problem = Problem.of(model, TABLE)
+    problem = make_problem(model, TABLE)
     layout, theta = problem.layout, problem.layout.starts()[0] + problem.layout.typical / 10
     near, changed = (
         LinearisedChain(problem.table, layout.steps(theta)),
@@ -38,7 +38,7 @@ def test_one_effect_changes_as_in_the_whole_chain(name: str) -> None:
 
 
 def test_what_only_adds_has_derivatives_to_the_last_digits() -> None:
-    problem = Problem.of(read_model("linear").with_effect(catalogue()["hysteresis"]), TABLE)
+    problem = make_problem(read_model("linear").with_effect(catalogue()["hysteresis"]), TABLE)
     layout, theta = problem.layout, problem.layout.starts()[0]
     near, term = LinearisedChain(problem.table, layout.steps(theta)), layout.model.effects.index("hysteresis")
     values = layout.values(term, theta)
@@ -56,7 +56,7 @@ def test_derivatives_are_those_of_the_whole_chain(stairs: bool) -> None:
     for each in (*EVERY, *others, "z-axis-scale", "cross-axis-scale"):
         if each != "quantisation" or stairs:
             model = model.with_effect(catalogue()[each])
-    problem = Problem.of(model, TABLE)
+    problem = make_problem(model, TABLE)
     theta = problem.layout.starts()[0] + problem.layout.typical / 10
     found, steps = problem.jacobian(theta, stairs=stairs), 1e-3 * np.diag(problem.layout.typical)
     for k, step in enumerate(steps):
@@ -81,7 +81,7 @@ def test_derivatives_of_magnitudes_are_those_of_the_way_back(
     larger = read_model(model)
     for each in effects:
         larger = larger.with_effect(catalogue()[each])
-    problem = Problem.of(larger, table)
+    problem = make_problem(larger, table)
     theta = problem.layout.starts()[0] + problem.layout.typical / 30
     found, steps = problem.jacobian(theta), 1e-4 * np.diag(problem.layout.typical)
     for k, step in enumerate(steps):

@@ -7,7 +7,7 @@ import pytest
 
 from calibrations.effects import Values
 from calibrations.effects.catalogue import catalogue
-from calibrations.fitting.problem import Problem
+from calibrations.fitting.problem_kinds import make_problem
 from calibrations.model.chain import forward
 from calibrations.model.file import read_model
 from tests.calibrations import synthetic
@@ -50,7 +50,7 @@ def test_a_scale_over_other_forces_multiplies_what_a_nonlinearity_adds_and_a_dri
 
 @pytest.mark.parametrize("name", ["temperature-bias", "bias-drift"])
 def test_a_drift_does_not_multiply_an_offset(name: str) -> None:
-    problem = Problem.of(read_model("linear").with_effect(catalogue()[name]), TABLE)
+    problem = make_problem(read_model("linear").with_effect(catalogue()[name]), TABLE)
     offset = (name, dict(problem.layout.steps(problem.layout.typical)[-1][1]))
     np.testing.assert_allclose(output(offset, DRIFT) - output(DRIFT), output(offset) - output(), rtol=0, atol=1e-14)
 
@@ -59,7 +59,7 @@ def test_derivatives_are_those_of_the_whole_chain() -> None:
     model = read_model("linear")
     for name in ("temperature-scale", "hysteresis", "quadratic-nonlinearity", "temperature-bias", "dead-zone"):
         model = model.with_effect(catalogue()[name])
-    problem = Problem.of(model, TABLE)
+    problem = make_problem(model, TABLE)
     layout = problem.layout
     theta = layout.starts()[0] + layout.typical / 3
     found = problem.jacobian(theta)

@@ -28,7 +28,7 @@ from calibrations.discovery.plausibility import doubt, rejection
 from calibrations.discovery.structure import find_unexplained_scatter
 from calibrations.errors import ModelError, UnusableData
 from calibrations.fitting.budget import SLOW_NOISE, Budget, make_budget, parameter_correlation, row_gains
-from calibrations.fitting.fit import Fit, evaluate, in_all_noise
+from calibrations.fitting.fit import Fit, evaluate
 from calibrations.fitting.inputs import Contribution, input_contributions
 from calibrations.fitting.sensed import in_milli, milli_unit
 from calibrations.geometry.rate_table import EARTH_DEG_S
@@ -51,7 +51,7 @@ CONFIRMED, CONSERVATIVE, WIDENED = "confirmed", "conservative", "widened"
 def simulate(fit: Fit, inputs: Sequence[Contribution], trials: int = TRIALS) -> Array:
     """Parameters of each trial, shape (trials, p). The same fit gives the same trials."""
     rng = np.random.default_rng(SEED)
-    cautious = in_all_noise(fit)
+    cautious = fit.in_all_noise()
     G = row_gains(cautious)
     disturbed = cautious.birge * _noise(cautious.noise, trials, rng)
     for c in inputs:
@@ -212,7 +212,7 @@ def _explain_wider_interval(k: int, coverage: float, std: float, simulated: floa
 
 def _weights(fit: Fit) -> Array:
     """By what share each row makes up the square of each parameter's sensitivities to the means, shape (p, n)."""
-    squares = np.sum(row_gains(in_all_noise(fit)) ** 2, axis=1)
+    squares = np.sum(row_gains(fit.in_all_noise()) ** 2, axis=1)
     total = squares.sum(axis=1, keepdims=True)
     return np.asarray(squares / np.where(total > 0, total, 1.0))
 

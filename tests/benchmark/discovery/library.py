@@ -12,7 +12,7 @@ import numpy as np
 
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import fit
-from calibrations.fitting.problem import Problem
+from calibrations.fitting.problem_kinds import make_problem
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 
@@ -51,7 +51,7 @@ def library(table: Table) -> Library:
             or not set(effect.after) <= {"bias", "scale-factor"}
         ):
             continue
-        problem = Problem.of(before.model.with_effect(effect), table)
+        problem = make_problem(before.model.with_effect(effect), table)
         mine = problem.layout.of_effect(name)
         groups = []
         for theta in problem.layout.starts():

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.discovery.results import Diagnosis, Discovery
-from calibrations.fitting.problem import Problem
+from calibrations.fitting.problem_kinds import make_problem
 from calibrations.loop import diagnose, discover
 from calibrations.model import Model
 from calibrations.model.file import read_model
@@ -64,7 +64,7 @@ def error(model: Model, table: Table, truth: Truth) -> float | None:
         where = Table.from_columns("poses", columns, table.constants, table.source)
     if where is None:
         return None
-    problem = Problem.of(model, where)
+    problem = make_problem(model, where)
     theta = problem.layout.known()
     assert theta is not None
     missed = problem.residual(theta)

@@ -1,0 +1,247 @@
+"""The least-squares problem of each kind of table, and `make_problem`, which chooses it.
+
+poses, rates   `Problem`: measured minus predicted output
+positions      |a| - 1, where a is the specific force that the model computes from the output, in g
+fields         the same of the field, as a share of its strength (that of the sphere nearest to the outputs)
+motion         the parts of measured minus predicted output in each stretch of the record
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calibrations.errors import DataError, ModelError, TooFewRows
+from calibrations.fitting.problem import Problem
+from calibrations.means.noise import norm_std
+from calibrations.model import Model
+from calibrations.model.chain import LinearisedChain, Step, backward, magnitude_by_output, sensed
+from calibrations.model.parameters import Layout
+from calibrations.table import Array, Table
+from calibrations.tables import FITTED
+
+if TYPE_CHECKING:
+    from calibrations.motion.stretches import Stretches
+
+STRENGTH = "field-strength"
+
+
+class RateProblem(Problem):
+    """Outputs of a gyroscope at known rates."""
+
+    @staticmethod
+    def check(model: Model, table: Table) -> None:  # noqa: ARG004
+        """Raises DataError for an output that never changes."""
+        _check_changes(table, "each gyroscope output must change when the table turns; check its channel and its cable")
+
+
+class PositionProblem(Problem):
+    """Magnitudes of what is sensed, of which only the strength is known."""
+
+    @staticmethod
+    def check(model: Model, table: Table) -> None:  # noqa: ARG004
+        """Positions turn each of three axes. Raises DataError."""
+        if len(table.axes) < 3:
+            raise DataError(
+                f"{table.source}: models of positions need the columns ax, ay, az, or mx, my, mz; "
+                f"it has: {', '.join(table.columns)}"
+            )
+        _check_changes(table, "each axis must point up and down in the positions; check its channel and its cable")
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The magnitude."""
+        return ("norm",)
+
+    @property
+    def unit(self) -> str:
+        """The unit of the sensed quantity."""
+        return self.table.input_unit
+
+    def residual_by(self, steps: Sequence[Step]) -> Array:
+        """The magnitude less the known one, shape (1, n)."""
+        error: Array = np.linalg.norm(backward(self.table, steps), axis=1)[:, None] - 1.0
+        return error.T
+
+    def sensed(self, theta: Array) -> Array:
+        """As the model has it from the outputs."""
+        steps = self.layout.steps(theta)
+        return sensed(backward(self.table, steps), self.table, steps)
+
+    def _chain_at(self, steps: Sequence[Step]) -> LinearisedChain:
+        """From the outputs back to what is sensed."""
+        return LinearisedChain(self.table, steps, backward(self.table, steps))
+
+    def of_output(self, theta: Array, changes: Array) -> Array:
+        """By how the magnitude follows each output."""
+        return self._of_output(self._chain_at(self.layout.steps(theta)), changes)
+
+    def _of_output(self, chain: LinearisedChain, changes: Array) -> Array:
+        by_output = magnitude_by_output(chain.static, self.table, chain.steps)
+        return np.asarray(-np.einsum("ni,nim->nm", by_output, changes)[None])
+
+    @property
+    def adds(self) -> bool:
+        """A magnitude is not linear in any parameter."""
+        return False
+
+    def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:  # noqa: ARG002
+        """The response at the same specific force changes; the magnitude follows it as it follows the output."""
+        chain = self._chain_at(self.layout.steps(theta))
+        by_response = self._of_output(chain, np.tile(np.eye(3), (self.table.n, 1, 1)))
+
+        def change(k: int, upper: float, lower: float) -> Array:
+            term = self.layout.slots[k].term
+            values = (self.layout.values_with(chain.steps[term][1], k, value) for value in (upper, lower))
+            return np.asarray(np.sum(by_response * chain.change(term, *values), axis=2))
+
+        return change
+
+    def _white(self, std: Array) -> Array:
+        return norm_std(self.table, std).T / self.layout.nominal
+
+
+class FieldProblem(PositionProblem):
+    """Magnitudes of a field, whose strength is a parameter."""
+
+    @staticmethod
+    def check(model: Model, table: Table) -> None:
+        """As for positions; raises ModelError for a model without a field."""
+        PositionProblem.check(model, table)
+        if STRENGTH not in model.effects:
+            raise ModelError(
+                f"{table.source}: a model of magnetometers needs the effect {STRENGTH}, and {model.name} has "
+                f"{', '.join(model.effects)}; take the model field or magnetometer"
+            )
+
+    def residual_by(self, steps: Sequence[Step]) -> Array:
+        """In the field's strength as the outputs show it, whatever the model makes of it.
+
+        By its own measure a field without end would leave nothing of any magnitude.
+        """
+        return super().residual_by(steps) * self._strength(steps)
+
+    def _strength(self, steps: Sequence[Step]) -> float:
+        """The model's strength of the field over that which the outputs show."""
+        strengths = [float(p["total"]) for effect, p in steps if effect.name == STRENGTH]
+        return strengths[0] / self.layout.nominal if strengths else 1.0
+
+    def _of_output(self, chain: LinearisedChain, changes: Array) -> Array:
+        return super()._of_output(chain, changes) * self._strength(chain.steps)
+
+    def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:
+        """The strength itself changes the measure of the magnitude as well."""
+        change_by_response = super()._changes_near(theta, stairs)
+        steps = self.layout.steps(theta)
+        error = super().residual_by(steps)
+
+        def change(k: int, upper: float, lower: float) -> Array:
+            by_response = change_by_response(k, upper, lower)
+            if steps[self.layout.slots[k].term][0].name != STRENGTH:
+                return by_response
+            return by_response + error * (upper - lower) / self.layout.nominal
+
+        return change
+
+
+@dataclass(frozen=True)
+class MotionProblem(Problem):
+    """The motion of a record, as its stretches represent it."""
+
+    table: Stretches
+
+    keeps_starts = True  # at one attitude an axis that does not move cannot tell its scale factor from its bias
+    averages = False  # some tens of stretches allow nearly any: Student's t of the noise found stands in its place
+
+    @staticmethod
+    def prepared(table: Table) -> Table:
+        """A row for each stretch."""
+        from calibrations.motion.stretches import make_stretches  # other kinds need no spectra
+
+        return make_stretches(table)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Axis and part, such as "x in phase at 10 Hz"."""
+        return self.table.channels
+
+    @property
+    def adds(self) -> bool:
+        """The parts are fitted by their own steps (`keeps_starts`)."""
+        return False
+
+    @cached_property
+    def white(self) -> Array | None:
+        """From the spectral density near each line."""
+        return self.table.white
+
+    @property
+    def samples(self) -> Table:
+        return self.table.samples
+
+    def of_output(self, theta: Array, changes: Array) -> Array:
+        """Behind the output filter."""
+        from calibrations.motion.spectrum import sample_output  # other kinds need no spectra
+
+        filtered = [sample_output(change, self.samples) for change in np.moveaxis(changes, 2, 0)]
+        return super().of_output(theta, np.stack(filtered, axis=2))
+
+    def _reduced(self, error: Array) -> Array:
+        return self.table.parts(error)
+
+
+PROBLEMS: Mapping[str, type[Problem]] = MappingProxyType(
+    {
+        "poses": Problem,
+        "rates": RateProblem,
+        "positions": PositionProblem,
+        "fields": FieldProblem,
+        "motion": MotionProblem,
+    }
+)
+
+
+def make_problem(model: Model, table: Table) -> Problem:
+    """The problem of a model on a table. Raises ModelError, DataError and TooFewRows if it cannot be solved."""
+    check_kind(table.kind, table.source)
+    problem = PROBLEMS[table.content]
+    table = problem.prepared(table)
+    problem.check(model, table)
+    _check_effects(model, table)
+    model = model.for_table(table)
+    if not model.terms:
+        raise ModelError(
+            f"{table.source}: no effect of the model {model.name} exists for {table.content}; `rig models` lists others"
+        )
+    made = problem(table, Layout.of(model, table))
+    free = int(np.sum(made.layout.free))
+    if table.n * len(made.channels) <= free:
+        raise TooFewRows(
+            f"{table.source}: {table.n} rows cannot determine the {free} parameters of {model.name}; "
+            "measure more poses, or take a smaller model"
+        )
+    return made
+
+
+def check_kind(kind: str, source: str) -> None:
+    """Raises ModelError for tables to which no model is fitted; known before any sample of theirs is read."""
+    if kind not in FITTED:
+        raise ModelError(f"{source}: models are fitted to poses, positions, motion or rates, not to a table of {kind}")
+
+
+def _check_effects(model: Model, table: Table) -> None:
+    """Raises DataError where the rows cannot show an effect of the model."""
+    for effect in (term.effect for term in model.terms if table.content in term.effect.kinds):
+        if reason := effect.lacks(table):
+            raise DataError(f"{table.source}: {effect.name} is not fitted: {reason}")
+
+
+def _check_changes(table: Table, but: str) -> None:
+    still = [name for name, spread in zip(table.output_names, np.ptp(table.outputs, axis=0), strict=True) if not spread]
+    if still:
+        raise DataError(f'{table.source}: the column "{still[0]}" never changes; {but}')
