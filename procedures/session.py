@@ -132,38 +132,50 @@ class Stillness(Protocol):
 
 
 class HandCourse(Protocol):
-    """The positions so far of a sensor in a hand, and the orientation that it needs next. Directions are unit vectors
-    upward in the sensor's frame.
+    """The positions so far of a sensor in a hand, and the attitude that it needs next. Directions are unit vectors in
+    the sensor's frame: of gravity upward, or of the magnetic field.
     """
 
     @property
     def count(self) -> int: ...
     @property
-    def ups(self) -> NDArray[np.float64]:
+    def directions(self) -> NDArray[np.float64]:
         """Directions of the positions, shape (n, 3)."""
 
     @property
-    def up(self) -> tuple[float, float, float]:
-        """The most informative orientation."""
+    def wanted(self) -> tuple[float, ...]:
+        """The most informative direction."""
+
+    @property
+    def up(self) -> tuple[float, ...]:
+        """What shall be upward for it."""
+
+    @property
+    def north(self) -> tuple[float, ...]:
+        """What shall point to the north for it; empty if this has no effect."""
 
     @property
     def words(self) -> str:
-        """The same in words."""
+        """The attitude in words."""
 
     @property
     def turn(self) -> str:
         """How to turn the sensor there; empty if that is not known."""
 
     @property
-    def uncertainty_g(self) -> tuple[float, str]:
-        """The largest standard uncertainty as an error at 1 g, and its parameter."""
+    def uncertainty(self) -> tuple[float, str]:
+        """The largest standard uncertainty as a share of the full scale (1 g, the field), and its parameter."""
+
+    @property
+    def doubt(self) -> str:
+        """What contradicts the assumptions of the calibration, in words; empty if nothing does."""
 
     def is_new(self, mean: NDArray[np.float64]) -> bool:
         """Whether a rest with this mean (3,) is worth taking."""
 
 
 class HandAnalysis(Protocol):
-    """The analysis behind positions by hand: the test of rest, and the choice of orientations."""
+    """The analysis behind calibration by hand: the test of rest, and the choice of attitudes."""
 
     def learn(self, windows: Sequence[NDArray[np.float64]], rate_hz: float) -> NoiseAtRest | None:
         """The noise from windows at rest, each (n, 3); None if they are too few or differ."""
@@ -172,21 +184,32 @@ class HandAnalysis(Protocol):
         """The test of the last of successive windows, each (n, 3)."""
 
     def course(self, dwells: Sequence[Dwell], noise: NoiseAtRest, skipped: Sequence[str]) -> HandCourse:
-        """The positions so far. Orientations that were `skipped` (their words) are not wanted."""
+        """The positions of an accelerometer so far. Orientations that were `skipped` (their words) are not wanted."""
+
+    def field_course(self, dwells: Sequence[Dwell], noise: NoiseAtRest, skipped: Sequence[str]) -> HandCourse:
+        """The same of a magnetometer."""
 
 
 @dataclass(frozen=True)
 class Guidance:
     """What a person with a sensor in the hand does next. Nobody answers it: the program sees when it is done.
 
-    `up` is the direction that shall be upward in the sensor's frame. `taken`: directions of the positions so far.
-    `moves`: whether the sensor shall be turned.
+    `up` is the direction that shall be upward in the sensor's frame, and `north` that to the north, if it matters.
+    `taken`: directions of the positions so far, of gravity or of the magnetic field; `wanted`: the next one, if it is
+    not `up`. `moves`: whether the sensor shall be turned.
     """
 
     text: str
-    up: tuple[float, float, float]
+    up: tuple[float, ...]
     taken: tuple[tuple[float, ...], ...] = ()
     moves: bool = True
+    north: tuple[float, ...] = ()
+    wanted: tuple[float, ...] = ()
+
+    @property
+    def target(self) -> tuple[float, ...]:
+        """The direction that the next position adds."""
+        return self.wanted or self.up
 
 
 class Host(Protocol):

@@ -26,7 +26,16 @@ SHARED = {  # settings that mean the same in every procedure
     "settle_s": "How long the stages stand still before samples are taken.",
     "block_s": "A record is saved in blocks of this length; a fault costs at most one block.",
 }
-UNITS = {"deg_s": "deg/s", "m_s2": "m/s^2", "deg": "deg", "hz": "Hz", "um": "um", "c": "°C", "s": "s"}  # ends of names
+UNITS = {
+    "deg_s": "deg/s",
+    "m_s2": "m/s^2",
+    "deg": "deg",
+    "hz": "Hz",
+    "um": "um",
+    "percent": "%",
+    "c": "°C",
+    "s": "s",
+}  # ends of names
 
 
 def parse(procedure: Procedure, entries: Mapping[str, Value]) -> dict[str, Value]:

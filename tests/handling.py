@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -20,8 +21,11 @@ from calibrations.design.orientations import ORIENTATIONS
 from calibrations.table import Array
 from drivers.handheld.hand import Hand
 from drivers.handheld.triad import noise_v, steady_v
-from drivers.handheld.world import INPUTS, Handheld, HandheldWorld
+from drivers.handheld.world import FIELDS, FORCES, Handheld, HandheldWorld
+from drivers.world import turned_sensors
 from drivers.world.config import WorldConfig
+from drivers.world.kernel import record
+from procedures.hand_fields import hand_fields
 from procedures.hand_positions import hand_positions
 from procedures.instruments import Samples
 from rig.instruments.by_hand import HandAnalysis
@@ -92,7 +96,7 @@ def by_procedure(seed: int, hand: Hand | None = None, target_g: float = 0.001) -
     world = world_of(seed, hand)
     rig, book = session(world)
     hand_positions(replace(rig, adc=SlowAdc(world), by_hand=HandAnalysis()), target_g=target_g)
-    means = np.array([[dwell.means[name] for name in INPUTS] for dwell in book.dwells])
+    means = np.array([[dwell.means[name] for name in FORCES] for dwell in book.dwells])
     b, M, _ = magnitude_fit(means)
     return Calibration(b, M, len(means), world.now_s)
 
@@ -172,7 +176,7 @@ def magnitude_fit(means: Array) -> tuple[Array, Array, float]:
 
 
 def _samples(world: HandheldWorld, duration_s: float) -> Array:
-    return world.adc_volts(INPUTS, world.now_s + 1 / RATE_HZ, 1 / RATE_HZ, round(duration_s * RATE_HZ))
+    return world.adc_volts(FORCES, world.now_s + 1 / RATE_HZ, 1 / RATE_HZ, round(duration_s * RATE_HZ))
 
 
 def _moving_variance(samples: Array, width: int) -> Array:
@@ -189,3 +193,66 @@ def _intervals(samples: Array, still: Array, width: int, shortest: int) -> Array
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
     bounds = [(a, b) for a, b in pairwise(edges) if still[a] and b - a >= shortest]
     return np.array([samples[a:b].mean(axis=0) for a, b in bounds]).reshape(-1, 3)
+
+
+# A magnetometer in a hand.
+
+FIELD_UT = 50.0
+PLACE = {"field_ut": FIELD_UT, "dip_deg": 65.0, "declination_deg": 3.0}
+
+
+def magnetometer_settings(seed: int) -> dict[str, Any]:
+    """A magnetometer with its own offsets, gains and angles, near a magnet and iron that turn with it."""
+    rng = np.random.default_rng([seed, 31])
+    plates = {
+        axis: {"volts_per_ut": 0.02 * (1 + 0.03 * gain), "offset_v": 0.02 * offset}
+        for axis, gain, offset in zip("xyz", *rng.standard_normal((2, 3)), strict=True)
+    }
+    moments = dict(zip(("moment_x_ma_m2", "moment_y_ma_m2", "moment_z_ma_m2"), 2 * rng.standard_normal(3), strict=True))
+    y_deg, z_deg = 0.5 * rng.standard_normal(2)
+    iron = {"x_mm": 9.0, "y_mm": 17.0, "z_mm": -4.0, "radius_mm": float(rng.uniform(3.0, 8.0))}
+    return plates | {"y_off_square_deg": y_deg, "z_off_square_deg": z_deg, "magnet": moments, "iron": iron}
+
+
+def field_world(seed: int, hand: Hand | None = None, **laboratory: Any) -> HandheldWorld:
+    """A magnetometer of `magnetometer_settings` and one hand, in a field of FIELD_UT unless `laboratory` changes it."""
+    settings = {"preset": "ideal", "magnetometer": magnetometer_settings(seed), "laboratory": PLACE | laboratory}
+    return HandheldWorld(WorldConfig.from_mapping(settings), seed, Handheld(hand=hand or Hand()))
+
+
+def true_ellipsoid(world: HandheldWorld) -> tuple[Array, Array]:
+    """Hard iron (3,) and the symmetric matrix (3, 3) whose square is that of the ellipsoid, in V per field."""
+    sensor = world.config.magnetometer
+    fields, volts = FIELD_UT * np.vstack([np.eye(3), -np.eye(3)]), np.empty((6, 3))
+    turned_sensors.magnetometer_volts(record(sensor), turned_sensors.normals(sensor), fields, 0.0, volts)
+    return volts.mean(axis=0), symmetric_root((volts[:3] - volts[3:]).T / 2)
+
+
+def symmetric_root(matrix: Array) -> Array:
+    """The symmetric matrix with the same ellipsoid: a turn of the sensor's frame has no effect."""
+    values, vectors = np.linalg.eigh(matrix @ matrix.T)
+    return np.asarray(vectors * np.sqrt(values) @ vectors.T)
+
+
+@dataclass(frozen=True)
+class FieldErrors:
+    """Errors as shares of the field: of the hard iron (3,), of the ellipsoid (3, 3); positions and time."""
+
+    hard_iron: Array
+    ellipsoid: Array
+    positions: int
+    time_s: float
+
+
+def fields_by_procedure(
+    seed: int, hand: Hand | None = None, target_percent: float = 0.2, **laboratory: Any
+) -> FieldErrors:
+    """hand-fields, with the ellipsoid of its means by an estimate of its own."""
+    world = field_world(seed, hand, **laboratory)
+    rig, book = session(world)
+    hand_fields(replace(rig, adc=SlowAdc(world), by_hand=HandAnalysis()), target_percent=target_percent)
+    means = np.array([[dwell.means[name] for name in FIELDS] for dwell in book.dwells])
+    hard_iron, M, _ = magnitude_fit(means)
+    true_iron, true_root = true_ellipsoid(world)
+    size = float(np.trace(true_root)) / 3
+    return FieldErrors((hard_iron - true_iron) / size, (symmetric_root(M) - true_root) / size, len(means), world.now_s)

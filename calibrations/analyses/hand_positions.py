@@ -28,15 +28,16 @@ from calibrations.design.orientations import (
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit, fit
 from calibrations.model.file import read_model
-from calibrations.table import AXES, Array, Table
+from calibrations.table import Array, Table
 
 FEWEST = 12  # nine parameters, and three positions that check them
+OUTPUTS = ("ax", "ay", "az")
 MODEL, ANGLES = "linear", "axis-nonorthogonality"
 
 
 @dataclass(frozen=True)
 class HandPosition:
-    """The mean (3,) of a position, the standard deviation (3,) and number of its samples, and the `told` direction."""
+    """The mean (3,) of a position, the standard deviation (3,) and number of its samples, and the stated direction."""
 
     mean: Array
     std: Array
@@ -59,10 +60,19 @@ class HandCourse:
         return len(self.positions)
 
     @property
-    def up(self) -> tuple[float, float, float]:
+    def up(self) -> tuple[float, ...]:
         """The upward direction of the most informative orientation."""
-        x, y, z = (float(part) for part in self.next.up)
-        return x, y, z
+        return tuple(map(float, self.next.up))
+
+    @property
+    def north(self) -> tuple[float, ...]:
+        """No direction to the north: a turn about the vertical has no effect."""
+        return ()
+
+    @property
+    def wanted(self) -> tuple[float, ...]:
+        """The direction that the position will add."""
+        return self.up
 
     @property
     def words(self) -> str:
@@ -80,25 +90,30 @@ class HandCourse:
         return np.array([p.mean for p in self.positions]).reshape(-1, 3)
 
     @cached_property
-    def ups(self) -> Array:
+    def directions(self) -> Array:
         """Directions upward of the positions, unit vectors (n, 3)."""
         return directions_up(self.outputs, np.array([p.stated_up for p in self.positions]).reshape(-1, 3))
 
     @cached_property
     def next(self) -> Next:
         """The most informative orientation."""
-        last = self.ups[-1] if len(self.ups) else None
-        return next_orientation(np.vstack([self.ups, self.skipped]), last, FIRST_SIDES + len(self.skipped))
+        last = self.directions[-1] if len(self.directions) else None
+        return next_orientation(np.vstack([self.directions, self.skipped]), last, FIRST_SIDES + len(self.skipped))
 
     def is_new(self, mean: Array) -> bool:
         """Whether a rest with this mean (3,) is worth taking."""
         if len(self.positions) < KNOWN_AFTER - 1:
             return is_other_side(mean, self.outputs, float(self.noise.std.max()))
-        up = directions_up(np.vstack([self.outputs, mean]), np.vstack([self.ups, self.next.up]))[-1]
-        return is_worth(up, self.next.up, self.ups)
+        up = directions_up(np.vstack([self.outputs, mean]), np.vstack([self.directions, self.next.up]))[-1]
+        return is_worth(up, self.next.up, self.directions)
+
+    @property
+    def doubt(self) -> str:
+        """Gravity is the same in all positions."""
+        return ""
 
     @cached_property
-    def uncertainty_g(self) -> tuple[float, str]:
+    def uncertainty(self) -> tuple[float, str]:
         """The largest standard uncertainty of a parameter as an error at 1 g, in g, and the parameter's key.
 
         Infinite with fewer than FEWEST positions.
@@ -108,12 +123,12 @@ class HandCourse:
         return largest_uncertainty_g(fit_positions(hand_table(self.positions, self.noise)))
 
 
-def hand_table(positions: Sequence[HandPosition], noise: NoiseAtRest) -> Table:
+def hand_table(positions: Sequence[HandPosition], noise: NoiseAtRest, outputs: Sequence[str] = OUTPUTS) -> Table:
     """The table of positions. The noise of a mean is that of the blocks of a window, which a filter does not hide."""
     means, count = np.array([p.mean for p in positions]), np.array([float(p.n) for p in positions])
     blocks = np.maximum(1.0, count / max(1, round(noise.rate_hz * 0.05)))
-    columns = {f"a{axis}": means[:, k] for k, axis in enumerate(AXES)}
-    columns |= {f"a{axis}_std": np.full(len(means), np.sqrt(noise.sway[k])) for k, axis in enumerate(AXES)}
+    columns = {name: means[:, k] for k, name in enumerate(outputs)}
+    columns |= {f"{name}_std": np.full(len(means), np.sqrt(noise.sway[k])) for k, name in enumerate(outputs)}
     return Table.from_columns("positions", {**columns, "n": blocks}, {}, "positions by hand")
 
 

@@ -1,24 +1,22 @@
-"""A simulated hand that turns a sensor to a wanted orientation, puts it down, and lets it go.
+"""A simulated hand that turns a sensor to a wanted attitude, puts it down, and lets it go.
 
-Only the direction upward matters to an accelerometer, so an orientation is this direction in the frame of the sensor.
-A hand is not exact: it trembles, misses the orientation, sometimes takes a wrong one, holds on for too long, or picks
-the sensor up too early; the table is not level, and the sensor sometimes slips after it was let go.
-
-Source  Elble, J. Clinical Neurophysiology 13 (1996), 133-144: physiological tremor of a hand, 8 to 12 Hz.
+An attitude is the direction upward and the direction to the north in the frame of the sensor. Only the direction upward
+matters to an accelerometer: without a wanted north, the hand turns the sensor by the shortest way. A hand is not exact:
+it trembles, misses the attitude, sometimes takes a wrong one, holds on for too long, or picks the sensor up too early;
+the table is not level, and the sensor sometimes slips after it was let go.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from drivers.handheld.motion import NORTH, Motion, Segment, Shaking, angle_between, last_north, move, unit
 from drivers.world.kernel import Floats
 
-TREMOR_HZ = (7.0, 8.3, 9.1, 10.4, 11.8)
-BUMP_HZ, BUMP_S = 25.0, 0.08
 SLIP_S = 0.4
 
 
@@ -35,6 +33,8 @@ class Hand:
     bump_g: float = 0.2  # of putting it down
     side_deg: float = 0.7  # standard deviation of a whole side on the table
     aim_deg: float = 8.0  # of an edge or a corner that leans on something
+    heading_deg: float = 10.0  # of a side that shall point to the north
+    place_mm: float = 30.0  # of the place on the table
     table_deg: float = 2.0  # tilt of the table
     slips: float = 0.1
     slip_deg: float = 2.0
@@ -43,161 +43,156 @@ class Hand:
     clings_s: float = 5.0
 
 
-@dataclass(frozen=True)
-class Segment:
-    """From `start_s` to `end_s` the direction upward goes from `before` to `after`, both unit vectors.
-
-    `tremor`: share of the hand's tremor that reaches the sensor. `bumps`: whether it was put down at `start_s`.
-    """
-
-    start_s: float
-    end_s: float
-    before: tuple[float, float, float]
-    after: tuple[float, float, float]
-    tremor: float = 0.0
-    bumps: bool = False
-
-
 class Script:
     """What a hand does from now on: segments in the order of time. It is picked up again at the end of the last."""
 
     def __init__(self, hand: Hand, random: np.random.Generator, up: Floats) -> None:
         self._hand, self._random = hand, random
         self._wanted = up
+        self._wanted_north: Floats | None = None
         self._table = _perturb(np.array([0.0, 0.0, 1.0]), hand.table_deg, random)
-        direction = _as_tuple(self._on_table(up))
-        self.segments = [Segment(0.0, math.inf, direction, direction)]
+        direction = self._on_table(up)
+        north = unit(np.array(NORTH) - (direction @ NORTH) * direction)
+        self.segments = [Segment(0.0, math.inf, _as_tuple(direction), _as_tuple(direction), north=_as_tuple(north))]
 
-    def turn_to(self, up: Floats, now_s: float) -> None:
-        """Begin to turn the sensor until `up` (3,) is upward, after the reaction time."""
+    def turn_to(self, up: Floats, now_s: float, north: Floats | None = None) -> None:
+        """Begin to turn the sensor until `up` (3,) is upward and `north` (3,) points north, after the reaction time."""
         self._wanted = np.asarray(up, dtype=float)
-        direction = self.up(np.array([now_s]))[0]
+        self._wanted_north = None if north is None else np.asarray(north, dtype=float)
+        attitude = self.motion(np.array([now_s])).attitude[0]
         recent = [s for s in self.segments if s.start_s <= now_s and s.end_s > now_s - 1]
-        self.segments = [Segment(s.start_s, min(s.end_s, now_s), s.before, s.after, s.tremor, s.bumps) for s in recent]
-        self._plan(direction, now_s, self._hand.reaction_s)
+        place_mm = recent[-1].place_mm
+        self.segments = [replace(s, end_s=min(s.end_s, now_s)) for s in recent]
+        self._plan(attitude[:, 2], attitude[:, 0], place_mm, now_s, self._hand.reaction_s)
 
     def force_g(self, times_s: Floats) -> Floats:
         """Specific force in the frame of the sensor at rising times (n,), shape (n, 3)."""
+        return self.motion(times_s).force_g
+
+    def up(self, times_s: Floats) -> Floats:
+        """Directions upward at rising times (n,), shape (n, 3)."""
+        return np.asarray(self.motion(times_s).attitude[:, :, 2])
+
+    def motion(self, times_s: Floats) -> Motion:
+        """The motion at rising times (n,)."""
         self._plan_until(float(times_s[-1]))
-        force = np.empty((len(times_s), 3))
+        hand = self._hand
+        shaking = Shaking(hand.tremor_g, hand.tremor_deg, hand.bump_g)
+        parts = []
         for segment in self.segments:
             in_segment = (times_s >= segment.start_s) & (times_s < segment.end_s)
             if in_segment.any():
-                force[in_segment] = self._segment_force(segment, times_s[in_segment])
-        return force
-
-    def up(self, times_s: Floats) -> Floats:
-        """Directions upward at rising times (n,), without tremor, shape (n, 3)."""
-        self._plan_until(float(times_s[-1]))
-        up = np.empty((len(times_s), 3))
-        for segment in self.segments:
-            in_segment = (times_s >= segment.start_s) & (times_s < segment.end_s)
-            up[in_segment] = _turn_slowly(segment, times_s[in_segment])
-        return up
+                parts.append(move(segment, shaking, times_s[in_segment]))
+        fields = zip(*((p.attitude, p.force_g, p.rate_deg_s, p.place_mm) for p in parts), strict=True)
+        return Motion(*(np.concatenate(values) for values in fields))
 
     def state(self) -> dict[str, Any]:
         """What it remembers, as JSON. An endless segment has no end."""
         segments = [asdict(s) | {"end_s": None if math.isinf(s.end_s) else s.end_s} for s in self.segments]
-        return {"wanted": self._wanted.tolist(), "table": self._table.tolist(), "segments": segments}
+        north = None if self._wanted_north is None else self._wanted_north.tolist()
+        return {"wanted": self._wanted.tolist(), "north": north, "table": self._table.tolist(), "segments": segments}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from what `state` gave."""
         self._wanted, self._table = np.array(state["wanted"]), np.array(state["table"])
+        self._wanted_north = None if state["north"] is None else np.array(state["north"])
         self.segments = [
             Segment(
-                s["start_s"], math.inf if s["end_s"] is None else s["end_s"], tuple(s["before"]), tuple(s["after"]),
-                s["tremor"], s["bumps"],
+                **{name: tuple(value) if isinstance(value, list) else value for name, value in segment.items()}
+                | {"end_s": math.inf if segment["end_s"] is None else segment["end_s"]}
             )
-            for s in state["segments"]
-        ]  # fmt: skip
+            for segment in state["segments"]
+        ]
 
     def _plan_until(self, t_s: float) -> None:
         while self.segments[-1].end_s <= t_s:
             last = self.segments[-1]
-            self._plan(np.array(last.after), last.end_s, 0.0)
+            self._plan(np.array(last.after), last_north(last), last.place_mm, last.end_s, 0.0)
 
-    def _plan(self, direction: Floats, now_s: float, reaction_s: float) -> None:
+    def _plan(
+        self, direction: Floats, north: Floats, place_mm: tuple[float, float], now_s: float, reaction_s: float
+    ) -> None:
         """Pick the sensor up after `reaction_s`, turn it, put it down, let it go, and leave it for a while."""
         hand, random = self._hand, self._random
         chance, size = random.random(3), random.standard_normal(2)
-        target = self._aim(chance[0])
-        turn_s = math.degrees(_angle(direction, target)) / hand.turning_deg_s + 0.5
-        self._add(now_s, reaction_s, direction, direction)
-        self._add(self._end(now_s), turn_s, direction, target, 1.0)
+        errs = chance[0] < hand.errs
+        target = self._on_table(_err(self._wanted) if errs else self._wanted)
+        turning = Segment(0.0, 1.0, _as_tuple(direction), _as_tuple(target), 1.0, north=_as_tuple(north))
+        heading_rad, next_mm = self._aim_heading(turning, errs), place_mm
+        if self._wanted_north is not None:
+            across, along = hand.place_mm * random.standard_normal(2)
+            next_mm = (float(across), float(along))
+        turn_s = math.degrees(max(angle_between(direction, target), abs(heading_rad))) / hand.turning_deg_s + 0.5
+        self._add(reaction_s, direction, now_s, north, place_mm)
+        self._add(turn_s, target, tremor=1.0, heading_rad=heading_rad, place_mm=next_mm)
         clings_s = hand.clings_s * math.exp(0.3 * size[0]) if chance[1] < hand.clings else 0.0
-        self._add(self._end(now_s), hand.letting_go_s + clings_s, target, target, 0.3)
+        self._add(hand.letting_go_s + clings_s, target, tremor=0.3)
         slips = chance[2] < hand.slips
         patience_s = hand.patience_s * math.exp(0.4 * size[1])
-        self._add(self._end(now_s), 1.0 if slips else patience_s, target, target, 0.0, True)
+        self._add(1.0 if slips else patience_s, target, bumps=True)
         if slips:
             slipped = _perturb(target, hand.slip_deg, random)
-            self._add(self._end(now_s), SLIP_S, target, slipped)
-            self._add(self._end(now_s), patience_s, slipped, slipped)
+            self._add(SLIP_S, slipped)
+            self._add(patience_s, slipped)
 
     def _add(
-        self, start_s: float, length_s: float, start: Floats, end: Floats, tremor: float = 0.0, bumps: bool = False
+        self,
+        length_s: float,
+        after: Floats,
+        now_s: float | None = None,
+        north: Floats | None = None,
+        place_mm: tuple[float, float] | None = None,
+        *,
+        tremor: float = 0.0,
+        bumps: bool = False,
+        heading_rad: float = 0.0,
     ) -> None:
-        self.segments.append(Segment(start_s, start_s + length_s, _as_tuple(start), _as_tuple(end), tremor, bumps))
+        """Add a segment that ends with `after` upward; what is not given is as at the end of the last one."""
+        last = self.segments[-1]
+        start_s = last.end_s if now_s is None else now_s
+        before = _as_tuple(after) if now_s is not None else last.after
+        self.segments.append(
+            Segment(
+                start_s,
+                start_s + length_s,
+                before,
+                _as_tuple(after),
+                tremor,
+                bumps,
+                _as_tuple(last_north(last) if north is None else north),
+                heading_rad,
+                last.place_mm if place_mm is None else place_mm,
+            )
+        )
 
-    def _end(self, now_s: float) -> float:
-        return self.segments[-1].end_s if self.segments else now_s
-
-    def _aim(self, chance: float) -> Floats:
-        """Where the hand puts the sensor: near the wanted orientation, or a wrong one."""
-        direction = self._wanted
-        if chance < self._hand.errs:
-            direction = np.roll(direction, 1) * np.array([1.0, -1.0, 1.0])
-        return self._on_table(direction)
+    def _aim_heading(self, turning: Segment, errs: bool) -> float:
+        """The turn about the vertical that brings the wanted side to the north, rad, within half a turn; 0: none."""
+        if self._wanted_north is None:
+            return 0.0
+        wanted = _err(self._wanted_north) if errs else self._wanted_north
+        up, north = np.array(turning.after), last_north(turning)
+        level = wanted - (wanted @ up) * up
+        error_rad = math.radians(self._hand.heading_deg) * self._random.standard_normal()
+        turn_rad = math.atan2(float(np.cross(north, level) @ up), float(north @ level)) + error_rad
+        return math.remainder(turn_rad, 2 * math.pi)
 
     def _on_table(self, direction: Floats) -> Floats:
         hand = self._hand
         leaning = np.abs(direction).max() < 0.99
         placed = _perturb(direction, hand.aim_deg if leaning else hand.side_deg, self._random)
         tilt = self._table - np.array([0.0, 0.0, 1.0])
-        return _unit(placed + np.roll(tilt, int(np.argmax(np.abs(direction))) + 1))
-
-    def _segment_force(self, segment: Segment, times_s: Floats) -> Floats:
-        hand, force = self._hand, _turn_slowly(segment, times_s)
-        if segment.tremor:
-            swing = segment.tremor * np.sqrt(2 / len(TREMOR_HZ))
-            turns = 2 * np.pi * np.outer(times_s, TREMOR_HZ)
-            tremor = np.stack([np.sin(turns + 1.7 * k + np.arange(len(TREMOR_HZ)) ** 2).sum(axis=1) for k in range(6)])
-            tilted = np.cross(force, math.radians(hand.tremor_deg) * swing * tremor[:3].T)
-            force = force + tilted + hand.tremor_g * swing * tremor[3:].T
-        if segment.bumps:
-            after_s = times_s - segment.start_s
-            bump = hand.bump_g * np.exp(-after_s / BUMP_S) * np.cos(2 * np.pi * BUMP_HZ * after_s)
-            force = force + bump[:, None] * np.array(segment.after)
-        return force
+        return unit(placed + np.roll(tilt, int(np.argmax(np.abs(direction))) + 1))
 
 
-def _turn_slowly(segment: Segment, times_s: Floats) -> Floats:
-    """Directions between both ends of a segment: along the great circle, slowly at both ends."""
-    start, end = np.array(segment.before), np.array(segment.after)
-    angle = _angle(start, end)
-    if angle < 1e-9:
-        return np.repeat(end[None], len(times_s), axis=0)
-    perpendicular = end - (end @ start) * start
-    if np.linalg.norm(perpendicular) < 1e-6:  # upside down: over any side
-        perpendicular = np.cross(start, np.eye(3)[int(np.argmin(np.abs(start)))])
-    perpendicular = _unit(perpendicular)
-    share = (times_s - segment.start_s) / (segment.end_s - segment.start_s)
-    turned = angle * share**2 * (3 - 2 * share)
-    return np.asarray(np.outer(np.cos(turned), start) + np.outer(np.sin(turned), perpendicular))
+def _err(direction: Floats) -> Floats:
+    """A wrong side in place of the wanted one."""
+    return np.asarray(np.roll(direction, 1) * np.array([1.0, -1.0, 1.0]))
 
 
 def _perturb(direction: Floats, std_deg: float, random: np.random.Generator) -> Floats:
     """A direction turned by a normal angle about two axes."""
     offset = math.radians(std_deg) * random.standard_normal(3)
-    return _unit(direction + np.cross(offset, direction))
-
-
-def _angle(first: Floats, second: Floats) -> float:
-    return math.acos(min(1.0, max(-1.0, float(first @ second))))
-
-
-def _unit(vector: Floats) -> Floats:
-    return np.asarray(vector / np.linalg.norm(vector))
+    return unit(direction + np.cross(offset, direction))
 
 
 def _as_tuple(vector: Floats) -> tuple[float, float, float]:

@@ -1,28 +1,37 @@
-"""The simulated world with a sensor in a hand: inputs ax, ay and az of the converter.
+"""The simulated world with a sensor in a hand: an accelerometer (inputs ax, ay, az of the converter), a gyroscope
+(gx, gy, gz) and a magnetometer (mx, my, mz) that turn together.
 
-A bench file has the hand and its sensor under `world`, as `hand` and `triad`; `{}` takes the defaults.
+Gyroscope and magnetometer are those of `drivers.world.turned_sensors`, and their field is that of the laboratory, whose
+magnet and iron are fixed to the table. A bench file has the hand and its accelerometer under `world`, as `hand` and
+`triad`; `{}` takes the defaults.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from drivers.handheld.hand import Hand, Script
+from drivers.handheld.motion import Motion
 from drivers.handheld.triad import Mass, Triad, individual, noise_v, steady_v
+from drivers.world import laboratory, turned_sensors
 from drivers.world.config import WorldConfig, changed_settings
 from drivers.world.digital import TRIMS, Trim
 from drivers.world.errors import BadSetting
+from drivers.world.gravity import Base
 from drivers.world.kernel import Floats
+from drivers.world.laboratory import Laboratory
+from drivers.world.mechanics import REFERENCE_C
 from drivers.world.world import World
 
-INPUTS = ("ax", "ay", "az")
+FORCES, RATES, FIELDS = ("ax", "ay", "az"), ("gx", "gy", "gz"), ("mx", "my", "mz")
+INPUTS = (*FORCES, *RATES, *FIELDS)
 KEYS = ("hand", "triad")
-OWN_TRIMS = MappingProxyType({**TRIMS, **{name: Trim(name, Mass.zero_v, Mass.volts_per_g) for name in INPUTS}})
+OWN_TRIMS = MappingProxyType({**TRIMS, **{name: Trim(name, Mass.zero_v, Mass.volts_per_g) for name in FORCES}})
 
 
 @dataclass(frozen=True)
@@ -61,21 +70,26 @@ class HandheldWorld(World):
             handheld_settings.triad.wander_v * self._noise_random.standard_normal(3),
         )
 
-    def turn_by_hand(self, up: Sequence[float]) -> None:
-        """Tell the hand which direction (3,) of the sensor's frame shall be upward."""
-        self.script.turn_to(np.asarray(up, dtype=float), self.now_s)
+    def turn_by_hand(self, up: Sequence[float], north: Sequence[float] = ()) -> None:
+        """Tell the hand which direction (3,) of the sensor's frame shall be upward, and which to the north, if any."""
+        self.script.turn_to(
+            np.asarray(up, dtype=float), self.now_s, np.asarray(north, dtype=float) if len(north) else None
+        )
 
     def adc_volts(
         self, inputs: Sequence[str], start_s: float, interval_s: float, n: int, places: Sequence[int] | None = None
     ) -> Floats:
         """As `World.adc_volts`, with the inputs of INPUTS too, all three sampled at the begin of a scan."""
-        triad_places = [k for k, name in enumerate(inputs) if name in INPUTS]
-        if not triad_places:
+        own_places = [k for k, name in enumerate(inputs) if name in INPUTS]
+        if not own_places:
             return super().adc_volts(inputs, start_s, interval_s, n, places)
-        other_places = [k for k in range(len(inputs)) if k not in triad_places]
+        other_places = [k for k in range(len(inputs)) if k not in own_places]
         volts = np.empty((n, len(inputs)))
-        triad_v = self._triad_v(np.asarray(start_s + interval_s * np.arange(n), dtype=np.float64), interval_s)
-        volts[:, triad_places] = triad_v[:, [INPUTS.index(inputs[k]) for k in triad_places]]
+        times_s = np.asarray(start_s + interval_s * np.arange(n), dtype=np.float64)
+        motion = self.script.motion(times_s)
+        for names, sensor in ((FORCES, self._triad_v), (RATES, self._gyroscope_v), (FIELDS, self._magnetometer_v)):
+            if own := [k for k in own_places if inputs[k] in names]:
+                volts[:, own] = sensor(motion, interval_s)[:, [names.index(inputs[k]) for k in own]]
         if other_places:
             positions = other_places if places is None else [places[k] for k in other_places]
             volts[:, other_places] = super().adc_volts(
@@ -85,10 +99,49 @@ class HandheldWorld(World):
             self.advance(start_s + interval_s * (n - 1))
         return volts
 
-    def _triad_v(self, times_s: Floats, interval_s: float) -> Floats:
-        noise = noise_v(self.triad, self._memory, self._wander, interval_s, len(times_s), self._noise_random)
+    def _triad_v(self, motion: Motion, interval_s: float) -> Floats:
+        noise = noise_v(self.triad, self._memory, self._wander, interval_s, len(motion.force_g), self._noise_random)
         self._memory, self._wander = noise[1:]
-        return np.asarray(steady_v(self.triad, self.script.force_g(times_s)) + noise[0])
+        return np.asarray(steady_v(self.triad, motion.force_g) + noise[0])
+
+    def _gyroscope_v(self, motion: Motion, interval_s: float) -> Floats:  # noqa: ARG002 - its noise is white
+        """The sensor turns with the hand and with the earth."""
+        sensor, volts = self.config.gyroscope, np.empty((len(motion.rate_deg_s), 3))
+        earth_deg_s = laboratory.rotation_deg_s(self._place, Base())
+        rates_deg_s = motion.rate_deg_s + motion.attitude @ earth_deg_s
+        turned_sensors.gyroscope_volts(
+            self._numbers.gyroscope, turned_sensors.die(sensor), rates_deg_s, motion.force_g, self._warmer_k, volts
+        )
+        return np.asarray(volts + sensor.noise_v * self._noise_random.standard_normal(volts.shape))
+
+    def _magnetometer_v(self, motion: Motion, interval_s: float) -> Floats:  # noqa: ARG002 - its noise is white
+        sensor, volts = self.config.magnetometer, np.empty((len(motion.attitude), 3))
+        fields_ut = np.einsum("nij,nj->ni", motion.attitude, self._fields_ut(motion.place_mm))
+        turned_sensors.magnetometer_volts(
+            self._numbers.magnetometer, turned_sensors.normals(sensor), fields_ut, self._warmer_k, volts
+        )
+        return np.asarray(volts + sensor.noise_v * self._noise_random.standard_normal(volts.shape))
+
+    @property
+    def _place(self) -> Laboratory:
+        """The laboratory with x to the north, y to the west and z upward, as the attitudes of a hand."""
+        return replace(self.config.laboratory, heading_deg=0.0)
+
+    @property
+    def _warmer_k(self) -> float:
+        return self.die_c() - REFERENCE_C
+
+    def _fields_ut(self, places_mm: Floats) -> Floats:
+        """The field at each place on the table (n, 2), shape (n, 3)."""
+        places, which = np.unique(places_mm, axis=0, return_inverse=True)
+        return np.array([self._field_ut(x_mm, y_mm) for x_mm, y_mm in places])[which.ravel()]
+
+    def _field_ut(self, x_mm: float, y_mm: float) -> Floats:
+        """Magnet and iron are at their place of the laboratory as seen from the middle of the table."""
+        place = self._place
+        magnet = replace(place.magnet, x_mm=place.magnet.x_mm - x_mm, y_mm=place.magnet.y_mm - y_mm)
+        iron = replace(place.iron, x_mm=place.iron.x_mm - x_mm, y_mm=place.iron.y_mm - y_mm)
+        return laboratory.field_ut(replace(place, magnet=magnet, iron=iron), Base())
 
     def state(self) -> dict[str, Any]:
         """All that the world remembers, with the hand."""

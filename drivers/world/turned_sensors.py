@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drivers.world.accelerometer import STANDARD_GRAVITY_M_S2
-from drivers.world.gravity import rotation
+from drivers.world.gravity import across, rotation
 from drivers.world.kernel import Floats, kernel
 from drivers.world.laboratory import Iron, Magnet, near_iron_ut, near_magnet_ut
 
@@ -80,6 +80,17 @@ def sensed_v(tines: Tines, rate_deg_s: float, load_g: float, warmer_k: float) ->
     return tines.zero_v + tines.volts_per_nm * moved_nm / (1 - (moved_nm / tines.gap_nm) ** 2)
 
 
+@kernel
+def gyroscope_volts(
+    sensor: Gyroscope, turn: Floats, rates_deg_s: Floats, loads_g: Floats, warmer_k: float, volts: Floats
+) -> None:
+    """Fill `volts` (n, 3) at rates and specific forces (n, 3) in the board's frame; `turn` (3, 3) is die from board."""
+    for i in range(len(volts)):
+        rate = across(turn, rates_deg_s[i, 0], rates_deg_s[i, 1], rates_deg_s[i, 2])
+        load = across(turn, loads_g[i, 0], loads_g[i, 1], loads_g[i, 2])
+        gyroscope_v(sensor, rate, load, warmer_k, volts[i])
+
+
 # A magnetometer: three Hall plates on one board, with a magnet and iron that turn with them.
 #
 # field of the place -> changed by iron and a magnet -> part along each plate's normal -> Hall voltage -> amplifier
@@ -139,3 +150,10 @@ def hall_v(plate: HallPlate, b_ut: float, warmer_k: float) -> float:
     """Output of one plate in a field along its normal."""
     loss = plate.bend_per_mt2 * (1e-3 * b_ut) ** 2 - 1e-6 * plate.softening_ppm_per_k * warmer_k
     return plate.offset_v + plate.volts_per_ut * b_ut / (1 + loss)
+
+
+@kernel
+def magnetometer_volts(sensor: Magnetometer, plates: Floats, fields_ut: Floats, warmer_k: float, volts: Floats) -> None:
+    """Fill `volts` (n, 3) in fields (n, 3) of the place, in the board's frame."""
+    for i in range(len(volts)):
+        magnetometer_v(sensor, plates, fields_ut[i, 0], fields_ut[i, 1], fields_ut[i, 2], warmer_k, volts[i])

@@ -1,8 +1,8 @@
 """The orientations of a sensor in a hand: those that it has, those that it lacks, and the next one.
 
 As text, three squares show the sphere of directions from above: its upper part, its equator and its lower part. Each
-place is a side, an edge or a corner of the sensor that points upward. As SVG, two discs show the halves of the sphere,
-beside the sensor as it rests in the next orientation.
+place is a side, an edge or a corner of the sensor that points upward, or along the magnetic field. As SVG, two discs
+show the halves of the sphere, beside the sensor as it rests in the next orientation.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from procedures.session import Guidance
 from rig.drawings import svg
 
 TAKEN, LACKING, WANTED = "●", "·", "◎"
-LAYERS = ((1, "+z upward"), (0, "z level"), (-1, "-z upward"))
+UPWARD = ((1, "+z upward"), (0, "z level"), (-1, "-z upward"))
+ALONG_FIELD = ((1, "+z with field"), (0, "z across"), (-1, "-z with field"))
 ROWS = (1, 0, -1)  # of y, from above
 COLUMNS = (-1, 0, 1)  # of x, from the left
 
@@ -25,12 +26,13 @@ COLUMNS = (-1, 0, 1)  # of x, from the left
 def orientation_map(guidance: Guidance) -> list[str]:
     """The map in five lines, with a legend."""
     marks = _marks(guidance)
-    heads = "   ".join(f"{name:<13}" for _, name in LAYERS)
+    layers = ALONG_FIELD if guidance.north else UPWARD
+    heads = "   ".join(f"{name:<13}" for _, name in layers)
     lines = [f"     {heads}"]
     for y in ROWS:
-        squares = ("  ".join(marks.get((x, y, z), " ") for x in COLUMNS) for z, _ in LAYERS)
+        squares = ("  ".join(marks.get((x, y, z), " ") for x in COLUMNS) for z, _ in layers)
         lines.append(f"{('+y', '  ', '-y')[1 - y]}   {'   '.join(f'{square:<13}' for square in squares)}".rstrip())
-    lines.append("   " + "   ".join(f"{'-x':<5}{'+x':<8}" for _ in LAYERS).rstrip())
+    lines.append("   " + "   ".join(f"{'-x':<5}{'+x':<8}" for _ in layers).rstrip())
     taken_count = sum(mark == TAKEN for mark in marks.values())
     return [*lines, f"{TAKEN} taken ({taken_count} of {len(marks)})   {WANTED} next   {LACKING} not yet"]
 
@@ -53,10 +55,11 @@ def orientation_drawing(guidance: Guidance) -> str:
 def _content(guidance: Guidance) -> Iterator[str]:
     yield svg.text((16, 20), guidance.text, 17, anchor="start", bold=True)
     if guidance.moves:
-        yield from _resting_cube(np.array(guidance.up))
+        yield from _resting_cube(np.array(guidance.up), np.array(guidance.north))
     marks = _marks(guidance)
     for centre, half, name in DISCS:
-        yield svg.text((centre[0] - 92, 66), name.replace("-", "−"), 14, svg.QUIET, bold=True)
+        of = " of the field" if guidance.north else ""
+        yield svg.text((centre[0] - 92 + 4 * len(of), 66), name.replace("-", "−") + of, 14, svg.QUIET, bold=True)
         yield from _disc(centre, half, marks)
     counts = f"{TAKEN} taken ({sum(mark == TAKEN for mark in marks.values())} of {len(marks)})   {WANTED} next"
     yield svg.text((555, 287), f"{counts}   ○ not yet", 13, svg.QUIET)
@@ -81,9 +84,9 @@ def _disc(centre: tuple[int, int], half: int, marks: dict[tuple[int, int, int], 
             )
 
 
-def _resting_cube(up: Array) -> Iterator[str]:
-    """The sensor as a cube with names on its sides, turned so that `up` points upward."""
-    turn = _turn_upward(up)
+def _resting_cube(up: Array, north: Array) -> Iterator[str]:
+    """The sensor as a cube with names on its sides, turned so that `up` points upward, and `north` away, if given."""
+    turn = np.array([np.cross(north, up), north, up]) if len(north) else _turn_upward(up)
     right = np.cross([0.0, 0.0, 1.0], VIEW) / np.hypot(VIEW[0], VIEW[1])
     above = np.cross(VIEW, right) / np.linalg.norm(VIEW)
 
@@ -100,6 +103,11 @@ def _resting_cube(up: Array) -> Iterator[str]:
             corners = [normal + a * first + b * second for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
             yield svg.polygon([seen(corner) for corner in corners], SIDES[axis], svg.INK, 1.2)
             yield svg.text(seen(normal), f"{'+' if sign > 0 else '−'}{axis}", 15, bold=True)
+    if len(north):
+        reach = np.abs(north).max()
+        start, end = seen(1.1 / reach * north), seen((1.1 / reach + 1.1) * north)
+        yield svg.arrow(start, end, svg.BLUE)
+        yield svg.text((end[0] + 6, end[1] + 4), "north", 13, svg.BLUE, "start", bold=True)
     x, y = seen(np.sign(np.round(up, 6)))
     yield svg.arrow((x, y), (x, y - 44), svg.ORANGE)
     yield svg.text((x + 9, y - 40), "up", 13, svg.ORANGE, "start", bold=True)
@@ -117,9 +125,12 @@ def _turn_upward(up: Array) -> Array:
 def _marks(guidance: Guidance) -> dict[tuple[int, int, int], str]:
     """The mark of each orientation by the signs of its three parts."""
     is_taken = find_covered(np.array(guidance.taken).reshape(-1, 3))
+    nearest = ORIENTATIONS[np.argmax(ORIENTATIONS @ np.array(guidance.target))]
+    wanted = tuple(int(part) for part in np.sign(np.round(nearest, 6)))
     marks = {}
     for up, is_covered in zip(ORIENTATIONS, is_taken, strict=True):
         x, y, z = (int(part) for part in np.sign(np.round(up, 6)))
-        is_target = guidance.moves and bool(up @ np.array(guidance.up) > 1 - 1e-6)
-        marks[x, y, z] = WANTED if is_target else TAKEN if is_covered else LACKING
+        marks[x, y, z] = TAKEN if is_covered else LACKING
+        if guidance.moves and (x, y, z) == wanted:
+            marks[x, y, z] = WANTED
     return marks

@@ -1,4 +1,4 @@
-"""The analysis behind positions by hand, for a session: the test of rest, and the choice of orientations."""
+"""The analysis behind calibration by hand, for a session: the test of rest, and the choice of attitudes."""
 
 from __future__ import annotations
 
@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 
 from procedures.session import Dwell, HandCourse, NoiseAtRest, Stillness
 
-OUTPUTS = ("ax", "ay", "az")
-
 
 class HandAnalysis:
-    """As `procedures.session.HandAnalysis`. Its functions are slow to import, and only positions by hand need them."""
+    """As `procedures.session.HandAnalysis`. Its functions are slow to import, and only procedures by hand need them."""
 
     def learn(self, windows: Sequence[NDArray[np.float64]], rate_hz: float) -> NoiseAtRest | None:
         """The noise from windows at rest."""
@@ -33,14 +31,34 @@ class HandAnalysis:
 
         The path of a pose has the orientation that was wanted, in words.
         """
+        from calibrations.analyses.hand_positions import OUTPUTS, HandPosition
         from calibrations.analyses.hand_positions import HandCourse as Course
-        from calibrations.analyses.hand_positions import HandPosition
         from calibrations.design.orientations import ORIENTATIONS, name_orientation
 
         def position(dwell: Dwell) -> HandPosition:
-            mean, std = (np.array([values[name] for name in OUTPUTS]) for values in (dwell.means, dwell.stds))
             orientation = name_orientation(dwell.pose.path)
-            return HandPosition(mean, std, dwell.n, ORIENTATIONS[0] if orientation is None else orientation, dwell.t_s)
+            stated = ORIENTATIONS[0] if orientation is None else orientation
+            return HandPosition(*_statistics(dwell, OUTPUTS), dwell.n, stated, dwell.t_s)
 
         unwanted = np.array([up for words in skipped if (up := name_orientation(words)) is not None]).reshape(-1, 3)
         return Course(tuple(map(position, dwells)), cast(Any, noise), unwanted)
+
+    def field_course(self, dwells: Sequence[Dwell], noise: NoiseAtRest, skipped: Sequence[str] = ()) -> HandCourse:
+        """The positions of a magnetometer so far; attitudes with the words `skipped` are not wanted."""
+        from calibrations.analyses.hand_fields import OUTPUTS, FieldCourse
+        from calibrations.analyses.hand_positions import HandPosition
+        from calibrations.design.attitudes import ATTITUDES, name_attitude
+
+        attitudes = tuple(name_attitude(dwell.pose.path) or ATTITUDES[0] for dwell in dwells)
+        positions = tuple(
+            HandPosition(*_statistics(dwell, OUTPUTS), dwell.n, attitude.up, dwell.t_s)
+            for dwell, attitude in zip(dwells, attitudes, strict=True)
+        )
+        unwanted = tuple(attitude for words in skipped if (attitude := name_attitude(words)) is not None)
+        return FieldCourse(positions, attitudes, cast(Any, noise), unwanted)
+
+
+def _statistics(dwell: Dwell, outputs: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean and standard deviation of the outputs, each (3,)."""
+    mean, std = (np.array([values[name] for name in outputs]) for values in (dwell.means, dwell.stds))
+    return mean, std

@@ -28,7 +28,7 @@ def follow(guidance: Guidance, rig: Rig) -> None:
     """Start the simulated hand with this instruction. A bench with a real instrument has none."""
     if isinstance(rig.world, HandheldWorld) and rig.bench.simulated and guidance.moves:
         rig.world.advance(max(rig.clock.now(), rig.world.now_s))
-        rig.world.turn_by_hand(guidance.up)
+        rig.world.turn_by_hand(guidance.up, guidance.north)
 
 
 @singledispatch

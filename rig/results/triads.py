@@ -1,14 +1,12 @@
-"""Results of sensors with three axes: hand-positions, rate-turn and magnetometer-turn."""
+"""Results of sensors with three axes on a stage: rate-turn and magnetometer-turn."""
 
 from __future__ import annotations
 
-import math
 from itertools import permutations
 from math import hypot
 
 import numpy as np
 
-from calibrations.analyses.hand_positions import ANGLES, fit_positions, largest_uncertainty_g
 from calibrations.analyses.magnetometer_turn import (
     Elements,
     ExtremesEstimate,
@@ -28,41 +26,6 @@ from rig.record.measured import Measured, sensor_from_base
 from rig.results.result import Missing, Result, evaluates, fit_shipped, result
 
 AXES = "xyz"
-ANGLE_PAIRS = ("xy", "xz", "yz")
-
-
-@evaluates(
-    "hand-positions",
-    "bias-{axis}",
-    "scale-{axis}",
-    *(f"nonorthogonality-{pair}" for pair in ANGLE_PAIRS),
-    "uncertainty",
-)
-def hand_positions(measured: Measured) -> dict[str, Result | Missing]:
-    """From all positions together, by the magnitude of gravity:
-
-    bias                 output without specific force, in the unit of the outputs
-    scale                that unit per g
-    nonorthogonality-xy  deg, departure of the angle between two sensing axes from 90 deg
-    uncertainty          g, the largest standard uncertainty of these as an error at 1 g
-
-    The uncertainty is Missing if it is above the setting target_g: the run ended at most_positions.
-    """
-    fit = fit_positions(measured.table())
-    results = {f"bias-{e.axis}": result(e) for e in fit.model.estimates("bias")}
-    results |= {f"scale-{e.axis}": result(e) for e in fit.model.estimates("scale-factor")}
-    results |= {f"nonorthogonality-{e.name}": result(e) for e in fit.model.estimates(ANGLES)}
-    worst_g, parameter = largest_uncertainty_g(fit)
-    target_g = float(measured.run.settings.get("target_g", math.inf))
-    if worst_g > target_g:
-        reason = (
-            f"{parameter} is known to {1e3 * worst_g:.3g} mg only, wanted {1e3 * target_g:g} mg; take more positions, "
-            "or longer rests"
-        )
-        return results | {"uncertainty": Missing(reason)}
-    return results | {"uncertainty": Result(worst_g, "g")}
-
-
 AXIS_PAIRS = tuple(own + other for own, other in permutations(AXES, 2))
 
 

@@ -170,7 +170,7 @@ class Book:
         """A world with a hand follows."""
         self.guided.append(guidance)
         if isinstance(self.world, HandheldWorld) and guidance.moves:
-            self.world.turn_by_hand(guidance.up)
+            self.world.turn_by_hand(guidance.up, guidance.north)
 
     def table(self) -> Table:
         """What was kept, as the table that analysis takes."""

@@ -33,11 +33,11 @@ def test_its_settings_have_types_units_and_defaults(name: str) -> None:
         assert kind in (float, int, bool, str) or get_origin(kind) in (tuple, Literal)
         assert parse(procedure, {setting: json.loads(json.dumps(default))})[setting] == default
         if kind is float:
-            assert setting.rpartition("_")[2] in ("deg", "s", "c", "hz", "v", "um", "g")
+            assert setting.rpartition("_")[2] in ("deg", "s", "c", "hz", "v", "um", "g", "percent")
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_it_can_be_planned_on_the_simulated_rig(name: str) -> None:
     procedure = find(name)
-    bench = read_bench(HAND if name == "hand-positions" else None)
+    bench = read_bench(HAND if name.startswith("hand-") else None)
     assert plan(bench, procedure, parse(procedure, {})).duration_s > 0

@@ -6,6 +6,7 @@ import io
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from rig.record.measured import table_of
 from rig.runs.background import status
 from rig.runs.runner import resume, start
 from rig.web.pages.run_begin import before_resume, before_start
+from tests.handling import FIELD_UT, true_ellipsoid
 from tests.rig.rigging import Onlooker
 
 Rig = Callable[..., Any]
@@ -69,6 +71,53 @@ def test_a_run_finds_zeros_gains_and_angles(rig: Rig, rig_home: Path) -> None:
     assert rig("compare", "last", "--model", "linear", "--json").status == 0
     verdict = json.loads(rig("diagnose", "last", "--json").out)
     assert verdict["verdict"] in ("effect-missing", "ambiguous")  # common-scale has one gain for all axes
+
+
+FIELDS_RUN = ("run", "hand-fields", "--bench", str(HAND), "--unattended", "--json")
+
+
+@pytest.mark.slow
+@pytest.mark.sockets
+def test_a_run_finds_hard_and_soft_iron(rig: Rig, rig_home: Path) -> None:
+    ended = rig(*FIELDS_RUN)
+    assert ended.status == 0, ended.err
+    found = json.loads(ended.out)["results"]
+    world = world_of(read_bench(HAND))
+    assert isinstance(world, HandheldWorld)
+    hard_iron, gains = true_ellipsoid(world)
+    strength = np.trace(gains) / 3 * world.config.laboratory.field_ut / FIELD_UT
+    assert [found[f"hard-iron-{axis}"]["value"] for axis in "xyz"] == pytest.approx(hard_iron, abs=2e-3 * strength)
+    assert found["field-total"]["value"] == pytest.approx(strength, rel=2e-3)
+    assert found["uncertainty"]["value"] < 0.2
+    verdict = json.loads(rig("diagnose", "last", "--json").out)
+    assert {"hard-iron"} <= {candidate["effect"] for candidate in verdict["candidates"]}
+    searched = json.loads(rig("discover", "last", "--json").out)
+    assert searched["causes"] == ["hard-iron", "soft-iron"]
+
+
+@pytest.mark.slow
+@pytest.mark.sockets
+def test_a_disturbed_field_is_a_result_that_is_missing(
+    rig: Rig, rig_home: Path, bench_with: Callable[..., Path]
+) -> None:
+    magnet = {"x_mm": 0.0, "z_mm": -80.0, "moment_z_ma_m2": 40.0}
+    bench = bench_with(laboratory={"magnet": magnet})
+    ended = rig("run", "hand-fields", "--bench", str(bench), "--unattended", "--json", "--most-positions", "14")
+    assert ended.status == 1
+    assert "the magnitude of the field differs by" in ended.err
+    assert "rig exclude" in ended.err
+    assert json.loads(ended.out)["results"].keys() >= {"hard-iron-x", "left-by-ellipsoid"}
+    assert rig("diagnose", "last", "--json").status == 0  # nothing is lost
+
+
+def test_a_bench_without_a_magnetometer_is_refused(rig: Rig, rig_home: Path, tmp_path: Path) -> None:
+    document = yaml.safe_load(HAND.read_text(encoding="utf-8"))
+    document["instruments"]["adc"]["settings"]["on_request"] = {}
+    path = tmp_path / "accelerometer.yaml"
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    ended = rig("run", "hand-fields", "--bench", str(path), "--unattended")
+    assert ended.status != 0
+    assert "adc: no input is wired to mx, my, mz; there are ax, ay, az" in ended.err
 
 
 @pytest.mark.slow
@@ -174,6 +223,18 @@ def test_the_map_shows_taken_lacking_and_next() -> None:
     assert sum(line.count("·") for line in lines[1:4]) == 23
     ended = orientation_map(Guidance("", (1.0, 0.0, 0.0), (UP,), moves=False))
     assert not any("◎" in line for line in ended[:-1])
+
+
+def test_the_map_of_a_magnetometer_shows_the_field() -> None:
+    wanted = tuple(np.array([1.0, 0.0, -1.0]) / np.sqrt(2))
+    guidance = Guidance("", (0.0, 0.0, 1.0), ((0.0, 0.0, -1.0),), north=(1.0, 0.0, 0.0), wanted=wanted)
+    lines = orientation_map(guidance)
+    assert "-z with field" in lines[0]
+    assert [line.count("◎") for line in lines[1:4]] == [0, 1, 0]
+    drawn = orientation_drawing(guidance)
+    assert ">north</text>" in drawn
+    assert ">up</text>" in drawn
+    assert ">north</text>" not in orientation_drawing(replace(guidance, north=(), wanted=()))
 
 
 def test_the_drawing_shows_the_next_orientation_and_both_halves() -> None:

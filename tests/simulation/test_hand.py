@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from drivers.handheld.hand import Hand, Script
+from drivers.handheld.motion import rotations
 from drivers.handheld.triad import Mass, Triad, individual, steady_v
-from drivers.handheld.world import INPUTS, Handheld, HandheldWorld, handheld
+from drivers.handheld.world import FIELDS, FORCES, INPUTS, RATES, Handheld, HandheldWorld, handheld
 from drivers.world.config import WorldConfig
 from drivers.world.errors import BadSetting, UnknownSetting
 
@@ -89,7 +91,7 @@ def test_sensors_of_one_kind_differ() -> None:
 
 
 def samples(world: HandheldWorld, start_s: float, n: int = 400) -> np.ndarray:
-    return world.adc_volts(INPUTS, start_s, 0.005, n)
+    return world.adc_volts(FORCES, start_s, 0.005, n)
 
 
 def test_it_continues_sample_for_sample_from_a_kept_state() -> None:
@@ -126,3 +128,75 @@ def test_a_bench_file_sets_the_hand_and_the_sensor() -> None:
         handheld({"hand": {"tremour_g": 1}})
     with pytest.raises(BadSetting, match="defaults"):
         handheld({"hand": 3})
+
+
+TREMBLING = Hand(slips=0.5, errs=0.0, clings=0.0, patience_s=3.0)
+
+
+def test_the_rates_of_a_trembling_hand_lead_from_attitude_to_attitude() -> None:
+    """Integrated in steps of 1 ms, turn by turn."""
+    hand = script(TREMBLING, 2)
+    times_s = np.arange(0.0, 24.0, 1e-3)
+    parts = []
+    attitudes = (EDGE, [0.0, 1.0, 0.0]), ([0.0, -1.0, 0.0], [1.0, 0.0, 0.0]), ([0.0, 0.0, 1.0], None)
+    for k, (up, north) in enumerate(attitudes):
+        hand.turn_to(np.array(up), 8.0 * k, None if north is None else np.array(north))
+        parts.append(hand.motion(times_s[8000 * k : 8000 * (k + 1)]))
+    moved = np.concatenate([part.attitude for part in parts])
+    rates_rad_s = np.radians(np.concatenate([part.rate_deg_s for part in parts]))
+    assert np.degrees(np.linalg.norm(rates_rad_s, axis=1).max()) > 90
+    attitude = moved[0]
+    for turned in rotations(-(rates_rad_s[1:] + rates_rad_s[:-1]) / 2 * 1e-3):
+        attitude = turned @ attitude
+    assert attitude == pytest.approx(moved[-1], abs=2e-4)
+
+
+def test_it_points_the_wanted_side_to_the_north() -> None:
+    hand = script(replace(CALM, heading_deg=0.0))
+    hand.turn_to(np.array([1.0, 0.0, 0.0]), 0.0, np.array([0.0, 0.0, 1.0]))
+    attitude = hand.motion(np.array([8.0])).attitude[0]
+    assert attitude[:, 0] == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
+    assert attitude[:, 2] == pytest.approx([1.0, 0.0, 0.0], abs=1e-9)
+    assert attitude.T @ attitude == pytest.approx(np.eye(3))
+    assert np.linalg.det(attitude) == pytest.approx(1.0)
+
+
+def units(world: HandheldWorld, names: Sequence[str], start_s: float, n: int = 400) -> np.ndarray:
+    return world.sensed(names, start_s, 0.005, n)
+
+
+def test_a_magnetometer_senses_the_field_of_the_place_and_a_gyroscope_the_earth() -> None:
+    place = {"field_ut": 50.0, "dip_deg": 60.0, "declination_deg": 0.0}
+    config = WorldConfig.from_mapping({"preset": "ideal", "laboratory": place})
+    world = HandheldWorld(config, 3, Handheld(hand=CALM))
+    field = units(world, FIELDS, 0.0, 4000).mean(axis=0)
+    assert field == pytest.approx([25.0, 0.0, -25.0 * np.sqrt(3)], abs=0.02)  # x to the north, z upward
+    rate = units(world, RATES, 25.0, 40_000).mean(axis=0)
+    latitude = np.radians(config.laboratory.latitude_deg)
+    assert rate == pytest.approx(np.array([np.cos(latitude), 0, np.sin(latitude)]) * 360 / 86164, abs=5e-3)
+
+
+def test_a_magnet_in_the_table_changes_the_field_from_place_to_place() -> None:
+    magnet = {"x_mm": 0.0, "z_mm": -80.0, "moment_z_ma_m2": 20.0}
+    sizes = {}
+    for name, laboratory in {"clean": {}, "magnet": {"magnet": magnet}}.items():
+        config = WorldConfig.from_mapping({"preset": "ideal", "laboratory": laboratory})
+        world = HandheldWorld(config, 3, Handheld(hand=CALM))
+        means = []
+        for k, side in enumerate(np.vstack([np.eye(3), -np.eye(3)])):
+            world.turn_by_hand(side, np.roll(side, 1))
+            units(world, FIELDS, 8.0 * k, 1400)
+            means.append(units(world, FIELDS, 8.0 * k + 7.0, 100).mean(axis=0))
+        sizes[name] = np.linalg.norm(means, axis=1)
+    assert np.ptp(sizes["clean"]) < 0.1
+    assert np.ptp(sizes["magnet"]) > 1.0
+
+
+def test_all_sensors_of_a_hand_continue_from_a_kept_state() -> None:
+    one, other = (HandheldWorld(WorldConfig.ideal(), 3, Handheld()) for _ in range(2))
+    one.turn_by_hand((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    units(one, INPUTS, 0.0)
+    kept = json.loads(json.dumps(one.state()))
+    expected = units(one, INPUTS, 2.0, 4000)
+    other.restore(kept)
+    assert np.array_equal(units(other, INPUTS, 2.0, 4000), expected)

@@ -1,0 +1,199 @@
+"""Positions at rest of a sensor in a hand: the part that all procedures by hand have in common.
+
+The noise at rest is measured first. Then the program says which attitude it needs, sees when the sensor is at rest in a
+new one, takes the position, and ends when the uncertainties are small enough.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from procedures.errors import NoAnswer, SettingError
+from procedures.instruments import Samples
+from procedures.session import (
+    Dwell,
+    Guidance,
+    HandAnalysis,
+    HandCourse,
+    NoiseAtRest,
+    Pose,
+    Session,
+    require_possible,
+)
+
+WINDOW_S = 0.5  # of a test of rest
+LEARNED = 20  # windows of rest that show the noise
+LONGEST_WAIT_S = 86_400.0
+FEWEST = 12  # positions: nine parameters, and three that check them
+KNOWN = "this position is known already"
+SIDES = 6  # the first positions
+TRIES = 2  # rests at known positions before another orientation is wanted
+FLAT = (0.0, 0.0, 1.0)
+
+Course = Callable[[Sequence[Dwell], NoiseAtRest, Sequence[str]], HandCourse]
+
+
+@dataclass(frozen=True)
+class RestWindows:
+    """Successive windows of one rest, as one block of samples."""
+
+    volts: NDArray[np.float64]
+    channels: Sequence[str]
+    rate_hz: float
+    start_s: float
+    temperature_c: float | None
+
+    @staticmethod
+    def of(windows: Sequence[Samples]) -> RestWindows:
+        """All `windows` joined."""
+        first = windows[0]
+        volts = np.concatenate([w.volts for w in windows])
+        reported = [w.temperature_c for w in windows if w.temperature_c is not None]
+        temperature_c = float(np.mean(reported)) if reported else None
+        return RestWindows(volts, first.channels, first.rate_hz, first.start_s, temperature_c)
+
+
+@dataclass(frozen=True)
+class Goal:
+    """When the positions suffice. `target` is a share of the full scale, which is shown times `shown` in `unit`."""
+
+    procedure: str
+    setting: str
+    target: float
+    shown: float
+    unit: str
+    rest_s: float
+    most_positions: int
+    wait_s: float
+
+    def require_valid(self) -> None:
+        """Raises SettingError for settings that no run can have."""
+        if (
+            self.target <= 0
+            or not 0 < self.wait_s <= LONGEST_WAIT_S
+            or self.rest_s < 2 * WINDOW_S
+            or self.most_positions < FEWEST
+        ):
+            raise SettingError(
+                f"{self.procedure}: {self.setting} and wait_s must be above 0, wait_s at most {LONGEST_WAIT_S:g}, "
+                f"rest_s at least {2 * WINDOW_S:g}, most_positions at least {FEWEST}"
+            )
+        require_possible(self.most_positions, "a smaller most_positions")
+
+    def is_reached(self, course: HandCourse) -> bool:
+        """Whether the positions suffice, or are as many as allowed."""
+        return course.count >= self.most_positions or course.uncertainty[0] <= self.target
+
+    def progress(self, course: HandCourse) -> str:
+        """What is known so far, in words; empty before that is known."""
+        worst, parameter = course.uncertainty
+        if not parameter:
+            return ""
+        known, wanted = f"{self.shown * worst:.2g} {self.unit}", f"{self.shown * self.target:g} {self.unit}"
+        return "; ".join(filter(None, (f"{parameter} is known to {known}, wanted {wanted}", course.doubt)))
+
+
+def require_analysis(rig: Session, procedure: str) -> HandAnalysis:
+    """The analysis by hand. Raises SettingError for a session without it."""
+    if rig.by_hand is None:
+        raise SettingError(f"{procedure}: this session has no analysis of positions; run it with `rig run`")
+    return rig.by_hand
+
+
+def take_positions(rig: Session, outputs: Sequence[str], question: str, course_of: Course, goal: Goal) -> None:
+    """Take positions of the sensor with these outputs until the goal is reached. Raises Declined, NoAnswer."""
+    analysis = require_analysis(rig, goal.procedure)
+    rig = replace(rig, adc=rig.adc.only(*outputs))
+    rig.confirm("at-rest", question)
+    noise = learn_noise(rig, analysis, goal.wait_s)
+    skipped: list[str] = []
+    while not goal.is_reached(course := course_of(rig.measured(), noise, skipped)):
+        rig.host.expect(max(1, FEWEST - course.count))
+        rig.host.guide(_guidance(course, goal))
+        next_rest = _find_next_rest(rig, analysis, course, noise, goal)
+        if next_rest is None:
+            skipped.append(course.words)
+            continue
+        if course.count >= SIDES:  # the directions are known, so no position has a wrong name any more
+            skipped.clear()
+        rig.keep(Pose(0.0, 0.0, path=course.words), samples=next_rest, temperature_c=rig.oven.temperature_c())
+    rig.host.guide(_guidance(course, goal, is_complete=True))
+
+
+def _guidance(course: HandCourse, goal: Goal, is_complete: bool = False) -> Guidance:
+    """The next action of the person, in words, and the drawing."""
+    progress = goal.progress(course)
+    if is_complete:
+        text = f"{course.count} positions taken; {progress}"
+    else:
+        turn = f" ({course.turn})" if course.turn else ""
+        text = "; ".join(filter(None, (f"position {course.count + 1}: {course.words}{turn}, then let go", progress)))
+    taken = tuple(tuple(map(float, direction)) for direction in course.directions)
+    return Guidance(text, course.up, taken, not is_complete, course.north, course.wanted if course.north else ())
+
+
+def learn_noise(rig: Session, analysis: HandAnalysis, wait_s: float) -> NoiseAtRest:
+    """The noise of the sensor at rest, from the first stretch of windows that are alike. Raises NoAnswer."""
+    rig.host.guide(
+        Guidance("leave the sensor on the table for 10 s: the program measures its noise", FLAT, moves=False)
+    )
+    windows: list[NDArray[np.float64]] = []
+    for _ in range(max(2 * LEARNED, round(wait_s / WINDOW_S))):
+        samples = rig.adc.acquire(WINDOW_S)
+        windows = [*windows, samples.volts][-LEARNED:]
+        if (noise := analysis.learn(windows, samples.rate_hz)) is not None:
+            return noise
+    raise NoAnswer(
+        f"the sensor was not at rest for {LEARNED * WINDOW_S:g} s within {wait_s:g} s; put it on a firm table away "
+        "from motors, let it go, and resume the run"
+    )
+
+
+def _find_next_rest(
+    rig: Session, analysis: HandAnalysis, course: HandCourse, noise: NoiseAtRest, goal: Goal
+) -> RestWindows | None:
+    """The next rest at a new position. The first window of a rest is left out: the hand has just let go.
+
+    None after TRIES rests at known positions: an earlier position was not the one that the person was told, and is the
+    wanted one. Raises NoAnswer after `wait_s` without one.
+    """
+    windows: list[Samples] = []
+    doing, refusals = Doing(rig), 0
+    for _ in range(round(goal.wait_s / WINDOW_S)):
+        windows.append(rig.adc.acquire(WINDOW_S))
+        stillness = analysis.judge([w.volts for w in windows], noise)
+        if not stillness.still:
+            doing.say(
+                f"{course.words}: the sensor moves ({stillness.noise:.2g} times the noise at rest, by {stillness.by})"
+            )
+            windows = windows[1:] if stillness.by == "creep" else []
+            if refusals >= TRIES:
+                return None
+        elif len(windows) * WINDOW_S <= goal.rest_s:
+            doing.say(f"{course.words}: at rest, wait")
+        elif course.is_new((candidate := RestWindows.of(windows[1:])).volts.mean(axis=0)):
+            return candidate
+        else:
+            refusals += not doing.text.startswith(KNOWN)
+            doing.say(f"{KNOWN}; needed: {course.words}")
+            windows = windows[1:]
+    raise NoAnswer(
+        f"no new position for {goal.wait_s:g} s; needed: {course.words}; {doing.text}; resume the run to go on"
+    )
+
+
+@dataclass
+class Doing:
+    """The present step, reported once."""
+
+    rig: Session
+    text: str = ""
+
+    def say(self, text: str) -> None:
+        if text.partition("(")[0] != self.text.partition("(")[0]:
+            self.rig.host.doing(text)
+        self.text = text

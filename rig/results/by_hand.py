@@ -1,0 +1,89 @@
+"""Results of sensors in a hand: hand-positions and hand-fields."""
+
+from __future__ import annotations
+
+import math
+
+from calibrations.analyses.hand_fields import field_doubt, fit_fields, largest_uncertainty
+from calibrations.analyses.hand_positions import ANGLES, fit_positions, largest_uncertainty_g
+from calibrations.geometry.sphere import magnetometer_coverage_warning
+from calibrations.means.noise import rms
+from rig.record.measured import Measured
+from rig.results.result import Missing, Result, evaluates, result
+from rig.results.triads import SOFT
+
+ANGLE_PAIRS = ("xy", "xz", "yz")
+
+
+@evaluates(
+    "hand-positions",
+    "bias-{axis}",
+    "scale-{axis}",
+    *(f"nonorthogonality-{pair}" for pair in ANGLE_PAIRS),
+    "uncertainty",
+)
+def hand_positions(measured: Measured) -> dict[str, Result | Missing]:
+    """From all positions together, by the magnitude of gravity:
+
+    bias                 output without specific force, in the unit of the outputs
+    scale                that unit per g
+    nonorthogonality-xy  deg, departure of the angle between two sensing axes from 90 deg
+    uncertainty          g, the largest standard uncertainty of these as an error at 1 g
+
+    The uncertainty is Missing if it is above the setting target_g: the run ended at most_positions.
+    """
+    fit = fit_positions(measured.table())
+    results = {f"bias-{e.axis}": result(e) for e in fit.model.estimates("bias")}
+    results |= {f"scale-{e.axis}": result(e) for e in fit.model.estimates("scale-factor")}
+    results |= {f"nonorthogonality-{e.name}": result(e) for e in fit.model.estimates(ANGLES)}
+    worst_g, parameter = largest_uncertainty_g(fit)
+    target_g = float(measured.run.settings.get("target_g", math.inf))
+    if worst_g > target_g:
+        reason = (
+            f"{parameter} is known to {1e3 * worst_g:.3g} mg only, wanted {1e3 * target_g:g} mg; take more positions, "
+            "or longer rests"
+        )
+        return results | {"uncertainty": Missing(reason)}
+    return results | {"uncertainty": Result(worst_g, "g")}
+
+
+@evaluates(
+    "hand-fields",
+    "hard-iron-{axis}",
+    *(f"soft-iron-{pair}" for pair in SOFT),
+    *("field-total", "left-by-ellipsoid", "uncertainty"),
+)
+def hand_fields(measured: Measured) -> dict[str, Result | Missing]:
+    """From all positions together, by the magnitude of the field:
+
+    hard-iron          of each axis, in the unit of the outputs
+    soft-iron          relative, as in the effect soft-iron
+    field-total        the strength of the field, in the unit of the outputs
+    left-by-ellipsoid  rms residual of the magnitude, per mille of the field
+    uncertainty        %, the largest standard uncertainty of these as a share of the field
+
+    The uncertainty is Missing if it is above the setting target_percent, and if the field differs from position to
+    position: then it contains iron that does not turn with the sensor.
+    """
+    table = measured.table()
+    if reason := magnetometer_coverage_warning(table):
+        names = (*(f"hard-iron-{axis}" for axis in "xyz"), *(f"soft-iron-{pair}" for pair in SOFT))
+        return {name: Missing(reason) for name in (*names, "field-total", "left-by-ellipsoid", "uncertainty")}
+    fit = fit_fields(table)
+    (strength,) = fit.model.estimates("field-strength")
+    results = {f"hard-iron-{e.axis}": result(e) for e in fit.model.estimates("hard-iron")}
+    results |= {f"soft-iron-{e.name}": result(e) for e in fit.model.estimates("soft-iron")}
+    results |= {"field-total": result(strength)}
+    results |= {"left-by-ellipsoid": Result(float(1e3 * rms(fit.residual)[0]), "per mille")}
+    if doubt := field_doubt(fit):
+        remedy = "move away from it and repeat the run, or leave out the pose with `rig exclude`"
+        return results | {"uncertainty": Missing(f"{doubt}; {remedy}")}
+    worst, parameter = largest_uncertainty(fit)
+    target_percent = float(measured.run.settings.get("target_percent", math.inf))
+    if 100 * worst > target_percent:
+        reason = (
+            f"{parameter} is known to {100 * worst:.2g} % of the field only, wanted {target_percent:g} %; take more "
+            "positions, or longer rests"
+        )
+        return results | {"uncertainty": Missing(reason)}
+    return results | {"uncertainty": Result(100 * worst, "%")}
