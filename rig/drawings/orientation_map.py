@@ -41,6 +41,7 @@ def orientation_map(guidance: Guidance) -> list[str]:
 
 WIDTH, HEIGHT = 820, 300
 CUBE, CUBE_PX = (150, 180), 50.0
+BESIDE = (78, 62)  # of the cube: where the arrow to the north begins
 DISCS = (((430, 164), 1, "+z half"), ((680, 164), -1, "-z half"))
 DISC_PX = 88.0
 VIEW = np.array([0.5, -0.7, 0.6])  # from the sensor to who looks at it; z is upward
@@ -53,16 +54,18 @@ def orientation_drawing(guidance: Guidance) -> str:
 
 
 def _content(guidance: Guidance) -> Iterator[str]:
-    yield svg.text((16, 20), guidance.text, 17, anchor="start", bold=True)
+    action, _, progress = guidance.text.partition("; ")
+    yield svg.text((16, 20), action, 16, anchor="start", bold=True)
+    yield svg.text((16, 42), progress, 14, svg.QUIET, anchor="start")
     if guidance.moves:
         yield from _resting_cube(np.array(guidance.up), np.array(guidance.north))
     marks = _marks(guidance)
     for centre, half, name in DISCS:
-        of = " of the field" if guidance.north else ""
-        yield svg.text((centre[0] - 92 + 4 * len(of), 66), name.replace("-", "−") + of, 14, svg.QUIET, bold=True)
+        yield svg.text((centre[0] - 92, 66), name.replace("-", "−"), 14, svg.QUIET, bold=True)
         yield from _disc(centre, half, marks)
     counts = f"{TAKEN} taken ({sum(mark == TAKEN for mark in marks.values())} of {len(marks)})   {WANTED} next"
-    yield svg.text((555, 287), f"{counts}   ○ not yet", 13, svg.QUIET)
+    of = "directions of the field: " if guidance.north else ""
+    yield svg.text((555, 287), f"{of}{counts}   ○ not yet", 13, svg.QUIET)
 
 
 def _disc(centre: tuple[int, int], half: int, marks: dict[tuple[int, int, int], str]) -> Iterator[str]:
@@ -104,8 +107,9 @@ def _resting_cube(up: Array, north: Array) -> Iterator[str]:
             yield svg.polygon([seen(corner) for corner in corners], SIDES[axis], svg.INK, 1.2)
             yield svg.text(seen(normal), f"{'+' if sign > 0 else '−'}{axis}", 15, bold=True)
     if len(north):
-        reach = np.abs(north).max()
-        start, end = seen(1.1 / reach * north), seen((1.1 / reach + 1.1) * north)
+        middle, ahead = seen(np.zeros(3)), seen(1.1 * north)
+        start = CUBE[0] + BESIDE[0], CUBE[1] + BESIDE[1]
+        end = start[0] + ahead[0] - middle[0], start[1] + ahead[1] - middle[1]
         yield svg.arrow(start, end, svg.BLUE)
         yield svg.text((end[0] + 6, end[1] + 4), "north", 13, svg.BLUE, "start", bold=True)
     x, y = seen(np.sign(np.round(up, 6)))
