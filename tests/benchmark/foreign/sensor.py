@@ -17,9 +17,10 @@ SAMPLES = 5000
 
 @dataclass(frozen=True)
 class Hidden:
-    """A cause with its size, so that it adds the demanded rms to the output."""
+    """A cause in its scene, with its size, so that it adds the demanded rms to the output."""
 
     cause: Cause
+    scene: Scene
     size: float
 
 
@@ -34,23 +35,23 @@ class Sensor:
 
     def output(self, hidden: Sequence[Hidden], noise: Array | float = 0.0) -> Array:
         """Means, V, (n, 2), with such noise in front of the converter."""
-        stages = {name: [(h, s) for h, s in zip(hidden, self.scenes, strict=False) if h.cause.stage == name]
+        stages = {name: [h for h in hidden if h.cause.stage == name]
                   for name in ("angles", "tilt", "frame", "response", "volts")}  # fmt: skip
         angles = (self.bench.alpha, self.bench.beta)
-        for h, scene in stages["angles"]:
-            angles = h.cause.law(angles, h.size, scene)
+        for h in stages["angles"]:
+            angles = h.cause.law(angles, h.size, h.scene)
         up = np.array([[0.0, 0.0, 1.0]])
-        for h, scene in stages["tilt"]:
-            up = h.cause.law(up, h.size, scene)
+        for h in stages["tilt"]:
+            up = h.cause.law(up, h.size, h.scene)
         force = turned(*angles, up[0])
-        for h, scene in stages["frame"]:
-            force = h.cause.law(force, h.size, scene)
+        for h in stages["frame"]:
+            force = h.cause.law(force, h.size, h.scene)
         u = force[:, :2]
-        for h, scene in stages["response"]:
-            u = h.cause.law(u, h.size, scene)
+        for h in stages["response"]:
+            u = h.cause.law(u, h.size, h.scene)
         v = self.bias_v + self.gain_v * u + noise
-        for h, scene in stages["volts"]:
-            v = h.cause.law(v, h.size, scene)
+        for h in stages["volts"]:
+            v = h.cause.law(v, h.size, h.scene)
         return v
 
 
@@ -77,15 +78,14 @@ def sensor(random: np.random.Generator, causes: int) -> Sensor:
     return Sensor(b, random.uniform(2.4, 2.6, 2), random.uniform(0.9, 1.1, 2), scenes)
 
 
-def sized(plain: Sensor, cause: Cause, scene: int, rms_v: float) -> Hidden:
+def sized(plain: Sensor, cause: Cause, scene: Scene, rms_v: float) -> Hidden:
     """The cause with the size at which it adds so much beyond bias, scale factor and the other causes' absence."""
-    alone = Sensor(plain.bench, plain.bias_v, plain.gain_v, (plain.scenes[scene],))
-    nothing = alone.output(())
+    nothing = plain.output(())
     linear = cause.stage in ("frame", "tilt") or cause.name == "stage-zero-offset"
-    base = np.column_stack([np.ones(plain.bench.n), plain.scenes[scene].force[:, :2]])
+    base = np.column_stack([np.ones(plain.bench.n), scene.force[:, :2]])
 
     def added(size: float) -> float:
-        d = alone.output((Hidden(cause, size),)) - nothing
+        d = plain.output((Hidden(cause, scene, size),)) - nothing
         columns = [base[:, [0, k + 1]] if linear else base for k in range(2)]
         left = [d[:, k] - c @ np.linalg.lstsq(c, d[:, k], rcond=None)[0] for k, c in enumerate(columns)]
         return float(np.sqrt(np.mean(np.square(left))))
@@ -96,13 +96,13 @@ def sized(plain: Sensor, cause: Cause, scene: int, rms_v: float) -> Hidden:
     for _ in range(40):
         middle = np.sqrt(low * high)
         low, high = (middle, high) if added(middle) < rms_v else (low, middle)
-    return Hidden(cause, high)
+    return Hidden(cause, scene, high)
 
 
 def table(random: np.random.Generator, causes: Sequence[Cause], floors: Sequence[float], slow: float) -> str:
     """A sensor with hidden causes of these sizes, in noise floors, as CSV text. `slow`: slow noise over white noise."""
     made = sensor(random, len(causes))
-    hidden = [sized(made, c, i, size * WHITE_V) for i, (c, size) in enumerate(zip(causes, floors, strict=True))]
+    hidden = [sized(made, c, s, size * WHITE_V) for c, s, size in zip(causes, made.scenes, floors, strict=True)]
     return logged(random, made, hidden, slow)
 
 
@@ -112,10 +112,9 @@ def logged(random: np.random.Generator, made: Sensor, hidden: Sequence[Hidden], 
     noise = random.normal(0, WHITE_V, (b.n, 2))
     noise += slow * WHITE_V * np.column_stack([flicker(random, b.t) for _ in range(2)])
     v = made.output(hidden, noise)
-    rounding = [(h, scene) for h, scene in zip(hidden, made.scenes, strict=False) if h.cause.name == "quantisation"]
     std = np.tile(b.sample_noise_v[:, None], (1, 2))
-    for h, scene in rounding:
-        std = rounded(made.output([other for other in hidden if other is not h], noise), h.size, scene)[1]
+    for rounding in [h for h in hidden if h.cause.name == "quantisation"]:
+        std = rounded(made.output([h for h in hidden if h is not rounding], noise), rounding.size, rounding.scene)[1]
     std = std * random.normal(1, 1 / np.sqrt(500), (b.n, 2))
     lines = ["# sample_rate_hz: 1000", "# filter_corner_hz: 15.2",
              "path,t_s,alpha_deg,beta_deg,direction,temperature_c,vx_v,vy_v,vx_std_v,vy_std_v,n,supply_v"]  # fmt: skip
