@@ -136,18 +136,28 @@ def _without_idle_additions(
 ) -> tuple[list[Addition], list[Fit]]:
     """The additions and fits without those, causes apart, that lower neither the error of the fit nor the unseen error.
 
-    Slow noise, or a free form beside them, describes their part as well.
+    Slow noise, or a free form beside them, describes their part as well. All are left out at once, or, where the unseen
+    error grows by that, one after another.
     """
     base, end = fits[0], fits[-1]
-    needed = [
-        addition
+    remaining = {
+        addition.effect.name: after.pooled_excess / before.pooled_excess
         for addition, (before, after) in zip(selected, pairwise(fits), strict=True)
-        if addition.effect.name in causes or after.pooled_excess < IDLE * before.pooled_excess
-    ]
-    if len(needed) == len(selected) or not needed:
+        if addition.effect.name not in causes
+    }
+    idle = [a for a in selected if remaining.get(a.effect.name, 0.0) >= IDLE]
+    if not idle or len(idle) == len(selected):
         return selected, fits
-    without = fit_together(base, needed)
-    if without.held_out_excess > NO_WORSE * end.held_out_excess:
+    idle.sort(key=lambda a: remaining[a.effect.name], reverse=True)
+    needed, without = selected, end
+    for left_out in (idle, *([addition] for addition in idle if len(idle) > 1)):
+        fewer = [a for a in needed if a not in left_out]
+        alternative = fit_together(base, fewer)
+        if alternative.held_out_excess <= NO_WORSE * end.held_out_excess:
+            needed, without = fewer, alternative
+            if left_out is idle:
+                break
+    if len(needed) == len(selected):
         return selected, fits
     return needed, [base, *fit_successively(base, without, needed)]
 
