@@ -129,6 +129,7 @@ def _summary(result: Discovery[F]) -> list[Document]:
         {
             "place": line.place,
             "effects": list(line.effects),
+            "possible_effects": list(line.possible),
             "size": line.size,
             "unit": line.unit,
             "share": line.share,

@@ -6,7 +6,7 @@ a line is its part of the squares of all lines.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,11 +28,13 @@ class Line:
     """One cause. `size`: rms in thousandths of the sensed unit; `certainty`: 1 minus the chance of it by noise alone.
 
     The certainty is that of the effect or of the added effects that the data cannot separate from it.
-    `effects`: () if the form is unknown. `in_another_form`: a free form describes the remainder of the effects.
+    `effects`: those named as causes, () if the form is unknown. `possible`: effects of the model that describe the
+    place and are not named, as the data do not show enough of them. `in_another_form`: a free form describes the rest.
     """
 
     place: str
     effects: tuple[str, ...]
+    possible: tuple[str, ...]
     size: float
     unit: str
     share: float
@@ -44,7 +46,8 @@ class Line:
     def effect(self) -> str:
         """The effects in words."""
         names = ", ".join(self.effects) or UNKNOWN
-        return f"{names} (another form)" if self.in_another_form else names
+        named = f"{names} (another form)" if self.in_another_form else names
+        return f"{named}, perhaps {' or '.join(self.possible)}" if self.possible else named
 
 
 def step_shares(discovery: Discovery[Fit]) -> list[float | None]:
@@ -70,39 +73,32 @@ def summary_lines(discovery: Discovery[Fit]) -> list[Line]:
     floor, unit = pool_in_milli(end)[1], milli_unit(end)
     added_effects = {step.name for step in discovery.steps}
     alternatives = discovery.alternatives
-    lines, listed = [], set[str]()
+    lines, listed = list[Line](), set[str]()
     for place in findings.places:
-        effects = tuple(c for c in place.causes if c in added_effects)
-        if not effects and f"{PREFIX}{place.name}" not in added_effects:
+        in_model = [c for c in place.causes if c in added_effects]
+        free_form = f"{PREFIX}{place.name}"
+        if not in_model and free_form not in added_effects:
             continue  # an effect with another name explains it, or the search stopped before
+        effects = tuple(c for c in in_model if c in discovery.causes)
+        possible = tuple(c for c in in_model if c not in discovery.causes)
         rivals = dict.fromkeys([*place.inseparable_from, *(r for e in effects for r in alternatives.get(e, ()))])
-        certainty = 1 - place.p_value
-        lines.append((place.name, effects, place.size * floor, certainty, tuple(rivals)))
-        listed |= {*effects, f"{PREFIX}{place.name}"}
+        in_another_form = bool(effects) and free_form in added_effects
+        size, certainty = place.size * floor, 1 - place.p_value
+        lines.append(Line(place.name, effects, possible, size, unit, 0.0, certainty, tuple(rivals), in_another_form))
+        listed |= {*in_model, free_form}
     for step in discovery.steps:
         if step.name in listed or (step.name in discovery.refinements and not step.name.startswith(PREFIX)):
             continue
         change = rms(in_milli_rows(step.after.residual - step.before.residual, end))
-        rivals_of_step = tuple(alternatives.get(step.name, ()))
-        p = chance(*first_order_cost(end, step.name, *added_effects.intersection(rivals_of_step)))
+        size = float(np.sqrt(np.mean(change**2)))
+        inseparable = tuple(alternatives.get(step.name, ()))
+        certainty = 1 - chance(*first_order_cost(end, step.name, *added_effects.intersection(inseparable)))
         effects = () if step.name.startswith(PREFIX) else (step.name,)
         place_name = place_of_effect(step.name) or "-"
-        lines.append((place_name, effects, float(np.sqrt(np.mean(change**2))), 1 - p, rivals_of_step))
-    total = sum(size**2 for _, _, size, _, _ in lines) or 1.0
-    summary = [
-        Line(
-            place_name,
-            e,
-            size,
-            unit,
-            size**2 / total,
-            certainty,
-            rivals,
-            bool(e) and f"{PREFIX}{place_name}" in added_effects,
-        )
-        for place_name, e, size, certainty, rivals in lines
-    ]
-    return sorted(summary, key=lambda line: -line.size)
+        in_another_form = bool(effects) and f"{PREFIX}{place_name}" in added_effects
+        lines.append(Line(place_name, effects, (), size, unit, 0.0, certainty, inseparable, in_another_form))
+    total = sum(line.size**2 for line in lines) or 1.0
+    return sorted((replace(line, share=line.size**2 / total) for line in lines), key=lambda line: -line.size)
 
 
 def in_milli_rows(values: Array, fit: Fit) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -84,6 +86,17 @@ def test_the_summary_has_a_line_for_each_cause_and_the_shares_of_the_steps_add_u
     text = discovery_text(found)
     assert all(line.effect in text for line in lines)
     assert "certainty" in text
+
+
+def test_an_effect_of_the_model_that_is_no_named_cause_is_called_possible() -> None:
+    found = discover(table(1e-3 * np.cos(4 * FORCES[:, [1, 0]]) + 1e-3 * FORCES[:, :2] ** 3), read_model("linear"))
+    unnamed = replace(found, findings=replace(found.findings, causes=()))
+    own, own_unnamed = (
+        next(line for line in summary_lines(result) if line.place == "own-response") for result in (found, unnamed)
+    )
+    assert (own.effects, own.possible) == (("cubic-nonlinearity",), ())
+    assert (own_unnamed.effects, own_unnamed.possible) == ((), ("cubic-nonlinearity",))
+    assert own_unnamed.effect == "unknown form, perhaps cubic-nonlinearity"
 
 
 def test_an_effect_with_one_parameter_is_certain_where_the_data_show_it() -> None:
