@@ -4,6 +4,7 @@
     kalman          unknowns that change by themselves: prediction and correction
     robust          a standard deviation that outliers hardly change
     scatter         the level of a logged column without the scatter of its reader
+    rounding        the mean of samples that a converter rounds
     approach        an exponential approach to a steady state, followed by a bank of Kalman filters
 
 Source  Book 18.2-18.4, equations (18.1)-(18.10).

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
+from calibrations.estimators.rounding import mean_of_rounded
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import Component, Starts
 from calibrations.free_forms.poses import PoseData
@@ -32,7 +32,6 @@ SAME_REMAINDER = (
 )
 SAW = "output/quantisation"  # the component that a search without stairs leaves out
 GRID = np.linspace(-1.0, 1.0, 401)  # of a step, about a code
-REACH = 3  # codes to either side that noise may reach
 LEAST_NOISE = 0.02  # of a step
 TREAD = np.linspace(-0.5, 0.5, 400, endpoint=False)  # of a step, about a code
 NOISES = tuple(map(float, np.geomspace(LEAST_NOISE, 0.4, 41)))  # of a sample, in steps: with more no stairs are seen
@@ -96,7 +95,7 @@ def _sample_noise(outputs: Array, white: Array, step: float, offset: float) -> f
     fraction, std = ((outputs - offset) / step).ravel()[:, None], np.maximum(white / step, NARROWEST).ravel()[:, None]
 
     def likelihood(share: float) -> float:
-        deviation = _mean_code(TREAD, 1.0, 0.0, share) - fraction
+        deviation = mean_of_rounded(TREAD, 1.0, 0.0, share) - fraction
         density = np.mean(np.exp(-0.5 * ((deviation - np.round(deviation)) / std) ** 2), axis=1)
         return float(np.sum(np.log(np.maximum(density, OUTLIER))))
 
@@ -140,7 +139,7 @@ def before_stairs(table: Table, white: Array, stairs: Stairs) -> Table:
     """
     code = np.round((table.outputs.T - stairs.offset) / stairs.step)
     fraction = (table.outputs.T - stairs.offset) / stairs.step - code  # of a step, beyond the code
-    mean = _mean_code(GRID, 1.0, 0.0, stairs.noise / stairs.step)
+    mean = mean_of_rounded(GRID, 1.0, 0.0, max(stairs.noise / stairs.step, LEAST_NOISE))
     std = np.maximum(white / stairs.step, 1e-3)
     weights = np.exp(-0.5 * ((mean - fraction[..., None]) / std[..., None]) ** 2)
     total = weights.sum(axis=2)
@@ -161,23 +160,14 @@ def fit_stairs(table: Table, unrounded: Array, white: Array, stairs: Stairs) -> 
 
     def residual(u: Array) -> Array:
         step, offset = stairs.step * (1 + u[1] * stairs.step / np.ptp(outputs)), code + u[0] * stairs.step
-        return ((outputs - _mean_code(unrounded, step, offset, stairs.noise)) / white).ravel()
+        return (
+            (outputs - mean_of_rounded(unrounded, step, offset, max(stairs.noise, LEAST_NOISE * step))) / white
+        ).ravel()
 
     grid = np.linspace(-0.1, 0.1, 21)
     start = min(((a, b) for a in grid for b in grid), key=lambda u: float(np.sum(np.abs(residual(np.array(u))))))
     step = stairs.step * (1 + start[1] * stairs.step / float(np.ptp(outputs)))
     return Stairs(step, code + start[0] * stairs.step - begins * step, stairs.noise)
-
-
-def _mean_code(values: Array, step: float, offset: float, noise: float) -> Array:
-    """Means of samples of such noise, rounded."""
-    codes = (values - offset) / step
-    nearest = np.round(codes)
-    deviation, share = codes - nearest, max(noise / step, LEAST_NOISE)
-    mean = nearest
-    for j in range(REACH):
-        mean = mean + ndtr((deviation - 0.5 - j) / share) - ndtr((-deviation - 0.5 - j) / share)
-    return np.asarray(offset + step * mean)
 
 
 def find_saw(

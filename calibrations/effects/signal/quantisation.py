@@ -1,14 +1,13 @@
 from functools import lru_cache
 
 import numpy as np
-import scipy  # its rooms are loaded where they are first entered: a list of effects needs none
 from numpy.typing import NDArray
 
 from calibrations.effects import Effect, Parameter, Values
+from calibrations.estimators.rounding import mean_of_rounded
 from calibrations.geometry.smooth import smooth_columns
 from calibrations.table import Array, Table
 
-CODES = 3  # to either side, that noise may reach
 LEAST_NOISE = 1e-3  # of a step
 FINEST = 4.0  # points in a resolved interval of frequency
 MOST = 20_000  # frequencies
@@ -62,18 +61,8 @@ class Quantisation(Effect):
         return len(_frequencies(table)) / FINEST
 
     def output(self, v: Array, table: Table, p: Values) -> Array:
-        codes = (v - p.offset) / p.step
-        nearest = np.round(codes)
-        remainder = codes - nearest
-        noise = max(float(p.noise / p.step), LEAST_NOISE)
-        mean = nearest
-        for j in range(CODES):
-            mean = (
-                mean
-                + scipy.special.ndtr((remainder - 0.5 - j) / noise)
-                - scipy.special.ndtr((-remainder - 0.5 - j) / noise)
-            )
-        return np.asarray(p.offset + p.step * mean)
+        noise = max(float(p.noise), LEAST_NOISE * float(p.step))
+        return mean_of_rounded(v, float(p.step), float(p.offset), noise)
 
 
 def _frequencies(table: Table) -> Array:
