@@ -25,10 +25,9 @@ from calibrations.criteria import (
 )
 from calibrations.discovery.outliers import outlier_text
 from calibrations.discovery.verdict import Finding, Verdict
-from calibrations.estimators.robust import robust_std
 from calibrations.fitting.fit import Fit
 from calibrations.geometry.orientation import one_orientation
-from calibrations.means.noise import inflation, rms, white_std
+from calibrations.means.noise import inflation, rms, robust_std, white_std
 from calibrations.table import Array, Table
 from calibrations.tables import Kind
 

@@ -25,11 +25,10 @@ from calibrations.criteria import (
     TIMES_NEXT,
     VISIBLE_STEP,
 )
-from calibrations.estimators.robust import robust_std
 from calibrations.fitting.table_noise import excess_over_ellipsoid, scatter
 from calibrations.geometry.sphere import sphere_radius
 from calibrations.importing.plausible import find_time_doubt
-from calibrations.means.noise import norm_std, rms, white_std
+from calibrations.means.noise import norm_std, rms, robust_std, white_std
 from calibrations.table import Array, Table
 
 FIELD_UNITS = {"nT": 1e3, "mG": 10.0, "G": 1e-2, "mT": 1e-3}  # of one uT

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from calibrations.criteria import GROSS, MOST_GROSS, SAME_G
-from calibrations.estimators.robust import robust_std
 from calibrations.fitting.fit import Fit, fit
 from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.means.noise import robust_std
 from calibrations.model import Model
 from calibrations.table import Array, Table
 

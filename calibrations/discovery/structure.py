@@ -31,7 +31,7 @@ from calibrations.discovery.patterns import Pattern, at_attitudes, one_sided, pa
 from calibrations.discovery.significance import Screen, Search
 from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.fitting.fit import Fit
-from calibrations.means.noise import correlation_known, rms
+from calibrations.means.noise import correlation_known, rms, robust_std
 from calibrations.table import Array
 
 FINALISTS = 6  # patterns that are sharpened
@@ -114,8 +114,7 @@ def find_outlying_rows(residual: Array, noise: Array) -> NDArray[np.intp]:
     The spread is at least `noise` (channels,), white and slow together: medians of slow noise are uncertain.
     """
     middle = np.median(residual, axis=1, keepdims=True)
-    spread = 1.4826 * np.median(np.abs(residual - middle), axis=1, keepdims=True)
-    spread = np.maximum(spread, noise[:, None])
+    spread = np.maximum(robust_std(residual - middle, axis=1), noise)[:, None]
     limit = -ndtri(SIGNIFICANT / 2 / residual.size)
     return np.flatnonzero(np.any(np.abs(residual - middle) > limit * spread, axis=0))
 

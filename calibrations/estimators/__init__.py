@@ -2,7 +2,6 @@
 
     least_squares   all at once, weighted
     kalman          unknowns that change by themselves: prediction and correction
-    robust          a standard deviation that outliers hardly change
     scatter         the level of a logged column without the scatter of its reader
     rounding        the mean of samples that a converter rounds
     approach        an exponential approach to a steady state, followed by a bank of Kalman filters

@@ -17,9 +17,9 @@ from scipy.special import fdtrc, stdtr
 from calibrations.criteria import FAR_SENSOR, FEWEST_SENSORS_PER_RIG, SIGNIFICANT
 from calibrations.effects import Effect, Values
 from calibrations.estimators.least_squares import between_variance, shortest_solution
-from calibrations.estimators.robust import robust_std
 from calibrations.fleet.look import StageScore
 from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.means.noise import robust_std
 from calibrations.table import Array, Table
 
 StageErrors = Mapping[str, Mapping[str, float]]  # effect -> parameter -> value

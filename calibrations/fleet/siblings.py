@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, stdtr
 
 from calibrations.criteria import FALSE_OUTLIER, FEWEST_SIBLINGS, MOST_USUAL
-from calibrations.estimators.robust import robust_std
+from calibrations.means.noise import robust_std
 from calibrations.table import Array
 
 # One quantity of many siblings: its mean and spread in the batch, and what each one's own value is in their light.

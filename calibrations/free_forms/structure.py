@@ -24,7 +24,7 @@ from calibrations.free_forms.selection import ENTER
 from calibrations.free_forms.stairs import SAW, Stairs
 from calibrations.geometry.orientation import out_of_plane
 from calibrations.geometry.smooth import smooth_columns
-from calibrations.means.noise import NORMAL_MEDIAN, neighbour_std, neighbours_contradict
+from calibrations.means.noise import neighbour_std, neighbours_contradict, robust_std
 from calibrations.table import Array, Table
 
 LARGER_NOISE = 1.5  # times the stated: less may be forms that are nearly right
@@ -360,7 +360,7 @@ def _noisy_rows_contradict(result: SearchResult) -> bool:
 
 def _rows_noise(result: SearchResult, k: int, residual: Array, uniform: bool) -> Array:
     """Noise of each row of one channel, (n,): a constant part, and parts that follow the samples' variance."""
-    usual = np.median(np.abs(residual - np.median(residual))) / NORMAL_MEDIAN
+    usual = robust_std(residual - np.median(residual))
     spread = result.data.spread
     if uniform or spread is None or np.ptp(spread[k]) == 0:
         return np.full(len(residual), min(usual, neighbour_std(residual[None])[0]))

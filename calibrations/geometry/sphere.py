@@ -1,18 +1,25 @@
-"""Coverage of the sphere of directions, as a fit of the magnitude needs it.
+"""The outputs of three axes in many orientations: coverage of the sphere of directions, and its six faces.
 
 The magnitude over the sphere is a sum of spherical harmonics: degree 0 is the strength, 1 an offset (hard iron), 2 a
 stretch (soft iron). They are orthogonal over the whole sphere. Where directions are missing, a combination of them is
-known worse, by 1 / sqrt(least eigenvalue of their Gram matrix); beyond MOST_WORSE it is not fitted.
+known worse, by 1 / sqrt(least eigenvalue of their Gram matrix); beyond MOST_WORSE_COVERED it is not fitted.
 
-Source  optimality of designs by the least eigenvalue (E-optimality): Pukelsheim, Optimal Design of Experiments
-(1993).
+The six faces give bias and scale factor of each axis from its own pair:
+
+    b = (v_up + v_down) / 2        s = (v_up - v_down) / 2
+
+Source  optimality of designs by the least eigenvalue (E-optimality): Pukelsheim, Optimal Design of Experiments (1993);
+        faces: Ferraris, Grimaldi and Parvis, Procedure for effortless in-field calibration of three-axis rate gyros and
+        accelerometers, Sensors and Materials 7 (1995); IEEE Std 1293, two-point tumble; Ang (1)-(2).
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from calibrations.criteria import MOST_WORSE_COVERED
+from calibrations.criteria import MOST_WORSE_COVERED, UPRIGHT_COSINE
 from calibrations.table import Array, Table
 
 HARD_IRON, SOFT_IRON = 1, 2  # highest degree of their part of the magnitude
@@ -80,3 +87,30 @@ def harmonics(u: Array, degree: int) -> Array:
         columns += [np.sqrt(15) * product for product in (x * y, x * z, y * z, (x**2 - y**2) / 2)]
         columns.append(np.sqrt(5) * (3 * z**2 - 1) / 2)
     return np.column_stack(columns)
+
+
+@dataclass(frozen=True)
+class Faces:
+    """Bias and scale factor (output per g) of each axis, in the outputs' unit, shape (3,)."""
+
+    bias: Array
+    scale: Array
+
+
+def estimate_faces(outputs: Array) -> Faces | None:
+    """From still outputs (n, 3), averaged over each face; None if an axis was not held both up and down."""
+    middle = (outputs.max(axis=0) + outputs.min(axis=0)) / 2
+    size = np.linalg.norm(outputs - middle, axis=1, keepdims=True)
+    cosine = (outputs - middle) / np.where(size > 0, size, 1.0)
+    up, down = (_mean_along(outputs, side * cosine) for side in (1, -1))
+    if up is None or down is None:
+        return None
+    return Faces((up + down) / 2, (up - down) / 2)
+
+
+def _mean_along(outputs: Array, cosine: Array) -> Array | None:
+    """Mean output of each axis over the rows in which it is upright, shape (3,); None if one never is."""
+    upright = cosine > UPRIGHT_COSINE
+    if not upright.any(axis=0).all():
+        return None
+    return np.array([outputs[upright[:, k], k].mean() for k in range(3)])

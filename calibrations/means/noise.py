@@ -191,6 +191,14 @@ def rms(x: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(x * x, axis=-1)))
 
 
+def robust_std(deviations: Array, axis: int | None = None) -> Array:
+    """Standard deviation that outliers hardly change, from `deviations` from their centre, along `axis` or of all.
+
+    By the median absolute deviation, Huber and Ronchetti, Robust Statistics (2009), chapter 5.
+    """
+    return np.asarray(np.median(np.abs(deviations), axis=axis) / NORMAL_MEDIAN)
+
+
 def neighbour_std(rows: Array) -> Array:
     """Noise of rows (channels, n) in order of time, from the median of their second differences, (channels,)."""
     return np.asarray(np.median(np.abs(_second_differences(rows)), axis=1) / NORMAL_MEDIAN)

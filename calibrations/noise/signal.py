@@ -18,7 +18,7 @@ from calibrations.errors import DataError
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.fit import fit as fit_rows
 from calibrations.free_forms.place_names import place_of_effect
-from calibrations.means.noise import with_white
+from calibrations.means.noise import neighbour_std, with_white
 from calibrations.model import Estimate, Model, Term
 from calibrations.noise.deviations import Curve, octaves
 from calibrations.noise.record import Channel, Still
@@ -96,8 +96,7 @@ def table_of_means(still: Still) -> Table:
     n = means.n // size
     columns = {name: x[: n * size].reshape(n, size).mean(axis=1) for name, x in means.columns.items()}
     table = replace(means, columns=columns)
-    second = np.median(np.abs(np.diff(table.outputs, 2, axis=0)), axis=0) / 0.6745 / np.sqrt(6)
-    white = np.maximum(second, LEAST_STD * np.ptp(table.outputs, axis=0))
+    white = np.maximum(neighbour_std(table.outputs.T), LEAST_STD * np.ptp(table.outputs, axis=0))
     return with_white(table, np.tile(white[:, None], (1, n)))
 
 

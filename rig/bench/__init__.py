@@ -7,6 +7,7 @@ parts.py  the parts: instruments, sensors, displacement sensor, certificates, fo
 bench.py  the whole bench
 file.py   reads the file, with the files that it names
 check.py  checks values and the relations between the parts
+result_names.py  the results that limits may be set on, and their meanings
 """
 
 from rig.bench.bench import Bench

@@ -23,6 +23,7 @@ from drivers.world.errors import SimulationError
 from procedures.session import Limits
 from rig.bench.bench import Bench
 from rig.bench.parts import D63, ROLES, Certificate, Displacement, Folders, Instrument, Lab, Sensor, Uncertainty
+from rig.bench.result_names import names_with_limits
 from rig.errors import BenchError, RecordError
 
 UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
@@ -175,7 +176,7 @@ def _check_lab(bench: Bench, path: Path) -> None:
     """Raises BenchError for a wrong URL of the lab's record, and for a password: every run keeps the bench."""
     if bench.lab is None:
         return
-    from rig.record.lab import has_password, lab_url  # slow to import, and only a rig with a lab needs it
+    from rig.lab_url import has_password, lab_url  # slow to import, and only a rig with a lab needs it
 
     key = f"{path}, key lab.url"
     try:
@@ -300,9 +301,7 @@ def _of_result_limits(bench: Bench) -> Iterator[KeyFault]:
         if not isinstance(limit, tuple) and not limit >= 0:
             yield f"limits.results.{name}", f"the limit is {limit:g}; give 0 or more, or a range [lowest, highest]"
     if bench.limits.results and bench.folders.procedures is None:
-        from rig.results.evaluate import names  # it imports the bench
-
-        result_names = names()
+        result_names = names_with_limits()
         for name in bench.limits.results:
             if name not in result_names:
                 yield f"limits.results.{name}", f"no procedure has such a result.{did_you_mean(name, result_names)}"

@@ -1,7 +1,4 @@
-"""The lab's record on a PostgreSQL server: its URL, connection and preparation.
-
-The URL is postgresql://USER@HOST:PORT/DATABASE?sslmode=verify-full. Its password is never shown.
-"""
+"""The lab's record on a PostgreSQL server: its connection and preparation."""
 
 from __future__ import annotations
 
@@ -13,41 +10,12 @@ from contextlib import suppress
 from functools import cache
 from typing import Any
 
-from sqlalchemy import URL, Connection, Engine, ExceptionContext, create_engine, event, make_url, text
-from sqlalchemy.exc import ArgumentError, InterfaceError, OperationalError
+from sqlalchemy import URL, Connection, Engine, ExceptionContext, create_engine, event, text
+from sqlalchemy.exc import InterfaceError, OperationalError
 
 from rig.errors import LabAway, RecordError
+from rig.lab_url import mask_url
 from rig.record.schema import SCHEMA, metadata, upgrade
-
-SECRET = ("password", "sslpassword")  # query keys of libpq
-# The message does not quote a refused URL, because it may contain a password.
-NO_URL = (
-    "is not the URL of a lab's record; write postgresql://USER@HOST/DATABASE, and in a password %40 for @, %2F for /; "
-    "or put the password into ~/.pgpass or PGPASSWORD"
-)
-
-
-def lab_url(text_url: str, source: str = "what was given") -> URL:
-    """The parsed URL. Raises RecordError, which begins with `source` and does not quote the URL."""
-    try:
-        url = make_url(text_url)
-    except (ArgumentError, ValueError):
-        raise RecordError(f"{source} {NO_URL}") from None
-    scheme = url.drivername.partition("+")[0]
-    if scheme not in ("postgresql", "postgres") or not url.database or "@" in f"{url.host}{url.database}":
-        raise RecordError(f"{source} {NO_URL}")
-    return url.set(drivername="postgresql+psycopg")
-
-
-def mask_url(url: URL) -> str:
-    """The URL for messages and logs, with stars for a password."""
-    return url.set(drivername="postgresql").difference_update_query(SECRET).render_as_string()
-
-
-def has_password(url: URL) -> bool:
-    """Whether the URL contains a password."""
-    return bool(url.password) or any(url.query.get(name) for name in SECRET)
-
 
 # libpq also uses PGPASSWORD, ~/.pgpass and PGSSLROOTCERT. A connection to another machine is encrypted, unless the user
 # sets another sslmode. LabAway: the network or the server fails. RecordError: a missing permission, a wrong server, or

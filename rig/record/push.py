@@ -16,6 +16,7 @@ from sqlalchemy import Connection, Table, insert, select, update
 
 from rig.bench import Lab
 from rig.errors import LabAway, RecordError
+from rig.lab_url import lab_url
 from rig.record.content import count, digest, head, rows_of, run_row, uid_of
 from rig.record.rows import timestamp
 from rig.record.schema import arrivals, is_new, poses, runs
@@ -30,8 +31,6 @@ def push_after(record: Record, run: Run, lab: Lab | None, notify: Callable[[str]
     """
     if lab is None or not lab.push or run.state != "complete":
         return
-    from rig.record.lab import lab_url  # only a rig with a lab needs the database driver
-
     try:
         with Record(lab_url(lab.url)) as lab_record:
             for pushed in push_all(record, lab_record, unsent(record, lab_record)):

@@ -22,6 +22,7 @@ from calibrations.table import Table
 from procedures.session import Dwell, Pose, Reading
 from rig.errors import RecordError, UnknownRun
 from rig.files import RECORD, home
+from rig.lab_url import lab_url, mask_url
 from rig.lease import is_held
 from rig.record import codec
 from rig.record.checksum import is_damaged, with_checksum
@@ -83,7 +84,7 @@ class Record:
         self.path = self.folder / FILE
         self.remarks: list[str] = []  # on the file: it was repaired during this command
         if isinstance(place, URL):
-            from rig.record.lab import mask_url, open_server
+            from rig.record.lab import open_server
 
             self.where, self.engine = mask_url(place), open_server(place)
         else:
@@ -95,8 +96,6 @@ class Record:
         """The record for reading: of a lab if it is chosen (`--record URL`, RIG_RECORD), else of this rig."""
         if not (url := os.environ.get(RECORD)):
             return cls()
-        from rig.record.lab import lab_url  # only a rig with a lab needs the database driver
-
         return cls(lab_url(url, RECORD))
 
     @classmethod

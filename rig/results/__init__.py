@@ -1,7 +1,8 @@
 """Results of runs: a function for each procedure that has results, in the module on its kind of measurement.
 
-`samples.py` has `@evaluates("noise-floor", NAMES...)` and below it a function of what the run measured, which gives a
-Result, or the reason why it is Missing, for each name. A user's procedure can return such a mapping itself instead.
+`samples.py` has `@evaluates("noise-floor")` and below it a function of what the run measured, which gives a Result, or
+the reason why it is Missing, for each name in `rig.bench.result_names`. A user's procedure can return such a mapping
+itself instead.
 """
 
 from rig.results.evaluate import judge_results

@@ -14,7 +14,7 @@ from rig.results.result import Result, evaluates
 REFERENCE = "xyz"
 
 
-@evaluates("level-check", "level-{axis}", "level-offset-{axis}", "base-{axis}", "base-offset-{axis}", of_bench=True)
+@evaluates("level-check", of_bench=True)
 def level_check(measured: Measured) -> dict[str, Result]:
     """Tilt of the table or of the base along x and y of the level, and the offset of the level, deg."""
     readings = {reading.name: reading for reading in measured.readings()}
@@ -29,12 +29,7 @@ def level_check(measured: Measured) -> dict[str, Result]:
     return results
 
 
-@evaluates(
-    "misalignment",
-    *(f"theta-{axis}{reference}" for axis in "xy" for reference in REFERENCE),
-    *("alpha-{axis}", "beta-{axis}", "non-orthogonality", "rounds"),
-    *(f"correction-{row}{column}" for row in REFERENCE for column in REFERENCE),
-)
+@evaluates("misalignment")
 def misalignment(measured: Measured) -> dict[str, Result]:
     """theta-xx .. theta-yz, alpha-x .. beta-y in deg, and the matrix of Ang (20)-(21) that corrects accelerations.
 

@@ -12,16 +12,8 @@ from rig.record.measured import Measured
 from rig.results.result import Missing, Result, evaluates, result
 from rig.results.triads import SOFT
 
-ANGLE_PAIRS = ("xy", "xz", "yz")
 
-
-@evaluates(
-    "hand-positions",
-    "bias-{axis}",
-    "scale-{axis}",
-    *(f"nonorthogonality-{pair}" for pair in ANGLE_PAIRS),
-    "uncertainty",
-)
+@evaluates("hand-positions")
 def hand_positions(measured: Measured) -> dict[str, Result | Missing]:
     """From all positions together, by the magnitude of gravity:
 
@@ -47,12 +39,7 @@ def hand_positions(measured: Measured) -> dict[str, Result | Missing]:
     return results | {"uncertainty": Result(worst_g, "g")}
 
 
-@evaluates(
-    "hand-fields",
-    "hard-iron-{axis}",
-    *(f"soft-iron-{pair}" for pair in SOFT),
-    *("field-total", "left-by-ellipsoid", "uncertainty"),
-)
+@evaluates("hand-fields")
 def hand_fields(measured: Measured) -> dict[str, Result | Missing]:
     """From all positions together, by the magnitude of the field:
 

@@ -14,7 +14,6 @@ from rig.record import Record, Run
 from rig.record.measured import Measured, sensors_of
 from rig.results.result import EVALUATIONS, Evaluation, Missing, Result, documents
 
-AXES = "xyz"
 MODULES = {  # with the evaluation of each procedure, imported when it is needed
     **dict.fromkeys(("check-standard", "repeat", "temperature-cycle", "sweep"), "tumbles"),
     **dict.fromkeys(("level-check", "misalignment"), "alignment"),
@@ -61,16 +60,6 @@ def evaluate_results(record: Record, run: Run) -> dict[str, Result | Missing]:
         return dict(evaluation.evaluate(Measured(record, run)))
     by_sensor = {sensor: evaluation.evaluate(Measured(record, run, sensor)) for sensor in sensors}
     return {f"{sensor}/{name}": result for sensor, results in by_sensor.items() for name, result in results.items()}
-
-
-def names() -> list[str]:
-    """The names of results of all shipped procedures, and of parameters on certificates, in alphabetical order."""
-    from calibrations.effects.catalogue import catalogue
-    from calibrations.presentation.certificate.terms import names as certificate_names
-
-    patterns = [pattern for procedure in MODULES for pattern in _evaluation(procedure).names]
-    parameters = {name for effect in catalogue().values() for name in certificate_names(effect)}
-    return sorted(parameters | {pattern.format(axis=axis) for pattern in patterns for axis in AXES})
 
 
 def _evaluation(procedure: str) -> Evaluation:

@@ -52,13 +52,12 @@ class Missing:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The results of a procedure by name, and their names, in which `{axis}` stands for any axis.
+    """The results of a procedure by name. `rig.bench.result_names` lists the names.
 
     `of_bench`: the results are those of the bench, and the same for all sensors of a batch.
     """
 
     evaluate: Callable[[Measured], Mapping[str, Result | Missing]]
-    names: tuple[str, ...]
     of_bench: bool = False
 
 
@@ -66,11 +65,11 @@ EVALUATIONS: dict[str, Evaluation] = {}
 Evaluate = TypeVar("Evaluate", bound=Callable[[Measured], Mapping[str, Any]])
 
 
-def evaluates(procedure: str, *names: str, of_bench: bool = False) -> Callable[[Evaluate], Evaluate]:
+def evaluates(procedure: str, *, of_bench: bool = False) -> Callable[[Evaluate], Evaluate]:
     """Register a function as the evaluation of `procedure`, see Evaluation."""
 
     def register(evaluate: Evaluate) -> Evaluate:
-        EVALUATIONS[procedure] = Evaluation(evaluate, names, of_bench)
+        EVALUATIONS[procedure] = Evaluation(evaluate, of_bench)
         return evaluate
 
     return register

@@ -19,7 +19,7 @@ from rig.results.result import Missing, Result, evaluates
 PEAK_TO_PEAK = 4  # x rms: Ang V
 
 
-@evaluates("noise-floor", "noise-rms-{axis}", "noise-pp-{axis}", "inclination-{axis}")
+@evaluates("noise-floor")
 def noise_floor(measured: Measured) -> dict[str, Result | Missing]:
     """Noise in the unit of the outputs, inclination in deg. The inclination needs the poses at +1 g and -1 g.
 
@@ -55,7 +55,7 @@ def _inclination(upright: list[Kept], axis: str, channel: str, rms: float, std: 
     return Result(inclination, "deg", inclination * std / rms if rms else None)
 
 
-@evaluates("motion", "rmse-linear-x", "rmse-physical-x", "improvement-x", "noise-limit-x", "amplitude", "frequency")
+@evaluates("motion")
 def motion(measured: Measured) -> dict[str, Result]:
     """rmse-linear-x, rmse-physical-x, noise-limit-x and amplitude in mm/s^2, improvement-x, frequency in Hz.
 

@@ -22,15 +22,7 @@ ENDS = {names["xyz".index(axis)] for names in OUTPUTS for axis in AXES}
 FEWEST_STEADY = 3  # reversals after the steady state before it ends a soak
 
 
-@evaluates(
-    "soak",
-    *("steady-state", "steady-state-time", "steady-state-{axis}", "steady-state-time-{axis}"),
-    *("steady-state-earliest", "steady-state-expected", "steady-state-latest"),
-    *("steady-state-earliest-{axis}", "steady-state-expected-{axis}", "steady-state-latest-{axis}"),
-    *("bias-drift-{axis}", "scale-drift-{axis}", "bias-tolerance-{axis}", "scale-tolerance-{axis}"),
-    *("time-constant-{axis}", "scale-time-constant-{axis}", "temperature-wander", "gap"),
-    *("bias-final-{axis}", "scale-final-{axis}", "bias-foreseen-{axis}", "scale-foreseen-{axis}"),
-)
+@evaluates("soak")
 def soak(measured: Measured) -> dict[str, Result]:
     """Results of each axis and of all axes. Times in h are since power-on.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import permutations
 from math import hypot
 
 import numpy as np
@@ -26,15 +25,9 @@ from rig.record.measured import Measured, sensor_from_base
 from rig.results.result import Missing, Result, evaluates, fit_shipped, result
 
 AXES = "xyz"
-AXIS_PAIRS = tuple(own + other for own, other in permutations(AXES, 2))
 
 
-@evaluates(
-    "rate-turn",
-    *("gyro-bias-{axis}", "gyro-bias-rate-{axis}", "gyro-scale-{axis}", "rate-residual-{axis}"),
-    *(f"gyro-misalignment-{pair}" for pair in AXIS_PAIRS),
-    *(f"gyro-g-sensitivity-{own}{other}" for own in AXES for other in AXES),
-)
+@evaluates("rate-turn")
 def rate_turn(measured: Measured) -> dict[str, Result | Missing]:
     """For each axis:
 
@@ -69,14 +62,7 @@ HEADING = "heading_deg"
 DECLINATION = "field-declination"
 
 
-@evaluates(
-    "magnetometer-turn",
-    *("hard-iron-{axis}", "hard-iron-by-hand-{axis}", "soft-iron-by-hand", "soft-iron-angle-by-hand"),
-    *(f"soft-iron-{pair}" for pair in SOFT),
-    *(*ELEMENTS.values(), DECLINATION),
-    *(f"{ELEMENTS[name]}-by-hand" for name in "HD"),
-    *("left-by-ellipsoid", "left-by-hand"),
-)
+@evaluates("magnetometer-turn")
 def magnetometer_turn(measured: Measured) -> dict[str, Result | Missing]:
     """By an ellipsoid fit to all directions (equations of Book 17):
 

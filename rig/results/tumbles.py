@@ -17,7 +17,7 @@ AXES = "xy"
 HOUR_S = 3600.0
 
 
-@evaluates("check-standard", "bias-{axis}", "scale-{axis}")
+@evaluates("check-standard")
 def check_standard(measured: Measured) -> dict[str, Result]:
     """bias-x in the unit of the outputs and scale-x per g, the same of y; uncertainties by white noise alone.
 
@@ -32,9 +32,7 @@ def check_standard(measured: Measured) -> dict[str, Result]:
     return results
 
 
-@evaluates(
-    "repeat", *(f"{quantity}-{kind}-{{axis}}" for quantity in ("bias", "scale") for kind in ("as-is", "power", "mount"))
-)
+@evaluates("repeat")
 def repeat(measured: Measured) -> dict[str, Result | Missing]:
     """bias-as-is-x in the unit of the outputs, scale-power-y as a fraction, and so on.
 
@@ -61,11 +59,7 @@ def _spread(estimate: tuple[float, float | None], unit: str) -> Result | Missing
     return Result(spread, unit, std)
 
 
-@evaluates(
-    "temperature-cycle",
-    *("bias-temperature-{axis}", "bias-temperature-hysteresis-{axis}"),
-    *("scale-temperature-{axis}", "scale-temperature-hysteresis-{axis}"),
-)
+@evaluates("temperature-cycle")
 def temperature_cycle(measured: Measured) -> dict[str, Result]:
     """Slopes of the bias per K, in the unit of the outputs, and of the scale factor in 1/K; hysteresis (up minus down)
     in the unit of the outputs and as a fraction. Raises DataError for too few steps."""
@@ -83,7 +77,7 @@ def temperature_cycle(measured: Measured) -> dict[str, Result]:
     return results
 
 
-@evaluates("sweep", "reference-drift-{axis}")
+@evaluates("sweep")
 def sweep(measured: Measured) -> dict[str, Result]:
     """Trend of the outputs at the reference pose, an hour, with the standard error that its scatter gives."""
     if not measured.run.settings.get("reference_every"):

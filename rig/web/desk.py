@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.errors import RigError
 from rig.files import RECORD, home, write_whole
+from rig.lab_url import lab_url, mask_url
 from rig.record import Record, Run
 from rig.runs.background import control
 
@@ -138,8 +139,6 @@ def lab_read() -> str | None:
     """The name of the lab's record if the workbench reads it, else None."""
     if not (url := os.environ.get(RECORD)):
         return None
-    from rig.record.lab import lab_url, mask_url
-
     return mask_url(lab_url(url, RECORD))
 
 

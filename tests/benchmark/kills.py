@@ -17,7 +17,8 @@ from collections import Counter
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from rig.record.lab import lab_url, prepare
+from rig.lab_url import lab_url
+from rig.record.lab import prepare
 from tests.rig.killing import HANDS, MISALIGNMENT, MOTION, RUN, SOAK, many, undisturbed
 from tests.rig.killing_transfers import kills_of_a_push, kills_of_imports
 from tests.rig.nursery import Nursery

@@ -22,9 +22,10 @@ from tempfile import TemporaryDirectory
 from sqlalchemy import event
 
 from rig.errors import LabAway
+from rig.lab_url import lab_url
 from rig.record import Record
 from rig.record import push as pushing
-from rig.record.lab import lab_url, prepare
+from rig.record.lab import prepare
 from rig.record.push import push, unsent, verify
 from tests.rig.cutting import at_random, wire
 from tests.rig.postgres import Server, serving

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibrations.fitting.fit import fit, refit
-from calibrations.fitting.held_out import folds, held_out
+from calibrations.fitting.solution import folds, held_out
 from calibrations.free_forms.bases import spline
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.form import Form

@@ -12,8 +12,9 @@ import yaml
 from calibrations.importing.foreign import write_csv
 from rig.bench import DEFAULT
 from rig.cli import main
+from rig.lab_url import lab_url
 from rig.record import Record
-from rig.record.lab import lab_url, prepare
+from rig.record.lab import prepare
 from tests.calibrations.synthetic import components, poses, turns
 from tests.rig.postgres import Server, serving
 

@@ -7,8 +7,8 @@ import shutil
 from collections import Counter
 from pathlib import Path
 
+from rig.lab_url import lab_url
 from rig.record import Record
-from rig.record.lab import lab_url
 from rig.record.measured import table_of
 from tests.rig.nursery import Harm, Nursery
 from tests.rig.pushing import a_run, held

@@ -11,8 +11,8 @@ import numpy as np
 from calibrations.table import Table
 from procedures.session import Pose, Reading
 from rig.errors import LabAway
+from rig.lab_url import lab_url
 from rig.record import Block, Kept, Record
-from rig.record.lab import lab_url
 from rig.record.push import Pushed, push, unsent
 
 POSES, SAMPLES = 12, 400

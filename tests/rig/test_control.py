@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from rig.bench.result_names import names_with_limits
 from rig.record import Record
-from rig.results.evaluate import names
 
 Rig = Callable[..., Any]
 QUIET = [2.50001, 2.49999] * 5
@@ -38,7 +38,7 @@ def test_a_check_standard_is_measured_and_begins_its_baseline(rig: Rig) -> None:
     results = document["results"]
     assert (ended.status, document["poses"], set(results)) == (0, 8, {"bias-x", "scale-x", "bias-y", "scale-y"})
     assert (results["bias-x"]["unit"], results["scale-x"]["unit"]) == ("V", "V/g")
-    assert set(results) <= set(names())
+    assert set(results) <= set(names_with_limits())
     assert results["scale-x"]["value"] == pytest.approx(1.0, abs=0.03)
     assert 0 < results["bias-x"]["std"] < 1e-3
     charted = rig("control", "simulated")

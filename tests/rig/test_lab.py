@@ -16,8 +16,9 @@ from rig.cli import rig as commands
 from rig.cli.terminal.options import OPTION
 from rig.errors import RecordError
 from rig.files import LAB, RECORD
+from rig.lab_url import has_password, lab_url
 from rig.record import Record
-from rig.record.lab import has_password, lab_url, prepare
+from rig.record.lab import prepare
 from rig.record.push import push
 from rig.record.schema import SCHEMA
 from rig.web.desk import runs as runs_of_workbench

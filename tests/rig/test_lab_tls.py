@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from rig.record.lab import lab_url, options
+from rig.lab_url import lab_url
+from rig.record.lab import options
 from tests.rig.conftest import WORD, Ended
 from tests.rig.cutting import Judge, wire
 from tests.rig.postgres import Server

@@ -15,9 +15,9 @@ from calibrations.analyses.misalignment import along_reference
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import DEFAULT, Bench, read_bench
+from rig.bench.result_names import names_with_limits
 from rig.planning.plan import plan
 from rig.record import Record
-from rig.results.evaluate import names
 from rig.runs.runner import start
 from tests.rig.rigging import Onlooker
 
@@ -34,7 +34,7 @@ def test_known_axes_are_found_within_0_02_deg(rig: Rig, tmp_path: Path) -> None:
     file.write_text(yaml.safe_dump(document))
     ended = rig("run", "misalignment", "--dwell-s", "2", "--bench", str(file), "--unattended", "--json")
     results = json.loads(ended.out)["results"]
-    assert set(results) <= set(names())
+    assert set(results) <= set(names_with_limits())
     axes = {axis: np.array([results[f"theta-{axis}{r}"]["value"] for r in "xyz"]) for axis in "xy"}
     # the package is turned about x, y, z in turn; its y beam leans to its x beam
     a, b, c = np.radians([0.75, -1.3, 0.33])

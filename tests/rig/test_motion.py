@@ -22,10 +22,10 @@ from procedures.errors import ProcedureError, SettingError
 from procedures.motion import KIND, STILL, SWEEP
 from procedures.settings import parse
 from rig.bench import Bench, read_bench
+from rig.bench.result_names import names_with_limits
 from rig.planning.plan import plan
 from rig.record import Kept, Record
 from rig.record.measured import Measured
-from rig.results.evaluate import names
 from rig.runs.runner import Outcome, resume, start
 from rig.services.report import of_run
 from tests.rig.rigging import Onlooker
@@ -64,7 +64,7 @@ def test_the_physical_model_reaches_the_limit_that_noise_sets(seed: int, rig_hom
     with Record() as record:
         results = shaken(record, bench(PAPERS, seed), duration_s="30").run.results
     found = {name: result["value"] for name, result in results.items()}
-    assert set(found) <= set(names())
+    assert set(found) <= set(names_with_limits())
     assert found["rmse-linear-x"] == pytest.approx(300, abs=10)
     assert found["improvement-x"] >= 0.97
     assert found["rmse-physical-x"] <= 1.2 * found["noise-limit-x"]

@@ -12,11 +12,11 @@ import pytest
 from sqlalchemy import insert
 
 from rig.errors import LabAway, RecordError, UnknownRun
+from rig.lab_url import lab_url
 from rig.record import Record
 from rig.record import lab as laboratory
 from rig.record import push as pushing
 from rig.record.content import run_row, uid_of
-from rig.record.lab import lab_url
 from rig.record.push import Pushed, push, push_all, unsent, verify
 from rig.record.schema import arrivals, runs
 from tests.rig.cutting import Enough, Judge, after_bytes, at_random, whole, wire

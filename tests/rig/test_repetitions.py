@@ -13,10 +13,10 @@ import yaml
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import DEFAULT, Bench
+from rig.bench.result_names import names_with_limits
 from rig.instruments.instruments import connect_all
 from rig.planning.plan import plan
 from rig.record import Record
-from rig.results.evaluate import names
 
 Rig = Callable[..., Any]
 FAST = ("--dwell-s", "0.2", "--unattended", "--json")
@@ -47,7 +47,7 @@ def test_a_temperature_cycle_gives_coefficients_and_leaves_the_oven_off(rig: Rig
         f"{q}-temperature{h}-{a}" for q in ("bias", "scale") for h in ("", "-hysteresis") for a in "xy"
     }
     slope = found["bias-temperature-x"]
-    assert set(found) <= set(names())
+    assert set(found) <= set(names_with_limits())
     assert (slope["unit"], slope["value"]) == ("V/K", pytest.approx(4e-3 / 8.2, rel=0.4))
     with Record() as record:
         state: Any = record.state(document["run"])
@@ -90,7 +90,7 @@ def test_repetitions_of_every_kind_are_in_the_budget(rig: Rig) -> None:
     assert set(found) == {f"{q}-{k}-{a}" for q in ("bias", "scale") for k in ("as-is", "power", "mount") for a in "xy"}
     assert all(0 <= found[f"bias-{kind}-x"]["value"] < 0.01 for kind in ("as-is", "power", "mount"))
     assert all(each["std"] > 0 for each in found.values())
-    assert set(found) <= set(names())
+    assert set(found) <= set(names_with_limits())
 
 
 @pytest.mark.sockets
@@ -133,7 +133,7 @@ def test_the_reference_pose_tells_drift(rig: Rig, tmp_path: Path) -> None:
     ended = rig("run", "sweep", *arguments, *FAST)
     document = json.loads(ended.out)
     drift = document["results"]["reference-drift-x"]
-    assert set(document["results"]) <= set(names())
+    assert set(document["results"]) <= set(names_with_limits())
     expected = 0.1 * (2.5 + 0.7) / 5
     assert drift["unit"] == "V/h"
     assert drift["value"] == pytest.approx(expected, rel=0.1)

@@ -1,6 +1,5 @@
 """Results: their verdicts, which allow for the uncertainty, and their meanings in words."""
 
-import importlib
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -13,12 +12,11 @@ import yaml
 from calibrations.errors import DataError
 from procedures.errors import ProcedureError
 from rig.bench import DEFAULT
+from rig.bench.result_names import RESULTS, meaning, names_with_limits
 from rig.record import Record
 from rig.record.measured import table_of
 from rig.results import Result, documents, read_returned
-from rig.results.evaluate import MODULES, names
-from rig.results.result import EVALUATIONS
-from rig.services.result_meaning import meaning
+from rig.results.evaluate import MODULES
 
 Rig = Callable[..., Any]
 
@@ -79,7 +77,7 @@ def test_the_noise_floor_is_that_of_the_world(rig: Rig, tmp_path: Path) -> None:
     hidden = np.degrees(np.arcsin(results["noise-pp-x"]["value"] / 1.0))
     assert results["inclination-x"]["value"] == pytest.approx(hidden, rel=0.05)
     assert {r["unit"] for r in results.values()} == {"V", "deg"}
-    assert set(results) <= set(names())
+    assert set(results) <= set(names_with_limits())
 
 
 @pytest.mark.sockets
@@ -102,7 +100,7 @@ def test_the_level_check_finds_the_tilt_and_not_the_offset(rig: Rig, tmp_path: P
     assert found == pytest.approx([0.1, 0.2], abs=0.02)
     assert all(results[f"level-{axis}"]["verdict"] == "pass" for axis in "xy")
     assert all(abs(results[f"level-offset-{axis}"]["value"]) < 0.1 for axis in "xy")
-    assert set(results) <= set(names())
+    assert set(results) <= set(names_with_limits())
 
 
 @pytest.mark.sockets
@@ -148,18 +146,16 @@ def test_what_was_measured_is_complete_even_if_nothing_comes_of_it(rig: Rig, mon
 
 @pytest.mark.parametrize("procedure", MODULES)
 def test_each_result_of_a_procedure_has_a_meaning(procedure: str) -> None:
-    importlib.import_module(f"rig.results.{MODULES[procedure]}")
-    results = [name.replace("{axis}", "x") for name in EVALUATIONS[procedure].names]
-    assert results
-    for name in results:
-        assert meaning(name).endswith("."), name
-        assert meaning(f"a1/{name}") == meaning(name)
+    assert RESULTS[procedure]
+    for name in RESULTS[procedure]:
+        assert meaning(procedure, name).endswith("."), name
+        assert meaning(procedure, f"a1/{name}") == meaning(procedure, name)
 
 
 def test_the_meaning_of_a_result_names_its_axes() -> None:
-    assert meaning("theta-xz") == "Component of sensing axis x along reference axis z."
-    assert meaning("bias-x") != meaning("bias-drift-x")
+    assert meaning("misalignment", "theta-xz") == "Component of sensing axis x along reference axis z."
+    assert meaning("hand-positions", "uncertainty") != meaning("hand-fields", "uncertainty")
 
 
 def test_a_result_of_a_users_procedure_has_none() -> None:
-    assert meaning("a1/my-own-result") == ""
+    assert meaning("my-own", "a1/my-own-result") == ""

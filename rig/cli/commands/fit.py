@@ -14,7 +14,7 @@ from calibrations.analyses.magnetometer_turn import correct_by_extremes, estimat
 from calibrations.discovery.check_poses import Check
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.matrices import CalibrationMatrices, calibration_matrices
-from calibrations.geometry.faces import Faces, estimate_faces
+from calibrations.geometry.sphere import Faces, estimate_faces
 from calibrations.table import Array, Table
 from calibrations.text import columns, concise
 from rig.cli.terminal.complete import complete_data

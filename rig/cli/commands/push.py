@@ -13,8 +13,9 @@ from rig.cli.terminal.options import require_no_password
 from rig.cli.terminal.output import bench_option, emit, json_option, note
 from rig.errors import RecordError
 from rig.files import LAB
+from rig.lab_url import lab_url, mask_url
 from rig.record import Record
-from rig.record.lab import READER, WRITER, lab_url, mask_url, prepare
+from rig.record.lab import READER, WRITER, prepare
 from rig.record.push import Pushed, push_all, unsent, verify
 
 

@@ -42,7 +42,7 @@ def _set_environment(context: click.Context, _: click.Parameter, url: str | None
 
 def require_no_password(url: str, instead: str) -> None:
     """Raises RecordError for a URL with a password: all users of the machine can read the words of a command."""
-    from rig.record.lab import has_password, lab_url  # slow to import; only needed with a URL
+    from rig.lab_url import has_password, lab_url  # slow to import; only needed with a URL
 
     if has_password(lab_url(url)):
         raise RecordError(

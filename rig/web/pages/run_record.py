@@ -14,6 +14,7 @@ from nicegui import ui
 from calibrations.presentation.interactive import figure
 from calibrations.text import join_words
 from procedures.settings import setting_text
+from rig.bench.result_names import meaning
 from rig.errors import RecordError
 from rig.record import Event, Record, Run
 from rig.record.tables import units_of
@@ -23,7 +24,6 @@ from rig.services.export import export
 from rig.services.history import lives
 from rig.services.next_steps import page_steps, result_rows
 from rig.services.request import Request
-from rig.services.result_meaning import meaning
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk
 from rig.web.frame import frame
@@ -336,7 +336,7 @@ def _results(run: Run) -> None:
                     if row.verdict:
                         words(row.verdict, f"chip {LOOKS[row.verdict]}")
                 with ui.element("td").classes("meaning quiet small"):
-                    words(meaning(row.name))
+                    words(meaning(run.procedure, row.name))
 
 
 def _circumstances(run: Run) -> tuple[dict[str, str], ...]:
