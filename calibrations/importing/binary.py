@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from calibrations.errors import DataError
 from calibrations.files import open_text_file
@@ -67,6 +67,8 @@ def _topics(path: Path) -> list[Topic] | None:
     reader_name = next((reader for mark, reader in READERS.items() if head.startswith(mark)), None)
     if reason := next((reason for mark, reason in CANNOT.items() if head.startswith(mark)), None):
         raise DataError(f"{path}: {reason}")
+    if _is_matlab_4(head):
+        raise DataError(f"{path}: is a MATLAB file of version 4; save it in MATLAB with save(..., '-v7'), or as CSV")
     if len(head) == MATLAB_HEADER_BYTES and head[126:] in (b"IM", b"MI") and head.startswith(b"MATLAB 5"):
         reader_name = ("arrays", "matlab_topics")
     elif head.startswith(b"MATLAB 7.3"):
@@ -76,6 +78,17 @@ def _topics(path: Path) -> list[Topic] | None:
     if reader_name is None:
         return None
     return _read_topics(reader_name, path)
+
+
+def _is_matlab_4(head: bytes) -> bool:
+    """Whether a file begins as one of MATLAB 4 does: five integers for its first variable, and the variable's name."""
+    orders: tuple[tuple[Literal["little", "big"], range], ...] = (("little", range(100)), ("big", range(1000, 1100)))
+    for order, kinds in orders:
+        kind, _, _, imaginary, length = (int.from_bytes(head[k : k + 4], order) for k in range(0, 20, 4))
+        name = head[20 : 20 + length]
+        if kind in kinds and imaginary in (0, 1) and name[-1:] == b"\0" and name[:-1].decode("latin-1").isidentifier():
+            return True
+    return False
 
 
 def _read_topics(reader: tuple[str, str], path: Path) -> list[Topic]:

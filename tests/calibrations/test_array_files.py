@@ -224,6 +224,9 @@ def test_what_no_library_reads_is_refused_with_a_remedy(tmp_path: Path) -> None:
         with pytest.raises(DataError, match=says):
             open_sheet(path)
     np.save(tmp_path / "objects.npy", np.array([{}, None], dtype=object), allow_pickle=True)
+    savemat(tmp_path / "old.mat", {"acc": ACC, "time": TIME}, format="4")
+    with pytest.raises(DataError, match=r"old\.mat: is a MATLAB file of version 4; save it .* '-v7'"):
+        open_sheet(tmp_path / "old.mat")
     with pytest.raises(DataError, match="holds Python objects, which are not read"):
         open_sheet(tmp_path / "objects.npy")
     np.save(tmp_path / "one.npy", np.float64(3))
