@@ -13,7 +13,6 @@ import numpy as np
 from calibrations.discovery.dataset import Dataset
 from calibrations.discovery.findings import Candidate, F, Step
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
-from calibrations.discovery.summary import step_shares, summary_lines
 from calibrations.discovery.verdict import Finding
 from calibrations.model import Model
 from calibrations.table import Array
@@ -115,16 +114,15 @@ def discovery_document(result: Discovery[F], path: str | None) -> Document:
 
 
 def _steps(result: Discovery[F]) -> list[Document]:
-    """The steps; of rows with the share of the variance beyond the noise that each explains on unseen data."""
+    """The steps, with their shares where the search has shares."""
     data = result.findings.data
     steps = [step_document(step, data) for step in result.steps]
-    shares = step_shares(result) if data.form == "rows" else []  # type: ignore[arg-type]
+    shares = data.step_shares(result)
     return [step | {"share": share} for step, share in zip(steps, shares, strict=True)] if shares else steps
 
 
 def _summary(result: Discovery[F]) -> list[Document]:
     """A line for each place that acts, and for each further effect that was added; none for a still record."""
-    lines = summary_lines(result) if result.findings.data.form == "rows" else []  # type: ignore[arg-type]
     return [
         {
             "place": line.place,
@@ -137,7 +135,7 @@ def _summary(result: Discovery[F]) -> list[Document]:
             "in_another_form": line.in_another_form,
             "inseparable_from": list(line.inseparable_from),
         }
-        for line in lines
+        for line in result.findings.data.summary(result)
     ]
 
 
@@ -159,11 +157,7 @@ def places_document(result: Diagnosis[F] | Discovery[F]) -> list[Document]:
     """The places of the signal chain that act, the largest first; none where the search has no places."""
     acting_places, data = result.findings.places, result.findings.data
     total = sum(place.rms**2 for place in acting_places) or 1.0
-    if not acting_places:
-        return []
-    from calibrations.discovery.curves import place_curves  # few results have places
-
-    curves = place_curves(result.findings)  # type: ignore[arg-type]  # only rows have places
+    curves = data.place_curves(result.findings)
     return [
         {
             "place": place.name,

@@ -15,7 +15,9 @@ from calibrations.errors import ModelError
 from calibrations.model import Model
 
 if TYPE_CHECKING:
+    from calibrations.discovery.curves import PlaceCurve
     from calibrations.discovery.enough import Enough
+    from calibrations.discovery.summary import Line
     from calibrations.model.correlations import Correlations
 
 
@@ -23,10 +25,18 @@ class Dataset(ABC, Generic[F]):
     """Data of one kind. A subclass implements fit, search, judgement and description."""
 
     form: str  # "rows" or "samples": the kind of pictures
-    default_model: str
     floor: str  # unit of errors, in words
-    unseen: str  # data that a fit did not use
     complete: str  # a comparison without a failing place, in words
+
+    @property
+    @abstractmethod
+    def default_model(self) -> str:
+        """The shipped model for this content."""
+
+    @property
+    @abstractmethod
+    def unseen(self) -> str:
+        """Data that a fit did not use, in words."""
 
     @property
     @abstractmethod
@@ -125,27 +135,27 @@ class Dataset(ABC, Generic[F]):
             undetermined=(self.undetermined(start), plan.undetermined[1]),
         )
 
-    def rejection(self, fit: F) -> Finding | None:  # noqa: ARG002
+    def rejection(self, fit: F) -> Finding | None:
         """The reason not to use the data or the values of a fit; None if they can be used."""
         return None
 
-    def covered(self, fit: F) -> dict[str, tuple[float, float]]:  # noqa: ARG002
+    def covered(self, fit: F) -> dict[str, tuple[float, float]]:
         """Lowest and highest value of each influence for which a fit is valid; {} if none was measured."""
         return {}
 
-    def correlations(self, fit: F) -> Correlations | None:  # noqa: ARG002
+    def correlations(self, fit: F) -> Correlations | None:
         """The correlations of the parameters of a fit; None if they are unknown."""
         return None
 
-    def undetermined(self, fit: F) -> str | None:  # noqa: ARG002
+    def undetermined(self, fit: F) -> str | None:
         """Why the data do not determine a model, in words."""
         return None
 
-    def untestable(self, fit: F, effects: Mapping[str, Effect]) -> str | None:  # noqa: ARG002
+    def untestable(self, fit: F, effects: Mapping[str, Effect]) -> str | None:
         """The effects that these data cannot show, in words; None if they show all."""
         return None
 
-    def expression(self, name: str, text: str) -> Effect:  # noqa: ARG002
+    def expression(self, name: str, text: str) -> Effect:
         """An effect that the user wrote. Raises ModelError, ExpressionError with the place in the text."""
         raise ModelError(
             f"{name}: an expression cannot be added to a noise model, and {self.source} is a still record; use "
@@ -161,16 +171,28 @@ class Dataset(ABC, Generic[F]):
     def errors_document(self, fit: F) -> dict[str, Any]:
         """Errors and noise by axis, for the JSON documents."""
 
-    def comparison_fields(self, result: Comparison[F]) -> dict[str, Any]:  # noqa: ARG002
+    def comparison_fields(self, result: Comparison[F]) -> dict[str, Any]:
         """Further fields of a comparison's document."""
         return {}
 
-    def step_fields(self, step: Step[F]) -> dict[str, Any]:  # noqa: ARG002
+    def step_fields(self, step: Step[F]) -> dict[str, Any]:
         """Further fields of a step's document."""
         return {}
 
-    def candidate_fields(self, candidate: Candidate) -> dict[str, Any]:  # noqa: ARG002
+    def candidate_fields(self, candidate: Candidate) -> dict[str, Any]:
         """Further fields of a candidate's document."""
+        return {}
+
+    def step_shares(self, discovery: Discovery[F]) -> list[float | None]:
+        """By step, its share of the variance beyond the noise; [] where a search has no shares."""
+        return []
+
+    def summary(self, discovery: Discovery[F]) -> list[Line]:
+        """A line for each place that acts, and for each further effect; [] where a search has no places."""
+        return []
+
+    def place_curves(self, findings: Findings[F]) -> dict[str, PlaceCurve]:
+        """By name, the curve of each place that acts; {} where a search has no places."""
         return {}
 
     def in_one_floor(self, start: F, steps: tuple[Step[F], ...]) -> tuple[F, tuple[Step[F], ...]]:
@@ -181,23 +203,23 @@ class Dataset(ABC, Generic[F]):
     def require_allowed(self, effect: Effect) -> None:
         """Raises ModelError where the effect is not defined for these data."""
 
-    def remarks(self, fit: F) -> list[str]:  # noqa: ARG002
+    def remarks(self, fit: F) -> list[str]:
         """Sentences on an error that cannot be right."""
         return []
 
-    def cautions(self, fit: F) -> list[str]:  # noqa: ARG002
+    def cautions(self, fit: F) -> list[str]:
         """Why a fit of these data may mislead."""
         return []
 
-    def doubts(self, fit: F) -> list[str]:  # noqa: ARG002
+    def doubts(self, fit: F) -> list[str]:
         """Doubts about the input of a fit."""
         return []
 
-    def is_noise_known(self, fit: F) -> bool:  # noqa: ARG002
+    def is_noise_known(self, fit: F) -> bool:
         """Whether the noise is known independently of the residual."""
         return True
 
-    def fails_by_scatter_only(self, fit: F) -> bool:  # noqa: ARG002
+    def fails_by_scatter_only(self, fit: F) -> bool:
         """Whether a model fails nowhere if the scatter from row to row counts as noise."""
         return False
 
@@ -226,7 +248,7 @@ class Dataset(ABC, Generic[F]):
         findings = self.search(model, effects)
         return Discovery.of(findings if enough is None else self.until(findings, enough))
 
-    def until(self, findings: Findings[F], enough: Enough) -> Findings[F]:  # noqa: ARG002
+    def until(self, findings: Findings[F], enough: Enough) -> Findings[F]:
         """The findings up to the first model whose error on unseen data is small enough. Raises ModelError."""
         raise ModelError(f"{self.source}: the search in a still record has no limit for the error; remove --enough")
 

@@ -204,41 +204,40 @@ class Findings(Generic[F]):
     def given(self) -> Judgement:
         """The judgement on the given model; on the model before the added effects if no further effect is missing."""
         fit = self.origin if self.added and not self._missing else self.start
-        return Judgement(
-            model=fit.model.name, missing=self._missing, added=self.added, undetermined=self.undetermined[0],
-            closest=self._closest, provisional=not self.settled, **self._common,
-        )  # fmt: skip
+        judgement = self._judge(fit, self.added, self.undetermined[0])
+        return replace(judgement, missing=self._missing, provisional=not self.settled)
 
     @cached_property
     def final(self) -> Judgement:
         """The judgement on the final model."""
+        return replace(self._judge(self.start, self.causes, self.undetermined[1]), refinements=self.refinements)
+
+    def _judge(self, fit: F, added: tuple[str, ...], undetermined: str | None) -> Judgement:
+        """The judgement on the model of `fit`, with the effects that were added to it."""
         return Judgement(
-            model=self.start.model.name, added=self.causes, refinements=self.refinements,
-            undetermined=self.undetermined[1], closest=self._closest, **self._common,
-        )  # fmt: skip
+            model=fit.model.name,
+            added=added,
+            unknown=tuple(place.name for place in self.places if place.unknown),
+            alternatives=self.alternatives,
+            left=self.left,
+            share_left=self.end.share_left(self.origin),
+            spoilt=self.spoilt,
+            unresponsive=self.unresponsive,
+            searched=self.searched,
+            enough=self.enough,
+            undetermined=undetermined,
+            set_aside=self.set_aside,
+            closest=self._closest,
+            error=self.end.pooled_excess,
+            floor=self.data.floor,
+            remarks=self.remarks,
+        )
 
     @property
     def _missing(self) -> tuple[str, ...]:
         """The effects of the steps. A curve at an unknown place has the name of its place."""
         unknown = any(place.unknown for place in self.places)
         return tuple(name for name in self.names if not (unknown and name.startswith("free:")))
-
-    @property
-    def _common(self) -> dict[str, Any]:
-        return {
-            "alternatives": self.alternatives,
-            "unknown": tuple(place.name for place in self.places if place.unknown),
-            "left": self.left,
-            "share_left": self.end.share_left(self.origin),
-            "spoilt": self.spoilt,
-            "unresponsive": self.unresponsive,
-            "searched": self.searched,
-            "enough": self.enough,
-            "set_aside": self.set_aside,
-            "error": self.end.pooled_excess,
-            "floor": self.data.floor,
-            "remarks": self.remarks,
-        }
 
     @property
     def _closest(self) -> Closest | None:

@@ -17,6 +17,7 @@ from calibrations.discovery.outliers import fit_without, outliers_in_fit
 from calibrations.discovery.places import fails_by_scatter_only, places
 from calibrations.discovery.plausibility import refusal, rejection
 from calibrations.discovery.row_search import ONE_ORIENTATION, RowSearch
+from calibrations.discovery.summary import Line, step_shares, summary_lines
 from calibrations.discovery.verdict import Finding
 from calibrations.effects import Effect
 from calibrations.effects.expression_effect import effect_for
@@ -31,7 +32,9 @@ from calibrations.model import Model
 from calibrations.table import NUMBERS, Array, Table
 
 if TYPE_CHECKING:
+    from calibrations.discovery.curves import PlaceCurve
     from calibrations.discovery.enough import Enough
+    from calibrations.discovery.results import Discovery
     from calibrations.model.correlations import Correlations
 
 INFLUENCES = ("temperature_c", "supply_v", "t_s")  # that a product may measure
@@ -48,12 +51,12 @@ class Rows(Dataset[Fit]):
     complete = "The model fails nowhere: the residual is noise."
 
     @property
-    def default_model(self) -> str:  # type: ignore[override]
+    def default_model(self) -> str:
         """The shipped model for this content."""
         return self.table.type.default_model
 
     @property
-    def unseen(self) -> str:  # type: ignore[override]
+    def unseen(self) -> str:
         """Rows that a fit did not use."""
         return f"unseen {self.table.type.rows}"
 
@@ -261,6 +264,22 @@ class Rows(Dataset[Fit]):
             "slow_noise": _by_axis(fit, fit.noise.slow),
             "excess": _by_axis(fit, fit.excess),
         }
+
+    def step_shares(self, discovery: Discovery[Fit]) -> list[float | None]:
+        """On unseen data."""
+        return step_shares(discovery)
+
+    def summary(self, discovery: Discovery[Fit]) -> list[Line]:
+        """Largest first."""
+        return summary_lines(discovery)
+
+    def place_curves(self, findings: Findings[Fit]) -> dict[str, PlaceCurve]:
+        """Those of places with a single driver."""
+        if not findings.places:
+            return {}
+        from calibrations.discovery.curves import place_curves  # few results have places
+
+        return place_curves(findings)
 
     def remarks(self, fit: Fit) -> list[str]:
         """A remark on a residual below the noise floor: then the floor is wrong."""

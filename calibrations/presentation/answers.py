@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
-from calibrations.discovery.summary import summary_lines, sure
+from calibrations.discovery.summary import sure
 from calibrations.documents import places_document, why
 from calibrations.presentation.views import view_of
 from calibrations.text import columns, quantity
@@ -53,7 +53,7 @@ def discovery_text(result: Discovery[Any], experiment: Iterable[str] = ()) -> st
     """The error after each step and the verdict. `experiment`: lines on the next one."""
     data = result.findings.data
     parts = [columns(*view_of(data).step_table(result)), discovery_verdict(result, experiment)]
-    if data.form == "rows" and (summary := _summary(result)):
+    if summary := _summary(result):
         parts[1:1] = filter(None, [summary, unknown_text(result)])
     return "\n\n".join(parts)
 
@@ -104,6 +104,6 @@ def _summary(result: Discovery[Any]) -> str:
             sure(line.certainty),
             ", ".join(line.inseparable_from) or "-",
         )
-        for line in summary_lines(result)
+        for line in result.findings.data.summary(result)
     ]
     return columns(("place", "effect", "size", "share", "certainty", "cannot be separated from"), rows) if rows else ""
