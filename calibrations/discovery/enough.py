@@ -10,8 +10,7 @@ import numpy as np
 
 from calibrations.discovery.findings import Findings
 from calibrations.errors import ModelError
-from calibrations.fitting.fit import Fit
-from calibrations.fitting.sensed import in_milli
+from calibrations.fitting.fit import Fit, in_milli
 from calibrations.free_forms.place_names import PREFIX
 from calibrations.geometry.orientation import one_orientation
 from calibrations.table import Array

@@ -15,8 +15,7 @@ from scipy.special import chdtrc
 
 from calibrations.criteria import MATERIAL, MOST_SLOW_NOISE, ONE_SIDED, SIGNIFICANT, STANDS_OUT
 from calibrations.discovery.findings import Place
-from calibrations.fitting.fit import Fit
-from calibrations.fitting.sensed import axis_of, milli_unit, scales
+from calibrations.fitting.fit import Fit, axis_of, milli_unit, scales
 from calibrations.means.noise import rms
 from calibrations.model.chain import backward
 from calibrations.table import Array, Table, in_time, time_origin

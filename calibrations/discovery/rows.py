@@ -23,8 +23,7 @@ from calibrations.effects import Effect
 from calibrations.effects.expression_effect import effect_for
 from calibrations.errors import ModelError, nearest
 from calibrations.fitting.determined import blind_to, explain_undetermined
-from calibrations.fitting.fit import Fit, evaluate, fit, refit
-from calibrations.fitting.sensed import axis_of
+from calibrations.fitting.fit import Fit, axis_of, evaluate, fit, refit
 from calibrations.free_forms.place_names import PREFIX
 from calibrations.geometry.orientation import one_orientation
 from calibrations.means.noise import rms

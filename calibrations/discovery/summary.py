@@ -13,8 +13,7 @@ import numpy as np
 from calibrations.discovery.results import Discovery
 from calibrations.discovery.search import first_order_cost
 from calibrations.discovery.significance import chance
-from calibrations.fitting.fit import Fit
-from calibrations.fitting.sensed import in_milli, milli_unit, pool_in_milli
+from calibrations.fitting.fit import Fit, in_milli, milli_unit, pool_in_milli
 from calibrations.free_forms.place_names import PREFIX, place_of_effect
 from calibrations.means.noise import rms
 from calibrations.table import Array

@@ -23,11 +23,12 @@ from calibrations.fitting.solution import Solution, solution_at, white_noise
 from calibrations.fitting.uncertainty import estimate_all_noise, uncertainty_factors
 from calibrations.frames import data_frame
 from calibrations.free_forms.place_names import PREFIX
+from calibrations.geometry.orientation import one_orientation
 from calibrations.means.noise import Noise
 from calibrations.model import Model
 from calibrations.model.model import Parameters
 from calibrations.result import Result
-from calibrations.table import Array, Table
+from calibrations.table import MILLI, Array, Table
 from calibrations.text import columns, quantity
 
 if TYPE_CHECKING:
@@ -239,3 +240,39 @@ def with_least_white(result: Fit, white: Array) -> Fit:
     noise = replace(result.noise, white=np.minimum(white, result.noise.white), scatter=0 * result.noise.scatter)
     uncertain = _with_uncertainties(replace(result, noise=noise, all_noise=None))
     return replace(uncertain, noise=result.noise)
+
+
+# Residuals in the unit of the sensed quantity: mg, thousandths of the field, or mdeg/s. At one orientation they are in mV,
+# because the scale factor is not known there.
+
+
+def scales(fitted: Fit) -> Array:
+    """Output per g, or deg/s, of each channel; 1 for a residual in what is sensed, or where that is not known."""
+    if fitted.table.type.magnitude:
+        return np.ones(1)
+    if one_orientation(fitted.table):
+        return np.ones(len(fitted.channels))
+    effect = "gyro-scale-factor" if fitted.table.type.turning else "scale-factor"
+    axes, nominal = [axis_of(channel) for channel in fitted.channels], fitted.problem.layout.nominal
+    return np.abs([fitted.model.value(f"{effect}.{axis}", nominal) for axis in axes])
+
+
+def axis_of(channel: str) -> str:
+    """The axis that a channel belongs to: "x" of "x in phase at 10 Hz"; itself where it has no parts."""
+    return channel.partition(" ")[0]
+
+
+def milli_unit(fitted: Fit) -> str:
+    """The unit of `in_milli`."""
+    return f"m{fitted.problem.unit}" if one_orientation(fitted.table) else MILLI[fitted.table.input_unit]
+
+
+def in_milli(values: Array, fitted: Fit) -> Array:
+    """Values per channel, in the residual's unit, as mg, thousandths of the field, or mdeg/s."""
+    return np.asarray(1e3 * values / scales(fitted))
+
+
+def pool_in_milli(fitted: Fit) -> tuple[float, float]:
+    """Rms of the residual over all channels, and the noise floor, in the unit of `in_milli`."""
+    error, floor = in_milli(fitted.rmse, fitted), in_milli(fitted.noise.floor, fitted)
+    return float(np.sqrt(np.mean(error**2))), float(np.sqrt(np.mean(floor**2)))

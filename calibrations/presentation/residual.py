@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.effects import Effect
-from calibrations.fitting.fit import Fit
-from calibrations.fitting.sensed import milli_unit, scales
+from calibrations.fitting.fit import Fit, milli_unit, scales
 from calibrations.geometry.orientation import other_in_plane, out_of_plane
 from calibrations.means.noise import rms
 from calibrations.model.chain import backward, force

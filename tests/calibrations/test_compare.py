@@ -10,8 +10,7 @@ import pytest
 
 from calibrations.criteria import MATERIAL
 from calibrations.effects.catalogue import catalogue
-from calibrations.fitting.fit import fit
-from calibrations.fitting.sensed import scales
+from calibrations.fitting.fit import fit, scales
 from calibrations.loop import compare, dataset, diagnose
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table

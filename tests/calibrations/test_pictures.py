@@ -14,8 +14,7 @@ import pytest
 from calibrations.discovery.findings import Step
 from calibrations.discovery.results import Discovery
 from calibrations.effects.catalogue import catalogue
-from calibrations.fitting.fit import Fit, fit
-from calibrations.fitting.sensed import pool_in_milli
+from calibrations.fitting.fit import Fit, fit, pool_in_milli
 from calibrations.loop import compare, discover
 from calibrations.model import Model
 from calibrations.model.file import read_model

@@ -15,8 +15,7 @@ from calibrations.design.expected import Expected
 from calibrations.design.experiment import Experiment
 from calibrations.discovery.results import Comparison, Discovery
 from calibrations.effects.catalogue import catalogue
-from calibrations.fitting.fit import Fit
-from calibrations.fitting.sensed import pool_in_milli
+from calibrations.fitting.fit import Fit, pool_in_milli
 from calibrations.loop import compare, discover
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.file import read_model

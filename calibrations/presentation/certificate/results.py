@@ -28,9 +28,8 @@ from calibrations.discovery.plausibility import doubt, rejection
 from calibrations.discovery.structure import find_unexplained_scatter
 from calibrations.errors import ModelError, UnusableData
 from calibrations.fitting.budget import SLOW_NOISE, Budget, make_budget, parameter_correlation, row_gains
-from calibrations.fitting.fit import Fit, evaluate
+from calibrations.fitting.fit import Fit, evaluate, in_milli, milli_unit
 from calibrations.fitting.inputs import Contribution, input_contributions
-from calibrations.fitting.sensed import in_milli, milli_unit
 from calibrations.geometry.rate_table import EARTH_DEG_S
 from calibrations.means.noise import Noise, rms
 from calibrations.model import Estimate, Model, Term

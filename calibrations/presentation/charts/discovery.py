@@ -11,8 +11,7 @@ import numpy as np
 from calibrations.analyses.motion import MotionResult
 from calibrations.discovery.findings import Step
 from calibrations.discovery.results import Comparison, Discovery
-from calibrations.fitting.fit import Fit
-from calibrations.fitting.sensed import milli_unit, pool_in_milli
+from calibrations.fitting.fit import Fit, milli_unit, pool_in_milli
 from calibrations.presentation.chart import (
     GOOD,
     MEASURED,

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.discovery.findings import Step
-from calibrations.fitting.fit import Fit
-from calibrations.fitting.sensed import scales
+from calibrations.fitting.fit import Fit, scales
 from calibrations.means.noise import rms
 from calibrations.presentation.chart import (
     CANDIDATE,

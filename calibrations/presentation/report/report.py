@@ -18,8 +18,7 @@ from calibrations.design.expected import pairs_separated
 from calibrations.design.experiment import Experiment
 from calibrations.discovery.findings import Candidate
 from calibrations.discovery.results import Comparison, Discovery
-from calibrations.fitting.fit import Fit
-from calibrations.fitting.sensed import in_milli, milli_unit, pool_in_milli
+from calibrations.fitting.fit import Fit, in_milli, milli_unit, pool_in_milli
 from calibrations.model import Model, Term
 from calibrations.presentation.budget import budget_section
 from calibrations.presentation.chart import Picture

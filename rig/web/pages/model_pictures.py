@@ -11,7 +11,7 @@ import numpy as np
 from nicegui import events, ui
 
 from calibrations.discovery.places import rows_at
-from calibrations.fitting.sensed import axis_of
+from calibrations.fitting.fit import axis_of
 from calibrations.presentation.chart import single_chart
 from calibrations.presentation.charts import motion
 from calibrations.presentation.charts.discovery import levels, waterfall
