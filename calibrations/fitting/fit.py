@@ -242,8 +242,8 @@ def with_least_white(result: Fit, white: Array) -> Fit:
     return replace(uncertain, noise=result.noise)
 
 
-# Residuals in the unit of the sensed quantity: mg, thousandths of the field, or mdeg/s. At one orientation they are in mV,
-# because the scale factor is not known there.
+# Residuals in the unit of the sensed quantity: mg, thousandths of the field, or mdeg/s. At one orientation the scale
+# factor is not known: there they are in mV.
 
 
 def scales(fitted: Fit) -> Array:
