@@ -1,8 +1,8 @@
 """The search in a table of rows: one effect if it explains all, else the places that act and their causes.
 
 An effect is a refinement if its removal costs little compared with the removal of the greatest effect. It corrects the
-form of another effect, which is known only approximately, and is not named as a cause. Geometry is exact: beside a
-strong misalignment, no effect is a refinement.
+form of another effect, which is known only approximately, and is not named as a cause. Geometry is exact: if the
+greatest effect is a misalignment, no effect is a refinement.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The search for missing effects of poses: first the places that act, then the catalogue effects that are their causes.
 
-Each named cause becomes an effect of the model. What a place shows beyond its causes becomes a free form, and so does
-a place without a cause: the error falls, and the cause remains open.
+Each named cause becomes an effect of the model. The part of a place that its causes do not explain becomes a free form,
+and so does a place without a cause: the error falls, and the cause remains unknown.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ from calibrations.progress import report
 from calibrations.table import Array
 
 STAIRS = "quantisation"
-AS_SEARCHED = 1.1  # times the error of a search that follows noise: a fit of less leaves nothing to a new search
-IDLE = 0.99  # of the error before: what is no cause and leaves more is tried without
+AS_SEARCHED = 1.1  # times the error of a search that follows noise: a fit with a smaller error needs no new search
+IDLE = 0.99  # of the error before: an addition that is no cause and leaves a larger error may be left out
 NEARLY = 1.5  # noise floors: with a larger error, the stairs are wrong
 
 

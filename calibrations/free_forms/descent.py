@@ -1,7 +1,7 @@
-"""One descent of the search: rounds of selection and Gauss-Newton steps, from a beginning to where nothing changes.
+"""One descent of the search: rounds of selection and Gauss-Newton steps until nothing changes.
 
-Each round linearises the chain where the descent stands, selects the components that act, and takes a step. The first
-rounds take only large components: what small ones would explain there may be a second-order remainder of large ones.
+Each round linearises the chain at the present point, selects the components that act, and takes a step. The first
+rounds take only large components: a small one may be a second-order remainder of large ones.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ from calibrations.free_forms.stairs import find_saw
 from calibrations.progress import report
 from calibrations.table import Array
 
-COARSE = (1e-3, 2e-5)  # of the misfit, at each linearisation: less may be a second-order remainder
+COARSE = (1e-3, 2e-5)  # of the misfit, in the first rounds: a smaller component may be a second-order remainder
 ROUNDS = 7
 EXCHANGES_AGAIN = 0.3  # noise floors by which the output changes, rms: exchanges of the same components are tried again
 CONVERGED = 0.03  # noise floors by which the output changes, rms
-LARGEST = 4.0  # of the mean square of the first misfit: more is two components against each other
+LARGEST = 4.0  # of the mean square of the first misfit: larger components cancel each other
 HALVINGS = 6  # of a step that overshoots
 SLOW_BEGIN = 0.1  # slow noise, in noise floors (rms): where its estimate starts
-SLOW_FIRST = 0.15  # at most, while the first components are found: it would take up part of them
+SLOW_FIRST = 0.15  # the most slow noise while the first components are found: more would explain a part of them
 SLOW_MOST = 0.5  # at most
 CAUTION = 30.0  # times the gain that a component needs after a step that failed
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What a descent works on.
+    """The input of a descent.
 
     white    standard deviation of each mean, (channels, n)
     flicker  whether slow noise may be of any size
@@ -92,7 +92,7 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Where a descent stands: all components, the variances of those that act, and the chain at their coefficients."""
+    """A point of a descent: all components, the variances of those that act, and the chain at their coefficients."""
 
     components: Sequence[Component]
     variances: Mapping[str, float]
@@ -212,7 +212,7 @@ class SearchResult:
 
     @property
     def criterion(self) -> float:
-        """What a search makes small: -2 log restricted likelihood, plus a price for each component that acts."""
+        """The minimised criterion: -2 log restricted likelihood, plus a price for each component that acts."""
         return self.sizes.deviance + ENTER * len(self.active) + prices(self.component(name) for name in self.active)
 
 

@@ -1,4 +1,4 @@
-"""Names within a place: the fewest catalogue forms that take up its curve; else the cause is unknown."""
+"""Names within a place: the fewest catalogue forms that explain its curve; if none do, the cause is unknown."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from calibrations.free_forms.descent import SearchResult, climb
 from calibrations.free_forms.reml import gains
 from calibrations.table import Array
 
-NEXT_FORM = 0.05  # of a place's variance that a second form must take up: less is the form of the first
-LEAST_NEEDED = 0.02  # the same of a form without which the others, as the catalogue has them, do less
-NAMED = 0.9  # of it that the forms must take up: another formula of the same mechanism leaves less
-MOST_FORMS = 2  # forms that only approximate a curve
+NEXT_FORM = 0.05  # of a place's variance: the least that a second form must explain; less may be the form of the first
+LEAST_NEEDED = 0.02  # of a place's variance: the least that the other forms must lose without this one
+NAMED = 0.9  # of a place's variance: the least that the forms must explain together
+MOST_FORMS = 2  # forms, at most, that only approximate a curve
 LEAST_SIZE = 0.6  # noise floors: a smaller place is a refinement
 LEAST_OWN = 0.3  # noise floors: part of a place with a cause that no other place explains, if the residual is noise
 LEAST_SHARE = 0.015  # of the largest place's size
 LEAST_UNKNOWN = 1.0  # noise floors: size of a place whose cause is unknown
 LEAST_UNKNOWN_SHARE = 0.05  # of the largest place's size: the part of such a place that no other one explains
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
-CLOSE = 10.0  # of -2 log likelihood: not told apart
-UNSEEN = 0.3  # noise floors: what an effect leaves of a curve, and a wider one does not, says nothing of the mechanism
-CLEARLY_LESS = 1.5  # times the rms that an effect leaves of a curve: one that leaves more is not its cause
-READING_ERRORS = 1.5  # times what the errors of noisy columns leave: their size is uncertain
-FOLLOWS = 0.97  # of the variance of a curve over time that a line over a column takes up: no two clocks agree so well
+CLOSE = 10.0  # of -2 log likelihood: the data cannot separate two causes that differ by less
+UNSEEN = 0.3  # noise floors: a smaller residual of an effect does not show that a wider effect is the cause
+CLEARLY_LESS = 1.5  # ratio of the rms residuals of two effects from which one of them is not the cause
+READING_ERRORS = 1.5  # times the residual by the errors of noisy columns, whose size is uncertain
+FOLLOWS = 0.97  # of the variance of a curve over time that a line over a column explains: then the column is the cause
 FOLLOWERS = {"time-bias": ("temperature-bias", "column:std"), "time-scale": ("temperature-scale",)}
-FORM_OF, MOSTLY = 0.25, 0.85  # size beside a larger place, and share of its gain that another form there takes up
+FORM_OF, MOSTLY = 0.25, 0.85  # size relative to a larger place, and share of its gain that another form there explains
 
 
 @dataclass(frozen=True)
 class ActingPlace:
-    """A place that acts: its size (rms over the poses, in floors), and its causes with the share that they take up.
+    """A place that acts: its size (rms over the poses, in floors), and its causes with the share that they explain.
 
     `own`: size of the part that no other place explains. `largest`: size of the largest place.
     """
@@ -49,7 +49,7 @@ class ActingPlace:
     material: bool
     gain: float
     inseparable_from: tuple[str, ...]
-    curve: Array  # (channels, n), in the output's unit, freed of what the base takes up
+    curve: Array  # (channels, n), in the output's unit, without its projection on the base
     constants: tuple[tuple[str, float], ...] = ()  # of the cause, where it is that of another place
 
     @property
@@ -155,7 +155,7 @@ def _project_off(Q: Array, x: Array) -> Array:
 def _name_effects(
     result: SearchResult, place: str, names: Sequence[str], curve: Array, Q: Array, b: int
 ) -> tuple[tuple[str, ...], float]:
-    """The fewest catalogue effects that take up the curve, and their share of its variance."""
+    """The fewest catalogue effects that explain the curve, and their share of its variance."""
     forms: dict[str, list[Component]] = {}
     jumps = any(_jumps(result, name) for name in names if "/walk-" in name)
     for comp in result.components:
@@ -204,10 +204,11 @@ def _name_effects(
 def _one_name(
     result: SearchResult, names: Sequence[str], cause_names: Sequence[str], curve: Array, Q: Array
 ) -> tuple[str, ...]:
-    """The causes with one name for an effect and the wider one that contains it.
+    """The causes, with one name for an effect and a wider effect that contains it.
 
-    It is the wider one where the other, at its best shape, leaves a part of the curve that can be seen, and the wider
-    one beside the other without a shape leaves clearly less: both with their shapes follow many lags.
+    The wider effect is the cause on two conditions: the inner one at its best shape leaves a visible residual, and the
+    wider one together with the inner one without a shape leaves a clearly smaller one. With both shapes free, the two
+    would follow nearly any lag.
     """
     causes = dict.fromkeys(cause_names)
 
@@ -230,8 +231,9 @@ def _find_followed_column(
 ) -> tuple[Component, float] | None:
     """The line over a temperature or a logged column that a curve over time follows, and its share of the variance.
 
-    A smooth curve over time has no scatter of a reader, and is likelier than a column that has, however well it follows
-    the column. None where it follows none, takes up no more than the `share` of its own causes, or is not over time.
+    A smooth curve over time is likelier than a column with reading errors, even if the column is its cause: so the
+    likelihood cannot decide. None if the place is not over time, if the curve follows no column, or if the line
+    explains no more than the `share` of the place's own causes.
     """
     if place not in FOLLOWERS:
         return None
@@ -270,13 +272,13 @@ def _at_best_shapes(
 
 
 def _columns_of(result: SearchResult, comp: Component, Q: Array) -> Array:
-    """Columns of a component over the noise, freed of what the base takes up, (channels * n, m)."""
+    """Columns of a component over the noise, without their projection on the base, (channels * n, m)."""
     X = comp.jacobian(result.state) / result.white[:, :, None]
     return _project_off(Q, X.reshape(-1, X.shape[2]))
 
 
 def _necessary(columns: Mapping[str, Array], curve: Array, total: float) -> tuple[tuple[str, ...], float]:
-    """Of the catalogue forms that act without a free form beside them, those that the curve needs, and their share."""
+    """The catalogue forms that the curve needs where no free form acts, and their share of its variance."""
     share = 1 - _residual_squares(list(columns.values()), curve) / total
 
     def cost_without(cause: str) -> float:
@@ -289,7 +291,7 @@ def _necessary(columns: Mapping[str, Array], curve: Array, total: float) -> tupl
 
 
 def _follows_many(comp: Component) -> bool:
-    """Whether a cause's columns are of many widths, so that they take up a part of most curves."""
+    """Whether a cause's columns are of many widths, so that they explain a part of most curves."""
     flexible_kinds = ("clips", "play", "preisach")
     return comp.cause == "quantisation" or (comp.form is not None and comp.form.basis(0).kind in flexible_kinds)
 
@@ -349,9 +351,9 @@ def _rivals(result: SearchResult, names: Sequence[str], larger: set[str]) -> tup
 
 
 def _replacements(result: SearchResult, names: Sequence[str], causes: Sequence[str], cause: str) -> tuple[str, ...]:
-    """Catalogue effects of other places that gain nearly as much as one cause does, or more, beside the other causes.
+    """Catalogue effects of other places whose gain, with the other causes present, is nearly that of `cause` or more.
 
-    Free forms are left out: beside these, no form of the catalogue is needed.
+    Free forms are left out, because with them no form of the catalogue is needed.
     """
     acting_components = [result.component(name) for name in names]
     other_causes = {c.name for c in acting_components if c.form is None and c.cause in causes and c.cause != cause}

@@ -2,9 +2,9 @@
 
 Then it removes the components that this result does not need.
 
-Slow noise is limited in a search, because more of it takes up parts of causes. Flicker beyond that limit is then
-followed by random walks and curves over time. Its spectrum tells it from a random walk: flicker has more power at high
-frequencies for the same power at low ones, so that all frequencies are compared, beside a straight drift.
+Slow noise is limited in a search, because more of it would explain parts of causes. Flicker above that limit then looks
+like random walks and curves over time. Its spectrum separates it from a random walk: for the same power at low
+frequencies, flicker has more power at high ones. So the likelihood of all frequencies decides, with a straight drift.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from calibrations.table import Array
 
 SETTLING = 6  # Gauss-Newton steps after components are left out
 SMALL_GAIN = 1.0  # of twice the log-likelihood
-NOISE_ALONE, FEW_COMPONENTS = 1.04, 3  # residual over noise and components of a search that needs no second beginning
+NOISE_ALONE, FEW_COMPONENTS = 1.04, 3  # residual over noise, and number of components, up to which one start is enough
 # The residual over the noise: a smaller one is explained without flicker; a larger one contains effects that the search
 # did not find.
 LEAST_MISFIT, MOST_MISFIT = 1.2, 2.0
@@ -37,14 +37,14 @@ ANY = 1e8  # a variance that is no limit
 def search(
     data: PoseData, white: Array, model_effects: ModelEffects, general: bool = True, noise_known: bool = True
 ) -> SearchResult:
-    """Places that act, with their sizes, from several beginnings: the likeliest end counts.
+    """Places that act, with their sizes: the likeliest result of several starts.
 
-    First forms of the catalogue begin, and free forms follow; where that leaves more than noise, or many components,
-    all begin together. What is not smooth is found by the one, what has another form by the other. Where the history
-    acts, loops that differ from place to place are tried too; without one they resemble most curves with a corner,
-    and where they gain little they take up part of what acts elsewhere. Where flicker of any size is likelier than what
-    follows the time, all begins again with it. This is not tried where a misfit may look like flicker: beside effects
-    of the given model, or with a large residual.
+    1. Forms of the catalogue first, then free forms. This finds causes that are not smooth.
+    2. If that leaves more than noise, or many components: all forms at once. This finds causes of another form.
+    3. If the history acts: loops that differ from place to place as well. They resemble most curves with a corner, so
+       they have to gain clearly.
+    4. If flicker of any size is likelier than the components over time: all again with such flicker. This is left out
+       if a misfit may look like flicker: with effects of the given model, or with a large residual.
 
     white    standard deviation of each mean, (channels, n)
     general  whether components that can follow almost anything are tried
@@ -74,10 +74,9 @@ def _search_from_all(setting: Setting, general: bool) -> SearchResult:
 def _without_remainders(best: SearchResult, descent: Callable[[SearchResult], SearchResult]) -> SearchResult:
     """The search without components that hold the remainder of others, if that is likelier.
 
-    While the first components are found, what they leave is of second order in large effects, and looks like other
-    places. The derivatives at the end rely on these. So each place, and each component, is left out in turn with
-    Gauss-Newton steps of its own; what is then missing is searched for again. Not where the residual is large: what
-    the search did not find is then in every component.
+    The first steps leave residuals of second order in large effects, which look like other places, and the search adds
+    components for them. So each place, and each component, is left out in turn with Gauss-Newton steps of its own; then
+    the search continues. Not with a large residual: every component then holds a part of the missing effects.
     """
     if best.ratio > MOST_MISFIT:
         return best

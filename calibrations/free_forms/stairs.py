@@ -1,6 +1,6 @@
-"""The stairs of a coarse converter: found in the outputs themselves, and taken off before any other search.
+"""The stairs of a coarse converter: found in the outputs themselves, and removed before any other search.
 
-A finer one leaves a saw in the means: periodic in the output, and found by a spectrum of the residual over the output.
+A finer converter leaves a sawtooth in the means: periodic in the output, found by the spectrum of the residual over it.
 
 Rounded outputs gather at the codes, whatever else acts on the sensor. Once height and place of a step are known, the
 output before the rounding is known to within its posterior: sharply at the edge of a step, and hardly on its tread.
@@ -26,7 +26,7 @@ POINTS = 4.0  # in a resolved interval of frequency
 MOST_FREQUENCIES = 20_000  # frequencies
 GATHERED = 0.28  # more than the linear model's outputs gather at the same codes: |mean of exp(2 pi i V / step)|
 BY_CHANCE = 3.0  # times the most that outputs at random gather: sqrt(log(frequencies) / outputs)
-FINEST = 3.0  # sample noises in a step: finer steps leave nothing in a mean
+FINEST = 3.0  # sample noises in a step: the mean of finer steps has no visible error
 SAME_REMAINDER = (
     0.4  # of the outputs, beyond an equal share: at codes of one remainder; some lie on the edge between two
 )
@@ -85,12 +85,12 @@ def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
 
 
 def _sample_noise(outputs: Array, white: Array, step: float, offset: float) -> float:
-    """The noise of a sample at which the outputs are likeliest to lie between the codes as they do.
+    """The noise of a sample with the greatest likelihood, from the positions of the means between the codes.
 
     outputs, white  means and their standard deviations, (channels, n)
 
-    Of steps so coarse that most means are samples of one code, their standard deviations tell nothing of it. Outputs
-    before the rounding are taken to lie anywhere between two codes with the same probability.
+    If the steps are so coarse that most means have samples of one code only, their standard deviations cannot give it.
+    Outputs before the rounding are assumed to be uniform between two codes.
     """
     fraction, std = ((outputs - offset) / step).ravel()[:, None], np.maximum(white / step, NARROWEST).ravel()[:, None]
 

@@ -61,9 +61,9 @@ class Structure:
     def causes(self) -> tuple[str, ...]:
         """Catalogue effects that are named, the largest place first.
 
-        What the data cannot separate from a larger cause is not named: one mechanism has one name. Beside something
-        larger that is unknown, an effect is named only where its own form, and not one that follows anything, is seen,
-        and a geometry only where it is larger than a linear part of what is unknown.
+        An effect that the data cannot separate from a larger cause is not named: one mechanism has one name. If a
+        larger place is unknown, an effect is named only if its own form is visible (not one that follows most curves),
+        and a geometry only if it is larger than the linear part that the unknown curve may have.
         """
         largest = max((place.size for place in self.unknown), default=0.0)
         cause_names: list[str] = []
