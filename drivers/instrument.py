@@ -69,6 +69,49 @@ class HasAlarm(Protocol):
         """Raises StageAlarm if it stays."""
 
 
+# Abilities that some instruments have. Waiting code and a stop of the rig use them where they exist.
+
+
+@runtime_checkable
+class CanLook(Protocol):
+    """An instrument with interlocks or alarms that need attention while the program waits."""
+
+    def look(self) -> None:
+        """Raises Interlocked or StageAlarm."""
+
+
+@runtime_checkable
+class CanHalt(Protocol):
+    """An instrument that stops in two steps, so that others can stop at the same time."""
+
+    def halt(self) -> None:
+        """Send the stop command and return at once; `stop` must follow."""
+
+
+@runtime_checkable
+class KeepsSteady(Protocol):
+    """An instrument that can compare its position or oscillation with the last command."""
+
+    def require_steady(self) -> None:
+        """Raises the error of a stage that has left its position, or of an oscillation that has ended."""
+
+
+@runtime_checkable
+class HasStopInput(Protocol):
+    """A drive with a stop input that may still be on after a stop that failed."""
+
+    def release(self) -> bool:
+        """Switch the stop input off if it is on; returns whether it was on."""
+
+
+@runtime_checkable
+class CountsSamples(Protocol):
+    """A digital sensor whose driver counts lost and damaged samples."""
+
+    def tally(self) -> dict[str, tuple[float, str]]:
+        """The counters since the connection, by name: a value with its unit."""
+
+
 def require_positive(settings: object, *names: str) -> None:
     """Raises ValueError with the names of the settings that are not positive and finite."""
     if wrong_names := [name for name in names if not 0 < getattr(settings, name) < math.inf]:

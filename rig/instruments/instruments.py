@@ -12,7 +12,7 @@ from typing import Any, cast
 
 from drivers.clock import SimulatedClock
 from drivers.errors import DriverError
-from drivers.instrument import Check, Identity
+from drivers.instrument import CanHalt, CanLook, Check, CountsSamples, HasStopInput, Identity, KeepsSteady
 from drivers.instrument import Instrument as Driver
 from drivers.manual_stage.driver import ManualStage
 from drivers.manual_stage.person import PersonLink
@@ -21,6 +21,7 @@ from drivers.transport.server import Server
 from drivers.world.batch import Batch
 from drivers.world.world import World
 from procedures.errors import ProcedureError
+from procedures.instruments import Oven, Stage
 from procedures.questions import Dial
 from procedures.session import Dwell, Host, Session
 from rig.bench import ROLES, Bench
@@ -129,12 +130,13 @@ class Rig:
     def tally(self) -> dict[str, tuple[float, str]]:
         """The counters of a digital sensor's driver since the connection, by name: a value with its unit."""
         adc = self.drivers.get("adc")
-        return getattr(adc, "tally", dict)()
+        return adc.tally() if isinstance(adc, CountsSamples) else {}
 
     def require_steady(self) -> None:
         """Raises the error of a stage that has left its position, or of an oscillation that has ended."""
         for driver in self._moving_drivers():
-            getattr(driver, "require_steady", _do_nothing)()
+            if isinstance(driver, KeepsSteady):
+                driver.require_steady()
 
     def look(self) -> None:
         """Raises the error of an open interlock or an alarm."""
@@ -150,15 +152,15 @@ class Rig:
             )
         return self.clock.guarded(checks)
 
-    def _drivers_with_check(self) -> list[Any]:
-        """Drivers with a check.
+    def _drivers_with_check(self) -> list[CanLook]:
+        """Drivers with interlocks or alarms.
 
         Without interlocks there is none in simulated time: there the end of a move is early enough for an alarm.
         """
         adc = self.bench.instruments.get("adc")
         if self.bench.simulated and not (adc and adc.parse_settings().interlocks):
             return []
-        return [driver for driver in self.drivers.values() if hasattr(driver, "look")]
+        return [driver for driver in self.drivers.values() if isinstance(driver, CanLook)]
 
     def release(self) -> list[str]:
         """Switch off the stop inputs that an earlier run left on. Returns a sentence for each.
@@ -167,7 +169,9 @@ class Rig:
         """
         if self.bench.simulated:
             return []
-        left_on = [mover.name for mover in self._moving_drivers() if getattr(mover, "release", bool)()]
+        left_on = [
+            mover.name for mover in self._moving_drivers() if isinstance(mover, HasStopInput) and mover.release()
+        ]
         return [f"{name}: the stop input was still on from an earlier stop; it is off now" for name in left_on]
 
     def stop(self) -> list[str]:
@@ -176,15 +180,17 @@ class Rig:
         Every instrument gets its stop command before the first wait. The oven is switched off, because only a run
         checks its temperature.
         """
-        movers, oven = self._moving_drivers(), cast(Any, self.drivers.get("oven"))
+        movers = self._moving_drivers()
         for mover in movers:
-            _failure(getattr(mover, "halt", _do_nothing))
-        failed = [(f"{mover.name} may still move", _failure(mover.stop)) for mover in movers]
-        if oven is not None:
-            failed.append((f"{oven.name} may still heat", _failure(lambda: oven.run(False))))
+            if isinstance(mover, CanHalt):
+                _failure(mover.halt)
+        failed = [(f"{mover.name} may still move", _failure(cast(Stage, mover).stop)) for mover in movers]
+        if (oven := self.drivers.get("oven")) is not None:
+            failed.append((f"{oven.name} may still heat", _failure(lambda: cast(Oven, oven).run(False))))
         return [f"{instrument}: {failure}" for instrument, failure in failed if failure is not None]
 
-    def _moving_drivers(self) -> list[Any]:
+    def _moving_drivers(self) -> list[Driver]:
+        """Stages and positioner."""
         return [self.drivers[role] for role in MOVING if role in self.drivers]
 
 
@@ -195,10 +201,6 @@ def _failure(act: Callable[[], object]) -> Exception | None:
     except Exception as failure:
         return failure
     return None
-
-
-def _do_nothing() -> None:
-    """For an instrument without this method."""
 
 
 def _at_rest(dwells: Sequence[Dwell], oven_c: float) -> bool:
