@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -100,14 +101,14 @@ def per_axis(basis: Basis) -> Columns:
     return columns
 
 
-def free(form: Form, data_state: State, cause: str = "", price: float = 0.0, **options: object) -> Component:
+def free(form: Form, data_state: State, cause: str = "", price: float = 0.0, **options: Any) -> Component:
     """The component of a free form."""
     table = data_state.data.table
     name = f"{form.place}/{form.name}"
     if form.driver in ANGLES:
         no_force = np.zeros((table.n, 3))
         angle = form.columns(table, no_force, no_force[:, 0], 0)
-        return Component(name, form.place, form.driver, cause, price=price, angle=angle, form=form, **options)  # type: ignore[arg-type]
+        return Component(name, form.place, form.driver, cause, price=price, angle=angle, form=form, **options)
 
     def basis(state: State, k: int) -> Array:
         return form.columns(table, state.force, state.response[k], k)
@@ -117,4 +118,4 @@ def free(form: Form, data_state: State, cause: str = "", price: float = 0.0, **o
     else:
         columns = per_axis(basis)
     stage = "output" if form.driver == "output" else "response"
-    return Component(name, form.place, stage, cause, price=price, columns=columns, form=form, **options)  # type: ignore[arg-type]
+    return Component(name, form.place, stage, cause, price=price, columns=columns, form=form, **options)

@@ -13,8 +13,9 @@ import zlib
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from zipfile import ZipFile
 
 import numpy as np
@@ -123,7 +124,7 @@ def _add(group: Group, name: str, value: Any) -> None:
         for field_name in values.dtype.names:
             _add(group, field_name, values[field_name])
     elif values.dtype.kind in "iufb" and values.size > 1:
-        group.arrays[name] = (values.shape, "", lambda values=values: values)  # type: ignore[misc]
+        group.arrays[name] = (values.shape, "", lambda: values)
     elif values.dtype.kind in "mM" and values.ndim == 1 and len(values) > 1:
         seconds = (values - (values[0] if values.dtype.kind == "M" else values.dtype.type(0))) / np.timedelta64(1, "s")
         group.arrays[name] = (values.shape, "s", lambda: seconds)
@@ -146,7 +147,7 @@ def npz_topics(path: Path) -> list[Topic]:
     group = Group("")
     with np.load(path, allow_pickle=False) as archive:
         for name in archive.files:
-            _add(group, name, _load(path, lambda name=name: archive[name]))  # type: ignore[misc]
+            _add(group, name, _load(path, partial(archive.__getitem__, name)))
     return group.topics()
 
 
@@ -254,10 +255,10 @@ def _matlab_bytes(path: Path) -> int:
     """The unpacked size of the variables: compressed ones are unpacked piece by piece, up to the limit, and dropped."""
     total = 0
     with path.open("rb") as file:
-        order = "little" if file.read(128)[126:] == b"IM" else "big"
+        order: Literal["little", "big"] = "little" if file.read(128)[126:] == b"IM" else "big"
         while len(tag := file.read(8)) == 8:
-            kind = int.from_bytes(tag[:4], order)  # type: ignore[arg-type]
-            size = int.from_bytes(tag[4:], order)  # type: ignore[arg-type]
+            kind = int.from_bytes(tag[:4], order)
+            size = int.from_bytes(tag[4:], order)
             if kind != 15:
                 total += size
                 file.seek(size, 1)
@@ -332,7 +333,7 @@ def excel_topics(path: Path) -> list[Topic]:
         book.close()
     filled = {name: head for name, head in heads.items() if head}
     return [
-        Topic(name, head, sizes[name][0], text=lambda name=name: _worksheet(openpyxl, path, name))  # type: ignore[misc]
+        Topic(name, head, sizes[name][0], text=partial(_worksheet, openpyxl, path, name))
         for name, head in filled.items()
     ]
 

@@ -153,11 +153,9 @@ DOMAINS = ("x domain", "y domain")
 def _axis(axis: c.Axis) -> dict[str, Any]:
     settings: dict[str, Any] = {"zeroline": False, "automargin": True, "exponentformat": "none"}
     settings["title"] = {"text": axis.label, "standoff": 6, "font": {"size": SIZE}}
-    ends = (axis.low, axis.high)
     if axis.log:
         settings |= {"type": "log", "exponentformat": "power", "dtick": 1, "tickfont": {"size": SIZE - 2}}
         settings |= _marks(axis)
-        ends = tuple(None if end is None else float(np.log10(end)) for end in ends)  # type: ignore[assignment]
     if axis.names:
         settings |= {"tickvals": list(range(len(axis.names))), "ticktext": list(axis.names), "showgrid": False}
     if axis.ticks == "quarters":
@@ -168,12 +166,19 @@ def _axis(axis: c.Axis) -> dict[str, Any]:
             settings["dtick"] = 1
     if axis.ticks == "dates":
         settings["type"] = "date"
-        ends = tuple(None if end is None else _dates([end])[0] for end in ends)  # type: ignore[assignment]
-    if ends != (None, None):
-        settings["range"] = list(reversed(ends)) if axis.reverse else list(ends)
+    ends = [None if end is None else _position(axis, end) for end in (axis.low, axis.high)]
+    if ends != [None, None]:
+        settings["range"] = ends[::-1] if axis.reverse else ends
     elif axis.reverse:
         settings["autorange"] = "reversed"
     return settings
+
+
+def _position(axis: c.Axis, value: float) -> float | str:
+    """A value on an axis as Plotly wants the ends of a range."""
+    if axis.ticks == "dates":
+        return _dates([value])[0]
+    return float(np.log10(value)) if axis.log else value
 
 
 def _marks(axis: c.Axis) -> dict[str, Any]:

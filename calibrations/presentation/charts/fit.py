@@ -28,6 +28,7 @@ from calibrations.presentation.chart import (
     Rule,
     Scale,
     Second,
+    Series,
     Symbol,
     floor_band,
     side_by_side,
@@ -135,14 +136,14 @@ def measurement(channel: ChannelResidual, x: Column, colour: Column) -> Panel:
     curve_hover = "model: %{y:.6g}"
     if x.name == "beta":
         lines = (Line(*_stretches(channel, x.values[c], model), width=1.2, hover=curve_hover),)
-        series = (*lines, dots)
+        series: tuple[Series, ...] = (*lines, dots)
     elif fit.table.type.magnitude:
         std = fit.noise.fast[0, rows]
         dots = replace(dots, low=dots.y - std, high=dots.y + std)
-        series = (Rule(1.0, colour=MODEL, width=1.2), dots)  # type: ignore[assignment] # a tuple of any series
+        series = (Rule(1.0, colour=MODEL, width=1.2), dots)
     else:
         crosses = Points(x.values[c, rows], model[rows], colour=MODEL, symbol="cross", size=9)
-        series = (dots, crosses)  # type: ignore[assignment]
+        series = (dots, crosses)
     title = "" if fit.table.type.magnitude else f"axis {fit.channels[c]}"
     second = None
     if not channel.in_g and fit.table.type.stage_angles:

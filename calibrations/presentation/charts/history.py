@@ -82,10 +82,14 @@ def life(q: Life) -> Panel:
     start, end = _ends(q)
     signals = [k in q.signals for k in range(len(values))]
     series: list[Band | Line | Rule | Note | Points] = list(_drift(q, start, end, factor))
-    for limit, text, place in zip(q.allowed or (), ("lowest allowed", "highest allowed"), ("bottom", "top"),
-                                  strict=False):  # fmt: skip
-        series.append(Rule(factor * limit, colour=CANDIDATE, width=1.4, dash="dash"))
-        series.append(Note(text, 0.01, factor * limit, "x", vertical=place))  # type: ignore[arg-type] # as above
+    if q.allowed is not None:
+        lowest, highest = (factor * limit for limit in q.allowed)
+        series += [
+            Rule(lowest, colour=CANDIDATE, width=1.4, dash="dash"),
+            Note("lowest allowed", 0.01, lowest, "x"),
+            Rule(highest, colour=CANDIDATE, width=1.4, dash="dash"),
+            Note("highest allowed", 0.01, highest, "x", vertical="top"),
+        ]
     if q.due_days is not None:
         series += [Rule(q.due_days, "x", CANDIDATE, 1.6), Note(q.due, q.due_days, 1, "y", "right")]
     series.append(
