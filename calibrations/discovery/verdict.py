@@ -188,6 +188,8 @@ def headline(j: Judgement) -> str:
         return f"No response: {j.left}."
     if j.verdict is Verdict.UNEXPLAINED and j.unknown and not j.spoilt:
         return f"An effect that is not in the catalogue acts at {join_words(j.unknown)}."
+    if j.verdict is Verdict.UNEXPLAINED and not j.searched:
+        return f"With {join_words(j.added)}, the residual is still more than noise: {j.left}."
     if j.verdict is Verdict.UNEXPLAINED:
         return f"No effect of the catalogue explains the residual: {j.left}."
     if j.missing:
@@ -213,7 +215,7 @@ def _details(j: Judgement) -> Iterator[str]:
     if j.verdict is Verdict.UNEXPLAINED:
         if j.missing:
             yield f"The model {j.model} also misses {join_words(j.missing)}."
-        elif j.added:
+        elif j.added and j.searched:
             yield f"The model {j.model} also misses {join_words(j.added)}."
         if j.unknown and not j.spoilt:
             yield _remaining_error(j)

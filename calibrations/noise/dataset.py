@@ -188,6 +188,7 @@ class StillRecord(Dataset[NoiseFit]):
             alternatives=doubts,
             left=structure or missing,
             spoilt=bool(structure or missing),
+            searched=missing is None,
             reason=reason_of(first, doubts, structure) or missing,
             further=next_of(first, doubts, structure),
             search=next_search,

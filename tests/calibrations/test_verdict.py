@@ -96,6 +96,15 @@ def test_an_error_above_the_floor_without_a_search_is_no_complete_model() -> Non
     assert "No search for further effects was made" in judgement.text
 
 
+def test_without_a_search_no_text_speaks_of_the_whole_catalogue() -> None:
+    """`rig add` tests one effect, so it cannot know that no effect of the catalogue explains the residual."""
+    facts: dict[str, Any] = {"model": "linear", "added": ("a",), "left": "follows temperature", "spoilt": True}
+    assert "catalogue" in Judgement(**facts).text
+    judgement = Judgement(**facts, searched=False)
+    assert judgement.verdict is Verdict.UNEXPLAINED
+    assert judgement.text == "With a, the residual is still more than noise: follows temperature."
+
+
 def test_noise_above_the_floor_is_said_to_be_noise() -> None:
     assert "slow noise or scatter" in Judgement(model="linear", error=2.46).text
     assert "slow noise" not in Judgement(model="linear", error=1.02).text
