@@ -89,7 +89,10 @@ class Commands(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if not args[0].startswith("-") and args[0] not in COMMANDS:
             from drivers.errors import did_you_mean
+            from procedures.catalogue import paths
 
+            if args[0] in paths():
+                raise click.UsageError(f"{args[0]!r} is a procedure; run it with: rig run {' '.join(args)}", ctx)
             raise click.UsageError(f"no command {args[0]!r}.{did_you_mean(args[0], sorted(COMMANDS))}", ctx)
         return super().resolve_command(ctx, args)
 

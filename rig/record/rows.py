@@ -126,6 +126,8 @@ def unknown_error(
             f"{len(of_sensor)} runs in {place} are of the sensor {name!r}: {listed}"
             f"{' ...' if of_sensor[MOST_LISTED:] else ''}; write an id, or '{LAST} {name}' for the newest one"
         )
+    if not all_runs:
+        return UnknownRun(f"no run {name!r}: the record {place} is empty; `rig run sweep` makes a run")
     sensors = list(dict.fromkeys(sensor for run in all_runs for sensor in run.sensors))[:MOST_SUGGESTED]
     suggestion = did_you_mean(name.removeprefix(f"{LAST} "), names[-MOST_SUGGESTED:], sensors)
     return UnknownRun(f"no run {name!r} in {place}.{suggestion}")

@@ -16,6 +16,7 @@ from calibrations.errors import DataError
 from calibrations.importing.foreign import drop_duplicate_rows, read_csv
 from calibrations.importing.raw_logs import average_raw_log
 from calibrations.table import Table
+from drivers.errors import did_you_mean
 from rig.errors import RecordError, UnknownRun
 
 if TYPE_CHECKING:
@@ -79,11 +80,26 @@ def _of_run(data: str) -> Table:
     from rig.record.measured import table_of
     from rig.record.store import Record  # a file needs no database
 
+    if _is_path(data):
+        raise UnknownRun(_no_file(Path(data)))
     try:
         with Record.to_find(data) as record:
             return table_of(record, data)
     except UnknownRun as error:
         raise UnknownRun(f"{data}: there is no such file, and {error}") from None
+
+
+def _is_path(data: str) -> bool:
+    """Whether `data`, which may also be RUN/SENSOR, can only be the path of a file."""
+    return data.startswith(("/", "./", "../")) or data.count("/") > 1
+
+
+def _no_file(path: Path) -> str:
+    """What is wrong with a path without a file: its folder, or its name, with the most similar one there."""
+    if not path.parent.is_dir():
+        return f"{path}: there is no such file, and no folder {path.parent}"
+    names = [entry.name for entry in path.parent.iterdir()]
+    return f"{path}: there is no such file.{did_you_mean(path.name, (), names)}"
 
 
 # Several runs or files of one sensor as one table.

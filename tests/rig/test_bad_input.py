@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from rig.bench import DEFAULT
+from rig.record import Record
 from tests.rig.conftest import MODEL
 from tests.rig.test_analysis_models import OWN
 
@@ -23,6 +24,26 @@ def test_data_that_is_neither_file_nor_run(refused: Callable[..., str], rig: Rig
     assert f"{run[:-1]}x: there is no such file, and no run" in said
     assert f"Did you mean '{run}'?" in said
     assert "nowhere.csv: " in refused("diagnose", "nowhere.csv")
+
+
+def test_a_path_without_a_file_is_no_run(refused: Callable[..., str], work: Path) -> None:
+    """A path is not RUN/SENSOR: the message is about the folder, or proposes the most similar file there."""
+    no_folder = refused("compare", f"{work}/nowhere/good.csv")
+    assert f"{work}/nowhere/good.csv: there is no such file, and no folder {work}/nowhere" in no_folder
+    for path in (f"{work}/god.csv", "./god.csv"):
+        assert "god.csv: there is no such file. Did you mean 'good.csv'?" in refused("compare", path)
+
+
+def test_an_empty_record_says_so(rig: Rig) -> None:
+    Record().close()
+    for command in ("show", "fit"):
+        ended = rig(command, "last")
+        assert ended.status == 2
+        assert "is empty; `rig run sweep` makes a run" in ended.err
+
+
+def test_a_procedure_is_run_by_rig_run(refused: Callable[..., str]) -> None:
+    assert "'sweep' is a procedure; run it with: rig run sweep --step-deg 30" in refused("sweep", "--step-deg", "30")
 
 
 def denied(name: str, method: str) -> Callable[..., Any]:
