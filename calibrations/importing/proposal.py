@@ -48,8 +48,8 @@ SCATTER = r"std|stdev|sigma|noise|scatter|deviation"
 # meaning of a name, the first match; {axis} is the letter x, y or z in it; some names are German or French
 NAME_PATTERNS: Mapping[str, Sequence[tuple[str, str]]] = {
     "poses": (
-        (r"alpha|inclin|tilt|pitch|polar|elevation|neigung|^kipp|schwenk", "alpha_deg"),
-        (r"beta|table|azimu|yaw|rotary|rotation|turn(?!ing)|dreh|rundtisch|plateau", "beta_deg"),
+        (r"alpha|inclin|tilt|pitch|polar|elevation|outer|neigung|^kipp|schwenk", "alpha_deg"),
+        (r"beta|table|azimu|yaw|rotary|rotation|inner|turn(?!ing)|dreh|rundtisch|plateau", "beta_deg"),
         (r"^dir|direction|turning|sense", "direction"),
         (r"mount", "mount_deg"),
         (r"flip|face", "flip"),
@@ -183,7 +183,8 @@ def guess_by_names(laid: Sheet, values: Mapping[str, Array], kind: str) -> list[
     guesses = [(name, _by_name_and_unit(unitless[name], units[name], kind)) for name in values]
     targets = {target for _, target in guesses}
     nameless = iter(name for name in KINDS[kind].outputs if name not in targets)
-    outputs = {name: next(nameless, "") for name, target in guesses if not target and _is_output(unitless[name])}
+    likely = [name for name, target in guesses if not target and _is_output(unitless[name])]
+    outputs = {name: next(nameless, "") for name in likely if not _contradicts(units[name], KINDS[kind].outputs[0])}
     return [(name, target or outputs.get(name, "")) for name, target in guesses if target or outputs.get(name)]
 
 
@@ -258,9 +259,13 @@ def _by_name(unitless: str, kind: str) -> str:
 def _by_name_and_unit(unitless: str, unit: str, kind: str) -> str:
     """Our name for theirs; a name whose unit is that of another quantity has the meaning of the unit."""
     target = _by_name(unitless, kind)
+    return target if target and not _contradicts(unit, target) else _by_unit(unitless, unit)
+
+
+def _contradicts(unit: str, target: str) -> bool:
+    """Whether the stated unit is that of another quantity than our column `target`."""
     target_unit = column_unit(target)
-    contradicts = unit and target_unit and UNITS[unit][0] != target_unit
-    return target if target and not contradicts else _by_unit(unitless, unit)
+    return bool(unit and target_unit and UNITS[unit][0] != target_unit)
 
 
 def _by_unit(unitless: str, unit: str) -> str:

@@ -102,4 +102,7 @@ class ColumnMapping:
             or (not before_colon and ":" in source and parse_unit(last))
         ):
             raise DataError(f'"{text}": write a column as NAME=THEIRS or NAME=THEIRS:UNIT, such as vx_v=Vout:mV')
+        our_name = next((f"{name.strip()}{suffix}" for suffix in SUFFIXES if f"{name.strip()}{suffix}" in NUMBERS), "")
+        if our_name and name.strip() not in NUMBERS:
+            raise DataError(f'"{text}": there is no column "{name.strip()}"; did you mean "{our_name}"?')
         return ColumnMapping(name.strip(), column.strip(), unit)

@@ -45,6 +45,7 @@ ROWS = "90;0;3500\n90;30;3400\n30;0;3000\n"
         ),
         ("Neigungswinkel;Drehtisch;Ux", {"alpha_deg=Neigungswinkel", "beta_deg=Drehtisch", "vx_v=Ux:mV"}),
         ("inclinaison;plateau;Ux", {"alpha_deg=inclinaison", "beta_deg=plateau", "vx_v=Ux:mV"}),
+        ("Outer axis;Inner axis;Ux", {"alpha_deg=Outer axis", "beta_deg=Inner axis", "vx_v=Ux:mV"}),
     ],
 )
 def test_columns_are_proposed_by_their_names_and_values(header: str, expected: set[str]) -> None:
@@ -75,6 +76,11 @@ def test_further_columns_are_proposed(name: str, value: float, expected: str | N
     rows = "".join(f"90;{k};3500;{value}\n" for k in (0, 30, 60))
     found = proposed(f"alpha_deg;beta_deg;Vx;{name}\n{rows}")
     assert found == {"vx_v=Vx:mV"} | ({expected} if expected else set())
+
+
+def test_an_output_is_not_proposed_in_the_unit_of_another_quantity() -> None:
+    assert proposed("alpha_deg;beta_deg;signal (deg)\n" + ROWS) == set()
+    assert proposed("alpha_deg;beta_deg;signal (mV)\n" + ROWS) == {"vx_v=signal (mV):mV"}
 
 
 def test_radians_are_proposed_as_such() -> None:
