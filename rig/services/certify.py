@@ -84,7 +84,7 @@ def certified(subject: Certified, number: str = "", customer: str = "") -> Certi
     model_digest = hashlib.sha256(dump_model(fitted.model).encode()).hexdigest()
     digest = hashlib.sha256(f"{table.digest}{model_digest}".encode()).hexdigest()
     return Certificate(
-        number=number or f"{data.replace('/', '-') if run is not None else Path(data).stem}-{digest[:8]}",
+        number=number or f"{measured.name.replace('/', '-') if measured is not None else Path(data).stem}-{digest[:8]}",
         issued=today(),
         program=program(),
         laboratory=Laboratory(**lab.model_dump(exclude={"customer"})) if lab is not None else Laboratory(),

@@ -52,7 +52,9 @@ def test_a_run_gives_all_three_forms(rig: Rig, bench_file: Callable[..., Path], 
         path = tmp_path / f"c{form}"
         assert f"written: {path}" in ended.out
         assert form == ".pdf" or text in path.read_text(encoding="utf-8")
-    document = json.loads(rig("certificate", run, "--model", "linear", "--out", str(tmp_path / "d.xml"), "--json").out)
+    last = ("certificate", "last", "--model", "linear", "--out", str(tmp_path / "d.xml"))
+    document = json.loads(rig(*last, "--json").out)
+    assert document["number"].startswith(run), "the number names the run, also where a command says `last`"
     assert document["schema"] == "rig.certificate/1"
     assert (document["serial"], document["customer"], document["laboratory"]["country"]) == ("17", "Somebody", "DE")
     assert {i["role"] for i in document["instruments"]} >= {"alpha", "adc", "hand level"}
