@@ -77,8 +77,8 @@ def _why_not(k: int, layout: Layout, std: Array, free: Array) -> str | None:
         return f"on this data it cannot be separated from {', '.join(partners)}"
     if std[k] >= layout.typical[k]:
         return (
-            f"not identifiable from these positions: its standard uncertainty {std[k]:.2g} is not smaller than a "
-            f"typical value ({layout.typical[k]:.2g}); measure at more orientations"
+            f"its standard uncertainty, {std[k]:.2g}, is not smaller than a typical value, {layout.typical[k]:.2g}; "
+            "measure at more orientations"
         )
     return None
 

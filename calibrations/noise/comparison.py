@@ -181,7 +181,7 @@ class Stretch:
         )
         return (
             f"{self.axis} has {ratio_text} the power of the model at {band_text} "
-            f"(averaging times of {low:.2g} to {high:.2g} s)"
+            f"(averaging times of {float(f'{low:.2g}'):g} to {float(f'{high:.2g}'):g} s)"
         )
 
 

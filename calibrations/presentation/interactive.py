@@ -289,7 +289,8 @@ def _bars(s: c.Bars, panel: c.Panel) -> Parts:
         "marker": {"color": list(s.colours)},
         "width": 0.6,
         "text": [f"\u2003{text}\u2003" for text in s.texts],
-        "textposition": ["inside" if inside else "outside" for inside in s.inside],
+        "textposition": ["auto" if inside else "outside" for inside in s.inside],  # outside a bar of few pixels
+        "textangle": 0,
         "insidetextanchor": "start",
         "hovertemplate": [f"{name}: {text}" for name, text in zip(panel.y.names, s.texts, strict=True)],
         "name": s.label,

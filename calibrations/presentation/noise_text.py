@@ -50,7 +50,7 @@ def coefficient_table(noise: ChannelNoise, sensed: Sensed | None) -> Cells:
         second = () if sensed is None else (_coefficient_text(coefficient, sensed.factor, sensed.unit, noise.unit),)
         meaning = MEANS.get(name, "") + _detail(coefficient)
         rows.append((name, _coefficient_text(coefficient, 1.0, noise.unit, noise.unit), *second, meaning))
-    return ("process", "coefficient", *(() if sensed is None else ("or",)), ""), rows
+    return ("process", "coefficient", *(() if sensed is None else (f"in {sensed.unit}",)), "meaning"), rows
 
 
 def _disturbances(analysis: NoiseAnalysis) -> Iterable[str]:

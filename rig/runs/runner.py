@@ -196,7 +196,7 @@ def _carry_out(
         if isinstance(failure, Exception) and error is not failure:
             raise  # a defect of the program
         return _interrupted_outcome(record, run, error, complaints)
-    log("complete", reason or f"{len(results)} results")
+    log("complete", reason or (f"{len(results)} results" if results else ""))
     _complete(record, run.run, reason and f"results: {reason}", results)
     return Outcome(record.run(run.run))
 

@@ -45,7 +45,7 @@ FEWEST = 4  # bars that there is room for: one alone is no thicker than they
 NEAR = 1.15  # times the floor: as good as noise
 LONG = 0.3  # of the axis: a bar that its text fits into
 ROW = 0.42  # inches
-MANY_EFFECTS = 4  # in the name of a model: more are counted, so that bars have room
+MANY_EFFECTS = 2  # in the name of a model: more are counted, so that bars have room
 MOST_CURVES = 4
 
 
