@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from calibrations.free_forms.descent import SearchResult, climb
 from calibrations.free_forms.reml import gains
 from calibrations.table import Array
 
+FIRST_FORM = 0.2  # of a place's variance: the least that the first form must explain
 NEXT_FORM = 0.05  # of a place's variance: the least that a second form must explain; less may be the form of the first
 LEAST_NEEDED = 0.02  # of a place's variance: the least that the other forms must lose without this one
 NAMED = 0.9  # of a place's variance: the least that the forms must explain together
@@ -156,6 +157,28 @@ def _name_effects(
     result: SearchResult, place: str, names: Sequence[str], curve: Array, Q: Array, b: int
 ) -> tuple[tuple[str, ...], float]:
     """The fewest catalogue effects that explain the curve, and their share of its variance."""
+    forms = _forms_by_cause(result, place, names)
+    columns = {cause: _columns(result, comps, names, Q, b) for cause, comps in forms.items()}
+    acting_causes = tuple(dict.fromkeys(result.component(name).cause for name in names))
+    if all(result.component(name).form is None for name in names):
+        total = float(curve @ curve) or 1.0
+        needed_causes, share = _necessary({cause: columns[cause][0] for cause in acting_causes}, curve, total)
+        return _one_name(result, names, needed_causes, curve, Q), share
+
+    def options_of(cause: str, chosen: Sequence[Array]) -> Sequence[Array]:
+        if cause in acting_causes:
+            return columns[cause]
+        return [*columns[cause], *_at_best_shapes(result, forms[cause], curve, chosen, Q)]
+
+    walks = {result.component(name).cause for name in names if "/walk-" in name}
+    first = [cause for cause in acting_causes if cause and cause not in walks] if walks else []  # walks follow anything
+    chosen_causes, share = _select_causes(tuple(columns), acting_causes, first, curve, options_of)
+    causes = _one_name(result, names, chosen_causes, curve, Q)
+    return (causes, share) if share >= NAMED else ((), share)
+
+
+def _forms_by_cause(result: SearchResult, place: str, names: Sequence[str]) -> dict[str, list[Component]]:
+    """The catalogue forms of a place that may explain its curve, by cause; `names` are the components that act."""
     forms: dict[str, list[Component]] = {}
     jumps = any(_jumps(result, name) for name in names if "/walk-" in name)
     for comp in result.components:
@@ -164,41 +187,43 @@ def _name_effects(
             if (smooth and jumps) or (_follows_many(comp) and comp.name not in names):
                 continue
             forms.setdefault(comp.cause, []).append(comp)
-    columns = {cause: _columns(result, comps, names, Q, b) for cause, comps in forms.items()}
+    return forms
+
+
+def _select_causes(
+    candidates: Sequence[str],
+    acting: Sequence[str],
+    first: Sequence[str],
+    curve: Array,
+    options_of: Callable[[str, Sequence[Array]], Sequence[Array]],
+) -> tuple[tuple[str, ...], float]:
+    """The causes that explain most of the curve, added one at a time, and their share of its variance.
+
+    The causes `first` come before all others. `options_of` gives the columns that a cause may have, beside those of the
+    causes that were chosen before.
+    """
     total = float(curve @ curve) or 1.0
-    acting_causes = dict.fromkeys(result.component(name).cause for name in names)
-    if all(result.component(name).form is None for name in names):
-        needed_causes, share = _necessary({cause: columns[cause][0] for cause in acting_causes}, curve, total)
-        return _one_name(result, names, needed_causes, curve, Q), share
-    columns_by_cause: dict[str, Array] = {}
+    chosen: dict[str, Array] = {}
     share = 0.0
-    walks = {result.component(name).cause for name in names if "/walk-" in name}
-    first = (
-        [cause for cause in acting_causes if cause and cause not in walks] if walks else []
-    )  # a walk follows anything
     while True:
-        at_limit = len(set(columns_by_cause) - acting_causes.keys()) >= MOST_FORMS
+        at_limit = len(set(chosen) - set(acting)) >= MOST_FORMS
+        chosen_columns = list(chosen.values())
         trials: dict[str, tuple[float, Array]] = {}
-        for cause in first or columns:
-            if cause in columns_by_cause or (at_limit and cause not in acting_causes):
+        for cause in first or candidates:
+            if cause in chosen or (at_limit and cause not in acting):
                 continue
-            chosen_columns = list(columns_by_cause.values())
-            options = columns[cause]
-            if cause not in acting_causes:
-                options = [*options, *_at_best_shapes(result, forms[cause], curve, chosen_columns, Q)]
+            options = options_of(cause, chosen_columns)
             squares, X = min(
                 ((_residual_squares([*chosen_columns, X], curve), X) for X in options), key=lambda option: option[0]
             )
             trials[cause] = 1 - squares / total, X
         best = max(trials, key=lambda c: trials[c][0], default="")
-        if not best or trials[best][0] - share < (NEXT_FORM if columns_by_cause else 0.2):
+        if not best or trials[best][0] - share < (NEXT_FORM if chosen else FIRST_FORM):
             if not first:
-                break
+                return tuple(chosen), share
             first = []
             continue
-        share, columns_by_cause[best] = trials[best]
-    causes = _one_name(result, names, tuple(columns_by_cause), curve, Q)
-    return (causes, share) if share >= NAMED else ((), share)
+        share, chosen[best] = trials[best]
 
 
 def _one_name(

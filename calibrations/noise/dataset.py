@@ -7,7 +7,7 @@ model itself describes it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -125,6 +125,7 @@ class StillRecord(Dataset[NoiseFit]):
         baseline = fit(start.model, without_patterns(start.still, missing.patterns)) if missing.patterns else start
         signal = calibration.steps(baseline, missing.patterns) if calibration else ()
         present = signal[-1].after if signal else baseline
+        signal_patterns = calibration.patterns if calibration else ()
         structure = structure_of(missing)
         names = () if missing.still.hidden else tuple(missing.gains)
         doubts = alternatives(missing, names) | (calibration.alternatives if calibration else {})
@@ -146,23 +147,11 @@ class StillRecord(Dataset[NoiseFit]):
             spoilt=is_spoilt,
             reason=reason_of(missing, doubts, structure),
             disturbances=tuple(
-                disturbance_document(disturbance)
-                for disturbance in (
-                    *map(as_disturbance, calibration.patterns if calibration else ()),
-                    *disturbances(missing),
-                )
+                map(disturbance_document, (*map(as_disturbance, signal_patterns), *disturbances(missing)))
             ),
             separations=calibration.separations if calibration else {},
             further=next_of(missing, {} if is_spoilt else of_noise, structure),
-            remarks=(
-                *(calibration.signal.lags if calibration else ()),
-                *(
-                    sentence(filter_text(name, corner))
-                    for name in doubts
-                    if (corner := possible_corner_hz(missing, name))
-                ),
-                *(sentence(disturbance.text) for disturbance in missing.telegraphs),
-            ),
+            remarks=(*(calibration.signal.lags if calibration else ()), *_remarks(missing, doubts)),
             search=missing,
         )
         if names and not (signal or is_spoilt) and result.given.verdict is Verdict.UNEXPLAINED:
@@ -260,6 +249,15 @@ class StillRecord(Dataset[NoiseFit]):
     def cautions(self, fit: NoiseFit) -> list[str]:  # noqa: ARG002
         """The points that a person should check in the record."""
         return record_doubts(self.still.channels)
+
+
+def _remarks(result: Search, doubts: Iterable[str]) -> Iterator[str]:
+    """Sentences on filters that effects in doubt may come from, and on telegraph noise."""
+    for name in doubts:
+        if corner := possible_corner_hz(result, name):
+            yield sentence(filter_text(name, corner))
+    for disturbance in result.telegraphs:
+        yield sentence(disturbance.text)
 
 
 def _steps(start: NoiseFit, search: Search, names: tuple[str, ...]) -> Iterator[Step[NoiseFit]]:
