@@ -104,7 +104,7 @@ def test_the_proof_holds_whatever_is_remembered() -> None:
     assert np.diag(half_held) == pytest.approx([1 / (1.01 + 0.03 / 2), 1 / (0.98 + 0.02 / 2)])
 
 
-def test_gravity_stands_in_for_an_axis_and_what_is_remembered_is_kept_once() -> None:
+def test_gravity_gives_a_missing_axis_and_the_memory_is_stored_once() -> None:
     made = invert_model(model({**PHYSICAL, **SLIPS}))
     (text,) = sources.python_files(made, ORIGIN, make_vectors(made)).values()
     names: dict[str, Any] = {"__name__": "sensor"}

@@ -130,7 +130,7 @@ def test_the_head_says_what_a_user_must_know() -> None:
     assert ("serial number 17" in head, "SHA-256 " + "0" * 64 in head) == (True, True)
 
 
-def test_a_name_cannot_end_the_comment_that_it_stands_in(tmp_path: Path) -> None:
+def test_a_name_with_a_comment_mark_does_not_end_the_comment(tmp_path: Path) -> None:
     made = invert_model(model(LINEAR))
     sources = written(made, tmp_path, Origin("sensor", "*/ int x = ; /*\n.yaml", "0", "*/ p", "2026"))
     build("gcc", sources, tmp_path / "test", "-DSENSOR_MAIN")

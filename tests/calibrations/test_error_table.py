@@ -86,7 +86,7 @@ def test_a_file_is_read_with_its_remarks(tmp_path: Path) -> None:
         ("angle_deg,error_deg,std_deg\n0,0\n", "point 1 is 0, 0, None"),
     ],
 )
-def test_what_is_wrong_with_a_file_is_said(tmp_path: Path, text: str, said: str) -> None:
+def test_a_wrong_error_table_is_refused_with_its_fault(tmp_path: Path, text: str, said: str) -> None:
     path = tmp_path / "beta.csv"
     path.write_text(text)
     with pytest.raises(DataError, match=said) as error:
@@ -95,6 +95,6 @@ def test_what_is_wrong_with_a_file_is_said(tmp_path: Path, text: str, said: str)
 
 
 @pytest.mark.parametrize("points", [(), ((0, float("nan"), 0.1),), ((0, 0, -0.1),)])
-def test_what_no_stage_can_have_is_refused(points: tuple[tuple[float, float, float], ...]) -> None:
+def test_an_impossible_error_table_is_refused(points: tuple[tuple[float, float, float], ...]) -> None:
     with pytest.raises(DataError, match="error table"):
         ErrorTable(points)

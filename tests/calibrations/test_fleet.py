@@ -50,7 +50,7 @@ def test_information_is_that_of_the_stated_uncertainties() -> None:
     assert np.sqrt(np.diag(np.linalg.inv(information(found)))) == pytest.approx(stated)
 
 
-def test_a_batch_shows_what_none_of_its_sensors_does() -> None:
+def test_a_batch_shows_an_effect_that_no_single_sensor_shows() -> None:
     found = looks(sensor(100 + k, Flaw(bend=30e-6)) for k in range(20))
     assert sum(each.chance < 0.003 for each in found) <= 1
     first = find_batch_effects(found, STAGE)[0]
@@ -59,7 +59,7 @@ def test_a_batch_shows_what_none_of_its_sensors_does() -> None:
     assert first.p_value < 1e-3
 
 
-def test_sensors_that_each_have_their_own_value_make_a_batch_too_and_it_is_no_stage_that_has() -> None:
+def test_an_effect_with_another_value_in_each_sensor_is_of_the_batch_and_not_of_the_stage() -> None:
     first = find_batch_effects(looks(sensor(200 + k, Flaw(askew=0.1)) for k in range(8)), STAGE)[0]
     assert (first.effect, first.common) == ("axis-misalignment", False)
 
@@ -171,7 +171,7 @@ def test_what_all_sensors_of_a_rig_share_is_the_rigs() -> None:
     assert abs(zero.value - 0.8) < 4 * zero.std < 0.5
 
 
-def test_rigs_that_are_alike_have_no_error_and_one_rig_alone_tells_none() -> None:
+def test_equal_rigs_and_a_single_rig_have_no_rig_error() -> None:
     assert not find_rig_errors(fleet({"a": Rig(), "b": Rig(), "c": Rig()}, count=4))
     assert not find_rig_errors(fleet({"a": Rig(wave=0.1)}))
 

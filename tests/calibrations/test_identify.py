@@ -75,7 +75,7 @@ def test_a_parameter_without_effect_on_the_data_says_so() -> None:
     assert (e.identified, e.std, e.why) == (False, None, "it changes nothing in this data")
 
 
-def test_an_estimate_no_better_than_what_a_sensor_may_show() -> None:
+def test_an_estimate_less_certain_than_a_typical_value_is_not_identified() -> None:
     columns = synthetic.turns((90,), step_deg=60)
     columns["alpha_deg"] = columns["alpha_deg"] - np.linspace(0, 0.5, len(columns["alpha_deg"]))
     a_x, a_y, _ = synthetic.components(columns)

@@ -161,7 +161,7 @@ def test_the_way_by_hand_makes_a_circle_of_a_turn() -> None:
     assert np.ptp(np.linalg.norm(correct_by_extremes(outputs)[:, :2], axis=1)) < 0.2
 
 
-def test_beside_an_accelerometer_a_constant_says_which_is_meant() -> None:
+def test_the_constant_triad_chooses_between_accelerometer_and_magnetometer() -> None:
     mag = turned.sap6("BB")
     columns = {**mag.columns, **{f"a{axis}": mag.column(f"m{axis}") for axis in "xyz"}}
     assert Table.from_columns("positions", columns).output_names == ("ax", "ay", "az")

@@ -63,14 +63,14 @@ def test_a_wild_sample_is_found_wherever_it_is(at: int, blocks: int) -> None:
     assert found.power == pytest.approx(40**2, rel=0.15)
 
 
-def test_the_wildest_of_several_is_named_and_two_beside_each_other_are_both() -> None:
+def test_odd_samples_count_neighbours_separately_and_name_the_largest() -> None:
     x = white(np.random.default_rng(1), 10_000)
     x[[300, 5000, 5001]] = 30.0, 90.0, 80.0
     found = wild(x, 3)
     assert (found.count, found.first, found.wildest) == (3, 300, 5000)
 
 
-def test_many_wild_samples_are_how_the_noise_is() -> None:
+def test_many_large_samples_count_as_noise() -> None:
     x = white(np.random.default_rng(1), 10_000)
     x[::200] += 50.0
     assert wild(x) == Wild()

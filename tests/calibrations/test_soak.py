@@ -151,7 +151,7 @@ def test_the_page_shows_results_limits_and_facts_and_loads_nothing() -> None:
     assert text == page(found, results)
 
 
-def test_the_page_says_what_is_not_reached() -> None:
+def test_the_page_of_a_soak_says_that_the_steady_state_is_not_reached() -> None:
     text = page(analyse_soak(soak_table(7200.0, drift_v=0.02)))
     assert "No steady state within" in text
     assert "steady state not reached" in text

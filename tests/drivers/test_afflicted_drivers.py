@@ -69,7 +69,7 @@ STREAMS = [
 
 
 @pytest.mark.parametrize(("what", "said"), STREAMS)
-def test_a_stream_that_is_not_what_it_should_be(afflicted: Callable[..., Any], what: str, said: str) -> None:
+def test_a_damaged_stream_is_an_error(afflicted: Callable[..., Any], what: str, said: str) -> None:
     converter, clock = afflicted("labjack_t7", Fault(what, at_s=0.5))
     clock.sleep(0.4)
     with pytest.raises(StreamError, match=said):
@@ -220,7 +220,7 @@ def at_fifty(afflicted: Callable[..., Any], fault: Fault) -> tuple[Any, Simulate
         ("silence", LinkTimeout, "alpha: no answer to ERR"),
     ],
 )
-def test_a_positioner_that_does_not_do_as_it_was_told(
+def test_a_positioner_that_does_not_follow_its_command_is_an_error(
     afflicted: Callable[..., Any], what: str, error: type[DriverError], said: str
 ) -> None:
     positioner, _ = at_fifty(afflicted, Fault(what, at_s=5.0))

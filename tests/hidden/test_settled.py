@@ -55,7 +55,7 @@ def test_a_rival_is_judged_with_its_shape_fitted() -> None:
     assert found_on("own/ageing reference", 30, 6166).alternatives == {"bias-drift": ("warm-up-bias",)}
 
 
-def test_a_cause_of_another_form_keeps_a_curve_beside_it() -> None:
+def test_a_cause_of_another_form_keeps_a_free_form_for_the_remainder() -> None:
     """Beams that warm as two masses do, where the catalogue has one time constant."""
     found = found_on("own/warming beams", 30, 6158)
     assert (found.causes, found.verdict) == (("warm-up-scale",), "adequate")
@@ -99,7 +99,7 @@ def test_a_cycle_of_temperature_tells_whether_there_is_play(lag_k: float, cause:
         ("one inclination", 5030, {"cross-axis-bias", "quadratic-nonlinearity"}, "sweep"),
     ],
 )
-def test_what_leaves_only_noise_is_a_rival_however_likely_another_is(
+def test_an_effect_that_leaves_only_noise_is_a_rival_of_a_likelier_one(
     name: str, seed: int, rivals: set[str], experiment: str
 ) -> None:
     found = diagnose(case(f"inseparable/{name}", 10, seed)[0], read_model("linear"))

@@ -281,13 +281,13 @@ def test_what_a_terminal_asks_is_answered_there() -> None:
         control.answer(status, "yes")
 
 
-def test_a_run_goes_on_where_nothing_can_be_told() -> None:
+def test_a_run_continues_without_a_folder_for_its_status() -> None:
     home().mkdir(parents=True, exist_ok=True)
     folder().write_text("a file is in the way")
     assert in_a_terminal(Onlooker(), "nobody").run.state == "complete"
 
 
-def test_nobody_is_answered_who_does_not_ask() -> None:
+def test_an_answer_without_a_question_is_refused() -> None:
     assert (control.latest(), keys()) == (None, [])
     status = Status(KEY, 4711, "sweep", "a bench")
     status_of_one_who_asked = replace(status, asked=OpenQuestion("mounting", "Is it mounted?", "yes or no"))

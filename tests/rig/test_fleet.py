@@ -147,7 +147,7 @@ def fragile(tasks: list[int]) -> list[int]:
 
 
 @pytest.mark.slow
-def test_a_worker_that_dies_loses_nothing_and_what_kills_it_is_told_alone() -> None:
+def test_a_task_that_kills_its_worker_fails_alone_and_all_others_are_computed() -> None:
     with crew(None, 1) as client:
         found = list(run_tasks(client, fragile, iter([[0, 1], [], [2, 3], [4]])))
     assert sorted(task for chunk, _ in found for task in chunk) == [0, 1, 2, 3, 4]

@@ -349,6 +349,6 @@ def test_columns_stand_under_each_other() -> None:
     assert columns(("run", "poses"), [("a", 518), ("long", 2)]) == "run   poses\na     518\nlong  2"
 
 
-def test_the_small_sweep_of_other_tests_is_what_they_think() -> None:
+def test_the_small_sweep_has_the_poses_that_other_tests_assume() -> None:
     assert plan(read_bench(), *small_sweep()).poses == POSES
     assert Choice("begin", "Begin?", choices=("go", "cancel")).checked("go") == "go"

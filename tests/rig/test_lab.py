@@ -218,7 +218,7 @@ def test_verify_says_what_has_changed(rig: Rig, server: Server, database: str) -
     assert (ended.status, json.loads(ended.out)["changed"]) == (1, [run])
 
 
-def test_a_cut_is_told_in_one_message(server: Server, database: str) -> None:
+def test_a_cut_connection_to_the_lab_gives_one_message(server: Server, database: str) -> None:
     """The driver's own reports of a broken wire, of which there are several, are not a person's business."""
     with Record() as own:
         a_run(own)

@@ -101,7 +101,9 @@ def test_nobody_knows_the_rooms_temperature_ahead() -> None:
     assert choose_experiment(dispute(temperature=False), told, read_bench(None)).expected is not None
 
 
-def test_without_an_oven_nothing_is_planned_in_it_and_what_lacks_is_said(bench_file: Callable[..., Path]) -> None:
+def test_an_experiment_that_needs_an_oven_is_not_planned_without_one_and_says_so(
+    bench_file: Callable[..., Path],
+) -> None:
     parts = {
         role: part.model_dump(mode="json") for role, part in read_bench(None).instruments.items() if role != "oven"
     }

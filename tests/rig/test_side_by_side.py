@@ -36,7 +36,7 @@ def test_sensors_of_a_batch_are_compared_by_their_own_names() -> None:
     assert (pair.name, pair.first, pair.second) == ("noise", 1, 2)
 
 
-def test_without_uncertainties_nothing_is_said_of_doubt() -> None:
+def test_a_pair_without_uncertainties_has_no_deviation() -> None:
     assert Pair("x", "V", 1.0, 2.0, None, None).deviations is None
 
 

@@ -96,7 +96,7 @@ def field(axis: int) -> Any:
     return lambda pose: float((sensor_from_base(pose) @ earth)[axis] + [0.1, -0.2, 0.3][axis])
 
 
-def test_hard_iron_comes_turn_by_turn_each_axis_when_it_was_level(follower: Any) -> None:
+def test_the_hard_iron_of_an_axis_is_shown_after_the_turn_in_which_it_is_level(follower: Any) -> None:
     follows = follower("positions")
     first = kept(full_turn("z", "up", 30.0), {f"m{axis}": field(k) for k, axis in enumerate("xyz")})
     assert set(last(follows, first)) == {"hard-iron-x", "hard-iron-y"}

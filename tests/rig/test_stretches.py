@@ -54,14 +54,14 @@ def test_every_pose_of_every_procedure_is_in_one_stretch(name: str) -> None:
     assert {"alpha", "beta"} <= set(whole.reach)
 
 
-def test_what_is_done_besides_is_named_once_and_long_waits_are_added_up() -> None:
+def test_a_stretch_lists_each_other_action_once_and_adds_up_long_waits() -> None:
     found = stretches(planned("temperature-cycle", temperatures_c="35,50"))
     assert found[0].also == ("oven to 35 C", "oven on", "waiting for 3600 s")
     assert found[0].words.endswith("8 poses  up 35 cycle 1")
 
 
 @pytest.mark.parametrize(("oven_c", "first"), [("0", ()), ("45", ("oven to 45 C", "oven on"))])
-def test_what_is_told_again_and_changes_nothing_is_no_step(oven_c: str, first: tuple[str, ...]) -> None:
+def test_a_repeated_command_without_effect_is_no_step(oven_c: str, first: tuple[str, ...]) -> None:
     cold, *others = stretches(planned("soak", duration_s="3600", block_s="60", oven_c=oven_c))
     switched = ("adc switches the sensor off", "adc switches the sensor on")
     assert cold.also == (*switched, *first, "waiting for 3600 s")
@@ -74,7 +74,7 @@ def test_poses_that_are_counted_are_one_stretch() -> None:
     assert [s.words for s in stretches(of(held))] == ["alpha 0, beta 0 deg: 6 poses  still 0 to 5"]
 
 
-def test_how_the_sensor_is_mounted_is_said_where_it_is_not_as_usual() -> None:
+def test_a_stretch_names_the_mounting_if_it_is_unusual() -> None:
     (other,) = stretches(of((PlannedDwell(0.0, Pose(0, 0, mount_deg=90.0, flip=1)),)))
     assert other.words == "alpha 0, beta 0 deg: 1 pose  mounted face down, rotated by 90 deg"
 

@@ -150,7 +150,7 @@ def test_every_command_takes_runs_of_gyroscopes_and_magnetometers(
 
 
 @pytest.mark.sockets
-def test_a_run_that_is_stopped_in_a_turn_stands_and_goes_on_sample_for_sample(
+def test_a_run_stopped_in_a_turn_halts_the_stage_and_resumes_with_the_same_samples(
     rig: Rig, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Ctrl-C comes while beta turns for the second time."""

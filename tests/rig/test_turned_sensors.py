@@ -56,7 +56,7 @@ def test_every_command_takes_a_magnetometer(rig: Rig, magnetometer: str, tmp_pat
     assert "‰ of the field" in page.read_text(encoding="utf-8")
 
 
-def test_a_single_turn_is_told_what_it_cannot_show(rig: Rig, tmp_path: Path) -> None:
+def test_a_fit_of_a_single_turn_lists_the_effects_that_it_cannot_show(rig: Rig, tmp_path: Path) -> None:
     t = np.radians(np.arange(0.0, 360.0, 10.0))
     outputs = np.column_stack([22 * np.cos(t) + 5, 18 * np.sin(t) - 3, np.full(36, 40.0) + 0.01 * np.sin(7 * t)])
     turn = written(turned.magnetometer(outputs), tmp_path / "turn.csv")
