@@ -23,7 +23,7 @@ BOUND_ROUNDS = 8
 RIDGE = 1e-12  # of the products of normalised columns: some may be the same
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solution:
     """Parameters `theta` (p,), their residual (channels, n) and jacobian (channels, n, p); rows in order of time."""
 
