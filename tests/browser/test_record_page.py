@@ -40,7 +40,7 @@ def test_runs_are_searched_and_one_is_opened_and_noted(workbench: Workbench, run
     workbench.fits(page)
     page.get_by_label("Search").fill(runs[2])
     expect(page.get_by_role("row")).to_have_count(2)
-    page.get_by_role("cell", name=runs[2], exact=True).click()
+    page.get_by_role("link", name=runs[2], exact=True).press("Enter")  # by the keyboard alone
     expect(page.get_by_text("its process was killed").first).to_be_visible()
     expect(page.locator("[aria-label='the run over time'] .points path")).to_have_count(1)
     page.get_by_label("Note").fill("the door was open")

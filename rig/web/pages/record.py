@@ -24,6 +24,9 @@ COLUMNS = sortable(
     fixed=("extent",),
 )  # fmt: skip
 PAGE = 25
+OPENED = """<q-td :props="props">
+  <a :href="`/record/${props.value.split('/')[0]}`" @click.stop>{{ props.value }}</a>
+</q-td>"""
 MARK_ALL = '<q-checkbox v-model="props.selected" dense aria-label="Select all runs" />'
 MARK = '<q-checkbox v-model="props.selected" dense :aria-label="`Select ${props.row.name}`" />'
 
@@ -66,6 +69,7 @@ class Runs:
                 on_select=self._marked,
             ).props("flat dense wrap-cells").classes("runs").on("rowClick", self._open)  # fmt: skip
             self.table.props("rows-per-page-label='Runs per page'")
+            self.table.add_slot("body-cell-name", OPENED)
             self.table.add_slot("body-cell-sensor", LINKED)
             self.table.add_slot("header-selection", MARK_ALL)
             self.table.add_slot("body-selection", MARK)
