@@ -153,7 +153,7 @@ def _data(data: Any) -> Table:
     """The table itself. Raises DataError for anything else: it would end in an error of the analysis."""
     if isinstance(data, Table):
         return data
-    hint = "cal.read(path)" if isinstance(data, (str, Path)) else 'cal.table(data, kind="positions")'
+    hint = "cal.read(path)" if isinstance(data, (str, Path)) else 'cal.table(data, kind="poses")'
     raise DataError(f"a table is needed, and a {type(data).__name__} was given; make one with {hint}")
 
 

@@ -111,9 +111,10 @@ class Table:
 
     @property
     def _title(self) -> str:
-        constants_text = (
-            f"; {', '.join(f'{name}: {value}' for name, value in self.constants.items())}" if self.constants else ""
-        )
+        texts = [
+            f"{name}: {f'{value:.6g}' if isinstance(value, float) else value}" for name, value in self.constants.items()
+        ]
+        constants_text = f"; {', '.join(texts)}" if texts else ""
         return f"{self.n} rows of {self.kind}{f', {self.source}' if self.source else ''}{constants_text}"
 
     def _shown(self) -> tuple[list[str], list[list[str]]]:
