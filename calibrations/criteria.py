@@ -12,7 +12,7 @@ from __future__ import annotations
 SIGNIFICANT = 0.003  # chance over a whole search: about one false name in 300 runs with nothing missing
 NOTEWORTHY = 0.05  # chance over a whole search: not named, but worth a second measurement
 CHECK_SIGNIFICANT = 0.01  # chance for check poses and repeats: one test alone, not a search
-INSEPARABLE = 6.0  # gain: odds below 20 to 1 between two explanations; the data cannot tell them apart
+INSEPARABLE = 6.0  # gain: odds below 20 to 1 between two explanations; the data cannot separate them
 CLEARLY_BETTER = 6.0  # gain beyond the price of parameters: odds of 20 to 1, enough to exchange one effect for another
 PATTERN_BETTER = 10.0  # gain beyond the price of parameters: odds of 150 to 1, to prefer a pattern without a cause
 
@@ -57,7 +57,7 @@ SAME_G = 1e-3  # specific force between two poses: with less they are the same p
 # Determination by the data
 MOST_UNCERTAIN = 2.0  # variance of a predicted row over that of noise: parameters count for as much as noise
 FEWEST_CHECKS = 3  # check poses, and repeats: fewer estimate no noise
-NOT_SHOWN = 1e-2  # of a column's length: data that leave less of it beside the model cannot show it
+NOT_SHOWN = 1e-2  # of a column's length: if less of it is independent of the model, the data cannot show the effect
 WRONG_FLOOR = 0.5  # error over the stated noise floor: white noise alone leaves no less, so that the floor is wrong
 FEWEST_FOR_FLOOR = 20  # rows: fewer can be so near to a model by chance
 FEWEST_FREE_ROWS = 2  # rows beyond the parameters of the widest form: fewer do not estimate their scatter
@@ -65,7 +65,7 @@ FEWEST_FREE_ROWS = 2  # rows beyond the parameters of the widest form: fewer do 
 # Next experiment
 CERTAIN_PROBABILITY = 0.95  # of separating two explanations: an experiment with less is not worth its time
 NAMED_GAIN = 20.0  # gain of two parameters with a chance of SIGNIFICANT in a search worth 60 trials
-LONGEST_RECORD_S = 7 * 86400.0  # of a record that is proposed: beyond a week nobody waits
+LONGEST_RECORD_S = 7 * 86400.0  # of a proposed record: a week at most
 
 # Noise of means
 FEWEST_FOR_SLOW = 20  # rows: with fewer, slow noise cannot be separated from white noise
@@ -77,7 +77,7 @@ ONE_SIDED = 0.5  # of the rms residual of the axis: a mean residual beyond lies 
 
 # Noise of a still record
 PATTERN_AMPLITUDE = 14.0  # gain: the amplitude of a pattern is chance in one of 5000 records
-PATTERN_CERTAIN = 60.0  # gain: noise that jumps has steps of its own, so that a step beside it needs far more
+PATTERN_CERTAIN = 60.0  # gain of a step in noise that jumps: such noise has steps of its own
 IDENTIFIED = 3.84  # gain at the end of a 95 % interval; an absent process reaches it in one of 40 channels
 AT_LONGEST_TIME = 0.9  # of the longest time constant: such a process has the form of the slower one that it contains
 FEWEST_PERIODS = 6  # in the record: a slower sinusoid cannot be separated from a drift
@@ -106,7 +106,7 @@ LEAST_DITHER = 0.5  # of a converter's step: with less noise, rounding is no lon
 FEWEST_FOR_SCALE = 256  # samples: the ninth decile of fewer is no scale of the noise
 WILD_SAMPLE = 12.0  # standard deviations: normal noise has no such sample in a lifetime, Laplacian noise one in 10^7
 MOST_WILD = 1e-3  # of the samples: more are how this noise is distributed
-MOST_PLACEHOLDERS = 0.05  # of the samples at exactly one value far away: they stand for missing readings
+MOST_PLACEHOLDERS = 0.05  # of the samples at exactly one value far away: placeholders for missing readings
 SHORTEST_STUCK = 32  # equal samples: coarse steps make shorter runs
 STUCK_BEYOND_CHANCE = 4.0  # times the longest run that chance makes
 CLIPPED = 0.002  # of the samples at the highest or lowest value: noise has few there
@@ -140,14 +140,14 @@ FEWEST_RUNS = 2  # of a chart: one run has no moving range
 # Sensors of a fleet
 FEWEST_SENSORS = 4  # that make a batch: a median and a spread of fewer mean nothing
 FEWEST_SIBLINGS = 3  # values: the posterior of a spread needs as many
-FEWEST_SENSORS_PER_RIG = 3  # beyond those that a rig's parameters take up
+FEWEST_SENSORS_PER_RIG = 3  # beyond those that a rig's parameters explain
 MOST_SCORE_LENGTH = 2.0  # times the median score: so that one sensor does not decide for its batch
 LEAST_SHARED_GAIN = 2.0  # fall of the sum of squares for each parameter (Mallows' C_p): errors on new data fall
 LEAST_GAINING_SHARE = 0.5  # of the sensors: an effect of the batch is one of most of them
 POSSIBLY_SLOW = 0.05  # chance where all slow noise is taken as an effect: below, it is compared with slow noise
 FALSE_OUTLIER = 0.01  # chance of setting any value of a batch apart where all are alike
 MOST_USUAL = 3.0  # robust standard deviations from the median: values beyond are tested without each other
-FAR_SENSOR = 5.0  # robust standard deviations from batch and rig: such a sensor shows nothing of the rig
+FAR_SENSOR = 5.0  # robust standard deviations from batch and rig: such a sensor is not used for the rig
 
 # Outputs that cannot be those of the sensor, mounted and wired as stated
 EXCITED_G = 0.1  # rms of a specific force about its mean: below, offsets of the stages hide a response
@@ -226,7 +226,7 @@ LEAST_FIELD_CHANGE = 0.005  # of the field, rms: sensors of the earth's field le
 MOST_FIELD_EXCESS = 3.0  # excess: with more, the field differs from position to position
 LEAST_TURNED_SPREAD = 3.0  # noise of a sample: gravity on several sides spreads hundreds of times more
 LEAST_HANDLED_SPREAD = 10.0  # quiet standard deviations: a hand exceeds it, a log at rest never does
-FEWEST_ROWS_AT_REST = 50  # in succession: nobody repeats a pose as often
+FEWEST_ROWS_AT_REST = 50  # in succession: more rows are samples of one pose, not repetitions
 FASTEST_MEANS_S = 0.5  # between rows: no stage moves and settles in less
 JITTER_DEG = 0.05  # of an encoder at rest, peak to peak; stages resolve 5 arcmin
 SHORTEST_DWELL_SHARE = 0.25  # of the typical dwell: a shorter one is a stage that stops on its way

@@ -71,14 +71,14 @@ def fit(data: Table, model: GivenModel) -> Fit:
 
 
 def compare(data: Table, model: GivenModel) -> Comparison[Fit]:
-    """`model` beside `data`, and where it fails."""
+    """The error of `model` on `data`, and the places where it fails."""
     from calibrations.loop import compare as compared
 
     return compared(_data(data), _model(model))
 
 
 def diagnose(data: Table, model: GivenModel, effects: Iterable[GivenEffect] = ()) -> Diagnosis[Fit]:
-    """Which physical effect `model` misses on `data`; `effects` of your own are tried beside those of the catalogue."""
+    """The physical effects that `model` misses on `data`. Your own `effects` are tried in addition to the catalogue."""
     from calibrations.effects.catalogue import with_own
     from calibrations.loop import diagnose as diagnosed
 
@@ -96,7 +96,7 @@ def discover(
 
     without   places of the signal chain, such as "own-response", that the search leaves out
     enough    an error on unseen data at which the search stops, such as "0.5mg", "2mV" or "1.5floors"
-    effects   of your own, beside those of the catalogue: classes, or their files
+    effects   your own, in addition to the catalogue: classes, or their files
     """
     from calibrations.discovery.enough import parse_enough
     from calibrations.effects.catalogue import with_own

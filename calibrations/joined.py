@@ -10,7 +10,7 @@ import numpy as np
 from calibrations.errors import DataError
 from calibrations.table import Array, Constant, Table
 
-ZERO_WHERE_MISSING = ("mount_deg", "flip", "direction")  # a table says nothing of a sensor that was never turned over
+ZERO_WHERE_MISSING = ("mount_deg", "flip", "direction")  # no column: the sensor was never turned over
 MEASURED = "noise_inflation_"  # constants that each table measured for itself
 
 

@@ -10,7 +10,7 @@ _SHOW: ContextVar[Callable[[str], None] | None] = ContextVar("show", default=Non
 
 
 def report(text: str) -> None:
-    """Report what an analysis does now. Nothing happens if nobody shows it."""
+    """Report the present step of an analysis, if something shows it."""
     if (show := _SHOW.get()) is not None:
         show(text)
 

@@ -212,7 +212,7 @@ class Table:
         return np.argsort(self.columns["t_s"], kind="stable") if "t_s" in self else np.arange(self.n)
 
     def in_order(self) -> Table:
-        """Rows in order of time; this very table where they are, so that what was found on it is found again."""
+        """Rows in order of time; the same object if they already are, so that results cached for it remain valid."""
         return self if np.all(np.diff(self.order) > 0) else self.rows(self.order)
 
     @cached_property
@@ -222,7 +222,7 @@ class Table:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of names and values: the same for the same data, whatever file it came from."""
+        """SHA-256 of names and values; it does not depend on the format of the file."""
         h = hashlib.sha256(self.kind.encode())
         for name in sorted(self.columns):
             h.update(name.encode())

@@ -126,7 +126,7 @@ class Rates(Kind):
 
 
 class Motion(Kind):
-    """A record of motion. A model is fitted to what each stretch of it holds of the motion."""
+    """A record of motion. A model is fitted to the parts of the motion in each stretch."""
 
     name = file = "motion"
     columns = (("t_s", "vx_v", "displacement_m"), ("t_s", "ax", "displacement_m"))

@@ -117,7 +117,7 @@ def _find_logged_column(place: str, table: Table) -> tuple[str, str, str] | None
 
 
 def _base(driver: str, factor: str, x: Array, weight: Array) -> Array:
-    """Orthonormal columns (n, k) that belong to bias, scale factor and geometry, whatever the place."""
+    """Orthonormal columns (n, k) of bias, scale factor and geometry, which are part of no curve."""
     force = [weight] if factor else [x] if "force" in driver else []
     return np.asarray(np.linalg.qr(np.column_stack([np.ones(len(x)), *force]))[0])
 

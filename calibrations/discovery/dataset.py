@@ -227,7 +227,7 @@ class Dataset(ABC, Generic[F]):
         """The model against the data, fitted first if it has no values.
 
         If only the residual measures the noise, or the rows scatter more than their samples, the method searches for
-        `effects`: only a search can tell noise from an effect then.
+        `effects`: only a search can separate noise from an effect then.
         """
         fit = self.evaluate(model) or self.fit(model)
         compared = Comparison(self, fit, self.places(fit), self.rejection(fit))

@@ -109,7 +109,7 @@ def _without_pattern(fit: Fit, channel: int) -> bool:
     if rms(r) < LEAST_REMAINDER * rms(fit.residual[channel]) or robust_std(r) < LEAST_REMAINDER * rms(r):
         return False  # an effect, or outliers: other checks name them
     orders = [np.arange(table.n)]
-    if table.type.known_input and channel < len(table.axes):  # by what is predicted: a reading holds its own error
+    if table.type.known_input and channel < len(table.axes):  # by the prediction: a reading contains an error
         orders += [np.argsort(table.outputs[:, channel] - fit.residual[channel], kind="stable")]
     if table.type.stage_angles:
         orders += [np.lexsort((table.column(a), table.column(b))) for a, b in (_ANGLES, _ANGLES[::-1])]

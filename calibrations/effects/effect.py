@@ -115,7 +115,7 @@ class Effect:
     exact      its form follows from geometry alone: no other effect refines it
     rounds     its output is a staircase, whose slope says nothing
     left_out   why a compensation in the sensor's product cannot undo it; "" where it can
-    incidental  nobody plans what excites it: a table that cannot show it is no reason for a remark
+    incidental  no experiment is planned for it: there is no remark if a table cannot show it
     of_force   it adds what the sensor makes of the force, which changes of the sensitivity multiply
     scales     it is a change of the sensitivity: it multiplies what the sensor makes of the force. With `of_force` it
                follows other forces, and drifts of the sensitivity multiply it; without, it is such a drift

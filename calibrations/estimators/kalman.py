@@ -3,7 +3,7 @@
     x(k+1) = A x(k) + w(k)      w of covariance Q       prediction, Book (18.9)
     z(k)   = H x(k) + v(k)      v of covariance R       correction, Book (18.10)
 
-The covariance is corrected in Joseph's form, which keeps it symmetric and positive whatever the gain is rounded to.
+The covariance is corrected in Joseph's form, which keeps it symmetric and positive in spite of rounding.
 
 Source  Book (18.9)-(18.10); Bucy and Joseph, Filtering for Stochastic Processes (1968); Bar-Shalom, Li and Kirubarajan,
         Estimation with Applications to Tracking and Navigation (2001), 5.4: consistency of innovations.

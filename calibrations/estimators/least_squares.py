@@ -84,7 +84,7 @@ def between_variance(matrix: Array, measured: Array, variances: Array, freedom: 
     return float(brentq(excess, 0.0, high, rtol=1e-9))
 
 
-# Least squares, one measurement after another: what is known so far is a triangle, into which the next one is turned.
+# Recursive least squares: a triangular matrix holds the information so far; a rotation adds the next measurement to it.
 #
 # After every measurement the answer is that of all of them at once. The square root of the information is kept, not
 # the

@@ -38,7 +38,7 @@ class Level(NamedTuple):
 def without_scatter(means: Array, readings: int) -> Level:
     """The level beneath the scatter of a column's means (m,), of which each of so many `readings` holds until the next.
 
-    Frequencies above those of the readings say nothing of their scatter, and are left
+    Frequencies above those of the readings do not show their scatter, and are left
     out.
     """
     m = len(means)

@@ -113,7 +113,7 @@ def row_gains(fit: Fit) -> Array:
 
 
 def _of_type_a(fit: Fit, G: Array, square: float) -> list[Line]:
-    """The fit's own covariance, in its parts; what the inputs leave in the residual, `square`, is no noise."""
+    """The fit's own covariance, in its parts. `square`: the part of the residual's squares by the inputs."""
     noise, rows = fit.noise, fit.residual.size - len(fit.theta)
     variances = np.array([np.nan if e.std is None else e.std for e in fit.params.values()]) ** 2
     by_noise = variances / fit.birge**2

@@ -31,7 +31,7 @@ ROUNDING = 1e-9  # of a leverage
 
 
 def leverages(fit: Fit) -> Array:
-    """The diagonal of the hat matrix, shape (channels, n): 1 where the fit goes through a value, whatever it is."""
+    """The diagonal of the hat matrix, shape (channels, n): 1 where one value alone determines a parameter."""
     jacobian = np.vstack([fit.whitened[:, 1:], fit.problem.layout.prior_rows])
     size = np.linalg.norm(jacobian, axis=0)
     columns = jacobian[:, size > 0] / size[size > 0]

@@ -161,7 +161,7 @@ def refit(before: Fit, model: Model, start: Array | None = None) -> Fit:
 
 def _alternate(problem: Problem, noise: Noise, starts: list[Array]) -> Fit:
     """Parameters and noise in turn. Raises ModelError for an effect with values that no fit resolves."""
-    with np.errstate(over="ignore", invalid="ignore"):  # what follows from them is refused
+    with np.errstate(over="ignore", invalid="ignore"):  # a fit with such values is refused below
         try:
             fitted = _alternate_unchecked(problem, noise, starts)
         except np.linalg.LinAlgError:

@@ -66,7 +66,7 @@ def estimates(model: Model, layout: Layout, theta: Array, jacobian: Array, wider
 def _why_not(k: int, layout: Layout, std: Array, free: Array) -> str | None:
     """Why entry `k` is not identified, or None. `free`: the projector (p, p) on what changes nothing in the data.
 
-    Two entries are told apart where the projector has no element for them, whatever basis it was made from.
+    Two entries are separable where the projector has no element for them. It does not depend on the basis.
     """
     if free[k, k] > UNDETERMINED:
         share = np.diag(free)

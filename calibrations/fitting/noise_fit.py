@@ -359,7 +359,7 @@ def widening(noise: Noise, residual: Array, jacobian: Array, typical: Array) -> 
     white = noise.whiten(basis)
     white_variance = _variance((white.T @ white)[None], turned)[0]
     wider = _mean(search, turned) / np.where(white_variance > 0, white_variance, np.inf)
-    return np.sqrt(np.where(wider > 0, wider, 1.0))  # what the data hardly determine has no variance to speak of
+    return np.sqrt(np.where(wider > 0, wider, 1.0))  # the variance of an undetermined parameter has no meaning
 
 
 def possible_slow_noise(gap_s: Array) -> list[Point]:

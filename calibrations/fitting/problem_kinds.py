@@ -41,7 +41,7 @@ class RateProblem(Problem):
 
 
 class PositionProblem(Problem):
-    """Magnitudes of what is sensed, of which only the strength is known."""
+    """Magnitudes of the sensed quantity, of which only the strength is known."""
 
     @staticmethod
     def check(model: Model, table: Table) -> None:  # noqa: ARG004
@@ -120,9 +120,9 @@ class FieldProblem(PositionProblem):
             )
 
     def residual_by(self, steps: Sequence[Step]) -> Array:
-        """In the field's strength as the outputs show it, whatever the model makes of it.
+        """As a share of the field's strength that the outputs show, not of the model's strength.
 
-        By its own measure a field without end would leave nothing of any magnitude.
+        Relative to the model's own strength, an infinite field would make every residual 0.
         """
         return super().residual_by(steps) * self._strength(steps)
 
@@ -155,8 +155,8 @@ class MotionProblem(Problem):
 
     table: Stretches
 
-    keeps_starts = True  # at one attitude an axis that does not move cannot tell its scale factor from its bias
-    averages = False  # some tens of stretches allow nearly any: Student's t of the noise found stands in its place
+    keeps_starts = True  # one attitude cannot separate scale factor and bias of an axis that does not move
+    averages = False  # some tens of stretches allow nearly any slow noise: Student's t is used instead
 
     @staticmethod
     def prepared(table: Table) -> Table:

@@ -1,4 +1,4 @@
-"""Sizes of the free forms that a person asks for by place, estimated beside a model by restricted likelihood.
+"""Sizes of the free forms that a person asks for by place, estimated together with a model by restricted likelihood.
 
 The forms of the place compete as in the search for places, without those that can follow almost anything, such as a
 random walk. One of them is always kept, however small: a person asked for it, and at a size near zero it changes

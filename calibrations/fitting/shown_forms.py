@@ -87,7 +87,7 @@ class Shown:
         return estimate(self.gram, {}, {})
 
     def gain_apart(self, sizes: Sizes) -> float:
-        """What the effect gains beside forms of these sizes, as twice the log-likelihood."""
+        """Twice the gain in log-likelihood by the effect, with forms of these sizes in the model."""
         return gains(self.gram, sizes, [self.apart])[self.apart][0]
 
     def sized(self, name: str, sizes: Sizes) -> Form:
@@ -145,7 +145,7 @@ def _component(name: str, form: Form) -> Component:
 def _gram(
     fit: Solution, X: Array, base: NDArray[np.bool_], blocks: Mapping[str, slice], scales: Mapping[str, float]
 ) -> Gram:
-    """Products of the columns, with the priors of the model's own free forms; `base`: parameters that stand first."""
+    """Products of the columns, with the priors of the model's own free forms; `base`: those of the first columns."""
     b, rows = int(base.sum()), fit.problem.layout.prior_rows[:, base]
     products = X.T @ X
     products[:b, :b] += rows.T @ rows

@@ -45,7 +45,7 @@ LEVELS = {  # the parameters that the mean of a curve belongs to, by its place
 def estimate_all_noise(solution: Solution) -> Noise:
     """All the noise that the residual shows, from which standard uncertainties are computed.
 
-    Here nothing is set aside: where inclinations follow each other in time, smooth functions of the angles take up slow
+    Here nothing is set aside: where inclinations follow each other in time, smooth functions of the angles explain slow
     noise as well, and parameters would look more certain than they are.
     """
     nothing = np.zeros((solution.table.n, 0))

@@ -140,7 +140,7 @@ WITH_BATCH, FULL_SEARCH = "beside its batch", "in full"
 class SensorVerdict:
     """One sensor: `effects` that the first model misses on it, those of its batch and its own; how it was judged.
 
-    `fault`: why it could not be read or fitted. `rivals` of an effect cannot be told from it.
+    `fault`: why it could not be read or fitted. The data cannot separate an effect from its `rivals`.
     """
 
     sensor: str
@@ -157,7 +157,7 @@ class SensorVerdict:
 
     @property
     def needs_a_person(self) -> bool:
-        """Whether it is unlike its siblings or could not be judged; what a whole batch misses is no sensor's matter."""
+        """Whether it is unlike its siblings or could not be judged; an effect of the whole batch does not count."""
         return self.verdict in ("failed", "unexplained", "no-response") or bool(self.own or self.remark)
 
 

@@ -196,7 +196,7 @@ class Clips:
 class Play:
     """Slip elements that follow x and slip at their widths, over the widths: hysteresis of any shape.
 
-    With `memory` each has another column: what is left of its state before the first pose, 1 where it is whole.
+    With `memory` each has another column: the remaining share of its state before the first pose, from 1 to 0.
     """
 
     widths: tuple[float, ...]

@@ -26,7 +26,7 @@ from calibrations.table import Array
 
 GEOMETRY = ("axis-nonorthogonality", "axis-misalignment", "stage-zero-offset", "base-tilt")
 CAUSE_PRICE, PARAMETER_PRICE = 12.0, 2.0  # of chi-square
-CLOSE = 8.0  # of chi-square: explanations that this data does not tell apart
+CLOSE = 8.0  # of chi-square: the data cannot separate explanations that differ by less
 LINEAR_PART = 2.0  # of a curve's odd part: the standard deviation of a mechanism's own linear part
 EVEN_PART = 1.0  # the same of its even part
 EVEN, ODD = (2, 4, 6), (3, 5)  # powers of the driver

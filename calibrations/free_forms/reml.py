@@ -27,7 +27,7 @@ LEAST_BESIDE = 1e-3  # of a component's squares: less beside the base is not mag
 ROUNDS = 40
 SETTLED = 0.02  # of a variance
 WHOLE = 64  # rows of a triangular matrix that is inverted at once
-REACH = 20.0  # times what a step gains: a deviance that is farther is out of reach
+REACH = 20.0  # times the gain of a step: a deviance farther away cannot be reached
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,7 +257,8 @@ def estimate(
 
 
 GRID, FINE_GRID = np.exp(np.linspace(-12.0, 6.0, 19)), np.exp(np.linspace(-0.8, 0.8, 9))  # of a variance
-NO_PRODUCTS, LEAST_VARIANCE = 1e-9, 1e-12  # what the active components leave of a component; the variance of nothing
+NO_PRODUCTS = 1e-9  # share of a component that is independent of the active ones: a smaller one gains nothing
+LEAST_VARIANCE = 1e-12  # of a component that gains nothing
 
 
 def gains(g: Gram, fit: Sizes, names: Sequence[str]) -> dict[str, tuple[float, float]]:

@@ -1,7 +1,7 @@
 """Possible outputs of any static sensor: smooth functions of the direction of gravity, and of the side of approach.
 
-Slow noise is fitted beside these columns, so that a misfit of the model, which returns with the angles, is not taken
-for noise, which does not. This is the pure error of a lack-of-fit test, with smoothness in place of repeats.
+Slow noise is fitted together with these columns: a misfit of the model repeats with the angles, and noise does not. So
+the misfit does not count as noise. This is the pure error of a lack-of-fit test, with smoothness in place of repeats.
 """
 
 from __future__ import annotations

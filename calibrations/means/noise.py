@@ -33,7 +33,7 @@ Processes = tuple[tuple[float, float], ...]  # (standard deviation, time constan
 BEYOND = 10.0  # lengths of a record: the longest time constants of flicker noise
 MOST_CORRELATED_ROWS = 400  # rows that degrees of freedom are computed on
 NORMAL_MEDIAN = 0.6745  # of the size of normal noise
-DIFFERENCES_PER_ROW = 1.944  # second differences that tell as much as one independent row: 1 + 2 (16 + 1) / 36
+DIFFERENCES_PER_ROW = 1.944  # second differences with the information of one independent row: 1 + 2 (16 + 1) / 36
 SLOW_FREEDOM = 60.0  # as a process has whose time constant is a hundredth of the record
 
 
@@ -236,7 +236,7 @@ WINDOW = 6.0  # lags summed, at least, and in correlation times: exp(-6) of an e
 def white_std(table: Table) -> Array | None:
     """Standard deviation of each mean, in the output's unit, shape (n, axes); None where it is not known.
 
-    Samples that a coarse converter all gave one code say nothing of their noise: it is taken as that of the others.
+    If a coarse converter gave all samples of a mean one code, their noise is unknown: that of the other means is used.
     """
     if all(_noise_name(name) in table for name in table.output_names):
         return np.column_stack([table.column(_noise_name(name)) for name in table.output_names])

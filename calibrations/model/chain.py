@@ -298,7 +298,7 @@ class LinearisedChain:
     def output(self, term: int, values: Values) -> Array:
         """Output of the measured axes with other `values` of one effect, up to a constant, shape (n, axes).
 
-        Where an effect only adds to the output, that is what it adds: beside the sum of all, digits would be lost.
+        If an effect only adds to the output, this is its contribution alone: in the sum of all, digits would be lost.
         """
         effect = self.steps[term][0]
         steps = [*self.steps[:term], (effect, values), *self.steps[term + 1 :]]

@@ -101,7 +101,7 @@ def gain_of(fit: ChannelFit, effect: Effect) -> float:
 def upper_bound(
     fit: ChannelFit, effect: Effect, other_effects: Sequence[Effect]
 ) -> tuple[float, float, dict[str, float]]:
-    """(most likely coefficient, its upper bound with 95 %, all its parameters), other effects beside it refitted.
+    """(most likely coefficient, its upper bound with 95 %, all its parameters), the other effects refitted.
 
     At the bound, twice the log-likelihood is criteria.IDENTIFIED below its maximum, times the squared excess where the
     model does not describe the spectrum.

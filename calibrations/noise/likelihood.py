@@ -190,7 +190,7 @@ class ChannelFit:
 
     @property
     def mismatch(self) -> float:
-        """Rms difference of the spectrum from the model's, as a share of it, bands weighted by what they tell."""
+        """Rms difference of the spectrum from the model's, as a share of it, bands weighted by their information."""
         return float(np.sqrt(2 * self.deviance / np.sum(self.freedom)))
 
     @property

@@ -26,7 +26,7 @@ from calibrations.spectrum import LENGTH, WINDOW, Bands, Sampling, fast_bands, s
 from calibrations.table import Array
 
 LOBE = 3  # ordinates on each side that a line reaches under the window
-AROUND = 65  # ordinates that tell the noise around a line
+AROUND = 65  # ordinates that give the noise around a line
 CENTROID = 0.02  # ordinates by which the middle of a line may be off
 WINDOW_LOSS = 1.5  # of variance, by the window
 

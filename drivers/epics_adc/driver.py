@@ -1,4 +1,4 @@
-"""Analog records of EPICS as a converter: whatever an IOC measures, the rig records.
+"""Analog records of EPICS as a converter: the rig records the values that an IOC measures.
 
 All channels are read at once, a few times a second, and not monitored: a monitor leaves out changes below the record's
 deadband (MDEL), so its values are no even sampling. The reading of a record carries its alarm and its time stamp. A

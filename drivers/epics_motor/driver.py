@@ -1,4 +1,4 @@
-"""Any motor record of EPICS as a rotary stage: whatever an IOC drives, the rig turns.
+"""Any motor record of EPICS as a rotary stage: the rig turns the motor of an IOC.
 
 The driver writes the fields VAL, VELO, ACCL, STOP, and HOMF or HOMR if the bench file asks for homing; no others. It
 moves a motor only if the record is in the mode Go, and VAL moves it (SET is Use) and does not redefine its position.
@@ -190,7 +190,7 @@ class MotorRecord:
         self._records.write(mr.STOP, 1.0)
 
     def stop(self) -> None:
-        """Brake to a standstill, whatever the stage is doing. An alarm is no reason to doubt a standstill."""
+        """Brake to a standstill, whatever the stage is doing. A stage with an alarm can be at a standstill as well."""
         self.halt()
         deadline = self._clock.now() + STOPPING_S
         while not self._read(mr.DONE)[mr.DONE].value:

@@ -65,11 +65,11 @@ class ManualStage:
         self.read_deg: float | None = None  # what the dial showed last
 
     def identify(self) -> Identity:
-        """Nobody is asked: a dial has no name."""
+        """The person is not asked: a dial has no name."""
         return Identity("stage turned by hand")
 
     def self_test(self) -> list[Check]:
-        """What there is to know without asking anybody."""
+        """The resolution of the dial; the person is not asked."""
         return [Check("dial", True, f"read by a person to {60 * self.settings.resolution_deg:g} arcmin")]
 
     def close(self) -> None:

@@ -215,7 +215,7 @@ def fields(message: Message, **values: Any) -> NDArray[np.void]:
 def checksum(rows: Bytes, extra: int) -> NDArray[np.uint16]:
     """CRC-16/MCRF4XX of each row and the byte `extra`, shape (n, bytes) -> (n,).
 
-    It is linear in the bits: each byte contributes by its distance from the end, whatever the other bytes are.
+    It is linear in the bits: each byte contributes by its distance from the end alone.
     """
     begin, table = _contributions()
     n = rows.shape[1]

@@ -196,7 +196,7 @@ class RotaryStage:
         self._unit.write(az.INPUTS, az.STOP, retries=0)  # the other drives wait for their commands
 
     def stop(self) -> None:
-        """Brake to a standstill, whatever the stage is doing. An alarm is no reason to doubt a standstill."""
+        """Brake to a standstill, whatever the stage is doing. A stage with an alarm can be at a standstill as well."""
         self._holds_target = False
         self._unit.write(az.INPUTS, az.STOP)
         try:

@@ -98,7 +98,7 @@ class Positioner:
         self.settings = settings
         self._gcs, self._clock = gcs, gcs.link.clock
         self._swinging: str | None = None  # the axis that oscillates
-        self._gcs.error()  # what went wrong before is not ours
+        self._gcs.error()  # clear the error of an earlier client
 
     def identify(self) -> Identity:
         """Maker's model, serial number and firmware as the controller reports them."""

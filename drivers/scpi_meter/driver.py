@@ -108,7 +108,7 @@ class Meter(Recorder[Settings]):
         self._lines, self._clock = lines, links.clock
         self._lines.write("*RST")
         self._lines.write("*CLS")
-        self._ask("*IDN?")  # some VISA libraries open a connection to nobody without a word
+        self._ask("*IDN?")  # some VISA libraries report no error for an address without an instrument
 
     def identify(self) -> Identity:
         """Maker, model, serial number and firmware, as `*IDN?` gives them. Raises BadFrame."""

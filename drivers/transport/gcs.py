@@ -1,7 +1,7 @@
 """PI General Command Set 2.0, the controller's side: lines of text, each followed by `ERR?`.
 
 Commands and answers end with LF; the lines of a longer answer end with space and LF, only the last with LF alone.
-Commands for an urgent matter are one byte without LF. What is refused is not answered: only `ERR?` tells why.
+Commands for an urgent matter are one byte without LF. A refused command has no answer: only `ERR?` gives the reason.
 There is no checksum, and nothing is sent twice.
 Source: PI GCS 2.0 as PI's own client uses it.
 """

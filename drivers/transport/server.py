@@ -1,7 +1,7 @@
 """The servers of the simulated instruments: passive, without threads, on TCP ports and pseudo-terminals.
 
 A `Port` listens and holds its connections; a `Server` is one instrument's (or one bus') ports together with
-the twins behind them. It acts only when the clock tells it the time, so one and the same server is
+the twins behind them. It acts only when the clock passes it the time, so one and the same server is
 deterministic under a simulated clock and serves anybody's client in real time.
 """
 

@@ -25,7 +25,7 @@ OWN = ("sensor", "noise", "magnetometer", "gyroscope")  # what may differ from s
 
 
 class Batch:
-    """Sensors by name on one table, each with its own changes to `config`. Stands for a `World`.
+    """Sensors by name on one table, each with its own changes to `config`. Has the interface of a `World`.
 
     Raises what `with_own` raises.
     """

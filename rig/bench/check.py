@@ -30,7 +30,7 @@ UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 
 
 def describe_error(error: ValidationError, model: type[BaseModel]) -> str:
-    """The first fault with its key. A misspelt key comes before the missing key that it stands for."""
+    """The first fault with its key. A misspelt key comes before the missing key that it should be."""
     faults = error.errors()
     fault = min(faults, key=lambda fault: fault["type"] not in UNKNOWN)
     key_path = [str(part) for part in fault["loc"] if "[" not in str(part)]  # the type of a union is not a key

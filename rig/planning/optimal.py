@@ -166,7 +166,7 @@ def _listing(settings: Mapping[str, Any], poses: Sequence[Pose]) -> dict[str, An
 def _as_good(design_range: Range, short: Judged, ratio: Callable[[Judged, Judged], float]) -> Judged:
     """The plan with the dwell at which its `ratio` to the standard sweep is 1.
 
-    White noise gives it at once. Where time itself tells something, a longer run tells more than its dwells: halving.
+    With white noise it follows directly. If effects depend on time, the length of the run counts as well: by bisection.
     """
     low, high = short, _with_dwell(design_range, short, _longer(short.dwell_s, ratio(design_range.standard, short)))
     while ratio(design_range.standard, high) < NEARLY and high.dwell_s - low.dwell_s > 0.15:

@@ -68,7 +68,7 @@ def _oven_c(settings: Mapping[str, Any], path: str) -> float:
 # faces
 # that it has. A plan is judged by the standard error of each parameter as what it does to the output where it does
 # most:
-# only so can volts be set beside degrees. The greatest of them is the worst standard error.
+# so that volts and degrees are comparable. The greatest of them is the worst standard error.
 
 GRID_DEG = 15.0
 MOST_ERROR = 0.01  # of the output per g: a plan that leaves more at full scale does not determine the parameter

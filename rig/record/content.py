@@ -45,7 +45,7 @@ def digest(connection: Connection, run: str) -> str:
 
 
 def head(connection: Connection, run: str) -> str:
-    """SHA-256 of the parts of a complete run that can change. An event stands for an excluded pose."""
+    """SHA-256 of the parts of a complete run that can change. An excluded pose is part of it by its event."""
     sha = hashlib.sha256(_line(run_row(connection, run)))
     sha.update(_line(connection.execute(rows_of(events, run)).all()))
     return sha.hexdigest()

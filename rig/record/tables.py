@@ -69,7 +69,7 @@ OUT_OF_PLANE = tuple(names[2] for names in OUTPUTS)  # which no motion of the ca
 def units_of(run: Run, channels: Iterable[str]) -> dict[str, str]:
     """The unit of those of `channels` that are not in V, as a digital sensor's."""
     possible = [channel for channel in channels if channel in DIGITAL]
-    if not possible or not run.bench.get("instruments"):  # of an imported run nobody knows the bench
+    if not possible or not run.bench.get("instruments"):  # the bench of an imported run is unknown
         return {}
     bench = Bench.model_validate(run.bench)
     return {channel: unit for channel in possible if (unit := bench.unit_of(channel)) != "V"}

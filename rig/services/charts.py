@@ -113,7 +113,7 @@ def kind_of(dwell: Dwell) -> str:
 
 DAY_S = 86400.0
 VOLTS: Mapping[str, str] = MappingProxyType({})  # no channel has another unit than V
-FEW = 400  # parts: as many can be told apart as dots
+FEW = 400  # parts: more would not be distinguishable
 ROW, AXIS = 0.27, 0.6  # inches of a difference, and of the axis of a group
 
 

@@ -1,4 +1,4 @@
-"""The faults of a simulated rig beside the effects that an analysis found: the table at the end of `rig demo`.
+"""The faults of a simulated rig, compared with the effects that an analysis found: the table at the end of `rig demo`.
 
 A fault is a mechanism of the simulation that the bench file sets. Its size is the rms change of the output without the
 mechanism, at the same poses and without noise. The size of an effect is the rms change of the model's output without
@@ -91,7 +91,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Group:
-    """Faults that the data cannot tell apart, and the effects that they were found as; none if they were not found.
+    """Faults that the data cannot separate, and the effects that were found for them; none if they were not found.
 
     `std`: standard uncertainty of the size of the effects together.
     """

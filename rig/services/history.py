@@ -323,7 +323,7 @@ def _no_drift(calibrations: Sequence[Calibration], days: float) -> str:
 
 
 def limits_of(bench_file: Path | None) -> dict[str, Limit]:
-    """The ranges in the bench file's `limits.results`; a magnitude says nothing of a change. Raises BenchError."""
+    """The ranges in the bench file's `limits.results`; a magnitude does not limit a change. Raises BenchError."""
     if bench_file is None:
         return {}
     from rig.bench import read_bench

@@ -185,7 +185,7 @@ def is_still(data: str) -> bool:
 
 
 def is_noise(model: Model | None) -> bool:
-    """Whether a model is one of a still record: of noise, and of the bias over temperature beside it.
+    """Whether a model is one of a still record: of noise, and possibly of the bias over temperature.
 
     Raises ModelError for one of noise and of other effects on samples.
     """

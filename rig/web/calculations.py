@@ -1,4 +1,4 @@
-"""Calculations of a page: in a thread beside the event loop, and ended with the visit to the page."""
+"""Calculations of a page: in a thread of their own, which ends with the visit to the page."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ def news(previous: Status | None, present: Status) -> tuple[str, str] | None:
 
 
 # Notifications of the browser. Browsers allow them after a click, and on https or on this machine only. All open pages
-# tell the same news under one tag, so it appears once.
+# show the same news under one tag, so it appears once.
 TELL = """<script>
 window.tellRig = (title, body) => {
   if (!("Notification" in window) || Notification.permission !== "granted") return;

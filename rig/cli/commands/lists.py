@@ -1,4 +1,4 @@
-"""procedures, effects, models and runs: what there is to choose from."""
+"""The commands procedures, effects, models and runs: lists to choose from."""
 
 from __future__ import annotations
 
