@@ -92,14 +92,9 @@ def state_at(
     """All signals; `components` must hold every component that has a coefficient."""
     c = data.channels
     bias, rows = values.base[:c], values.base[c : 4 * c].reshape(c, 3)
-    alpha0, tilt = values.base[4 * c : 4 * c + 2]
-    beta0 = values.base[4 * c + 2] if data.remounted else 0.0
+    tilt = values.base[4 * c + 1]
     active = [comp for comp in components if comp.name in values.of and not comp.noise]
-    alpha, beta = data.alpha + alpha0, data.beta + beta0
-    for comp in active:
-        if comp.angle is not None:
-            error = comp.angle @ values.of[comp.name]
-            alpha, beta = (alpha + error, beta) if comp.stage == "alpha" else (alpha, beta + error)
+    alpha, beta = _true_angles(data, values, active)
 
     def at(alpha: Array, beta: Array, tilt: float) -> Array:
         up = np.array([0.0, -np.sin(tilt), np.cos(tilt)])
@@ -112,37 +107,58 @@ def state_at(
     by_beta = rows @ (at(alpha, beta + SMALL, tilt) - at(alpha, beta - SMALL, tilt)).T / (2 * SMALL)
     by_tilt = rows @ (at(alpha, beta, tilt + SMALL) - at(alpha, beta, tilt - SMALL)).T / (2 * SMALL)
     force = a if data.at_rest else a @ _find_sensing_axes(rows).T
-    unit_gain = np.ones_like(linear)
-    undrifted = State(data, force, a, by_alpha, by_beta, by_tilt, linear, linear, unit_gain)
-    response, of_force = linear.copy(), np.zeros_like(linear)
+    undrifted = State(data, force, a, by_alpha, by_beta, by_tilt, linear, linear, np.ones_like(linear))
+    return _with_output(undrifted, _response(undrifted, rows, values, active), values, active)
+
+
+def _true_angles(data: PoseData, values: Coefficients, active: Sequence[Component]) -> tuple[Array, Array]:
+    """Stage angles with their offsets and errors, rad, shape (n,) each."""
+    c = data.channels
+    beta0 = values.base[4 * c + 2] if data.remounted else 0.0
+    alpha, beta = data.alpha + values.base[4 * c], data.beta + beta0
+    for comp in active:
+        if comp.angle is not None:
+            error = comp.angle @ values.of[comp.name]
+            alpha, beta = (alpha + error, beta) if comp.stage == "alpha" else (alpha, beta + error)
+    return alpha, beta
+
+
+def _response(undrifted: State, rows: Array, values: Coefficients, active: Sequence[Component]) -> Array:
+    """The linear output with the components of the response added, (channels, n).
+
+    A change of the sensitivity multiplies the whole response to the force; a drift also multiplies this change.
+    """
+    response, of_force = undrifted.response.copy(), np.zeros_like(undrifted.response)
     for comp in active:
         if comp.stage == "response" and not comp.scales:
             part = comp.jacobian(undrifted) @ values.of[comp.name]
             response += part
             of_force += part if comp.of_force else 0.0
     for is_of_force in (True, False):
-        # a change of the sensitivity multiplies all that the sensor makes of the force; a drift multiplies this change
         changing = [c for c in active if c.stage == "response" and c.scales and c.of_force is is_of_force]
-        for k in range(c if changing else 0):
-            own_force = force.copy()
+        for k in range(len(response) if changing else 0):
+            own_force = undrifted.force.copy()
             own_force[:, k] += of_force[k] / np.linalg.norm(rows[k])
             scaling = replace(undrifted, force=own_force)
             part = sum(comp.jacobian(scaling)[k] @ values.of[comp.name] for comp in changing)
             response[k] += part
             of_force[k] += part if is_of_force else 0.0
+    return response
+
+
+def _with_output(undrifted: State, response: Array, values: Coefficients, active: Sequence[Component]) -> State:
+    """The state with the output of a response (channels, n), and the gain of the output stage."""
+    converting = [comp for comp in active if comp.stage == "output"]
 
     def output(response: Array) -> Array:
-        unconverted = State(data, force, a, by_alpha, by_beta, by_tilt, response, response, unit_gain)
-        contributions = (comp.jacobian(unconverted) @ values.of[comp.name] for comp in active if comp.stage == "output")
-        return sum(contributions, response)
+        unconverted = replace(undrifted, response=response, predicted=response)
+        return sum((comp.jacobian(unconverted) @ values.of[comp.name] for comp in converting), response)
 
     small_step = SMALL * float(np.ptp(response))
-    gain = (
-        (output(response + small_step) - output(response - small_step)) / (2 * small_step)
-        if small_step > 0
-        else unit_gain
-    )
-    return State(data, force, a, by_alpha, by_beta, by_tilt, response, output(response), gain)
+    gain = undrifted.gain
+    if small_step > 0:
+        gain = (output(response + small_step) - output(response - small_step)) / (2 * small_step)
+    return replace(undrifted, response=response, predicted=output(response), gain=gain)
 
 
 def base_jacobian(state: State, model_effects: ModelEffects) -> Array:
