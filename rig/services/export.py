@@ -24,16 +24,20 @@ from rig.record import Record, Run
 from rig.record.measured import table_of
 from rig.services.tables import load
 
+NOT_CSV = (".parquet", ".h5", ".hdf5", ".xlsx", ".xls", ".ods", ".mat", ".npy", ".npz", ".json", ".jsonl")  # endings
 UNITS = {"deg": "deg", "v": "V", "s": "s", "c": "degC"}
 
 
 def export(data: str, kind: str, path: Path) -> int:
     """Write `data` (a run or a file) to `path`, completely or not at all. Returns the number of rows.
 
-    Raises ExportError for an unknown format, or a format that needs a run; OutputError if `path` cannot be written.
+    Raises ExportError for an unknown format, by name or by the ending of `path`, or a format that needs a run;
+    OutputError if `path` cannot be written.
     """
     if kind in ("parquet", "hdf5"):
         raise ExportError(f"this version does not write {kind}; use --format csv, which {kind} programs also read")
+    if kind == "csv" and path.suffix.lower() in NOT_CSV:
+        raise ExportError(f"{path}: this version writes CSV, and no {path.suffix}; give a name that ends in .csv")
     require_out(path)
     with draft_of(path) as draft:
         return _write_events(data, draft) if kind == "event-model" else _write_csv(data, draft)
