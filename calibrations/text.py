@@ -183,6 +183,11 @@ def size(count: int) -> str:
 # Intervals and limits
 
 
+def count_words(number: int, singular: str, plural: str) -> str:
+    """`1 batch`, `2 batches`."""
+    return f"{number} {singular if number == 1 else plural}"
+
+
 def interval(low: float, high: float) -> str:
     """An interval, to a hundredth of its length: `22.32 to 23.13`, `30 to 150`."""
     decimals = max(1, 1 - exponent(high - low)) if high > low else 6

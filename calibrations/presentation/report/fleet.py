@@ -9,7 +9,7 @@ from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.fleet import Spread, rigs, shares, spreads
 from calibrations.presentation.document import Block, Page, Remark, Section, Table
 from calibrations.presentation.page import html
-from calibrations.text import estimate_text, join_words, probability, rounded
+from calibrations.text import count_words, estimate_text, join_words, probability, rounded
 
 MOST = 200  # sensors in a table of those that need a person
 ONE_RIG = (
@@ -27,6 +27,7 @@ def population_report(population: Population, model: str, facts: Mapping[str, st
     persons = [sensor for sensor in population.sensors if sensor.needs_a_person]
     faulty_rigs = {error.rig for error in population.rigs if error.beyond}
     missing = [batch for batch in population.batches if batch.effects]
+    batches = f"of {count_words(len(population.batches), 'batch', 'batches')}"
     state = "found" if missing or faulty_rigs or persons else "adequate"
     return html(
         Page(
@@ -37,7 +38,7 @@ def population_report(population: Population, model: str, facts: Mapping[str, st
             summary=f"Each sensor was compared with the model {model}, then with the model of its batch, on poses "
             "corrected for the errors of its rig. Sensors that differ from their batch were diagnosed in full.",
             figures=[
-                ("sensors", str(len(population.sensors)), f"of {len(population.batches)} batches"),
+                ("sensors", str(len(population.sensors)), batches),
                 ("batches that miss an effect", str(len(missing)), "in all their sensors"),
                 ("rigs in error", str(len(faulty_rigs)), "against the median of the rigs"),
                 ("sensors to inspect", str(len(persons)), "unlike their batch, or without a verdict"),
@@ -77,17 +78,13 @@ def _headline(missing: list[BatchVerdict], faulty_rigs: set[str], persons: list[
     parts = []
     if missing:
         effects = join_words(list(dict.fromkeys(e.effect for batch in missing for e in batch.effects)))
-        parts.append(f"{effects} missing in {_count(len(missing), 'batch', 'batches')}")
+        parts.append(f"{effects} missing in {count_words(len(missing), 'batch', 'batches')}")
     if faulty_rigs:
-        parts.append(f"{_count(len(faulty_rigs), 'rig', 'rigs')} in error")
+        parts.append(f"{count_words(len(faulty_rigs), 'rig', 'rigs')} in error")
     if persons:
-        parts.append(f"{_count(len(persons), 'sensor', 'sensors')} to inspect")
+        parts.append(f"{count_words(len(persons), 'sensor', 'sensors')} to inspect")
     text = join_words(parts) or "no effect is missing in any sensor"
     return f"{text[:1].upper()}{text[1:]}."
-
-
-def _count(number: int, singular: str, plural: str) -> str:
-    return f"{number} {singular if number == 1 else plural}"
 
 
 def _batches(population: Population) -> Section:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from calibrations.fleet.batch import BatchEffect, Population, SensorVerdict
-from calibrations.text import columns, concise, concise_in_prefix, join_words, percent
+from calibrations.text import columns, concise, concise_in_prefix, count_words, join_words, percent
 from rig.cli.terminal.complete import complete_model
 from rig.cli.terminal.output import FOLDER, bench_option, emit, json_option, note, out_option, require_outputs
 from rig.fleet.calibrate import Calibrated, Calibration
@@ -135,7 +135,11 @@ def _fleet(request: Request) -> Iterator[tuple[Fleet, list[Member]]]:
     if request.out is not None:
         require_outputs(*sorted(request.out.glob("*.yaml")))
     members = fleet_of(request.sources)
-    note(f"{len(members)} sensors of {len({m.batch for m in members})} batches on {len({m.rig for m in members})} rigs")
+    batches, rigs = {m.batch for m in members}, {m.rig for m in members}
+    note(
+        f"{count_words(len(members), 'sensor', 'sensors')} of {count_words(len(batches), 'batch', 'batches')} "
+        f"on {count_words(len(rigs), 'rig', 'rigs')}"
+    )
     with Record() as record, crew(request.scheduler, request.workers) as client:
         yield Fleet(client, record, _Steps()), members
 

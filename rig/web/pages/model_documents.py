@@ -70,7 +70,7 @@ class CertificateDialog(Asking):
         with self.fields:
             self.form = ui.select({".html": "HTML", ".pdf": "PDF", ".xml": "DCC XML"}, label="Form", value=".html")
             self.number = ui.input("Number (empty: run and digest)")
-            self.customer = ui.input("Customer (empty: that of the bench)")
+            self.customer = ui.input("Customer (empty: the bench's)")
             self.before = ui.select(earlier, label="As found: model in use until now", value="")
         for field in (self.form, self.number, self.customer, self.before):
             field.props("dense options-dense")

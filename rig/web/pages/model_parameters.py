@@ -92,7 +92,7 @@ class ParametersBox:
             for axis, noise in NoiseAnalysis(still, findings.search).channels.items():
                 words(f"Noise coefficients of {axis}, by all processes that the search found", "title")
                 head, rows = coefficient_table(noise, still.sensed.get(axis))
-                with wide_table():
+                with wide_table().classes("coefficients"):
                     table(("", *head), [(SYMBOLS.get(row[0], ""), *map(_page_text, row)) for row in rows])
                 words(_page_text(density(noise, still.sensed.get(axis))), "quiet small")
 
