@@ -16,7 +16,6 @@ from calibrations.errors import DataError
 from calibrations.importing.foreign import drop_duplicate_rows, read_csv
 from calibrations.importing.raw_logs import average_raw_log
 from calibrations.table import Table
-from drivers.errors import did_you_mean
 from rig.errors import RecordError, UnknownRun
 
 if TYPE_CHECKING:
@@ -99,6 +98,8 @@ def _no_file(path: Path) -> str:
     if not path.parent.is_dir():
         return f"{path}: there is no such file, and no folder {path.parent}"
     names = [entry.name for entry in path.parent.iterdir()]
+    from drivers.errors import did_you_mean  # an analysis of a file needs no driver
+
     return f"{path}: there is no such file.{did_you_mean(path.name, (), names)}"
 
 
