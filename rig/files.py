@@ -99,6 +99,17 @@ def home() -> Path:
     return Path(platformdirs.user_data_dir("inertial-rig"))
 
 
+def choose_kernel_cache() -> None:
+    """Cache compiled kernels in the folder of the record if the user's home is read-only, as for a service.
+
+    Call it before numba is imported: without a place for its cache, numba fails.
+    """
+    user_home = os.environ.get("HOME", "")
+    places = (user_home, f"{user_home}/.cache", os.environ.get("XDG_CACHE_HOME", ""))
+    if not any(os.access(place, os.W_OK) for place in places):
+        os.environ.setdefault("NUMBA_CACHE_DIR", str(home() / "kernels"))
+
+
 def free_bytes(folder: Path) -> int:
     """Free bytes on the disk of `folder`, which need not exist yet."""
     existing = next(place for place in (folder, *folder.resolve().parents) if place.exists())

@@ -48,7 +48,8 @@ def share_with_kernels(function: Function) -> Function:
 def _cache_folder() -> str:
     sources = sorted(Path(__file__).parent.glob("*.py"))
     digest = sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
-    return str(user_cache_path("inertial-rig") / "kernels" / digest)
+    chosen = settings.CACHE_DIR  # type: ignore[attr-defined] # NUMBA_CACHE_DIR
+    return str((Path(chosen) if chosen else user_cache_path("inertial-rig") / "kernels") / digest)
 
 
 def record(values: Values) -> Values:

@@ -16,6 +16,7 @@ import click
 
 from rig.cli.terminal.failure import exit_status
 from rig.cli.terminal.options import with_record
+from rig.files import choose_kernel_cache
 
 SECTIONS: Mapping[str, Mapping[str, tuple[str, str]]] = {  # of `rig --help`: command -> its module, its line
     "Start": {
@@ -134,6 +135,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command and exit with its status; an error is one message."""
     # Before numpy is imported: the matrices are small, and threads that wait for each other slow a busy machine.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    choose_kernel_cache()
     gc.set_threshold(NEW_OBJECTS)
 
     if instruction := os.environ.get(COMPLETE):  # the shell asks what may follow
