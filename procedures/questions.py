@@ -138,7 +138,7 @@ class Remount(Confirm):
 
 @dataclass(frozen=True)
 class Choice(Question):
-    """One of `choices`."""
+    """One of `choices`, or the beginning of one that no other choice has."""
 
     choices: tuple[str, ...] = ()
 
@@ -147,7 +147,8 @@ class Choice(Question):
         return f"one of {', '.join(self.choices)}"
 
     def checked(self, answer: str) -> str:
-        word = answer.strip()
-        if word not in self.choices:
-            raise BadAnswer(f"{self._bad_answer(answer)}.{did_you_mean(word, self.choices)}")
-        return word
+        word = answer.strip().lower()
+        begun = [choice for choice in self.choices if word and choice.startswith(word)]
+        if word in self.choices or len(begun) == 1:
+            return word if word in self.choices else begun[0]
+        raise BadAnswer(f"{self._bad_answer(answer)}.{did_you_mean(word, (), self.choices)}")

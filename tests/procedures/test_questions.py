@@ -47,9 +47,16 @@ def test_a_choice_is_one_of_its_own() -> None:
         (DIAL, "no", "answer with yes for 90 deg"),
         (replace(DIAL, expected=None), "", "answer with a number from 89.5 to 90.5 deg"),
         (SIDE, "bakc", "answer with one of front, back. Did you mean 'back'?"),
+        (SIDE, "", "answer with one of front, back."),
+        (replace(SIDE, choices=("resume", "repeat", "end")), "re", "answer with one of resume, repeat, end."),
     ],
 )
 def test_what_makes_no_sense_is_refused(question: Question, said: str, told: str) -> None:
     with pytest.raises(BadAnswer, match=question.name) as refused:
         question.checked(said)
     assert told in str(refused.value)
+
+
+@pytest.mark.parametrize(("said", "chosen"), [("front", "front"), ("Back", "back"), ("b", "back")])
+def test_a_choice_is_known_by_its_beginning(said: str, chosen: str) -> None:
+    assert SIDE.checked(said) == chosen

@@ -122,9 +122,10 @@ def ask_mapping(
     if kind is None:
         kinds = click.Choice(sorted(NAME_PATTERNS))
         question = (
-            "Known stage angles (poses), still positions by hand (positions), rotation (rates), vibration (motion)"
+            "Kind of table: known stage angles (poses), still positions by hand (positions), rotation (rates), "
+            "vibration (motion); Enter accepts"
         )
-        kind = str(click.prompt(question, default=likely_kind(sheet, mapped), type=kinds, err=True))
+        kind = str(click.prompt(question, default=likely_kind(sheet, mapped), type=kinds, show_choices=False, err=True))
     names = "; ".join(" ".join(filter(None, (group, *names))) for group, names in COLUMN_NAMES[kind].items())
     note(f"\nColumn names: {names}\nEnter accepts the proposal in brackets, {LEAVE} skips the column. Or type a name,")
     note("with a unit if it differs (vx_v:mV), or only a unit (mV).\n")
