@@ -11,5 +11,6 @@ places      all components that a table can show
 reml        sizes by restricted maximum likelihood
 search      which components act
 naming      which catalogue effects are the causes within a place
+rivals      which causes at other places explain a place as well
 geometry    which misalignment and stage errors the linear parts need
 """

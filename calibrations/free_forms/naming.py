@@ -10,7 +10,7 @@ from scipy.special import chdtrc  # scipy.stats takes 0.4 s to load
 
 from calibrations.free_forms.components import Component
 from calibrations.free_forms.descent import SearchResult, climb
-from calibrations.free_forms.reml import gains
+from calibrations.free_forms.rivals import gain_and_rivals, replacements_of
 from calibrations.table import Array
 
 FIRST_FORM = 0.2  # of a place's variance: the least that the first form must explain
@@ -18,19 +18,19 @@ NEXT_FORM = 0.05  # of a place's variance: the least that a second form must exp
 LEAST_NEEDED = 0.02  # of a place's variance: the least that the other forms must lose without this one
 NAMED = 0.9  # of a place's variance: the least that the forms must explain together
 MOST_FORMS = 2  # forms, at most, that only approximate a curve
+MOST_NAMES = 3  # causes of one curve, at most: four forms, each with a shape of its own, approximate any curve
 LEAST_SIZE = 0.6  # noise floors: a smaller place is a refinement
 LEAST_OWN = 0.3  # noise floors: part of a place with a cause that no other place explains, if the residual is noise
 LEAST_SHARE = 0.015  # of the largest place's size
 LEAST_UNKNOWN = 1.0  # noise floors: size of a place whose cause is unknown
 LEAST_UNKNOWN_SHARE = 0.05  # of the largest place's size: the part of such a place that no other one explains
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
-CLOSE = 10.0  # of -2 log likelihood: the data cannot separate two causes that differ by less
 UNSEEN = 0.3  # noise floors: a smaller residual of an effect does not show that a wider effect is the cause
 CLEARLY_LESS = 1.5  # ratio of the rms residuals of two effects from which one of them is not the cause
 READING_ERRORS = 1.5  # times the residual by the errors of noisy columns, whose size is uncertain
 FOLLOWS = 0.97  # of the variance of a curve over time that a line over a column explains: then the column is the cause
 FOLLOWERS = {"time-bias": ("temperature-bias", "column:std"), "time-scale": ("temperature-scale",)}
-FORM_OF, MOSTLY = 0.25, 0.85  # size relative to a larger place, and share of its gain that another form there explains
+FORM_OF = 0.25  # of a larger place's size: a smaller place may be a part of its form
 
 
 @dataclass(frozen=True)
@@ -92,10 +92,10 @@ def places(result: SearchResult) -> list[ActingPlace]:
         followed = _find_followed_column(result, curves, place, Q, 0.0 if walks else share) if curved else None
         if followed is not None:
             causes, share = (followed[0].cause,), followed[1]
-        gain, alternatives = _rivals(
+        gain, alternatives = gain_and_rivals(
             result, names, {larger_place for larger_place in sizes if sizes[place] < FORM_OF * sizes[larger_place]}
         )
-        replacements = [_replacements(result, names, causes, cause) for cause in causes] if len(names) > 1 else []
+        replacements = [replacements_of(result, names, causes, cause) for cause in causes] if len(names) > 1 else []
         alternatives = tuple(sorted({*alternatives, *(name for each in replacements for name in each)} - set(causes)))
         least = LEAST_SHARE * largest
         if walks:
@@ -350,50 +350,3 @@ def _residual_squares(columns: Sequence[Array], y: Array) -> float:
     scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
     residual = y - X @ (np.linalg.lstsq(X / scale, y, rcond=1e-8)[0] / scale)
     return float(residual @ residual)
-
-
-def _rivals(result: SearchResult, names: Sequence[str], larger: set[str]) -> tuple[float, tuple[str, ...]]:
-    """The gain of the place, and causes at other places that explain it as well.
-
-    Of one component those that gain nearly as much. At a `larger` place that acts, also a form that gains most of it:
-    the form of a mechanism is never quite that of the catalogue.
-    """
-    reduced = result.sizes_without(names)
-    cost = reduced.deviance - result.sizes.deviance
-    acting_components = [result.component(name) for name in names]
-    inactive = [
-        c for c in result.components if c.name not in result.sizes.variances and c.place != acting_components[0].place
-    ]
-    gained = gains(result.gram, reduced, [c.name for c in inactive])
-    limit = cost - acting_components[0].price - CLOSE if len(names) == 1 else np.inf
-    most = MOSTLY * cost
-    close = {
-        c.cause or c.place
-        for c in inactive
-        if gained[c.name][0] - c.price > (min(limit, most) if c.place in larger and not c.general else limit)
-    }
-    return cost, tuple(sorted(close - {component.cause for component in acting_components}))
-
-
-def _replacements(result: SearchResult, names: Sequence[str], causes: Sequence[str], cause: str) -> tuple[str, ...]:
-    """Catalogue effects of other places whose gain, with the other causes present, is nearly that of `cause` or more.
-
-    Free forms are left out, because with them no form of the catalogue is needed.
-    """
-    acting_components = [result.component(name) for name in names]
-    other_causes = {c.name for c in acting_components if c.form is None and c.cause in causes and c.cause != cause}
-    reduced = result.sizes_without(name for name in names if name not in other_causes)
-    place = acting_components[0].place
-    trials = [
-        c
-        for c in result.components
-        if c.cause
-        and c.form is None
-        and not c.noise
-        and (c.name in names or c.name not in result.sizes.variances)
-        and (c.cause == cause if c.place == place else c.name not in names)
-    ]
-    gained = gains(result.gram, reduced, [c.name for c in trials])
-    net_gains = {c.name: gained[c.name][0] - c.price for c in trials}
-    least = max((net_gains[c.name] for c in trials if c.place == place), default=np.inf) - CLOSE
-    return tuple({c.cause for c in trials if c.place != place and net_gains[c.name] > least})
