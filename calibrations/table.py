@@ -35,6 +35,7 @@ OPTIONAL = (
 # fmt: on
 NUMBERS = {name for kind in KINDS.values() for wanted in kind.columns for name in wanted} | set(OPTIONAL) - {"path"}
 AXES = ("x", "y", "z")
+LIKE = 0.65  # likeness of an unknown name and a column's, at which it may be meant
 MILLI = {"g": "mg", "field": "‰ of the field", "deg/s": "mdeg/s"}  # thousandths of what is sensed
 STANDARD_GRAVITY = 9.80665
 GRAVITY_M_S2 = (9.76, 9.84)  # local gravity on Earth: from the highest mountain near the equator to the poles
@@ -378,11 +379,12 @@ def guess_kind(names: Iterable[str]) -> str:
     for kind in ("motion", "poses", "rates", "positions"):
         if any(all(name in names for name in columns) for columns in FILE_KINDS[kind].columns):
             return kind
-    required = {name for kind in FILE_KINDS.values() for columns in kind.columns for name in columns}
+    required = sorted({name for kind in FILE_KINDS.values() for columns in kind.columns for name in columns})
     for name in names:
-        close = difflib.get_close_matches(name, required, n=1, cutoff=0.65)
-        if name not in required and name not in OPTIONAL and close:
-            raise MissingColumn(f'the column name is unknown: "{name}"; did you mean "{close[0]}"?')
+        likeness = [difflib.SequenceMatcher(None, other, name).ratio() for other in required]
+        if name not in required and name not in OPTIONAL and max(likeness) >= LIKE:
+            likely_name = required[likeness.index(max(likeness))]  # of equals the first: ax, not mx
+            raise MissingColumn(f'the column name is unknown: "{name}"; did you mean "{likely_name}"?')
     column_sets = [(kind.name, columns) for kind in FILE_KINDS.values() for columns in kind.columns]
     kind, columns = max(column_sets, key=lambda e: sum(name in names for name in e[1]))
     missing = [name for name in columns if name not in names]

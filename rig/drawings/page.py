@@ -30,7 +30,7 @@ def _side_by_side(attitude: Attitude) -> Iterator[str]:
     turned = f"Beta {attitude.beta_deg:g}°, sensor turned by {attitude.mount_deg:g}°"
     yield svg.text((660, 54), turned, 14, svg.QUIET, bold=True)
     yield from table_view(attitude, (660, 172), 88)
-    yield svg.text((660, 285), _marks(attitude), 13, svg.QUIET)
+    yield svg.text((660, 290), _marks(attitude), 13, svg.QUIET)
 
 
 def _marks(attitude: Attitude) -> str:

@@ -126,6 +126,7 @@ GOOD = "ax,ay,az\n1,2,3\n4,5,6\n"
         ('ax,ay,az\n1,2,"' + "x" * 200_000, (), "theirs.txt: cannot be split into columns"),
         ("axx,ay,az\n1,2,3\n", (), 'theirs.txt, line 1: the column name is unknown: "axx"; did you mean "ax"?'),
         (GOOD, ("ax=acx",), 'theirs.txt: there is no column "acx"; did you mean "ax"?'),
+        ("x,y,z\n1,2,3\n", (), 'theirs.txt, line 1: the column name is unknown: "x"; did you mean "ax"?'),
         (GOOD, ("vx=ax",), '"vx=ax": there is no column "vx"; did you mean "vx_v"?'),
         (GOOD, ("ax=ax:mgg",), 'theirs.txt: unknown unit "mgg" of the column "ax"; did you mean "mg"?'),
         (GOOD, ("ax=ax:g", "ay=ay:mg", "az=az:V"), "the three axes must have the same unit: ax in g, ay in g, az in V"),
