@@ -376,7 +376,7 @@ def _nearest_given(missing: str, other_names: list[str]) -> str:
 def guess_kind(names: Iterable[str]) -> str:
     """The kind of table that has these columns. Raises MissingColumn when none has."""
     names = list(names)
-    for kind in ("motion", "poses", "rates", "positions"):
+    for kind in ("motion", "poses", "turns", "rates", "positions"):
         if any(all(name in names for name in columns) for columns in FILE_KINDS[kind].columns):
             return kind
     required = sorted({name for kind in FILE_KINDS.values() for columns in kind.columns for name in columns})

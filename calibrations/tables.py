@@ -43,10 +43,12 @@ class Kind:
     known_input: bool = False  # whether each row has a known specific force or rate: the residual is in the output
     stage_angles: bool = False  # whether stages gave each row its orientation
     moving: bool = False  # whether the sensor moves: its output filter matters, and rows are stretches that repeat
+    from_output: bool = False  # whether a model computes what is sensed from the output, and the residual is in that
     turning: bool = False  # whether the sensor turns at a constant rate, and senses it
     magnitude: bool = False  # whether only the magnitude of the sensed quantity is known
     field: bool = False  # whether that is a field, whose strength is a parameter
     same_pose: tuple[str, ...] = ()  # columns whose values make two rows the same pose
+    overlapping: bool = False  # whether a sample may be in two rows, with its time
     fewest_for_form: int = 24  # rows that can show a free form: the base of poses of two axes has ten parameters
     sequential: bool = True  # whether rows without times are taken as one second apart
 
@@ -77,7 +79,7 @@ class Positions(Kind):
     columns = (("ax", "ay", "az"), ("mx", "my", "mz"))
     outputs = ("ax", "ay", "az")
     default_model = "common-scale"
-    means = budget = magnitude = True
+    means = budget = magnitude = from_output = True
     measurement_caption = "The magnitude of gravity by the model {} at each position: 1 g if the model is right."
     failure_caption = "The residual of the model {} over the direction of gravity; pale is near the noise."
 
@@ -125,6 +127,26 @@ class Rates(Kind):
     failure_caption = "The residual of the model {} over the rate of the turn."
 
 
+class Turns(Kind):
+    """Turns of a gyroscope between rests: an accelerometer gives the direction of gravity before and after each."""
+
+    name = file = rows = "turns"
+    size_in = "samples"
+    columns = (("t_s", "turn", "resting", "gx", "gy", "gz", "ax", "ay", "az"),)
+    outputs = ("gx", "gy", "gz")
+    input_unit = "deg/s"
+    default_model = "gyroscope"
+    perfect_sensor = "a gyroscope without error"
+    nominal = " of 1 V/(deg/s)"
+    from_output = turning = overlapping = True
+    sensed_in = "deg/s"
+    sensed_along = "rate about {} (deg/s)"
+    nearest_to = "the axis of turn"
+    note = "Each turn has five values: two of its angle, which gravity shows, and the three rates at rest."
+    measurement_caption = "The error of each turn and rest by the model {}: 0 if the model is right."
+    failure_caption = "The residual of the model {} over the rate of the turn."
+
+
 class Motion(Kind):
     """A record of motion. A model is fitted to the parts of the motion in each stretch."""
 
@@ -159,7 +181,7 @@ class Still(Kind):
 
 
 KINDS: Mapping[str, Kind] = MappingProxyType(
-    {kind.name: kind for kind in (Poses(), Positions(), Motion(), Still(), Rates(), Fields())}
+    {kind.name: kind for kind in (Poses(), Positions(), Motion(), Still(), Rates(), Turns(), Fields())}
 )
 FILE_KINDS: Mapping[str, Kind] = MappingProxyType({name: kind for name, kind in KINDS.items() if kind.file == name})
 MEANS = tuple(name for name, kind in FILE_KINDS.items() if kind.means)

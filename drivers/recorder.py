@@ -22,7 +22,7 @@ class Samples:
     """A record: `volts` of shape (n, channels), the first scan at `start_s` of the clock.
 
     Of a sensor that sends its own values, `volts` are in the unit of its settings. `temperature_c` is what the sensor
-    itself reports; None if it does not.
+    itself reports; None if it does not. `lost`: number of samples that are missing in or near this block.
     """
 
     volts: NDArray[np.float64]
@@ -30,6 +30,7 @@ class Samples:
     rate_hz: float
     start_s: float
     temperature_c: float | None = None
+    lost: int = 0
 
 
 @dataclass(frozen=True)
@@ -151,4 +152,5 @@ def _join(blocks: Sequence[Samples]) -> Samples:
     volts = np.concatenate([block.volts for block in blocks])
     reported = [block.temperature_c for block in blocks if block.temperature_c is not None]
     temperature_c = float(np.mean(reported)) if reported else None
-    return Samples(volts, first.channels, first.rate_hz, first.start_s, temperature_c)
+    lost = sum(block.lost for block in blocks)
+    return Samples(volts, first.channels, first.rate_hz, first.start_s, temperature_c, lost)

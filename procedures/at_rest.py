@@ -38,23 +38,25 @@ Course = Callable[[Sequence[Dwell], NoiseAtRest, Sequence[str]], HandCourse]
 
 
 @dataclass(frozen=True)
-class RestWindows:
-    """Successive windows of one rest, as one block of samples."""
+class Windows:
+    """Successive windows, as one block of samples."""
 
     volts: NDArray[np.float64]
     channels: Sequence[str]
     rate_hz: float
     start_s: float
     temperature_c: float | None
+    lost: int = 0
 
     @staticmethod
-    def of(windows: Sequence[Samples]) -> RestWindows:
+    def of(windows: Sequence[Samples]) -> Windows:
         """All `windows` joined."""
         first = windows[0]
         volts = np.concatenate([w.volts for w in windows])
         reported = [w.temperature_c for w in windows if w.temperature_c is not None]
         temperature_c = float(np.mean(reported)) if reported else None
-        return RestWindows(volts, first.channels, first.rate_hz, first.start_s, temperature_c)
+        lost = sum(w.lost for w in windows)
+        return Windows(volts, first.channels, first.rate_hz, first.start_s, temperature_c, lost)
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,11 @@ class Goal:
         return "; ".join(filter(None, (f"{parameter} is known to {known}, wanted {wanted}", course.doubt)))
 
 
+def outputs_of(samples: Samples, names: Sequence[str]) -> NDArray[np.float64]:
+    """The samples of these outputs, in this order, shape (n, names)."""
+    return samples.volts[:, [list(samples.channels).index(name) for name in names]]
+
+
 def require_analysis(rig: Session, procedure: str) -> HandAnalysis:
     """The analysis by hand. Raises SettingError for a session without it."""
     if rig.by_hand is None:
@@ -109,11 +116,11 @@ def take_positions(rig: Session, outputs: Sequence[str], question: str, course_o
     analysis = require_analysis(rig, goal.procedure)
     rig = replace(rig, adc=rig.adc.only(*outputs))
     rig.confirm("at-rest", question)
-    noise = learn_noise(rig, analysis, goal.wait_s)
+    (noise,) = learn_noise(rig, analysis, goal.wait_s, outputs)
     skipped: list[str] = []
     while not goal.is_reached(course := course_of(rig.measured(), noise, skipped)):
         rig.host.expect(max(1, FEWEST - course.count))
-        rig.host.guide(_guidance(course, goal))
+        rig.host.guide(guidance(course, goal))
         next_rest = _find_next_rest(rig, analysis, course, noise, goal)
         if next_rest is None:
             skipped.append(course.words)
@@ -121,12 +128,12 @@ def take_positions(rig: Session, outputs: Sequence[str], question: str, course_o
         if course.count >= SIDES:  # the directions are known, so no position has a wrong name any more
             skipped.clear()
         rig.keep(Pose(0.0, 0.0, path=course.words), samples=next_rest, temperature_c=rig.oven.temperature_c())
-    rig.host.guide(_guidance(course, goal, is_complete=True))
+    rig.host.guide(guidance(course, goal, is_complete=True))
 
 
-def _guidance(course: HandCourse, goal: Goal, is_complete: bool = False) -> Guidance:
-    """The next action of the person, in words, and the drawing."""
-    progress = goal.progress(course)
+def guidance(course: HandCourse, goal: Goal, *, is_complete: bool = False, remark: str = "") -> Guidance:
+    """The next action of the person, in words, and the drawing; `remark` is on the last one."""
+    progress = "; ".join(filter(None, (remark, goal.progress(course))))
     if is_complete:
         text = f"{course.count} positions taken; {progress}"
     else:
@@ -136,17 +143,17 @@ def _guidance(course: HandCourse, goal: Goal, is_complete: bool = False) -> Guid
     return Guidance(text, course.up, taken, not is_complete, course.north, course.wanted if course.north else ())
 
 
-def learn_noise(rig: Session, analysis: HandAnalysis, wait_s: float) -> NoiseAtRest:
-    """The noise of the sensor at rest, from the first stretch of windows that are alike. Raises NoAnswer."""
+def learn_noise(rig: Session, analysis: HandAnalysis, wait_s: float, *triads: Sequence[str]) -> list[NoiseAtRest]:
+    """The noise of each triad of outputs at rest, from the first stretch of windows that are alike. Raises NoAnswer."""
     rig.host.guide(
         Guidance("leave the sensor on the table for 10 s: the program measures its noise", FLAT, moves=False)
     )
-    windows: list[NDArray[np.float64]] = []
+    windows: list[Samples] = []
     for _ in range(max(2 * LEARNED, round(wait_s / WINDOW_S))):
-        samples = rig.adc.acquire(WINDOW_S)
-        windows = [*windows, samples.volts][-LEARNED:]
-        if (noise := analysis.learn(windows, samples.rate_hz)) is not None:
-            return noise
+        windows = [*windows, rig.adc.acquire(WINDOW_S)][-LEARNED:]
+        learned = [analysis.learn([outputs_of(w, t) for w in windows], windows[-1].rate_hz) for t in triads]
+        if all(noise is not None for noise in learned):
+            return [noise for noise in learned if noise is not None]
     raise NoAnswer(
         f"the sensor was not at rest for {LEARNED * WINDOW_S:g} s within {wait_s:g} s; put it on a firm table away "
         "from motors, let it go, and resume the run"
@@ -155,7 +162,7 @@ def learn_noise(rig: Session, analysis: HandAnalysis, wait_s: float) -> NoiseAtR
 
 def _find_next_rest(
     rig: Session, analysis: HandAnalysis, course: HandCourse, noise: NoiseAtRest, goal: Goal
-) -> RestWindows | None:
+) -> Windows | None:
     """The next rest at a new position. The first window of a rest is left out: the hand has just let go.
 
     None after TRIES rests at known positions: an earlier position was not the one that the person was told, and is the
@@ -175,7 +182,7 @@ def _find_next_rest(
                 return None
         elif len(windows) * WINDOW_S <= goal.rest_s:
             doing.say(f"{course.words}: at rest, wait")
-        elif course.is_new((candidate := RestWindows.of(windows[1:])).volts.mean(axis=0)):
+        elif course.is_new((candidate := Windows.of(windows[1:])).volts.mean(axis=0)):
             return candidate
         else:
             refusals += not doing.text.startswith(KNOWN)

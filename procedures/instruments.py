@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Sequence
 from contextlib import AbstractContextManager
 from typing import Protocol, TypeVar
 
@@ -16,7 +16,7 @@ class Samples(Protocol):
     """A block of samples: `volts`, shape (n, channels); `start_s` is the clock's time of the first sample.
 
     Of a digital sensor, `volts` are in the unit of the sensor, and `temperature_c` is what it reports; None if it does
-    not.
+    not. `lost`: number of samples that are missing in or near this block.
     """
 
     @property
@@ -29,6 +29,8 @@ class Samples(Protocol):
     def start_s(self) -> float: ...
     @property
     def temperature_c(self) -> float | None: ...
+    @property
+    def lost(self) -> int: ...
 
 
 OUTPUTS = (("vx", "vy", "vz"), ("ax", "ay", "az"))  # of an analog accelerometer, and of a digital one
@@ -78,8 +80,8 @@ class Adc(Protocol):
     def only(self, *outputs: str) -> Adc:
         """The converter with the channels of these outputs only. Raises if the bench has no such channel."""
 
-    def stream(self, duration_s: float, block_s: float) -> Iterator[Samples]:
-        """The samples in blocks of `block_s`, without a gap between them."""
+    def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
+        """The samples in blocks of `block_s`, without a gap between them. Closing it ends the record."""
 
     def power(self, on: bool) -> None:
         """Switch the sensor's supply."""

@@ -189,6 +189,9 @@ class HandAnalysis(Protocol):
     def field_course(self, dwells: Sequence[Dwell], noise: NoiseAtRest, skipped: Sequence[str]) -> HandCourse:
         """The same of a magnetometer."""
 
+    def turn_course(self, recorded: Sequence[Recorded], noise: NoiseAtRest, rest_s: float) -> HandCourse:
+        """The rests and turns of an accelerometer and a gyroscope so far. A turn begins with a rest of `rest_s`."""
+
 
 @dataclass(frozen=True)
 class Guidance:
@@ -212,8 +215,26 @@ class Guidance:
         return self.wanted or self.up
 
 
+class Recorded(Protocol):
+    """A pose in the record with its samples; `number` counts all poses of the run, `t_s` is the middle."""
+
+    @property
+    def pose(self) -> Pose: ...
+    @property
+    def samples(self) -> Samples: ...
+    @property
+    def t_s(self) -> float: ...
+    @property
+    def temperature_c(self) -> float | None: ...
+    @property
+    def number(self) -> int: ...
+
+
 class Host(Protocol):
     """The run or the plan that executes the procedure."""
+
+    def recorded(self) -> Sequence[Recorded]:
+        """The poses in the record with their samples, in order."""
 
     def kept(self) -> Sequence[Pose]:
         """The poses in the record."""
@@ -356,6 +377,10 @@ class Session:
     def measured(self) -> Sequence[Dwell]:
         """All measurements of this run, in order. An adaptive procedure chooses its poses by them."""
         return self.host.measured()
+
+    def recorded(self) -> Sequence[Recorded]:
+        """All poses of this run with their samples, in order."""
+        return self.host.recorded()
 
     def reading(self, name: str) -> float | None:
         """The value of a reading of this run; None if it is not in the record."""

@@ -10,6 +10,7 @@ imucal   six sides, 3 s each, as Ferraris et al.: means of opposite sides give t
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -17,8 +18,9 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
+from calibrations.analyses.hand_turns import fit_turns
 from calibrations.design.orientations import ORIENTATIONS
-from calibrations.table import Array
+from calibrations.table import Array, Table
 from drivers.handheld.hand import Hand
 from drivers.handheld.triad import noise_v, steady_v
 from drivers.handheld.world import FIELDS, FORCES, Handheld, HandheldWorld
@@ -27,10 +29,12 @@ from drivers.world.config import WorldConfig
 from drivers.world.kernel import record
 from procedures.hand_fields import hand_fields
 from procedures.hand_positions import hand_positions
+from procedures.hand_turns import hand_turns
 from procedures.instruments import Samples
 from rig.instruments.by_hand import HandAnalysis
+from rig.record.turns import is_turn, turn_columns
 from rig.record.values import Block
-from tests.procedures.bench import Adc, session
+from tests.procedures.bench import Adc, Book, session
 
 RATE_HZ = 200.0
 DEG = np.pi / 180
@@ -73,6 +77,11 @@ class SlowAdc(Adc):
         start_s, n = self.world.now_s, round(duration_s * RATE_HZ)
         volts = self.world.adc_volts(self.channels, start_s, 1 / RATE_HZ, n)
         return Block(volts, self.channels, RATE_HZ, start_s)
+
+    def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
+        begin_s, n = self.world.now_s, round(block_s * RATE_HZ)
+        for start_s in begin_s + block_s * np.arange(round(duration_s / block_s)):
+            yield Block(self.world.adc_volts(self.channels, start_s, 1 / RATE_HZ, n), self.channels, RATE_HZ, start_s)
 
 
 def world_of(seed: int, hand: Hand | None = None) -> HandheldWorld:
@@ -256,3 +265,82 @@ def fields_by_procedure(
     true_iron, true_root = true_ellipsoid(world)
     size = float(np.trace(true_root)) / 3
     return FieldErrors((hard_iron - true_iron) / size, (symmetric_root(M) - true_root) / size, len(means), world.now_s)
+
+
+# A gyroscope in a hand, with an accelerometer on the same board.
+
+
+def gyroscope_settings(seed: int) -> dict[str, Any]:
+    """A gyroscope with its own zeros, gains and angles to the board."""
+    rng = np.random.default_rng([seed, 37])
+    tines = {
+        axis: {"volts_per_nm": 0.11 * (1 + 0.02 * gain), "zero_v": 2.5 + 0.02 * zero}
+        for axis, gain, zero in zip("xyz", *rng.standard_normal((2, 3)), strict=True)
+    }
+    return tines | dict(zip(("turn_x_deg", "turn_y_deg", "turn_z_deg"), 0.7 * rng.standard_normal(3), strict=True))
+
+
+def turn_world(seed: int, hand: Hand | None = None) -> HandheldWorld:
+    """A gyroscope of `gyroscope_settings` and one hand."""
+    config = WorldConfig.from_mapping({"preset": "ideal", "gyroscope": gyroscope_settings(seed)})
+    return HandheldWorld(config, seed, Handheld(hand=hand or Hand()))
+
+
+def true_gyroscope(world: HandheldWorld) -> Calibration:
+    """Zeros and matrix of the gyroscope in the frame of its accelerometer: x kept, y in the plane of x and y."""
+    sensor = world.config.gyroscope
+    rates, volts = 50.0 * np.vstack([np.eye(3), -np.eye(3)]), np.empty((6, 3))
+    turned_sensors.gyroscope_volts(record(sensor), turned_sensors.die(sensor), rates, np.zeros((6, 3)), 0.0, volts)
+    frame, upper = np.linalg.qr(truth(world).M.T)
+    return Calibration(volts.mean(axis=0), (volts[:3] - volts[3:]).T / 100 @ (frame * np.sign(np.diag(upper))), 0, 0.0)
+
+
+@dataclass(frozen=True)
+class TurnErrors:
+    """Errors of bias in deg/s, of scale as a share, each (3,), of misalignment in rad (6,); and what they took.
+
+    `worst`: the largest error of scale or misalignment. `normalised`: errors over their stated uncertainties.
+    """
+
+    bias_deg_s: Array
+    scale: Array
+    misalignment: Array
+    normalised: Array
+    positions: int
+    time_s: float
+
+    @property
+    def worst(self) -> float:
+        """As a share, or in rad."""
+        return float(max(np.abs(self.scale).max(), np.abs(self.misalignment).max()))
+
+
+def turns_by_procedure(seed: int, hand: Hand | None = None, **settings: Any) -> TurnErrors:
+    """hand-turns, and the fit of its turns."""
+    world = turn_world(seed, hand)
+    rig, book = session(world)
+    hand_turns(replace(rig, adc=SlowAdc(world), by_hand=HandAnalysis()), **settings)
+    return turn_errors(world, book)
+
+
+def turn_errors(world: HandheldWorld, book: Book) -> TurnErrors:
+    """The errors of a calibration from the record of hand-turns."""
+    fitted = fit_turns(Table.from_columns("turns", turn_columns(book.blocks, 2.0), {}, "a hand"))
+    true = true_gyroscope(world)
+    rows = true.M / true.gains[:, None]
+    bias, scale, angle, normalised = [], [], [], []
+    for key, estimate in fitted.params.items():
+        k = "xyz".index(key.rpartition(".")[2][0])
+        if key.startswith("gyro-bias"):
+            bias.append((estimate.value - true.b[k]) / true.gains[k])
+        elif key.startswith("gyro-scale"):
+            scale.append(estimate.value / true.gains[k] - 1)
+            normalised.append((estimate.value - true.gains[k]) / estimate.std)
+        else:
+            angle_deg = np.degrees(np.arcsin(rows[k, "xyz".index(key[-1])]))
+            angle.append(np.radians(estimate.value - angle_deg))
+            normalised.append((estimate.value - angle_deg) / estimate.std)
+    rests = sum(not is_turn(block.pose) for block in book.blocks)
+    return TurnErrors(
+        np.array(bias), np.array(scale), np.array(angle), np.array(normalised), positions=rests, time_s=world.now_s
+    )

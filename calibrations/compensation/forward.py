@@ -110,8 +110,9 @@ def steps_of(model: Model) -> list[Step]:
 
 def input_unit(model: Model) -> str:
     """Unit of the sensed quantity: g, the field's strength, or deg/s."""
-    kinds = {kind for term in model.terms for kind in term.effect.kinds if len(term.effect.kinds) == 1}
-    return KINDS[kinds.pop()].input_unit if len(kinds) == 1 else "g"
+    units_by_term = [{KINDS[kind].input_unit for kind in term.effect.kinds} for term in model.terms]
+    units = {unit for units in units_by_term for unit in units if len(units) == 1}
+    return units.pop() if len(units) == 1 else "g"
 
 
 def known_at_run_time(effect: Effect) -> str:

@@ -55,7 +55,7 @@ def _times(table: Table) -> Iterator[str]:
         yield from _sample_rate(table, t_s)
         return
     repeated = int(np.count_nonzero(np.diff(np.sort(t_s)) == 0))
-    if repeated:
+    if repeated and not table.type.overlapping:
         yield (
             f"{repeated} rows have the time of another row, as of a clock that began again or of two files in one; "
             "rows are ordered by t_s: correct the times, or separate the files"

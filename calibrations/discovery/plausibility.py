@@ -62,10 +62,10 @@ def findings(table: Table) -> tuple[Finding, ...]:
     """Reasons against a table of poses or rates, worst first; () for other kinds and for healthy data."""
     if table.n < FEWEST_RESPONSE_ROWS:
         return ()
-    if table.type.turning:
-        return tuple(_of_rates(table))
     if table.type.magnitude:
         return tuple(_of_magnitudes(table))
+    if table.type.turning and table.type.known_input:
+        return tuple(_of_rates(table))
     if not table.type.stage_angles:
         return ()
     force = specific_force(nominal_pose(table))

@@ -248,8 +248,8 @@ def with_least_white(result: Fit, white: Array) -> Fit:
 
 def scales(fitted: Fit) -> Array:
     """Output per g, or deg/s, of each channel; 1 for a residual in what is sensed, or where that is not known."""
-    if fitted.table.type.magnitude:
-        return np.ones(1)
+    if fitted.table.type.from_output:
+        return np.ones(len(fitted.channels))
     if one_orientation(fitted.table):
         return np.ones(len(fitted.channels))
     effect = "gyro-scale-factor" if fitted.table.type.turning else "scale-factor"

@@ -20,12 +20,13 @@ from calibrations.errors import DataError, ModelError, TooFewRows
 from calibrations.fitting.problem import Problem
 from calibrations.means.noise import norm_std
 from calibrations.model import Model
-from calibrations.model.chain import LinearisedChain, Step, backward, magnitude_by_output, sensed
+from calibrations.model.chain import LinearisedChain, Step, backward, magnitude_by_output, sensed, slope_at
 from calibrations.model.parameters import Layout
 from calibrations.table import Array, Table
 from calibrations.tables import FITTED
 
 if TYPE_CHECKING:
+    from calibrations.geometry.turns import Turns
     from calibrations.motion.stretches import Stretches
 
 STRENGTH = "field-strength"
@@ -195,6 +196,82 @@ class MotionProblem(Problem):
         return self.table.parts(error)
 
 
+@dataclass(frozen=True)
+class TurnProblem(Problem):
+    """Turns between rests, as the rates by the model make them."""
+
+    table: Turns
+
+    @staticmethod
+    def prepared(table: Table) -> Table:
+        """A row for each turn."""
+        from calibrations.geometry.turns import make_turns  # other kinds integrate no rates
+
+        return make_turns(table)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The angle of the turn along its axis and across it, and the rates at rest."""
+        from calibrations.geometry.turns import CHANNELS
+
+        return CHANNELS
+
+    @property
+    def unit(self) -> str:
+        """The unit of a rate."""
+        return self.table.input_unit
+
+    @property
+    def samples(self) -> Table:
+        return self.table.samples
+
+    @property
+    def adds(self) -> bool:
+        """An angle is not linear in any parameter."""
+        return False
+
+    @cached_property
+    def white(self) -> Array | None:
+        """From the scatter at rest."""
+        return self.table.white
+
+    def residual_by(self, steps: Sequence[Step]) -> Array:
+        """What the turns and rests leave, shape (channels, n)."""
+        return self.table.residual(backward(self.samples, steps))
+
+    def sensed(self, theta: Array) -> Array:
+        """As the model has it from the outputs."""
+        steps = self.layout.steps(theta)
+        return sensed(backward(self.samples, steps), self.samples, steps)
+
+    def of_output(self, theta: Array, changes: Array) -> Array:
+        """By how the rates follow each output."""
+        by_response = self._by_response(self._chain_at(self.layout.steps(theta)))
+        return self.table.add_up(by_response @ changes)
+
+    def _chain_at(self, steps: Sequence[Step]) -> LinearisedChain:
+        """From the outputs back to the rates."""
+        return LinearisedChain(self.samples, steps, backward(self.samples, steps))
+
+    def _by_response(self, chain: LinearisedChain) -> Array:
+        """How the residual of its turn follows the response at each sample, shape (samples, channels, 3)."""
+        slope = slope_at(chain.static, self.samples, chain.steps)
+        by_rate = self.table.by_rate(chain.static).transpose(0, 2, 1)
+        return np.asarray(-np.linalg.solve(slope.transpose(0, 2, 1), by_rate).transpose(0, 2, 1))
+
+    def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:  # noqa: ARG002
+        """The response at the same rates changes; the rates follow it as they follow the output."""
+        chain = self._chain_at(self.layout.steps(theta))
+        by_response = self._by_response(chain)
+
+        def change(k: int, upper: float, lower: float) -> Array:
+            term = self.layout.slots[k].term
+            values = (self.layout.values_with(chain.steps[term][1], k, value) for value in (upper, lower))
+            return self.table.add_up(by_response @ chain.change(term, *values)[:, :, None])[:, :, 0]
+
+        return change
+
+
 PROBLEMS: Mapping[str, type[Problem]] = MappingProxyType(
     {
         "poses": Problem,
@@ -202,6 +279,7 @@ PROBLEMS: Mapping[str, type[Problem]] = MappingProxyType(
         "positions": PositionProblem,
         "fields": FieldProblem,
         "motion": MotionProblem,
+        "turns": TurnProblem,
     }
 )
 

@@ -25,7 +25,7 @@ EARTH_DEG_S = np.degrees(7.292115e-5)
 def rate_deg_s(table: Table) -> Array:
     """Angular rate along the sensor's reference axes, deg/s, shape (n, 3), as far as it is known."""
     turned = table.column("rate_deg_s")[:, None] * turn_axes(table)
-    return turned + _vertical_deg_s(table) * _up(table)
+    return turned + vertical_deg_s(table) * _up(table)
 
 
 def turn_axes(table: Table) -> Array:
@@ -111,7 +111,7 @@ def _changing(table: Table) -> Array:
     return rate
 
 
-def _vertical_deg_s(table: Table) -> float:
+def vertical_deg_s(table: Table) -> float:
     """The earth's rotation about the vertical; 0 where the latitude is not known."""
     return float(EARTH_DEG_S * np.sin(np.radians(table.number("latitude_deg", 0.0))))
 

@@ -264,7 +264,9 @@ def _output_unit(mapped: Sequence[ColumnMapping], kind: str, field: bool, source
     Raises DataError if the axes have different units.
     """
     accelerometer = any(m.name == "ax" for m in mapped)
-    for axes in (RATES,) if kind == "rates" else TRIADS[1:] if field else TRIADS[:1] if accelerometer else TRIADS:
+    for axes in (
+        (RATES,) if kind in ("rates", "turns") else TRIADS[1:] if field else TRIADS[:1] if accelerometer else TRIADS
+    ):
         stated_units = {m.name: UNITS[m.unit][0] for m in mapped if m.unit}
         units = {axis: stated_units.get(axis, "") for axis in axes}
         if len(set(units.values())) > 1:

@@ -38,6 +38,7 @@ COLUMN_NAMES: Mapping[str, Mapping[str, tuple[str, ...]]] = {
              "n"),
         "of named sections": ("path",),
     },
+    "turns": {"": ("t_s", "turn", "resting", "gx", "gy", "gz", "ax", "ay", "az", "temperature_c")},
     "motion": {"": ("t_s", "vx_v", "vy_v", "displacement_m", "temperature_c", "supply_v")},
     "still": {"": ("t_s", "vx_v", "vy_v", "vz_v", "temperature_c", "supply_v")},
 }  # fmt: skip

@@ -179,7 +179,7 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         self._begin()
         self._warmth.forget()
         decoder, reception, sent = self._decoder(), self._reception(), 0
-        begun_s, quiet_s, damaged = self._clock.now(), max(QUIET_S, 10 / rate_hz), 0
+        begun_s, quiet_s, damaged, lost = self._clock.now(), max(QUIET_S, 10 / rate_hz), 0, 0
         try:
             while sent < total:
                 due = min(block, total - sent)
@@ -191,10 +191,11 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
                     if self._clock.now() - (reception.end_s if reception.count else begun_s) > quiet_s:
                         raise self._unreadable(decoder) if decoder.damaged > damaged else self._silence(quiet_s)
                 self._require_complete(reception, decoder)
+                lost_before, lost = lost, self._lost(reception, decoder)
                 values = reception.pull(due)
                 self._require_alive(values, names, reception)
                 start_s, temperature_c = reception.start_s + sent / rate_hz, self._warmth.pull_c(self._clock.now())
-                yield Samples(values, names, rate_hz, start_s, temperature_c)
+                yield Samples(values, names, rate_hz, start_s, temperature_c, lost - lost_before)
                 sent += due
         finally:
             self._tally.add(reception, decoder.damaged)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Self
+from typing import ClassVar, Self
 
 from drivers.errors import LimitError
 from drivers.instrument import require_positive
@@ -25,6 +25,7 @@ class DigitalSettings(NoDigitalLines):
     rate_hz: float
     range: float | None
     most_lost: float
+    is_chosen: ClassVar[bool] = False  # whether a procedure asked for these outputs; `only` sets it on the copy
 
     @property
     def wired(self) -> Mapping[str, int | str]:
@@ -43,6 +44,8 @@ class DigitalSettings(NoDigitalLines):
     @property
     def channels(self) -> Mapping[str, int | str]:
         """The recorded outputs if a procedure does not ask for others: those of one sensor, and the voltages."""
+        if self.is_chosen:
+            return self.wired
         first = next((names for names in (FORCES, RATES, FIELDS) if set(names) & set(self.wired)), ())
         return {name: place for name, place in self.wired.items() if name in (*first, *VOLTAGES)}
 
@@ -63,7 +66,9 @@ class DigitalSettings(NoDigitalLines):
                 f"{name}: the sensor sends no {', '.join(missing)}; its outputs are {', '.join(self.wired)}",
                 "Name the outputs in the bench file, in the sensor's settings",
             )
-        return self.chosen(outputs)
+        chosen = self.chosen(outputs)
+        object.__setattr__(chosen, "is_chosen", True)  # no setting of a bench file
+        return chosen
 
     def require_valid(self) -> None:
         """Raises ValueError for an invalid rate, range or share of lost samples."""

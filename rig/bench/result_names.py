@@ -49,6 +49,12 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
         "left-by-ellipsoid": MAGNITUDE_ERROR,
         "uncertainty": "Largest standard uncertainty of the results above, as a share of the field.",
     },
+    "hand-turns": {
+        **_by_axis({"gyro-bias-{axis}": "Output at rest.", "gyro-scale-{axis}": "Output for each deg/s."}),
+        **_by_pair("gyro-misalignment", "Response of {0} to a turn about {1}, as an angle.", permutations(AXES, 2)),
+        "turn-residual": "Rms error of the angles of the turns over their duration.",
+        "uncertainty": "Largest standard uncertainty of a scale factor, or of a misalignment in rad.",
+    },
     "level-check": _by_axis(
         {
             "level-{axis}": "Tilt of the table along this axis of the level.",

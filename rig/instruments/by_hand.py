@@ -8,7 +8,9 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from procedures.session import Dwell, HandCourse, NoiseAtRest, Stillness
+from procedures.session import Dwell, HandCourse, NoiseAtRest, Recorded, Stillness
+from rig.record.turns import is_turn, turn_columns
+from rig.record.values import Kept
 
 
 class HandAnalysis:
@@ -56,6 +58,17 @@ class HandAnalysis:
         )
         unwanted = tuple(attitude for words in skipped if (attitude := name_attitude(words)) is not None)
         return FieldCourse(positions, attitudes, cast(Any, noise), unwanted)
+
+    def turn_course(self, recorded: Sequence[Recorded], noise: NoiseAtRest, rest_s: float) -> HandCourse:
+        """The rests and turns so far; the path of a rest has the orientation that was wanted, in words."""
+        from calibrations.analyses.hand_turns import TurnCourse
+        from calibrations.table import Table
+
+        rests = [cast(Kept, each).dwell for each in recorded if not is_turn(each.pose)]
+        columns = turn_columns(recorded, rest_s)
+        table = Table.from_columns("turns", columns, {}, "turns by hand") if columns else None
+        course = cast(Any, self.course(rests, noise))
+        return TurnCourse(course.positions, course.noise, table=table)
 
 
 def _statistics(dwell: Dwell, outputs: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from inspect import isgenerator
 from itertools import groupby
@@ -21,7 +20,7 @@ from calibrations.geometry.error_table import ErrorTable
 from procedures.catalogue import Procedure
 from procedures.instruments import Samples
 from procedures.questions import Dial, Question
-from procedures.session import Dwell, Guidance, Pose, Session
+from procedures.session import Dwell, Guidance, Pose, Recorded, Session
 from rig.bench import ROLES, SIMULATED, TURNING, Bench
 from rig.errors import BenchError
 from rig.instruments.instruments import Rig, absent, connect_all
@@ -57,11 +56,17 @@ class RecordedTwin:
 
         def both(*arguments: Any, **keywords: Any) -> Any:
             planned = count(*arguments, **keywords)
-            if isgenerator(planned):
-                deque(planned, maxlen=0)  # run it to its end
-            return act(*arguments, **keywords)
+            recorded = act(*arguments, **keywords)
+            return _together(planned, recorded) if isgenerator(planned) else recorded
 
         return both
+
+
+def _together(planned: Iterator[Any], recorded: Generator[Any, None, None]) -> Generator[Any, None, None]:
+    """The blocks of a twin's record, each of which is planned too. Closing it ends the record."""
+    with closing(recorded):
+        for _, block in zip(planned, recorded, strict=False):
+            yield block
 
 
 @dataclass
@@ -69,18 +74,21 @@ class RehearsalHost(PlanHost):
     """A planned host that stores the simulated measurements of `rig` during the rehearsal."""
 
     rig: Rig
-    dwells: list[Dwell] = field(default_factory=list)
+    blocks: list[Kept] = field(default_factory=list)
 
     def kept(self) -> Sequence[Pose]:
-        return [dwell.pose for dwell in self.dwells]
+        return [recorded.pose for recorded in self.blocks]
 
     def measured(self) -> Sequence[Dwell]:
-        return self.dwells
+        return [recorded.dwell for recorded in self.blocks]
+
+    def recorded(self) -> Sequence[Recorded]:
+        return self.blocks
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
         self.ledger.held.append(PlannedDwell(self.ledger.now_s, pose))  # the clock of the twins differs
-        recorded = Kept(pose, samples, samples.start_s, temperature_c)
-        self.dwells.append(of_sensor(recorded, self.rig.bench.first_sensor).dwell)
+        recorded = Kept(pose, samples, samples.start_s, temperature_c, number=len(self.blocks))
+        self.blocks.append(of_sensor(recorded, self.rig.bench.first_sensor))
 
     def guide(self, guidance: Guidance) -> None:
         follow(guidance, self.rig)

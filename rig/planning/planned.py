@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
@@ -18,7 +18,7 @@ from drivers.labjack_t7.driver import Settings as AdcSettings
 from drivers.omega_cn7500.driver import Settings as OvenSettings
 from procedures.instruments import Samples
 from procedures.questions import Choice, Number, Question
-from procedures.session import MOST_POSES, SHORTEST_APPROACH_DEG, Dwell, Guidance, Pose, Reading
+from procedures.session import MOST_POSES, SHORTEST_APPROACH_DEG, Dwell, Guidance, Pose, Reading, Recorded
 from rig.bench import Bench
 from rig.errors import PlanError
 from rig.record.values import Block
@@ -169,12 +169,15 @@ class PlannedAdc:
     def only(self, *outputs: str) -> PlannedAdc:
         return PlannedAdc(self._name, self._settings.only(self._name, outputs), self._ledger)
 
-    def stream(self, duration_s: float, block_s: float) -> Iterator[Samples]:
+    def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         names, rate_hz = tuple(self._settings.channels), self._settings.rate_hz
         start_s = self._ledger.now()
+        count = max(1, round(duration_s / block_s))
         self._ledger.add(f"{self._name} records {', '.join(names)} for {duration_s:g} s", duration_s + EXCHANGE_S)
-        self._ledger.samples += max(1, round(duration_s * rate_hz)) * len(names)
-        for k in range(max(1, round(duration_s / block_s))):
+        self._ledger.now_s -= duration_s
+        for k in range(count):  # a record may be ended before its last block
+            self._ledger.now_s += duration_s / count
+            self._ledger.samples += max(1, round(duration_s / count * rate_hz)) * len(names)
             yield Block(np.zeros((1, len(names))), names, rate_hz, start_s + k * block_s)
 
     def power(self, on: bool) -> None:
@@ -282,6 +285,9 @@ class PlanHost:
         """A plan has no progress."""
 
     def measured(self) -> Sequence[Dwell]:
+        return ()
+
+    def recorded(self) -> Sequence[Recorded]:
         return ()
 
     def readings(self) -> Sequence[Reading]:

@@ -22,6 +22,7 @@ from rig.errors import RecordError, UnknownRun
 from rig.record import tables
 from rig.record.store import Record
 from rig.record.tables import MOST_BLOCKS, inflations, poses_table, samples_table, stated_unit, units_of
+from rig.record.turns import turn_columns
 from rig.record.values import CHANGED, Block, Kept, Run
 
 # The table of a magnetometer or a gyroscope.
@@ -99,8 +100,19 @@ def _table(run: Run, recorded: Sequence[Kept], outputs: Sequence[str], extra_col
     return replace(table, numbers=np.array([pose.number for pose in recorded]))
 
 
+def turns_table(run: Run, poses: Iterable[Kept]) -> Table:
+    """Every sample of a gyroscope and an accelerometer in turns between rests. Raises RecordError without a turn."""
+    columns = turn_columns(poses, float(run.settings["rest_s"]))
+    if not columns:
+        raise RecordError(f"run {run.run} has no turn between two rests yet; `rig resume` continues it")
+    unit = stated_unit(units_of(run, RATE)) or {"unit": "V"}
+    constants = {name: value for name, value in run.constants.items() if name not in NOT_OF_THESE}
+    rate_hz = 1 / float(np.median(np.diff(columns["t_s"])))
+    return Table.from_columns(run.kind, columns, {**constants, **unit, "sample_rate_hz": rate_hz}, run.run)
+
+
 # Tables with a row for each pose or turn; the others have a row for each sample.
-MADE = {"poses": poses_table, "positions": positions_table, "rates": rates_table}
+MADE = {"poses": poses_table, "positions": positions_table, "rates": rates_table, "turns": turns_table}
 
 
 @dataclass(frozen=True)

@@ -70,6 +70,7 @@ class Run:
             "poses": f"{self.rows} poses",
             "positions": f"{self.rows} positions",
             "rates": f"{self.rows} turns",
+            "turns": f"{self.rows} turns and rests",
         }.get(self.kind, f"{self.rows} poses and blocks")
 
 
@@ -82,6 +83,7 @@ class Block:
     rate_hz: float
     start_s: float
     temperature_c: float | None = None  # in the record it is that of the pose
+    lost: int = 0  # samples that are missing; not in the record
 
 
 @dataclass(frozen=True)

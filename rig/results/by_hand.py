@@ -1,10 +1,11 @@
-"""Results of sensors in a hand: hand-positions and hand-fields."""
+"""Results of sensors in a hand: hand-positions, hand-fields and hand-turns."""
 
 from __future__ import annotations
 
 import math
 
-from calibrations.analyses.hand_fields import field_doubt, fit_fields, largest_uncertainty
+from calibrations.analyses import hand_fields as fields
+from calibrations.analyses import hand_turns as turns
 from calibrations.analyses.hand_positions import ANGLES, fit_positions, largest_uncertainty_g
 from calibrations.geometry.sphere import magnetometer_coverage_warning
 from calibrations.means.noise import rms
@@ -56,21 +57,45 @@ def hand_fields(measured: Measured) -> dict[str, Result | Missing]:
     if reason := magnetometer_coverage_warning(table):
         names = (*(f"hard-iron-{axis}" for axis in "xyz"), *(f"soft-iron-{pair}" for pair in SOFT))
         return {name: Missing(reason) for name in (*names, "field-total", "left-by-ellipsoid", "uncertainty")}
-    fit = fit_fields(table)
+    fit = fields.fit_fields(table)
     (strength,) = fit.model.estimates("field-strength")
     results = {f"hard-iron-{e.axis}": result(e) for e in fit.model.estimates("hard-iron")}
     results |= {f"soft-iron-{e.name}": result(e) for e in fit.model.estimates("soft-iron")}
     results |= {"field-total": result(strength)}
     results |= {"left-by-ellipsoid": Result(float(1e3 * rms(fit.residual)[0]), "per mille")}
-    if doubt := field_doubt(fit):
+    if doubt := fields.field_doubt(fit):
         remedy = "move away from it and repeat the run, or leave out the pose with `rig exclude`"
         return results | {"uncertainty": Missing(f"{doubt}; {remedy}")}
-    worst, parameter = largest_uncertainty(fit)
+    worst, parameter = fields.largest_uncertainty(fit)
+    return results | _uncertainty(
+        measured, worst, f"{parameter} is known to {100 * worst:.2g} % of the field only", "positions"
+    )
+
+
+@evaluates("hand-turns")
+def hand_turns(measured: Measured) -> dict[str, Result | Missing]:
+    """From all turns together, by the direction of gravity before and after each:
+
+    gyro-bias             output at rest, in the unit of the outputs
+    gyro-scale            that unit per deg/s
+    gyro-misalignment-xy  deg, response of x to a turn about y, as an arc sine; the axes are those of the accelerometer
+    turn-residual         deg/s, rms residual of the turns: the error of their angles over their duration
+    uncertainty           %, the largest standard uncertainty of a scale factor, or of a misalignment in rad
+
+    The uncertainty is Missing if it is above the setting target_percent: the run ended at most_positions.
+    """
+    fit = turns.fit_turns(measured.table())
+    results = {f"gyro-bias-{e.axis}": result(e) for e in fit.model.estimates("gyro-bias")}
+    results |= {f"gyro-scale-{e.axis}": result(e) for e in fit.model.estimates("gyro-scale-factor")}
+    results |= {f"gyro-misalignment-{e.name}": result(e) for e in fit.model.estimates("gyro-misalignment")}
+    results |= {"turn-residual": Result(float(rms(fit.residual)[:2].max()), "deg/s")}
+    worst, parameter = turns.largest_uncertainty(fit)
+    return results | _uncertainty(measured, worst, f"{parameter} is known to {100 * worst:.2g} % only", "turns")
+
+
+def _uncertainty(measured: Measured, worst: float, known: str, of: str) -> dict[str, Result | Missing]:
+    """The result `uncertainty`, in %; Missing above the setting target_percent."""
     target_percent = float(measured.run.settings.get("target_percent", math.inf))
-    if 100 * worst > target_percent:
-        reason = (
-            f"{parameter} is known to {100 * worst:.2g} % of the field only, wanted {target_percent:g} %; take more "
-            "positions, or longer rests"
-        )
-        return results | {"uncertainty": Missing(reason)}
-    return results | {"uncertainty": Result(100 * worst, "%")}
+    if 100 * worst <= target_percent:
+        return {"uncertainty": Result(100 * worst, "%")}
+    return {"uncertainty": Missing(f"{known}, wanted {target_percent:g} %; take more {of}, or longer rests")}

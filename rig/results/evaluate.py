@@ -18,7 +18,7 @@ MODULES = {  # with the evaluation of each procedure, imported when it is needed
     **dict.fromkeys(("check-standard", "repeat", "temperature-cycle", "sweep"), "tumbles"),
     **dict.fromkeys(("level-check", "misalignment"), "alignment"),
     **dict.fromkeys(("noise-floor", "motion"), "samples"),
-    **dict.fromkeys(("hand-positions", "hand-fields"), "by_hand"),
+    **dict.fromkeys(("hand-positions", "hand-fields", "hand-turns"), "by_hand"),
     **dict.fromkeys(("rate-turn", "magnetometer-turn"), "triads"),
     "soak": "soak",
 }

@@ -150,7 +150,7 @@ def _level_rows(dwell: Dwell) -> Iterator[Row]:
 
     Positions by hand have no such turns, and no rows.
     """
-    if FIELD[0] not in dwell.means:
+    if FIELD[0] not in dwell.means or not dwell.pose.direction:
         return
     pose, m = dwell.pose, np.array([dwell.means[name] for name in FIELD])
     level = np.array([axis != pose.up for axis in AXES], dtype=float)

@@ -8,7 +8,7 @@ from typing import Any
 
 from procedures.instruments import Samples
 from procedures.questions import Question
-from procedures.session import Dwell, Guidance, Pose, Reading
+from procedures.session import Dwell, Guidance, Pose, Reading, Recorded
 from rig.errors import RunMismatch
 from rig.instruments.instruments import Rig
 from rig.instruments.person import answer, follow
@@ -66,6 +66,9 @@ class RunHost:
         if self._dwells is None:
             self._dwells = [recorded.dwell for recorded in self._measured.kept()]
         return self._dwells
+
+    def recorded(self) -> Sequence[Recorded]:
+        return list(self._measured.kept())
 
     def readings(self) -> Sequence[Reading]:
         if self._readings is None:

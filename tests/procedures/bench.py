@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -86,7 +86,7 @@ class Adc:
     def acquire_with(self, duration_s: float, reading: Callable[[], Any]) -> tuple[Samples, Any]:
         return self.acquire(duration_s), reading()
 
-    def stream(self, duration_s: float, block_s: float) -> Iterator[Samples]:
+    def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         raise NotImplementedError
 
     def power(self, on: bool) -> None:
@@ -145,6 +145,9 @@ class Book:
 
     def measured(self) -> Sequence[Dwell]:
         return self.dwells
+
+    def recorded(self) -> Sequence[Kept]:
+        return self.blocks
 
     def readings(self) -> Sequence[Reading]:
         return self.read

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Any
@@ -30,7 +30,7 @@ class Streaming(Adc):
 
     line: bool = True
 
-    def stream(self, duration_s: float, block_s: float) -> Iterator[Samples]:
+    def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         for _ in range(round(duration_s / block_s)):
             yield self.acquire(block_s)
 

@@ -196,7 +196,8 @@ def test_the_bench_files_of_the_how_to_page_are_checked(rig: Rig, rig_home: Path
 
 
 def test_every_procedure_is_tried_with_a_digital_sensor() -> None:
-    assert {*SHORT, "hand-positions"} == set(paths())  # hand-positions: tests/rig/test_hand_run.py
+    by_hand = {"hand-positions", "hand-fields", "hand-turns"}  # tests/rig/test_hand_run.py
+    assert {*SHORT, *by_hand} == set(paths())
 
 
 @pytest.mark.slow

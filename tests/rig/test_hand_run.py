@@ -15,8 +15,10 @@ import pytest
 import yaml
 from rich.console import Console
 
+from calibrations.geometry.turns import make_turns
 from drivers.handheld.hand import Hand
-from drivers.handheld.world import HandheldWorld
+from drivers.handheld.world import INPUTS, HandheldWorld
+from drivers.imu_lines.driver import Settings
 from procedures.catalogue import find
 from procedures.session import Guidance
 from procedures.settings import parse
@@ -33,7 +35,7 @@ from rig.record.measured import table_of
 from rig.runs.background import status
 from rig.runs.runner import resume, start
 from rig.web.pages.run_begin import before_resume, before_start
-from tests.handling import FIELD_UT, true_ellipsoid
+from tests.handling import FIELD_UT, true_ellipsoid, true_gyroscope
 from tests.rig.rigging import Onlooker
 
 Rig = Callable[..., Any]
@@ -110,14 +112,70 @@ def test_a_disturbed_field_is_a_result_that_is_missing(
     assert rig("diagnose", "last", "--json").status == 0  # nothing is lost
 
 
-def test_a_bench_without_a_magnetometer_is_refused(rig: Rig, rig_home: Path, tmp_path: Path) -> None:
+TURNS_RUN = ("run", "hand-turns", "--bench", str(HAND), "--unattended", "--json")
+
+
+@pytest.mark.slow
+@pytest.mark.sockets
+def test_a_run_finds_the_scale_factors_and_the_misalignment_of_a_gyroscope(
+    rig: Rig, rig_home: Path, tmp_path: Path
+) -> None:
+    ended = rig(*TURNS_RUN)
+    assert ended.status == 0, ended.err
+    found = json.loads(ended.out)["results"]
+    world = world_of(read_bench(HAND))
+    assert isinstance(world, HandheldWorld)
+    true = true_gyroscope(world)
+    for k, axis in enumerate("xyz"):
+        assert found[f"gyro-scale-{axis}"]["value"] == pytest.approx(true.gains[k], rel=2e-3)
+        assert found[f"gyro-bias-{axis}"]["value"] == pytest.approx(true.b[k], abs=1e-4)
+    assert found["uncertainty"]["value"] < 0.2
+    verdict = json.loads(rig("diagnose", "last", "--json").out)
+    assert verdict["candidates"][0]["effect"] == "gyro-misalignment"
+    searched = json.loads(rig("discover", "last", "--json").out)
+    assert (searched["verdict"], searched["causes"]) == ("adequate", ["gyro-misalignment"])
+    exported = tmp_path / "turns.csv"
+    assert rig("export", "last", "--format", "csv", "--out", str(exported)).status == 0
+    again = json.loads(rig("fit", str(exported), "--model", "gyroscope", "--json").out)
+    fitted = json.loads(rig("fit", "last", "--model", "gyroscope", "--json").out)
+    values = [[p["value"] for p in document["parameters"]] for document in (again, fitted)]
+    assert values[0] == pytest.approx(values[1], rel=1e-6)
+    assert rig("report", "last", "--model", "gyroscope", "--out", str(tmp_path / "report.html")).status == 0
+
+
+@pytest.mark.slow
+@pytest.mark.sockets
+def test_turns_that_were_interrupted_go_on(rig_home: Path) -> None:
+    procedure, bench = find("hand-turns"), read_bench(HAND)
+
+    class Interrupting(Onlooker):
+        def kept(self, kept: Any) -> None:
+            super().kept(kept)
+            if len(self.seen) == 8:
+                raise KeyboardInterrupt
+
+    with Record() as record:
+        stopped = start(record, bench, procedure, parse(procedure, {}), Interrupting())
+        assert (stopped.run.state, stopped.run.rows) == ("stopped", 8)
+        ended = resume(record, stopped.run.run, Onlooker())
+        assert ended.run.state == "complete"
+        kept = list(record.kept(ended.run.run))
+        turns = make_turns(table_of(record, ended.run.run))
+    assert kept[7].pose.path.startswith("turn to ")
+    assert turns.numbers is not None
+    assert 7 not in turns.numbers  # its rest did not come
+    assert turns.n >= 10
+
+
+def test_a_bench_without_the_sensor_is_refused(rig: Rig, rig_home: Path, tmp_path: Path) -> None:
     document = yaml.safe_load(HAND.read_text(encoding="utf-8"))
     document["instruments"]["adc"]["settings"]["on_request"] = {}
     path = tmp_path / "accelerometer.yaml"
     path.write_text(yaml.safe_dump(document), encoding="utf-8")
-    ended = rig("run", "hand-fields", "--bench", str(path), "--unattended")
-    assert ended.status != 0
-    assert "adc: no input is wired to mx, my, mz; there are ax, ay, az" in ended.err
+    for procedure, missing in (("hand-fields", "mx, my, mz"), ("hand-turns", "gx, gy, gz")):
+        ended = rig("run", procedure, "--bench", str(path), "--unattended")
+        assert ended.status != 0
+        assert f"adc: no input is wired to {missing}; there are ax, ay, az" in ended.err
 
 
 @pytest.mark.slow
@@ -192,6 +250,34 @@ def test_a_digital_sensor_is_calibrated_in_its_own_unit(rig: Rig, rig_home: Path
     assert fitted.status == 0
     assert f" {unit}/g" in fitted.out
     assert " V" not in fitted.out
+
+
+NINE = {"columns": {name: k + 1 for k, name in enumerate(("time", *INPUTS))}, "unit": "g", "rate_hz": 100}
+
+
+@pytest.mark.slow
+@pytest.mark.sockets
+@pytest.mark.parametrize(("procedure", "found_name", "unit"), [
+    ("hand-fields", "hard-iron-x", "uT"),
+    ("hand-turns", "gyro-bias-x", "deg/s"),
+])  # fmt: skip
+def test_a_digital_unit_is_calibrated_in_its_own_units(
+    rig: Rig, rig_home: Path, tmp_path: Path, procedure: str, found_name: str, unit: str
+) -> None:
+    document = yaml.safe_load(HAND.read_text(encoding="utf-8"))
+    document["instruments"]["adc"] = {"driver": "imu_lines", "url": "simulated", "settings": NINE}
+    path = tmp_path / "digital.yaml"
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    ended = rig("run", procedure, "--bench", str(path), "--unattended", "--json")
+    assert ended.status == 0, ended.err
+    assert json.loads(ended.out)["results"][found_name]["unit"] == unit
+
+
+def test_a_digital_sensor_records_the_outputs_of_two_sensors_for_who_asks() -> None:
+    settings = Settings(columns={name: k + 1 for k, name in enumerate(INPUTS)})
+    assert list(settings.channels) == ["ax", "ay", "az"]
+    assert list(settings.only("adc", INPUTS[:6]).channels) == list(INPUTS[:6])
+    assert list(settings.only("adc", INPUTS[6:]).channels) == list(INPUTS[6:])
 
 
 def test_a_hand_is_set_in_the_bench_file(bench_with: Callable[..., Path]) -> None:

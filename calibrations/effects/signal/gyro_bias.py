@@ -15,7 +15,7 @@ class GyroBias(Effect):
     Source    Book 17.3.6; IEEE Std 528, bias.
     """
 
-    kinds = ("rates",)
+    kinds = ("rates", "turns")
 
     bias = Parameter(
         "{out}",

@@ -16,7 +16,7 @@ class GyroGSensitivity(Effect):
     Source    Ferraris, Grimaldi and Parvis, Sensors and Materials 7 (1995); IEEE Std 528, drift rate by acceleration.
     """
 
-    kinds = ("rates",)
+    kinds = ("rates", "turns")
     left_out = "it follows the specific force by an accelerometer with a calibration of its own"
     needs = ("ax", "ay", "az")
 

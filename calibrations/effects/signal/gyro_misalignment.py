@@ -36,7 +36,7 @@ class GyroMisalignment(Effect):
     Source    Book 17.3.9; Ferraris, Grimaldi and Parvis, Sensors and Materials 7 (1995); IEEE Std 528, misalignment.
     """
 
-    kinds = ("rates",)
+    kinds = ("rates", "turns")
     exact = True
 
     xy = _lean("x", "y")

@@ -25,7 +25,7 @@ class GyroScaleFactor(Effect):
     Source    Book 17.3.7; IEEE Std 528, scale factor.
     """
 
-    kinds = ("rates",)
+    kinds = ("rates", "turns")
 
     scale = Parameter("{out}/(deg/s)", typical=1.0, where="turned", guess=rate_scales, doc="change of output per deg/s")
     turned_x = Constant(partial(is_turned, axis=0))

@@ -144,7 +144,7 @@ def measurement(channel: ChannelResidual, x: Column, colour: Column) -> Panel:
     else:
         crosses = Points(x.values[c, rows], model[rows], colour=MODEL, symbol="cross", size=9)
         series = (dots, crosses)
-    title = "" if fit.table.type.magnitude else f"axis {fit.channels[c]}"
+    title = _title(fit, c)
     second = None
     if not channel.in_g and fit.table.type.stage_angles:
         second = Second(float(scales(fit)[c]), zero(fit, c), f"{fit.table.input_unit}, by bias and scale factor")
@@ -190,8 +190,15 @@ def failure(channel: ChannelResidual) -> Panel:
         circles = tuple(
             Line(np.cos(turn) + offset, np.sin(turn), colour=QUIET, width=0.8) for offset in (0.0, HALF_SPHERES)
         )
-    title = "" if fit.table.type.magnitude else f"axis {fit.channels[c]}"
+    title = _title(fit, c)
     return Panel((*circles, dots), *axes, title, equal=fit.table.type.magnitude)
+
+
+def _title(fit: Fit, c: int) -> str:
+    """The channel, if there are several."""
+    if fit.table.type.magnitude:
+        return ""
+    return fit.channels[c] if fit.table.type.from_output else f"axis {fit.channels[c]}"
 
 
 def _marker_px(channel: ChannelResidual) -> float:
@@ -230,6 +237,8 @@ def _outputs(channel: ChannelResidual) -> tuple[Array, Array, str]:
     if fit.table.type.magnitude:
         magnitude_label = f"|{fit.table.type.symbol}| by the model ({fit.table.type.sensed_in})"
         return 1.0 + fit.residual[0], np.ones(fit.table.n), magnitude_label
+    if fit.table.type.from_output:
+        return fit.residual[c], np.zeros(fit.table.n), f"error {fit.channels[c]} ({fit.problem.unit})"
     measured = fit.table.outputs[:, c]
     model = measured - fit.residual[c]
     if not channel.in_g:

@@ -25,6 +25,7 @@ from calibrations.importing.sheet import Sheet
 from calibrations.importing.suggestion import import_command as repeating_command
 from calibrations.importing.units import ColumnMapping, parse_unit
 from calibrations.table import NUMBERS
+from calibrations.tables import FILE_KINDS
 from rig.cli.terminal.output import emit, json_option, note
 from rig.cli.terminal.progress import working
 
@@ -33,7 +34,7 @@ LEAVE = "-"
 
 @click.command("import")
 @click.argument("file", type=click.Path(exists=True, path_type=Path))
-@click.option("--kind", type=click.Choice(["poses", "positions", "motion", "still", "rates"]), help="Kind of table.")
+@click.option("--kind", type=click.Choice(tuple(FILE_KINDS)), help="Kind of table.")
 @click.option(
     "--column", "mapped", multiple=True, metavar="NAME=THEIRS:UNIT", help="Name a column of the file; repeatable."
 )

@@ -1,0 +1,72 @@
+"""Calibration of a gyroscope by hand as it goes on: the rests so far, and when the turns between them suffice.
+
+The orientations are those of an accelerometer (`calibrations.analyses.hand_positions`): turns between sides, edges and
+corners have axes in all directions. The turns suffice when the standard uncertainty of every scale factor, as a share
+of it, and of every angle, in rad, is at most the wanted one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from calibrations.analyses.hand_positions import FEWEST, HandCourse
+from calibrations.criteria import SMALLEST_TURN_DEG
+from calibrations.design.orientations import KNOWN_AFTER, LEAST_TURN, directions_up
+from calibrations.effects.catalogue import catalogue
+from calibrations.errors import CalibrationError
+from calibrations.fitting.fit import Fit, fit
+from calibrations.model.file import read_model
+from calibrations.table import Array, Table
+
+MOST_NOISE = 10.0  # times the noise of a sample: the means of two rests in one orientation differ by less
+MODEL, ANGLES = "gyroscope", "gyro-misalignment"
+
+
+@dataclass(frozen=True)
+class TurnCourse(HandCourse):
+    """The rests so far, and the `table` of the turns between them; None before the first."""
+
+    table: Table | None = None
+
+    def is_new(self, mean: Array) -> bool:
+        """Whether a rest with this mean (3,) ends a turn: the sensor does not lie as before."""
+        if not self.positions:
+            return True
+        if len(self.positions) < KNOWN_AFTER - 1:
+            points = np.vstack([self.outputs, mean])
+            size = float(np.linalg.norm(points[:, None] - points[None], axis=2).max())
+            least = max(LEAST_TURN * size, MOST_NOISE * float(self.noise.std.max()))
+            return bool(np.linalg.norm(mean - self.outputs[-1]) > least)
+        up = directions_up(np.vstack([self.outputs, mean]), np.vstack([self.directions, self.next.up]))[-1]
+        return bool(up @ self.directions[-1] < np.cos(np.radians(SMALLEST_TURN_DEG)))
+
+    @cached_property
+    def uncertainty(self) -> tuple[float, str]:
+        """The largest standard uncertainty, and the parameter's key. Infinite with fewer than FEWEST rests."""
+        if len(self.positions) < FEWEST or self.table is None:
+            return np.inf, ""
+        try:
+            return largest_uncertainty(fit_turns(self.table))
+        except CalibrationError:  # turns that cannot be used may leave too few
+            return np.inf, ""
+
+
+def fit_turns(table: Table) -> Fit:
+    """Bias, scale factor and misalignment of a gyroscope from a table of turns. Raises as `fit`."""
+    return fit(read_model(MODEL).with_effect(catalogue()[ANGLES]), table)
+
+
+def largest_uncertainty(fitted: Fit) -> tuple[float, str]:
+    """The largest relative standard uncertainty of a scale factor, or of an angle in rad, and its key."""
+    errors: dict[str, float] = {}
+    for key, estimate in fitted.params.items():
+        if key.startswith("gyro-bias"):
+            continue
+        if estimate.std is None or not estimate.identified:
+            return np.inf, key
+        errors[key] = np.radians(estimate.std) if key.startswith(ANGLES) else estimate.std / abs(estimate.value)
+    worst = max(errors, key=lambda key: errors[key])
+    return float(errors[worst]), worst
