@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +30,7 @@ class Request:
     @property
     def bench_words(self) -> str:
         """The option --bench for a proposed command, with a space before it; empty for the simulated rig."""
-        return f" --bench {self.bench_file}" if self.bench_file else ""
+        return f" --bench {shlex.quote(str(self.bench_file))}" if self.bench_file else ""
 
 
 def effects_of(bench_file: Path | None) -> Mapping[str, Effect]:

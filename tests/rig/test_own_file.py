@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -101,3 +102,18 @@ def test_a_single_inclination_is_reported_with_the_effects_it_cannot_test(rig: R
             in ended.err
         )
     assert "one inclination" not in rig("fit", "ours.csv", "--model", "linear").err
+
+
+def test_the_proposed_commands_work_for_a_name_with_a_space(rig: Rig, folder: Path) -> None:
+    columns = turns((90, 30, 150, 60), step_deg=30.0)
+    x = components(columns)[0]
+    volts = 2.5 + x + 0.01 * x**2 + np.random.default_rng(0).standard_normal(len(x)) * 1e-4
+    rows = zip(columns["alpha_deg"], columns["beta_deg"], volts, strict=True)
+    lines = [f"{alpha:g},{beta:g},{v:.6f},{1e-3},100" for alpha, beta, v in rows]
+    (folder / "my sweep.csv").write_text("\n".join(["alpha_deg,beta_deg,vx_v,vx_std_v,n", *lines]))
+    compared = rig("compare", "my sweep.csv").out
+    diagnosed = rig(*shlex.split(compared.partition("missing effect: rig ")[2].splitlines()[0]))
+    assert diagnosed.status == 0, diagnosed.err
+    added = rig(*shlex.split(diagnosed.out.partition("Add it: rig ")[2].splitlines()[0]))
+    assert added.status == 0, added.err
+    assert (folder / "model.yaml").is_file()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -54,7 +55,8 @@ def compare_command(request: Request, check: bool, as_json: bool) -> int:
     else:
         click.echo(result.report())
         if result.rejection is None and not result.adequate:
-            click.echo(f"\nTo find the missing effect: rig diagnose {request.data} --model {name}")
+            command = shlex.join(["rig", "diagnose", request.data, "--model", name])
+            click.echo(f"\nTo find the missing effect: {command}")
         for line in filter(None, (question.data.note, *warning(cautions))):
             click.echo(f"\n{line}")
     silent = result.rejection is not None and result.rejection.verdict == Verdict.NO_RESPONSE
@@ -101,9 +103,8 @@ def _diagnosis_text(result: Diagnosis[Any], model: str, request: Request) -> str
     lines = [diagnosis_text(result, model), ""]
     if result.missing:
         best = result.candidates[0]
-        lines.append(
-            f"Add it: rig add {best.name} --model {model} --data {request.data} --out model.yaml{request.bench_words}"
-        )
+        words = ["rig", "add", best.name, "--model", model, "--data", request.data, "--out", "model.yaml"]
+        lines.append(f"Add it: {shlex.join(words)}{request.bench_words}")
     if data.note:
         lines += ["", data.note]
     if result.next_experiment:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -117,7 +118,7 @@ def check_document(check: Check | None) -> dict[str, Any]:
 def _check_verdict(check: Check, data: str) -> str:
     if check.passed:
         return ", as expected from noise"
-    return f" (p = {check.chance:.0e}); the model misses an effect: rig diagnose {data}"
+    return f" (p = {check.chance:.0e}); the model misses an effect: rig diagnose {shlex.quote(data)}"
 
 
 # Sensors with three axes: the general calibration, and the method of the Book for magnetometers.

@@ -83,7 +83,7 @@ def addition(result: Discovery[Any], data: str, out: Path) -> str:
     """The error with one more effect, and the verdict."""
     text = discovery(result)
     if result.verdict not in (Verdict.ADEQUATE, Verdict.NO_RESPONSE):
-        text += f"\nTo find the missing effect: rig diagnose {data} --model {out}"
+        text += f"\nTo find the missing effect: rig diagnose {shlex.quote(data)} --model {shlex.quote(str(out))}"
     return text
 
 
