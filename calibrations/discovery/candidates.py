@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ from calibrations.means.noise import rms
 from calibrations.model.parameters import Layout
 from calibrations.table import Array
 
+C = TypeVar("C", bound=Candidate)
 OFFSETS = {"bias", "hard-iron", "gyro-bias"}
 DRIFTING = {"t_s", "temperature_c"}  # columns that drive the drift of an offset
 DECIMALS = 3  # decimals of twice the log-likelihood: less is rounding, and the catalogue's order counts
@@ -104,14 +106,23 @@ def schwarz(c: RowCandidate, rows: int) -> float:
     return c.gain - c.rank * float(np.log(rows))
 
 
-def with_planned(ranked: Sequence[RowCandidate], step: Step[Fit]) -> list[RowCandidate]:
-    """The candidates, first the effect of a planned step with the errors of its full fit. It may be a free form."""
+def named_first(ranked: Sequence[C], names: Sequence[str]) -> list[C]:
+    """The candidates, first those with these names, in the order of the names."""
+    return sorted(ranked, key=lambda c: names.index(c.name) if c.name in names else len(names))
+
+
+def with_planned(ranked: Sequence[RowCandidate], steps: Sequence[Step[Fit]]) -> list[RowCandidate]:
+    """The candidates, first the effects of the planned steps, the next one with the errors of its full fit.
+
+    The next one may be a free form.
+    """
+    step = steps[0]
     base, extended = step.before, step.after
     planned = next((c for c in ranked if c.name == step.name), None)
     if planned is None:
         planned = _free_candidate(next(t.effect for t in extended.model.terms if t.name == step.name), base, extended)
     fitted_candidate = replace(planned, excess_after=extended.pooled_excess, held_out_after=extended.held_out_excess)
-    remaining = [c for c in ranked if c.name != step.name]
+    remaining = [c for c in named_first(ranked, [s.name for s in steps]) if c.name != step.name]
     return _with_probabilities([fitted_candidate, *remaining], base.residual.size, base.held_out_excess)
 
 

@@ -21,7 +21,7 @@ from calibrations.criteria import (
     MOST_UNEXPLAINED,
     NO_MORE_THAN_NOISE,
 )
-from calibrations.discovery.candidates import candidates, with_rivals
+from calibrations.discovery.candidates import candidates, named_first, with_rivals
 from calibrations.discovery.findings import Candidate, Findings, Step
 from calibrations.discovery.outliers import caution, outlier_text
 from calibrations.discovery.plausibility import rejection
@@ -259,8 +259,8 @@ def _cross_validated(fit: Fit) -> float:
 
 
 def _start_candidates(path: Path, final: FinalModel) -> tuple[Candidate, ...]:
-    """Candidates on the given model, that of the first effect first, with its alternatives."""
-    first = path.first
+    """Candidates on the given model, those of the final model first, the first one with its alternatives."""
+    first = tuple(named_first(path.first, final.names))
     name = next((name for name in final.names), None)
     leading = next((c for c in first if c.name == name), None)
     if leading is None:

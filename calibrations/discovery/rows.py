@@ -164,9 +164,9 @@ class Rows(Dataset[Fit]):
         return until(findings, enough)
 
     def candidates(self, base: Fit, plan: Findings[Fit], effects: Mapping[str, Effect]) -> tuple[Candidate, ...]:
-        """One round of the search, the next effect of the plan first."""
+        """One round of the search, the effects of the plan first."""
         ranked = candidates(base, effects)
-        return tuple(with_planned(ranked, plan.steps[0]) if plan.steps else ranked)
+        return tuple(with_planned(ranked, plan.steps) if plan.steps else ranked)
 
     def fit_without_outliers(self, model: Model) -> tuple[Rows, Fit]:
         """(the table without gross outliers, the model fitted to it)."""

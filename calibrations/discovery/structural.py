@@ -256,13 +256,13 @@ def _steps(start: Fit, names: list[str], base: Fit, effects: Mapping[str, Effect
 
 
 def _first(start: Fit, steps: list[Step[Fit]], ranked: list[RowCandidate]) -> tuple[RowCandidate, ...]:
-    """The candidates on the given model, that of the first step first, with the errors of its full fit.
+    """The candidates on the given model, those of the steps first, the first one with the errors of its full fit.
 
     A single cause has the rivals of the search that adds effects; several causes have none here.
     """
     if not steps:
         return tuple(ranked)
-    first_effect, *other_candidates = with_planned(ranked, steps[0])
+    first_effect, *other_candidates = with_planned(ranked, steps)
     single = sum(not step.name.startswith(PREFIX) for step in steps) == 1
     if single and not first_effect.name.startswith(PREFIX):
         first_effect = with_rivals(first_effect, ranked, start)

@@ -88,6 +88,14 @@ def test_the_summary_has_a_line_for_each_cause_and_the_shares_of_the_steps_add_u
     assert "certainty" in text
 
 
+def test_the_effects_that_a_discovery_adds_are_the_first_candidates() -> None:
+    swing = np.sin(np.linspace(0, 19, len(FORCES)))
+    added = 1e-3 * FORCES[:, :2] ** 3 + 2e-3 * swing[:, None] * [1.0, -0.7]
+    found = discover(table(added, temperature_c=25 + 8 * swing), read_model("linear"))
+    assert set(found.causes) == {"cubic-nonlinearity", "temperature-bias"}
+    assert [c.name for c in found.findings.candidates][:2] == [step.name for step in found.steps]
+
+
 def test_an_effect_of_the_model_that_is_no_named_cause_is_called_possible() -> None:
     found = discover(table(1e-3 * np.cos(4 * FORCES[:, [1, 0]]) + 1e-3 * FORCES[:, :2] ** 3), read_model("linear"))
     unnamed = replace(found, findings=replace(found.findings, causes=()))
