@@ -29,7 +29,8 @@ READERS: Mapping[bytes, tuple[str, str]] = {  # first bytes: the reader's module
     b"\x89MCAP0\r\n": BAG,
     b"SQLite format 3\0": BAG,
 }
-CANNOT = {  # first bytes of what no library reads, and what to do
+CANNOT = {  # first bytes of what holds no data or what no library reads, and what to do
+    b"schema: rig.model/": "is a model file and holds no data; give it with --model",
     b"ULogEnc": "is an encrypted PX4 ULog; decrypt it with decrypt_ulog.py of PX4-Autopilot and the log's private key",
     b"PARE": "is an encrypted Parquet file; save it without encryption",
     b"\xd0\xcf\x11\xe0": (

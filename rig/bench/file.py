@@ -34,6 +34,8 @@ def read_bench(path: Path | None = None) -> Bench:
 
 
 def _check_document(document: dict[str, Any], path: Path) -> Bench:
+    if str(document.get("schema", "")).startswith("rig.model/"):
+        raise BenchError(f"{path}: is a model file, not a bench file; give it with --model")
     try:
         bench = Bench.model_validate({**document, **_with_curve(document.get("d63"), path)})
     except ValidationError as error:

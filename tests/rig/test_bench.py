@@ -70,6 +70,7 @@ def test_every_driver_is_found_by_its_file() -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
+        ({"schema": "rig.model/1"}, "is a model file, not a bench file; give it with --model"),
         ({"sensr": {}}, "key sensr: no such key. Did you mean 'sensor'?"),
         ({"sensor": {"gravity": 9.8}}, "key sensor.gravity: no such key. Did you mean 'gravity_m_s2'?"),
         ({"limits": {"temprature_c": [0, 1]}}, "key limits.temprature_c: no such key. Did you mean 'temperature_c'?"),
