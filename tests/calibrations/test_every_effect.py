@@ -15,7 +15,7 @@ from calibrations.fitting.fit import fit
 from calibrations.fitting.problem_kinds import make_problem
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
-from tests.calibrations import shaken, synthetic
+from tests.calibrations import shaken, synthetic, test_turns
 
 NOISE = {name: effect for name, effect in catalogue().items() if effect.kinds == ("still",)}
 SIGNAL = {name: effect for name, effect in catalogue().items() if name not in NOISE}
@@ -38,6 +38,10 @@ def table_for(effect: Effect, kind: str) -> Table:
         return Table.from_columns("motion", {**moved.columns, **needed}, moved.constants)
     if kind == "rates":
         return _turned_at_rates(needed)
+    if kind == "turns":
+        moved = test_turns.table(test_turns.samples(noise=0.02))
+        needed = {name: np.linspace(4.9, 5.1, moved.n) for name in effect.needs if name not in moved}
+        return Table.from_columns("turns", {**moved.columns, **needed}, moved.constants)
     turned = Rotation.random(len(a), rng=np.random.default_rng(0)).as_matrix()[:, 0]
     needed |= {"t_s": columns["t_s"]}
     names = ("mx", "my", "mz") if kind == "fields" else ("ax", "ay", "az")
@@ -53,7 +57,8 @@ def _turned_at_rates(needed: dict[str, Array]) -> Table:
     return Table.from_columns("rates", columns | {k: np.resize(v, 120) for k, v in needed.items() if k not in columns})
 
 
-STARTS = {"fields": "magnetometer", "rates": "gyroscope"}  # models that an effect is added to, where not to `linear`
+# The models that an effect is added to, where not to `linear`.
+STARTS = {"fields": "magnetometer", "rates": "gyroscope", "turns": "gyroscope"}
 
 
 @EFFECTS_ON_SAMPLES
