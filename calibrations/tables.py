@@ -127,6 +127,9 @@ class Rates(Kind):
     failure_caption = "The residual of the model {} over the rate of the turn."
 
 
+TURN_MARKS = frozenset(("turn", "resting"))  # columns that a log of turns may lack: they are found in the samples
+
+
 class Turns(Kind):
     """Turns of a gyroscope between rests: an accelerometer gives the direction of gravity before and after each."""
 

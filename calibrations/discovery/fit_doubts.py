@@ -169,15 +169,13 @@ def misfit(fit: Fit) -> Finding | None:
     table = fit.table
     if table.n < FEWEST_RESPONSE_ROWS or table.type.moving or one_orientation(table):
         return None  # an output at rest varies only by effects that the model may lack
-    size = np.ones(1) if table.type.magnitude else table.outputs.std(axis=0)
-    share = float(np.max(fit.rmse / np.maximum(size, np.finfo(float).tiny)))
+    share = float(np.max(fit.rmse / np.maximum(fit.problem.signal_rms, np.finfo(float).tiny)))
     if share <= LARGEST_MISFIT:
         return None
-    quantity = "magnitude" if table.type.magnitude else "variation of an output"
     return Finding(
         Verdict.UNEXPLAINED,
-        f"the model leaves {share:.0%} of the {quantity}, more than effects of a sensor: the values cannot be "
-        "used; check units, rounding and the order of rows and columns, then use `rig diagnose`",
+        f"the model leaves {share:.0%} of the {fit.problem.signal}, more than effects of a sensor: the values cannot "
+        "be used; check units, rounding and the order of rows and columns, then use `rig diagnose`",
     )
 
 

@@ -56,6 +56,13 @@ class Problem:
         """Unit of the residual."""
         return self.table.unit
 
+    signal: ClassVar[str] = "variation of an output"
+
+    @property
+    def signal_rms(self) -> Array:
+        """The size of what the model predicts, in the unit of the residual, (channels,) or (1,)."""
+        return np.asarray(self.table.outputs.std(axis=0))
+
     def residual(self, theta: Array) -> Array:
         """Shape (channels, n)."""
         return self.residual_by(self.layout.steps(theta))

@@ -18,7 +18,7 @@ import numpy as np
 
 from calibrations.errors import DataError, ModelError, TooFewRows
 from calibrations.fitting.problem import Problem
-from calibrations.means.noise import norm_std
+from calibrations.means.noise import norm_std, rms
 from calibrations.model import Model
 from calibrations.model.chain import LinearisedChain, Step, backward, magnitude_by_output, sensed, slope_at
 from calibrations.model.parameters import Layout
@@ -43,6 +43,13 @@ class RateProblem(Problem):
 
 class PositionProblem(Problem):
     """Magnitudes of the sensed quantity, of which only the strength is known."""
+
+    signal = "magnitude"
+
+    @property
+    def signal_rms(self) -> Array:
+        """The magnitude is 1."""
+        return np.ones(1)
 
     @staticmethod
     def check(model: Model, table: Table) -> None:  # noqa: ARG004
@@ -201,6 +208,13 @@ class TurnProblem(Problem):
     """Turns between rests, as the rates by the model make them."""
 
     table: Turns
+
+    signal = "rate of the turns"
+
+    @property
+    def signal_rms(self) -> Array:
+        """The mean rates of the turns, deg/s."""
+        return np.array([rms(self.table.column("rate_deg_s"))])
 
     @staticmethod
     def prepared(table: Table) -> Table:

@@ -53,6 +53,19 @@ def rate_slopes(table: Table) -> Array:
     return np.asarray(deviations @ table.outputs / (deviations @ deviations))
 
 
+def at_rest(output: str) -> str:
+    """The column of an output at the rest before each turn."""
+    return f"{output}_at_rest"
+
+
+def outputs_at_rest(table: Table) -> Array:
+    """The outputs without a rate, (3,): at the rests before the turns, or at the smallest rate."""
+    names = [at_rest(name) for name in table.output_names]
+    if all(name in table for name in names):
+        return np.array([table.column(name).mean() for name in names])
+    return np.asarray(table.outputs[np.argmin(np.abs(table.column("rate_deg_s")))])
+
+
 def rate_scales(table: Table) -> Array:
     """Output of each axis per deg/s about itself, shape (3,); 0 for an axis that was not turned about, or hardly.
 

@@ -29,7 +29,7 @@ from scipy.optimize import least_squares
 
 from calibrations.criteria import FEWEST_TURNS_OF_A_GYROSCOPE, SMALLEST_TURN_DEG
 from calibrations.errors import DataError, TooFewRows
-from calibrations.geometry.rate_table import vertical_deg_s
+from calibrations.geometry.rate_table import at_rest, vertical_deg_s
 from calibrations.geometry.triad import gravity_directions
 from calibrations.table import AXES, Array, Table
 
@@ -43,7 +43,8 @@ SCALES = np.geomspace(0.4, 1.25, 16)  # of the largest possible output per deg/s
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Turns(Table):
-    """A row for each turn: means of its samples, mean rate and axis of the turn.
+    """A row for each turn: means of its samples, among them that of the rate (its size and axis), and the outputs of
+    the rest before it.
 
     `samples` has for each turn its rest before, block means of the turn, and its rest after, between `bounds` (n, 2).
     `before`, `after`: directions upward (n, 3). `along`: two directions (n, 2, 3) at right angles to `after`, the first
@@ -195,20 +196,20 @@ def _rows(table: Table, samples: Table, bounds: NDArray[np.intp], before: Array,
             "side to side, so that ax, ay and az change"
         )
     durations = samples.column("duration_s")
-    turn_s = np.array([durations[a + 1 : b - 1].sum() for a, b in bounds])
     bias, matrix = _rough_calibration(samples, bounds, before, after)
     rates = (np.column_stack([samples.column(name) for name in RATES]) - bias) @ matrix.T
     steps = _padded([np.radians(rates[a + 1 : b - 1]) * durations[a + 1 : b - 1, None] for a, b in bounds])
-    net = -_rotation_vectors(_products(_rotations(-steps)))
-    size = np.linalg.norm(net, axis=1)
-    axis = net / np.maximum(size, np.finfo(float).tiny)[:, None]
-    means = {
-        name: np.array([np.average(values[a + 1 : b - 1], weights=durations[a + 1 : b - 1]) for a, b in bounds])
-        for name, values in samples.columns.items()
-        if name in table
-    }
-    columns = {**means, "rate_deg_s": np.degrees(size) / turn_s}
-    columns |= {f"axis_{letter}": axis[:, k] for k, letter in enumerate(AXES)}
+    axis = _unit_vectors(-_rotation_vectors(_products(_rotations(-steps))))
+
+    def means(values: Array) -> Array:
+        weighted = (np.average(values[a + 1 : b - 1], axis=0, weights=durations[a + 1 : b - 1]) for a, b in bounds)
+        return np.array(list(weighted))
+
+    mean_rates = means(rates)
+    columns = {name: means(values) for name, values in samples.columns.items() if name in table}
+    columns |= {at_rest(name): samples.column(name)[bounds[:, 0]] for name in RATES}
+    columns |= {"rate_deg_s": np.linalg.norm(mean_rates, axis=1)}
+    columns |= {f"axis_{letter}": part for letter, part in zip(AXES, _unit_vectors(mean_rates).T, strict=True)}
     return Turns(
         kind="turns",
         columns=MappingProxyType(columns),
@@ -282,6 +283,12 @@ def _rough_calibration(samples: Table, bounds: NDArray[np.intp], before: Array, 
     best = starts[int(np.argmin(costs))]
     found = least_squares(residual, best.ravel(), x_scale=1 / largest)
     return bias, np.degrees(found.x.reshape(3, 3))
+
+
+def _unit_vectors(vectors: Array) -> Array:
+    """The directions of vectors (n, 3)."""
+    length = np.linalg.norm(vectors, axis=1)
+    return np.asarray(vectors / np.maximum(length, np.finfo(float).tiny)[:, None])
 
 
 def _padded(parts: Sequence[Array]) -> Array:

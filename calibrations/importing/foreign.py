@@ -31,7 +31,7 @@ from calibrations.importing.sessions import RATE, is_session, sample_rates
 from calibrations.importing.sheet import Sheet, look_like_names, read_cells, read_sheet
 from calibrations.importing.units import UNITS, ColumnMapping, column_unit
 from calibrations.table import NUMBERS, Array, Constant, Table, guess_kind
-from calibrations.tables import FILE_KINDS
+from calibrations.tables import FILE_KINDS, TURN_MARKS
 
 TRIADS = (("ax", "ay", "az"), ("mx", "my", "mz"))
 RATES = ("gx", "gy", "gz")
@@ -139,6 +139,10 @@ def _import_with(
     labels = {k: texts[k] for k in unmapped if k in texts} | ({PATH: texts[path]} if path in texts else {})
     if is_session(kind, columns, labels.get(PATH)):
         columns[RATE] = sample_rates(columns, labels[PATH], merged, laid.name)
+    if kind == "turns" and TURN_MARKS.isdisjoint(columns) and all(name in columns for name in (*RATES, *TRIADS[0])):
+        from calibrations.importing.turn_logs import cut_turns  # few tables are such logs
+
+        columns, labels = cut_turns(columns, merged, laid.name), {}
     table = Table.from_columns(kind, columns, merged, laid.name, labels)
     _check_units(table, laid, mapping)
     check_at_rest(table)
@@ -169,6 +173,8 @@ def needs_mapping(laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping]
         from calibrations.importing.proposal import missing_columns  # as above
 
         return bool(missing_columns(kind, laid, mapping))
+    if kind == "turns" and names.isdisjoint(TURN_MARKS):
+        names |= TURN_MARKS
     kinds = [FILE_KINDS[kind]] if kind else FILE_KINDS.values()
     sets = [columns for kind_of_table in kinds for columns in kind_of_table.columns if kind or len(columns) > 1]
     return not any(names.issuperset(columns) for columns in sets)

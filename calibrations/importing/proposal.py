@@ -24,7 +24,7 @@ from calibrations.importing.plausible import (
 from calibrations.importing.sheet import Sheet
 from calibrations.importing.units import UNITS, ColumnMapping, column_unit, split_unit
 from calibrations.table import AXES, NUMBERS, Array
-from calibrations.tables import KINDS
+from calibrations.tables import KINDS, TURN_MARKS
 
 # names of columns by kind of table; each second list belongs to another sensor
 COLUMN_NAMES: Mapping[str, Mapping[str, tuple[str, ...]]] = {
@@ -75,6 +75,13 @@ NAME_PATTERNS: Mapping[str, Sequence[tuple[str, str]]] = {
         (r"acc|^a[xyz]$", "a{axis}"),
         (r"gyr|omega|angular|^g[xyz]$", "g{axis}"),
         (r"rate|speed|velocity", "rate_deg_s"),
+    ),
+    "turns": (
+        (TEMPERATURE, "temperature_c"),
+        (TIME, "t_s"),
+        (r"orient|quat", ""),
+        (r"acc|^a[xyz]$", "a{axis}"),
+        (r"gyr|omega|angular|^g[xyz]$", "g{axis}"),
     ),
     "motion": (
         (r"displac|distance|position|stroke", "displacement_m"),
@@ -169,6 +176,8 @@ def missing_columns(kind: str | None, laid: Sheet, mapped: Iterable[ColumnMappin
     present = {m.name for m in mapped} | set(laid.bare)
     if kind == "rates" and "path" in present:
         present.add("rate_deg_s")  # given by the sections of a session
+    if kind == "turns" and TURN_MARKS.isdisjoint(present):
+        present |= TURN_MARKS
     return [name for name in required_columns(kind, present) if name not in present]
 
 

@@ -1,6 +1,7 @@
 import numpy as np
 
 from calibrations.effects import Effect, Parameter, Values
+from calibrations.geometry.rate_table import outputs_at_rest
 from calibrations.table import Array, Table
 
 
@@ -20,7 +21,7 @@ class GyroBias(Effect):
     bias = Parameter(
         "{out}",
         typical=5.0,
-        guess=lambda table: table.outputs[np.argmin(np.abs(table.column("rate_deg_s")))],
+        guess=outputs_at_rest,
         doc="output at zero angular rate",
     )
 
