@@ -13,6 +13,7 @@ from playwright.sync_api import Page, expect
 from rig.record import Record
 from rig.web.upload import MOST_BYTES, given_name
 from tests.browser.conftest import Workbench
+from tests.calibrations.test_turn_logs import log as turn_log
 
 pytestmark = pytest.mark.slow
 
@@ -34,6 +35,15 @@ def foreign(folder: Path, clock: str = "Takt") -> Path:
 def choose(page: Page, field: str, value: str) -> None:
     page.get_by_label(field, exact=True).click()
     page.get_by_role("option", name=value, exact=True).click()
+
+
+def test_a_log_of_a_gyroscope_with_an_accelerometer_is_imported_as_turns(workbench: Workbench, tmp_path: Path) -> None:
+    path = turn_log(tmp_path)
+    page = workbench.visit(f"/import?file={quote(str(path))}")
+    choose(page, "Kind of table", "Turns: a gyroscope with an accelerometer, between rests")
+    expect(page.get_by_text("rows of turns")).to_be_visible()
+    expect(page.get_by_role("button", name="Import", exact=True)).to_be_enabled()
+    workbench.shot(page, "import-turns")
 
 
 def test_a_file_is_imported_by_drop_downs(workbench: Workbench, tmp_path: Path) -> None:

@@ -46,6 +46,7 @@ KINDS = {
     "positions": "Positions: still, in unknown directions",
     "still": "Still record: single samples at rest",
     "rates": "Rates: a gyroscope that is turned",
+    "turns": "Turns: a gyroscope with an accelerometer, between rests",
     "motion": "Motion: with a displacement sensor",
 }
 CONSTANTS = {  # constants that a person may know, with the labels of their fields
@@ -56,7 +57,10 @@ CONSTANTS = {  # constants that a person may know, with the labels of their fiel
     "gravity_m_s2": "Gravity (m/s²)",
     "turn_deg": "Angle of each turn (deg)",
 }
-OF_KIND = {"turn_deg": ("rates",), "sample_rate_hz": ("positions", "rates", "still", "motion")}  # else of all kinds
+OF_KIND = {  # kinds that have a constant; all kinds where it is not here
+    "turn_deg": ("rates",),
+    "sample_rate_hz": ("positions", "rates", "turns", "still", "motion"),
+}
 PICTURE = "Data as imported"
 TIMES = ("s", "min", "h", "ms")
 UNIT_DOUBT = re.compile(  # the end of a message about a unit that does not fit the values
