@@ -37,7 +37,6 @@ LOOP_INTERVALS = 8
 DEAD_G = (0.003, 0.012, 0.05)
 THRESHOLDS_G = tuple(np.geomspace(0.002, 0.2, 8).tolist())  # of dead zones that are not all of one width
 ENDS = (0.75, 0.9, 0.97, 0.99)  # of an axis's range, where saturation begins
-OWN_INTERVALS = 40  # of the own response: fine enough for the knee of a saturation that begins within 0.1 g
 DEGREE = 4  # of a general function of the force's direction
 FEWEST_ANGLES, FINE_ANGLES = 8, 33  # different angles beta that can show harmonics, and fine ones
 FEWEST_INCLINATIONS = 4
@@ -113,7 +112,7 @@ def _response_components(data: PoseData, first: State) -> list[Component]:
         form("cubic-nonlinearity", lambda s, k: s.force[:, k, None] ** 3),
         form("odd-quadratic-nonlinearity", lambda s, k: (s.force[:, k] * np.abs(s.force[:, k]))[:, None]),
         form("scale-factor-asymmetry", lambda s, k: np.abs(s.force[:, k, None])),
-        free(Form(place, "curve", "own", _splines_over(first.force, data.channels, OWN_INTERVALS)), first),
+        free(Form(place, "curve", "own", _splines_over(first.force, data.channels, 22)), first),
     ]
     price = 2 * np.log(len(DEAD_G))
 
