@@ -174,7 +174,7 @@ def _name_effects(
     first = [cause for cause in acting_causes if cause and cause not in walks] if walks else []  # walks follow anything
     chosen_causes, share = _select_causes(tuple(columns), acting_causes, first, curve, options_of)
     causes = _one_name(result, names, chosen_causes, curve, Q)
-    return (causes, share) if share >= NAMED else ((), share)
+    return (causes, share) if share >= NAMED and len(causes) <= MOST_NAMES else ((), share)
 
 
 def _forms_by_cause(result: SearchResult, place: str, names: Sequence[str]) -> dict[str, list[Component]]:
