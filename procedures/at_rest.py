@@ -12,18 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from procedures.bounds import require_possible
 from procedures.errors import NoAnswer, SettingError
 from procedures.instruments import Samples
-from procedures.session import (
-    Dwell,
-    Guidance,
-    HandAnalysis,
-    HandCourse,
-    NoiseAtRest,
-    Pose,
-    Session,
-    require_possible,
-)
+from procedures.session import Dwell, Guidance, HandAnalysis, HandCourse, NoiseAtRest, Pose, Session
 
 WINDOW_S = 0.5  # of a test of rest
 LEARNED = 20  # windows of rest that show the noise

@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from procedures.bounds import count_parts
 from procedures.errors import SettingError
 from procedures.level_check import prepare
 from procedures.questions import EDGES
-from procedures.session import Pose, Session, count_parts
+from procedures.session import Pose, Session
 
 KIND = "positions"
 OUTPUTS = ("mx", "my", "mz")

@@ -23,10 +23,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from procedures.bounds import require_possible
 from procedures.errors import ProcedureError, SettingError
 from procedures.instruments import output_channel
 from procedures.level_check import prepare
-from procedures.session import Dwell, Pose, Session, require_possible
+from procedures.session import Dwell, Pose, Session
 
 ADAPTIVE = True
 COARSE = "coarse"

@@ -15,10 +15,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import chain
 
+from procedures.bounds import count_parts, require_bounded
 from procedures.errors import ProcedureError, SettingError
 from procedures.instruments import Stage
 from procedures.level_check import prepare
-from procedures.session import Pose, Session, count_parts, require_bounded
+from procedures.session import Pose, Session
 from procedures.sweep import turn
 
 KIND = "motion"

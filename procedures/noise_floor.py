@@ -7,9 +7,10 @@ Source    Ang V: peak-to-peak noise is 4 x rms, 3.1 mV, equal to an inclination 
 
 from __future__ import annotations
 
+from procedures.bounds import count_parts, require_bounded
 from procedures.errors import SettingError
 from procedures.level_check import check_level
-from procedures.session import Pose, Session, count_parts, require_bounded
+from procedures.session import Pose, Session
 
 KIND = "still"
 STILL = "still"  # path of the record

@@ -15,8 +15,9 @@ from dataclasses import fields
 from typing import Any
 
 from drivers.errors import did_you_mean
+from procedures.bounds import require_bounded
 from procedures.errors import SettingError
-from procedures.session import Pose, require_bounded
+from procedures.session import Pose
 
 # `up` and `rate_deg_s` belong to positions and rates, not to poses.
 NAMES = tuple(field.name for field in fields(Pose) if field.name not in ("up", "rate_deg_s"))

@@ -12,9 +12,10 @@ from contextlib import suppress
 from itertools import groupby, repeat
 
 from drivers.errors import LimitError
+from procedures.bounds import MOST_POSES, count_parts
 from procedures.errors import SettingError
 from procedures.level_check import prepare
-from procedures.session import MOST_POSES, Pose, Reading, Session, count_parts
+from procedures.session import Pose, Reading, Session
 from procedures.tumbles import is_first, tumble
 
 REVERSAL, HOLD = "reversal", "hold"  # first words of the paths; a number follows

@@ -11,10 +11,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Literal
 
+from procedures.bounds import require_possible
 from procedures.errors import SettingError
 from procedures.level_check import check_level, prepare
 from procedures.pose_list import parse_poses
-from procedures.session import Pose, Session, require_possible
+from procedures.session import Pose, Session
 
 HALF_TURN_DEG = 180.0
 INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0, 45.0, 135.0)

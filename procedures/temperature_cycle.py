@@ -8,9 +8,10 @@ Source    IEEE 1293, temperature sensitivity; Book 17.3.12.
 
 from __future__ import annotations
 
+from procedures.bounds import require_bounded
 from procedures.errors import SettingError
 from procedures.level_check import prepare
-from procedures.session import Session, require_bounded
+from procedures.session import Session
 from procedures.tumbles import is_first, tumble
 
 SLICE_S = 60.0  # interval of the temperature checks in a soak

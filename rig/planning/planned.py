@@ -16,9 +16,10 @@ from drivers.errors import LimitError
 from drivers.instrument import OUTSIDE_ANGLE, OUTSIDE_POSITION, OUTSIDE_TEMPERATURE, require_within
 from drivers.labjack_t7.driver import Settings as AdcSettings
 from drivers.omega_cn7500.driver import Settings as OvenSettings
+from procedures.bounds import MOST_POSES
 from procedures.instruments import Samples
 from procedures.questions import Choice, Number, Question
-from procedures.session import MOST_POSES, SHORTEST_APPROACH_DEG, Dwell, Guidance, Pose, Reading, Recorded
+from procedures.session import SHORTEST_APPROACH_DEG, Dwell, Guidance, Pose, Reading, Recorded
 from rig.bench import Bench
 from rig.errors import PlanError
 from rig.record.values import Block
