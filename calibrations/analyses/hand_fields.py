@@ -15,11 +15,10 @@ from functools import cached_property
 
 import numpy as np
 
-from calibrations.analyses.hand_positions import FEWEST, HandPosition, hand_table
-from calibrations.analyses.stillness import NoiseAtRest
+from calibrations.analyses.hand_positions import FEWEST, Course, hand_table
 from calibrations.criteria import LEAST_FIELD_CHANGE, MOST_FIELD_EXCESS
 from calibrations.design.attitudes import Attitude, NextAttitude, assumed_field, estimate_field, next_attitude
-from calibrations.design.orientations import KNOWN_AFTER, directions_up, is_other_side, is_worth
+from calibrations.design.orientations import KNOWN_AFTER, directions_up
 from calibrations.fitting.fit import Fit, fit
 from calibrations.means.noise import rms
 from calibrations.model.file import read_model
@@ -30,18 +29,14 @@ OUTPUTS = ("mx", "my", "mz")
 
 
 @dataclass(frozen=True)
-class FieldCourse:
-    """The positions so far, each with the attitude that was wanted. Attitudes `skipped` are not wanted."""
+class FieldCourse(Course):
+    """The positions of a magnetometer so far, each with the attitude that was wanted.
 
-    positions: tuple[HandPosition, ...]
-    attitudes: tuple[Attitude, ...]
-    noise: NoiseAtRest
+    Attitudes `skipped` are not wanted.
+    """
+
+    attitudes: tuple[Attitude, ...] = ()
     skipped: tuple[Attitude, ...] = ()
-
-    @property
-    def count(self) -> int:
-        """Number of positions."""
-        return len(self.positions)
 
     @property
     def up(self) -> tuple[float, ...]:
@@ -57,21 +52,6 @@ class FieldCourse:
     def wanted(self) -> tuple[float, ...]:
         """The direction of the field that it will give."""
         return tuple(map(float, self.next.direction))
-
-    @property
-    def words(self) -> str:
-        """The most informative attitude, in words."""
-        return self.next.attitude.words
-
-    @property
-    def turn(self) -> str:
-        """How to turn the sensor there from its last position; empty before the first."""
-        return self.next.turn
-
-    @property
-    def outputs(self) -> Array:
-        """Means of the positions, shape (n, 3)."""
-        return np.array([p.mean for p in self.positions]).reshape(-1, 3)
 
     @cached_property
     def directions(self) -> Array:
@@ -90,14 +70,6 @@ class FieldCourse:
         skipped = np.array([attitude.matrix @ self.field for attitude in self.skipped]).reshape(-1, 3)
         last = self.attitudes[-1] if self.attitudes else None
         return next_attitude(np.vstack([self.directions, skipped]), self.field, last)
-
-    def is_new(self, mean: Array) -> bool:
-        """Whether a rest with this mean (3,) is worth taking."""
-        if self.count < KNOWN_AFTER - 1:
-            return is_other_side(mean, self.outputs, float(self.noise.std.max()))
-        wanted = self.next.direction
-        direction = directions_up(np.vstack([self.outputs, mean]), np.vstack([self.directions, wanted]))[-1]
-        return is_worth(direction, wanted, self.directions)
 
     @cached_property
     def fitted(self) -> Fit | None:

@@ -9,9 +9,11 @@ Source  Tedaldi, Pretto and Menegatti, ICRA 2014: calibration of a triad from po
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
@@ -46,18 +48,71 @@ class HandPosition:
     t_s: float = 0.0
 
 
+class NextPosition(Protocol):
+    """The most informative position, in words, and how to turn the sensor there; empty if that is not known."""
+
+    @property
+    def words(self) -> str: ...
+    @property
+    def turn(self) -> str: ...
+
+
 @dataclass(frozen=True)
-class HandCourse:
-    """The positions so far. `noise` is that of the sensor at rest. Orientations `skipped` (k, 3) are not wanted."""
+class Course(ABC):
+    """The positions so far, of any sensor. `noise` is that of the sensor at rest."""
 
     positions: tuple[HandPosition, ...]
     noise: NoiseAtRest
-    skipped: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+    @property
+    @abstractmethod
+    def directions(self) -> Array:
+        """Directions of gravity upward, or of the field, at the positions, unit vectors (n, 3)."""
+
+    @property
+    @abstractmethod
+    def wanted(self) -> tuple[float, ...]:
+        """The direction that the next position will add."""
+
+    @property
+    @abstractmethod
+    def next(self) -> NextPosition:
+        """The most informative position."""
 
     @property
     def count(self) -> int:
         """Number of positions."""
         return len(self.positions)
+
+    @property
+    def words(self) -> str:
+        """The most informative position, in words."""
+        return self.next.words
+
+    @property
+    def turn(self) -> str:
+        """How to turn the sensor there from its last position; empty if that is not known."""
+        return self.next.turn
+
+    @property
+    def outputs(self) -> Array:
+        """Means of the positions, shape (n, 3)."""
+        return np.array([p.mean for p in self.positions]).reshape(-1, 3)
+
+    def is_new(self, mean: Array) -> bool:
+        """Whether a rest with this mean (3,) is worth taking."""
+        if self.count < KNOWN_AFTER - 1:
+            return is_other_side(mean, self.outputs, float(self.noise.std.max()))
+        wanted = np.array(self.wanted)
+        direction = directions_up(np.vstack([self.outputs, mean]), np.vstack([self.directions, wanted]))[-1]
+        return is_worth(direction, wanted, self.directions)
+
+
+@dataclass(frozen=True)
+class HandCourse(Course):
+    """The positions of an accelerometer so far. Orientations `skipped` (k, 3) are not wanted."""
+
+    skipped: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
     def up(self) -> tuple[float, ...]:
@@ -74,21 +129,6 @@ class HandCourse:
         """The direction that the position will add."""
         return self.up
 
-    @property
-    def words(self) -> str:
-        """The most informative orientation, in words."""
-        return self.next.words
-
-    @property
-    def turn(self) -> str:
-        """How to turn the sensor there from its last position; empty if that is not known."""
-        return self.next.turn
-
-    @property
-    def outputs(self) -> Array:
-        """Means of the positions, shape (n, 3)."""
-        return np.array([p.mean for p in self.positions]).reshape(-1, 3)
-
     @cached_property
     def directions(self) -> Array:
         """Directions upward of the positions, unit vectors (n, 3)."""
@@ -99,13 +139,6 @@ class HandCourse:
         """The most informative orientation."""
         last = self.directions[-1] if len(self.directions) else None
         return next_orientation(np.vstack([self.directions, self.skipped]), last, FIRST_SIDES + len(self.skipped))
-
-    def is_new(self, mean: Array) -> bool:
-        """Whether a rest with this mean (3,) is worth taking."""
-        if len(self.positions) < KNOWN_AFTER - 1:
-            return is_other_side(mean, self.outputs, float(self.noise.std.max()))
-        up = directions_up(np.vstack([self.outputs, mean]), np.vstack([self.directions, self.next.up]))[-1]
-        return is_worth(up, self.next.up, self.directions)
 
     @property
     def doubt(self) -> str:

@@ -56,6 +56,11 @@ class NextAttitude:
     direction: Array
     turn: str
 
+    @property
+    def words(self) -> str:
+        """The attitude in words."""
+        return self.attitude.words
+
 
 def assumed_field() -> Array:
     """The direction of the field in the frame of the room before it is known, (3,)."""

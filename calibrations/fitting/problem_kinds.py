@@ -158,7 +158,28 @@ class FieldProblem(PositionProblem):
 
 
 @dataclass(frozen=True)
-class MotionProblem(Problem):
+class SummedProblem(Problem):
+    """Rows that sum up many samples: stretches of a motion, turns of a gyroscope."""
+
+    table: Stretches | Turns
+
+    @property
+    def adds(self) -> bool:
+        """A row is not linear in any parameter, or is fitted by its own steps (`keeps_starts`)."""
+        return False
+
+    @cached_property
+    def white(self) -> Array | None:
+        """From the samples of each row."""
+        return self.table.white
+
+    @property
+    def samples(self) -> Table:
+        return self.table.samples
+
+
+@dataclass(frozen=True)
+class MotionProblem(SummedProblem):
     """The motion of a record, as its stretches represent it."""
 
     table: Stretches
@@ -178,20 +199,6 @@ class MotionProblem(Problem):
         """Axis and part, such as "x in phase at 10 Hz"."""
         return self.table.channels
 
-    @property
-    def adds(self) -> bool:
-        """The parts are fitted by their own steps (`keeps_starts`)."""
-        return False
-
-    @cached_property
-    def white(self) -> Array | None:
-        """From the spectral density near each line."""
-        return self.table.white
-
-    @property
-    def samples(self) -> Table:
-        return self.table.samples
-
     def of_output(self, theta: Array, changes: Array) -> Array:
         """Behind the output filter."""
         from calibrations.motion.spectrum import sample_output  # other kinds need no spectra
@@ -204,7 +211,7 @@ class MotionProblem(Problem):
 
 
 @dataclass(frozen=True)
-class TurnProblem(Problem):
+class TurnProblem(SummedProblem):
     """Turns between rests, as the rates by the model make them."""
 
     table: Turns
@@ -234,20 +241,6 @@ class TurnProblem(Problem):
     def unit(self) -> str:
         """The unit of a rate."""
         return self.table.input_unit
-
-    @property
-    def samples(self) -> Table:
-        return self.table.samples
-
-    @property
-    def adds(self) -> bool:
-        """An angle is not linear in any parameter."""
-        return False
-
-    @cached_property
-    def white(self) -> Array | None:
-        """From the scatter at rest."""
-        return self.table.white
 
     def residual_by(self, steps: Sequence[Step]) -> Array:
         """What the turns and rests leave, shape (channels, n)."""

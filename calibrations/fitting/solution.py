@@ -144,7 +144,7 @@ def solution_at(problem: Problem, theta: Array, noise: Noise) -> Solution:
 
 
 def white_noise(problem: Problem) -> Noise:
-    """The noise of a problem before any is estimated: white, and what is known of slow noise."""
+    """The noise at the start of a fit: the stated white noise, and the slow noise of a still record."""
     return white_only(problem.white, problem.gap_s, len(problem.channels), problem.given)
 
 

@@ -29,7 +29,7 @@ READERS: Mapping[bytes, tuple[str, str]] = {  # first bytes: the reader's module
     b"\x89MCAP0\r\n": BAG,
     b"SQLite format 3\0": BAG,
 }
-CANNOT = {  # first bytes of what holds no data or what no library reads, and what to do
+CANNOT = {  # files that cannot be imported, by their first bytes: the reason and the remedy
     b"schema: rig.model/": "is a model file and holds no data; give it with --model",
     b"ULogEnc": "is an encrypted PX4 ULog; decrypt it with decrypt_ulog.py of PX4-Autopilot and the log's private key",
     b"PARE": "is an encrypted Parquet file; save it without encryption",

@@ -1,4 +1,4 @@
-"""The motion of a sensor in a hand between two attitudes: where it points, how fast it turns, and what it is pushed by.
+"""The motion of a hand-held sensor from one attitude to the next: its attitude, angular rate and acceleration.
 
 An attitude is a matrix (3, 3) whose columns are the directions to the north, to the west and upward in the frame of the
 sensor. From one attitude to the next the sensor turns along the great circle of its upward direction, and at the same
@@ -135,7 +135,7 @@ def _axis(start: Floats, end: Floats) -> Floats:
 
 
 def _taper(segment: Segment, times_s: Floats) -> tuple[Floats, Floats]:
-    """The share of the tremor and its slope, each (n, 1): a hand takes hold and lets go within TAPER_S."""
+    """The factor of the tremor and its derivative, each (n, 1). It rises and falls within TAPER_S."""
     rising = np.clip((times_s - segment.start_s) / TAPER_S, 0.0, 1.0)[:, None]
     falling = np.clip((segment.end_s - times_s) / TAPER_S, 0.0, 1.0)[:, None]
     up, down = (part**2 * (3 - 2 * part) for part in (rising, falling))

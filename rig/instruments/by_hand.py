@@ -57,7 +57,7 @@ class HandAnalysis:
             for dwell, attitude in zip(dwells, attitudes, strict=True)
         )
         unwanted = tuple(attitude for words in skipped if (attitude := name_attitude(words)) is not None)
-        return FieldCourse(positions, attitudes, cast(Any, noise), unwanted)
+        return FieldCourse(positions, cast(Any, noise), attitudes, unwanted)
 
     def turn_course(self, recorded: Sequence[Recorded], noise: NoiseAtRest, rest_s: float) -> HandCourse:
         """The rests and turns so far; the path of a rest has the orientation that was wanted, in words."""
