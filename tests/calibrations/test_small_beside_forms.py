@@ -1,7 +1,12 @@
-"""Where a fit begins once more: causes that are small beside the free forms of their own places."""
+"""Additions of a structural search: where a fit begins once more, and which additions are idle."""
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
+import pytest
+
+from calibrations.discovery import structural
 from calibrations.discovery.additions import SMALL, Addition, start_small_at_forms
 from calibrations.effects.catalogue import catalogue
 from calibrations.free_forms.bases import Spline
@@ -29,3 +34,18 @@ def test_only_what_is_linear_at_the_place_of_a_free_form_becomes_small() -> None
 
 def test_without_such_a_place_nothing_is_tried_again() -> None:
     assert start_small_at_forms([addition("temperature-bias", slope=0.01)], [Addition(free_form((CURVE,)))]) == []
+
+
+def test_idle_additions_go_one_by_one_where_one_of_them_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+    cause, needed, idle = (addition(name) for name in ("temperature-bias", "saturation", "quadratic-nonlinearity"))
+    errors = {"temperature-bias": 2.0, "saturation": 2.0, "quadratic-nonlinearity": 1.99}
+    fits = [SimpleNamespace(pooled_excess=e, held_out_excess=e) for e in (9.0, *errors.values())]
+
+    def together(base: object, additions: list[Addition]) -> SimpleNamespace:
+        held_out = 2.0 if needed in additions else 3.0  # without saturation unseen poses are predicted worse
+        return SimpleNamespace(pooled_excess=2.0, held_out_excess=held_out)
+
+    monkeypatch.setattr(structural, "fit_together", together)
+    monkeypatch.setattr(structural, "fit_successively", lambda base, end, additions: [end for _ in additions])
+    kept, _ = structural._without_idle_additions([cause, needed, idle], fits, ["temperature-bias"])
+    assert [a.effect.name for a in kept] == ["temperature-bias", "saturation"]
