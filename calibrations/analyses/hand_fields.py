@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from calibrations.analyses.hand_positions import FEWEST, Course, hand_table
+from calibrations.analyses.hand_positions import FEWEST, Course, hand_table, largest_error
 from calibrations.criteria import LEAST_FIELD_CHANGE, MOST_FIELD_EXCESS
 from calibrations.design.attitudes import Attitude, NextAttitude, assumed_field, estimate_field, next_attitude
 from calibrations.design.orientations import KNOWN_AFTER, directions_up
@@ -98,13 +98,7 @@ def fit_fields(table: Table) -> Fit:
 def largest_uncertainty(fitted: Fit) -> tuple[float, str]:
     """The largest standard uncertainty of a parameter as a share of the field, and its key."""
     (strength,) = fitted.model.estimates("field-strength")
-    errors: dict[str, float] = {}
-    for key, estimate in fitted.params.items():
-        if estimate.std is None or not estimate.identified:
-            return np.inf, key
-        errors[key] = estimate.std if key.startswith("soft-iron") else estimate.std / strength.value
-    worst = max(errors, key=lambda key: errors[key])
-    return float(errors[worst]), worst
+    return largest_error(fitted, lambda key, _, std: std if key.startswith("soft-iron") else std / strength.value)
 
 
 def field_doubt(fitted: Fit) -> str:

@@ -10,7 +10,7 @@ Source  Tedaldi, Pretto and Menegatti, ICRA 2014: calibration of a triad from po
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol
@@ -29,6 +29,7 @@ from calibrations.design.orientations import (
 )
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit, fit
+from calibrations.model import Estimate
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 
@@ -173,11 +174,18 @@ def fit_positions(table: Table) -> Fit:
 def largest_uncertainty_g(fit: Fit) -> tuple[float, str]:
     """The largest standard uncertainty of a parameter as an error at 1 g, in g, and its key."""
     scale = {e.axis: abs(e.value) for e in fit.model.estimates("scale-factor")}
+    return largest_error(fit, lambda key, e, std: np.radians(std) if key.startswith(ANGLES) else std / scale[e.axis])
+
+
+def largest_error(fit: Fit, error_of: Callable[[str, Estimate, float], float]) -> tuple[float, str]:
+    """The largest error of a parameter, and its key; infinite with the first that is not identified.
+
+    error_of  from key, estimate and standard uncertainty of a parameter: its error at full scale
+    """
     errors: dict[str, float] = {}
     for key, estimate in fit.params.items():
         if estimate.std is None or not estimate.identified:
             return np.inf, key
-        is_angle = key.startswith(ANGLES)
-        errors[key] = np.radians(estimate.std) if is_angle else estimate.std / scale[estimate.axis]
+        errors[key] = float(error_of(key, estimate, estimate.std))
     worst = max(errors, key=lambda key: errors[key])
-    return float(errors[worst]), worst
+    return errors[worst], worst

@@ -12,17 +12,18 @@ from functools import cached_property
 
 import numpy as np
 
-from calibrations.analyses.hand_positions import FEWEST, HandCourse
+from calibrations.analyses.hand_positions import FEWEST, HandCourse, largest_error
 from calibrations.criteria import SMALLEST_TURN_DEG
 from calibrations.design.orientations import KNOWN_AFTER, LEAST_TURN, directions_up
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import CalibrationError
 from calibrations.fitting.fit import Fit, fit
+from calibrations.model import Estimate
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 
 MOST_NOISE = 10.0  # times the noise of a sample: the means of two rests in one orientation differ by less
-MODEL, ANGLES = "gyroscope", "gyro-misalignment"
+MODEL, BIAS, ANGLES = "gyroscope", "gyro-bias", "gyro-misalignment"
 
 
 @dataclass(frozen=True)
@@ -61,12 +62,10 @@ def fit_turns(table: Table) -> Fit:
 
 def largest_uncertainty(fitted: Fit) -> tuple[float, str]:
     """The largest relative standard uncertainty of a scale factor, or of an angle in rad, and its key."""
-    errors: dict[str, float] = {}
-    for key, estimate in fitted.params.items():
-        if key.startswith("gyro-bias"):
-            continue
-        if estimate.std is None or not estimate.identified:
-            return np.inf, key
-        errors[key] = np.radians(estimate.std) if key.startswith(ANGLES) else estimate.std / abs(estimate.value)
-    worst = max(errors, key=lambda key: errors[key])
-    return float(errors[worst]), worst
+
+    def error(key: str, estimate: Estimate, std: float) -> float:
+        if key.startswith(BIAS):
+            return 0.0  # the rests show it better than the turns show the others
+        return float(np.radians(std)) if key.startswith(ANGLES) else std / abs(estimate.value)
+
+    return largest_error(fitted, error)

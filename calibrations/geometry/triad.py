@@ -26,13 +26,13 @@ def gravity_directions(means: Array) -> Array:
     size = float(np.mean(np.linalg.norm(means - centre, axis=1))) or 1.0
     scaled = (means - centre) / size
     if len(means) <= FEWEST_RESTS:
-        return _unit(scaled)
+        return unit_vectors(scaled)
 
     def residual(theta: Array) -> Array:
         return np.asarray(np.linalg.norm(_corrected(scaled, theta), axis=1) - 1)
 
     start = np.concatenate([np.zeros(3), np.eye(3)[LOWER]])
-    return _unit(_corrected(scaled, least_squares(residual, start).x))
+    return unit_vectors(_corrected(scaled, least_squares(residual, start).x))
 
 
 def _corrected(scaled: Array, theta: Array) -> Array:
@@ -41,5 +41,6 @@ def _corrected(scaled: Array, theta: Array) -> Array:
     return np.asarray((scaled - theta[:3]) @ matrix.T)
 
 
-def _unit(vectors: Array) -> Array:
+def unit_vectors(vectors: Array) -> Array:
+    """The directions of vectors (n, 3); 0 where a vector is 0."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), np.finfo(float).tiny))

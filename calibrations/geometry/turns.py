@@ -30,7 +30,7 @@ from scipy.optimize import least_squares
 from calibrations.criteria import FEWEST_TURNS_OF_A_GYROSCOPE, SMALLEST_TURN_DEG
 from calibrations.errors import DataError, TooFewRows
 from calibrations.geometry.rate_table import at_rest, vertical_deg_s
-from calibrations.geometry.triad import gravity_directions
+from calibrations.geometry.triad import gravity_directions, unit_vectors
 from calibrations.table import AXES, Array, Table
 
 CHANNELS = ("along the turn", "across the turn", *(f"{axis} at rest" for axis in AXES))
@@ -199,7 +199,7 @@ def _rows(table: Table, samples: Table, bounds: NDArray[np.intp], before: Array,
     bias, matrix = _rough_calibration(samples, bounds, before, after)
     rates = (np.column_stack([samples.column(name) for name in RATES]) - bias) @ matrix.T
     steps = _padded([np.radians(rates[a + 1 : b - 1]) * durations[a + 1 : b - 1, None] for a, b in bounds])
-    axis = _unit_vectors(-_rotation_vectors(_products(_rotations(-steps))))
+    axis = unit_vectors(-_rotation_vectors(_products(_rotations(-steps))))
 
     def means(values: Array) -> Array:
         weighted = (np.average(values[a + 1 : b - 1], axis=0, weights=durations[a + 1 : b - 1]) for a, b in bounds)
@@ -209,7 +209,7 @@ def _rows(table: Table, samples: Table, bounds: NDArray[np.intp], before: Array,
     columns = {name: means(values) for name, values in samples.columns.items() if name in table}
     columns |= {at_rest(name): samples.column(name)[bounds[:, 0]] for name in RATES}
     columns |= {"rate_deg_s": np.linalg.norm(mean_rates, axis=1)}
-    columns |= {f"axis_{letter}": part for letter, part in zip(AXES, _unit_vectors(mean_rates).T, strict=True)}
+    columns |= {f"axis_{letter}": part for letter, part in zip(AXES, unit_vectors(mean_rates).T, strict=True)}
     return Turns(
         kind="turns",
         columns=MappingProxyType(columns),
@@ -283,12 +283,6 @@ def _rough_calibration(samples: Table, bounds: NDArray[np.intp], before: Array, 
     best = starts[int(np.argmin(costs))]
     found = least_squares(residual, best.ravel(), x_scale=1 / largest)
     return bias, np.degrees(found.x.reshape(3, 3))
-
-
-def _unit_vectors(vectors: Array) -> Array:
-    """The directions of vectors (n, 3)."""
-    length = np.linalg.norm(vectors, axis=1)
-    return np.asarray(vectors / np.maximum(length, np.finfo(float).tiny)[:, None])
 
 
 def _padded(parts: Sequence[Array]) -> Array:

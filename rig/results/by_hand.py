@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from calibrations.analyses import hand_fields as fields
 from calibrations.analyses import hand_turns as turns
@@ -12,6 +13,19 @@ from calibrations.means.noise import rms
 from rig.record.measured import Measured
 from rig.results.result import Missing, Result, evaluates, result
 from rig.results.triads import SOFT
+
+
+class Target(NamedTuple):
+    """The setting with the wanted uncertainty, its unit, and the unit in which a message shows it."""
+
+    setting: str
+    unit: str
+    factor: float
+    shown_unit: str
+
+
+TARGET_G = Target("target_g", "g", 1e3, "mg")
+TARGET_PERCENT = Target("target_percent", "%", 1.0, "%")
 
 
 @evaluates("hand-positions")
@@ -30,14 +44,8 @@ def hand_positions(measured: Measured) -> dict[str, Result | Missing]:
     results |= {f"scale-{e.axis}": result(e) for e in fit.model.estimates("scale-factor")}
     results |= {f"nonorthogonality-{e.name}": result(e) for e in fit.model.estimates(ANGLES)}
     worst_g, parameter = largest_uncertainty_g(fit)
-    target_g = float(measured.run.settings.get("target_g", math.inf))
-    if worst_g > target_g:
-        reason = (
-            f"{parameter} is known to {1e3 * worst_g:.3g} mg only, wanted {1e3 * target_g:g} mg; take more positions, "
-            "or longer rests"
-        )
-        return results | {"uncertainty": Missing(reason)}
-    return results | {"uncertainty": Result(worst_g, "g")}
+    known = f"{parameter} is known to {1e3 * worst_g:.3g} mg only"
+    return results | _uncertainty(measured, worst_g, known, "positions", TARGET_G)
 
 
 @evaluates("hand-fields")
@@ -67,9 +75,8 @@ def hand_fields(measured: Measured) -> dict[str, Result | Missing]:
         remedy = "move away from it and repeat the run, or leave out the pose with `rig exclude`"
         return results | {"uncertainty": Missing(f"{doubt}; {remedy}")}
     worst, parameter = fields.largest_uncertainty(fit)
-    return results | _uncertainty(
-        measured, worst, f"{parameter} is known to {100 * worst:.2g} % of the field only", "positions"
-    )
+    known = f"{parameter} is known to {100 * worst:.2g} % of the field only"
+    return results | _uncertainty(measured, 100 * worst, known, "positions", TARGET_PERCENT)
 
 
 @evaluates("hand-turns")
@@ -90,12 +97,16 @@ def hand_turns(measured: Measured) -> dict[str, Result | Missing]:
     results |= {f"gyro-misalignment-{e.name}": result(e) for e in fit.model.estimates("gyro-misalignment")}
     results |= {"turn-residual": Result(float(rms(fit.residual)[:2].max()), "deg/s")}
     worst, parameter = turns.largest_uncertainty(fit)
-    return results | _uncertainty(measured, worst, f"{parameter} is known to {100 * worst:.2g} % only", "turns")
+    known = f"{parameter} is known to {100 * worst:.2g} % only"
+    return results | _uncertainty(measured, 100 * worst, known, "turns", TARGET_PERCENT)
 
 
-def _uncertainty(measured: Measured, worst: float, known: str, of: str) -> dict[str, Result | Missing]:
-    """The result `uncertainty`, in %; Missing above the setting target_percent."""
-    target_percent = float(measured.run.settings.get("target_percent", math.inf))
-    if 100 * worst <= target_percent:
-        return {"uncertainty": Result(100 * worst, "%")}
-    return {"uncertainty": Missing(f"{known}, wanted {target_percent:g} %; take more {of}, or longer rests")}
+def _uncertainty(
+    measured: Measured, value: float, known: str, rows: str, target: Target
+) -> dict[str, Result | Missing]:
+    """The result `uncertainty`, in the unit of the target; Missing above it. `known`: how well, in words."""
+    wanted = float(measured.run.settings.get(target.setting, math.inf))
+    if value <= wanted:
+        return {"uncertainty": Result(value, target.unit)}
+    shown = f"{target.factor * wanted:g} {target.shown_unit}"
+    return {"uncertainty": Missing(f"{known}, wanted {shown}; take more {rows}, or longer rests")}
