@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from calibrations.analyses.hand_turns import fit_turns
 from calibrations.discovery.findings import Step
 from calibrations.discovery.results import Discovery
 from calibrations.effects.catalogue import catalogue
@@ -35,6 +36,7 @@ from calibrations.presentation.interactive import figure
 from calibrations.presentation.residual import ChannelResidual, choices, first_choices, select_telling_columns
 from calibrations.presentation.static import PictureError, compact, draw, inline, png, save, save_all, svg
 from calibrations.table import Array, Table
+from tests.calibrations import test_turns
 from tests.calibrations.synthetic import components, poses, turns
 
 EFFECTS = {name: catalogue()[name] for name in ("temperature-bias", "quadratic-nonlinearity", "z-axis-bias")}
@@ -161,6 +163,13 @@ def test_the_right_axis_is_the_left_over_the_scale_factor() -> None:
     drawing.draw_without_rendering()
     left, right = drawing.axes[5].get_ylim(), drawing.axes[5].child_axes[0].get_ylim()
     np.testing.assert_allclose(np.array(left) / 0.99, right, rtol=1e-3)
+
+
+def test_turns_have_one_axis_as_their_residual_is_in_the_sensed_unit() -> None:
+    fitted = fit_turns(test_turns.table(test_turns.samples(noise=0.02)))
+    panels = [panel for row in charts.residual_chart(fitted).panels for panel in row]
+    assert len(panels) >= 5
+    assert all(panel.second is None for panel in panels)
 
 
 def test_colours_are_inclinations_and_open_markers_anticlockwise() -> None:

@@ -162,13 +162,14 @@ def residual(
 ) -> Panel:
     """The residual over `x` and the noise floor; the part that the effect of `step` explains as a line.
 
-    The line is full for clockwise and broken for anticlockwise approaches. `second`: an axis in mg on the right.
+    The line is full for clockwise and broken for anticlockwise approaches. `second`: an axis in thousandths
+    of the sensed unit on the right, where the residual is in the unit of the output.
     """
     c, rows = channel.c, channel.rows
     dots = _dots(channel, x.values[c, rows], channel.residual, colour, channel.hover)
     lines = tuple(_mark_explained(step, x, channel)) if step else ()
     second_axis = None
-    if second and not channel.fit.table.type.magnitude and not channel.in_g:
+    if second and not channel.fit.table.type.from_output and not channel.in_g:
         second_axis = Second(channel.scale, 0.0, MILLI[channel.fit.table.input_unit])
     label = channel.label
     if channel.fit.table.type.moving:
