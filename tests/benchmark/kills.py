@@ -1,7 +1,7 @@
 """Kills at random moments that runs survived: `python -m tests.benchmark.kills [KILLS] [SEED]`.
 
 A third of them come to a sweep, the rest to a soak and a motion, which are records without gaps, to a misalignment,
-which chooses its poses by what it measured, to positions by hand, to imports, and to pushes to a server of PostgreSQL.
+which chooses its poses by what it measured, to the procedures by hand, to imports, and to pushes to PostgreSQL.
 Each of these is killed at least once, and reports its count on standard error when it has ended. Before the first kill
 come the warm-up and two undisturbed runs of each procedure; on a busy machine these take minutes.
 
@@ -19,12 +19,20 @@ from tempfile import TemporaryDirectory
 
 from rig.lab_url import lab_url
 from rig.record.lab import prepare
-from tests.rig.killing import HANDS, MISALIGNMENT, MOTION, RUN, SOAK, many, undisturbed
+from tests.rig.killing import FIELDS, MISALIGNMENT, MOTION, POSITIONS, RUN, SOAK, TURNS, many, undisturbed
 from tests.rig.killing_transfers import kills_of_a_push, kills_of_imports
 from tests.rig.nursery import Nursery
 from tests.rig.postgres import serving
 
-RUNS = ((RUN, 0.32), (SOAK, 0.14), (MOTION, 0.14), (MISALIGNMENT, 0.14), (HANDS, 0.14))  # and shares of the kills
+RUNS = (  # and shares of the kills
+    (RUN, 0.32),
+    (SOAK, 0.12),
+    (MOTION, 0.12),
+    (MISALIGNMENT, 0.12),
+    (POSITIONS, 0.08),
+    (FIELDS, 0.06),
+    (TURNS, 0.06),
+)
 IMPORTS, PUSHES = 0.06, 0.06
 A_PUSH = 6  # kills, until it is let through
 

@@ -28,7 +28,9 @@ MOTION = (
     "--dwell-s", "0.1", "--settle-s", "0",
 )  # fmt: skip
 HAND = str(Path(__file__).parents[2] / "rig" / "bench" / "hand.yaml")
-HANDS = ("run", "hand-positions", "--bench", HAND, "--unattended", "--json")
+POSITIONS, FIELDS, TURNS = (
+    ("run", name, "--bench", HAND, "--unattended", "--json") for name in ("hand-positions", "hand-fields", "hand-turns")
+)
 MISALIGNMENT = ("run", "misalignment", "--unattended", "--json", "--dwell-s", "0.2", "--most-rounds", "1")
 NEAR_V = 5e-3  # of a mean, where a record without gaps began anew: ten times its noise
 KINDS = ("clock", "sql", "wire", "disk")
@@ -61,7 +63,7 @@ class Undisturbed:
     @property
     def by_hand(self) -> bool:
         """Whether a person makes the positions."""
-        return self.words[1] == "hand-positions"
+        return self.words[1].startswith("hand-")
 
     def drawn(self, luck: random.Random, left: float, log_bytes: int) -> Harm:
         """Harm somewhere in the share of a run that is `left`, or just beyond it; `log_bytes` are written already."""

@@ -19,7 +19,20 @@ import pytest
 
 from rig.record import Record
 from tests.benchmark.kills import number
-from tests.rig.killing import MOTION, RUN, SOAK, Story, Undisturbed, finished, inspected, many, measured, undisturbed
+from tests.rig.killing import (
+    FIELDS,
+    MOTION,
+    RUN,
+    SOAK,
+    TURNS,
+    Story,
+    Undisturbed,
+    finished,
+    inspected,
+    many,
+    measured,
+    undisturbed,
+)
 from tests.rig.killing_transfers import kills_of_a_push, kills_of_imports
 from tests.rig.nursery import Harm, Nursery
 from tests.rig.postgres import Server
@@ -54,8 +67,8 @@ def test_kills_at_random_moments(nursery: Nursery, whole: Undisturbed, tmp_path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("words", [SOAK, MOTION], ids=lambda words: words[1])
-def test_kills_of_records_without_gaps(nursery: Nursery, tmp_path: Path, words: tuple[str, ...]) -> None:
+@pytest.mark.parametrize("words", [SOAK, MOTION, FIELDS, TURNS], ids=lambda words: words[1])
+def test_kills_of_other_procedures(nursery: Nursery, tmp_path: Path, words: tuple[str, ...]) -> None:
     survived = many(nursery, tmp_path, undisturbed(nursery, tmp_path / "undisturbed", words), 7, 3)
     assert survived.total() >= 3
 
