@@ -156,6 +156,7 @@ class Planning:
             self.attended.set_visibility(bench.simulated)
             with div("row-of"):
                 self.button = ui.button("Start", icon="play_arrow", on_click=self.start)
+                self.button.disable()  # until there is a plan
                 self.optimal = ui.button("Choose poses for a model", icon="auto_fix_high", on_click=self._optimal)
                 self.optimal.props("outline")
 
@@ -242,9 +243,11 @@ class Planning:
         if under_way is not None and under_way.phase != "ended":
             ui.notify(f"{under_way.procedure} is running; stop it first", type="warning")
             return
-        if self.planned is not None:
-            name, settings = str(self.name.value), self.settings()
-            BeginDialog(before_start(self.planned, self.bench), partial(self._begin, name, settings))
+        if self.planned is None:  # a click that was on its way while a setting changed
+            ui.notify("The plan is not ready; press Start again when it is shown", type="warning")
+            return
+        name, settings = str(self.name.value), self.settings()
+        BeginDialog(before_start(self.planned, self.bench), partial(self._begin, name, settings))
 
     async def _begin(
         self, name: str, settings: Mapping[str, str], sensor: Mapping[str, str], answers: Mapping[str, str]
