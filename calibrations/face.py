@@ -10,7 +10,7 @@ import numpy as np
 
 from calibrations.errors import DataError, ModelError
 from calibrations.frames import columns_by_name
-from calibrations.result import Result
+from calibrations.result import Presentation, Result
 from calibrations.table import AXES, Array, Constant, Table
 from calibrations.tables import KINDS
 
@@ -147,6 +147,16 @@ def compensate(model: GivenModel, outputs: Table | Columns | Array, **columns: f
     from calibrations.compensation.samples import compensate as compensated
 
     return compensated(_model(model), outputs, columns)
+
+
+def _presentation_of(result: Result) -> Presentation:
+    """The forms of a result. They load when it is shown."""
+    from calibrations.presentation.results import presentation_of
+
+    return presentation_of(result)
+
+
+Result.register_presentation(_presentation_of)
 
 
 def _data(data: Any) -> Table:

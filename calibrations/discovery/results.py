@@ -19,12 +19,9 @@ from calibrations.model import Model
 from calibrations.result import Result
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from calibrations.design.experiment import Experiment
     from calibrations.discovery.dataset import Dataset
     from calibrations.discovery.patterns import Pattern
-    from calibrations.presentation.chart import Picture
 
 
 @dataclass(frozen=True, repr=False)
@@ -46,34 +43,9 @@ class Comparison(Result, Generic[F]):
         missing = self.given is not None and self.given.verdict is not Verdict.ADEQUATE
         return not self.fails and self.rejection is None and not missing
 
-    def report(self) -> str:
-        """The error of each channel, and the places where the model fails."""
-        from calibrations.presentation.answers import comparison_text
-
-        return comparison_text(self)
-
-    def to_dict(self) -> dict[str, Any]:
-        """`rig.comparison/1`."""
-        from calibrations.documents import comparison_document
-
-        return comparison_document(self, self.fit.model.name)
-
     def records(self) -> list[dict[str, Any]]:
         """A row a place where the model fails."""
         return [vars(place) for place in self.fails]
-
-    def plot(self) -> Figure:
-        """The residual, or the Allan deviations."""
-        from calibrations.presentation.static import draw  # a result without a picture needs no matplotlib
-        from calibrations.presentation.views import view_of
-
-        return draw(view_of(self.data).fit_chart(self.fit))
-
-    def pictures(self) -> list[Picture]:
-        """The model and the data."""
-        from calibrations.presentation.views import view_of
-
-        return view_of(self.data).fit_album(self.fit)
 
 
 @dataclass(frozen=True, repr=False)
@@ -119,34 +91,9 @@ class Diagnosis(_Answer[F]):
         needs_experiment = findings.given.verdict is not Verdict.EFFECT_MISSING
         return cls(findings, findings.experiment(findings.names) if needs_experiment else None)
 
-    def report(self) -> str:
-        """The verdict on the given model, its candidates, and the best of them."""
-        from calibrations.presentation.answers import diagnosis_text
-
-        return diagnosis_text(self)
-
-    def to_dict(self) -> dict[str, Any]:
-        """`rig.diagnosis/1`."""
-        from calibrations.documents import diagnosis_document
-
-        return diagnosis_document(self, self.fit.model.name)
-
     def records(self) -> list[dict[str, Any]]:
         """A row a candidate."""
         return list(self.to_dict()["candidates"])
-
-    def plot(self) -> Figure:
-        """The residual of the given model, or its Allan deviations."""
-        from calibrations.presentation.static import draw  # a result without a picture needs no matplotlib
-        from calibrations.presentation.views import view_of
-
-        return draw(view_of(self.findings.data).fit_chart(self.fit))
-
-    def pictures(self) -> list[Picture]:
-        """The given model and the data."""
-        from calibrations.presentation.views import view_of
-
-        return view_of(self.findings.data).fit_album(self.fit)
 
     @property
     def judgement(self) -> Judgement:
@@ -203,34 +150,9 @@ class Discovery(_Answer[F]):
         """The final model, with its values."""
         return self.end.model
 
-    def report(self) -> str:
-        """The error after each step, the verdict, and the final model."""
-        from calibrations.presentation.answers import discovery_text
-
-        return f"{self.findings.data.description}\n\n{discovery_text(self)}\n\n{self.model.params}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """`rig.discovery/1`."""
-        from calibrations.documents import discovery_document
-
-        return discovery_document(self, None)
-
     def records(self) -> list[dict[str, Any]]:
         """A row a step."""
         return list(self.to_dict()["steps"])
-
-    def plot(self) -> Figure:
-        """Error by model."""
-        from calibrations.presentation.static import draw  # a result without a picture needs no matplotlib
-        from calibrations.presentation.views import view_of
-
-        return draw(view_of(self.findings.data).steps_chart(self))
-
-    def pictures(self) -> list[Picture]:
-        """Error by model, and the signal of each effect."""
-        from calibrations.presentation.views import view_of
-
-        return view_of(self.findings.data).steps_album(self)
 
     @property
     def judgement(self) -> Judgement:

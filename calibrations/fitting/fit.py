@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -29,12 +29,6 @@ from calibrations.model import Model
 from calibrations.model.model import Parameters
 from calibrations.result import Result
 from calibrations.table import MILLI, Array, Table
-from calibrations.text import columns, quantity
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from calibrations.presentation.chart import Picture
 
 ROUNDS = 2
 LARGEST_CHANGE = 1e70  # of the output by a unit of a parameter: products of squares stay finite
@@ -55,39 +49,9 @@ class Fit(Solution, Result):
         """The estimates by key: `params["bias.x"].value`, `.std`, `.unit`, `.identified`."""
         return self.model.params
 
-    def report(self) -> str:
-        """The parameters with their uncertainties, and the error of each channel beside the noise floor."""
-        unit, floor = self.problem.unit, "noise floor" if self.noise.known else "scatter (noise floor not known)"
-        errors = [
-            (name, quantity(self.rmse[c], unit), quantity(self.noise.floor[c], unit), f"{self.excess[c]:.2f}")
-            for c, name in enumerate(self.channels)
-        ]
-        head = f"{self.model.name}, fitted to {self.table.n} rows of {self.table.source or 'data without a name'}"
-        return f"{head}\n\n{self.params}\n\n{columns(('axis', 'rms error', floor, 'error / floor'), errors)}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """`rig.fit/1`."""
-        from calibrations.documents import fit_document
-        from calibrations.loop import dataset
-
-        return fit_document(dataset(self.table), self, None)
-
     def records(self) -> list[dict[str, Any]]:
         """A row a parameter."""
         return self.params.records()
-
-    def plot(self) -> Figure:
-        """The residual."""
-        from calibrations.presentation.charts.fit import residual_chart
-        from calibrations.presentation.static import draw
-
-        return draw(residual_chart(self))
-
-    def pictures(self) -> list[Picture]:
-        """Measurement and model, the residual, and its pattern."""
-        from calibrations.presentation.charts.fit import fit_album
-
-        return fit_album(self)
 
     @cached_property
     def covariance(self) -> Array:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.special import chdtri
@@ -31,11 +31,6 @@ from calibrations.noise.samples import CONSTANT, WILD, HiddenNoise, hidden_in
 from calibrations.noise.search import Search, search
 from calibrations.result import Result
 from calibrations.table import Array
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from calibrations.presentation.chart import Picture
 
 Document = dict[str, Any]
 MODEL = "still"  # the search begins with white noise alone
@@ -180,35 +175,12 @@ class NoiseAnalysis(Result):
     def disturbances(self) -> tuple[Disturbance, ...]:
         return disturbances(self.search)
 
-    def report(self) -> str:
-        """Coefficients, density and Allan deviation of each channel."""
-        from calibrations.presentation.noise_text import summary
-
-        return summary(self)
-
-    def to_dict(self) -> Document:
-        """`rig.noise/1`."""
-        return noise_document(self)
-
     def records(self) -> list[Document]:
         """A row a process of each channel."""
         processes = [
             (axis, coefficient) for axis, noise in self.channels.items() for coefficient in noise.coefficients.items()
         ]
         return [{"axis": axis, "process": name, **_coefficient(coefficient)} for axis, (name, coefficient) in processes]
-
-    def plot(self) -> Figure:
-        """The Allan deviation of the first channel."""
-        from calibrations.presentation.charts.noise import noise_album
-        from calibrations.presentation.static import draw
-
-        return draw(noise_album(self)[0].chart)
-
-    def pictures(self) -> list[Picture]:
-        """Allan deviation and spectrum of each channel."""
-        from calibrations.presentation.charts.noise import noise_album
-
-        return noise_album(self)
 
     def spoils(self, disturbance: Disturbance) -> tuple[str, ...]:
         """The coefficients that a disturbance changes, or would change had it not been removed."""

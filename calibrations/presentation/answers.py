@@ -1,4 +1,4 @@
-"""Comparison, diagnosis and discovery in words: what a terminal prints and a notebook shows."""
+"""Fit, comparison, diagnosis and discovery in words: what a terminal prints and a notebook shows."""
 
 from __future__ import annotations
 
@@ -10,11 +10,24 @@ import numpy as np
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
 from calibrations.discovery.summary import sure
 from calibrations.documents import places_document, why
+from calibrations.fitting.fit import Fit
 from calibrations.presentation.views import view_of
 from calibrations.text import columns, quantity
 
 MOST_CANDIDATES = 6
 SELF_JUDGED = "The noise is known from this residual only, so that the error alone shows no failure."
+
+
+def fit_text(result: Fit) -> str:
+    """The parameters with their uncertainties, and the error of each channel beside the noise floor."""
+    unit, noise = result.problem.unit, result.noise
+    errors = [
+        (name, quantity(result.rmse[c], unit), quantity(noise.floor[c], unit), f"{result.excess[c]:.2f}")
+        for c, name in enumerate(result.channels)
+    ]
+    head = f"{result.model.name}, fitted to {result.table.n} rows of {result.table.source or 'data without a name'}"
+    floor = "noise floor" if noise.known else "scatter (noise floor not known)"
+    return f"{head}\n\n{result.params}\n\n{columns(('axis', 'rms error', floor, 'error / floor'), errors)}"
 
 
 def comparison_text(result: Comparison[Any]) -> str:
