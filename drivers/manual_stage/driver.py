@@ -13,8 +13,8 @@ from typing import NoReturn
 
 from drivers.errors import LimitError, LinkRefused, NotSettled
 from drivers.instrument import OUTSIDE_ANGLE, Check, Identity, require_positive, require_range, require_within
-from drivers.manual_stage.person import PERSON, PersonLink
 from drivers.transport import Address, Links
+from drivers.transport.person import PERSON, PersonLink
 
 UNIT = "deg"
 

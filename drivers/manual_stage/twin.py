@@ -11,8 +11,8 @@ from typing import Protocol
 import numpy as np
 
 from drivers.manual_stage.driver import Settings
-from drivers.manual_stage.person import PERSON
 from drivers.transport.address import Address
+from drivers.transport.person import PERSON
 from drivers.transport.server import Server
 from drivers.world.stage import Trajectory
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from random import Random
 from typing import Any, NamedTuple
 
-from drivers.manual_stage.person import PERSON
+from drivers.transport.person import PERSON
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from drivers.clock import Clock
 from drivers.errors import LinkRefused
-from drivers.manual_stage.person import PersonLink
 from drivers.transport.address import CA_PORT, Address, Url
 from drivers.transport.channel_access import Circuit, Records, found_server
 from drivers.transport.lines import LinkLines, TextLines, VisaLines
 from drivers.transport.link import Link, Tap, open_link
 from drivers.transport.modbus import Bus, Unit
+from drivers.transport.person import PersonLink
 
 
 class Links:

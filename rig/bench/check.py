@@ -16,9 +16,9 @@ from pydantic import BaseModel, ValidationError
 
 from calibrations.table import gravity_fault
 from drivers.errors import LinkRefused, did_you_mean
-from drivers.manual_stage.person import PERSON
 from drivers.transport.address import Url
 from drivers.transport.faults import Fault, kinds_of
+from drivers.transport.person import PERSON
 from drivers.world.errors import SimulationError
 from procedures.session import Limits
 from rig.bench.bench import Bench

@@ -15,8 +15,8 @@ from drivers.errors import DriverError
 from drivers.instrument import CanHalt, CanLook, Check, CountsSamples, HasStopInput, Identity, KeepsSteady
 from drivers.instrument import Instrument as Driver
 from drivers.manual_stage.driver import ManualStage
-from drivers.manual_stage.person import PersonLink
 from drivers.transport.link import Tap
+from drivers.transport.person import PersonLink
 from drivers.transport.server import Server
 from drivers.world.batch import Batch
 from drivers.world.world import World

@@ -19,11 +19,11 @@ from drivers.clock import Clock, SimulatedClock, WallClock, serve_forever
 from drivers.errors import LinkRefused
 from drivers.handheld.world import HandheldWorld, handheld
 from drivers.instrument import Instrument as Driver
-from drivers.manual_stage.person import PERSON
 from drivers.transport import Address, Links
 from drivers.transport.address import Url
 from drivers.transport.faults import faults_of
 from drivers.transport.link import Tap
+from drivers.transport.person import PERSON
 from drivers.transport.server import Server
 from drivers.world.batch import Batch
 from drivers.world.config import WorldConfig

@@ -13,9 +13,9 @@ import pytest
 
 from drivers.clock import SimulatedClock
 from drivers.labjack_t7.driver import T7
-from drivers.manual_stage.person import PersonLink
 from drivers.oriental_az.twin import Drive
 from drivers.transport.faults import EFFECTS, Fault
+from drivers.transport.person import PersonLink
 from drivers.world.stage import Trajectory, at_rest
 from procedures.errors import ProcedureError
 from procedures.session import Limits

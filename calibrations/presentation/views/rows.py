@@ -14,7 +14,7 @@ from calibrations.discovery.results import Diagnosis, Discovery
 from calibrations.discovery.summary import step_shares
 from calibrations.discovery.verdict import Verdict
 from calibrations.fitting.fit import Fit, milli_unit, pool_in_milli
-from calibrations.presentation.views import View
+from calibrations.presentation.views.view import View
 from calibrations.text import Cells, quantity, rounded
 
 if TYPE_CHECKING:

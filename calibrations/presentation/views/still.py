@@ -11,7 +11,7 @@ from calibrations.discovery.findings import Candidate
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
 from calibrations.noise.comparison import compared_deviations, mismatch
 from calibrations.noise.fit import NoiseFit
-from calibrations.presentation.views import View
+from calibrations.presentation.views.view import View
 from calibrations.text import Cells, quantity, rounded
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ from calibrations.text import columns
 from drivers.clock import WallClock, serve_forever
 from drivers.errors import StageAlarm
 from drivers.instrument import Check, HasAlarm, Identity, Instrument
-from drivers.manual_stage.person import PERSON
 from drivers.transport import Address
+from drivers.transport.person import PERSON
 from drivers.transport.server import Server
 from rig.bench import DEFAULT, Bench, read_bench
 from rig.bench.certificates import EXPIRED, certificates, find_expired
