@@ -3,7 +3,6 @@
     least_squares   all at once, weighted
     kalman          unknowns that change by themselves: prediction and correction
     scatter         the level of a logged column without the scatter of its reader
-    rounding        the mean of samples that a converter rounds
     approach        an exponential approach to a steady state, followed by a bank of Kalman filters
 
 Source  Book 18.2-18.4, equations (18.1)-(18.10).

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.estimators.rounding import mean_of_rounded
+from calibrations.effects.signal.quantisation import mean_of_rounded
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import Component, Starts
 from calibrations.free_forms.poses import PoseData

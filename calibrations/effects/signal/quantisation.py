@@ -1,16 +1,17 @@
 from functools import lru_cache
 
 import numpy as np
+import scipy  # loads its special functions at the first use
 from numpy.typing import NDArray
 
 from calibrations.effects import Effect, Parameter, Values
-from calibrations.estimators.rounding import mean_of_rounded
 from calibrations.geometry.smooth import smooth_columns
 from calibrations.table import Array, Table
 
 LEAST_NOISE = 1e-3  # of a step
 FINEST = 4.0  # points in a resolved interval of frequency
 MOST = 20_000  # frequencies
+CODES = 3  # to either side of the nearest one, that noise may reach
 TOGETHER = 64  # frequencies of one block
 VISIBLE = 0.6  # of a step: more noise leaves a thousandth of the saw
 
@@ -21,7 +22,7 @@ class Quantisation(Effect):
         V <- o + q (m + sum_j Phi((f - 1/2 - j) q / s) - Phi((-f - 1/2 - j) q / s))     q, o, s in {out}; j = 0, 1, 2
                                                          m: the nearest code's number, f: (V - o) / q - m
 
-    The mean of rounded samples with normal noise of standard deviation s, exactly; codes stand at o + m q.
+    The mean of rounded samples with normal noise of standard deviation s, exactly. The codes are at o + m q.
 
     Symptom   the residual is a sawtooth over the output, as high as one step.
     Excited by  outputs that differ by many fractions of a step.
@@ -45,7 +46,7 @@ class Quantisation(Effect):
         doc="from one code to the next",
     )
     offset = Parameter(
-        "{out}", typical=1e-4, per_axis=False, guess=lambda table: _start(table, 1), doc="where a code stands"
+        "{out}", typical=1e-4, per_axis=False, guess=lambda table: _start(table, 1), doc="of a code"
     )
     noise = Parameter(
         "{out}",
@@ -63,6 +64,21 @@ class Quantisation(Effect):
     def output(self, v: Array, table: Table, p: Values) -> Array:
         noise = max(float(p.noise), LEAST_NOISE * float(p.step))
         return mean_of_rounded(v, float(p.step), float(p.offset), noise)
+
+
+def mean_of_rounded(values: Array, step: float, offset: float, noise: float) -> Array:
+    """Means of rounded samples about `values`, exactly. The codes are at offset + m step. All in the output's unit.
+
+    noise   standard deviation of a normal sample before it is rounded, > 0 and at most half a step
+    """
+    codes = (values - offset) / step
+    nearest = np.round(codes)
+    deviation, spread = codes - nearest, noise / step
+    mean = nearest
+    for j in range(CODES):
+        above, below = (deviation - 0.5 - j) / spread, (-deviation - 0.5 - j) / spread
+        mean = mean + scipy.special.ndtr(above) - scipy.special.ndtr(below)
+    return np.asarray(offset + step * mean)
 
 
 def _frequencies(table: Table) -> Array:
