@@ -15,7 +15,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
 
 from calibrations.criteria import LIKELY, NOTEWORTHY
-from calibrations.discovery.verdict import Closest, Judgement
+from calibrations.discovery.verdict import Closest, Evidence, Judgement
 from calibrations.effects import Effect
 from calibrations.model import Model
 
@@ -131,7 +131,7 @@ class Step(Generic[F]):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Findings(Generic[F]):
+class Findings(Evidence, Generic[F]):
     """The findings of one search. Diagnosis and discovery are two views of them, so that they cannot disagree.
 
     data          the data
@@ -143,12 +143,8 @@ class Findings(Generic[F]):
     tried         the steps of the search, where none is kept
     candidates    every effect alone on top of the baseline; the effect of the first step comes first
     causes        effects of the steps named as causes; the others refine the form of a cause
-    alternatives  by effect, those that the data cannot separate from it
     places        places of the signal chain that act, the largest first, where the search has found them
-    left          unexplained part of the residual, in words; `pattern` holds it as an expression
-    spoilt        whether that makes every effect doubtful; `unresponsive`, whether an output does not follow the poses
-    searched      whether further effects were searched for after the last step
-    enough        whether the steps end at an error that is as small as was asked
+    pattern       `left`, as an expression
     undetermined  why the data do not determine the given model, and the final model
     set_aside     rows that the search left out, and why; `outliers` are their numbers
     reason        why the data cannot decide, in words
@@ -167,14 +163,8 @@ class Findings(Generic[F]):
     tried: tuple[Step[F], ...] = ()
     candidates: tuple[Candidate, ...] = ()
     causes: tuple[str, ...] = ()
-    alternatives: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     places: tuple[ActingPlace, ...] = ()
-    left: str | None = None
     pattern: Pattern | None = None
-    spoilt: bool = False
-    unresponsive: bool = False
-    searched: bool = True
-    enough: bool = False
     undetermined: tuple[str | None, str | None] = (None, None)
     set_aside: str | None = None
     outliers: tuple[int, ...] = ()
@@ -183,7 +173,6 @@ class Findings(Generic[F]):
     separations: Mapping[str, Experiment] = field(default_factory=dict)
     further: Experiment | None = None
     settled: bool = True
-    remarks: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -218,19 +207,12 @@ class Findings(Generic[F]):
             model=fit.model.name,
             added=added,
             unknown=tuple(place.name for place in self.places if place.unknown),
-            alternatives=self.alternatives,
-            left=self.left,
             share_left=self.end.share_left(self.origin),
-            spoilt=self.spoilt,
-            unresponsive=self.unresponsive,
-            searched=self.searched,
-            enough=self.enough,
             undetermined=undetermined,
-            set_aside=self.set_aside,
             closest=self._closest,
             error=self.end.pooled_excess,
             floor=self.data.floor,
-            remarks=self.remarks,
+            **self.shared,
         )
 
     @property

@@ -14,8 +14,9 @@ with the effects that the search added.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import Enum, StrEnum
+from typing import Any
 
 from calibrations.criteria import MATERIAL, MOST_BY_FORM, MOST_UNEXPLAINED, SIGNIFICANT
 from calibrations.text import join_words
@@ -55,7 +56,34 @@ class Closest:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Judgement:
+class Evidence:
+    """The facts of a search that hold for every model that it judges.
+
+    alternatives  by effect, those that the data cannot separate from it
+    left          unexplained part of the residual, in words
+    spoilt        whether that part makes every effect of the search doubtful
+    unresponsive  whether that part is an output that does not follow the poses
+    searched      whether further effects were searched for after the last one was added
+    enough        whether the search stopped at an error that is as small as was asked
+    remarks       further sentences
+    """
+
+    alternatives: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    left: str | None = None
+    spoilt: bool = False
+    unresponsive: bool = False
+    searched: bool = True
+    enough: bool = False
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def shared(self) -> dict[str, Any]:
+        """The facts by name."""
+        return {fact.name: getattr(self, fact.name) for fact in fields(Evidence)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judgement(Evidence):
     """The facts on a model from which its verdict follows, and what a sentence on it names.
 
     model         its name
@@ -63,18 +91,11 @@ class Judgement:
     added         effects that the search added to it, named as causes
     refinements   effects that the search added for the form of a cause
     unknown       places of the signal chain where something acts that no effect of the catalogue describes
-    alternatives  effects that the data cannot separate from a missing or added one
-    left          unexplained part of the residual, in words
     share_left    part of the excess variance at the start of the search that stays
-    spoilt        whether that part makes every effect of the search doubtful
-    unresponsive  whether that part is an output that does not follow the poses
-    searched      whether further effects were searched for after the last one was added
-    enough        whether the search stopped at an error that is as small as was asked
     undetermined  why the data do not determine the model
-    set_aside     the rows that the fit leaves out, and why
+    closest       the best candidate, where none is significant
     error         error of the model with all missing effects, as a multiple of `floor`
     provisional   whether the names may change when further effects are added
-    remarks       further sentences
     """
 
     model: str
@@ -82,20 +103,12 @@ class Judgement:
     added: tuple[str, ...] = ()
     refinements: tuple[str, ...] = ()
     unknown: tuple[str, ...] = ()
-    alternatives: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    left: str | None = None
     share_left: float = 0.0
-    spoilt: bool = False
-    unresponsive: bool = False
-    searched: bool = True
-    enough: bool = False
     undetermined: str | None = None
-    set_aside: str | None = None
     closest: Closest | None = None
     error: float = 1.0
     floor: str = "the noise floor"
     provisional: bool = False
-    remarks: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> Verdict:

@@ -10,9 +10,9 @@ from calibrations.analyses import hand_turns as turns
 from calibrations.analyses.hand_positions import ANGLES, fit_positions, largest_uncertainty_g
 from calibrations.geometry.sphere import magnetometer_coverage_warning
 from calibrations.means.noise import rms
+from rig.bench.result_names import SOFT_IRON_PAIRS
 from rig.record.measured import Measured
 from rig.results.result import Missing, Result, evaluates, result
-from rig.results.triads import SOFT
 
 
 class Target(NamedTuple):
@@ -63,7 +63,7 @@ def hand_fields(measured: Measured) -> dict[str, Result | Missing]:
     """
     table = measured.table()
     if reason := magnetometer_coverage_warning(table):
-        names = (*(f"hard-iron-{axis}" for axis in "xyz"), *(f"soft-iron-{pair}" for pair in SOFT))
+        names = (*(f"hard-iron-{axis}" for axis in "xyz"), *(f"soft-iron-{pair}" for pair in SOFT_IRON_PAIRS))
         return {name: Missing(reason) for name in (*names, "field-total", "left-by-ellipsoid", "uncertainty")}
     fit = fields.fit_fields(table)
     (strength,) = fit.model.estimates("field-strength")

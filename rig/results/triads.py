@@ -21,6 +21,7 @@ from calibrations.means.noise import rms, white_std
 from calibrations.table import Array, Table
 from procedures.questions import EDGES
 from procedures.session import Pose
+from rig.bench.result_names import SOFT_IRON_PAIRS
 from rig.record.measured import Measured, sensor_from_base
 from rig.results.result import Missing, Result, evaluates, fit_shipped, result
 
@@ -56,7 +57,6 @@ def rate_turn(measured: Measured) -> dict[str, Result | Missing]:
     return {name: value for name, value in results.items() if complete or isinstance(value, Result)}
 
 
-SOFT = ("xx", "yy", "xy", "xz", "yz")
 ELEMENTS = {"F": "field-total", "H": "field-horizontal", "D": "field-azimuth", "I": "field-inclination"}
 HEADING = "heading_deg"
 DECLINATION = "field-declination"
@@ -116,7 +116,11 @@ def _std(table: Table) -> float:
 
 
 def _all_missing(reason: str) -> dict[str, Result | Missing]:
-    names = (*(f"hard-iron-{axis}" for axis in AXES), *(f"soft-iron-{pair}" for pair in SOFT), *ELEMENTS.values())
+    names = (
+        *(f"hard-iron-{axis}" for axis in AXES),
+        *(f"soft-iron-{pair}" for pair in SOFT_IRON_PAIRS),
+        *ELEMENTS.values(),
+    )
     names = (*names, "left-by-ellipsoid")
     return {name: Missing(reason) for name in names}
 

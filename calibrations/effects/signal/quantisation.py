@@ -45,9 +45,7 @@ class Quantisation(Effect):
         guess=lambda table: _start(table, 0),
         doc="from one code to the next",
     )
-    offset = Parameter(
-        "{out}", typical=1e-4, per_axis=False, guess=lambda table: _start(table, 1), doc="of a code"
-    )
+    offset = Parameter("{out}", typical=1e-4, per_axis=False, guess=lambda table: _start(table, 1), doc="of a code")
     noise = Parameter(
         "{out}",
         typical=1e-4,
