@@ -131,7 +131,7 @@ class Judgement(Evidence):
         if self._complete:
             return "No effect is missing."
         is_long = len(self.missing) > MOST_NAMED and self.verdict in (Verdict.EFFECT_MISSING, Verdict.AMBIGUOUS)
-        return f"The model {self.model} misses {len(self.missing)} effects." if is_long else self.text
+        return f'The model "{self.model}" misses {len(self.missing)} effects.' if is_long else self.text
 
     @property
     def rest(self) -> str:
@@ -206,11 +206,11 @@ def headline(j: Judgement) -> str:
     if j.verdict is Verdict.UNEXPLAINED:
         return f"No effect of the catalogue explains the residual: {j.left}."
     if j.missing:
-        return f"The model {j.model} misses {join_words(j.missing)}."
+        return f'The model "{j.model}" misses {join_words(j.missing)}.'
     if j.added:
-        return f"The model {j.model} misses {join_words(j.added)}."
+        return f'The model "{j.model}" misses {join_words(j.added)}.'
     if j.enough:
-        return f"The model {j.model} needs no further effect."
+        return f'The model "{j.model}" needs no further effect.'
     if j.undetermined is not None:
         return f"No effect is significant, but {j.undetermined}."
     if j.closest is not None:
@@ -227,9 +227,9 @@ def _details(j: Judgement) -> Iterator[str]:
         return
     if j.verdict is Verdict.UNEXPLAINED:
         if j.missing:
-            yield f"The model {j.model} also misses {join_words(j.missing)}."
+            yield f'The model "{j.model}" also misses {join_words(j.missing)}.'
         elif j.added and j.searched:
-            yield f"The model {j.model} also misses {join_words(j.added)}."
+            yield f'The model "{j.model}" also misses {join_words(j.added)}.'
         if j.unknown and not j.spoilt:
             yield _remaining_error(j)
     elif not (j.missing or j.enough) and j.closest is None and j.undetermined is None:

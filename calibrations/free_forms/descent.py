@@ -218,7 +218,8 @@ class SearchResult:
 
 def descend(
     setting: Setting,
-    general: bool = True,
+    general: bool,
+    step: str,
     catalogue_first: bool = False,
     loops: bool = False,
     origin: SearchResult | None = None,
@@ -226,15 +227,15 @@ def descend(
     """The end of a descent from the base, or from the components of an earlier search.
 
     general          whether components that can follow almost anything are tried
+    step             which of several searches this is, for the progress
     catalogue_first  whether the first rounds prefer forms of the catalogue to free ones
     loops            whether hysteresis whose loops differ from place to place is tried
     """
     point = _begin(setting, general, loops) if origin is None else origin.point
     progress = _Progress(point, {})
-    beginning = "effects first" if catalogue_first else "all forms together"
-    beginning += ", loops" * loops + ", flicker" * setting.flicker
-    for number in range(0 if origin is None else len(COARSE), ROUNDS):
-        report(f"searching for places ({beginning}), pass {number + 1} of at most {ROUNDS}")
+    first = 0 if origin is None else len(COARSE)
+    for number in range(first, ROUNDS):
+        report(f"searching for places ({step}), pass {number - first + 1} of at most {ROUNDS - first}")
         progress = _advance(setting, progress, number, catalogue_first)
         if progress.converged:
             break

@@ -35,7 +35,12 @@ ANY = 1e8  # a variance that is no limit
 
 
 def search(
-    data: PoseData, white: Array, model_effects: ModelEffects, general: bool = True, noise_known: bool = True
+    data: PoseData,
+    white: Array,
+    model_effects: ModelEffects,
+    general: bool = True,
+    noise_known: bool = True,
+    reason: str = "",
 ) -> SearchResult:
     """Places that act, with their sizes: the likeliest result of several starts.
 
@@ -49,26 +54,29 @@ def search(
     white    standard deviation of each mean, (channels, n)
     general  whether components that can follow almost anything are tried
     noise_known  whether `white` is the noise of the means; else it is the misfit of an earlier search
+    reason   why this search follows another one, for the progress
     """
     setting = Setting(data, white, model_effects)
-    best = _search_from_all(setting, general)
+    best = _search_from_all(setting, general, reason)
     asked = noise_known and not model_effects.columns.shape[2] and LEAST_MISFIT < best.ratio < MOST_MISFIT
     if not asked or not _is_flicker(best):
         return best
-    in_flicker = _search_from_all(replace(setting, flicker=True), general)
+    in_flicker = _search_from_all(replace(setting, flicker=True), general, f"{reason}again with flicker noise, ")
     return min(best, in_flicker, key=lambda end: end.criterion)
 
 
-def _search_from_all(setting: Setting, general: bool) -> SearchResult:
+def _search_from_all(setting: Setting, general: bool, reason: str) -> SearchResult:
     """The likeliest end of several beginnings."""
-    effects_first = descend(setting, general, catalogue_first=True)
+    effects_first = descend(setting, general, f"{reason}effects first", catalogue_first=True)
     if effects_first.ratio < NOISE_ALONE and len(effects_first.active) <= FEW_COMPONENTS:
         return effects_first
-    best = min(effects_first, descend(setting, general), key=lambda end: end.criterion)
+    together = descend(setting, general, f"{reason}all forms together")
+    best = min(effects_first, together, key=lambda end: end.criterion)
     if any(best.component(name).place == "history" for name in best.active):
-        looped = descend(setting, general, catalogue_first=True, loops=True)
+        looped = descend(setting, general, f"{reason}with loops", catalogue_first=True, loops=True)
         best = looped if looped.criterion < best.criterion - SPILL * abs(best.criterion) else best
-    return _without_remainders(best, lambda origin: descend(setting, general, origin=origin))
+    step = f"{reason}without components that are not needed"
+    return _without_remainders(best, lambda origin: descend(setting, general, step, origin=origin))
 
 
 def _without_remainders(best: SearchResult, descent: Callable[[SearchResult], SearchResult]) -> SearchResult:

@@ -283,13 +283,16 @@ def _search_with_noise(
     if noise is None:
         return result, source
     source = FloorSource.CONTRADICTED if source is FloorSource.SAMPLES else source
-    for _ in range(FLOOR_ROUNDS):
-        result = search(data, noise, model_effects, general=False)
+    for number in range(1, FLOOR_ROUNDS + 1):
+        reason = f"with the noise of the residual, round {number}, "
+        result = search(data, noise, model_effects, general=False, reason=reason)
         next_noise = _scatter(result, source, uniform=False)
         if next_noise is None:
             break
         noise = next_noise
-    return (result if result.ratio < NOISE_ALONE else search(data, noise, model_effects)), source
+    if result.ratio >= NOISE_ALONE:
+        result = search(data, noise, model_effects, reason="with the noise of the residual and every component, ")
+    return result, source
 
 
 def _in_larger_noise(result: SearchResult, model_effects: ModelEffects) -> tuple[SearchResult, float]:
@@ -299,11 +302,12 @@ def _in_larger_noise(result: SearchResult, model_effects: ModelEffects) -> tuple
     """
     best, white = (result.criterion, result, 1.0), result.white
     factor = 1.0
-    for _ in range(FLOOR_ROUNDS):
+    for number in range(1, FLOOR_ROUNDS + 1):
         factor *= best[1].ratio
         if best[1].ratio < LARGER_NOISE:
             break
-        larger = search(result.data, factor * white, model_effects, noise_known=False)
+        reason = f"with larger noise, round {number}, "
+        larger = search(result.data, factor * white, model_effects, noise_known=False, reason=reason)
         scale = 2 * (larger.gram.rows - larger.gram.base_rank) * float(np.log(factor))
         if larger.criterion + scale + ENTER >= best[0]:
             break

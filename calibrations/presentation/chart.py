@@ -117,7 +117,10 @@ class Rule:
 
 @dataclass(frozen=True)
 class Bars:
-    """Horizontal bars number 0, 1, 2 ... from `base` to `ends`, with a text each, inside the bar or after it."""
+    """Horizontal bars number 0, 1, 2 ... from `base` to `ends`, with a text each, inside the bar or after it.
+
+    `starts`: where texts after a bar begin; without them at its end.
+    """
 
     base: float
     ends: Array
@@ -125,6 +128,7 @@ class Bars:
     texts: Sequence[str]
     inside: Sequence[bool]
     label: str = ""
+    starts: Array | None = None
 
 
 @dataclass(frozen=True)

@@ -280,6 +280,7 @@ def _rule(s: c.Rule, panel: c.Panel) -> Parts:
 
 @_series.register
 def _bars(s: c.Bars, panel: c.Panel) -> Parts:
+    starts = {} if s.starts is None else {k: start for k, start in enumerate(s.starts) if not s.inside[k]}
     trace = {
         "type": "bar",
         "orientation": "h",
@@ -288,14 +289,15 @@ def _bars(s: c.Bars, panel: c.Panel) -> Parts:
         "base": s.base,
         "marker": {"color": list(s.colours)},
         "width": 0.6,
-        "text": [f"\u2003{text}\u2003" for text in s.texts],
+        "text": [f"\u2003{text}\u2003" if k not in starts else "" for k, text in enumerate(s.texts)],
         "textposition": ["auto" if inside else "outside" for inside in s.inside],  # outside a bar of few pixels
         "textangle": 0,
         "insidetextanchor": "start",
         "hovertemplate": [f"{name}: {text}" for name, text in zip(panel.y.names, s.texts, strict=True)],
         "name": s.label,
     }
-    return [trace], [], []
+    after = [c.Note(f"\u2003{s.texts[k]}", float(start), k, vertical="middle") for k, start in starts.items()]
+    return [trace], [], [note for text in after for note in _note(text, panel)[2]]
 
 
 @_series.register

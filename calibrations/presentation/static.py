@@ -318,8 +318,9 @@ def _rule(s: c.Rule, ax: Axes) -> None:
 def _bars(s: c.Bars, ax: Axes) -> None:
     places = np.arange(len(s.ends))
     ax.barh(places, np.asarray(s.ends) - s.base, 0.6, s.base, color=list(s.colours), zorder=1, label=s.label or None)
-    for k, (end, text, inside) in enumerate(zip(s.ends, s.texts, s.inside, strict=True)):
-        place, offset_px = (s.base, 6) if inside else (end, 12)
+    starts = s.ends if s.starts is None else s.starts
+    for k, (start, text, inside) in enumerate(zip(starts, s.texts, s.inside, strict=True)):
+        place, offset_px = (s.base, 6) if inside else (start, 12)
         ax.annotate(text, (place, k), (offset_px, 0), textcoords="offset points", va="center", zorder=3,
                     color="white" if inside else c.INK)  # fmt: skip
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import click
 
+from rig.cli.terminal.compiling import say_when_compiling
 from rig.cli.terminal.failure import exit_status
 from rig.cli.terminal.options import with_record
 from rig.files import choose_kernel_cache
@@ -136,6 +137,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     # Before numpy is imported: the matrices are small, and threads that wait for each other slow a busy machine.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     choose_kernel_cache()
+    if arguments is None:
+        say_when_compiling()
     gc.set_threshold(NEW_OBJECTS)
 
     if instruction := os.environ.get(COMPLETE):  # the shell asks what may follow

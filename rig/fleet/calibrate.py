@@ -75,7 +75,8 @@ def calibrate_fleet(fleet: Fleet, members: Sequence[Member], guide: Guide) -> Ca
     """Fit all sensors, and pool those of a batch that have the same parameters."""
     faults = {member: member.fault for member in members if member.fault}
     screenings: dict[Member, Screening] = {}
-    for member, answer in fleet.ask([(m, guide.question(m)) for m in members if m not in faults]):
+    questions = [(m, guide.question(m)) for m in members if m not in faults]
+    for member, answer in fleet.ask(questions, "fitting the sensors"):
         if "fault" in answer:
             faults[member] = answer["fault"]
         else:

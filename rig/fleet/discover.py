@@ -97,17 +97,21 @@ def _rigs(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
     if len({member.rig for members in batches.values() for member in members}) < 2:
         return stand
     faults = dict(stand.faults)
-    stages = {member: look.stage for member, look in _screen_members(fleet, stand, batches, faults) if look}
+    screened = _screen_members(fleet, stand, batches, faults, "searching for errors of the rigs")
+    stages = {member: look.stage for member, look in screened if look}
     measured = [Measured(m.batch, m.rig, stages[m]) for members in batches.values() for m in members if m in stages]
     return replace(stand, faults=faults, errors=tuple(find_rig_errors(measured)))
 
 
 def _screen_members(
-    fleet: Fleet, stand: Stand, batches: Batches, faults: dict[Member, str]
+    fleet: Fleet, stand: Stand, batches: Batches, faults: dict[Member, str], step: str
 ) -> Iterator[tuple[Member, Screening | None]]:
-    """Every sensor with its screening, batch by batch; without one, the reason is added to `faults`."""
+    """Every sensor with its screening, batch by batch; without one, the reason is added to `faults`.
+
+    `step` says in the progress what the screening is for.
+    """
     questions = [(m, stand.question("look", m)) for members in batches.values() for m in members if m not in faults]
-    for member, answer in fleet.ask(questions):
+    for member, answer in fleet.ask(questions, step):
         if "fault" in answer:
             faults[member] = answer["fault"]
         yield member, None if "fault" in answer else read_look(answer)
@@ -117,21 +121,24 @@ def _add_missing_effects(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
     """The state with the missing effects of every batch, added one after another."""
     open_ = batches
     for rounds_left in reversed(range(MOST_ROUNDS + 1)):
-        stand, missing = _judge_batches(fleet, stand, open_)
+        step = f"searching for missing effects, round {MOST_ROUNDS - rounds_left + 1}"
+        stand, missing = _judge_batches(fleet, stand, open_, step)
         open_ = {batch: batches[batch] for batch, effects in missing.items() if effects and rounds_left}
         for batch in open_:
             stand = stand.judge_with_siblings(batch, (*stand.effects.get(batch, ()), missing[batch][0]))
     return stand
 
 
-def _judge_batches(fleet: Fleet, stand: Stand, batches: Batches) -> tuple[Stand, dict[str, list[BatchEffect]]]:
+def _judge_batches(
+    fleet: Fleet, stand: Stand, batches: Batches, step: str
+) -> tuple[Stand, dict[str, list[BatchEffect]]]:
     """The state with the screened sensors, and the missing effects of each batch, found after its last sensor."""
     stage = {name for name, effect in effects_of(stand.start.own).items() if "pose" in effect.places}
     faults, screened = dict(stand.faults), dict(stand.screening)
     waiting = {batch: sum(m not in faults for m in members) for batch, members in batches.items()}
     screenings: dict[str, dict[Member, Screening]] = defaultdict(dict)
     missing = {}
-    for member, look in _screen_members(fleet, stand, batches, faults):
+    for member, look in _screen_members(fleet, stand, batches, faults, step):
         batch = member.batch
         if look is not None:
             screenings[batch][member] = look
@@ -161,9 +168,8 @@ def _drop_needless_effects(fleet: Fleet, stand: Stand, batch: str, members: Sequ
     if len(significant) == len(tested):
         return stand.judge_with_siblings(batch, significant)
     k, effects = tested.index(None), stand.effects[batch]
-    fewer, _ = _judge_batches(
-        fleet, stand.judge_with_siblings(batch, (*effects[:k], *effects[k + 1 :])), {batch: members}
-    )
+    reduced = stand.judge_with_siblings(batch, (*effects[:k], *effects[k + 1 :]))
+    fewer, _ = _judge_batches(fleet, reduced, {batch: members}, f"batch {batch}: leaving out {effects[k].effect}")
     return _drop_needless_effects(fleet, fewer, batch, members) if len(effects) > 2 else fewer
 
 
@@ -173,7 +179,8 @@ def _test_jointly(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Memb
     tested = []
     for k, effect in enumerate(effects):
         reduced = stand.judge_with_siblings(batch, (*effects[:k], *effects[k + 1 :]))
-        missed = _judge_batches(fleet, reduced, {batch: members})[1].get(batch, [])
+        step = f"batch {batch}: testing the need of {effect.effect}"
+        missed = _judge_batches(fleet, reduced, {batch: members}, step)[1].get(batch, [])
         tested.append(next((candidate for candidate in missed if candidate.effect == effect.effect), None))
     return tested
 
@@ -187,7 +194,8 @@ def _diagnose_members(fleet: Fleet, stand: Stand, batches: Batches) -> dict[Memb
     outliers = [
         m for m, screened in stand.screening.items() if m not in stand.faults and stands_out(screened, usual[m.batch])
     ]
-    return dict(fleet.ask([(m, stand.question("diagnosis", m)) for m in outliers]))
+    questions = [(m, stand.question("diagnosis", m)) for m in outliers]
+    return dict(fleet.ask(questions, "diagnosing sensors unlike their batch"))
 
 
 def stands_out(look: Screening | ScreeningSummary, batch: Sequence[float]) -> bool:

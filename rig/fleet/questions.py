@@ -72,29 +72,31 @@ def kept(record: Record, keys: Sequence[str]) -> dict[str, Any]:
 CHUNK = {"look": 20, "diagnosis": 4}  # sensors of one task: about half a second's work
 SLICE = 100  # sensors in one query of the record
 KILLED = "its data ends the worker process; send the data to a maintainer with `rig doctor`"
-Tell = Callable[[int, int], None]
+Tell = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
 class Fleet:
-    """The workers, the record, and the function that gets the numbers of finished and of all sensors."""
+    """The workers, the record, and the function that gets the present step, its finished sensors, and all of them."""
 
     client: Client
     record: Record
     tell: Tell
 
-    def ask(self, questions: Sequence[tuple[Member, Question]]) -> Generator[tuple[Member, Any], None, None]:
-        """Every member with its answer or a `fault`, roughly in the order of `questions`."""
+    def ask(self, questions: Sequence[tuple[Member, Question]], step: str) -> Generator[tuple[Member, Any], None, None]:
+        """Every member with its answer or a `fault`, about in the order of `questions`; `step`: for the progress."""
         stored_answers: list[tuple[Member, Any]] = []
         open_: dict[str, list[tuple[Member, Question]]] = {}
         chunks, answered_count = self._chunks(questions, stored_answers, open_), 0
+        if questions:
+            self.tell(step, 0, len(questions))
         for new_answers in self._answers(chunks, open_):
             ready = [*stored_answers, *new_answers]
             stored_answers.clear()
             yield from ready
             answered_count += len(ready)
             if new_answers:
-                self.tell(answered_count, len(questions))
+                self.tell(step, answered_count, len(questions))
 
     def _chunks(
         self,

@@ -22,7 +22,7 @@ from calibrations.analyses.forecast import LATEST_STEADY_S, STRETCH_S, Forecast,
 from calibrations.analyses.soak import HOLD, HOUR_S, REVERSAL
 from calibrations.estimators.least_squares import Recursive
 from calibrations.table import Array
-from calibrations.text import estimate_text, rounded
+from calibrations.text import count_words, estimate_text, rounded
 from procedures.instruments import OUTPUTS
 from procedures.questions import EDGES
 from procedures.session import Dwell, Pose
@@ -126,7 +126,8 @@ class RunningEstimates:
                 value, std = float(estimate.values[place]), float(estimate.scattered[place])
                 if np.isfinite(std):
                     value_text = f"{estimate_text(value, std)} {unit.replace('{out}', output_unit)}"
-                    yield Value(f"{sensor} {parameter}".strip(), value_text, "from the poses so far")
+                    poses = count_words(squares.count, "pose", "poses")
+                    yield Value(f"{sensor} {parameter}".strip(), value_text, f"from {poses}")
 
 
 def _rows_by_load(outputs: Collection[str], load: Callable[[Pose], Array]) -> Callable[[Dwell], Iterator[Row]]:

@@ -23,15 +23,19 @@ from rig.web.parts import button, dialog_with_name, message
 
 LOOK_S = 0.5
 TITLE = "rig workbench"
+BRIEF = "rig"  # after the name of a page in the tab of the browser
 STOP_KEY = "F8"  # the one key that acts on the rig from every page, also while a person types
 PHASES = {"starting": "starts", "running": "runs", "asking": "asks you", "paused": "is paused"}
 
 
 class Strip:
-    """Reads the status twice a second; hidden without a present run."""
+    """Reads the status twice a second; hidden without a present run.
 
-    def __init__(self) -> None:
-        self.title = ""
+    The tab of the browser has the title `idle`, and during a run its progress and its question.
+    """
+
+    def __init__(self, idle: str) -> None:
+        self.idle, self.title = idle, ""
         self.before: Status | None = None
         self.begun = False
         with ui.element("div").classes("under-way").props("role=status") as self.box:
@@ -59,9 +63,8 @@ class Strip:
             self.pause.set_visibility(status.phase == "running" and status.seat != "nobody")
 
     def _title(self, status: Status | None) -> None:
-        """Show in the browser's tab the progress of the run and its question; "" before the first run of this page."""
         if status is None:
-            title = TITLE if self.title else ""
+            title = self.idle
         else:
             share = f"{100 * status.done // status.total} % " if status.total else ""
             attention = "❗ " if status.phase in ("asking", "paused") else ""
@@ -102,6 +105,8 @@ ANSWERS = {
     "none": "This browser allows notifications only on https or on the computer of the server.",
 }
 
+
+LOST = '<script src="/static/lost.js" defer></script>'
 
 # NiceGUI resizes a picture also in the moment in which the page removes it; Plotly then rejects a promise that nobody
 # reads, which the console would show as an error.
@@ -162,29 +167,29 @@ class Key:
 
 
 def static_files() -> None:
-    """Serve the style sheet."""
+    """Serve the style sheet and the script for a lost server."""
     app.add_static_files("/static", STATIC)
 
 
 @contextmanager
-def frame(desk: Desk, path: str) -> Iterator[dict[str, Key]]:
-    """The head of a page; the body adds content and keys."""
+def frame(desk: Desk, path: str, title: str = "") -> Iterator[dict[str, Key]]:
+    """The head of a page; the body adds content and keys. `title`: of the tab, by default the name of the page."""
     keys = {
-        str(k): Key(f"go to {title}", partial(ui.navigate.to, page_path))
-        for k, (page_path, title) in enumerate(PAGES.items(), 1)
+        str(k): Key(f"go to {name}", partial(ui.navigate.to, page_path))
+        for k, (page_path, name) in enumerate(PAGES.items(), 1)
     }
-    ui.add_head_html(f'<link rel="stylesheet" href="/static/workbench.css">{TELL}{RESIZED}')
+    ui.add_head_html(f'<link rel="stylesheet" href="/static/workbench.css">{LOST}{TELL}{RESIZED}')
     ui.colors(primary="#0067a3", negative="#b3261e")
     with ui.element("header").classes("bar"):
         with ui.element("h1").classes("name"):
             ui.label(TITLE)
         with ui.element("nav").classes("ways"):
-            for page_path, title in PAGES.items():
-                ui.link(title, page_path).classes("here" if page_path == path else "")
+            for page_path, name in PAGES.items():
+                ui.link(name, page_path).classes("here" if page_path == path else "")
         if (lab := lab_read()) is not None:
             ui.label(f"record: {lab}").classes("quiet small")
         ui.element("div").classes("space")
-        Strip()
+        Strip(f"{title or PAGES[path]} – {BRIEF}")
         keys[STOP_KEY] = Key("stop the run, also while a field has the focus", stop_run)
         _bell()
         _keys(keys)

@@ -25,18 +25,21 @@ TEXTS = """() => [document.body.innerText, ...Array.from(document.querySelectorA
   each => each.contentDocument ? each.contentDocument.body.innerText : each.textContent)].join("\\n")"""
 GRAVE = ("serious", "critical")
 SWEEP, NOISE = "20260101-120000-sweep-000", "20260131-120000-noise-floor-000"
-PAGES = {  # address: what it shows when it is complete
-    f"/?data={SWEEP}": ".card",
-    f"/?data={NOISE}": "[aria-label='The record'] .lines",
-    "/run": "text=Turns alpha",
-    "/record": "text=soak",
-    f"/record/{SWEEP}": ".report iframe",
-    "/history": "text=Check standards",
-    "/fleet": "text=Many sensors at once",
-    "/history?sensor=simulated": "[aria-label^='Quantit'] .points, .three .points",
-    f"/compare?first={SWEEP}&second={SWEEP}": "[aria-label='Residuals of both'] .points",
-    "/compare": "text=Two runs are needed",
-    "/import": "text=Choose a file",
+PAGES = {  # address: what it shows when it is complete, and what the tab of the browser says
+    f"/?data={SWEEP}": (".card", f"Model of {SWEEP}"),
+    f"/?data={NOISE}": ("[aria-label='The record'] .lines", f"Model of {NOISE}"),
+    "/run": ("text=Turns alpha", "Run"),
+    "/record": ("text=soak", "Record"),
+    f"/record/{SWEEP}": (".report iframe", f"Run {SWEEP}"),
+    "/history": ("text=Check standards", "History"),
+    "/fleet": ("text=Many sensors at once", "Fleet"),
+    "/history?sensor=simulated": ("[aria-label^='Quantit'] .points, .three .points", "History of simulated"),
+    f"/compare?first={SWEEP}&second={SWEEP}": (
+        "[aria-label='Residuals of both'] .points",
+        f"Compare {SWEEP} and {SWEEP}",
+    ),
+    "/compare": ("text=Two runs are needed", "Compare"),
+    "/import": ("text=Choose a file", "Import a file"),
 }
 
 
@@ -60,12 +63,14 @@ def visitor_of(
     context.close()
 
 
-@pytest.mark.parametrize(("path", "shown"), PAGES.items())
-def test_every_page_fits_and_is_accessible(visitor_of: tuple[BrowserContext, str], path: str, shown: str) -> None:
+@pytest.mark.parametrize("path", PAGES)
+def test_every_page_fits_and_is_accessible(visitor_of: tuple[BrowserContext, str], path: str) -> None:
+    shown, title = PAGES[path]
     context, origin = visitor_of
     page = context.new_page()
     page.goto(origin + path)
     expect(page.locator(shown).first).to_be_attached(timeout=PATIENCE_MS)
+    expect(page).to_have_title(f"{title} – rig")
     page.evaluate(SETTLED)
     found = [each for each in axe.Axe().run(page).response["violations"] if each["impact"] in GRAVE]
     assert [(each["id"], each["nodes"][0]["html"], each["nodes"][0]["failureSummary"]) for each in found] == []

@@ -52,7 +52,7 @@ def test_a_file_is_imported_by_drop_downs(workbench: Workbench, tmp_path: Path) 
     page.get_by_role("button", name="Import a file").click()
     page.locator("input[type=file]").set_input_files(path)
     expect(page.get_by_text("Import theirs.csv")).to_be_visible()
-    expect(page).to_have_title("Import theirs.csv")
+    expect(page).to_have_title("Import theirs.csv – rig")
     for column, name in (("inclination", "alpha_deg"), ("table", "beta_deg"), ("Ux", "vx_v"), ("state", "other")):
         expect(page.get_by_label(f"meaning of {column}", exact=True)).to_have_value(name)
     expect(page.get_by_label("unit of Ux")).to_have_value("mV")

@@ -126,7 +126,7 @@ def test_questions_are_asked_and_a_wrong_answer_is_refused(workbench: Workbench)
     workbench.shot(page, "question")
     page.locator(".question").get_by_role("button", name="yes").click()
     phase(page, "complete")
-    expect(page).to_have_title("rig workbench")
+    expect(page).to_have_title("Run – rig")
 
 
 def test_a_plan_that_cannot_be_says_why_and_does_not_start(workbench: Workbench) -> None:

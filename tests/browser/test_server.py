@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -102,11 +103,15 @@ def test_a_page_says_that_its_server_is_lost_and_connects_again(
         said = json.loads(server.stdout.readline())
         page = visitor().new_page()
         page.goto(said["url"])
-        expect(page.get_by_text("There are no measurements yet")).to_be_visible()
+        page.get_by_role("link", name="Run").click()
+        expect(page.get_by_text("Takes", exact=True)).to_be_visible()
         lost = page.get_by_text("The workbench does not answer")
         expect(lost).to_be_hidden()
         server.terminate()
     expect(lost).to_be_visible()
+    page.get_by_label("step (deg)").fill("90")
+    page.get_by_label("step (deg)").press("F8")
+    page.get_by_role("button", name="Start").click()
     box = page.locator("#popup").bounding_box()
     assert box is not None
     assert 0 < box["y"] < 100  # where the eye is, and no button of the head is covered
@@ -115,9 +120,27 @@ def test_a_page_says_that_its_server_is_lost_and_connects_again(
         assert server.stdout is not None
         assert server.stdout.readline()
         expect(lost).to_be_hidden()
+        expect(page).to_have_url(re.compile("step_deg=90"))  # what was typed meanwhile counts
+        expect(page.get_by_label("step (deg)")).to_have_value("90")
         page.context.close()
         server.terminate()
     watch.expects("")  # requests that no server answered
+
+
+def test_a_click_while_the_connection_is_lost_does_nothing_later(workbench: Workbench) -> None:
+    """The browser would send it when the connection is back, and a run would begin when nobody expects it."""
+    page = workbench.visit("/run")
+    expect(page.get_by_text("Takes", exact=True)).to_be_visible()
+    page.evaluate("socket.disconnect()")
+    expect(page.get_by_text("The workbench does not answer")).to_be_visible()
+    page.get_by_role("button", name="Start").click()
+    page.get_by_label("step (deg)").fill("45")
+    page.evaluate("socket.connect()")
+    expect(page.get_by_text("The workbench does not answer")).to_be_hidden()
+    expect(page).to_have_url(re.compile("step_deg=45"))
+    expect(page.get_by_role("dialog")).to_have_count(0)
+    page.get_by_role("button", name="Start").click()
+    expect(page.get_by_role("dialog")).to_be_visible()
 
 
 def test_the_address_lasts_over_a_restart_until_a_new_token_is_asked_for() -> None:

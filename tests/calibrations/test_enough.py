@@ -52,7 +52,7 @@ def test_a_search_stops_at_the_first_error_that_is_small_enough() -> None:
 def test_a_model_whose_error_is_small_enough_gets_no_effect() -> None:
     result = found("100mg")
     assert (names(result), result.verdict) == ([], "adequate")
-    assert result.judgement.text.startswith("The model linear needs no further effect.")
+    assert result.judgement.text.startswith('The model "linear" needs no further effect.')
 
 
 def test_the_text_says_that_no_model_reaches_the_requested_error() -> None:

@@ -24,6 +24,7 @@ from calibrations.presentation.chart import Bars, Chart, Line, Panel, Points, Se
 from calibrations.presentation.charts import fit as charts
 from calibrations.presentation.charts.discovery import (
     MOST_CURVES,
+    Level,
     album,
     brief,
     effect_chart,
@@ -288,6 +289,17 @@ def test_the_waterfall_falls_from_level_to_level() -> None:
     assert dots(panel).x.tolist() == [levels(found)[0].unseen, found.steps[0].held_out_after]
     assert panel.y.names == ("linear", "+ temperature-bias")
     assert bars.texts[0].endswith(f"× ({pool_in_milli(found.start)[0]:.2f} mg)")
+
+
+def test_the_diamond_of_unseen_rows_covers_no_text_of_a_short_bar() -> None:
+    chart = waterfall(
+        [Level("linear", 90.0, 95.0, "9 mg"), Level("+ a", 1.0, 1.6, "0.1 mg"), Level("+ b", 1.2, 1.1, "0.1 mg")]
+    )
+    shown = figure(chart, "waterfall")
+    (bars,) = [trace for trace in shown["data"] if trace["type"] == "bar"]
+    assert [bool(text.strip()) for text in bars["text"]] == [True, False, False]
+    starts = [(note["text"].strip(), 10 ** note["x"], note["y"]) for note in shown["layout"]["annotations"]]
+    assert starts == [("1.00 × (0.1 mg)", pytest.approx(1.6), 1), ("1.20 × (0.1 mg)", pytest.approx(1.2), 2)]
 
 
 def test_the_name_of_a_model_with_many_effects_leaves_room_for_bars() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 from collections import Counter
 from dataclasses import replace
@@ -134,7 +135,7 @@ def test_a_report_loads_nothing_from_the_network(make: object) -> None:
 
 def test_it_opens_with_the_verdict_and_the_falling_error() -> None:
     text = page()
-    assert "<h1>The model linear misses temperature-bias.</h1>" in text
+    assert '<h1>The model "linear" misses temperature-bias.</h1>' in html.unescape(text)
     assert text.index("<h1>") < text.index("waterfall-") < text.index("Residuals of the model linear")
     assert "effect missing" in Page(text).text
 

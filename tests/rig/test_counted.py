@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from calibrations.effects.catalogue import catalogue
+from calibrations.free_forms import search
+from calibrations.free_forms.search import MOST_MISFIT
 from calibrations.progress import report, shown_by
 from rig.services.request import Request
 from rig.services.search import Cancelled, Counted
@@ -43,6 +46,22 @@ def test_an_analysis_says_what_it_does(tmp_path: Path) -> None:
     report("nobody shows this")
     assert [text.partition(" ")[0] for text in texts] == ["Reading", "Fitting", "searching"]
     assert texts[-1] == "searching for places (effects first), pass 1 of at most 7"
+
+
+def test_searches_that_follow_each_other_have_different_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else the progress seems to go back from the last pass of one to the first pass of the next."""
+    steps: list[str] = []
+
+    def descended(_setting: object, _general: bool, step: str, **_options: object) -> SimpleNamespace:
+        steps.append(step)
+        place = SimpleNamespace(place="history")
+        return SimpleNamespace(ratio=MOST_MISFIT + 0.1, active=["loop"], criterion=0.0, component=lambda _: place)
+
+    monkeypatch.setattr(search, "descend", descended)
+    for reason in ("", "with larger noise, round 1, "):
+        search._search_from_all(SimpleNamespace(), True, reason)
+    starts = ["effects first", "all forms together", "with loops"]
+    assert steps == [*starts, *(f"with larger noise, round 1, {start}" for start in starts)]
 
 
 def test_a_cancelled_search_ends(tmp_path: Path) -> None:

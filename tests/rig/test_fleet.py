@@ -27,6 +27,7 @@ from tests.calibrations.fleets import Flaw, Rig, sensor
 Command = Callable[..., Any]
 LINEAR = dump_model(read_model("linear"))
 START = Question("look", LINEAR)
+STEP = "a step"
 RIGS = {"a": Rig(), "b": Rig(wave=0.06), "c": Rig()}
 
 
@@ -129,12 +130,12 @@ def test_answers_are_kept_as_they_come(cluster: LocalCluster, folder: Path, tmp_
     asked = [(member, Question("diagnosis", LINEAR)) for member in members]
     with Client(cluster) as client, Record(tmp_path) as record, pytest.MonkeyPatch.context() as patch:
         patch.setitem(__import__("rig.fleet.questions").fleet.questions.CHUNK, "diagnosis", 1)
-        stopped = Fleet(client, record, lambda *_: None).ask(asked)
+        stopped = Fleet(client, record, lambda *_: None).ask(asked, STEP)
         first, _ = next(stopped)
         stopped.close()
         left: list[list[Any]] = []
         patch.setattr("rig.fleet.questions.run_tasks", lambda _client, _work, chunks: left.extend(chunks) or [])
-        again = [member for member, _ in Fleet(client, record, lambda *_: None).ask(asked)]
+        again = [member for member, _ in Fleet(client, record, lambda *_: None).ask(asked, STEP)]
     assert again == [first]
     assert sum(map(len, left)) == 2
 
@@ -221,6 +222,6 @@ def test_a_run_is_looked_at_by_its_worker(
         run = record.add_table(sensor(3))
         (member,) = fleet_of([run])
         with Client(cluster) as client:
-            ((asked, said),) = Fleet(client, record, lambda *_: None).ask([(member, Question("look", LINEAR))])
+            ((asked, said),) = Fleet(client, record, lambda *_: None).ask([(member, Question("look", LINEAR))], STEP)
     assert isinstance(asked, Member)
     assert "fault" not in said

@@ -26,6 +26,7 @@ from rig.fleet.members import Member, fleet_of
 from rig.fleet.questions import Fleet
 from rig.fleet.worker import Question, Task, answer, write_look
 from rig.record import Record
+from rig.web.pages.fleet import progress_text
 from tests.calibrations import turned
 from tests.calibrations.fleets import BETA, sensor
 
@@ -145,10 +146,11 @@ class Told:
     """A fleet whose sensors miss `of[effects]` beside those effects: names with how strongly; and what was asked."""
 
     def __init__(self, of: dict[tuple[str, ...], dict[str, float]]) -> None:
-        self.of, self.asked = of, set[tuple[str, ...]]()
+        self.of, self.asked, self.steps = of, set[tuple[str, ...]](), list[str]()
         self.bare = screen_sensor(sensor(1), read_model("linear"), SharedDesigns({}))
 
-    def ask(self, asked: Sequence[tuple[Member, Question]]) -> Iterator[tuple[Member, Any]]:
+    def ask(self, asked: Sequence[tuple[Member, Question]], step: str) -> Iterator[tuple[Member, Any]]:
+        self.steps += [step] if asked else []
         for member, question in asked:
             self.asked.add(question.effects)
             yield member, write_look(self._look(int(member.sensor), question.effects))
@@ -166,6 +168,7 @@ class Told:
 
 
 MEMBERS = [Member(str(k), "lot", "", f"{k}.csv") for k in range(12)]
+STEP = "a step"
 START = Question("look", dump_model(read_model("linear")))
 
 
@@ -187,9 +190,16 @@ def test_an_effect_that_others_make_needless_is_dropped() -> None:
 
 
 def test_effects_that_are_all_needed_stay() -> None:
-    found, _ = effects_found({(): {"first": 50.0, "second": 20.0}, ("first",): {"second": 20.0},
-                              ("second",): {"first": 40.0}})  # fmt: skip
+    found, told = effects_found({(): {"first": 50.0, "second": 20.0}, ("first",): {"second": 20.0},
+                                 ("second",): {"first": 40.0}})  # fmt: skip
     assert found == ["first", "second"]
+    assert told.steps == [
+        "searching for missing effects, round 1",
+        "searching for missing effects, round 2",
+        "searching for missing effects, round 3",
+        "batch lot: testing the need of first",
+        "batch lot: testing the need of second",
+    ]
 
 
 def test_what_the_record_knows_passes_through_in_slices(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -200,11 +210,18 @@ def test_what_the_record_knows_passes_through_in_slices(tmp_path: Path, monkeypa
         return {key: {"fault": ""} for key in keys}
 
     monkeypatch.setattr(asked_module, "kept", kept)
-    fleet = Fleet(None, None, lambda *_: None)
-    answers = fleet.ask([(replace(m, digest=str(k)), START) for k, m in enumerate(MEMBERS * 50)])
+    told: list[tuple[str, int, int]] = []
+    fleet = Fleet(None, None, lambda *step: told.append(step))
+    answers = fleet.ask([(replace(m, digest=str(k)), START) for k, m in enumerate(MEMBERS * 50)], STEP)
     next(answers)
     assert asked_for == [asked_module.SLICE]
+    assert told == [(STEP, 0, 600)]  # what the record knows takes no time
     assert sum(1 for _ in answers) == 599
+
+
+def test_the_page_does_not_say_that_all_is_done_while_it_works() -> None:
+    assert progress_text("fitting the sensors", 3, 4) == "Fitting the sensors: 3 of 4 sensors"
+    assert progress_text("fitting the sensors", 4, 4) == "Fitting the sensors: evaluating the answers"
 
 
 def test_copies_of_a_table_are_one_question_and_each_has_its_answer(cluster: LocalCluster, tmp_path: Path) -> None:
@@ -213,6 +230,6 @@ def test_copies_of_a_table_are_one_question_and_each_has_its_answer(cluster: Loc
     one, two = fleet_of([str(tmp_path)])
     assert one.digest == two.digest
     with Client(cluster) as client, Record(tmp_path) as record:
-        said = dict(Fleet(client, record, lambda *_: None).ask([(one, START), (two, START)]))
+        said = dict(Fleet(client, record, lambda *_: None).ask([(one, START), (two, START)], STEP))
     assert said[one] == said[two]
     assert "fault" not in said[one]

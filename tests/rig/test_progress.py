@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import io
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from rig.cli.terminal import progress
+from rig.cli.terminal import compiling, progress
 from rig.cli.terminal.output import note
 from tests.rig.conftest import Ended
 
@@ -96,3 +97,18 @@ def test_a_command_says_what_it_does(
     assert ended.status == quiet.status == 0
     assert says not in quiet.err + ended.out
     assert any(line.startswith(says) for line in ended.err.splitlines()), ended.err
+
+
+COMPILED = """
+from rig.cli.terminal.compiling import say_when_compiling
+say_when_compiling()
+import numba
+import calibrations.criteria
+for function in (lambda x: x + 1, lambda x: x + 2):
+    numba.njit(function)(1)
+"""
+
+
+def test_a_command_that_compiles_says_so_once() -> None:
+    ended = subprocess.run([sys.executable, "-c", COMPILED], capture_output=True, text=True, timeout=60, check=True)
+    assert (ended.stdout, ended.stderr.splitlines()) == ("", [compiling.TEXT])

@@ -72,6 +72,13 @@ def test_bias_and_scale_factor_come_with_the_poses(follower: Any) -> None:
         assert abs(value - true) < 4 * std
 
 
+def test_an_estimate_says_from_how_many_poses_it_is(follower: Any) -> None:
+    """It stays true when the run has ended and its page still shows it."""
+    told = follower("poses")
+    *_, values = (told.values(each) for each in kept(swept((90.0, 60.0)), {"vx": askew}))
+    assert {value.remark for value in values} == {"from 24 poses"}
+
+
 def test_at_one_inclination_the_bias_is_not_told_beside_the_load_along_z(follower: Any) -> None:
     assert set(last(follower("poses"), kept(swept((60.0,)), {"vx": askew}))) == {"scale-x"}
     assert last(follower("poses"), kept(swept((90.0,)), {"vx": askew}))["bias-x"].startswith("2.50")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 import shutil
@@ -122,7 +123,7 @@ def test_the_report_is_one_page_with_both_pictures(rig: Rig, folder: Path) -> No
     ended = rig("report", "still.csv", "--out", "page.html", "--pictures", "pictures", "--format", "svg")
     assert ended.status == 0, ended.err
     page = Path("page.html").read_text()
-    assert "The model still misses flicker-noise." in page
+    assert 'The model "still" misses flicker-noise.' in html.unescape(page)
     assert "Allan deviation and model" in page
     assert "src=" not in page
     assert {path.name for path in Path("pictures").iterdir()} == {"allan.svg", "spectrum.svg"}

@@ -50,7 +50,7 @@ def test_every_command_takes_a_magnetometer(rig: Rig, magnetometer: str, tmp_pat
     model = str(tmp_path / "hard.yaml")
     assert "+ hard-iron" in rig("add", "hard-iron", "--model", "field", "--data", magnetometer, "--out", model).out
     assert "side " in rig("compare", magnetometer, "--model", model).out
-    assert "The model field+hard-iron misses soft-iron." in rig("diagnose", magnetometer, "--model", model).out
+    assert 'The model "field+hard-iron" misses soft-iron.' in rig("diagnose", magnetometer, "--model", model).out
     page = tmp_path / "report.html"
     assert rig("report", magnetometer, "--model", "field", "--out", str(page)).status == 0
     assert "‰ of the field" in page.read_text(encoding="utf-8")
@@ -75,7 +75,7 @@ def test_every_command_takes_a_gyroscope(rig: Rig, gyroscope: str, tmp_path: Pat
     assert json.loads(said.out)["causes"] == ["gyro-misalignment"]
     assert "give the constant latitude_deg" in said.err
     assert "rate " in rig("compare", gyroscope).out
-    assert "The model gyroscope misses gyro-misalignment." in rig("diagnose", gyroscope).out
+    assert 'The model "gyroscope" misses gyro-misalignment.' in rig("diagnose", gyroscope).out
     fitted = json.loads(rig("fit", gyroscope, "--model", model, "--json").out)["calibration"]
     assert fitted["unit"] == {"from": "count", "to": "deg/s"}
     assert np.diag(fitted["S"]["value"]) == pytest.approx([1 / 16.0, 1 / 15.5, 1 / 16.4], rel=1e-3)

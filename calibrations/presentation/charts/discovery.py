@@ -43,7 +43,7 @@ from calibrations.text import rounded
 BELOW = 0.5  # times the floor: where the logarithmic axis begins
 FEWEST = 4  # bars that there is room for: one alone is no thicker than they
 NEAR = 1.15  # times the floor: as good as noise
-LONG = 0.3  # of the axis: a bar that its text fits into
+LONG = 0.5  # of the axis: a bar that its text fits into
 ROW = 0.42  # inches
 MANY_EFFECTS = 2  # in the name of a model: more are counted, so that bars have room
 MOST_CURVES = 4
@@ -107,7 +107,7 @@ def waterfall(steps: Sequence[Level], words: Measure = Measure()) -> Chart:
     hover = [f"{rounded(value)} × {words.over} on {words.unseen}" for value in unseen]
     series = (
         Span(BELOW, 1.0, "x"),
-        Bars(BELOW, excess, colours, texts, text_inside),
+        Bars(BELOW, excess, colours, texts, text_inside, starts=np.fmax(excess, unseen)),  # behind the diamond
         Points(unseen, np.arange(len(steps), dtype=float), colour=UNSEEN, symbol="diamond", size=10, hover=hover),
     )
     x = Axis(words.axis, log=True, low=BELOW, high=reach)

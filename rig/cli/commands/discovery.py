@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from rig.cli.terminal.complete import complete_data, complete_effect, complete_model
-from rig.cli.terminal.options import request_options
+from rig.cli.terminal.options import DataCommand, request_options
 from rig.cli.terminal.output import (
     check_option,
     emit,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from rig.services.request import Request
 
 
-@click.command("compare")
+@click.command("compare", cls=DataCommand)
 @click.argument("data", shell_complete=complete_data)
 @model_option
 @check_option
@@ -64,7 +64,7 @@ def compare_command(request: Request, check: bool, as_json: bool) -> int:
     return int(silent or (check and (not result.adequate or undetermined)))
 
 
-@click.command("diagnose")
+@click.command("diagnose", cls=DataCommand)
 @click.argument("data", shell_complete=complete_data)
 @model_option
 @check_option
@@ -180,7 +180,7 @@ def _find_effect(effect: str, name: str | None, question: Loaded) -> Effect:
     return resolve_effect(effect, question.effects)
 
 
-@click.command("discover")
+@click.command("discover", cls=DataCommand)
 @click.argument("data", nargs=-1, shell_complete=complete_data)
 @model_option
 @out_option("Write the final model to this file.")

@@ -19,7 +19,7 @@ from calibrations.geometry.sphere import Faces, estimate_faces
 from calibrations.table import Array, Table
 from calibrations.text import columns, concise
 from rig.cli.terminal.complete import complete_data
-from rig.cli.terminal.options import request_options
+from rig.cli.terminal.options import DataCommand, request_options
 from rig.cli.terminal.output import check_option, emit, model_option, note, notes, out_option
 from rig.cli.terminal.progress import working
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from rig.services.request import Request
 
 
-@click.command("fit")
+@click.command("fit", cls=DataCommand)
 @click.argument("data", shell_complete=complete_data)
 @model_option
 @out_option("Write the fitted model to this file.")

@@ -145,16 +145,16 @@ def _fleet(request: Request) -> Iterator[tuple[Fleet, list[Member]]]:
 
 
 class _Steps:
-    """Prints the progress at every tenth of a round."""
+    """Prints the progress at every tenth of a step."""
 
     def __init__(self) -> None:
-        self._printed = (0, 0)
+        self._printed = ("", 0)
 
-    def __call__(self, count: int, total: int) -> None:
-        step = (total, 10 * count // total)
-        if step != self._printed:
-            self._printed = step
-            note(f"{count} of {total} sensors analysed")
+    def __call__(self, step: str, count: int, total: int) -> None:
+        tenth = (step, 10 * count // total)
+        if count and tenth != self._printed:
+            self._printed = tenth
+            note(f"{step}: {count} of {total} sensors")
 
 
 # Results in words.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from rig.cli.terminal.complete import complete_data, complete_model
-from rig.cli.terminal.options import request_options
+from rig.cli.terminal.options import DataCommand, request_options
 from rig.cli.terminal.output import (
     FILE,
     bench_option,
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from rig.services.request import Request
 
 
-@click.command("report")
+@click.command("report", cls=DataCommand)
 @click.argument("data", shell_complete=complete_data)
 @model_option
 @picture_options("Write all pictures here.")

@@ -113,6 +113,24 @@ def _pair(text: str) -> tuple[str, str]:
     return name.replace("-", "_"), value
 
 
+class DataCommand(click.Command):
+    """A command with DATA and --model: a model after DATA belongs to --model."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        values, words, _ = self.make_parser(ctx).parse_args(list(args))
+        several = values["data"][1:] if isinstance(values["data"], tuple) else ()
+        if model := next(filter(_is_model, (*several, *words)), None):
+            raise click.UsageError(f"{model} is a model: give it as --model {model}", ctx)
+        return super().parse_args(ctx, args)
+
+
+def _is_model(word: str) -> bool:
+    """Whether a word is the name of a shipped model, or that of a model file."""
+    from calibrations.model.file import shipped_names
+
+    return word.endswith((".yaml", ".yml")) or word in shipped_names()
+
+
 # The options that the analysis commands share, as one argument `request`.
 
 

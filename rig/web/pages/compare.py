@@ -113,7 +113,7 @@ def register(desk: Desk) -> None:
 
     @ui.page("/compare")
     def page(first: str = "", second: str = "", model: str = "") -> None:
-        with frame(desk, "/record") as keys:
+        with frame(desk, "/record", f"Compare {first} and {second}" if first and second else "Compare") as keys:
             if not first or not second:
                 with state("Two runs are needed", "Select them on the page Record, then Compare."):
                     button("Record", "list", lambda: ui.navigate.to("/record"))

@@ -10,6 +10,7 @@ from fastapi import Request
 from nicegui import ui
 
 from calibrations.model.file import dump_model, read_model
+from calibrations.text import capital
 from rig.fleet.members import Member, fleet_of
 from rig.record import Record
 from rig.web.calculations import Visit, off_loop
@@ -22,7 +23,7 @@ WHY = (
     "A fleet is the last complete run of every sensor in the record, or the tables of a folder or of an index with the "
     "columns sensor, batch, rig and file."
 )
-Tell = Callable[[int, int], None]
+Tell = Callable[[str, int, int], None]
 
 
 def register(desk: Desk) -> None:
@@ -30,7 +31,7 @@ def register(desk: Desk) -> None:
 
     @ui.page("/fleet")
     def page(request: Request) -> None:
-        with frame(desk, "/history"):
+        with frame(desk, "/history", "Fleet"):
             FleetPage(desk, request.query_params.get("source", ""), request.query_params.get("model", "linear"))
 
 
@@ -72,9 +73,15 @@ class FleetPage:
                 button("Download", "download", lambda: ui.download.content(text, "fleet.html"))
             ui.html(frame_html("Report on the fleet", text), sanitize=False)
 
-    def _show_progress(self, count: int, total: int) -> None:
+    def _show_progress(self, step: str, count: int, total: int) -> None:
         self.visit.check()
-        self.done = f"{count} of {total} sensors analysed"
+        self.done = progress_text(step, count, total)
+
+
+def progress_text(step: str, count: int, total: int) -> str:
+    """The present step of an analysis: between its last answer and the next step, the answers are evaluated."""
+    doing = f"{count} of {total} sensors" if count < total else "evaluating the answers"
+    return f"{capital(step)}: {doing}"
 
 
 def discovery_page(sources: list[str], model: str, bench_file: Any, notify: Tell) -> str:

@@ -90,7 +90,8 @@ def register(desk: Desk) -> None:
 
     @ui.page("/history")
     def page(request: Request) -> None:
-        with frame(desk, "/history") as keys:
+        sensor = request.query_params.get("sensor", "")
+        with frame(desk, "/history", f"History of {sensor}" if sensor else "") as keys:
             try:
                 all_runs = runs()
                 history_request, runs_by_sensor = parse_request(request.query_params), calibrating(all_runs)

@@ -73,13 +73,12 @@ UNIT_DOUBT = re.compile(  # the end of a message about a unit that does not fit 
 def register(desk: Desk) -> None:
     """The page at /import; the file, the kind of table and the constants may be part of the address."""
 
-    @ui.page("/import", title="Import a file")
+    @ui.page("/import")
     async def page(request: Request, file: str = "", topic: str = "") -> None:
-        with frame(desk, "/record"):
+        with frame(desk, "/record", f"Import {Path(file).name or 'a file'}"):
             if not file:
                 _choose()
                 return
-            ui.page_title(f"Import {Path(file).name}")
             body = div("stack")
             with body:
                 waiting(f"Reading {Path(file).name}")

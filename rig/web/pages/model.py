@@ -70,7 +70,7 @@ class Workbench:
             with frame(self.desk, "/"):
                 show_error("The record cannot be read", error)
             return
-        with frame(self.desk, "/") as keys:
+        with frame(self.desk, "/", f"Model of {Path(self.data).name}" if self.data else "") as keys:
             self.chosen = Choice(self)
             self.body = div("stack")
         with self.body:

@@ -73,8 +73,7 @@ class Choice:
                     ui.menu_item(label, on_click=lambda path=path: self._open(page.data, page.model, path))
 
     def opened(self, session: ModelSession[Any]) -> None:
-        """Show the names of the open data and model, also if the address has none."""
-        self.data.set_value(self.page.data)
+        """Show the name of the default model, and enable the buttons for the model."""
         if not self.page.model:
             self.model.set_options(models(default=f"{session.model.name} (default)"), value="")
         self.save.enable()

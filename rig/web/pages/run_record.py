@@ -210,7 +210,7 @@ def register(desk: Desk) -> None:
 
     @ui.page("/record/{run}")
     def page(run: str) -> None:
-        with frame(desk, "/record"):
+        with frame(desk, "/record", f"Run {run}"):
             try:
                 with Record.to_find(run) as record:
                     recorded_run, excluded = record.run(run), record.excluded(run)

@@ -1,0 +1,51 @@
+// A page whose server does not answer: clicks and keys do nothing, and text in its fields outlasts the reload.
+//
+// Without this, the browser would send a click when the connection is back: a run would begin when nobody expects it.
+(() => {
+  const KEPT = "typed text";
+  const PATIENCE_MS = 60000; // until a field appears, of a page that computes before it shows all fields
+  const LOOK_MS = 200;
+  const typed = new Set(); // names of fields in which a person has written
+
+  const lost = () => document.getElementById("popup")?.ariaHidden === "false";
+  const isText = (field) =>
+    field.matches?.("textarea, input:not([type=checkbox], [type=radio], [type=file])") && !field.closest(".q-select, .q-dialog");
+  const fields = () => [...document.querySelectorAll("textarea, input")].filter(isText);
+  const label = (field) => field.getAttribute("aria-label") || field.placeholder;
+  const named = (name) => fields().find((field) => label(field) === name);
+
+  const hold = (event) => {
+    const writes = event.type === "keydown" && isText(event.target) && !["Enter", "F8"].includes(event.key);
+    if (!lost() || writes) return;
+    event.stopImmediatePropagation();
+    event.preventDefault();
+  };
+  for (const kind of ["click", "keydown"]) window.addEventListener(kind, hold, true);
+
+  window.addEventListener("input", (event) => isText(event.target) && typed.add(label(event.target)), true);
+  window.addEventListener("pagehide", () => {
+    if (!lost()) return;
+    const texts = [...typed].map((name) => [name, named(name)?.value]).filter(([, text]) => text);
+    sessionStorage.setItem(KEPT, JSON.stringify({ address: location.href, texts }));
+  });
+
+  const kept = JSON.parse(sessionStorage.getItem(KEPT) || "{}");
+  sessionStorage.removeItem(KEPT);
+  if (kept.address !== location.href) return;
+  const waiting = new Map(kept.texts);
+  const write = (field, text) => {
+    Object.getOwnPropertyDescriptor(Object.getPrototypeOf(field), "value").set.call(field, text);
+    field.dispatchEvent(new Event("input", { bubbles: true }));
+  };
+  const timer = setInterval(() => {
+    if (!window.did_handshake) return;
+    for (const [name, text] of waiting) {
+      const field = named(name);
+      if (!field) continue;
+      waiting.delete(name);
+      if (field.value !== text) write(field, text);
+    }
+    if (!waiting.size) clearInterval(timer);
+  }, LOOK_MS);
+  setTimeout(() => clearInterval(timer), PATIENCE_MS);
+})();
