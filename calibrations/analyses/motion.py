@@ -154,9 +154,8 @@ class MotionResult:
 def evaluate_motion(table: Table, linear: Model, physical: Model, still: Table | None = None) -> MotionResult:
     """Both models, with their values, on the longest record of a table of motion.
 
-    The noise limit comes from the `still` record of the same sensor, or else from the physical model's residual
-    outside of
-    the motion's lines. Raises ModelError for a model without values, DataError where nothing moves.
+    The noise limit comes from the `still` record of the same sensor, or else from the physical model's residual outside
+    of the motion's lines. Raises ModelError for a model without values, DataError where nothing moves.
     """
     record = max(find_records(table), key=lambda r: r.end - r.first)
     part = table.rows(np.arange(record.first, record.end))

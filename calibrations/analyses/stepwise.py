@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.errors import DataError
-from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.geometry.orientation import reported_force
 from calibrations.importing.foreign import require_kind
 from calibrations.means.noise import rms
 from calibrations.table import Array, Table
@@ -181,7 +181,7 @@ class Stepwise:
     @cached_property
     def force(self) -> Array:
         """Specific force by the stage angles, g, shape (n, 3)."""
-        return specific_force(nominal_pose(self.table))
+        return reported_force(self.table)
 
     @cached_property
     def predicted(self) -> Array:
@@ -234,7 +234,7 @@ def estimate_stepwise(table: Table) -> Stepwise:
     """
     require_kind(table, "poses")
     v = np.column_stack([table.output("x"), table.output("y")])
-    a = specific_force(nominal_pose(table))
+    a = reported_force(table)
     turn = in_vertical_plane(a)
     x, y = (
         estimate_axis(axis, inclination_planes(table, k, v[:, k], a), v[turn, k], v[turn, 1 - k], a[turn, k])

@@ -17,7 +17,7 @@ from calibrations.compensation.forward import FORCES, INVERTED, Forward, steps_o
 from calibrations.compensation.program import Program
 from calibrations.effects.logged import RATE
 from calibrations.errors import CalibrationError, ModelError
-from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.geometry.orientation import reported_force
 from calibrations.geometry.stage_path import turning_points
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.chain import Step, respond, sensed
@@ -218,7 +218,7 @@ def compensation_costs(
 ) -> Cost:
     """All costs of a compensation, in `unit`; `spans` has the stated ranges of the inputs besides the outputs."""
     table = _sweep(model, spans)
-    a = specific_force(nominal_pose(table)) * (1.0 if unit != "deg/s" else reach)
+    a = reported_force(table) * (1.0 if unit != "deg/s" else reach)
     fates = {fate.effect: fate.how for fate in forward.fates}
     followed = [step for step in steps_of(model) if fates[step[0].name] == INVERTED]
     trial = _Trial(forward, program, table, a, memory_at(table, sensed(a, table, followed), forward))

@@ -178,7 +178,7 @@ def _select_used_values(outputs: Sequence[Node], memories: Mapping[str, Node]) -
 
 
 def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str, Node]]:
-    """Outputs of all three axes, shape (1, 3), and what is remembered after the sample, by name.
+    """Outputs of all three axes, shape (1, 3), and the values stored after the sample, by name.
 
     The signal chain of `calibrations.model.chain`, without its poses.
     """
@@ -186,23 +186,49 @@ def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str,
     a: Any = Traced([[variable(name) for name in FORCES]])
     for effect, p in steps:
         a = effect.force(a, table, p)
+    v, of_force, memory = _response_to_force(a, steps, table)
+    force = add_response(a, of_force, steps) if any(effect.of_force and not effect.scales for effect, _ in steps) else a
+    v = _scale(a, force, v, steps, table)
+    for effect, p in steps:
+        if isinstance(effect, FreeForm) and "output" in effect.places:
+            v = v + trace_free_form(effect, a, v, table, p)
+        else:
+            v = effect.output(v, table, p)
+    return as_traced(v), memory
+
+
+def _response_to_force(a: Any, steps: Sequence[Step], table: Any) -> tuple[Any, Any, dict[str, Node]]:
+    """Outputs of the effects that do not scale, the part that acts like a force, and the stored values by name."""
     v: Any = as_traced(np.zeros((1, 3)))
     of_force: Any = as_traced(np.zeros((1, 3)))
     memory: dict[str, Node] = {}
     for effect, p in steps:
         before_v = v
         if effect.memory:
-            slots = [[f"m{len(memory) // 3 + k}{axis}" for axis in AXES] for k in range(effect.memory)]
-            slots_before: Any = [Traced([[variable(name) for name in row]]) for row in slots]
-            part, slots_after = effect.follow(a, table, p, slots_before)
-            for row, stored in zip(slots, slots_after, strict=True):
-                memory |= dict(zip(row, as_traced(stored).nodes[0], strict=True))
+            part, stored = _follow(a, (effect, p), table, len(memory) // 3)
+            memory |= stored
             v = v + part
         elif "transduction" in effect.places and not effect.scales:
             v = v + _response(effect, a, table, p)
         if effect.of_force:
             of_force = of_force + (v - before_v)
-    force = add_response(a, of_force, steps) if any(effect.of_force and not effect.scales for effect, _ in steps) else a
+    return v, of_force, memory
+
+
+def _follow(a: Any, step: Step, table: Any, first_slot: int) -> tuple[Any, dict[str, Node]]:
+    """Output of an effect with a history, and its stored values by name. Their numbers begin at `first_slot`."""
+    effect, p = step
+    slots = [[f"m{first_slot + k}{axis}" for axis in AXES] for k in range(effect.memory)]
+    slots_before: Any = [Traced([[variable(name) for name in row]]) for row in slots]
+    part, slots_after = effect.follow(a, table, p, slots_before)
+    stored: dict[str, Node] = {}
+    for row, values in zip(slots, slots_after, strict=True):
+        stored |= dict(zip(row, as_traced(values).nodes[0], strict=True))
+    return part, stored
+
+
+def _scale(a: Any, force: Any, v: Any, steps: Sequence[Step], table: Any) -> Any:
+    """The outputs `v` with the effects that scale the response, stage by stage."""
     for stage in (Stage.SCALE, Stage.DRIFT):
         response = force
         for effect, p in steps:
@@ -210,12 +236,7 @@ def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str,
                 part = staged_part(stage, partial(_response, effect, table=table, p=p), a, response)
                 v = v + part
                 force = add_response(force, part, steps) if effect.of_force else force
-    for effect, p in steps:
-        if isinstance(effect, FreeForm) and "output" in effect.places:
-            v = v + trace_free_form(effect, a, v, table, p)
-        else:
-            v = effect.output(v, table, p)
-    return as_traced(v), memory
+    return v
 
 
 def _response(effect: Effect, a: Any, table: Any, p: Values) -> Traced:

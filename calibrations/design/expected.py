@@ -23,7 +23,7 @@ from calibrations.errors import DataError, MissingColumn
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.minimise import newton_step
 from calibrations.fitting.problem_kinds import make_problem
-from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.geometry.orientation import reported_force
 from calibrations.joined import join_tables
 from calibrations.means.noise import white_only
 from calibrations.model import Model
@@ -166,7 +166,7 @@ def _expect_outputs(
     noise = {f"v{axis}_std_v": np.full(n, SAMPLE_STD_V) for axis in axes}
     flat = {f"v{axis}_v": np.zeros(n) for axis in axes}
     table = Table.from_columns("poses", {"n": np.ones(n)} | calm | dict(columns) | noise | flat, constants, "a plan")
-    a = specific_force(nominal_pose(table))
+    a = reported_force(table)
     outputs = {f"v{axis}_v": a[:, AXES.index(axis)] for axis in axes}
     return Table.from_columns("poses", {**table.columns, **outputs}, constants, "a plan")
 

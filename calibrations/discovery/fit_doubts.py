@@ -9,7 +9,7 @@ Source  von Neumann, Ann. Math. Statist. 12 (1941): the mean square of successiv
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.fitting.fit import Fit
 from calibrations.geometry.orientation import one_orientation
 from calibrations.means.noise import inflation, rms, robust_std, white_std
+from calibrations.model import Estimate
 from calibrations.table import Array, Table
 from calibrations.tables import Kind
 
@@ -181,48 +182,64 @@ def misfit(fit: Fit) -> Finding | None:
 
 def _response(fit: Fit) -> Iterator[str]:
     """Scale factors that no sensor has."""
-    table, kind = fit.table, fit.table.type
     scale_factors = [
         e for name in SCALES for e in fit.model.estimates(name)
         if e.axis and e.std is not None and (e.identified or e.std > 0) and e.name in ("scale_factor", "scale", name)
     ]  # fmt: skip
     if not scale_factors:
         return
-    for e in scale_factors:
-        if e.std is not None and abs(e.value) < ROWS_APART * e.std:
-            yield (
-                f"the scale factor of {e.axis} is 0 within its uncertainty: this output does not follow "
-                f"{_input(kind)}; check its column, its cable and the reference"
-            )
-            return
-    sizes = {e.axis: abs(e.value) for e in scale_factors}
-    low, high = min(sizes, key=lambda a: sizes[a]), max(sizes, key=lambda a: sizes[a])
-    if sizes[high] > UNLIKE_AXES * sizes[low] > 0:
-        yield (
-            f"the scale factor of {high} is {sizes[high] / sizes[low]:.3g} times that of {low}, and the axes of one "
-            "sensor are alike; check the units and the gains of these outputs"
-        )
+    kind, unit = fit.table.type, fit.table.unit
+    if (doubt := _zero_response(scale_factors, kind) or _unlike_axes(scale_factors)) is not None:
+        yield doubt
         return
-    value = float(np.median(list(sizes.values())))
+    value = float(np.median([abs(e.value) for e in scale_factors]))
     if kind.moving and all(e.value < 0 for e in scale_factors):
         yield (
             "the scale factor is negative: displacement_m or the outputs have the wrong sign, or the sensor is turned; "
             "check the direction in which displacement_m counts"
         )
-    if table.unit == "V" and kind.input_unit == "g" and not V_PER_G[0] <= value <= V_PER_G[1]:
+    if unit == "V" and kind.input_unit == "g" and not V_PER_G[0] <= value <= V_PER_G[1]:
         yield (
             f"a scale factor of {value:.3g} V/g is no accelerometer's ({V_PER_G[0]:g} to {V_PER_G[1]:g} V/g); check "
             "the units of the outputs and of the reference"
         )
-    if table.unit == kind.input_unit == "deg/s" and not OWN_UNIT[0] <= value <= OWN_UNIT[1]:
-        units = {
-            u: size
-            for name, of in RATE_UNITS.items()
-            for u, size in ((f"rate_deg_s in {name}", of), (f"outputs in {name}", 1 / of))
-        }
-        likely = [text for text, of in units.items() if 1 / SAME_FACTOR < value / of < SAME_FACTOR]
-        fits = f"it looks like {' or '.join(likely)}" if likely else "the unit of rate_deg_s or of the outputs is wrong"
-        yield f"outputs in deg/s have a scale factor of {value:.4g}; {fits}: state the unit of each column"
+    if unit == kind.input_unit == "deg/s" and not OWN_UNIT[0] <= value <= OWN_UNIT[1]:
+        yield _wrong_rate_unit(value)
+
+
+def _zero_response(scale_factors: Sequence[Estimate], kind: Kind) -> str | None:
+    """An axis whose scale factor is 0 within its uncertainty."""
+    for e in scale_factors:
+        if e.std is not None and abs(e.value) < ROWS_APART * e.std:
+            return (
+                f"the scale factor of {e.axis} is 0 within its uncertainty: this output does not follow "
+                f"{_input(kind)}; check its column, its cable and the reference"
+            )
+    return None
+
+
+def _unlike_axes(scale_factors: Sequence[Estimate]) -> str | None:
+    """Two axes with very different scale factors."""
+    sizes = {e.axis: abs(e.value) for e in scale_factors}
+    low, high = min(sizes, key=lambda a: sizes[a]), max(sizes, key=lambda a: sizes[a])
+    if not sizes[high] > UNLIKE_AXES * sizes[low] > 0:
+        return None
+    return (
+        f"the scale factor of {high} is {sizes[high] / sizes[low]:.3g} times that of {low}, and the axes of one "
+        "sensor are alike; check the units and the gains of these outputs"
+    )
+
+
+def _wrong_rate_unit(scale_factor: float) -> str:
+    """A gyroscope in deg/s whose scale factor is far from 1, and the unit that explains it."""
+    units = {
+        u: size
+        for name, of in RATE_UNITS.items()
+        for u, size in ((f"rate_deg_s in {name}", of), (f"outputs in {name}", 1 / of))
+    }
+    likely = [text for text, of in units.items() if 1 / SAME_FACTOR < scale_factor / of < SAME_FACTOR]
+    fits = f"it looks like {' or '.join(likely)}" if likely else "the unit of rate_deg_s or of the outputs is wrong"
+    return f"outputs in deg/s have a scale factor of {scale_factor:.4g}; {fits}: state the unit of each column"
 
 
 def _input(kind: Kind) -> str:

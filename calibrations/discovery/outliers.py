@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from calibrations.criteria import GROSS, MOST_GROSS, SAME_G
 from calibrations.fitting.fit import Fit, fit
-from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.geometry.orientation import reported_force
 from calibrations.means.noise import robust_std
 from calibrations.model import Model
 from calibrations.table import Array, Table
@@ -35,7 +35,7 @@ def gross(complete: Fit) -> NDArray[np.intp]:
     table = complete.table
     if not table.type.stage_angles or table.n < 3 * NEIGHBOURS:
         return np.zeros(0, dtype=np.intp)
-    direction = specific_force(nominal_pose(table))
+    direction = reported_force(table)
     neighbour_residuals = complete.residual[:, _nearest(direction)]
     middle = np.median(neighbour_residuals, axis=2)
     deviation = complete.residual - middle

@@ -44,7 +44,7 @@ from calibrations.criteria import (
 from calibrations.discovery.readings import Response, geometry_finding, response
 from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.fitting.fit import Fit
-from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.geometry.orientation import reported_force
 from calibrations.geometry.rate_table import turn_axes
 from calibrations.means.noise import rms, white_std
 from calibrations.table import AXES, Array, Table
@@ -68,7 +68,7 @@ def findings(table: Table) -> tuple[Finding, ...]:
         return tuple(_of_rates(table))
     if not table.type.stage_angles:
         return ()
-    force = specific_force(nominal_pose(table))
+    force = reported_force(table)
     stated_response, variation = response(table.outputs, force), table.outputs.std(axis=0)
     dead_outputs = tuple(_unresponsive_outputs(table, stated_response))
     least = V_PER_G[0] * force.std(axis=0).max() if table.unit == "V" else 0.0
@@ -112,7 +112,7 @@ def _implausible_zero(fit: Fit) -> Finding | None:
 
 def _unresponsive_outputs(table: Table, stated_response: Response) -> Iterator[Finding]:
     """Outputs that do not respond to gravity, or in some rows only."""
-    a = specific_force(nominal_pose(table))
+    a = reported_force(table)
     white = white_std(table)
     for k, name in enumerate(table.output_names):
         if np.std(a[:, k]) < EXCITED_G:
@@ -225,7 +225,7 @@ def _two_groups(table: Table, known_input: Array | None = None) -> Finding | Non
     """
     if known_input is None:
         table = table.in_order()
-        known_input = specific_force(nominal_pose(table))
+        known_input = reported_force(table)
     columns = np.column_stack([np.ones(table.n), known_input])
     labels, within_share, distance = _clusters(columns, table.outputs)
     if within_share > LEFT_WITHIN_GROUPS:  # effects that both sensors have may hide the groups

@@ -31,7 +31,7 @@ from calibrations.criteria import (
     UNTOUCHED_BY_READINGS,
 )
 from calibrations.discovery.verdict import Finding, Verdict
-from calibrations.geometry.orientation import Pose, nominal_pose, specific_force
+from calibrations.geometry.orientation import Pose, nominal_pose, reported_force, specific_force
 from calibrations.means.noise import rms, white_std
 from calibrations.table import AXES, Array, Table
 
@@ -71,7 +71,7 @@ def geometry_finding(table: Table, stated_response: Response) -> Finding | None:
     if (reading := _find_better_columns(table, 1 - stated_response.share)) is not None:
         return Finding(Verdict.UNEXPLAINED, f"the outputs do not follow the poses as stated; they do if {reading}")
     explained = bool(np.all(stated_response.share >= EXPLAINED_BY_GEOMETRY))
-    assignment = _assignment(table, stated_response, specific_force(nominal_pose(table))) if explained else None
+    assignment = _assignment(table, stated_response, reported_force(table)) if explained else None
     if explained and (assignment is None or assignment.verdict is None):
         return assignment
     angle_readings = " or if ".join(_find_better_angles(table, stated_response, explained))
@@ -160,7 +160,7 @@ def _by_sensor(table: Table) -> float:
 
     A scale factor that changes with the third axis resembles an angle with a wrong scale of half a percent.
     """
-    force = specific_force(nominal_pose(table))
+    force = reported_force(table)
     x, y, z = force[:, 0], force[:, 1], force[:, 2]
     mechanisms: list[list[Array]] = [
         [x**2, x**3, y**2, y**3, np.abs(x), np.abs(y)],
@@ -201,7 +201,7 @@ def _refine_angle(angle: _Angle, table: Table, *, free_scale: bool) -> _Angle:
 
 def _check_row_shift(table: Table, limit: float) -> str | None:
     """One output, or all outputs, in another row than their pose."""
-    force = specific_force(nominal_pose(table))
+    force = reported_force(table)
     names = table.output_names
     for shift in SHIFTS:
         overlap = slice(max(-shift, 0), table.n - max(shift, 0))
@@ -219,7 +219,7 @@ def _check_row_shift(table: Table, limit: float) -> str | None:
 
 def _response_change(table: Table, limit: float) -> str | None:
     """A row at which the linear response of the outputs changes."""
-    columns = np.column_stack([np.ones(table.n), specific_force(nominal_pose(table))])
+    columns = np.column_stack([np.ones(table.n), reported_force(table)])
     outputs = (table.outputs - table.outputs.mean(axis=0)) / table.outputs.std(axis=0)
     first, last = FEWEST_RESPONSE_ROWS, table.n - FEWEST_RESPONSE_ROWS
     if last <= first:

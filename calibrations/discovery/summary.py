@@ -6,6 +6,7 @@ a line is its part of the squares of all lines.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -68,12 +69,19 @@ def summary_lines(discovery: Discovery[Fit]) -> list[Line]:
     """The lines, largest first."""
     if not discovery.steps:
         return []  # an output that does not respond has no scale
-    findings, end = discovery.findings, discovery.end
+    lines, listed = _place_lines(discovery)
+    lines += _further_lines(discovery, listed)
+    total = sum(line.size**2 for line in lines) or 1.0
+    return sorted((replace(line, share=line.size**2 / total) for line in lines), key=lambda line: -line.size)
+
+
+def _place_lines(discovery: Discovery[Fit]) -> tuple[list[Line], set[str]]:
+    """A line for each place that acts, without its share, and the effects that these lines list."""
+    end, alternatives = discovery.end, discovery.alternatives
     floor, unit = pool_in_milli(end)[1], milli_unit(end)
     added_effects = {step.name for step in discovery.steps}
-    alternatives = discovery.alternatives
     lines, listed = list[Line](), set[str]()
-    for place in findings.places:
+    for place in discovery.findings.places:
         in_model = [c for c in place.causes if c in added_effects]
         free_form = f"{PREFIX}{place.name}"
         if not in_model and free_form not in added_effects:
@@ -85,19 +93,24 @@ def summary_lines(discovery: Discovery[Fit]) -> list[Line]:
         size, certainty = place.size * floor, 1 - place.p_value
         lines.append(Line(place.name, effects, possible, size, unit, 0.0, certainty, tuple(rivals), in_another_form))
         listed |= {*in_model, free_form}
+    return lines, listed
+
+
+def _further_lines(discovery: Discovery[Fit], listed: Collection[str]) -> Iterator[Line]:
+    """A line for each further step, without its share; none for an effect that refines the form of a cause."""
+    end, unit = discovery.end, milli_unit(discovery.end)
+    added_effects = {step.name for step in discovery.steps}
     for step in discovery.steps:
         if step.name in listed or (step.name in discovery.refinements and not step.name.startswith(PREFIX)):
             continue
         change = rms(in_milli_rows(step.after.residual - step.before.residual, end))
         size = float(np.sqrt(np.mean(change**2)))
-        inseparable = tuple(alternatives.get(step.name, ()))
+        inseparable = tuple(discovery.alternatives.get(step.name, ()))
         certainty = 1 - chance(*first_order_cost(end, step.name, *added_effects.intersection(inseparable)))
         effects = () if step.name.startswith(PREFIX) else (step.name,)
         place_name = place_of_effect(step.name) or "-"
         in_another_form = bool(effects) and f"{PREFIX}{place_name}" in added_effects
-        lines.append(Line(place_name, effects, (), size, unit, 0.0, certainty, inseparable, in_another_form))
-    total = sum(line.size**2 for line in lines) or 1.0
-    return sorted((replace(line, share=line.size**2 / total) for line in lines), key=lambda line: -line.size)
+        yield Line(place_name, effects, (), size, unit, 0.0, certainty, inseparable, in_another_form)
 
 
 def in_milli_rows(values: Array, fit: Fit) -> Array:

@@ -16,7 +16,7 @@ from itertools import product
 import numpy as np
 
 from calibrations.effects.expression import Apply, Expression, Name, Node, evaluate, forces, variables
-from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.geometry.orientation import nominal_pose, reported_force, specific_force
 from calibrations.table import AXES, Array, Table
 
 LARGEST_TRIALS = 800
@@ -71,7 +71,7 @@ def _spread(column: Array) -> float:
 
 
 def _variables(expression: Expression, table: Table) -> dict[str, Array]:
-    return variables(expression.names, table) | forces(specific_force(nominal_pose(table)))
+    return variables(expression.names, table) | forces(reported_force(table))
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ class _Search:
 
     @cached_property
     def _model(self) -> Array:
-        a = specific_force(nominal_pose(self.table))
+        a = reported_force(self.table)
         return np.asarray(np.linalg.qr(np.column_stack([np.ones(len(a)), a]))[0])
 
     def free(self, column: Array) -> Array:

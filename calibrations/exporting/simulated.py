@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -11,7 +11,7 @@ import numpy as np
 from calibrations.compensation.document import error_text
 from calibrations.compensation.forward import FORCES, INVERTED, LEFT_OUT, trace_model
 from calibrations.compensation.graph import evaluate_nodes, variable_names
-from calibrations.compensation.inverse import Range, invert_model
+from calibrations.compensation.inverse import Compensation, Range, invert_model
 from calibrations.effects.logged import RATE
 from calibrations.errors import ModelError
 from calibrations.model import Model
@@ -110,17 +110,18 @@ def simulate(
     outputs = _outputs(model, remembering, input_values, len(a))
     inverted = [f.effect for f in forward.fates if f.how == INVERTED]
     parts = {name: outputs - _outputs(model, (*remembering, name), input_values, len(a)) for name in inverted}
-    loss_list = []
+    lost = tuple(_losses(compensation, remembering))
+    return Simulated(model, compensation.unit, a, outputs, ranges, other_inputs.get("temperature_c"), parts, lost)
+
+
+def _losses(compensation: Compensation, remembering: Collection[str]) -> Iterator[Loss]:
+    """The effects that the inverse leaves out, with the error of each."""
     for fate in compensation.forward.fates:
         if fate.how == LEFT_OUT:
             size = compensation.costs.left_out.get(fate.effect)
             reason = HISTORY if fate.effect in remembering else fate.why
-            loss_list.append(
-                Loss(fate.effect, reason, size.rms if size else None, size.most if size else None, compensation.unit)
-            )
-    return Simulated(
-        model, compensation.unit, a, outputs, ranges, other_inputs.get("temperature_c"), parts, tuple(loss_list)
-    )
+            rms, most = (size.rms, size.most) if size else (None, None)
+            yield Loss(fate.effect, reason, rms, most, compensation.unit)
 
 
 def _span(model: Model, name: str, spans: Mapping[str, tuple[float, float]]) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from calibrations.effects import Effect, Parameter, Values
 from calibrations.errors import ModelError, nearest
 from calibrations.free_forms.form import ANGLES, Form
 from calibrations.free_forms.place_names import EFFECTS_AT, GEOMETRY_PLACE, PLACES, PREFIX
-from calibrations.geometry.orientation import Pose, nominal_pose, specific_force
+from calibrations.geometry.orientation import Pose, reported_force
 from calibrations.table import AXES, Array, Table
 
 
@@ -193,7 +193,7 @@ class _OnAngle(FreeForm):
     """Adds to a stage angle; coefficients are in rad."""
 
     def pose(self, pose: Pose, table: Table, p: Values) -> Pose:
-        error = self._cache_columns(table, linear_force(table))[0] @ self._coefficients(p, 0)
+        error = self._cache_columns(table, reported_force(table))[0] @ self._coefficients(p, 0)
         if self.forms[0].driver == "alpha":
             return replace(pose, alpha=pose.alpha + error)
         return replace(pose, beta=pose.beta + error)
@@ -242,9 +242,3 @@ def _explain_exclusion(forms: tuple[Form, ...]) -> str:
     if any(form.factor == "side" or form.bases[0].kind in ("play", "preisach") for form in forms):
         return "it follows the way of the stage to each pose"
     return ""
-
-
-@lru_cache(maxsize=4)
-def linear_force(table: Table) -> Array:
-    """Specific force at the reported poses, g, shape (n, 3)."""
-    return specific_force(nominal_pose(table))

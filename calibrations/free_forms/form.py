@@ -32,7 +32,7 @@ from calibrations.effects.kernels import play, slip_elements
 from calibrations.effects.logged import leading_temperature, level
 from calibrations.free_forms.bases import Basis, Play, Preisach, Products, Spline
 from calibrations.free_forms.poses import side, turning_forces
-from calibrations.geometry.orientation import nominal_pose, other_in_plane, out_of_plane, specific_force
+from calibrations.geometry.orientation import other_in_plane, out_of_plane, reported_force
 from calibrations.table import Array, Table
 
 Factor = Literal["", "force", "side", "load", "pressed"]
@@ -174,7 +174,7 @@ def _lag_by_play(table: Table, basis: Play, lead_s: float) -> Array:
 @lru_cache(maxsize=32)
 def _hysteretic(table: Table, basis: Preisach, approach_deg: float) -> Array:
     """Columns of a Preisach hysteresis of the force along each axis, shape (3, n, count)."""
-    driver = specific_force(nominal_pose(table))
+    driver = reported_force(table)
     widths = np.array(basis.widths)
     forces = slip_elements(driver, turning_forces(table, approach_deg), np.ones_like(driver), widths, np.zeros(3))
     plays = np.moveaxis(driver[:, None, :] - forces, 2, 0)
@@ -185,7 +185,7 @@ def _hysteretic(table: Table, basis: Preisach, approach_deg: float) -> Array:
 def _slip_forces(table: Table, basis: Play, approach_deg: float, is_pressed: bool) -> Array:
     """Forces of the slip elements over their widths, and the decay of their first state, shape (3, n, columns)."""
     widths = np.array(basis.widths)
-    driver = specific_force(nominal_pose(table))
+    driver = reported_force(table)
     path, even = turning_forces(table, approach_deg), np.ones_like(driver)
     by_load = even + np.abs(other_in_plane(driver)) if is_pressed else even
     forces = slip_elements(driver, path, by_load, widths, np.zeros(3))

@@ -44,10 +44,16 @@ def nominal_pose(table: Table) -> Pose:
     )
 
 
+@lru_cache(maxsize=4)
+def reported_force(table: Table) -> Array:
+    """Static specific force at the poses that the stages report, g, shape (n, 3)."""
+    return specific_force(nominal_pose(table))
+
+
 @lru_cache(maxsize=8)
 def one_orientation(table: Table) -> bool:
     """Whether the specific force is the same in all rows of a table with stage angles: a sensor at rest."""
-    return table.type.stage_angles and bool(np.all(np.ptp(specific_force(nominal_pose(table)), axis=0) < SAME_G))
+    return table.type.stage_angles and bool(np.all(np.ptp(reported_force(table), axis=0) < SAME_G))
 
 
 def specific_force(pose: Pose) -> Array:

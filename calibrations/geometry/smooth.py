@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 import scipy  # its room of linear algebra is loaded where it is first entered
 
-from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.geometry.orientation import reported_force
 from calibrations.table import Array, Table
 
 DEGREE = 5
@@ -33,7 +33,7 @@ def smooth_columns(table: Table) -> Array:
 
 def _directions(table: Table) -> Array:
     """Polynomials of the direction of gravity, of the highest degree that the rows allow."""
-    a = specific_force(nominal_pose(table))
+    a = reported_force(table)
     most = table.n // ROWS_PER_COLUMN
     for degree in range(DEGREE, 0, -1):
         columns = np.column_stack(list(_harmonics(a, degree)))

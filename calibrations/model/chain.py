@@ -14,13 +14,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from calibrations.effects import Effect, Values
-from calibrations.geometry.orientation import Pose, nominal_pose, specific_force
+from calibrations.geometry.orientation import Pose, nominal_pose, reported_force, specific_force
 from calibrations.geometry.rate_table import rate_deg_s
 from calibrations.table import Array, Table
 
@@ -55,7 +55,7 @@ def static_force(table: Table, steps: Sequence[Step]) -> Array:
     if table.type.turning:
         return rate_deg_s(table)
     pose = true_pose(table, steps)
-    a = _reported_force(table).copy() if pose is nominal_pose(table) else specific_force(pose)
+    a = reported_force(table).copy() if pose is nominal_pose(table) else specific_force(pose)
     if table.type.moving:  # along the sensor's reference edge x, Ang V
         a[:, 0] += table.column("acceleration_m_s2") / table.gravity_m_s2
     return a
@@ -67,12 +67,6 @@ def true_pose(table: Table, steps: Sequence[Step]) -> Pose:
     for effect, p in steps:
         pose = effect.pose(pose, table, p)
     return pose
-
-
-@lru_cache(maxsize=2)
-def _reported_force(table: Table) -> Array:
-    """Static specific force at the poses that the stages report, g, shape (n, 3)."""
-    return specific_force(nominal_pose(table))
 
 
 def sensed(a: Array, table: Table, steps: Sequence[Step]) -> Array:

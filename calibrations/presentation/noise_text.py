@@ -8,6 +8,7 @@ import numpy as np
 
 from calibrations.noise.analysis import ChannelNoise, Coefficient, NoiseAnalysis
 from calibrations.noise.deviations import minimum_s
+from calibrations.noise.doubts import Disturbance
 from calibrations.noise.record import Sensed
 from calibrations.noise.samples import COARSE
 from calibrations.noise.telegraph import TWO_LEVELS
@@ -68,12 +69,17 @@ def _disturbances(analysis: NoiseAnalysis) -> Iterable[str]:
         spoils = f"; it spoils {effect}" if effect else ""
         yield f"  {disturbance.text}{removed_words}{spoils}{'' if disturbance.matters else '; too small to matter'}"
     yield ""
+    yield from _uncleaned(analysis, removable)
+
+
+def _uncleaned(analysis: NoiseAnalysis, removed: Iterable[Disturbance]) -> Iterable[str]:
+    """The coefficients that the removed disturbances would change."""
     if analysis.uncleaned is None:
         return
     yield "With these disturbances in the record, the fit would give:"
     for axis, noise in analysis.uncleaned.items():
         changed_coefficients = {
-            name for disturbance in removable if disturbance.axis == axis for name in analysis.spoils(disturbance)
+            name for disturbance in removed if disturbance.axis == axis for name in analysis.spoils(disturbance)
         }
         for name, coefficient in noise.coefficients.items():
             if name in changed_coefficients:

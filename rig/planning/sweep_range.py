@@ -15,7 +15,7 @@ from calibrations.design.expected import assume_sensor, predict_data
 from calibrations.design.optimal_design import covariance_of, information, scale_rows
 from calibrations.discovery.check_poses import MARK
 from calibrations.fitting.fit import Fit
-from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.geometry.orientation import reported_force
 from calibrations.model import Model
 from calibrations.table import AXES, Array, Table
 from procedures.catalogue import Procedure
@@ -140,7 +140,7 @@ class Range:
     def places(self) -> Array:
         """Where the candidates are, for distances: gravity in the sensor's frame, and the side of the approach."""
         table = self._foreseen
-        return np.column_stack([specific_force(nominal_pose(table)), SIDE * table.column("direction")])
+        return np.column_stack([reported_force(table), SIDE * table.column("direction")])
 
     def judged(self, settings: Mapping[str, Any]) -> Judged:
         """The sweep with other settings; its fit does not use the check poses. Raises what a plan raises."""

@@ -1,8 +1,7 @@
 """A certificate of data and a model: for `rig certificate` and the workbench.
 
-The record tells who measured what, with which instruments, when and where, and has the samples.
-
-DATA that is a file has no rig: then the certificate says so, and its rows have digests of their own numbers.
+The record has the operator, the procedure, the instruments, the time, the place and the samples of a run. A file has no
+rig: the certificate says so, and its rows have digests of their own numbers.
 """
 
 from __future__ import annotations
@@ -78,20 +77,21 @@ def certified(subject: Certified, number: str = "", customer: str = "") -> Certi
         fitted, figured, before = _results(subject, bench.result_limits if bench is not None else {})
         table = fitted.table
         samples = tuple(_samples(table, measured))
-    lab = bench.laboratory if bench is not None else None
-    constant = {name: as_written(value) for name, value in table.constants.items()}
+    laboratory, bench_customer = _laboratory(bench)
+    sensor, serial, manufacturer = _identity(table)
     end_time = (run.ended or run.created) if run is not None else datetime.now(UTC).isoformat(timespec="seconds")
     model_digest = hashlib.sha256(dump_model(fitted.model).encode()).hexdigest()
     digest = hashlib.sha256(f"{table.digest}{model_digest}".encode()).hexdigest()
+    source_name = measured.name.replace("/", "-") if measured is not None else Path(data).stem
     return Certificate(
-        number=number or f"{measured.name.replace('/', '-') if measured is not None else Path(data).stem}-{digest[:8]}",
+        number=number or f"{source_name}-{digest[:8]}",
         issued=today(),
         program=program(),
-        laboratory=Laboratory(**lab.model_dump(exclude={"customer"})) if lab is not None else Laboratory(),
-        customer=customer or (lab.customer if lab is not None else "") or UNSTATED,
-        sensor=constant.get("sensor", UNSTATED),
-        serial=constant.get("serial", UNSTATED),
-        manufacturer=constant.get("manufacturer", UNSTATED),
+        laboratory=laboratory,
+        customer=customer or bench_customer or UNSTATED,
+        sensor=sensor,
+        serial=serial,
+        manufacturer=manufacturer,
         rig=bench.name if bench is not None else "measured elsewhere",
         instruments=tuple(_instruments(run, end_time[:10])) if run is not None else (),
         procedure=run.procedure if run is not None else "data of a file",
@@ -106,11 +106,7 @@ def certified(subject: Certified, number: str = "", customer: str = "") -> Certi
         data=data if run is not None else Path(data).name,
         data_sha256=table.digest,
         model_sha256=model_digest,
-        remarks=(
-            *_remarks(run, lab is not None and lab.name != UNSTATED),
-            *_program_remarks(table),
-            *_gravity_remarks(table),
-        ),
+        remarks=(*_remarks(run, bench), *_program_remarks(table), *_gravity_remarks(table)),
         reference=_reference(table),
         simulated=bool(_list_simulated_roles(run)),
     )
@@ -160,6 +156,19 @@ def _open_run(data: str) -> Iterator[Measured | None]:
         return
     with Record.to_find(data) as record:
         yield Measured.named(record, data)
+
+
+def _laboratory(bench: Bench | None) -> tuple[Laboratory, str]:
+    """The laboratory and its customer, as far as the bench file states them."""
+    if bench is None or (lab := bench.laboratory) is None:
+        return Laboratory(), ""
+    return Laboratory(**lab.model_dump(exclude={"customer"})), lab.customer
+
+
+def _identity(table: Table) -> list[str]:
+    """Type, serial number and manufacturer of the sensor."""
+    names = ("sensor", "serial", "manufacturer")
+    return [as_written(table.constants[name]) if name in table.constants else UNSTATED for name in names]
 
 
 def _bench(run: Run) -> Bench:
@@ -254,14 +263,14 @@ def _list_simulated_roles(run: Run | None) -> list[str]:
     return [role for role, part in _bench(run).instruments.items() if part.simulated]
 
 
-def _remarks(run: Run | None, is_stated: bool) -> Iterator[str]:
+def _remarks(run: Run | None, bench: Bench | None) -> Iterator[str]:
     if roles := _list_simulated_roles(run):
         yield f"These instruments were simulated: {', '.join(roles)}. This document certifies no sensor."
     if run is not None and EXPIRED in run.constants:
         yield f"{run.constants[EXPIRED]}: measurements with it are not traceable."
     if run is not None and run.state != "complete":
         yield f"The run is {run.state}; the certificate covers the data that it has."
-    if not is_stated:
+    if bench is None or bench.laboratory is None or bench.laboratory.name == UNSTATED:
         yield "The bench file does not name the laboratory (key laboratory)."
 
 

@@ -46,13 +46,15 @@ def make_charts(
     sensor_names = list(dict.fromkeys(point.sensor for point in points))
     if sensor is not None and sensor not in sensor_names:
         raise RecordError(f"no check-standard run of the sensor {sensor!r}.{did_you_mean(sensor, sensor_names)}")
-    keys = dict.fromkeys((p.sensor, p.quantity) for p in points if sensor in (None, p.sensor))
-    if not keys:
+    points_by_key: dict[tuple[str, str], list[_Point]] = {}
+    for point in points:
+        if sensor in (None, point.sensor):
+            points_by_key.setdefault((point.sensor, point.quantity), []).append(point)
+    if not points_by_key:
         raise RecordError("no check-standard run is complete yet; `rig run check-standard` makes one")
-    points_by_key = {key: [p for p in points if (p.sensor, p.quantity) == key] for key in keys}
     charted = {key: own_points for key, own_points in points_by_key.items() if len(own_points) >= FEWEST_RUNS}
     if not charted:
-        names = ", ".join(dict.fromkeys(sensor for sensor, _ in keys))
+        names = ", ".join(dict.fromkeys(sensor for sensor, _ in points_by_key))
         raise RecordError(f"{names}: {FEWEST_RUNS} check-standard runs are needed for a chart; there is one")
     return [_control(*key, own_points, baseline) for key, own_points in charted.items()]
 

@@ -191,19 +191,23 @@ def group_steps(
 ) -> tuple[tuple[Group, ...], tuple[Curve, ...]]:
     """The groups, the largest first, and the effects of none. Free forms join the effects at their place."""
     of_catalogue = [e for e in effects if e.span is not None]
-    made_by = {f.name: _makers(f, of_catalogue, floor) for f in faults}
     groups: list[Group] = []
     for fault in sorted(faults, key=lambda f: -f.size):
-        makers = made_by[fault.name]
-        shared = [g for g in groups if any(e in makers for e in g.effects)]
-        members = (*(f for g in shared for f in g.faults), fault)
-        shared_effects = dict.fromkeys([e.name for g in shared for e in g.effects] + [e.name for e in makers])
-        groups = [g for g in groups if g not in shared]
-        groups.append(Group(members, tuple(e for e in of_catalogue if e.name in shared_effects)))
+        groups = _join_fault(fault, _makers(fault, of_catalogue, floor), groups, of_catalogue)
     confirmed = [part for group in groups for part in _judge_group(group, effects)]
     used = {e.name for group in confirmed for e in group.effects}
     ordered = tuple(sorted(confirmed, key=lambda g: -max(f.size for f in g.faults)))
     return ordered, tuple(e for e in effects if e.name not in used)
+
+
+def _join_fault(
+    fault: Curve, makers: Sequence[Curve], groups: Sequence[Group], effects: Sequence[Curve]
+) -> list[Group]:
+    """The groups with one fault more. It joins the groups that have one of its makers, and makes them one."""
+    shared = [g for g in groups if any(e in makers for e in g.effects)]
+    names = {e.name for e in makers}.union(e.name for g in shared for e in g.effects)
+    joined = Group((*(f for g in shared for f in g.faults), fault), tuple(e for e in effects if e.name in names))
+    return [*(g for g in groups if g not in shared), joined]
 
 
 def _makers(fault: Curve, effects: Sequence[Curve], floor: float) -> list[Curve]:

@@ -176,24 +176,23 @@ def result_rows(
             continue
         limit, verdict = "" if r["limit"] is None else bound(r["value"], r["limit"]), r["verdict"] or ""
         if (steady := STEADY.fullmatch(name)) is not None:
-            sensor, axis = steady["sensor"] or "", steady["axis"] or ""
-            parts = {
-                end: results[part]
-                for end in ("time", *FORECAST)
-                if (part := f"{sensor}steady-state-{end}{axis}") in results
-            }
-            listed |= {
-                f"{sensor}steady-state-{end}{axis}"
-                for end, result_document in parts.items()
-                if result_document["limit"] is None
-            }
-            value = _steady_sentence(bool(r["value"]), parts)
-            rows.append(ResultRow(name, value, "must be reached" if limit else "", verdict))
+            times = _steady_times(results, steady)
+            listed |= {part for part in times.values() if results[part]["limit"] is None}
+            value = _steady_sentence(bool(r["value"]), {end: results[part] for end, part in times.items()})
+            limit = "must be reached" if limit else ""
         elif name.rpartition("/")[2] == "gap" and not r["value"]:
-            rows.append(ResultRow(name, "none", limit, verdict))
+            value = "none"
         else:
-            rows.append(ResultRow(name, value_text(name, r), limit, verdict))
+            value = value_text(name, r)
+        rows.append(ResultRow(name, value, limit, verdict))
     return rows
+
+
+def _steady_times(results: Mapping[str, Any], steady: re.Match[str]) -> dict[str, str]:
+    """The names of the results with the time of a steady state and its forecast, by kind of time."""
+    sensor, axis = steady["sensor"] or "", steady["axis"] or ""
+    names = {end: f"{sensor}steady-state-{end}{axis}" for end in ("time", *FORECAST)}
+    return {end: name for end, name in names.items() if name in results}
 
 
 def _steady_sentence(reached: bool, parts: Mapping[str, Any]) -> str:

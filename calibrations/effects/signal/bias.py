@@ -1,7 +1,7 @@
 import numpy as np
 
 from calibrations.effects import Effect, Parameter, Values
-from calibrations.geometry.orientation import nominal_pose, specific_force
+from calibrations.geometry.orientation import reported_force
 from calibrations.table import Array, Table
 
 
@@ -9,7 +9,7 @@ def _at_zero(table: Table) -> Array:
     """The middle of each output; in a table of motion less what gravity gives there."""
     middle: Array = (table.outputs.max(axis=0) + table.outputs.min(axis=0)) / 2
     if table.type.moving:
-        gravity = specific_force(nominal_pose(table))[:, : len(middle)]
+        gravity = reported_force(table)[:, : len(middle)]
         return np.asarray(middle - table.number("output_per_g", 0.0) * gravity.mean(axis=0))
     return middle
 

@@ -20,6 +20,7 @@ Source  JCGM 101:2008, 7 (trials), 7.7 (interval), 8.1 (comparison, one signific
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,7 +33,7 @@ from calibrations.fitting.fit import Fit, evaluate, in_milli, milli_unit
 from calibrations.fitting.inputs import Contribution, input_contributions
 from calibrations.geometry.rate_table import EARTH_DEG_S
 from calibrations.means.noise import Noise, rms
-from calibrations.model import Estimate, Model, Term
+from calibrations.model import Model
 from calibrations.presentation.budget import sources
 from calibrations.presentation.certificate.content import Error, Figures, Limit, Outcome, Simulated, decide
 from calibrations.presentation.certificate.terms import name, term
@@ -125,14 +126,10 @@ def figures(fit: Fit, earlier_model: Model | None, limits: Mapping[str, Limit], 
     inputs = input_contributions(fit.table)
     budget = make_budget(fit, inputs)
     trial = simulate(fit, inputs, trials)
-    weights = _weights(fit)
     earlier = _values(earlier_model) if earlier_model is not None else {}
     certified = [k for k, (_, e) in enumerate(fit.model.all_estimates) if e.identified and e.std]
-    outcomes = tuple(
-        _outcome(k, t, e, budget, trial[:, k], weights[k], fit, earlier, limits)
-        for k, (t, e) in enumerate(fit.model.all_estimates)
-        if k in certified
-    )
+    calibration = _Calibration(fit, budget, trial, _weights(fit), earlier, limits)
+    outcomes = tuple(map(calibration.outcome, certified))
     if not outcomes:
         raise ModelError(f"{fit.table.source}: the data determine no parameter of {fit.model.name}: nothing to certify")
     joint = parameter_correlation(fit, budget, inputs)[np.ix_(certified, certified)]
@@ -160,43 +157,62 @@ def _values(model: Model) -> dict[tuple[str, str, str], tuple[float, float | Non
     return {(t.name, e.name, e.axis): (e.value, e.std) for t, e in model.all_estimates if e.identified}
 
 
-def _outcome(
-    k: int,
-    model_term: Term,
-    e: Estimate,
-    budget: Budget,
-    trial: Array,
-    weights: Array,
-    fit: Fit,
-    earlier: Mapping[tuple[str, str, str], tuple[float, float | None]],
-    limits: Mapping[str, Limit],
-) -> Outcome:
-    std, coverage = float(budget.combined[k]), max(CERTAIN_K, float(budget.coverage[k]))
-    low, high = (float(end) for end in interval(trial))
-    judgement = verdict(e.value, coverage * std, std, low, high)
-    reason = _explain_wider_interval(k, coverage, std, float(trial.std()), budget) if judgement == CONSERVATIVE else ""
-    if judgement == WIDENED:
-        coverage = max(coverage, (e.value - low) / std, (high - e.value) / std)
-    limit = limits.get(parameter_name := name(model_term.effect, e.name, e.axis))
-    order = np.argsort(-weights)
-    numbers = fit.table.numbered(np.arange(fit.table.n))
-    return Outcome(
-        name=parameter_name,
-        term=term(model_term.effect, next(p for p in model_term.effect.parameters if p.name == e.name)),
-        effect=model_term.name,
-        parameter=e.name,
-        axis=e.axis,
-        unit=e.unit,
-        value=e.value,
-        std=std,
-        coverage=coverage,
-        freedom=float(budget.freedom[k]),
-        sources=sources(budget, k),
-        simulated=Simulated(float(trial.std()), low, high, judgement, reason),
-        found=earlier.get((model_term.name, e.name, e.axis)),
-        decision=None if limit is None else decide(e.value, std, coverage * std, limit),
-        weights=tuple((int(numbers[i]), float(weights[i])) for i in order),
-    )
+@dataclass(frozen=True)
+class _Calibration:
+    """A fit with everything that the figures of one parameter need.
+
+    trials   parameters of the simulated trials, shape (trials, p)
+    weights  weight of each row in each parameter, shape (p, n)
+    earlier  value and standard uncertainty in the model in use until now, by effect, parameter and axis
+    """
+
+    fit: Fit
+    budget: Budget
+    trials: Array
+    weights: Array
+    earlier: Mapping[tuple[str, str, str], tuple[float, float | None]]
+    limits: Mapping[str, Limit]
+
+    def outcome(self, k: int) -> Outcome:
+        """The figures of the parameter with index k."""
+        model_term, e = self.fit.model.all_estimates[k]
+        std, simulated = float(self.budget.combined[k]), self._simulated(k)
+        coverage = self._coverage(k)
+        if simulated.verdict == WIDENED:
+            coverage = max(coverage, (e.value - simulated.low) / std, (simulated.high - e.value) / std)
+        limit = self.limits.get(parameter_name := name(model_term.effect, e.name, e.axis))
+        numbers, weights = self.fit.table.numbered(np.arange(self.fit.table.n)), self.weights[k]
+        return Outcome(
+            name=parameter_name,
+            term=term(model_term.effect, next(p for p in model_term.effect.parameters if p.name == e.name)),
+            effect=model_term.name,
+            parameter=e.name,
+            axis=e.axis,
+            unit=e.unit,
+            value=e.value,
+            std=std,
+            coverage=coverage,
+            freedom=float(self.budget.freedom[k]),
+            sources=sources(self.budget, k),
+            simulated=simulated,
+            found=self.earlier.get((model_term.name, e.name, e.axis)),
+            decision=None if limit is None else decide(e.value, std, coverage * std, limit),
+            weights=tuple((int(numbers[i]), float(weights[i])) for i in np.argsort(-weights)),
+        )
+
+    def _coverage(self, k: int) -> float:
+        """The coverage factor of the budget."""
+        return max(CERTAIN_K, float(self.budget.coverage[k]))
+
+    def _simulated(self, k: int) -> Simulated:
+        """The interval of the trials, and its verdict on that of the budget."""
+        value, trial = self.fit.model.all_estimates[k][1].value, self.trials[:, k]
+        std, coverage = float(self.budget.combined[k]), self._coverage(k)
+        low, high = (float(end) for end in interval(trial))
+        judgement = verdict(value, coverage * std, std, low, high)
+        spread = float(trial.std())
+        reason = _explain_wider_interval(k, coverage, std, spread, self.budget) if judgement == CONSERVATIVE else ""
+        return Simulated(spread, low, high, judgement, reason)
 
 
 def _explain_wider_interval(k: int, coverage: float, std: float, simulated: float, budget: Budget) -> str:

@@ -189,18 +189,23 @@ def shares_by_place(steps: Falling) -> tuple[list[str], Array]:
     gains = np.maximum(-np.diff(errors), 0.0)
     unexplained = max(float(errors[-1]) - 1.0, 0.0)
     total = float(gains.sum()) + unexplained or 1.0
-    place_labels = [_legend_label(step.name) for step in steps.steps]
-    size = {name: sum(g for g, a in zip(gains, place_labels, strict=True) if a == name) for name in place_labels}
-    names = sorted(size, key=lambda name: (name == LINEAR, -size[name]))
-    minor = [name for name in names if name != LINEAR][MOST_SHARES:]
-    place_labels = [MINOR_PLACES if name in minor else name for name in place_labels]
-    names = [*(name for name in names if name not in minor), *([MINOR_PLACES] if minor else [])]
+    names, place_labels = _named_places(steps, gains)
     shares = np.zeros((len(errors), len(names) + 1))
     for row in range(len(errors)):
         for k in range(row, len(gains)):
             shares[row, names.index(place_labels[k])] += gains[k] / total
     shares[:, -1] = unexplained / total
     return [*names, UNEXPLAINED], shares
+
+
+def _named_places(steps: Falling, gains: Array) -> tuple[list[str], list[str]]:
+    """The places in the order of the legend, the largest first, and that of each step. Small places are one."""
+    place_labels = [_legend_label(step.name) for step in steps.steps]
+    size = {name: sum(g for g, a in zip(gains, place_labels, strict=True) if a == name) for name in place_labels}
+    names = sorted(size, key=lambda name: (name == LINEAR, -size[name]))
+    minor = [name for name in names if name != LINEAR][MOST_SHARES:]
+    labels = [MINOR_PLACES if name in minor else name for name in place_labels]
+    return [*(name for name in names if name not in minor), *([MINOR_PLACES] if minor else [])], labels
 
 
 def _legend_label(effect: str) -> str:
