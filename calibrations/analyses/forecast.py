@@ -65,17 +65,17 @@ class Forecast:
     steady_s: Bounds
     tolerance: float
     change: float  # of the whole approach, by the forecast
-    surprise: float  # see `Bank.surprise`
+    innovation_ratio: float  # see `Bank.surprise`
 
     @property
     def known(self) -> bool:
         """Whether the final value is known."""
-        return not self.surprised and self.final.half <= max(self.tolerance, MOST_KNOWN_WIDTH * abs(self.change))
+        return not self.contradicted and self.final.half <= max(self.tolerance, MOST_KNOWN_WIDTH * abs(self.change))
 
     @property
-    def surprised(self) -> bool:
+    def contradicted(self) -> bool:
         """Whether the measured drift agrees with no filter; the bounds are then invalid."""
-        return self.surprise >= MOST_SURPRISE
+        return self.innovation_ratio >= MOST_SURPRISE
 
     @property
     def steady(self) -> bool:
@@ -117,7 +117,7 @@ class QuantityFilter:
             _bounds(steady_s),
             tolerance * self.unit,
             median * self.unit,
-            self.bank.surprise,
+            self.bank.innovation_ratio,
         )
 
     def _bounds(self, draws: Array) -> Bounds:
@@ -203,7 +203,7 @@ def steady_time(histories: Mapping[str, ForecastHistory], axis: str = "") -> Bou
     """When all quantities of an axis, or of all axes, are steady by the last forecasts, s since power-on: the latest of
     each bound, infinite beyond FARTHEST_S. None where one of them is no approach."""
     last = [course.last for name, course in histories.items() if name.endswith(axis)]
-    if not last or any(forecast.surprised for forecast in last):
+    if not last or any(forecast.contradicted for forecast in last):
         return None
     steady_times = [
         [s if s - forecast.t_s < LATEST_STEADY_S else np.inf for s in forecast.steady_s] for forecast in last

@@ -265,7 +265,7 @@ class Bound:
 
 def prove_bound(
     outputs: Sequence[Node],
-    sought: tuple[str, ...],
+    unknowns: tuple[str, ...],
     reach: float,
     inputs: Mapping[str, tuple[float, float]],
     want: float,
@@ -275,14 +275,14 @@ def prove_bound(
 
     None where the contraction cannot be proved.
     """
-    inputs = {name: inputs[name] for name in variable_names(outputs) if name not in {*sought, *memory}}
+    inputs = {name: inputs[name] for name in variable_names(outputs) if name not in {*unknowns, *memory}}
     inputs |= dict.fromkeys(memory, UNBOUNDED)
-    slopes = _slopes_in_the_middle(outputs, sought, inputs)
+    slopes = _slopes_in_the_middle(outputs, unknowns, inputs)
     if not np.isfinite(slopes).all() or abs(np.linalg.det(slopes / (np.max(np.abs(slopes)) or 1.0))) < 1e-9:
         return None
     C = np.asarray(np.linalg.inv(slopes), dtype=np.float64)
-    first = _greatest(outputs, sought, reach, inputs, C)
-    q = _greatest(outputs, sought, (1 + first) * reach, inputs, C) if first < 1 else first
+    first = _greatest(outputs, unknowns, reach, inputs, C)
+    q = _greatest(outputs, unknowns, (1 + first) * reach, inputs, C) if first < 1 else first
     if not q < 1:
         return None
     steps = max(1, math.ceil(math.log(want / reach) / math.log(max(q, SMALLEST_FACTOR))))
@@ -290,12 +290,12 @@ def prove_bound(
 
 
 def _slopes_in_the_middle(
-    outputs: Sequence[Node], sought: tuple[str, ...], inputs: Mapping[str, tuple[float, float]]
+    outputs: Sequence[Node], unknowns: tuple[str, ...], inputs: Mapping[str, tuple[float, float]]
 ) -> Array:
     """d output / d a at 0 g, shape (axes, axes)."""
-    point = {name: point_interval(np.zeros(1)) for name in sought}
+    point = {name: point_interval(np.zeros(1)) for name in unknowns}
     point |= {name: _middle(ends) for name, ends in inputs.items()}
-    results = evaluate_interval(outputs, point, sought)
+    results = evaluate_interval(outputs, point, unknowns)
     with np.errstate(invalid="ignore"):  # of a jump at 0: no number
         return np.array([(d.low[:, 0] + d.high[:, 0]) / 2 for _, d in results])
 
@@ -307,16 +307,20 @@ def _middle(ends: tuple[float, float]) -> Interval:
 
 
 def _greatest(
-    outputs: Sequence[Node], sought: tuple[str, ...], reach: float, inputs: Mapping[str, tuple[float, float]], C: Array
+    outputs: Sequence[Node],
+    unknowns: tuple[str, ...],
+    reach: float,
+    inputs: Mapping[str, tuple[float, float]],
+    C: Array,
 ) -> float:
     """The greatest row sum of |1 - C G'| over the boxes of the range."""
-    ranges = _boxes(dict.fromkeys(sought, (-reach, reach)), inputs)
-    slopes = [d for _, d in evaluate_interval(outputs, ranges, sought)]
+    ranges = _boxes(dict.fromkeys(unknowns, (-reach, reach)), inputs)
+    slopes = [d for _, d in evaluate_interval(outputs, ranges, unknowns)]
     boxes = slopes[0].low.shape[1]
     worst = np.zeros(boxes)
-    for i in range(len(sought)):
+    for i in range(len(unknowns)):
         row = np.zeros(boxes)
-        for j in range(len(sought)):
+        for j in range(len(unknowns)):
             entry = point_interval(np.full(boxes, float(i == j)))
             for k, d in enumerate(slopes):
                 entry = entry - point_interval(np.full(boxes, C[i, k])) * Interval(d.low[j], d.high[j])
@@ -325,14 +329,16 @@ def _greatest(
     return float(np.max(worst)) if np.isfinite(worst).all() else math.inf
 
 
-def _boxes(sought: Mapping[str, tuple[float, float]], inputs: Mapping[str, tuple[float, float]]) -> dict[str, Interval]:
+def _boxes(
+    unknowns: Mapping[str, tuple[float, float]], inputs: Mapping[str, tuple[float, float]]
+) -> dict[str, Interval]:
     """The range divided into boxes: every combination of parts of the bounded variables."""
     endless = [name for name, ends in inputs.items() if ends == UNBOUNDED]
     inputs = {name: ends for name, ends in inputs.items() if name not in endless}
-    parts = [BOXES_PER_AXIS] * len(sought) + [BOXES_PER_INPUT] * len(inputs)
+    parts = [BOXES_PER_AXIS] * len(unknowns) + [BOXES_PER_INPUT] * len(inputs)
     while math.prod(parts) > MOST_BOXES:
         parts = [max(1, n // 2) for n in parts]
-    ranges = {**sought, **inputs}
+    ranges = {**unknowns, **inputs}
     cuts = [np.linspace(low, high, n + 1) for (low, high), n in zip(ranges.values(), parts, strict=True)]
     lows = np.meshgrid(*(edges[:-1] for edges in cuts), indexing="ij")
     highs = np.meshgrid(*(edges[1:] for edges in cuts), indexing="ij")

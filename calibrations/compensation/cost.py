@@ -127,7 +127,9 @@ def _stds(model: Model, forward: Forward, table: Table, a: Array, inputs: Inputs
     sides = [(output(up, a), output(down, a)) for up, down in _perturb_models(model)]
     changes = np.stack([np.einsum("nij,nj->ni", inverse, up - down) for up, down in sides]) / (2 * PARAMETER_STEP)
     mixed = (
-        changes if model.correlations is None else np.tensordot(model.correlations.among(list(estimates)), changes, 1)
+        changes
+        if model.correlations is None
+        else np.tensordot(model.correlations.submatrix(list(estimates)), changes, 1)
     )
     return np.asarray(np.sqrt(np.maximum(np.sum(changes * mixed, axis=0), 0.0)))
 

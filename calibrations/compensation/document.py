@@ -291,7 +291,7 @@ class ReferenceVectors:
 def make_vectors(compensation: Compensation, count: int = COUNT) -> ReferenceVectors:
     """`count` vectors, a power of two; the first is a corner of the range, the second its middle."""
     ranges = (
-        dict.fromkeys(compensation.forward.sought, (-compensation.range.reach, compensation.range.reach))
+        dict.fromkeys(compensation.forward.unknowns, (-compensation.range.reach, compensation.range.reach))
         | compensation.input_limits
     )
     unit = scipy.stats.qmc.Sobol(len(ranges), scramble=False).random(count)
@@ -300,7 +300,7 @@ def make_vectors(compensation: Compensation, count: int = COUNT) -> ReferenceVec
     outputs = [np.broadcast_to(v, count) for v in _in_a_row(compensation, inputs_by_name, count)]
     inputs_by_name |= {f"v{axis}": v for axis, v in zip(compensation.forward.axes, outputs, strict=True)}
     inputs = np.column_stack([inputs_by_name[name] for name in compensation.program.inputs])
-    expected = np.column_stack([inputs_by_name[name] for name in compensation.forward.sought])
+    expected = np.column_stack([inputs_by_name[name] for name in compensation.forward.unknowns])
     return ReferenceVectors(inputs, expected, TOLERANCE[compensation.precision] * compensation.range.reach)
 
 
@@ -366,7 +366,7 @@ def summary(compensation: Compensation, origin: Origin) -> dict[str, Any]:
             }
             for name in program.inputs
         ],
-        "outputs": list(program.sought),
+        "outputs": list(program.unknowns),
         "steps": program.steps,
         "bound": {"reach": compensation.range.reach, "q": bound.q, "within": bound.within},
         "operations": dict(program.operations),

@@ -85,7 +85,7 @@ class Forward:
         return tuple(fate.effect for fate in self.fates if fate.how == LEFT_OUT)
 
     @property
-    def sought(self) -> tuple[str, ...]:
+    def unknowns(self) -> tuple[str, ...]:
         """Names of the sought quantities in the graphs."""
         return tuple(f"a{axis}" for axis in self.axes)
 

@@ -130,10 +130,10 @@ def invert_model(
 
 def _bound(forward: Forward, input_range: Range, precision: str) -> Bound | None:
     inputs = input_range.of(
-        [name for name in variable_names(forward.outputs) if name not in {*forward.sought, *forward.memory}]
+        [name for name in variable_names(forward.outputs) if name not in {*forward.unknowns, *forward.memory}]
     )
     want = DEFAULT_TOLERANCE[precision] * input_range.reach
-    return prove_bound(forward.outputs, forward.sought, input_range.reach, inputs, want, tuple(forward.memory))
+    return prove_bound(forward.outputs, forward.unknowns, input_range.reach, inputs, want, tuple(forward.memory))
 
 
 def _explain_missing_inverse(

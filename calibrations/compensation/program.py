@@ -36,7 +36,7 @@ class Program:
     """
 
     inputs: tuple[str, ...]
-    sought: tuple[str, ...]
+    unknowns: tuple[str, ...]
     before: tuple[Line, ...]
     loop: tuple[Line, ...]
     next: tuple[str | float, ...]
@@ -60,13 +60,13 @@ class Program:
         values |= self.tables
         values |= {name: np.asarray(inputs.get(name, 0.0), float) for name in self.remembered}
         _execute(self.before, values)
-        values |= {name: np.zeros(np.shape(values[self.inputs[0]])) for name in self.sought}
+        values |= {name: np.zeros(np.shape(values[self.inputs[0]])) for name in self.unknowns}
         for _ in range(self.steps):
             _execute(self.loop, values)
-            values |= dict(zip(self.sought, [_value(name, values) for name in self.next], strict=True))
+            values |= dict(zip(self.unknowns, [_value(name, values) for name in self.next], strict=True))
         _execute(self.after, values)
         memories = {name: _value(word, values) for name, word in self.remembered.items()}
-        return {name: values[name] for name in self.sought} | memories
+        return {name: values[name] for name in self.unknowns} | memories
 
 
 def write_program(forward: Forward, bound: Bound) -> Program:
@@ -74,8 +74,8 @@ def write_program(forward: Forward, bound: Bound) -> Program:
     outputs = tuple(f"v{axis}" for axis in forward.axes)
     nexts, later = _next(forward, bound, outputs), list(forward.memory.values())
     nodes = sort_nodes([*nexts, *later])
-    iterated = _find_dependent_nodes(nodes, set(forward.sought))
-    own_names = {*forward.sought, *outputs, *forward.memory}
+    iterated = _find_dependent_nodes(nodes, set(forward.unknowns))
+    own_names = {*forward.unknowns, *outputs, *forward.memory}
     used = [node.name for node in nodes if node.operation == "given" and node.name not in own_names]
     names = _Names()
     in_loop = [node for node in sort_nodes(nexts) if node in iterated]
@@ -86,7 +86,7 @@ def write_program(forward: Forward, bound: Bound) -> Program:
     lines_after = [names.line(node) for node in sort_nodes(later) if node in iterated and node.inner]
     return Program(
         inputs=(*outputs, *used),
-        sought=forward.sought,
+        unknowns=forward.unknowns,
         before=tuple(lines_before),
         loop=tuple(loop),
         next=next_,
@@ -127,7 +127,7 @@ class _Names:
 def _next(forward: Forward, bound: Bound, outputs: tuple[str, ...]) -> list[Node]:
     errors = [variable(name) - G for name, G in zip(outputs, forward.outputs, strict=True)]
     nexts = []
-    for name, row in zip(forward.sought, bound.C, strict=True):
+    for name, row in zip(forward.unknowns, bound.C, strict=True):
         next_node = variable(name)
         for share, error in zip(row, errors, strict=True):
             next_node += number(float(share)) * error
@@ -135,11 +135,11 @@ def _next(forward: Forward, bound: Bound, outputs: tuple[str, ...]) -> list[Node
     return nexts
 
 
-def _find_dependent_nodes(nodes: list[Node], sought: set[str]) -> set[Node]:
+def _find_dependent_nodes(nodes: list[Node], unknowns: set[str]) -> set[Node]:
     """The nodes that depend on the sought values."""
     dependent: set[Node] = set()
     for node in nodes:
-        if node.name in sought or any(inner in dependent for inner in node.inner):
+        if node.name in unknowns or any(inner in dependent for inner in node.inner):
             dependent.add(node)
     return dependent
 

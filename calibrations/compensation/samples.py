@@ -33,7 +33,7 @@ def compensate(model: Model, samples: Any, columns: Mapping[str, Any]) -> Any:
         outputs = _columns(given, compensation)
         inputs = {name: given[name] for name in compensation.program.inputs if name in given} | inputs
     result = compensation.program.run(_inputs(compensation, outputs, inputs))
-    forces = np.column_stack([result[name] for name in compensation.program.sought])
+    forces = np.column_stack([result[name] for name in compensation.program.unknowns])
     if not hasattr(samples, "iloc"):
         return forces
     names = [NAMES[compensation.unit].format(axis) for axis in compensation.forward.axes]

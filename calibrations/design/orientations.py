@@ -23,7 +23,7 @@ from calibrations.table import AXES, Array
 FIRST_SIDES = 6  # a sphere's centre is known after five positions: until then only whole sides can be named
 KNOWN_AFTER = 5
 ALIKE = 0.02  # relative difference of gains that counts as none: the nearer orientation is chosen
-WORTH = 0.5  # share of the best gain that makes any other position worth taking
+GOOD_SHARE = 0.5  # share of the best gain that makes any other position worth taking
 CELL_DEG = 30.0  # distance from a named orientation within which it counts as covered
 NEAR_DEG = 25.0  # distance within which the sensor is at the wanted orientation
 LEAST_TURN = 0.3  # of the largest distance between outputs: a smaller one is the same position
@@ -83,7 +83,7 @@ def is_worth(up: Array, proposed: Array, measured: Array) -> bool:
     if up @ proposed >= np.cos(np.radians(NEAR_DEG)):
         return True
     gains = gain(measured, np.array([up, proposed]))
-    return bool(gains[0] >= WORTH * gains[1])
+    return bool(gains[0] >= GOOD_SHARE * gains[1])
 
 
 def is_other_side(mean: Array, outputs: Array, noise_std: float) -> bool:

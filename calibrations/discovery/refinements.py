@@ -99,7 +99,7 @@ def _one_of_slow_pair(end: Fit, names: list[str]) -> list[str]:
 
 def _takes_up(shown: Shown) -> bool:
     """Whether the forms explain most of the signal of the effect that is fitted apart."""
-    return shown.gain_apart(shown.selected) < max(ENTER, (1 - MOSTLY) * shown.gain_apart(shown.nothing))
+    return shown.gain_apart(shown.selected) < max(ENTER, (1 - MOSTLY) * shown.gain_apart(shown.without_forms))
 
 
 def _is_smaller(growth: float, larger: float) -> bool:

@@ -118,6 +118,6 @@ def in_milli_rows(values: Array, fit: Fit) -> Array:
     return np.asarray(in_milli(values.T, fit).T)
 
 
-def sure(certainty: float) -> str:
+def certainty_text(certainty: float) -> str:
     """A certainty in words: never 100 %."""
     return "> 99.99 %" if certainty > 0.9999 else f"{100 * certainty:.4g} %"

@@ -183,11 +183,11 @@ def trials(root: Node, name: str, values: Mapping[str, Array]) -> Array:
     if not path:
         return _both_signs(ANY)
     operation, inner = path[-1].operation.name, path[-1].inner
-    first = _is(inner[0], name)
+    first = _is_parameter(inner[0], name)
     in_wave = any(node.operation.name in WAVES for node in path)
     if in_wave and operation in "+-":
         return np.linspace(-np.pi, np.pi, 24, endpoint=False)
-    operands = [evaluate(node, values) for node in inner if not _is(node, name)]
+    operands = [evaluate(node, values) for node in inner if not _is_parameter(node, name)]
     operand_values = np.unique(np.concatenate([np.ravel(node) for node in operands])) if operands else np.zeros(0)
     operand_values = operand_values[np.isfinite(operand_values)]
     if not len(operand_values) or not np.any(operand_values):
@@ -214,15 +214,15 @@ def _path(node: Node, name: str) -> list[Apply]:
     """The operations from `node` down to that which has the parameter among its arguments."""
     if not isinstance(node, Apply):
         return []
-    if any(_is(inner_node, name) for inner_node in node.inner) and node.operation.name not in ("neg", "pos"):
+    if any(_is_parameter(inner_node, name) for inner_node in node.inner) and node.operation.name not in ("neg", "pos"):
         return [node]
     return next(([node, *tail] for inner_node in node.inner if (tail := _path(inner_node, name))), [])
 
 
-def _is(node: Node, name: str) -> bool:
+def _is_parameter(node: Node, name: str) -> bool:
     """Whether the node is the parameter, of either sign."""
     if isinstance(node, Apply) and node.operation.name in ("neg", "pos"):
-        return _is(node.inner[0], name)
+        return _is_parameter(node.inner[0], name)
     return isinstance(node, Name) and node.name == name
 
 

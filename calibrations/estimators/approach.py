@@ -90,7 +90,7 @@ class Bank:
         return float(np.sqrt(self.weight @ (1 + np.sum(self.slow**2, axis=1) + self.scatter**2 + self.room**2)))
 
     @property
-    def surprise(self) -> float:
+    def innovation_ratio(self) -> float:
         """Mean normalised innovation squared: 1 where some filter's model holds, more where none does."""
         return self.nis / max(self.count, 1)
 

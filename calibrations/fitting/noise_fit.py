@@ -152,7 +152,7 @@ def gains(noise: Noise, residual: Array, jacobian: Array, extras: Sequence[Array
     search = NoiseSearch(noise, residual, (jacobian, *extras), smooth, candidate_noises(noise))
     base_deviance = search.best().deviance
     return [
-        max(0.0, base_deviance - search.best(k).deviance) if k in search.beside[1] else 0.0
+        max(0.0, base_deviance - search.best(k).deviance) if k in search.further_columns[1] else 0.0
         for k in range(1, len(extras) + 1)
     ]
 
@@ -209,7 +209,7 @@ class NoiseSearch:
     grid: list[Point]
 
     @cached_property
-    def beside(self) -> tuple[Array, tuple[int, ...]]:
+    def further_columns(self) -> tuple[Array, tuple[int, ...]]:
         """Orthonormal columns (channels, n, rank) of each group, orthogonal to the smooth columns and the first group.
 
         Also the number of the group that each comes from.
@@ -248,7 +248,7 @@ class NoiseSearch:
     @cached_property
     def grams(self) -> list[Grams]:
         """Per channel, over the grid."""
-        basis, _ = self.beside
+        basis, _ = self.further_columns
         smooth = np.broadcast_to(self.smooth, (len(basis), *self.smooth.shape))
         columns = np.concatenate([smooth, basis, self.residual[:, :, None]], axis=2)
         fast, gap_s, k = self.noise.fast, self.noise.gap_s, self.smooth.shape[1]
@@ -280,7 +280,7 @@ class NoiseSearch:
     def best(self, group: int = 0) -> Best:
         """The noise of greatest likelihood with the first group in the model, and another; channels in turn."""
         channels, n = self.residual.shape
-        selected = np.flatnonzero([origin in (0, group) for origin in self.beside[1]])
+        selected = np.flatnonzero([origin in (0, group) for origin in self.further_columns[1]])
         rank = len(selected)
         grams = [g.of(selected) for g in self.grams]
         free = n - self.smooth.shape[1]
@@ -353,7 +353,7 @@ def widening(noise: Noise, residual: Array, jacobian: Array, typical: Array) -> 
     if len(points) == 1 or not jacobian.shape[2]:
         return np.ones(jacobian.shape[2])
     search = NoiseSearch(noise, residual, (jacobian,), np.zeros((residual.shape[1], 0)), points)
-    basis, _ = search.beside
+    basis, _ = search.further_columns
     flat = (basis / noise.fast[:, :, None]).reshape(residual.size, -1)
     turned = gain(flat.T @ (jacobian / noise.fast[:, :, None]).reshape(residual.size, -1), typical)
     white = noise.whiten(basis)

@@ -79,10 +79,10 @@ class Shown:
     def selected(self) -> Sizes:
         """The forms that act, and their sizes."""
         components = [_component(name, form) for name, form in self.forms.items()]
-        return select(self.gram, self.nothing, components, [{c.name: c for c in components}], {}, ENTER, True)
+        return select(self.gram, self.without_forms, components, [{c.name: c for c in components}], {}, ENTER, True)
 
     @property
-    def nothing(self) -> Sizes:
+    def without_forms(self) -> Sizes:
         """No form acts."""
         return estimate(self.gram, {}, {})
 

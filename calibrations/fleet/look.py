@@ -187,7 +187,7 @@ class StageScore:
     information: Array
 
 
-NOWHERE = StageScore((), np.zeros(0), np.zeros((0, 0)))  # of a sensor on no stage
+NO_STAGE = StageScore((), np.zeros(0), np.zeros((0, 0)))  # of a sensor on no stage
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ class Correlations:
         names = [self.names[i] for i in indices]
         return Correlations.of(names, self.matrix[np.ix_(indices, indices)])
 
-    def among(self, keys: Sequence[str]) -> Array:
+    def submatrix(self, keys: Sequence[str]) -> Array:
         """The matrix for `keys`, in their order; 0 where nothing is known."""
         place = {name: i for i, name in enumerate(self.names)}
         present = [k for k, key in enumerate(keys) if key in place]

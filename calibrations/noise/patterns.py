@@ -67,7 +67,7 @@ class Pattern:
         return np.asarray(form - form.mean())
 
     @property
-    def worth(self) -> float:
+    def net_gain(self) -> float:
         """Gain beyond the price."""
         return self.gain - self.price
 
@@ -79,7 +79,7 @@ class Pattern:
     @property
     def certain(self) -> bool:
         """Whether chance is excluded, with any other pattern in the fit."""
-        return self.worth > (0.0 if self.kind == FOLLOWS else PATTERN_CERTAIN)
+        return self.net_gain > (0.0 if self.kind == FOLLOWS else PATTERN_CERTAIN)
 
     @property
     def needless(self) -> bool:
@@ -110,17 +110,17 @@ def pattern_of(fit: ChannelFit, removed_patterns: Iterable[Pattern] = ()) -> Pat
         *_further(fit.channel, spectrum, unit, removed_patterns),
     ]  # fmt: skip
     kinds = {(pattern.kind, pattern.cause) for pattern in candidates}
-    best, *weaker = sorted((_best(candidates, *kind) for kind in kinds), key=lambda pattern: -pattern.worth)
-    if best.worth <= 0:
+    best, *weaker = sorted((_best(candidates, *kind) for kind in kinds), key=lambda pattern: -pattern.net_gain)
+    if best.net_gain <= 0:
         return None
-    return replace(best, rivals=tuple(pattern for pattern in weaker if best.worth - pattern.worth < INSEPARABLE))
+    return replace(best, rivals=tuple(pattern for pattern in weaker if best.net_gain - pattern.net_gain < INSEPARABLE))
 
 
 def _best(candidates: Iterable[Pattern], kind: str, cause: str) -> Pattern:
     """The best pattern of one kind."""
     return max(
         (pattern for pattern in candidates if (pattern.kind, pattern.cause) == (kind, cause)),
-        key=lambda pattern: pattern.worth,
+        key=lambda pattern: pattern.net_gain,
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
-from calibrations.discovery.summary import sure
+from calibrations.discovery.summary import certainty_text
 from calibrations.documents import places_document, why
 from calibrations.fitting.fit import Fit
 from calibrations.presentation.views import view_of
@@ -114,7 +114,7 @@ def _summary(result: Discovery[Any]) -> str:
             line.effect,
             f"{line.size:.3g} {line.unit}",
             f"{100 * line.share:.3g} %",
-            sure(line.certainty),
+            certainty_text(line.certainty),
             ", ".join(line.inseparable_from) or "-",
         )
         for line in result.findings.data.summary(result)

@@ -17,7 +17,7 @@ from calibrations.compensation.forward import known_at_run_time
 from calibrations.effects import Effect, Parameter
 from calibrations.effects.catalogue import catalogue
 from calibrations.presentation.charts.signature import noise_signature_chart, shown_noise, shown_value, signature_chart
-from calibrations.presentation.static import sparing, svg
+from calibrations.presentation.static import compact_svg, svg
 
 ACTS_ON = {
     "pose": "the pose: the true position of the stages and of the vertical",
@@ -77,7 +77,7 @@ def pages(effects: Mapping[str, Effect]) -> dict[str, str]:
 def drawing(effect: Effect) -> str:
     """The effect's picture as an SVG document; the same effect gives the same text."""
     chart = noise_signature_chart(effect) if effect.is_noise else signature_chart(effect)
-    return sparing(svg(chart).decode())
+    return compact_svg(svg(chart).decode())
 
 
 def write(folder: Path) -> None:

@@ -382,7 +382,7 @@ def _round_attribute(match: re.Match[str]) -> str:
     return " " + " ".join(FINE.sub(r"\1", match[0]).split())
 
 
-def sparing(text: str) -> str:
+def compact_svg(text: str) -> str:
     """The same drawing for a page that holds many: digits beyond 0.1 pt, names and words for machines left out."""
     text = re.sub(r"<!DOCTYPE.*?>\s*|<metadata>.*?</metadata>\s*|<\?xml.*?\?>\s*", "", text, flags=re.DOTALL)
     text = re.sub(r'<g id="[^"]*"', "<g", text).replace("font-family: 'DejaVu Sans', Verdana, sans-serif; ", "")

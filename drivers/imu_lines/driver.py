@@ -26,7 +26,7 @@ from drivers.transport import Address, Links
 
 WRAP = 2**32  # counts of the sensor's time
 LONGEST = 1024  # bytes without an end of line
-UNASKED = (TIME, TEMPERATURE)  # columns that every record reads
+DEFAULT_COLUMNS = (TIME, TEMPERATURE)  # columns that every record reads
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Settings(DigitalSettings):
     def __post_init__(self) -> None:
         self.require_valid()
         require_positive(self, "time_unit_s")
-        if not set(self.columns) & {*OUTPUTS} or not set(self.columns) <= {*OUTPUTS, *VOLTAGES, *UNASKED}:
+        if not set(self.columns) & {*OUTPUTS} or not set(self.columns) <= {*OUTPUTS, *VOLTAGES, *DEFAULT_COLUMNS}:
             other_names = f"{', '.join(VOLTAGES)}, {TEMPERATURE} and {TIME}"
             raise ValueError(f"columns must name outputs of {', '.join(OUTPUTS)}, and may name {other_names}")
         if len(set(self.columns.values())) < len(self.columns):
@@ -65,14 +65,14 @@ class Settings(DigitalSettings):
     @property
     def wired(self) -> Mapping[str, int | str]:
         """All columns but time and temperature, by name."""
-        return {name: column for name, column in self.columns.items() if name not in UNASKED}
+        return {name: column for name, column in self.columns.items() if name not in DEFAULT_COLUMNS}
 
     @property
     def kinds(self) -> tuple[str, str, str]:
         return self.unit, self.gyro_unit, self.field_unit
 
     def chosen(self, outputs: Sequence[str]) -> Settings:
-        return replace(self, columns={k: c for k, c in self.columns.items() if k in (*outputs, *UNASKED)})
+        return replace(self, columns={k: c for k, c in self.columns.items() if k in (*outputs, *DEFAULT_COLUMNS)})
 
 
 class LineDecoder:

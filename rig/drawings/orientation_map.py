@@ -93,7 +93,7 @@ def _resting_cube(up: Array, north: Array) -> Iterator[str]:
     right = np.cross([0.0, 0.0, 1.0], VIEW) / np.hypot(VIEW[0], VIEW[1])
     above = np.cross(VIEW, right) / np.linalg.norm(VIEW)
 
-    def seen(place: Array) -> tuple[float, float]:
+    def projected(place: Array) -> tuple[float, float]:
         x, y = float(right @ turn @ place), float(above @ turn @ place)
         return CUBE[0] + CUBE_PX * x, CUBE[1] - CUBE_PX * y
 
@@ -104,15 +104,15 @@ def _resting_cube(up: Array, north: Array) -> Iterator[str]:
                 continue
             first, second = np.eye(3)[(k + 1) % 3], np.eye(3)[(k + 2) % 3]
             corners = [normal + a * first + b * second for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
-            yield svg.polygon([seen(corner) for corner in corners], SIDES[axis], svg.INK, 1.2)
-            yield svg.text(seen(normal), f"{'+' if sign > 0 else '−'}{axis}", 15, bold=True)
+            yield svg.polygon([projected(corner) for corner in corners], SIDES[axis], svg.INK, 1.2)
+            yield svg.text(projected(normal), f"{'+' if sign > 0 else '−'}{axis}", 15, bold=True)
     if len(north):
-        middle, ahead = seen(np.zeros(3)), seen(1.1 * north)
+        middle, ahead = projected(np.zeros(3)), projected(1.1 * north)
         start = CUBE[0] + BESIDE[0], CUBE[1] + BESIDE[1]
         end = start[0] + ahead[0] - middle[0], start[1] + ahead[1] - middle[1]
         yield svg.arrow(start, end, svg.BLUE)
         yield svg.text((end[0] + 6, end[1] + 4), "north", 13, svg.BLUE, "start", bold=True)
-    x, y = seen(np.sign(np.round(up, 6)))
+    x, y = projected(np.sign(np.round(up, 6)))
     yield svg.arrow((x, y), (x, y - 44), svg.ORANGE)
     yield svg.text((x + 9, y - 40), "up", 13, svg.ORANGE, "start", bold=True)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from calibrations.errors import ModelError
 from calibrations.fleet.batch import BatchVerdict, Population
-from calibrations.fleet.look import NOWHERE, Screening
+from calibrations.fleet.look import NO_STAGE, Screening
 from calibrations.fleet.rigs import StageErrors
 from calibrations.fleet.siblings import Pooled, pool_siblings
 from calibrations.model import Estimate, Model
@@ -80,7 +80,7 @@ def calibrate_fleet(fleet: Fleet, members: Sequence[Member], guide: Guide) -> Ca
         if "fault" in answer:
             faults[member] = answer["fault"]
         else:
-            screenings[member] = replace(read_look(answer), scores=(), stage=NOWHERE)  # pooling needs no scores
+            screenings[member] = replace(read_look(answer), scores=(), stage=NO_STAGE)  # pooling needs no scores
     groups: dict[tuple[str, Names], list[Member]] = defaultdict(list)
     for member in members:
         if member in screenings:
@@ -137,7 +137,7 @@ def _with(base: Model, names: Names, values: object, stds: object, provenance: M
 
 RIGS = "rigs.json"
 SCHEMA = "rig.fleet-rigs/1"
-OTHERWISE = "other.yaml"  # for sensors without a batch
+OTHER_MODEL = "other.yaml"  # for sensors without a batch
 
 
 def write_guide(population: Population, start: Question, folder: Path) -> list[Path]:
@@ -173,7 +173,7 @@ def read_guide(source: str, batches: set[str], effect_files: Own = ()) -> Guide:
 
 def safe(name: str) -> str:
     """A name with the characters of a file name only."""
-    return "".join(c if c.isalnum() or c in "-_." else "_" for c in name).lstrip(".") or Path(OTHERWISE).stem
+    return "".join(c if c.isalnum() or c in "-_." else "_" for c in name).lstrip(".") or Path(OTHER_MODEL).stem
 
 
 def _guide_model(start: Question, batch: BatchVerdict) -> str:

@@ -28,7 +28,7 @@ from calibrations.fleet.batch import (
     batch_verdict,
     find_batch_effects,
 )
-from calibrations.fleet.look import NOWHERE, Screening
+from calibrations.fleet.look import NO_STAGE, Screening
 from calibrations.fleet.rigs import Measured, RigError, StageErrors, find_rig_errors, find_unconnected_rigs
 from rig.fleet.members import Member
 from rig.fleet.questions import Fleet
@@ -212,7 +212,7 @@ def _population(stand: Stand, diagnosed: Mapping[Member, Any], members: Sequence
         batch_sensors = tuple(verdict for verdict in sensors if verdict.batch == batch)
         batches.append(batch_verdict(batch, stand.effects.get(batch, ()), batch_sensors))
     unconnected = find_unconnected_rigs(
-        [Measured(m.batch, m.rig, NOWHERE) for m, screened in stand.screening.items() if screened.on_stages]
+        [Measured(m.batch, m.rig, NO_STAGE) for m, screened in stand.screening.items() if screened.on_stages]
     )
     return Population(sensors, tuple(batches), stand.errors, tuple(unconnected))
 

@@ -20,7 +20,7 @@ from sqlalchemy import select
 import calibrations
 from calibrations.errors import DataError
 from rig.files import RECORD, program
-from rig.fleet.crew import run_tasks
+from rig.fleet.cluster import run_tasks
 from rig.fleet.members import Member, content
 from rig.fleet.worker import Question, Task, answer
 from rig.record import Record

@@ -147,7 +147,7 @@ def model_of(question: Question) -> Model:
 def _check_table(table: Table, model: Model) -> Table:
     """The table, if a fleet can test it with the model. Raises DataError, ModelError."""
     if not table.type.means:
-        raise DataError(_instead(table.source, table.kind))
+        raise DataError(_unsuitable_kind(table.source, table.kind))
     if not model.for_table(table).terms:
         raise ModelError(
             f"{table.source}: {model.name} is not a model of {table.content}; put these sensors into a separate "
@@ -157,7 +157,7 @@ def _check_table(table: Table, model: Model) -> Table:
     return table
 
 
-def _instead(source: str, kind: str) -> str:
+def _unsuitable_kind(source: str, kind: str) -> str:
     command = "discover" if kind in FITTED else "noise"
     return (
         f"{source}: is a table of {kind}, and a fleet can have {join_words(list(MEANS))}; leave it out, and analyse "
@@ -169,16 +169,16 @@ def _read_table(task: Task) -> Table:
     """Raises DataError, RecordError."""
     if task.text is not None:
         if channels_alone(task.text[:LONGEST_BEGINNING]):
-            raise DataError(_instead(task.data, "still"))
-        return average_log(parse_csv(task.text, task.data), _nobody)
+            raise DataError(_unsuitable_kind(task.data, "still"))
+        return average_log(parse_csv(task.text, task.data), _suppress_remark)
     from rig.record.measured import table_of
     from rig.record.store import Record
 
     with Record(Path(task.home)) if task.home else Record.to_read() as record:
-        return average_log(table_of(record, task.data), _nobody)
+        return average_log(table_of(record, task.data), _suppress_remark)
 
 
-def _nobody(_: str) -> None:
+def _suppress_remark(_: str) -> None:
     """Suppress a remark on a single sensor."""
 
 

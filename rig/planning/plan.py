@@ -54,15 +54,15 @@ class RecordedTwin:
         if name == "only":
             return lambda *outputs: RecordedTwin(count(*outputs), act(*outputs))
 
-        def both(*arguments: Any, **keywords: Any) -> Any:
+        def plan_and_act(*arguments: Any, **keywords: Any) -> Any:
             planned = count(*arguments, **keywords)
             recorded = act(*arguments, **keywords)
-            return _together(planned, recorded) if isgenerator(planned) else recorded
+            return _plan_and_record(planned, recorded) if isgenerator(planned) else recorded
 
-        return both
+        return plan_and_act
 
 
-def _together(planned: Iterator[Any], recorded: Generator[Any, None, None]) -> Generator[Any, None, None]:
+def _plan_and_record(planned: Iterator[Any], recorded: Generator[Any, None, None]) -> Generator[Any, None, None]:
     """The blocks of a twin's record, each of which is planned too. Closing it ends the record."""
     with closing(recorded):
         for _, block in zip(planned, recorded, strict=False):

@@ -26,7 +26,7 @@ PREPARE = "`rig push --prepare --to URL`, run by the owner of the database,"
 PATIENCE = {"connect_timeout": "5", "keepalives_idle": "10", "keepalives_interval": "5", "keepalives_count": "3"}
 PATIENCE |= {"tcp_user_timeout": "20000", "application_name": "rig"}
 ENCRYPTED = {"sslmode": "require"}  # by default; the default of libpq would fall back to plain text
-HERE = ("/", "@", "127.", "localhost", "::1")  # prefixes of this machine; the first two are sockets
+LOCAL_HOSTS = ("/", "@", "127.", "localhost", "::1")  # prefixes of this machine; the first two are sockets
 TLS = ("SSL", "certificate")  # words in libpq's messages on encryption
 FORBIDDEN, READ_ONLY = "42501", "25006"  # SQLSTATE: insufficient privilege, read-only transaction
 LOCKED = "55P03"  # SQLSTATE: lock not available
@@ -103,7 +103,7 @@ def _is_here(url: URL) -> bool:
     """Whether every host of the URL is this machine."""
     host_names = url.query.get("host") or url.host or os.environ.get("PGHOST", "")
     hosts = host_names.split(",") if isinstance(host_names, str) else host_names
-    return all(not host or host.startswith(HERE) for host in hosts)
+    return all(not host or host.startswith(LOCAL_HOSTS) for host in hosts)
 
 
 def open_server(url: URL) -> Engine:
@@ -162,7 +162,7 @@ def _first_line(error: BaseException) -> str:
 
 READER, WRITER = "rig_reader", "rig_writer"
 ONE_AT_A_TIME = 0x52494700  # key of the advisory lock for the preparation
-MAY = {READER: "SELECT", WRITER: "SELECT, INSERT, UPDATE"}  # rows are never deleted
+PRIVILEGES = {READER: "SELECT", WRITER: "SELECT, INSERT, UPDATE"}  # rows are never deleted
 
 
 def prepare(url: URL) -> int:
@@ -188,7 +188,7 @@ def prepare(url: URL) -> int:
 
 def _grant(connection: Connection) -> None:
     tables = ", ".join(connection.dialect.identifier_preparer.format_table(table) for table in metadata.sorted_tables)
-    for role, may in MAY.items():
+    for role, may in PRIVILEGES.items():
         if not connection.execute(text("SELECT 1 FROM pg_roles WHERE rolname = :role"), {"role": role}).scalar():
             connection.execute(text(f"CREATE ROLE {role} NOLOGIN"))
         connection.execute(text(f"GRANT {may} ON {tables} TO {role}"))

@@ -46,7 +46,7 @@ def soak(measured: Measured) -> dict[str, Result]:
 
     A soak with too few reversals to separate drift from noise has only the gap.
     """
-    soak, forecasts = night(measured), foreseen_of(measured)
+    soak, forecasts = read_soak(measured), read_forecasts(measured)
     results: dict[str, Result] = {}
     for axis in ("", *soak.axes) if all(course.state for course in soak.courses.values()) else ():
         results |= _steady(soak, forecasts, axis)
@@ -59,12 +59,12 @@ def soak(measured: Measured) -> dict[str, Result]:
     return results | {"gap": Result(sum(gap.length_s for gap in soak.gaps), "s")}
 
 
-def night(measured: Measured) -> Soak:
+def read_soak(measured: Measured) -> Soak:
     """The soak of the run. Times are since power-on, or since the beginning if that is not known."""
     return soak_of(measured.table(), measured.run.settings["oven_c"])
 
 
-def foreseen_of(measured: Measured) -> dict[str, ForecastHistory]:
+def read_forecasts(measured: Measured) -> dict[str, ForecastHistory]:
     """The forecasts of each quantity in the course of the run."""
     return forecast_history(measured.table(), measured.run.settings["oven_c"])
 

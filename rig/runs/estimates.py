@@ -270,7 +270,7 @@ def present(name: str, forecast: Forecast, output_unit: str) -> str:
 
 def outlook(name: str, forecast: Forecast, output_unit: str) -> str:
     """The final value and the time of the steady state, with bounds of 95 %."""
-    if forecast.surprised:
+    if forecast.contradicted:
         return "the drift does not look like a warm-up, so there is no forecast"
     return f"{_final(forecast, _unit(name, output_unit))}; {_time_to_steady(forecast)}"
 

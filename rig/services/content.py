@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rig.record import Record
-from rig.services.tables import AND, names_of
+from rig.services.tables import SEPARATOR, names_of
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ def content_of(data: str, model: str | None) -> Content:
     of_model = _of_file(Path(model)) if model and Path(model).is_file() else model or ""
     if len(names := names_of(data)) > 1:
         parts = [content_of(name, model) for name in names]
-        extent = AND.join(part.extent or "a file" for part in parts)
+        extent = SEPARATOR.join(part.extent or "a file" for part in parts)
         return Content(_key(*(part.key for part in parts)), extent, any(part.growing for part in parts))
     if Path(data).is_file():
         return Content(_key("file", _of_file(Path(data)), of_model))

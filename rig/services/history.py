@@ -236,7 +236,7 @@ def stale(life: History, calibration: Calibration, age_days: float) -> str | Non
 
 def _runs(record: Record, sensor: str) -> list[tuple[str, Run]]:
     """The complete runs of a sensor in the order of time, each with its name as data, such as `RUN/a1`."""
-    complete = sorted((run for run in record.runs() if run.state == "complete"), key=when)
+    complete = sorted((run for run in record.runs() if run.state == "complete"), key=run_date)
     members_and_runs = [(members(run).get(sensor), run) for run in complete]
     return [
         (f"{run.run}/{member}" if member else run.run, run) for member, run in members_and_runs if member is not None
@@ -284,7 +284,7 @@ def date_of(run: Run) -> datetime:
     )
 
 
-def when(run: Run) -> datetime:
+def run_date(run: Run) -> datetime:
     """The date of a run. A run with an invalid date is passed over later, with a message."""
     try:
         return date_of(run)

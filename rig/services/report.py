@@ -44,7 +44,7 @@ def of_run(data: str) -> tuple[MotionResult | None, Mapping[str, Any]]:
 Page = tuple[list["Picture"], Callable[[], str]]
 
 
-def night_of(data: str, date: str, program: str) -> Page | None:
+def soak_report_of(data: str, date: str, program: str) -> Page | None:
     """The pictures of a soak and what makes its page; None where `data` is no run of a soak.
 
     Raises RecordError, DataError where it holds too little.
@@ -56,10 +56,10 @@ def night_of(data: str, date: str, program: str) -> Page | None:
             return None
         from calibrations.presentation.charts.soak import soak_album
         from calibrations.presentation.report.soak import soak_report
-        from rig.results.soak import foreseen_of, night
+        from rig.results.soak import read_forecasts, read_soak
 
         measured = Measured.named(record, data)
-        result, forecasts = night(measured), foreseen_of(measured)
+        result, forecasts = read_soak(measured), read_forecasts(measured)
     pictures, facts = soak_album(result, forecasts), _facts(measured, date, program)
     return pictures, lambda: soak_report(result, measured.run.results, facts, pictures, forecasts)
 
@@ -95,16 +95,17 @@ def make_report(
     question: Loaded | None = None,
     found: Findings[Any] | None = None,
 ) -> Page:
-    """On a model, or on the night of a soak where none is named.
+    """On a model, or on a soak where no model is named.
 
     Raises what `load_request` and `fit` raise, UnusableData.
 
     `searched` makes the effects of the search, which report its progress and may end it. `question`: data and model in
     memory, so that the page and its report show the same rows. `found`: the search on these that the page has made.
     """
-    night = night_of(request.data, today(), program()) if request.model is None and request.channel is None else None
-    if night is not None:
-        return night
+    if request.model is None and request.channel is None:
+        soak_report = soak_report_of(request.data, today(), program())
+        if soak_report is not None:
+            return soak_report
     question = question or load_request(request, notify)
     return _on_a_model(
         request, question, notify, lambda: found or question.data.search(question.model, searched(question.effects))

@@ -66,7 +66,7 @@ class ModelSession(Generic[F]):
         """The effects added."""
         return tuple(step.name for step in self.steps)
 
-    def among(self, effects: Mapping[str, Effect]) -> ModelSession[F]:
+    def with_effects(self, effects: Mapping[str, Effect]) -> ModelSession[F]:
         """The same with other effects to be added."""
         return replace(self, effects=effects)
 
@@ -234,5 +234,5 @@ def brought_up_to_date(old: ModelSession[Any]) -> ModelSession[Any]:
             f"{extent_before or 'a file'}, now {extent_now or 'new'}."
         )
     ]
-    new = new.among({**old.effects, **new.effects}).with_added(old.added)
+    new = new.with_effects({**old.effects, **new.effects}).with_added(old.added)
     return replace(new, notes=(*notes, *new.notes))

@@ -59,7 +59,7 @@ def _without_excluded_rows(table: Table, notify: Callable[[str], None]) -> Table
 
 
 def load(data: str, kind: str | None = None, notify: Callable[[str], None] = lambda _: None) -> Table:
-    """The table of `data`: a file, else a run, or several joined by AND. `notify` receives remarks.
+    """The table of `data`: a file, else a run, or several joined by SEPARATOR. `notify` receives remarks.
 
     Raises DataError naming file, line and column; UnknownRun naming the nearest run.
     """
@@ -105,12 +105,12 @@ def _no_file(path: Path) -> str:
 
 # Several runs or files of one sensor as one table.
 
-AND = " + "  # between their names, where one text names all
+SEPARATOR = " + "  # between their names, where one text names all
 
 
 def names_of(data: str) -> list[str]:
     """The runs and files that a text names: `A + B` names two."""
-    return [data] if Path(data).exists() else [name.strip() for name in data.split(AND)]
+    return [data] if Path(data).exists() else [name.strip() for name in data.split(SEPARATOR)]
 
 
 def load_all(names: Sequence[str], notify: Callable[[str], None] = lambda _: None) -> Table:

@@ -24,7 +24,7 @@ import psutil
 from calibrations.effects.catalogue import catalogue
 from calibrations.importing.foreign import write_csv
 from calibrations.model.file import dump_model, read_model
-from rig.fleet.crew import crew
+from rig.fleet.cluster import connect_workers
 from rig.fleet.discover import discover_fleet
 from rig.fleet.members import fleet_of
 from rig.fleet.questions import Fleet
@@ -73,7 +73,7 @@ def make(folder: Path, count: int, odd: float) -> None:
 def measured(folder: Path, workers: int) -> dict[str, Any]:
     """One discovery into a record of its own."""
     memory, began = Memory(), time.perf_counter()
-    with tempfile.TemporaryDirectory() as home, Record(Path(home)) as record, crew(None, workers) as client:
+    with tempfile.TemporaryDirectory() as home, Record(Path(home)) as record, connect_workers(None, workers) as client:
         client.run(catalogue)
         start_s, began, own_s = time.perf_counter() - began, time.perf_counter(), time.process_time()
         with memory:

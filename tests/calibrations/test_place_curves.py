@@ -9,7 +9,7 @@ import pytest
 
 from calibrations.discovery.curves import place_curve, place_curves
 from calibrations.discovery.rows import Rows
-from calibrations.discovery.summary import step_shares, summary_lines, sure
+from calibrations.discovery.summary import certainty_text, step_shares, summary_lines
 from calibrations.effects.catalogue import catalogue
 from calibrations.free_forms.requested import resolve_effect
 from calibrations.loop import discover
@@ -122,4 +122,4 @@ def test_without_variance_beyond_the_noise_a_step_has_no_share() -> None:
 
 
 def test_a_certainty_is_never_whole() -> None:
-    assert (sure(1.0), sure(0.95)) == ("> 99.99 %", "95 %")
+    assert (certainty_text(1.0), certainty_text(0.95)) == ("> 99.99 %", "95 %")

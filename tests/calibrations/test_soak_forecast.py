@@ -141,7 +141,7 @@ def test_minutes_and_hours_are_both_followed() -> None:
     volts = 2.5 - 2e-3 * np.exp(-t_s / TAU_S) + 1e-3 * np.exp(-t_s / 240) + noise(4, t_s, "flicker")
     last = told(t_s, volts)[-1]
     assert last.final.low < 2.5 < last.final.high
-    assert 0.3 < last.surprise < 1.5
+    assert 0.3 < last.innovation_ratio < 1.5
 
 
 @pytest.mark.slow
@@ -175,7 +175,7 @@ def test_beyond_two_days_there_is_no_latest_and_of_no_approach_nothing() -> None
     assert bounds.high == np.inf
     t_s = times_s(40)
     step = told(t_s, 2.5 + noise(3, t_s, "white") + np.where(t_s > 5 * 3600, 30e-3, 0.0))[-1]
-    assert step.surprised
+    assert step.contradicted
     assert steady_time({"bias-x": ForecastHistory((step,))}) is None
 
 

@@ -25,7 +25,19 @@ from rig.record import Kept, Record
 from rig.runs.background import control, process
 from rig.runs.background import status as status_file
 from rig.runs.background.control import PublishingObserver
-from rig.runs.background.status import KEPT, OpenQuestion, Order, Seat, Status, file, folder, keys, lock, read, tidy
+from rig.runs.background.status import (
+    KEPT,
+    OpenQuestion,
+    Order,
+    Seat,
+    Status,
+    file,
+    folder,
+    keys,
+    lock,
+    read,
+    remove_old_files,
+)
 from rig.runs.runner import Outcome, start
 from rig.web.pages.run_live import stop_words
 from tests.rig.rigging import POSES, SMALL
@@ -203,7 +215,7 @@ def test_only_the_last_ones_are_kept() -> None:
     file(KEY, "json").parent.mkdir(parents=True)
     for number in range(25):
         Status(f"{KEY}-{number:02}", 4711, "sweep", "a bench", phase="ended").write()
-    tidy()
+    remove_old_files()
     assert [key[-2:] for key in keys()] == [f"{number:02}" for number in range(25 - KEPT, 25)]
 
 
@@ -212,7 +224,7 @@ def test_of_those_that_are_kept_none_is_under_way() -> None:
     for number in range(25):
         Status(f"{KEY}-{number:02}", 4711, "sweep", "a bench", phase="running").write()
     with lease(home(), lock(f"{KEY}-03"), "a test"):
-        tidy()
+        remove_old_files()
         assert keys()[0] == f"{KEY}-03"
         status = control.latest()  # the one that is under way, though others are newer
         assert status is not None

@@ -16,7 +16,7 @@ from distributed import Client, LocalCluster
 from calibrations.importing.foreign import write_csv
 from calibrations.model.file import dump_model, read_model
 from rig.errors import RigError
-from rig.fleet.crew import FleetError, crew, run_tasks
+from rig.fleet.cluster import FleetError, connect_workers, run_tasks
 from rig.fleet.discover import discover_fleet
 from rig.fleet.members import Member, fleet_of
 from rig.fleet.questions import Fleet
@@ -149,7 +149,7 @@ def fragile(tasks: list[int]) -> list[int]:
 
 @pytest.mark.slow
 def test_a_task_that_kills_its_worker_fails_alone_and_all_others_are_computed() -> None:
-    with crew(None, 1) as client:
+    with connect_workers(None, 1) as client:
         found = list(run_tasks(client, fragile, iter([[0, 1], [], [2, 3], [4]])))
     assert sorted(task for chunk, _ in found for task in chunk) == [0, 1, 2, 3, 4]
     assert [chunk for chunk, said in found if said is None] == [[1]]
@@ -157,7 +157,7 @@ def test_a_task_that_kills_its_worker_fails_alone_and_all_others_are_computed() 
 
 
 def test_no_scheduler_is_one_message(rig: Command, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rig.fleet.crew.PATIENCE_S", 0.2)
+    monkeypatch.setattr("rig.fleet.cluster.PATIENCE_S", 0.2)
     ended = rig("fleet", "discover", str(folder), "--scheduler", "tcp://127.0.0.1:1")
     assert ended.status == 3
     assert "tcp://127.0.0.1:1: no scheduler answers" in ended.err

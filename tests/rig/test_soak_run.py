@@ -21,7 +21,7 @@ from rig.bench import DEFAULT, read_bench
 from rig.bench.result_names import names_with_limits
 from rig.record import Record
 from rig.record.measured import Measured
-from rig.results.soak import night
+from rig.results.soak import read_soak
 from rig.runs.estimates import SoakForecaster, lines, outlook
 from rig.runs.runner import resume, start
 from rig.services.exclusion import exclude
@@ -113,7 +113,7 @@ def test_bounds_are_told_however_wide(steady_h: tuple[float, float, float], half
     steady_s = Bounds(*(3600.0 * h for h in steady_h))
     forecast = Forecast(7200.0, Bounds(2.49, 2.491, 2.492), final, steady_s, 1e-4, 9e-3, 1.0)
     assert outlook("bias-x", forecast, "V").endswith(said)
-    step = replace(forecast, surprise=9.0)
+    step = replace(forecast, innovation_ratio=9.0)
     assert outlook("bias-x", step, "V") == "the drift does not look like a warm-up, so there is no forecast"
 
 
@@ -126,7 +126,7 @@ def test_until_steady_it_ends_early_and_says_when(rig: Rig, cold: str) -> None:
     assert document["results"]["steady-state"]["value"] == 1.0
     with Record() as record:
         measured = Measured.named(record, document["run"])
-        t_s = night(measured).courses["bias-x"].t_s
+        t_s = read_soak(measured).courses["bias-x"].t_s
     assert 0 < measured.table().time_s[0] < 30  # since power-on, ten hours after the run's beginning
     assert 0 < t_s[0] < 60
     last_h = t_s[-1] / 3600
@@ -192,7 +192,7 @@ def test_a_kill_in_a_hold_is_a_gap_in_the_results(rig_home: Path) -> None:
             run = record.runs()[0].run
         assert nursery.run(rig_home, "resume", run, "--unattended").status == 0
     with Record(rig_home) as record:
-        (gap,) = night(Measured.named(record, run)).gaps
+        (gap,) = read_soak(Measured.named(record, run)).gaps
         assert gap.path == "hold 4"
         assert 0 < gap.length_s == pytest.approx(record.run(run).results["gap"]["value"])
 

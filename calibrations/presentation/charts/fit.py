@@ -78,7 +78,9 @@ def fit_album(fit: Fit) -> list[Picture]:
 def measurement_chart(fit: Fit) -> Chart:
     """A panel for each output, or one for the magnitude of positions."""
     if fit.table.type.moving:
-        return stack_panels([motion.measurement(ChannelResidual(fit, c, False)) for c in motion.firsts(fit)], 2.6)
+        return stack_panels(
+            [motion.measurement(ChannelResidual(fit, c, False)) for c in motion.first_channels(fit)], 2.6
+        )
     columns_of_fit, n = choices(fit), 1 if fit.table.type.magnitude else len(fit.channels)
     x, colour = (columns_of_fit[name] for name in first_choices(list(columns_of_fit), fit.table))
     if fit.table.type.magnitude:
@@ -107,7 +109,7 @@ def residual_chart(fit: Fit) -> Chart:
 def failure_chart(fit: Fit) -> Chart:
     """A map for each channel; for a motion the residual over one period."""
     if fit.table.type.moving:
-        return stack_panels([motion.failure(ChannelResidual(fit, c, False)) for c in motion.firsts(fit)], 2.6)
+        return stack_panels([motion.failure(ChannelResidual(fit, c, False)) for c in motion.first_channels(fit)], 2.6)
     panels = [failure(ChannelResidual(fit, c, False)) for c in range(len(fit.channels))]
     reach = max(PALE, float(np.abs(fit.residual / fit.noise.floor[:, None]).max()))
     return stack_panels(panels, 4.2 if len(panels) == 1 else ROW, bar=_signed_scale(reach))

@@ -85,7 +85,7 @@ def failure(channel: ChannelResidual) -> Panel:
     return Panel(series, x, Axis(f"mean residual of {axis} ({channel.unit})"), f"axis {axis}")
 
 
-def firsts(fit: Fit) -> list[int]:
+def first_channels(fit: Fit) -> list[int]:
     """The first channel of each axis: `x mean` of `x mean`, `x in phase at 10 Hz` and so on."""
     axes = [name.partition(" ")[0] for name in fit.channels]
     return [axes.index(axis) for axis in dict.fromkeys(axes)]

@@ -193,8 +193,11 @@ def record(channel: Channel, scaled: Scaled) -> Panel:
 
 def levels(start: NoiseFit, steps: Sequence[Step[NoiseFit]]) -> list[Level]:
     """Error by model of a noise model: the mismatch of its spectrum, and that of its Allan deviation."""
-    first = Level(start.model.name, start.pooled_excess, start.held_out_excess, _off(start))
-    return [first, *(Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, _off(s.after)) for s in steps)]
+    first = Level(start.model.name, start.pooled_excess, start.held_out_excess, _mismatch_text(start))
+    return [
+        first,
+        *(Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, _mismatch_text(s.after)) for s in steps),
+    ]
 
 
 def steps_chart(start: NoiseFit, steps: Sequence[Step[NoiseFit]]) -> Chart:
@@ -212,7 +215,7 @@ def fit_chart(fit: NoiseFit) -> Chart:
     )
 
 
-def _off(fit: NoiseFit) -> str:
+def _mismatch_text(fit: NoiseFit) -> str:
     return " and ".join(f"{100 * value:.2g} %" for value in mismatch(fit).values())
 
 

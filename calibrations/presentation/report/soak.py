@@ -173,7 +173,7 @@ def _outlook(name: str, history: ForecastHistory, output_unit: str) -> tuple[str
     factor, unit = in_milli(output_unit if quantity == "bias" else f"{output_unit}/g")
     if known_s is not None:
         value = f"{rounded(factor * final.value, 7)} ± {rounded(factor * final.half, 2)}"
-    elif history.last.surprised:
+    elif history.last.contradicted:
         value = "not a warm-up: no forecast"
     else:
         value = f"not known: {rounded(factor * final.low, 6)} to {rounded(factor * final.high, 6)}"

@@ -104,14 +104,14 @@ def _summary(discovery: Discovery[NoiseFit]) -> str:
         text += (
             f"With {join_words(discovery.causes)} the mismatch of the spectrum falls from "
             f"{rounded(start.pooled_excess)} to {rounded(end.pooled_excess)} times the scatter by chance, and that of "
-            f"the Allan deviation from {_off(start)} to {_off(end)}."
+            f"the Allan deviation from {_mismatch_text(start)} to {_mismatch_text(end)}."
         )
     else:
         text += f"The mismatch of the spectrum is {rounded(discovery.start.pooled_excess)} times the scatter by chance."
     return f"{text} {discovery.judgement.text}"
 
 
-def _off(fit: NoiseFit) -> str:
+def _mismatch_text(fit: NoiseFit) -> str:
     return join_words(f"{rounded(100 * value, 2)} % ({axis})" for axis, value in mismatch(fit).items())
 
 
@@ -127,7 +127,7 @@ def _figures(discovery: Discovery[NoiseFit]) -> list[tuple[str, str, str]]:
 
 def _step(name: str, gained: float | None, loss: float | None, fit: NoiseFit) -> tuple[str, ...]:
     likelihoods = ("–" if value is None else rounded(value) for value in (gained, loss))
-    return name, *likelihoods, rounded(fit.pooled_excess), rounded(fit.held_out_excess), _off(fit)
+    return name, *likelihoods, rounded(fit.pooled_excess), rounded(fit.held_out_excess), _mismatch_text(fit)
 
 
 def _provenance(discovery: Discovery[NoiseFit], date: str, program: str) -> dict[str, str]:

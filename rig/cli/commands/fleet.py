@@ -127,7 +127,7 @@ def _write_report(request: Request, paths: list[Path], page: Callable[[], str]) 
 @contextmanager
 def _fleet(request: Request) -> Iterator[tuple[Fleet, list[Member]]]:
     """The workers and the sensors; progress goes to standard error. Raises OutputError for an unusable report file."""
-    from rig.fleet.crew import crew
+    from rig.fleet.cluster import connect_workers
     from rig.fleet.members import fleet_of
     from rig.fleet.questions import Fleet
     from rig.record import Record
@@ -140,7 +140,7 @@ def _fleet(request: Request) -> Iterator[tuple[Fleet, list[Member]]]:
         f"{count_words(len(members), 'sensor', 'sensors')} of {count_words(len(batches), 'batch', 'batches')} "
         f"on {count_words(len(rigs), 'rig', 'rigs')}"
     )
-    with Record() as record, crew(request.scheduler, request.workers) as client:
+    with Record() as record, connect_workers(request.scheduler, request.workers) as client:
         yield Fleet(client, record, _Steps()), members
 
 

@@ -14,14 +14,14 @@ from rig.cli.terminal.output import FILE, json_option, note
 if TYPE_CHECKING:
     from rig.web.server import Place
 
-HERE = ("127.0.0.1", "localhost", "::1")
+LOCAL_HOSTS = ("127.0.0.1", "localhost", "::1")
 
 
 @click.command("web")
 @click.option("--port", type=click.IntRange(1, 65535), help="Port. Default: 8473, or any free port.")
 @click.option(
     "--host",
-    default=HERE[0],
+    default=LOCAL_HOSTS[0],
     show_default=True,
     help="Address to listen at. Another address opens the workbench to other machines.",
 )
@@ -53,7 +53,7 @@ def web_command(
     benches = bench_files or (None, DEMO)
     for bench_file in benches:
         read_bench(bench_file)  # an error appears here and not on a page
-    if host not in HERE:
+    if host not in LOCAL_HOSTS:
         note(
             f"Listening at {host}: other machines can reach the workbench and the rig. Nothing is encrypted; "
             "in a shared network, leave out --host and connect by `ssh -L`."

@@ -37,7 +37,7 @@ from rig.runs.background.status import (
     new_key,
     open_question,
     read,
-    tidy,
+    remove_old_files,
 )
 from rig.runs.observer import Decision, Observer, Outcome
 
@@ -75,7 +75,7 @@ class PublishingObserver(Observer):
         if not self._run:
             with suppress(RigError, OSError):
                 folder().mkdir(parents=True, exist_ok=True)
-                tidy()
+                remove_old_files()
                 self._held.enter_context(lease(home(), lock(self._key), f"an order, {self._procedure}"))
         self._run = run
         self._observer.begun(run)
@@ -161,7 +161,7 @@ def _begin(order: Order) -> str:
                 f"{current.procedure} is in progress since {begin_time(current)}; stop it, or wait until it ends"
             )
         bench = order.bench().name
-        tidy()
+        remove_old_files()
         os.mkfifo(file(order.key, "answers"))
         with file(order.key, "log").open("wb") as log:
             words = [sys.executable, "-m", "rig.runs.background.process", order.text()]

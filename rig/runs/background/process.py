@@ -28,7 +28,7 @@ from rig.runs.signals import who_stopped
 
 PAUSE = signal.SIGINT  # by which a page pauses a run
 LONGEST = 4096  # bytes of an answer, which a pipe hands over in one piece
-WISHES = Choice("interrupted", "What now?", choices=("resume", "repeat", "end"))
+NEXT_STEP = Choice("interrupted", "What now?", choices=("resume", "repeat", "end"))
 
 
 class Attendant(StatusWriter):
@@ -53,7 +53,7 @@ class Attendant(StatusWriter):
         """Wait at rest for the decision of a person."""
         by_a_person = isinstance(outcome.error, Stopped)
         self.publish(error="" if by_a_person else str(outcome.error), moving=outcome.moving)
-        return cast(Decision, self._answer(WISHES, "resume", "paused"))
+        return cast(Decision, self._answer(NEXT_STEP, "resume", "paused"))
 
     def _answer(self, question: Question, proposed: str, phase: str) -> str:
         """Ask until the question accepts the answer."""
@@ -77,7 +77,7 @@ def _pipe(key: str) -> Iterator[Callable[[], Mapping[str, str]]]:
     """A function that waits for the next answer; a signal interrupts it."""
     pipe = os.open(file(key, "answers"), os.O_RDONLY | os.O_NONBLOCK)
 
-    def heard() -> Mapping[str, str]:
+    def wait_for_answer() -> Mapping[str, str]:
         select.select([pipe], [], [])
         try:
             document = json.loads(os.read(pipe, LONGEST))
@@ -86,7 +86,7 @@ def _pipe(key: str) -> Iterator[Callable[[], Mapping[str, str]]]:
         return document if isinstance(document, dict) else {}
 
     try:
-        yield heard
+        yield wait_for_answer
     finally:
         os.close(pipe)
 

@@ -205,7 +205,7 @@ def folder() -> Path:
     return home() / FOLDER
 
 
-def tidy() -> None:
+def remove_old_files() -> None:
     """Remove the files of old processes, except the last KEPT. Their runs stay in the record."""
     for key in keys()[:-KEPT]:
         if not is_held(home(), lock(key)):

@@ -11,7 +11,7 @@ from calibrations.presentation.charts.history import CONTROL_LEGENDS, control_pa
 from rig.errors import RecordError
 from rig.record import Run
 from rig.services.control import HEAD, OUT, PROCEDURE, make_charts, row, signals, worst
-from rig.services.history import when
+from rig.services.history import run_date
 from rig.web.pages.history_results import CLICKED, without_title
 from rig.web.parts import box, button, div, for_page, show_error, table, wide_table, words
 from rig.web.pictures import draw, plot_with_title
@@ -40,7 +40,7 @@ class CheckStandards:
                 return
             verdict.set_text(worst(self.standards))
             verdict.classes(LOOKS[worst(self.standards)])
-            self.days = {run.run: when(run).date().isoformat() for run in runs}
+            self.days = {run.run: run_date(run).date().isoformat() for run in runs}
             with wide_table():
                 table(HEAD, [tuple(map(for_page, row(standard))) for standard in self.standards])
             for line in (line for standard in self.standards for line in signals(standard)):

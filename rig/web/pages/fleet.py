@@ -112,9 +112,9 @@ def calibrated(sources: list[str], model: str, bench_file: Any, notify: Tell) ->
 
 def _fleet_page(sources: list[str], notify: Tell, page: Callable[[Any, list[Member]], str]) -> str:
     """The page that the workers' answers make. Raises RigError, FleetError."""
-    from rig.fleet.crew import crew
+    from rig.fleet.cluster import connect_workers
     from rig.fleet.questions import Fleet
 
     members = fleet_of(sources)
-    with Record() as record, crew(None, None) as client:
+    with Record() as record, connect_workers(None, None) as client:
         return page(Fleet(client, record, notify), members)

@@ -21,7 +21,7 @@ from rig.services.history import (
     judge_history,
     latest,
     limits_of,
-    when,
+    run_date,
 )
 from rig.services.request import effects_of
 from rig.web.calculations import Visit, off_loop
@@ -75,7 +75,7 @@ def sensor_table(runs_by_sensor: Mapping[str, list[Run]]) -> None:
 
 
 def _row(sensor: str, runs: list[Run]) -> dict[str, object]:
-    days = sorted(when(run).date().isoformat() for run in runs)
+    days = sorted(run_date(run).date().isoformat() for run in runs)
     return {
         "sensor": sensor,
         "to": HistoryRequest(sensor).address,

@@ -239,7 +239,7 @@ class Workbench:
             self.missing.wait(search)
             self.verdict.wait("Searching for missing effects")
             try:
-                self.diagnoses[key] = await self.visit.work(session.among(search).diagnosed)
+                self.diagnoses[key] = await self.visit.work(session.with_effects(search).diagnosed)
             except Cancelled:
                 return
             except Exception as error:

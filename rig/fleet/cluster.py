@@ -35,7 +35,7 @@ class FleetError(RigError):
 
 
 @contextmanager
-def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
+def connect_workers(scheduler: str | None, workers: int | None) -> Iterator[Client]:
     """The client of the scheduler at an address, or of a local cluster with `workers` processes.
 
     Raises FleetError if Dask is not installed or no scheduler answers.
@@ -46,7 +46,7 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
 
     except ImportError:
         raise FleetError("fleets need Dask; install it with: pip install 'inertial-rig[fleet]'") from None
-    hush()
+    silence_dask()
     settings = {
         "distributed.scheduler.allowed-failures": 0,
         "distributed.comm.timeouts.connect": f"{PATIENCE_S} s",
@@ -68,7 +68,7 @@ def crew(scheduler: str | None, workers: int | None) -> Iterator[Client]:
             ) as cluster,
             Client(cluster) as client,
         ):
-            client.register_plugin(Deaf())
+            client.register_plugin(QuietWorker())
             yield client
 
 
@@ -118,15 +118,15 @@ def run_tasks(
 # A terminal sends Ctrl-C to local workers too. They ignore it and print nothing, because the command handles both.
 
 
-def hush() -> None:
+def silence_dask() -> None:
     """Suppress the messages of Dask, because the command reports each fault once."""
     for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
         logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
-class Deaf(WorkerPlugin):
+class QuietWorker(WorkerPlugin):
     """Plugin of every worker process of a local cluster, also of one that replaces a dead one."""
 
     def setup(self, worker: Worker) -> None:  # noqa: ARG002 Dask calls it so
-        hush()
+        silence_dask()
         signal.signal(signal.SIGINT, signal.SIG_IGN)
