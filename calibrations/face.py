@@ -109,11 +109,16 @@ def discover(
 def add(model: GivenModel, effect: GivenEffect) -> Model:
     """`model` with one effect more, which `fit` then estimates. Raises ModelError where the model has it already.
 
-    `effect` is the name of one of the catalogue, the file of one of your own, or a class that derives from `Effect`.
+    `effect` is the name of one of the catalogue, the file of one of your own, a class that derives from `Effect`, or a
+    curve of unknown form at a place of the signal chain, such as `free:own-response`.
     """
     from calibrations.effects.catalogue import load_effect
+    from calibrations.free_forms.place_names import PREFIX
+    from calibrations.free_forms.requested import resolve_effect
 
-    base, new_effect = _model(model), load_effect(effect)
+    base = _model(model)
+    is_curve = isinstance(effect, str) and effect.startswith(PREFIX)
+    new_effect = resolve_effect(effect, {}) if is_curve else load_effect(effect)
     if base.holds(new_effect.name):
         raise ModelError(f"{base.name}: {new_effect.name} is already in the model; it has {', '.join(base.effects)}")
     return base.with_effect(new_effect)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import calibrations as cal
 from calibrations.discovery.rows import Rows
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import CalibrationError, ModelError
@@ -50,6 +51,16 @@ def test_a_requested_form_takes_up_the_curve_at_its_place(place: str) -> None:
     found = with_form(place, table(CURVES[place], **changing(place)))
     assert found.pooled_excess < 1.1
     assert found.held_out_excess < 1.5  # folds of neighbouring poses: a curve over time is continued
+
+
+def test_the_library_adds_a_curve_by_the_name_of_its_place() -> None:
+    data = table(CURVES["own-response"])
+    wavy = cal.add("linear", "free:own-response")
+    assert cal.fit(data, wavy).pooled_excess < 1.1 < cal.fit(data, "linear").pooled_excess
+    with pytest.raises(ModelError, match="free:own-response is already in the model"):
+        cal.add(wavy, "free:own-response")
+    with pytest.raises(CalibrationError, match="own-response"):
+        cal.add("linear", "free:own-respons")
 
 
 @pytest.mark.parametrize("place", ["own-response", "z-response", "history", "time-scale", "output"])
