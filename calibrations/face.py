@@ -117,8 +117,10 @@ def add(model: GivenModel, effect: GivenEffect) -> Model:
     from calibrations.free_forms.requested import resolve_effect
 
     base = _model(model)
-    is_curve = isinstance(effect, str) and effect.startswith(PREFIX)
-    new_effect = resolve_effect(effect, {}) if is_curve else load_effect(effect)
+    if isinstance(effect, str) and effect.startswith(PREFIX):
+        new_effect = resolve_effect(effect, {})
+    else:
+        new_effect = load_effect(effect)
     if base.holds(new_effect.name):
         raise ModelError(f"{base.name}: {new_effect.name} is already in the model; it has {', '.join(base.effects)}")
     return base.with_effect(new_effect)
