@@ -14,8 +14,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from procedures.at_rest import (
     FEWEST,
     WINDOW_S,
@@ -35,8 +33,7 @@ KIND = "turns"
 ADAPTIVE = True
 FORCES, RATES = ("ax", "ay", "az"), ("gx", "gy", "gz")
 TURN = "turn to "  # the path of a turn begins so; that of one that is not used has a reason before it
-FLAT_TOP = 4  # equal successive samples at the extreme of an output: the end of its range
-LARGE = 20.0  # times the noise: smaller outputs are equal by coarse steps
+STILL_FIRST = "keep the sensor still until this position is taken"
 TABLE = "Does the sensor lie on a table, and is its cable long enough to turn it upside down? Let it go."
 
 
@@ -75,7 +72,8 @@ def hand_turns(
 class Watch:
     """The record in progress: windows of the rest `before`, of the `turn` since then, and of the present rest.
 
-    The first window of a rest belongs to the turn: the hand has just let go. `remark`: why the last turn is not used.
+    The first window of a rest belongs to the turn: the hand has just let go. `remark`: why the last turn is not used;
+    before the first rest, that the sensor stays still, because a turn begins with a rest.
     """
 
     rig: Session
@@ -86,7 +84,7 @@ class Watch:
     before: list[Samples] = field(default_factory=list)
     turn: list[Samples] = field(default_factory=list)
     rest: list[Samples] = field(default_factory=list)
-    remark: str = ""
+    remark: str = STILL_FIRST
 
     @property
     def _count(self) -> int:
@@ -112,6 +110,7 @@ class Watch:
     def keep(self, words: str) -> None:
         """Store the turn, if its rest before is known, and the present rest."""
         temperature_c = self.rig.oven.temperature_c()
+        self.remark = ""
         if self.before:
             turned = Windows.of([*self.before, *self.turn, *self.rest[:1]])
             self.remark = self._fault(turned)
@@ -140,15 +139,8 @@ class Watch:
         """Why this turn cannot be used, in words; empty if it can."""
         if turned.lost:
             return f"{turned.lost} samples were lost during the turn"
-        rates, at_rest = outputs_of(turned, RATES), outputs_of(Windows.of(self.before), RATES)
-        for name, values, rest in zip(RATES, rates.T, at_rest.T, strict=True):
-            for end in (values.min(), values.max()):
-                if abs(end - rest.mean()) > LARGE * rest.std() and _longest(values == end) >= FLAT_TOP:
-                    return f"{name} reached the end of its range, turn more slowly"
+        at_rest = outputs_of(Windows.of(self.before), RATES)
+        moving = outputs_of(Windows.of(self.turn), RATES)
+        if (output := self.analysis.clipped(moving, at_rest)) is not None:
+            return f"{RATES[output]} reached the end of its range, turn more slowly"
         return ""
-
-
-def _longest(flags: np.ndarray) -> int:
-    """The length of the longest run of true values."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
-    return int((edges[1::2] - edges[::2]).max(initial=0))

@@ -158,6 +158,9 @@ class HandAnalysis(Protocol):
     def field_course(self, dwells: Sequence[Dwell], noise: NoiseAtRest, skipped: Sequence[str]) -> HandCourse:
         """The same of a magnetometer."""
 
+    def clipped(self, turn: NDArray[np.float64], rest: NDArray[np.float64]) -> int | None:
+        """The number of an output that a turn (n, outputs) clips; None if none does. `rest`: samples at rest."""
+
     def turn_course(self, recorded: Sequence[Recorded], noise: NoiseAtRest, rest_s: float) -> HandCourse:
         """The rests and turns of an accelerometer and a gyroscope so far. A turn begins with a rest of `rest_s`."""
 

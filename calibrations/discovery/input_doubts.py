@@ -5,6 +5,7 @@ doubts: a saturated output or a coarse converter is a property of the sensor, an
 
 equal values   exactly one value in several rows, where nearly all other rows differ: saturation at an end of the
                range, a placeholder for a missing reading inside it
+clipped turns  an output of a gyroscope that repeats its extreme value in a turn
 rounding       all outputs are multiples of a step that adds more than the noise of a mean
 """
 
@@ -26,6 +27,7 @@ from calibrations.criteria import (
     VISIBLE_STEP,
 )
 from calibrations.fitting.table_noise import excess_over_ellipsoid, scatter
+from calibrations.geometry.clipped_turns import clipped_turns_warning
 from calibrations.geometry.sphere import sphere_radius
 from calibrations.importing.plausible import find_time_doubt
 from calibrations.means.noise import norm_std, rms, robust_std, white_std
@@ -39,7 +41,7 @@ WIDEST = 10.0  # times the noise of a mean, by the widest form of a kind
 
 def doubts(table: Table) -> tuple[str, ...]:
     """All doubts about a table, () for a healthy one."""
-    checks = (_times, _copies, _equal_values, _check_rounding, _field, _check_most_general_model)
+    checks = (_times, _copies, _equal_values, _clipped_turns, _check_rounding, _field, _check_most_general_model)
     return tuple(text for check in checks for text in check(table))
 
 
@@ -107,6 +109,12 @@ def _equal_values(table: Table) -> Iterator[str]:
             other_values - np.median(other_values)
         ):
             yield f"{repetition}: it may stand for a missing reading, or a stuck one; leave these rows out"
+
+
+def _clipped_turns(table: Table) -> Iterator[str]:
+    """Turns in which an output reached the end of its range."""
+    if table.kind == "turns" and (warning := clipped_turns_warning(table)):
+        yield warning
 
 
 def _copies(table: Table) -> Iterator[str]:

@@ -29,6 +29,7 @@ from scipy.optimize import least_squares
 
 from calibrations.criteria import FEWEST_TURNS_OF_A_GYROSCOPE, SMALLEST_TURN_DEG
 from calibrations.errors import DataError, TooFewRows
+from calibrations.geometry.clipped_turns import find_clipped_turns
 from calibrations.geometry.rate_table import at_rest, vertical_deg_s
 from calibrations.geometry.triad import gravity_directions, unit_vectors
 from calibrations.table import AXES, Array, Table
@@ -116,13 +117,16 @@ class Turns(Table):
 
 @lru_cache(maxsize=8)
 def make_turns(table: Table) -> Turns:
-    """The rows of a table of samples. Raises DataError, TooFewRows."""
+    """The rows of a table of samples, without the turns that are clipped. Raises DataError, TooFewRows."""
     if isinstance(table, Turns):
         return table
-    blocks = [_block(table, first, last) for first, last in _find_turns(table)]
+    found = _find_turns(table)
+    clipped = find_clipped_turns(table)
+    blocks = [_block(table, *rows) for number, rows in found if number not in clipped]
     if len(blocks) < FEWEST_TURNS_OF_A_GYROSCOPE:
+        clipped_words = f", and {len(clipped)} in which an output reached the end of its range" if clipped else ""
         raise TooFewRows(
-            f"{table.source}: {len(blocks)} turns between rests; a gyroscope needs "
+            f"{table.source}: {len(blocks)} turns between rests{clipped_words}; a gyroscope needs "
             f"{FEWEST_TURNS_OF_A_GYROSCOPE} or more, about different axes"
         )
     lengths = np.array([len(block["t_s"]) for block in blocks])
@@ -134,10 +138,12 @@ def make_turns(table: Table) -> Turns:
     return _rows(table, samples, bounds, before, after)
 
 
-def _find_turns(table: Table) -> list[tuple[int, int]]:
-    """First row and end row of each turn with its rests. Raises DataError for a turn without one of them."""
+def _find_turns(table: Table) -> list[tuple[int, tuple[int, int]]]:
+    """The number of each turn, its first row and its end row, with its rests. Raises DataError for a turn without one
+    of them.
+    """
     numbers, is_resting = table.column("turn"), table.column("resting") > 0.5
-    bounds, first = [], 0
+    turns, first = [], 0
     for number, group in groupby(numbers.tolist()):
         last = first + len(list(group))
         resting = is_resting[first:last]
@@ -146,9 +152,9 @@ def _find_turns(table: Table) -> list[tuple[int, int]]:
                 f"{table.source}: turn {number:g} has no rest before it, or after it, or no sample between them; "
                 'remove its rows, or correct the column "resting"'
             )
-        bounds.append((first, last))
+        turns.append((int(number), (first, last)))
         first = last
-    return bounds
+    return turns
 
 
 def _block(table: Table, first: int, last: int) -> dict[str, Array]:

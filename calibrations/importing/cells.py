@@ -7,7 +7,7 @@ table whose lines are damaged as a rule was understood wrongly: it is refused wi
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import date, timedelta
 from typing import Literal
@@ -75,6 +75,7 @@ def number_or_text(cell: str) -> Constant:
 MOST_SKIPPED = 0.01  # of the lines, unless a person asks for more
 MOST_ASKED = 0.5  # of the lines in any case
 SHOWN = 3
+FEWEST_OF_LOG = 100  # lines: a shorter table may be typed by hand, its last line without an end
 
 Policy = Literal["few", "skip", "refuse"]
 SHARES: dict[Policy, float] = {"few": MOST_SKIPPED, "skip": MOST_ASKED, "refuse": 0.0}
@@ -114,3 +115,31 @@ class BadLines:
         rest_words = f" and {self.bad - len(self.shown)} more" if self.bad > len(self.shown) else ""
         verb = "are damaged and were" if self.bad > 1 else "is damaged and was"
         report(f"{self.name}: {count_words} {verb} skipped: {', '.join(self.shown)}{rest_words}.")
+
+
+@dataclass
+class Lines:
+    """Lines of a text, and the last one that was read. A log that was cut has no line end there."""
+
+    lines: Iterator[str]
+    last: str = ""
+
+    def __iter__(self) -> Iterator[str]:
+        for line in self.lines:
+            self.last = line
+            yield line
+
+    def may_be_cut(self, cell: str, sample: Sequence[Sequence[str]]) -> bool:
+        """Whether the last line has no end, and its last `cell` may have lost digits, as other rows show."""
+        others = [row[-1] for row in sample[:-1] if is_number(row[-1])]
+        if self.last.endswith("\n") or not is_number(cell) or len(others) < FEWEST_OF_LOG:
+            return False
+        if any("e" in other.lower() for other in others):
+            return True  # without its exponent a number is another one
+        if least := min(map(_decimals, others)):
+            return _decimals(cell) < least
+        return len(cell.lstrip("+-")) < max(len(other.lstrip("+-")) for other in others)
+
+
+def _decimals(cell: str) -> int:
+    return len(cell.replace(",", ".").partition(".")[2])

@@ -48,15 +48,16 @@ def as_table(first: str, source: Source) -> Source:
     names = [match["name"] for match in NAMED.finditer(first)]
     with source.lines(marked=True) as lines:
         rows = list(_rows(lines, names, source.name))
-    return text_source("\n".join([",".join(names), *rows]) + "\n", source.name)
+    return text_source("".join([",".join(names) + "\n", *rows]), source.name)
 
 
 def _rows(lines: Iterator[str], names: list[str], name: str) -> Iterator[str]:
-    """The values of each line; a damaged line as it is, which the table then counts."""
+    """The values of each line, with its line end; a damaged line as it is, which the table then counts."""
     size = 0
     for line in filter(str.strip, lines):
         size += len(line)
         if size > LONGEST_LOG:
             raise DataError(f"{name}: has more than {LONGEST_LOG >> 20} million characters; save it as CSV")
         found = {match["name"]: match["value"] for match in NAMED.finditer(line)}
-        yield ",".join(found.values()) if list(found) == names else line.strip()
+        row = ",".join(found.values()) if list(found) == names else line.strip()
+        yield row + "\n" if line.endswith("\n") else row

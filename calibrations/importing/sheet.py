@@ -20,7 +20,7 @@ import numpy as np
 
 from calibrations.errors import DataError
 from calibrations.files import Source
-from calibrations.importing.cells import BadLines, is_number, number_or_text, parse_cell
+from calibrations.importing.cells import BadLines, Lines, is_number, number_or_text, parse_cell
 from calibrations.importing.line_logs import as_table
 from calibrations.importing.units import parse_unit, split_unit
 from calibrations.table import Array, Constant
@@ -91,11 +91,19 @@ class Sheet:
         return tuple(split_unit(name)[0] for name in self.header)
 
     def rows(self, bad_lines: BadLines) -> Iterator[Row]:
-        """Iterate over the rows of data without those of another width, which `bad_lines` counts or refuses."""
-        with self.source.lines(marked=self.skipped > 0) as lines:
-            for number, cells in split_rows(islice(lines, self.first - 1, None), self.separator, self.name, self.first):
-                if len(cells) == self.width:
+        """Iterate over the rows of data without those of another width and without a cut last one, which `bad_lines`
+        counts or refuses.
+        """
+        with self.source.lines(marked=self.skipped > 0) as opened:
+            lines = Lines(islice(opened, self.first - 1, None))
+            for number, cells in split_rows(lines, self.separator, self.name, self.first):
+                if len(cells) == self.width and not lines.may_be_cut(cells[-1], self.sample):
                     yield number, cells
+                    continue
+                if len(cells) == self.width:
+                    reason = f"no line end, and {cells[-1]} may be cut"
+                    remedy = "complete it and end the line, or remove it"
+                    bad_lines.add(number, reason, f"{self.name}, line {number}, the last: {reason}; {remedy}")
                     continue
                 spans = 1 + sum(cell.count("\n") for cell in cells)  # an open quote swallows lines
                 reason = f"{len(cells)} values for {len(self.header)} columns"
@@ -317,8 +325,9 @@ def _at_once(sheet: Sheet) -> Array | None:
     if len(sheet.header) != sheet.width:
         return None
     comma = sheet.separator != "," and any("," in cell for row in sheet.sample for cell in row)
-    with sheet.source.lines() as lines:
-        numeric = (line.replace(",", ".") for line in lines) if comma else lines
+    with sheet.source.lines() as opened:
+        lines = Lines(opened)
+        numeric = (line.replace(",", ".") for line in lines) if comma else iter(lines)
         try:
             for _ in range(sheet.first - 1):
                 next(numeric)
@@ -332,6 +341,8 @@ def _at_once(sheet: Sheet) -> Array | None:
             raise
         except ValueError:
             return None
+    if lines.may_be_cut(lines.last.rstrip(BLANK).split(sheet.separator)[-1].strip(BLANK + '"'), sheet.sample):
+        return None
     return numbers if numbers.shape[1] == sheet.width and np.isfinite(numbers).all() else None
 
 

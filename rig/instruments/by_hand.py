@@ -59,6 +59,12 @@ class HandAnalysis:
         unwanted = tuple(attitude for words in skipped if (attitude := name_attitude(words)) is not None)
         return FieldCourse(positions, cast(Any, noise), attitudes, unwanted)
 
+    def clipped(self, turn: NDArray[np.float64], rest: NDArray[np.float64]) -> int | None:
+        """The output that a turn clips."""
+        from calibrations.geometry.clipped_turns import find_clipped_output
+
+        return find_clipped_output(turn, rest)
+
     def turn_course(self, recorded: Sequence[Recorded], noise: NoiseAtRest, rest_s: float) -> HandCourse:
         """The rests and turns so far; the path of a rest has the orientation that was wanted, in words."""
         from calibrations.analyses.hand_turns import TurnCourse

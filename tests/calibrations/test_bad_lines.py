@@ -24,9 +24,9 @@ def lines() -> list[str]:
     return [HEADER, *(f"{k / 100:.2f},{x:.5f},{y:.5f},{1 + z:.5f}" for k, (x, y, z) in enumerate(noise))]
 
 
-def imported(tmp_path: Path, given: list[str | bytes], policy: Policy = "few") -> ImportedTable:
+def imported(tmp_path: Path, given: list[str | bytes], policy: Policy = "few", end: bytes = b"\n") -> ImportedTable:
     path = tmp_path / "log.csv"
-    path.write_bytes(b"\n".join(line.encode() if isinstance(line, str) else line for line in given) + b"\n")
+    path.write_bytes(b"\n".join(line.encode() if isinstance(line, str) else line for line in given) + end)
     return import_sheet(replace(read_sheet(open_text_file(path, garbled=True)), skipped=SHARES[policy]), "still")
 
 
@@ -108,3 +108,32 @@ def test_an_open_quote_does_not_hide_the_lines_that_it_swallows(tmp_path: Path) 
     given[1000] = '10.0,"0.1,0.2,0.9'
     with pytest.raises(DataError, match=r"300\d of 400\d lines are damaged"):
         imported(tmp_path, given)
+
+
+@pytest.mark.parametrize(("form", "lost"), [("{:.5f}", 3), ("{:.3e}", 4), ("{:.0f}", 2)])
+def test_a_last_line_that_was_cut_in_its_last_number_is_skipped_and_shown(tmp_path: Path, form: str, lost: int) -> None:
+    rows = [row.rpartition(",")[0] + "," + form.format(1e3 + k) for k, row in enumerate(lines()[1:])]
+    given: list[str | bytes] = [HEADER, *rows]
+    assert imported(tmp_path, given).table.n == N
+    cut: list[str | bytes] = [HEADER, *rows[:-1], rows[-1][:-lost]]
+    found = imported(tmp_path, cut, end=b"")
+    assert found.table.n == N - 1
+    last = rows[-1][:-lost].rpartition(",")[2]
+    assert found.notes[0].endswith(f"was skipped: line {N + 1} (no line end, and {last} may be cut).")
+    with pytest.raises(DataError, match=rf"line {N + 1}, the last: no line end, and .* may be cut; complete it and"):
+        imported(tmp_path, cut, "refuse", end=b"")
+
+
+def test_a_last_line_whose_number_is_complete_needs_no_line_end(tmp_path: Path) -> None:
+    found = imported(tmp_path, [*lines()], end=b"")
+    assert (found.notes, found.table.n) == ((), N)
+    assert imported(tmp_path, [*lines()[:30]], end=b"").table.n == 29
+
+
+def test_a_cut_last_line_of_named_values_is_shown(tmp_path: Path) -> None:
+    given: list[str | bytes] = [f"t_s:{k / 100:.2f},ax:0.10{k % 7},ay:0.200,az:0.98{k % 3}" for k in range(N)]
+    assert imported(tmp_path, given, end=b"").table.n == N
+    given[-1] = str(given[-1])[:-2]
+    found = imported(tmp_path, given, end=b"")
+    assert found.table.n == N - 1
+    assert "no line end, and 0.9 may be cut" in found.notes[0]

@@ -52,6 +52,12 @@ def test_a_calm_hand_needs_no_more_rests_than_the_accelerometer_does(calm: Book)
     assert "wanted 0.2 %" in calm.guided[-1].text
 
 
+def test_the_person_is_told_that_the_first_turn_begins_with_a_rest(calm: Book) -> None:
+    positions = [guidance.text for guidance in calm.guided if guidance.text.startswith("position ")]
+    assert positions[0].endswith("; keep the sensor still until this position is taken")
+    assert not any("keep the sensor still" in text for text in positions[1:])
+
+
 def test_a_turn_goes_from_rest_to_rest_without_a_gap(calm: Book) -> None:
     for turn, rest in zip(calm.blocks[1::2], calm.blocks[2::2], strict=True):
         assert turn.pose.path == TURN + rest.pose.path
