@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 
+from drivers.errors import LimitError
 from procedures.at_rest import (
     FEWEST,
     WINDOW_S,
@@ -26,7 +27,7 @@ from procedures.at_rest import (
     require_analysis,
 )
 from procedures.errors import NoAnswer
-from procedures.instruments import Samples
+from procedures.instruments import Adc, Samples
 from procedures.session import HandAnalysis, HandCourse, NoiseAtRest, Pose, Session
 
 KIND = "turns"
@@ -34,6 +35,10 @@ ADAPTIVE = True
 FORCES, RATES = ("ax", "ay", "az"), ("gx", "gy", "gz")
 TURN = "turn to "  # the path of a turn begins so; that of one that is not used has a reason before it
 STILL_FIRST = "keep the sensor still until this position is taken"
+WITHOUT_ACCELEROMETER = (
+    "For a gyroscope without an accelerometer, log whole turns on the table, and import the log with `rig import LOG "
+    "--kind rates --constant turn_deg=360`"
+)
 TABLE = "Does the sensor lie on a table, and is its cable long enough to turn it upside down? Let it go."
 
 
@@ -55,7 +60,7 @@ def hand_turns(
     goal = Goal("hand-turns", "target_percent", target_percent / 100, 100, "%", rest_s, most_positions, wait_s)
     goal.require_valid()
     analysis = require_analysis(rig, goal.procedure)
-    rig = replace(rig, adc=rig.adc.only(*FORCES, *RATES))
+    rig = replace(rig, adc=_only_both_triads(rig))
     rig.confirm("at-rest", TABLE)
     noises = learn_noise(rig, analysis, wait_s, FORCES, RATES)
     with closing(rig.adc.stream(most_positions * wait_s, WINDOW_S)) as stream:
@@ -66,6 +71,15 @@ def hand_turns(
             watch.next_rest(course)
             watch.keep(course.words)
     rig.host.guide(guidance(course, goal, is_complete=True))
+
+
+def _only_both_triads(rig: Session) -> Adc:
+    """The converter with the outputs of both sensors. Raises LimitError, with what to do without an accelerometer."""
+    try:
+        return rig.adc.only(*FORCES, *RATES)
+    except LimitError as error:
+        remedies = [error.remedy, *([WITHOUT_ACCELEROMETER] if "ax" in error.what.partition(";")[0] else [])]
+        raise LimitError(error.what, ". ".join(remedies)) from None
 
 
 @dataclass

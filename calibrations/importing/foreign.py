@@ -30,6 +30,7 @@ from calibrations.importing.raw_logs import is_raw_log
 from calibrations.importing.sessions import RATE, is_session, sample_rates
 from calibrations.importing.sheet import Sheet, look_like_names, read_cells, read_sheet
 from calibrations.importing.units import UNITS, ColumnMapping, column_unit
+from calibrations.importing.whole_turns import TURN, cut_whole_turns, is_whole_turn_log
 from calibrations.table import NUMBERS, Array, Constant, Table, guess_kind
 from calibrations.tables import FILE_KINDS, TURN_MARKS
 
@@ -139,6 +140,8 @@ def _import_with(
     labels = {k: texts[k] for k in unmapped if k in texts} | ({PATH: texts[path]} if path in texts else {})
     if is_session(kind, columns, labels.get(PATH)):
         columns[RATE] = sample_rates(columns, labels[PATH], merged, laid.name)
+    elif is_whole_turn_log(kind, columns, merged):
+        columns, labels = cut_whole_turns(columns, merged, laid.name)
     if kind == "turns" and TURN_MARKS.isdisjoint(columns) and all(name in columns for name in (*RATES, *TRIADS[0])):
         from calibrations.importing.turn_logs import cut_turns  # few tables are such logs
 
@@ -169,7 +172,7 @@ def needs_mapping(laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping]
     """Whether a table of `kind`, or of any kind, still lacks columns. Raises as `complete_mapping`."""
     mapping = complete_mapping(laid, mapped)
     names = {m.name for m in mapping} | set(_unmapped_columns(laid, mapping, bool(mapped)))
-    if kind == "rates" and PATH in names:
+    if kind == "rates" and (PATH in names or TURN in laid.constants):
         from calibrations.importing.proposal import missing_columns  # as above
 
         return bool(missing_columns(kind, laid, mapping))

@@ -174,8 +174,8 @@ def likely_kind(laid: Sheet, mapped: Iterable[ColumnMapping] = ()) -> str:
 def missing_columns(kind: str | None, laid: Sheet, mapped: Iterable[ColumnMapping]) -> list[str]:
     """The columns that a table of this kind needs and that neither header nor mapping gives."""
     present = {m.name for m in mapped} | set(laid.bare)
-    if kind == "rates" and "path" in present:
-        present.add("rate_deg_s")  # given by the sections of a session
+    if kind == "rates" and ("path" in present or "turn_deg" in laid.constants):
+        present.add("rate_deg_s")  # given by the sections of a session, or by whole turns
     if kind == "turns" and TURN_MARKS.isdisjoint(present):
         present |= TURN_MARKS
     return [name for name in required_columns(kind, present) if name not in present]

@@ -221,7 +221,7 @@ def _reference(table: Table) -> str:
     if table.type.field:
         return "the local magnetic field, constant in place and time; its strength is not known"
     if table.type.turning:
-        return "angular rate of the rate table, deg/s, about the stated axes"
+        return "angular rate, deg/s, about the stated axes, as of a rate table or of whole turns"
     quantity = "its direction from the stage angles" if table.type.stage_angles else "its magnitude alone"
     return f"local gravity, {table.gravity_m_s2:.6g} m/s²; {quantity}"
 

@@ -8,7 +8,8 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -31,7 +32,9 @@ from rig.instruments.wiring import world_of
 from rig.planning.plan import plan
 from rig.planning.preparation import checks
 from rig.record import Record
-from rig.record.measured import table_of
+from rig.record.measured import Measured, table_of
+from rig.results.by_hand import TARGET_PERCENT, _uncertainty
+from rig.results.result import Missing, Result
 from rig.runs.background import status
 from rig.runs.runner import resume, start
 from rig.web.pages.run_begin import before_resume, before_start
@@ -178,6 +181,21 @@ def test_a_bench_without_the_sensor_is_refused(rig: Rig, rig_home: Path, tmp_pat
         assert f"adc: no input is wired to {missing}; there are ax, ay, az" in ended.err
 
 
+def test_a_gyroscope_without_an_accelerometer_is_led_to_whole_turns(rig: Rig, rig_home: Path, tmp_path: Path) -> None:
+    document = yaml.safe_load(HAND.read_text(encoding="utf-8"))
+    settings = document["instruments"]["adc"]["settings"]
+    inputs = {**settings["channels"], **settings["on_request"]}
+    settings["on_request"] = {}
+    settings["channels"] = {name: inputs[name] for name in ("gx", "gy", "gz")}
+    path = tmp_path / "gyroscope.yaml"
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    ended = rig("run", "hand-turns", "--bench", str(path), "--unattended")
+    assert ended.status != 0
+    assert "adc: no input is wired to ax, ay, az; there are gx, gy, gz" in ended.err
+    assert "log whole turns on the table" in ended.err
+    assert "rig import LOG --kind rates --constant turn_deg=360" in ended.err
+
+
 @pytest.mark.slow
 @pytest.mark.sockets
 def test_a_stopped_run_goes_on_with_its_positions(rig_home: Path) -> None:
@@ -207,6 +225,18 @@ def test_an_accuracy_that_was_not_reached_is_a_result_that_is_missing(rig: Rig, 
     assert ended.status == 1
     assert "mg only, wanted 0.001 mg; take more positions, or longer rests" in ended.err
     assert "uncertainty" not in json.loads(ended.out)["results"]
+
+
+@pytest.mark.parametrize(("percent", "is_reached"), [(0.19, True), (0.201, True), (0.23, True), (0.25, False)])
+def test_a_target_that_is_reached_within_the_error_of_an_uncertainty_is_reached(
+    percent: float, is_reached: bool
+) -> None:
+    measured = cast(Measured, SimpleNamespace(run=SimpleNamespace(settings={"target_percent": 0.2})))
+    known = f"gyro-scale-factor.x is known to {percent:g} % only"
+    found = _uncertainty(measured, percent, known, "turns", TARGET_PERCENT)["uncertainty"]
+    assert found == (
+        Result(percent, "%") if is_reached else Missing(f"{known}, wanted 0.2 %; take more turns, or longer rests")
+    )
 
 
 def test_a_bench_without_the_inputs_is_refused(rig: Rig, rig_home: Path) -> None:

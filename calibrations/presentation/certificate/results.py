@@ -149,8 +149,16 @@ def require_reference(source: str, kind: str) -> None:
     if kind not in MEANS:
         raise ModelError(
             f"{source}: a certificate needs poses, positions, rates or fields, whose reference is known; this is "
-            f"{kind}. Certify a sweep of the sensor (`rig run sweep`); `rig report` shows the results of this data"
+            f"{kind}. {OTHER_DATA.get(kind, SWEEP)}; `rig report` shows the results of this data"
         )
+
+
+SWEEP = "Certify a sweep of the sensor (`rig run sweep`)"
+OTHER_DATA = {
+    "turns": "The angles of these turns come from an accelerometer on the board, whose errors have no stated "
+    "uncertainty. Certify known rates (`rig run rate-turn`), or whole turns (`rig import --kind rates --constant "
+    "turn_deg=360`)"
+}
 
 
 def _values(model: Model) -> dict[tuple[str, str, str], tuple[float, float | None]]:

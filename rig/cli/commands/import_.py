@@ -82,6 +82,7 @@ def import_command(
         topic = str(click.prompt("Topic", default=several.proposed or None, type=choice, err=True))
         sheet = open_file(file, topic, bad_lines or "few")
     columns, constants = [ColumnMapping.parse(text) for text in mapped], _constants(constant_texts)
+    sheet = replace(sheet, constants={**sheet.constants, **constants})
     if attended and needs_mapping(sheet, kind, columns):
         kind, columns = ask_mapping(sheet, kind, columns, constant_texts)
     with working(f"storing {file}"):
