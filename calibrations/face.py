@@ -57,7 +57,7 @@ def table(columns: Columns, kind: str, constants: Mapping[str, Constant] | None 
 
     if not callable(getattr(columns, "items", None)):
         raise DataError(
-            f"cal.table: columns with names are needed, and a {type(columns).__name__} was given; give a data frame or "
+            f"cal.table: columns with names are needed, not a {type(columns).__name__}; give a data frame or "
             'a mapping, such as {"ax": a[:, 0], "ay": a[:, 1], "az": a[:, 2]}'
         )
     return average_raw_log(Table.from_columns(kind, dict(columns.items()), constants, "the given columns"))
@@ -171,7 +171,7 @@ def _data(data: Any) -> Table:
     if isinstance(data, Table):
         return data
     hint = "cal.read(path)" if isinstance(data, (str, Path)) else 'cal.table(data, kind="poses")'
-    raise DataError(f"a table is needed, and a {type(data).__name__} was given; make one with {hint}")
+    raise DataError(f"a table is needed, not a {type(data).__name__}; make one with {hint}")
 
 
 def _model(source: GivenModel) -> Model:
@@ -186,7 +186,7 @@ def _model(source: GivenModel) -> Model:
         return model
     hint = "; its fit is in its member `fit`" if isinstance(getattr(source, "fit", None), Result) else ""
     raise ModelError(
-        f"a model is needed, and a {type(source).__name__} was given; give the name of a model, its file, a model, a "
+        f"a model is needed, not a {type(source).__name__}; give the name of a model, its file, a model, a "
         f"fit or a discovery{hint}"
     )
 

@@ -118,7 +118,7 @@ class Rates(Kind):
     default_model = "gyroscope"
     means = known_input = turning = True
     sequential = False
-    widest_form = "outputs linear in rates and specific forces"
+    widest_form = "a linear response to rates and specific forces"
     sensed_in = "deg/s"
     sensed_along = "rate about {} (deg/s)"
     nearest_to = "the axis of turn"

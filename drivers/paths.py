@@ -18,10 +18,10 @@ def move_s(distance_deg: float, speed_deg_s: float, acceleration_deg_s2: float) 
 
 
 def require_rate(name: str, asked_deg_s: float, rate_deg_s: float, limit_deg_s: float) -> None:
-    """Raises LimitError where a stage that is asked for a rate, and would have the nearest, cannot turn at it."""
+    """Raises LimitError if the stage cannot turn at `rate_deg_s`, its rate that is nearest to the requested one."""
     if not 0 < abs(rate_deg_s) <= limit_deg_s:
         raise LimitError(
-            f"{name}: {abs(asked_deg_s):g} deg/s is not a rate of this stage; its limit is "
+            f"{name}: the stage cannot turn at {abs(asked_deg_s):g} deg/s; its limit is "
             f"{limit_deg_s:g} deg/s; nothing was sent",
             "Ask for a slower turn, or change speed_limit_deg_s in the bench file after checking the load",
         )

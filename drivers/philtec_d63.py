@@ -91,7 +91,10 @@ class Curve:
         curve = f"the {side} side of the calibration curve of {self.date}"
         subject = f"D63 {self.serial}: {place}, {worst:.4f} V, is outside {curve}"
         if worst > high:
-            raise SensorFault(f"{subject}: above {high:g} V it is on the optical peak", REMEDIES[side])
+            raise SensorFault(
+                f"{subject}: above {high:g} V the reading is near the optical peak, where the sensor cannot measure",
+                REMEDIES[side],
+            )
         raise SensorFault(
             f"{subject}: {low:g} .. {high:g} V", "Check lamp, cable and target, then the distance of the tip"
         )

@@ -186,7 +186,7 @@ def _effects(compensation: Compensation) -> Iterator[str]:
             cost = (
                 f"error {_size_text(size, compensation.unit)}"
                 if size
-                else "a sweep does not excite it: error not computed"
+                else "a sweep does not excite this effect; its error is not computed"
             )
             yield f"Left out: {fate.effect}, because {fate.why}; {cost}."
 

@@ -48,15 +48,17 @@ def _of(procedure: str, reason: str, **settings: object) -> Experiment:
     return Experiment(procedure, settings, (), reason)
 
 
-FINE = "full turns both ways at finely spaced inclinations, out of order, excite each of them differently"
-COARSE = "inclinations out of order: height does not follow time, and what depends on the angle returns with it"
-FACES = "mounted face down, an error of the sensor's axes turns with the sensor and one of the stage does not"
+FINE = "full turns in both directions at many inclinations in mixed order excite each of these effects differently"
+COARSE = (
+    "inclinations in mixed order: the height does not follow time, and an effect of the angle repeats with the angle"
+)
+FACES = "with the sensor face down, an error of its axes turns with the sensor, but an error of the stage does not"
 LONGER = "longer dwells: the noise of each mean is half as large"
 LATER = "with fixed angles, all changes follow the time: an exponential settles, a drift continues"
 HELD = "the oven keeps the temperature constant, so all changes follow the time"
 CYCLED = "the oven heats and cools: an effect with a lag differs between both directions, an effect of time does not"
-TURNED_ROUND = "a level laid on the base shows the tilt of the base alone; an offset of alpha moves the table only"
-SHAKEN = "in a field of 1 g the squares of the three axes add up to a constant; motion along one axis does not"
+TURNED_ROUND = "a level on the base shows only the tilt of the base; an offset of alpha moves only the table"
+SHAKEN = "at rest the squares of the three axes add up to a constant; in a motion along one axis they do not"
 RECORDED = "this data has no temperature: a thermometer read at each pose separates temperature from time"
 TWO_TONES = "a corner changes the size of an oscillation with its frequency, a delay only its phase"
 ALL_ROUND = "full turns on each edge, upward and downward, show every side of the sphere of directions"

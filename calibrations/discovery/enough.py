@@ -47,16 +47,15 @@ class Enough:
         measures, base, factor = UNITS[self.of]
         if measures == SENSED and one_orientation(fit.table):
             raise ModelError(
-                f"an error of {self.text} cannot be asked of data at one orientation, which do not show the scale "
-                f"factor; give it in {unit(fit.table.unit)} or floors"
+                f"the limit {self.text} needs the scale factor, which data at one orientation do not show; give a "
+                f"limit in {unit(fit.table.unit)} or floors"
             )
         data_unit = fit.table.unit if measures == OUTPUT else fit.table.input_unit
         if base != data_unit:
             other_unit = fit.table.input_unit if measures == OUTPUT else fit.table.unit
             raise ModelError(
-                f"an error of {self.text} cannot be asked of this data, whose outputs are in {unit(fit.table.unit)} "
-                f"and whose input is in {unit(fit.table.input_unit)}; give it in {unit(data_unit)}, {unit(other_unit)} "
-                "or floors"
+                f"the limit {self.text} does not fit this data: the outputs are in {unit(fit.table.unit)}, the input "
+                f"is in {unit(fit.table.input_unit)}; give a limit in {unit(data_unit)}, {unit(other_unit)} or floors"
             )
         floor = fit.noise.floor if measures == OUTPUT else in_milli(fit.noise.floor, fit) / 1e3
         return self.value * factor / _pool_channels(floor)

@@ -67,7 +67,7 @@ def _floor(fit: Fit) -> Iterator[str]:
         highest = float(np.max(fit.excess[noisy]))
         names = ", ".join(fit.channels[k] for k in noisy)
         yield (
-            f"the rows of {names} scatter, without a pattern, {highest:.3g} times more than std and n say: "
+            f"the rows of {names} scatter without a pattern, {highest:.3g} times more than std and n give: "
             f"{_cause(fit, highest, high=False)}; the uncertainties are from the scatter"
         )
 
@@ -156,7 +156,7 @@ def _misfit(fit: Fit) -> Iterator[str]:
     if fit.table.type.moving:
         if fit.noise.known and fit.pooled_excess > MUCH_MORE_THAN_NOISE:
             yield (
-                f"the model leaves {fit.pooled_excess:.3g} times the noise: it does not follow the motion; "
+                f"the residual is {fit.pooled_excess:.3g} times the noise: the model does not follow the motion; "
                 "check filter_corner_hz, the delay and the unit of displacement_m, and the attitude, then use "
                 "`rig diagnose`"
             )
@@ -175,8 +175,8 @@ def misfit(fit: Fit) -> Finding | None:
         return None
     return Finding(
         Verdict.UNEXPLAINED,
-        f"the model leaves {share:.0%} of the {fit.problem.signal}, more than effects of a sensor: the values cannot "
-        "be used; check units, rounding and the order of rows and columns, then use `rig diagnose`",
+        f"the residual is {share:.0%} of the {fit.problem.signal}, more than effects of a sensor can cause: do not use "
+        "the values; check units, rounding and the order of rows and columns, then use `rig diagnose`",
     )
 
 
@@ -200,7 +200,7 @@ def _response(fit: Fit) -> Iterator[str]:
         )
     if unit == "V" and kind.input_unit == "g" and not V_PER_G[0] <= value <= V_PER_G[1]:
         yield (
-            f"a scale factor of {value:.3g} V/g is no accelerometer's ({V_PER_G[0]:g} to {V_PER_G[1]:g} V/g); check "
+            f"the scale factor is {value:.3g} V/g, and accelerometers have {V_PER_G[0]:g} to {V_PER_G[1]:g} V/g; check "
             "the units of the outputs and of the reference"
         )
     if unit == kind.input_unit == "deg/s" and not OWN_UNIT[0] <= value <= OWN_UNIT[1]:
@@ -226,7 +226,7 @@ def _unlike_axes(scale_factors: Sequence[Estimate]) -> str | None:
         return None
     return (
         f"the scale factor of {high} is {sizes[high] / sizes[low]:.3g} times that of {low}, and the axes of one "
-        "sensor are alike; check the units and the gains of these outputs"
+        "sensor have similar scale factors; check the units and the gains of these outputs"
     )
 
 

@@ -59,8 +59,8 @@ def _times(table: Table) -> Iterator[str]:
     repeated = int(np.count_nonzero(np.diff(np.sort(t_s)) == 0))
     if repeated and not table.type.overlapping:
         yield (
-            f"{repeated} rows have the time of another row, as of a clock that began again or of two files in one; "
-            "rows are ordered by t_s: correct the times, or separate the files"
+            f"{repeated} rows have the same time as another row: the clock restarted, or the file contains two files. "
+            "The rows are ordered by t_s; correct the times, or separate the files"
         )
     elif table.type.stage_angles:
         poses = np.column_stack([table.column("alpha_deg"), table.column("beta_deg")])[table.order]
@@ -108,7 +108,7 @@ def _equal_values(table: Table) -> Iterator[str]:
         elif distance < 0 or abs(value - np.median(other_values)) > FAR_FROM_OTHERS * robust_std(
             other_values - np.median(other_values)
         ):
-            yield f"{repetition}: it may stand for a missing reading, or a stuck one; leave these rows out"
+            yield f"{repetition}: it may mark a missing reading, or the reading is stuck; remove these rows"
 
 
 def _clipped_turns(table: Table) -> Iterator[str]:
@@ -174,8 +174,8 @@ def _check_most_general_model(table: Table) -> Iterator[str]:
     times = float(np.max(rms(remainder) / floor))
     if times > WIDEST:
         yield (
-            f"{table.type.widest_form or 'an ellipsoid'} leaves {times:.0f} times the noise that the samples of a mean "
-            "give, so that no error of a sensor explains these rows; check for saturated or missing readings, columns "
-            "that are shifted by a row, two sensors in one file, and that the std columns are standard deviations of "
-            "single samples"
+            f"after the fit of {table.type.widest_form or 'an ellipsoid'}, the residual is {times:.0f} times the noise "
+            "of the means: no error of a sensor explains it; check for saturated or missing readings, columns that are "
+            "shifted by a row and two sensors in one file; the std columns must be standard deviations of single "
+            "samples"
         )

@@ -166,9 +166,9 @@ def _of_rates(table: Table) -> Iterator[Finding]:
     if reversed_ := [table.output_names[k] for k in turned if stated_response.slope[k, k] < 0]:
         yield Finding(
             None,
-            f"{' and '.join(reversed_)} fall{'s' if len(reversed_) == 1 else ''} where the rate rises, as of a table "
-            "that turns the other way or an inverted output; rates are positive by the right-hand rule about the "
-            "sensor's axis: check the sign of rate_deg_s and of the outputs",
+            f"{' and '.join(reversed_)} fall{'s' if len(reversed_) == 1 else ''} when the rate rises: the table turns "
+            "the other way, or the output is inverted; rates are positive by the right-hand rule about the sensor's "
+            "axis: check the sign of rate_deg_s and of the outputs",
         )
 
 

@@ -209,11 +209,11 @@ def _check_row_shift(table: Table, limit: float) -> str | None:
         displacement = f"{abs(shift)} row{'s' if abs(shift) > 1 else ''} too {'late' if shift > 0 else 'early'}"
         shifted_shares = _unexplained_share(shifted_outputs[overlap], force[overlap])
         if np.max(shifted_shares) <= limit:
-            return f"the outputs stand {displacement} in the file; shift their columns, or those of the angles"
+            return f"the outputs are {displacement} in the file; shift their columns, or those of the angles"
         stated_shares = _unexplained_share(table.outputs[overlap], force[overlap])
         for k, name in enumerate(names):
             if shifted_shares[k] <= limit and np.max(np.delete(stated_shares, k), initial=0.0) <= limit:
-                return f"{name} stands {displacement} in the file; shift this column"
+                return f"{name} is {displacement} in the file; shift this column"
     return None
 
 
@@ -322,12 +322,12 @@ def _assignment(table: Table, stated_response: Response, a: Array) -> Finding | 
     if len(reversed_) == len(cosine) or (len(cosine) > 2 and reversed_ == [0, 1]):
         return Finding(
             None,
-            f"the scale factor of {names} is negative, as of a sensor turned by 180 deg on the stage; if it is, state "
-            "mount_deg = 180; if not, check the sign of alpha_deg and the wiring",
+            f"the scale factor of {names} is negative: the sensor may be turned by 180 deg on the stage; if it is, "
+            "state mount_deg = 180; if not, check the sign of alpha_deg and the wiring",
         )
     return Finding(
         None,
-        f"the scale factor of {names} is negative and that of the others is not, as of a mirrored sensor: beta counts "
+        f"the scale factor of {names} is negative and that of the others is positive: beta counts "
         "backwards (change the sign of beta_deg), the sensor is mounted face down (state flip = 1), or the output of "
         f"{names} is inverted",
     )

@@ -280,7 +280,7 @@ def _check_whole(cls: type[Effect]) -> None:
         if p.where and p.where not in cls.constants and not any(f"{p.where}_{axis}" in cls.constants for axis in "xyz"):
             _refuse(cls, f'{p.name}: the effect has no constant "{p.where}"{nearest(p.where, cls.constants)}')
     if (cls.memory > 0) != (cls.follow is not Effect.follow):
-        _refuse(cls, "memory and follow belong together: memory says how many arrays follow keeps")
+        _refuse(cls, "memory and follow belong together: memory is the number of arrays that follow stores")
 
 
 def _refuse(cls: type[Effect], message: str) -> NoReturn:

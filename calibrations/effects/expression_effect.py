@@ -178,13 +178,13 @@ def _check(expression: Expression, parameters: tuple[str, ...]) -> None:
     """Raise ExpressionError for an expression that is not an effect."""
     for word, column in expression.names.items():
         if word in MEASURED:
-            raise expression.fault(column, f"{word} is what is measured; write the effect in ax, ay, az instead")
+            raise expression.fault(column, f"{word} is the measured output; write the effect in ax, ay, az")
         if _on_angle(expression) and word in FORCES:
             raise expression.fault(column, f"{word} follows from the stage angles; write this in alpha and beta")
     if not parameters:
         raise ExpressionError(
-            f"{expression.text}: there is nothing to be fitted; all of its names are columns. Multiply it by "
-            "a parameter, which is any other name, as in a*sin(beta)"
+            f"{expression.text}: it has no parameter to fit: all its names are columns. Multiply it by a "
+            "parameter with any other name, such as a in a*sin(beta)"
         )
     if len(parameters) > MOST_PARAMETERS:
         raise ExpressionError(f"{expression.text}: has more than {MOST_PARAMETERS} parameters")

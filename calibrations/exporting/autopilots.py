@@ -175,8 +175,8 @@ def _check_range(program: str, outputs: Outputs, quantity: str, values: Array, s
     for axis, value in zip("xyz", values, strict=True):
         if not span[0] <= value <= span[1]:
             raise ModelError(
-                f"{outputs.simulated.model.name}: {program} accepts for {quantity} values from {span[0]:g} to "
-                f"{span[1]:g}, and that of {axis} is {value:.4g}; check the sensor and the unit of its data, "
+                f"{outputs.simulated.model.name}: {program} accepts {quantity} from {span[0]:g} to "
+                f"{span[1]:g}, but that of {axis} is {value:.4g}; check the sensor and the unit of its data, "
                 f"{outputs.simulated.model.unit}"
             )
 

@@ -234,7 +234,7 @@ def _explain_exclusion(forms: tuple[Form, ...]) -> str:
     if forms[0].driver in ANGLES:
         return "it is an error of the stage"
     if forms[0].driver == "time":
-        return "the drift of one record says nothing of the next"
+        return "the drift of one record does not predict the next"
     if any(form.driver == "variance" for form in forms):
         return "it follows the standard deviation of the samples of a mean"
     if any(form.driver == "temperature" and form.bases[0].kind == "play" for form in forms):

@@ -98,8 +98,8 @@ def specific_force_g(table: Table) -> Array:
         raise DataError(f"{table.source}: ax, ay and az are 0; remove the columns if there was no accelerometer")
     if high - low > MOST_MAGNITUDE_SPREAD * gravity:
         raise DataError(
-            f"{table.source}: ax, ay, az have magnitudes from {low:.3g} to {high:.3g} in half of the rows, and "
-            "gravity has one; exchange them with gx, gy, gz if these hold the accelerations, or remove them"
+            f"{table.source}: in half of the rows the magnitude of ax, ay, az is {low:.3g} to {high:.3g}, but gravity "
+            "is constant; exchange them with gx, gy, gz if these hold the accelerations, or remove them"
         )
     return np.asarray(a / gravity)
 

@@ -305,7 +305,7 @@ def _steps(tau_s: float, n: int, rate_hz: float, source: str) -> int:
     """Samples to an averaging time."""
     m = round(tau_s * rate_hz)
     if m < 1:
-        raise DataError(f"{source}: an averaging time of {tau_s:g} s is below that of one sample, {1 / rate_hz:g} s")
+        raise DataError(f"{source}: an averaging time of {tau_s:g} s is shorter than one sample, {1 / rate_hz:g} s")
     if 2 * m > n:
         raise TooFewRows(
             f"{source}: an averaging time of {tau_s:g} s needs a record of {2 * tau_s:g} s or more, and this one has "

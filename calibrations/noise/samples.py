@@ -67,9 +67,9 @@ class HiddenNoise:
         slow = "" if self.all else "; slow noise is larger, and its coefficients are given"
         fast = "" if self.all else ", from sample to sample,"
         return (
-            f"the noise{fast} is below the converter's step: the samples have {values_text} {self.step:.4g} apart, so "
-            f"that its level is not known{slow}. Amplify the output, choose a smaller range or a finer converter, or "
-            "add noise of half a step or more (dither)"
+            f"the noise{fast} is below the converter's step: the samples have {values_text} in steps of "
+            f"{self.step:.4g}, so the level of the noise is not known{slow}. Amplify the output, choose a smaller "
+            "range or a finer converter, or add noise of half a step or more (dither)"
         )
 
     def hides(self, process: str) -> bool:

@@ -295,6 +295,6 @@ def _largest(values: NDArray[np.float64]) -> float:
 def no_samples(name: str, url: str, timeout_s: float, expected: str) -> LinkTimeout:
     """The error for a link on which `expected` does not arrive."""
     return LinkTimeout(
-        f"{name}: no {expected} came on {url} within {timeout_s:g} s",
+        f"{name}: received no {expected} on {url} within {timeout_s:g} s",
         "Check power and cable, and that the sensor sends it",
     )

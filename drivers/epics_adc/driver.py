@@ -123,7 +123,9 @@ class AnalogRecords(Recorder[Settings]):
                 "Find its cause in the IOC; set highest_severity in the bench file if the rig shall go on with it",
             )
         if not np.isfinite(reading.value):
-            raise SensorFault(f"{context} is {reading.value:g}, which is no voltage", "Check the IOC and the converter")
+            raise SensorFault(
+                f"{context} is {reading.value:g}, which is not a voltage", "Check the IOC and the converter"
+            )
 
     def _require_fresh(self, fresh: Freshness, scans: int) -> None:
         """Raises StreamError for a record that the IOC processes less often than it is read."""
@@ -143,7 +145,7 @@ class AnalogRecords(Recorder[Settings]):
         units = self._records.units(record)
         if units.lower() not in UNITS_V:
             raise LimitError(
-                f"{self.name}: the units of {self._records.beginning}{record} are {units!r} (EGU), which is no voltage",
+                f"{self.name}: the units of {self._records.beginning}{record} are {units!r} (EGU), not a voltage",
                 "Name a record of a voltage in the bench file, or set volts_per_unit there",
             )
         return UNITS_V[units.lower()]

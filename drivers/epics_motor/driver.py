@@ -103,7 +103,7 @@ class MotorRecord:
         if self.settings.home == "none":
             return
         self._records.written(mr.HOME[self.settings.home], 1.0)
-        self._wait_until_done(HOMING_S, "has not found its home")
+        self._wait_until_done(HOMING_S, "did not find its home position")
         if not self.referenced():
             raise StageLost(
                 f"{self.name}: has sought its home and is not homed (MSTA)",
@@ -136,7 +136,7 @@ class MotorRecord:
             self._clock.sleep(POLL_S)  # the record may not have begun yet
             state = self._wait_until_done(PATIENCE_S, "is still moving")
         self._require_movable(state)
-        self._require_at_target(state, "Free the stage of what holds it, check the load's balance, then resume the run")
+        self._require_at_target(state, "Remove what blocks the stage, check the load's balance, then resume the run")
 
     def rate_deg_s(self, asked_deg_s: float) -> float:
         """The rate asked for."""
@@ -171,7 +171,7 @@ class MotorRecord:
         self._require_movable(state)
         if not state[mr.DONE].value:
             raise NotSettled(
-                f"{self.name}: has not stood still",
+                f"{self.name}: moved although no move was commanded",
                 "Find out what moves it: another client, a hand; then resume the run",
             )
         if not math.isnan(self._target_deg):
@@ -236,7 +236,7 @@ class MotorRecord:
             if self._clock.now() > deadline:
                 raise NotSettled(
                     f"{self.name}: {failure} {timeout_s:.0f} s after the end was due (DMOV is 0)",
-                    "Free the stage of what holds it; compare speed_deg_s in the bench file with the motor's",
+                    "Remove what blocks the stage; compare speed_deg_s in the bench file with the motor's",
                 )
             self._clock.sleep(POLL_S)
         return state
@@ -316,7 +316,7 @@ class MotorRecord:
         if abs(off_deg) > allowed_deg:
             raise NotSettled(
                 f"{self.name}: is {off_deg:+.3f} deg from where a turn at {rate_deg_s:g} deg/s should be",
-                "Free the stage of what holds it; compare acceleration_deg_s2 in the bench file with the motor's",
+                "Remove what blocks the stage; compare acceleration_deg_s2 in the bench file with the motor's",
             )
 
     def _deg_per_unit(self) -> float:

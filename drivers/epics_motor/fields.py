@@ -28,7 +28,7 @@ GO = 3  # of SPMG: stop, pause, move, go
 MODES = ("Stop", "Pause", "Move", "Go")
 SLIP_STALL, PROBLEM, COMM_ERR, HOMED = 1 << 6, 1 << 9, 1 << 12, 1 << 14  # bits of MSTA
 FAULTY = {
-    SLIP_STALL: ("the motor slips or stalls", "Free the stage of what holds it, check the load's balance"),
+    SLIP_STALL: ("the motor slips or stalls", "Remove what blocks the stage, check the load's balance"),
     PROBLEM: ("the driver has stopped polling the controller", "Look at the controller, and restart the IOC"),
     COMM_ERR: ("the IOC does not reach the controller", "Check the controller's power and cable"),
 }

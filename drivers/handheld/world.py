@@ -51,7 +51,7 @@ def handheld(settings: Mapping[str, Any]) -> tuple[dict[str, Any], Handheld | No
     hand_settings = {key: value for key, value in settings.items() if key in KEYS}
     for key, value in hand_settings.items():
         if not isinstance(value, Mapping):
-            raise BadSetting(f"{key} of the simulated world is {value!r}", "Give a mapping; {} takes the defaults")
+            raise BadSetting(f"{key} of the simulated world is {value!r}", "Give a mapping; {} uses the defaults")
     return other_settings, changed_settings(Handheld(), hand_settings) if hand_settings else None
 
 

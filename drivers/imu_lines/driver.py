@@ -137,7 +137,7 @@ class LineSensor(DigitalSensor[Settings, LineDecoder]):
 
     def _silence(self, timeout_s: float) -> DriverError:
         return LinkTimeout(
-            f"{self.name}: no line came on {self._link.url} within {timeout_s:g} s",
+            f"{self.name}: received no line on {self._link.url} within {timeout_s:g} s",
             "Check power and cable, and that the sensor sends by itself",
         )
 
@@ -146,7 +146,7 @@ class LineSensor(DigitalSensor[Settings, LineDecoder]):
         columns = ", ".join(f"{name}: {column}" for name, column in self.settings.columns.items())
         if not assembly.damaged:
             return LinkTimeout(
-                f"{self.name}: no whole line came on {self._link.url}", "Check baud rate, power and cable"
+                f"{self.name}: received no complete line on {self._link.url}", "Check baud rate, power and cable"
             )
         if assembly.unread.isascii() and assembly.unread.isprintable():
             return BadFrame(

@@ -107,7 +107,7 @@ class ManualStage:
         read_deg = self._person.ask(name, text, UNIT, angle_deg - reach, angle_deg + reach, angle_deg)
         if not abs(read_deg - angle_deg) <= reach:
             raise NotSettled(
-                f"{self.name}: its dial was read as {read_deg:g} deg, {angle_deg:g} deg was asked for",
+                f"{self.name}: the dial shows {read_deg:g} deg, but {angle_deg:g} deg was requested",
                 f"Set it to within {reach:g} deg, and read it again",
             )
         self._set_deg, self.read_deg = angle_deg, read_deg

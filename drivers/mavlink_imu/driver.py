@@ -61,7 +61,7 @@ class Settings(DigitalSettings):
         if (self.message == "RAW_IMU") != (self.raw is not None):
             raise ValueError("raw must be `count` or `milli` with RAW_IMU, and is not for another message")
         if not 0 <= self.imu <= 255 or (self.imu and self.message.startswith("SCALED")):
-            raise ValueError("imu must be 0 to 255; SCALED_IMU2 and SCALED_IMU3 are messages of their own")
+            raise ValueError("imu must be 0 to 255; SCALED_IMU2 and SCALED_IMU3 are separate messages")
 
     @property
     def wired(self) -> Mapping[str, int | str]:

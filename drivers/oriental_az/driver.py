@@ -137,7 +137,7 @@ class RotaryStage:
         self._require_coordinates(outputs)
         self._require_ready(outputs)
         self._watch(False)
-        self._require_at_target("Free the stage of what holds it, check the load's balance, then repeat the move")
+        self._require_at_target("Remove what blocks the stage, check the load's balance, then repeat the move")
 
     def rate_deg_s(self, asked_deg_s: float) -> float:
         """The rate nearest to the one asked for that the drive can have: a whole number of steps a second."""
@@ -178,7 +178,7 @@ class RotaryStage:
         self._require_coordinates(outputs)
         if not _is_at_rest(outputs, az.IN_POSITION):
             remedy = "Find out what moves it: the load's balance, a hand, the drive's current; then resume the run"
-            raise NotSettled(f"{self.name}: has not stood still", remedy)
+            raise NotSettled(f"{self.name}: moved although no move was commanded", remedy)
         self._require_ready(outputs)
         if not self._holds_target:
             return
@@ -223,7 +223,7 @@ class RotaryStage:
         self._watch(True)
         self._unit.write(az.INPUTS, az.ZHOME)
         self._unit.write(az.INPUTS, 0)
-        self._poll_until(az.HOME_END, HOMING_S, "has not found its home")
+        self._poll_until(az.HOME_END, HOMING_S, "did not find its home position")
         self._watch(False)
 
     def _require_at_target(self, remedy: str) -> None:
@@ -326,7 +326,7 @@ class RotaryStage:
         if abs(speed - rate_deg_s) > OFF_RATE * abs(rate_deg_s) + 1 / per_deg:
             raise NotSettled(
                 f"{self.name}: turns at {speed:.3f} deg/s instead of {rate_deg_s:.3f} deg/s",
-                "Free the stage of what holds it, check the load's balance, then resume the run",
+                "Remove what blocks the stage, check the load's balance, then resume the run",
             )
 
     def _watch(self, on: bool) -> None:

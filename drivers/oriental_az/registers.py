@@ -101,11 +101,11 @@ BAD_OPERATION_DATA = 0x70
 _LIMITS = "Turn the stage by hand away from its limit, then home it"
 _POWER = "Switch the drive's power off, wait a minute and switch it on; if it returns, have the drive serviced"
 _WORDS: dict[int, tuple[str, str]] = {
-    0x10: ("excessive position deviation", "Free the stage of what blocks it, or lower speed and acceleration"),
+    0x10: ("excessive position deviation", "Remove what blocks the stage, or lower speed and acceleration"),
     0x20: ("overcurrent", _POWER),
     0x28: ("encoder error", _POWER),
     0x2A: ("encoder communication error", "Check the encoder's cable with the power off"),
-    0x30: ("overload", "Free the stage of what blocks it, let the motor cool, or lower the acceleration"),
+    0x30: ("overload", "Remove what blocks the stage, let the motor cool, or lower the acceleration"),
     0x41: ("memory error", _POWER),
     0x42: ("encoder error at power-on", _POWER),
     0x45: ("motor and drive do not match", "Connect the motor that belongs to this drive"),

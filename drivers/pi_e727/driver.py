@@ -231,7 +231,7 @@ class Positioner:
 
     def _require_swing(self, peak_to_peak_um: float) -> None:
         if not peak_to_peak_um > 0:
-            fault = f"{self.name}: an oscillation of {peak_to_peak_um:g} um is none; nothing was sent"
+            fault = f"{self.name}: an oscillation of {peak_to_peak_um:g} um is not possible; nothing was sent"
             raise LimitError(fault, "Ask for a positive width, peak to peak")
 
     def _wave(self, frequency_hz: float) -> Wave:

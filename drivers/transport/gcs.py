@@ -17,7 +17,7 @@ TIMEOUT_S = 1.0  # without a byte; the longest answers arrive in many pieces
 LONGEST_S = 300.0  # of one answer: all that a recorder holds, over a serial line
 QUIET_S = 0.02  # after which nothing more of an interrupted answer comes
 LATIN = "latin-1"  # one character is one byte
-REMEDY = "Check power and cable, and that no other program holds the controller"
+REMEDY = "Check power and cable, and that no other program uses the controller"
 
 
 class Gcs:

@@ -151,5 +151,5 @@ def _text(data: bytes, name: str, command: str) -> str:
     try:
         return data.decode("ascii").strip()
     except UnicodeDecodeError:
-        description = f"{len(data)} bytes that are no text ({data[:24]!r})"
+        description = f"{len(data)} bytes that are not text ({data[:24]!r})"
         raise BadFrame(f"{name}: the answer to {command!r} is {description}", SILENT) from None

@@ -290,9 +290,9 @@ def _open_port(url: Url) -> SocketPort | SerialPort | DatagramPort:
     if url.scheme == "serial":
         return SerialPort(url.path, url.baud, url.parity, url.stop_bits)
     if url.scheme == "visa":
-        raise ValueError("only the driver scpi_meter speaks through VISA")
+        raise ValueError("only the driver scpi_meter uses VISA")
     if url.scheme == "ca":
-        raise ValueError("only the drivers epics_motor and epics_adc speak Channel Access")
+        raise ValueError("only the drivers epics_motor and epics_adc use Channel Access")
     if url.scheme in UDP:
         return DatagramPort(url.host, url.port, listens=url.scheme == "udpin")
     return SocketPort(url.host, url.port)
@@ -300,7 +300,7 @@ def _open_port(url: Url) -> SocketPort | SerialPort | DatagramPort:
 
 def _remedy(url: Url) -> str:
     if url.scheme != "serial":
-        return "Check the address, the network cable and that no other program holds the instrument"
+        return "Check the address, the network cable and that no other program uses the instrument"
     if url.path.startswith("/dev/pts/") and url.parity != "N":
         return "A pseudo-terminal has no parity: write parity=N"
-    return "Check the device's path, your right to open it and that no other program holds it"
+    return "Check the device's path, your permission to open it, and that no other program uses it"

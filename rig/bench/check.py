@@ -192,7 +192,7 @@ def _check_lab(bench: Bench, path: Path) -> None:
 def _check_faults(key: str, instrument: Instrument) -> None:
     """Raises BenchError for an unknown fault of a twin, and for faults of a real instrument."""
     if instrument.faults and not instrument.simulated:
-        raise BenchError(f"{key}: only a simulated instrument takes faults; remove them, or write `url: simulated`")
+        raise BenchError(f"{key}: only a simulated instrument can have faults; remove them, or write `url: simulated`")
     for k, fault in enumerate(instrument.faults):
         if fault.what not in (kinds := kinds_of(instrument.driver)):
             raise BenchError(f"{key}.{k}.what: no fault {fault.what!r}.{did_you_mean(fault.what, kinds)}")

@@ -29,7 +29,7 @@ def checks(plan: Plan) -> list[str]:
     if not plan.reach:
         return list(HAND_CHECKS)
     lines = [
-        "the cables can follow the stages over the whole range, and nothing and nobody is within their reach",
+        "the cables are long enough for the whole range, and no object or person is in the way of the stages",
         "the sensor is fastened as in the drawing, with pin 1 at the drawn place",
     ]
     if any("level is read" in action for action in actions):

@@ -187,7 +187,7 @@ def _of_one_kind(calibrations: list[Calibration]) -> tuple[list[Calibration], di
     """The calibrations by the most frequent procedure, of equal ones the last; the others with the reason."""
     kinds = [calibration.kind for calibration in calibrations]
     kind = max(reversed(kinds), key=kinds.count)
-    reason = "a calibration by {}, and those of {} are shown: another choice of poses is not comparable"
+    reason = "a calibration by {}; the history shows those by {}, because other poses are not comparable"
     excluded = {
         calibration.data: reason.format(calibration.kind, kind)
         for calibration in calibrations

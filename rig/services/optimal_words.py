@@ -26,7 +26,7 @@ def plan_rows(optimum: Optimal) -> list[tuple[str, ...]]:
 def savings(optimum: Optimal) -> Iterator[str]:
     """How much less time the rig needs."""
     yield f"{optimum.times_less:.1f} times less rig time for the same worst standard error ({_worst(optimum)})."
-    yield f"{_times(optimum.times_less_for_all)} if no parameter may be less certain: {_longest(optimum)}."
+    yield f"{_times(optimum.times_less_for_all)} if no parameter becomes less certain: {_longest(optimum)}."
     if undetermined := [
         optimum.over.name(k) for k, is_determined in enumerate(optimum.standard.determined) if not is_determined
     ]:

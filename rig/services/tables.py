@@ -51,7 +51,8 @@ def _without_excluded_rows(table: Table, notify: Callable[[str], None]) -> Table
     if not is_excluded.any():
         return table
     notify(
-        f"{table.source}: {np.count_nonzero(is_excluded)} of {table.n} rows are left out, as its column `{EXCLUDED}`."
+        f"{table.source}: {np.count_nonzero(is_excluded)} of {table.n} rows are left out: their column `{EXCLUDED}` is "
+        "not 0."
     )
     if is_excluded.all():
         raise DataError(f"{table.source}: its column `{EXCLUDED}` excludes every row; write 0 for the rows to use")

@@ -74,5 +74,5 @@ def test_a_text_that_is_not_an_error_is_refused_with_an_example(text: str) -> No
 
 
 def test_an_error_in_the_unit_of_another_sensor_is_refused() -> None:
-    with pytest.raises(ModelError, match="give it in g, V or floors"):
+    with pytest.raises(ModelError, match="give a limit in g, V or floors"):
         parse_enough("3deg/s").limit(found("").start)

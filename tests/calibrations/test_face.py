@@ -80,7 +80,7 @@ def test_an_effect_of_ones_own_is_refused_by_its_name() -> None:
     [
         ({"ax": ["one"], "ay": [0.0], "az": [1.0]}, 'the column "ax" is not a column of numbers'),
         ({"ax": np.zeros((3, 2)), "ay": np.zeros(3), "az": np.zeros(3)}, r'the column "ax" has the shape \(3, 2\)'),
-        (np.zeros((3, 3)), r'columns with names are needed, and a ndarray was given.*\{"ax": a\[:, 0\]'),
+        (np.zeros((3, 3)), r'columns with names are needed, not a ndarray.*\{"ax": a\[:, 0\]'),
     ],
 )
 def test_columns_that_are_no_numbers_are_named(columns: Any, said: str) -> None:
@@ -89,7 +89,7 @@ def test_columns_that_are_no_numbers_are_named(columns: Any, said: str) -> None:
 
 
 @pytest.mark.parametrize("call", [cal.fit, cal.compare, cal.diagnose, cal.discover])
-@pytest.mark.parametrize(("data", "said"), [("sweep.csv", r"cal\.read"), ({"ax": [1.0]}, r"a dict .*cal\.table")])
+@pytest.mark.parametrize(("data", "said"), [("sweep.csv", r"cal\.read"), ({"ax": [1.0]}, r"a dict.*cal\.table")])
 def test_data_that_are_no_table_are_refused_with_the_way_to_make_one(call: Any, data: Any, said: str) -> None:
     with pytest.raises(DataError, match=said):
         call(data, "linear")

@@ -156,7 +156,7 @@ def test_what_to_look_at_depends_on_the_wire(afflicted: Callable[..., Any], what
 
 def test_a_stage_that_says_for_ever_that_it_moves(afflicted: Callable[..., Any]) -> None:
     stage, clock = afflicted("oriental_az", Fault("busy"))
-    with pytest.raises(NotSettled, match=r"alpha: has not found its home after 120 s. Look at the stage"):
+    with pytest.raises(NotSettled, match=r"alpha: did not find its home position after 120 s. Look at the stage"):
         stage.home()
     with pytest.raises(NotSettled, match="alpha: has not stopped after 10 s"):
         stage.stop()

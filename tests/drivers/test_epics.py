@@ -139,7 +139,7 @@ MOTOR_FAILURES = [
     (Fault("status", at_s=2, size=0x1000), {}, StageAlarm, r"does not reach the controller.*power and cable"),
     (Fault("limit-switch", at_s=2), {}, StageAlarm, r"is at its high limit switch \(HLS\).*away from the switch"),
     (Fault("stopped", at_s=2), {}, Interlocked, r"in the mode Stop \(SPMG\), and does not move.*set SPMG to Go"),
-    (Fault("stuck"), {}, NotSettled, r"is at 0\.000 deg instead of 90\.000 deg.*Free the stage"),
+    (Fault("stuck"), {}, NotSettled, r"is at 0\.000 deg instead of 90\.000 deg.*Remove what blocks the stage"),
     (Fault("busy"), {}, NotSettled, r"is still moving 10 s after the end was due \(DMOV is 0\)"),
     (Fault("silence", at_s=2), {}, LinkTimeout, r"no answer to sim:beta\.RBV within 1 s on tcp://.*IOC runs"),
     (Fault("disconnect", at_s=2), {}, LinkRefused, r"beta: tcp://.*the connection is lost.*Check cable"),
@@ -195,7 +195,7 @@ def test_a_motor_that_another_client_moves_is_noticed(bench: Bench) -> None:
     motor = bench.motor()
     motor.move_to(10.0)
     bench.servers[0]._twins["beta"].put("sim:beta.VAL", 20.0, bench.clock.now())  # type: ignore[attr-defined]
-    with pytest.raises(NotSettled, match="has not stood still"):
+    with pytest.raises(NotSettled, match="moved although no move was commanded"):
         motor.require_steady()
     bench.clock.sleep(5.0)
     with pytest.raises(NotSettled, match=r"is at 20\.000 deg instead of 10\.000 deg.*another client"):
@@ -312,7 +312,7 @@ def test_units_that_cannot_be_are_refused(bench: Bench) -> None:
         LimitError, match=r"the units of sim:x are 'mm' \(EGU\), which is not an angle.*set deg_per_unit"
     ):
         motor_driver.connect(at, bench.links, motor_driver.Settings(), "beta")
-    with pytest.raises(LimitError, match=r"units of sim:xai1 are 'mm' \(EGU\), which is no voltage.*volts_per_unit"):
+    with pytest.raises(LimitError, match=r"units of sim:xai1 are 'mm' \(EGU\), not a voltage.*volts_per_unit"):
         adc_driver.connect(at, bench.links, adc_driver.Settings(), "adc")
 
 

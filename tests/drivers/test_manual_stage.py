@@ -66,7 +66,7 @@ def test_a_reading_elsewhere_is_no_arrival_and_leaves_the_stage_unknown() -> Non
     person = Person(lambda expected: next(answers))
     alpha = stage(person)
     alpha.move_to(30.0)
-    with pytest.raises(NotSettled, match=r"alpha: its dial was read as 9 deg, 90 deg was asked for"):
+    with pytest.raises(NotSettled, match=r"alpha: the dial shows 9 deg, but 90 deg was requested"):
         alpha.move_to(90.0)
     assert alpha.read_deg is None
     alpha.move_to(90.0)  # the same again is asked again

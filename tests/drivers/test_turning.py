@@ -79,8 +79,8 @@ def test_a_rate_is_a_whole_number_of_steps_a_second(stage: Stages) -> None:
 @pytest.mark.parametrize(
     ("settings", "rate", "words"),
     [
-        (Settings(), 1201.0, "1201 deg/s is not a rate of this stage; its limit is 1200 deg/s; nothing was sent"),
-        (Settings(), 0.0, "0 deg/s is not a rate"),
+        (Settings(), 1201.0, "cannot turn at 1201 deg/s; its limit is 1200 deg/s; nothing was sent"),
+        (Settings(), 0.0, "cannot turn at 0 deg/s"),
         (Settings(), 200.0, r"outside its limits -400 .. 400 deg; nothing was sent. Ask for a slower"),
         (
             dataclasses.replace(ENDLESS, communication_timeout_s=0.0),

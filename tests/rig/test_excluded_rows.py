@@ -21,7 +21,7 @@ def test_rows_that_the_file_excludes_are_left_out_and_that_is_said(tmp_path: Pat
     file.write_text("\n".join(ROWS))
     table = load(str(file), notify=said.append)
     assert list(table.column("vx_v")) == [3.5, 1.5]
-    assert said == [f"{file}: 1 of 3 rows are left out, as its column `excluded`."]
+    assert said == [f"{file}: 1 of 3 rows are left out: their column `excluded` is not 0."]
 
 
 def test_a_file_cannot_exclude_all(tmp_path: Path) -> None:

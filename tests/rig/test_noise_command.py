@@ -210,7 +210,7 @@ def test_a_supply_is_coarse_where_noise_does_not_smooth_its_steps(noise_v: float
         (("short.npy", "--rate", "5"), "needs 64 or more"),
         (("still.npy", "--rate", "0"), "0 is not in the range"),
         (("still.npy", "--rate", "50", "--tau", "100"), "an averaging time of 100 s needs a record of 200 s or more"),
-        (("still.npy", "--rate", "50", "--tau", "0.001"), "is below that of one sample, 0.02 s"),
+        (("still.npy", "--rate", "50", "--tau", "0.001"), "is shorter than one sample, 0.02 s"),
         (("rate.csv",), "the stated rate is 100 samples a second, the column t_s gives 50"),
         (("uneven.csv",), "s; samples must be evenly spaced: record again with every sample"),
         (("means.csv",), "a row is the mean of 500 samples (column n), as in poses"),
@@ -288,7 +288,7 @@ def test_noise_below_the_converters_step_and_of_two_levels_is_said_first(rig: Ri
     trap = np.where(np.cumsum(random.random(6000) < 0.01) % 2, 0.0, 0.4)
     np.save("trap.npy", samples() + trap)
     coarse = rig("noise", "coarse.npy", "--rate", "50")
-    assert "Of x, the noise is below the converter's step: the samples have 2 values 1 apart" in coarse.out
+    assert "Of x, the noise is below the converter's step: the samples have 2 values in steps of 1" in coarse.out
     assert "flicker-noise       not known" in coarse.out
     assert "not noise:" not in coarse.out
     assert "cannot separate" not in coarse.err

@@ -87,12 +87,24 @@ def test_a_guided_run_asks_when_all_is_at_rest(procedure: str, role: str, what: 
 
 
 LIMITS = [  # a fault of an instrument, the exit status, and what is said
-    ("sweep", "alpha", Fault("alarm", at_s=25.0), 3, "alpha: has stopped with alarm 30, overload. Free the stage"),
+    (
+        "sweep",
+        "alpha",
+        Fault("alarm", at_s=25.0),
+        3,
+        "alpha: has stopped with alarm 30, overload. Remove what blocks the stage",
+    ),
     ("sweep", "beta", Fault("alarm", at_s=27.0, size=0x28), 3, "the alarm needs a power cycle"),
     ("sweep", "beta", Fault("stuck", at_s=25.0), 3, "beta: is at"),
-    ("sweep", "beta", Fault("lies", at_s=25.0, size=0.2), 3, "more than 0.05 deg away. Free the stage"),
+    ("sweep", "beta", Fault("lies", at_s=25.0, size=0.2), 3, "more than 0.05 deg away. Remove what blocks the stage"),
     ("sweep", "beta", Fault("busy", at_s=24.0), 3, "beta: is still moving, or not in position, after 2 s. Look"),
-    ("sweep", "alpha", Fault("busy", at_s=26.3), 3, "alpha: has not stood still. Find out what moves it"),
+    (
+        "sweep",
+        "alpha",
+        Fault("busy", at_s=26.3),
+        3,
+        "alpha: moved although no move was commanded. Find out what moves it",
+    ),
     ("sweep", "alpha", Fault("restart", at_s=26.0), 3, "alpha: the position is unknown, so no move is allowed"),
     ("sweep", "beta", Fault("restart", at_s=33.0), 3, "beta: the position is unknown, so no move is allowed"),
     ("sweep", "alpha", Fault("silence", at_s=25.0), 3, "alpha: reading register 0x007F (driver output status): no"),

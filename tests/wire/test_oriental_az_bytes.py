@@ -81,7 +81,9 @@ def test_arrival_is_measured_not_assumed(stage: Stages) -> None:
 
 
 def test_an_alarm_during_a_move_is_put_into_words(stage: Stages) -> None:
-    with pytest.raises(StageAlarm, match=r"alarm 30, overload. Free the stage .* then reset the alarm") as raised:
+    with pytest.raises(
+        StageAlarm, match=r"alarm 30, overload. Remove what blocks the stage.* then reset the alarm"
+    ) as raised:
         stage([*START, (ASK_STATUS, BLOCKED)]).move_to(85.0)
     assert raised.value.code == 0x30
 

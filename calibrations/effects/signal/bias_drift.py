@@ -32,7 +32,7 @@ class BiasDrift(Effect):
     """
 
     kinds = ("poses", "positions", "fields", "rates")
-    left_out = "the drift of one record says nothing of the next"
+    left_out = "the drift of one record does not predict the next"
     needs = ("t_s",)
 
     slope = Parameter("{out}/h", typical=0.001, doc="drift in a straight line")

@@ -17,7 +17,7 @@ class GyroGSensitivity(Effect):
     """
 
     kinds = ("rates", "turns")
-    left_out = "it follows the specific force by an accelerometer with a calibration of its own"
+    left_out = "it needs the specific force from an accelerometer, which has its own calibration"
     needs = ("ax", "ay", "az")
 
     x = Parameter("{out}/g", typical=0.1, doc="output per g of specific force along x")

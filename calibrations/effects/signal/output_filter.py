@@ -16,7 +16,7 @@ class OutputFilter(Effect):
     """
 
     kinds = ("motion",)
-    left_out = "it follows what came before: it is a filter, and belongs to the sampling"
+    left_out = "it depends on earlier samples: it is a filter of the sampling"
 
     off_nominal = Parameter("Hz", typical=2.0, low=-10.0, high=100.0, doc="corner less its nominal value")
 

@@ -25,7 +25,7 @@ class TemperatureHysteresis(Effect):
     contains = ("temperature-bias",)
     memory = 1
 
-    slope = Parameter("{out}/K", typical=0.001, doc="bias per kelvin, once the play is gone through")
+    slope = Parameter("{out}/K", typical=0.001, doc="bias per kelvin, after the temperature has crossed the play")
     play = Parameter(
         "K",
         typical=0.1,

@@ -17,8 +17,8 @@ ONE_RIG = (
     "sensors."
 )
 SHARED = (
-    "An error that the sensors of one rig share and those of other rigs do not is an error of the rig. Values are "
-    "relative to the median of the rigs; an error common to all rigs appears as one of the sensors' design."
+    "If all sensors of one rig have an error that the sensors of other rigs do not have, it is an error of the rig. "
+    "Values are relative to the median of the rigs. An error of all rigs appears as an error of the sensors' design."
 )
 
 
@@ -89,7 +89,7 @@ def _headline(missing: list[BatchVerdict], faulty_rigs: set[str], persons: list[
 
 def _batches(population: Population) -> Section:
     blocks: list[Block] = [
-        "An effect belongs to a batch if its sensors show it together, even if it is significant in none alone."
+        "An effect belongs to a batch if its sensors show it together, even if no single sensor shows it significantly."
     ]
     if any(batch.shares for batch in population.batches):
         caption = "Share of a batch's sensors that have the effect; 100 % if the batch as a whole shows it."

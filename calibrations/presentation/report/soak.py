@@ -20,7 +20,7 @@ from calibrations.text import estimate_text, in_milli, join_words, minus, rounde
 WANDERED_K = 1.0  # peak to peak; ambient that changes by more is not constant
 TOLERANCE = (
     "The digits in brackets are the standard uncertainty of the last digits, slow noise included. The tolerance is "
-    "the expanded uncertainty (k = 2) of one reversal. A quantity is steady from the time on from which it stays "
+    "the expanded uncertainty (k = 2) of one reversal. A quantity is steady from the time after which it stays "
     "within the tolerance."
 )
 FORECAST = (
