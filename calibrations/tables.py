@@ -121,7 +121,7 @@ class Rates(Kind):
     widest_form = "a linear response to rates and specific forces"
     sensed_in = "deg/s"
     sensed_along = "rate about {} (deg/s)"
-    nearest_to = "the axis of turn"
+    nearest_to = "the axis of rotation"
     drawn_over = ("rate", "rate (deg/s)", "rate_deg_s")
     measurement_caption = "Dots are measured, crosses are the model {}."
     failure_caption = "The residual of the model {} over the rate of the turn."
@@ -144,7 +144,7 @@ class Turns(Kind):
     from_output = turning = overlapping = True
     sensed_in = "deg/s"
     sensed_along = "rate about {} (deg/s)"
-    nearest_to = "the axis of turn"
+    nearest_to = "the axis of rotation"
     note = "Each turn has five values: two of its angle, which gravity shows, and the three rates at rest."
     measurement_caption = "The error of each turn and rest by the model {}: 0 if the model is right."
     failure_caption = "The residual of the model {} over the rate of the turn."

@@ -2,7 +2,7 @@
 
 Excites   tilt of the base, zero offset of alpha.
 Blind to  rotation about the vertical; the offset of the level, which the half turn removes. On the table it cannot
-          separate tilt of the base from zero offset of alpha; on the base the level shows the base alone.
+          separate tilt of the base from zero offset of alpha; on the base the level shows only the base.
 Source    Ang V: the level is read before every experiment; reversal, as for any spirit level.
 """
 

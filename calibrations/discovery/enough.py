@@ -90,11 +90,11 @@ def until(findings: Findings[Fit], enough: Enough) -> Findings[Fit]:
     k = next((k for k, fit in enumerate(fits) if fit.held_out_excess <= enough.limit(fit)), None)
     if k is None:
         error = enough.error(findings.end)
-        remark = f"The error on {findings.data.unseen} is {error}, more than asked ({enough.text})."
+        remark = f"The error on {findings.data.unseen} is {error}, above the limit ({enough.text})."
         return replace(findings, remarks=(*findings.remarks, remark))
     kept_steps, omitted_steps = findings.steps[:k], findings.steps[k:]
     names = {step.name for step in kept_steps}
-    remark = f"The error on {findings.data.unseen} is {enough.error(fits[k])}, as small as asked ({enough.text})."
+    remark = f"The error on {findings.data.unseen} is {enough.error(fits[k])}, within the limit ({enough.text})."
     if omitted_steps:
         remark += f" Left out: {join_words([step.name for step in omitted_steps])}."
     return replace(

@@ -145,7 +145,7 @@ def _check_rounding(table: Table) -> Iterator[str]:
         if np.max(np.abs(steps - np.round(steps))) < 1e-3:
             yield (
                 f"all values of {name} are multiples of {step:.3g} {table.unit}, {step / floor:.0f} times the noise of "
-                "a mean: they were rounded; take the values with all their digits"
+                "a mean: they were rounded; use values with all their digits"
             )
 
 

@@ -3,7 +3,7 @@
 A verdict is always that of the model that is judged. A diagnosis judges the given model, a discovery the final model,
 with the effects that the search added.
 
-    adequate        no effect is missing, and the residual is noise or an error as small as was asked
+    adequate        no effect is missing, and the residual is noise or an error within the limit that the user gave
     effect-missing  effects of the catalogue are missing, and they explain the residual (given model only)
     ambiguous       the data cannot decide: another effect explains them as well, a small part of the residual may be
                     the form of a named cause, or the data do not determine the model
@@ -64,7 +64,7 @@ class Evidence:
     spoilt        whether that part makes every effect of the search doubtful
     unresponsive  whether that part is an output that does not follow the poses
     searched      whether further effects were searched for after the last one was added
-    enough        whether the search stopped at an error that is as small as was asked
+    enough        whether the search stopped at an error within the limit that the user gave
     remarks       further sentences
     """
 

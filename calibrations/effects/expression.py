@@ -197,7 +197,7 @@ def _statement(text: str) -> tuple[str, ast.expr]:
         case ast.AugAssign(target=ast.Name(id=name), op=ast.Add(), value=value) if name in TARGETS:
             return name, value
         case ast.AugAssign(target=ast.Name(id=name), op=ast.Add()):
-            raise fault(text, 0, f'nothing can be added to "{name}"{nearest(name, TARGETS)}')
+            raise fault(text, 0, f'an expression cannot change "{name}"{nearest(name, TARGETS)}')
     raise fault(text, 0, "is not an expression; write the added term, as in v += a*sin(5*beta)")
 
 

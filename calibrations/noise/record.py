@@ -111,8 +111,8 @@ def require_length(n: int, rate_hz: float, corner_hz: float, source: str) -> Non
         )
     if corner_hz * n < FEWEST_SAMPLES * rate_hz:
         raise TooFewRows(
-            f"{source}: {n / rate_hz:.3g} s are too short behind a low-pass of {corner_hz:g} Hz, which lets "
-            f"through little noise in that time: record for {FEWEST_SAMPLES / corner_hz:.3g} s or more"
+            f"{source}: {n / rate_hz:.3g} s are too short after a low-pass of {corner_hz:g} Hz, which "
+            f"passes too little noise in that time: record for {FEWEST_SAMPLES / corner_hz:.3g} s or more"
         )
 
 

@@ -135,7 +135,7 @@ def choices(fit: Fit) -> dict[str, Column]:
 
 
 def nearest_axis(fit: Fit) -> Column:
-    """The sensor axis nearest to gravity, to the field or to the axis of turn: 0, 1, 2."""
+    """The sensor axis nearest to gravity, to the field or to the axis of rotation: 0, 1, 2."""
     n, nearest = len(fit.channels), np.argmax(np.abs(specific_force(fit)), axis=1).astype(float)
     return Column("axis", (f"axis nearest to {fit.table.type.nearest_to}",) * n, np.tile(nearest, (n, 1)), AXES)
 

@@ -132,7 +132,7 @@ class LineSensor(DigitalSensor[Settings, LineDecoder]):
             return []
         columns = ", ".join(f"{name}: {column}" for name, column in proposal["columns"].items())
         other_settings = ", ".join(f"{name}: {value}" for name, value in proposal.items() if name != "columns")
-        text = f"the lines fit {{columns: {{{columns}}}, {other_settings}}} in the sensor's settings, if it is at rest"
+        text = f"if the sensor is at rest, its lines fit the settings {{columns: {{{columns}}}, {other_settings}}}"
         return [Check("proposal", False, text)]
 
     def _silence(self, timeout_s: float) -> DriverError:

@@ -127,5 +127,7 @@ class ManualStage:
 def connect(address: Address, links: Links, settings: Settings, name: str) -> ManualStage:
     """The stage that the person at the rig turns; asks nothing. Raises LinkRefused for any other address."""
     if address.url != PERSON:
-        raise LinkRefused(f"{name}: {address.url!r} leads to no person", f"Write `url: {PERSON}` in the bench file")
+        raise LinkRefused(
+            f"{name}: {address.url!r} is not the address of a person", f"Write `url: {PERSON}` in the bench file"
+        )
     return ManualStage(links.person, settings, name)

@@ -194,7 +194,7 @@ class Meter(Recorder[Settings]):
         if count_now >= self.settings.memory:
             raise StreamError(
                 f"{self.name}: its memory of {count_now} readings is full, and readings may be lost",
-                "Lower rate_hz in the bench file, or keep other programs from this computer",
+                "Lower rate_hz in the bench file, or stop other programs on this computer",
             )
 
     def _points(self) -> int:
@@ -202,7 +202,7 @@ class Meter(Recorder[Settings]):
         if not np.isfinite(count):
             raise BadFrame(
                 f"{self.name}: the answer to 'DATA:POIN?' is {count:g}, not a number of readings",
-                "Switch the instrument off and on, and keep other programs from it",
+                "Switch the instrument off and on, and stop other programs that use it",
             )
         return int(count)
 
@@ -271,7 +271,7 @@ class Meter(Recorder[Settings]):
         if not (match := ERROR.fullmatch(answer)):
             raise BadFrame(
                 f"{self.name}: the answer to 'SYST:ERR?' is {answer[:60]!r}, not a number and a text",
-                "Switch the instrument off and on, and keep other programs from it",
+                "Switch the instrument off and on, and stop other programs that use it",
             )
         return int(match[1]), match[2] or "no text"
 

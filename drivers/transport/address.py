@@ -83,11 +83,11 @@ class Url:
                 options.pop("library", PYVISA_PY),
             )
         except ValueError as error:
-            raise LinkRefused(f"{_display_text(text)} is not the address of a wire ({error})", REMEDY) from error
+            raise LinkRefused(f"{_display_text(text)} is not the address of an instrument ({error})", REMEDY) from error
         if "@" in parts.netloc:
-            raise LinkRefused(f"{_display_text(text)} has a user name, which a wire does not need", REMEDY)
+            raise LinkRefused(f"{_display_text(text)} has a user name; remove it", REMEDY)
         if options or not url._complete():
-            raise LinkRefused(f"{_display_text(text)} is not the address of a wire", REMEDY)
+            raise LinkRefused(f"{_display_text(text)} is not the address of an instrument", REMEDY)
         if parts.port is None and url.scheme in NETWORK:
             raise LinkRefused(f"{_display_text(text)} has no port", f"Write {url.scheme}://{url.host}:PORT")
         return url

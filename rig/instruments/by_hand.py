@@ -8,6 +8,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrations.table import Table
 from procedures.session import Dwell, HandCourse, NoiseAtRest, Recorded, Stillness
 from rig.record.turns import is_turn, turn_columns
 from rig.record.values import Kept
@@ -68,7 +69,6 @@ class HandAnalysis:
     def turn_course(self, recorded: Sequence[Recorded], noise: NoiseAtRest, rest_s: float) -> HandCourse:
         """The rests and turns so far; the path of a rest has the orientation that was wanted, in words."""
         from calibrations.analyses.hand_turns import TurnCourse
-        from calibrations.table import Table
 
         rests = [cast(Kept, each).dwell for each in recorded if not is_turn(each.pose)]
         columns = turn_columns(recorded, rest_s)

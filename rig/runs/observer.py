@@ -169,7 +169,7 @@ class RunView:
         planned_s = self.progress.planned_left_s()
         if planned_s is None:
             return ""
-        return f"{duration(planned_s)} {'of simulated time ' if self.simulated else ''}left by the plan"
+        return f"{duration(planned_s)} {'of simulated time ' if self.simulated else ''}left, as planned"
 
 
 class RunViewer(Observer):

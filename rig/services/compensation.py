@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from calibrations.compensation import document, sources
 from calibrations.compensation.document import (
     Origin,
     coverage_text,
@@ -105,6 +106,5 @@ def export_document(exported: Exported, form: str, models: Sequence[str], out: P
 
 
 def _writer(language: str) -> Callable[..., dict[str, str]]:
-    from calibrations.compensation import document, sources
 
     return {"c": sources.c_files, "python": sources.python_files, "json": document.files}[language]

@@ -26,6 +26,7 @@ from calibrations.presentation.certificate.terms import name as result_name
 from calibrations.tables import MEANS
 from calibrations.text import as_written, rounded
 from drivers.errors import did_you_mean
+from rig.bench import read_bench
 from rig.bench.certificates import EXPIRED
 from rig.errors import RecordError, RigError
 from rig.record import Record, Run
@@ -326,7 +327,6 @@ def limits_of(bench_file: Path | None) -> dict[str, Limit]:
     """The ranges in the bench file's `limits.results`; a magnitude does not limit a change. Raises BenchError."""
     if bench_file is None:
         return {}
-    from rig.bench import read_bench
 
     return {name: limit for name, limit in read_bench(bench_file).result_limits.items() if isinstance(limit, tuple)}
 

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from calibrations.errors import CalibrationError
+from calibrations.model.file import read_model, shipped_names
 from rig.errors import RigError
 from rig.files import RECORD, home, write_whole
 from rig.lab_url import lab_url, mask_url
@@ -144,7 +146,6 @@ def lab_read() -> str | None:
 
 def models(selected: str = "", default: str | None = "by kind of data") -> dict[str, str]:
     """The available models by name or file, with their labels; "" is the default model, where there is one."""
-    from calibrations.model.file import shipped_names
 
     labels = {} if default is None else {"": default}
     labels |= {name: name for name in shipped_names()} | saved_models()
@@ -153,8 +154,6 @@ def models(selected: str = "", default: str | None = "by kind of data") -> dict[
 
 def noise_models() -> dict[str, str]:
     """The saved models of noise, with their labels. A file that cannot be read is left out."""
-    from calibrations.errors import CalibrationError
-    from calibrations.model.file import read_model
     from rig.services.load import is_noise
 
     labels = {}

@@ -44,7 +44,7 @@ def test_a_search_stops_at_the_first_error_that_is_small_enough() -> None:
     assert names(result) == ["z-axis-bias"]
     assert result.causes == ("z-axis-bias",)
     assert result.verdict == "adequate"
-    assert "as small as asked" in result.judgement.text
+    assert "within the limit" in result.judgement.text
     assert "Left out: quadratic-nonlinearity." in result.judgement.text
     assert "no effect is missing" not in result.judgement.text
 
@@ -58,7 +58,7 @@ def test_a_model_whose_error_is_small_enough_gets_no_effect() -> None:
 def test_the_text_says_that_no_model_reaches_the_requested_error() -> None:
     result = found("0.5 floors")
     assert names(result) == ["z-axis-bias", "quadratic-nonlinearity"]
-    assert "more than asked (0.5 noise floors)" in result.judgement.text
+    assert "above the limit (0.5 noise floors)" in result.judgement.text
 
 
 def test_equal_errors_in_other_units_are_one_limit() -> None:

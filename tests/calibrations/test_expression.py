@@ -56,7 +56,7 @@ REFUSED = [
     ("a^2", r"a power is \*\*"),
     ("a*t; b", "one expression at a time"),
     ("a = 3", "write the added term"),
-    ("gamma += a", 'nothing can be added to "gamma"'),
+    ("gamma += a", 'an expression cannot change "gamma"'),
     ("v -= a", "write the added term"),
     ("a.real", "column 1: 'a.real' is not allowed here"),
     ("a[0]", "is not allowed here"),

@@ -186,7 +186,7 @@ def test_a_record_that_is_too_short() -> None:
 
 
 def test_behind_a_low_pass_that_lets_through_too_little() -> None:
-    with pytest.raises(TooFewRows, match=r"1 s are too short behind a low-pass of 10 Hz.*record for 6.4 s or more"):
+    with pytest.raises(TooFewRows, match=r"1 s are too short after a low-pass of 10 Hz.*record for 6.4 s or more"):
         analysed(np.random.default_rng(1).standard_normal(1000), 1000.0, corner_hz=10.0)
 
 

@@ -61,7 +61,7 @@ def test_lost_and_doubled_datagrams_are_counted(sensor: Start) -> None:
 
 def test_silence_on_a_udp_port_is_a_timeout(sensor: Start) -> None:
     adc = sensor(Fault("silence"))
-    with pytest.raises(LinkTimeout, match="no line came on udpin://"):
+    with pytest.raises(LinkTimeout, match="received no line on udpin://"):
         adc.acquire(1.0)
 
 

@@ -110,7 +110,7 @@ def test_doubled_lines_are_dropped(connect: Connect) -> None:
     ("fault", "keys", "kind", "said"),
     [
         (Fault("lost-line", at_s=0.2, for_s=0.1), {}, StreamError, "samples were lost"),
-        (Fault("lost-line"), {}, LinkTimeout, "no line came"),
+        (Fault("lost-line"), {}, LinkTimeout, "received no line"),
         (Fault("wrong-baud"), {}, BadFrame, "baud rate is probably wrong"),
         (Fault("stuck-axis"), {}, SensorFault, "ax gave the same value"),
         (None, {"range": 0.9}, OverRange, "az reached the end of its range, 0.9 g"),

@@ -215,7 +215,7 @@ def test_an_address_of_visa_names_its_line() -> None:
     assert Url.parse("visa:TCPIP0::localhost::5025::SOCKET").line == Url.parse("tcp://127.0.0.1:5025").line
     assert Url.parse("visa:gpib0::22::INSTR").line == Url.parse("visa:GPIB0::22::INSTR").line
     assert Url.parse("visa:GPIB0::22::INSTR?library=/lib/visa.so").library == "/lib/visa.so"
-    with pytest.raises(LinkRefused, match="not the address of a wire"):
+    with pytest.raises(LinkRefused, match="not the address of an instrument"):
         Url.parse("visa:nothing")
 
 

@@ -99,7 +99,7 @@ def test_before_a_run_one_screen_says_all_of_it() -> None:
         "from -5 to 365 deg; the limits are -400 to 400 deg",
         "not at -20 to 85 C; if the tilt of the table exceeds 0.3 deg",
         "MB on the disk; 2.0 GB are free",
-        "[ ] the cables can follow",
+        "[ ] the cables are long enough",
         "[ ] the level lies on the table",
         "of simulated time",
     ):
@@ -255,8 +255,8 @@ def test_a_procedure_that_expects_part_by_part_has_the_plans_total() -> None:
 
 def test_simulated_time_is_said_to_be_that() -> None:
     way = Progress(at_s=(10.0,), end_s=60.0).expect(1, 0)
-    assert "0:50 left by the plan" in shown(screen(seen(progress=way), 0.0))
-    assert "0:50 of simulated time left by the plan" in shown(screen(seen(progress=way, simulated=True), 0.0))
+    assert "0:50 left, as planned" in shown(screen(seen(progress=way), 0.0))
+    assert "0:50 of simulated time left, as planned" in shown(screen(seen(progress=way, simulated=True), 0.0))
 
 
 # questions

@@ -8,7 +8,7 @@ from calibrations.table import Table
 
 
 class StageEccentricity(Effect):
-    """stage-eccentricity: the angle scale of the stage is off centre: an angle error of one wave in a turn.
+    """stage-eccentricity: the angle scale of the stage is off centre, so the angle error has one wave in a turn.
 
         beta <- beta + s sin(beta) + c cos(beta)          s, c in deg
 

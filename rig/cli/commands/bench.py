@@ -27,6 +27,7 @@ from rig.bench.file import HAND
 from rig.cli.terminal.output import bench_option, emit, json_option, note, notes, out_option
 from rig.cli.terminal.progress import working
 from rig.errors import BenchError
+from rig.files import write_whole
 from rig.instruments.instruments import check_all
 from rig.instruments.wiring import on_a_network, serve, world_of
 
@@ -210,7 +211,6 @@ def draw_command(alpha: float, beta: float, mount: float, flip: int, out: Path |
     Without --out, a sketch of the table appears in the terminal.
     """
     from rig.drawings import Attitude, page, sketch
-    from rig.files import write_whole
 
     attitude = Attitude(alpha, beta, mount, flip)
     if out is not None:

@@ -22,6 +22,8 @@ from rig.cli.terminal.output import (
     require_outputs,
 )
 from rig.cli.terminal.progress import working
+from rig.files import make_folder, program, write_whole
+from rig.services.request import effects_of
 
 if TYPE_CHECKING:
     from calibrations.compensation.inverse import Range, Residual
@@ -67,10 +69,8 @@ def compensate_command(
     from calibrations.compensation.document import summary
     from calibrations.compensation.inverse import compensate_residual, invert_model
     from calibrations.model.file import dump_model, read_model
-    from rig.files import make_folder, write_whole
     from rig.services.compensation import compensation_lines, how_to_test, origin_of, source_files
     from rig.services.load import check_unit
-    from rig.services.request import effects_of
 
     if picture is not None and data is None:
         raise click.UsageError("--picture shows the test of --data: also give --data DATA")
@@ -161,9 +161,7 @@ def export_model_command(
     from calibrations.exporting.formats import NOISES, export_model
     from calibrations.exporting.noise_files import Stream
     from calibrations.model.file import read_model
-    from rig.files import program, write_whole
     from rig.services.compensation import export_document, export_lines
-    from rig.services.request import effects_of
 
     if form in NOISES and rate_hz is None:
         raise click.UsageError(f"--for {form} needs the number of measurements a second: give --rate HZ")

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING
 import click
 
 from rig.cli.terminal.output import FOLDER, emit, force_option, json_option, note, require_outputs
+from rig.cli.terminal.progress import working
+from rig.files import make_folder, program, write_whole
+from rig.services.request import effects_of
 
 if TYPE_CHECKING:
     from rig.bench import Bench
@@ -41,12 +44,9 @@ def demo_command(folder: Path | None, realistic: bool, as_json: bool) -> None:
     from calibrations.presentation.report.report import report
     from rig.bench import read_bench
     from rig.bench.file import DEMO
-    from rig.cli.terminal.progress import working
     from rig.cli.terminal.words import discovery
-    from rig.files import make_folder, program, write_whole
     from rig.services.hidden_faults import hidden_faults
     from rig.services.provenance import today, write_model
-    from rig.services.request import effects_of
     from rig.services.tables import load
 
     folder = folder or Path("rig-demo-realistic" if realistic else "rig-demo")

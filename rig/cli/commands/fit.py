@@ -12,7 +12,7 @@ import click
 import numpy as np
 
 from calibrations.analyses.magnetometer_turn import correct_by_extremes, estimate_hard_iron, fit_ellipse
-from calibrations.discovery.check_poses import Check
+from calibrations.discovery.check_poses import Check, judge_check_poses
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.matrices import CalibrationMatrices, calibration_matrices
 from calibrations.geometry.sphere import Faces, estimate_faces
@@ -83,7 +83,6 @@ class _Further:
 def _further(data: Dataset[Any], model: Model, fitted: Any) -> _Further:
     if data.form != "rows":
         return _Further({})
-    from calibrations.discovery.check_poses import judge_check_poses
     from calibrations.presentation.budget import budget_document as budget_of
     from rig.cli.terminal.words import paper
 

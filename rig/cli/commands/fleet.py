@@ -12,10 +12,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from calibrations.fleet.batch import BatchEffect, Population, SensorVerdict
+from calibrations.model.file import dump_model, read_model
 from calibrations.text import columns, concise, concise_in_prefix, count_words, join_words, percent
 from rig.cli.terminal.complete import complete_model
 from rig.cli.terminal.output import FOLDER, bench_option, emit, json_option, note, out_option, require_outputs
-from rig.fleet.calibrate import Calibrated, Calibration
+from rig.files import write_whole
+from rig.fleet.calibrate import Calibrated, Calibration, calibrate_fleet, read_guide, write_guide, write_models
+from rig.fleet.cluster import connect_workers
+from rig.fleet.discover import discover_fleet
+from rig.fleet.members import fleet_of
+from rig.fleet.questions import Fleet
+from rig.fleet.worker import Question, effects_of, own_files
+from rig.record import Record
 
 if TYPE_CHECKING:
     from rig.fleet.members import Member
@@ -77,11 +85,7 @@ def _fleet_options(model: str, out: str) -> Callable[[Callable[[Request], None]]
 @_fleet_options("Model to test: a name or a file.", "Write the model of each batch into this folder.")
 def discover(request: Request) -> None:
     """Find effects that batches miss, errors of rigs, and sensors unlike the others of their batch."""
-    from calibrations.model.file import dump_model, read_model
-    from rig.fleet.calibrate import write_guide
-    from rig.fleet.discover import discover_fleet
     from rig.fleet.documents import population_document, population_page
-    from rig.fleet.worker import Question, effects_of, own_files
 
     effect_files, model = own_files(request.bench_file), request.model
     start = Question("look", dump_model(read_model(model, effects_of(effect_files))), own=effect_files)
@@ -99,9 +103,7 @@ def discover(request: Request) -> None:
 @_fleet_options("A name, a file, or the folder of fleet discover.", "Write the model of each sensor into this folder.")
 def calibrate(request: Request) -> None:
     """Calibrate the sensors of SOURCES with the statistics of their batch, with 95 % intervals."""
-    from rig.fleet.calibrate import calibrate_fleet, read_guide, write_models
     from rig.fleet.documents import calibration_document, calibration_page
-    from rig.fleet.worker import own_files
 
     effect_files, model = own_files(request.bench_file), request.model
     with _fleet(request) as (fleet, members):
@@ -117,7 +119,6 @@ def calibrate(request: Request) -> None:
 
 def _write_report(request: Request, paths: list[Path], page: Callable[[], str]) -> None:
     """Write the `page` if --report is given, and add it to the `paths` files."""
-    from rig.files import write_whole
 
     if request.report is not None:
         write_whole(request.report, page())
@@ -127,10 +128,6 @@ def _write_report(request: Request, paths: list[Path], page: Callable[[], str]) 
 @contextmanager
 def _fleet(request: Request) -> Iterator[tuple[Fleet, list[Member]]]:
     """The workers and the sensors; progress goes to standard error. Raises OutputError for an unusable report file."""
-    from rig.fleet.cluster import connect_workers
-    from rig.fleet.members import fleet_of
-    from rig.fleet.questions import Fleet
-    from rig.record import Record
 
     if request.out is not None:
         require_outputs(*sorted(request.out.glob("*.yaml")))

@@ -13,6 +13,7 @@ import click
 from calibrations.analyses.stability import YEAR_DAYS, Agreement
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
 from calibrations.text import columns, concise_in_prefix
+from drivers.errors import did_you_mean
 from rig.cli.terminal.complete import complete_model, complete_sensor
 from rig.cli.terminal.output import bench_option, emit, json_option, note, picture_options
 from rig.cli.terminal.progress import working
@@ -29,6 +30,7 @@ from rig.services.history_words import (
     significance,
     summary,
 )
+from rig.services.request import effects_of
 
 Near = tuple[Calibration, float] | None  # the calibration closest to a day, and its age on that day in days
 
@@ -87,7 +89,6 @@ def history_command(
     file, or --limit. Exit status 1: the calibration at --at is stale, or a comparison does not agree.
     """
     from calibrations.model.file import read_model
-    from rig.services.request import effects_of
 
     model_read = read_model(model, effects_of(bench_file))
     limits = changes(changes_given)
@@ -114,7 +115,6 @@ def history_command(
 
 def _select_quantities(life: History, names: Sequence[str], limited: Iterable[str]) -> History:
     """The history of the chosen quantities. Raises UsageError for an unknown quantity."""
-    from drivers.errors import did_you_mean
 
     quantity_names = [q.name for q in life.quantities]
     for name in (*names, *limited):

@@ -11,7 +11,7 @@ from typing import Literal
 import click
 
 from calibrations.errors import DataError, nearest
-from calibrations.importing.foreign import PATH, check_unit
+from calibrations.importing.foreign import PATH, check_unit, needs_mapping
 from calibrations.importing.proposal import (
     COLUMN_NAMES,
     NAME_PATTERNS,
@@ -65,9 +65,7 @@ def import_command(
     THEIRS is a name in the file's header, or a column number from 1 if the file has no header. In a terminal the
     program proposes names for unknown columns and asks.
     """
-    from calibrations.importing.foreign import needs_mapping
     from calibrations.importing.topics import SeveralTopics
-    from calibrations.importing.units import ColumnMapping
     from rig.services.importing import open_file, store_sheet
 
     attended = sys.stdin.isatty() and sys.stderr.isatty()

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from calibrations.effects import Effect
 from calibrations.text import columns
 from rig.cli.terminal.complete import complete_effect, complete_procedure
 from rig.cli.terminal.output import bench_option, emit, json_option, notes
+from rig.services.request import effects_of
 
 if TYPE_CHECKING:
     from rig.record import Run
@@ -43,8 +45,6 @@ def effects_command(effect: str | None, bench_file: Path | None, as_json: bool) 
 
     EFFECT may be a free form, free:PLACE: a smooth curve of unknown form at a place of the signal chain.
     """
-    from calibrations.effects import Effect
-    from rig.services.request import effects_of
 
     effects_by_name = effects_of(bench_file)
 

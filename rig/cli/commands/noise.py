@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from calibrations.noise.analysis import NoiseAnalysis
+from calibrations.noise.analysis import NoiseAnalysis, analyse, noise_document
+from calibrations.noise.deviations import OVERLAPPING, curve_at
 from rig.cli.terminal.complete import complete_data
 from rig.cli.terminal.output import Positive, emit, json_option, note, notes, picture_options
 from rig.cli.terminal.progress import working
+from rig.services.request import Request
 
 if TYPE_CHECKING:
     from calibrations.noise.record import Still
@@ -46,7 +48,6 @@ def noise_command(
     soak. It is read once and is not held in memory, except for averaging times given with --tau. Disturbances that are
     not noise (a step, an output that follows a logged column) are removed first, as `rig diagnose` does.
     """
-    from calibrations.noise.analysis import analyse, noise_document
     from calibrations.presentation.noise_text import remarks
 
     with working("reading the record") as progress:
@@ -74,9 +75,7 @@ def _record(data: str, channel: str | None, rate_hz: float | None, tau_s: tuple[
 
     import numpy as np
 
-    from calibrations.noise.deviations import OVERLAPPING, curve_at
     from rig.services.load import still_of
-    from rig.services.request import Request
 
     blocks: dict[str, list[Any]] | None = {} if tau_s else None
     still = still_of(Request(data, channel=channel, rate_hz=rate_hz), note, every_deviation=True, keep=blocks)

@@ -27,7 +27,9 @@ from rig.cli.terminal.output import bench_option, emit, json_option, model_optio
 from rig.cli.terminal.progress import working
 from rig.cli.terminal.settings_help import ProcedureCommand
 from rig.errors import BeyondLimits
+from rig.files import write_whole
 from rig.planning.optimal import Optimal, relative
+from rig.planning.optimal import optimal as chosen
 from rig.planning.plan import Plan, Stretch, plan, stretches
 from rig.planning.sweep_range import Judged
 from rig.services.optimal_words import PLANS, plan_rows, purpose, savings
@@ -115,7 +117,6 @@ def _optimal(bench: Bench, procedure: Procedure, settings: Mapping[str, Any], op
     """Choose poses for a model, and compare them with the standard sweep. Raises UsageError without a grid."""
     from calibrations.effects.catalogue import catalogue
     from calibrations.model.file import read_model
-    from rig.planning.optimal import optimal as chosen
 
     if procedure.name != "sweep" or settings["pose_list"]:
         raise click.UsageError("--optimal is for a sweep over a grid, without --pose-list")
@@ -132,7 +133,6 @@ def _optimal(bench: Bench, procedure: Procedure, settings: Mapping[str, Any], op
 
 
 def _write_poses(out: Path, planned: Plan) -> None:
-    from rig.files import write_whole
 
     write_whole(out, "\n".join([*format_poses(dwell.pose for dwell in planned.held), ""]))
 

@@ -226,9 +226,7 @@ def exclude_command(run: str, pose: int, reason: str | None, include: bool, as_j
     """
     if include == bool(reason and reason.strip()):
         raise click.UsageError("give a reason (--reason TEXT), or include the pose again (--include)")
-    from rig.record import Record
     from rig.services.exclusion import RESULTS, exclude
-    from rig.services.next_steps import results_table
 
     with Record.to_find(run) as record:
         exclusion = exclude(record, run, [pose], None if include else reason)

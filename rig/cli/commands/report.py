@@ -23,6 +23,8 @@ from rig.cli.terminal.output import (
 )
 from rig.cli.terminal.progress import working
 from rig.errors import OutputError
+from rig.files import write_whole
+from rig.services.request import Request
 
 if TYPE_CHECKING:
     from calibrations.presentation.certificate.content import Certificate
@@ -44,7 +46,6 @@ def report_command(request: Request, out: Path | None, folder: Path | None, form
     if out is None and folder is None:
         raise click.UsageError("nothing to write: give --out FILE.html, --pictures FOLDER, or both")
     from calibrations.presentation.static import save_all
-    from rig.files import write_whole
     from rig.services.report import make_report
 
     with working("fitting the model and searching for missing effects") as progress:
@@ -105,7 +106,6 @@ def certificate_command(
     from rig.bench import read_bench
     from rig.services.certify import Certified, certified, failed_results
     from rig.services.load import is_still, loaded_table
-    from rig.services.request import Request
 
     paths = _paths(out)
     require_outputs(*paths)
@@ -136,7 +136,6 @@ def _paths(out: Path) -> list[Path]:
 
 def _write_certificate(path: Path, certificate: Certificate) -> None:
     """Write one format of the certificate."""
-    from rig.files import write_whole
     from rig.services.certify import format_certificate
 
     write_whole(path, format_certificate(certificate, path.suffix))

@@ -9,12 +9,16 @@ from nicegui import ui
 
 from calibrations.errors import CalibrationError
 from calibrations.importing.topics import SeveralTopics
+from calibrations.model.file import dump_model
 from rig.errors import RigError
-from rig.files import home
+from rig.files import home, write_whole
 from rig.services.importing import needs_person, open_file
+from rig.services.load import Loaded
 from rig.services.page_words import IMPORT, address
+from rig.services.request import Request
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import MODELS, models, noise_models, runs, saved_models
+from rig.web.pages.run_report import download_report
 from rig.web.parts import box, button, dialog_with_name, message, words
 from rig.web.upload import upload
 
@@ -142,23 +146,18 @@ class Choice:
         dialog.open()
 
     def _text(self) -> str:
-        from calibrations.model.file import dump_model
 
         session = self.page.session
         assert session is not None  # noqa: S101 the button is enabled with the session
         return dump_model(session.complete_model())
 
     def _write(self, path: Path) -> None:
-        from rig.files import write_whole
 
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, self._text())
 
     async def _report(self) -> None:
         """Download the report, as from `rig report`."""
-        from rig.services.load import Loaded
-        from rig.services.request import Request
-        from rig.web.pages.run_report import download_report
 
         page, session = self.page, self.page.session
         question = Loaded(session.data, session.model, session.effects) if session is not None else None

@@ -9,6 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
+from calibrations.compensation.inverse import Range, invert_model
+from calibrations.model.file import dump_model
+from rig.bench import read_bench
+from rig.errors import RigError
 from rig.web.calculations import off_loop
 from rig.web.desk import models
 from rig.web.parts import dialog_with_name, div, for_page, message, words
@@ -78,7 +82,6 @@ class CertificateDialog(Asking):
 
     def made(self) -> tuple[bytes | str, str, list[str]]:
         """The certificate of the present model."""
-        from rig.bench import read_bench
         from rig.services.certify import Certified, certificate_head, certified, failed_results, format_certificate
 
         session, form = self.session, str(self.form.value)
@@ -108,7 +111,6 @@ class CompensationDialog(Asking):
             "that they are enough over the whole range.",
         )
         self.model: Model = session.complete_model()
-        from calibrations.compensation.inverse import Range
 
         self.default = Range.for_model(self.model)
         with self.fields:
@@ -141,8 +143,6 @@ class CompensationDialog(Asking):
 
     def _range(self) -> Range:
         """The range of the proof. Raises RigError for ends that are not in order."""
-        from calibrations.compensation.inverse import Range
-        from rig.errors import RigError
 
         ends = {name: (float(low.value), float(high.value)) for name, (low, high) in self.inputs.items()}
         for name, (low, high) in ends.items():
@@ -155,8 +155,6 @@ class CompensationDialog(Asking):
 
     def made(self) -> tuple[bytes | str, str, list[str]]:
         """All files in one archive."""
-        from calibrations.compensation.inverse import invert_model
-        from calibrations.model.file import dump_model
         from rig.services.compensation import compensation_lines, how_to_test, origin_of, source_files
 
         language = str(self.language.value)

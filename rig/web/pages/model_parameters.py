@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
+from calibrations.model.file import dump_model
 from calibrations.noise.analysis import NoiseAnalysis
 from calibrations.noise.dataset import NoiseFindings
 from calibrations.presentation.noise_text import coefficient_table, density
@@ -103,7 +104,6 @@ class ParametersBox:
 
     def download(self) -> None:
         """Download the model file."""
-        from calibrations.model.file import dump_model
 
         if (session := self.page.session) is None:
             return
