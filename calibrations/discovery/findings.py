@@ -194,7 +194,8 @@ class Findings(Evidence, Generic[F]):
         """The judgement on the given model; on the model before the added effects if no further effect is missing."""
         fit = self.origin if self.added and not self._missing else self.start
         judgement = self._judge(fit, self.added, self.undetermined[0])
-        return replace(judgement, missing=self._missing, provisional=not self.settled)
+        refinements = tuple(name for name in self.refinements if name in self._missing) if self.causes else ()
+        return replace(judgement, missing=self._missing, refinements=refinements, provisional=not self.settled)
 
     @cached_property
     def final(self) -> Judgement:

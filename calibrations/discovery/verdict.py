@@ -89,7 +89,7 @@ class Judgement(Evidence):
     model         its name
     missing       effects that it lacks, in the order in which a search adds them
     added         effects that the search added to it, named as causes
-    refinements   effects that the search added for the form of a cause
+    refinements   effects that the search added for the form of a cause, or that are missing for it
     unknown       places of the signal chain where something acts that no effect of the catalogue describes
     share_left    part of the excess variance at the start of the search that stays
     undetermined  why the data do not determine the model
@@ -236,7 +236,11 @@ def _details(j: Judgement) -> Iterator[str]:
         yield _remaining_error(j)
     elif j.left is not None and not j.spoilt:
         yield f"Remaining with them: {j.left}."
-    if j.refinements and (j.added or j.missing or j.unknown):
+    if of_form := [name for name in j.refinements if name in j.missing]:
+        others = [name for name in j.missing if name not in of_form]
+        whose = others[0] if len(others) == 1 else "the others"
+        yield f"Of these, {join_words(of_form)} only describe{'s' * (len(of_form) == 1)} the exact form of {whose}."
+    elif j.refinements and (j.added or j.missing or j.unknown):
         yield f"To describe the exact form of these effects, the model also has {join_words(j.refinements)}."
     elif j.refinements:
         yield f"The model also has {join_words(j.refinements)}, which noise may explain as well."

@@ -58,8 +58,8 @@ class Strip:
         self.box.set_visibility(active)
         self._title(status if active else None)
         if status is not None and active:
-            count = f" {status.done}/{status.total}" if status.total else ""
-            self.link.set_text(f"{status.procedure}{count} {PHASES[status.phase]}")
+            count = f", {status.done} of {status.total}" if status.total else ""
+            self.link.set_text(f"{status.procedure} {PHASES[status.phase]}{count}")
             self.pause.set_visibility(status.phase == "running" and status.seat != "nobody")
 
     def _title(self, status: Status | None) -> None:
@@ -106,7 +106,7 @@ ANSWERS = {
 }
 
 
-LOST = '<script src="/static/lost.js" defer></script>'
+SCRIPT = '<script src="/static/workbench.js" defer></script>'
 
 # NiceGUI resizes a picture also in the moment in which the page removes it; Plotly then rejects a promise that nobody
 # reads, which the console would show as an error.
@@ -167,7 +167,7 @@ class Key:
 
 
 def static_files() -> None:
-    """Serve the style sheet and the script for a lost server."""
+    """Serve the style sheet and the script of all pages."""
     app.add_static_files("/static", STATIC)
 
 
@@ -178,7 +178,7 @@ def frame(desk: Desk, path: str, title: str = "") -> Iterator[dict[str, Key]]:
         str(k): Key(f"go to {name}", partial(ui.navigate.to, page_path))
         for k, (page_path, name) in enumerate(PAGES.items(), 1)
     }
-    ui.add_head_html(f'<link rel="stylesheet" href="/static/workbench.css">{LOST}{TELL}{RESIZED}')
+    ui.add_head_html(f'<link rel="stylesheet" href="/static/workbench.css">{SCRIPT}{TELL}{RESIZED}')
     ui.colors(primary="#0067a3", negative="#b3261e")
     with ui.element("header").classes("bar"):
         with ui.element("h1").classes("name"):

@@ -280,6 +280,23 @@ def test_the_drawing_is_legible_and_an_ended_run_leaves_the_plan_in_view(workben
     expect(page.locator(".live .tiles")).to_be_hidden()
 
 
+def test_a_double_click_is_one_click(workbench: Workbench) -> None:
+    """The second would act on the button that appears in the place of the first: Pause after Continue."""
+    page = workbench.visit(NIGHT)
+    expect(page.get_by_text("Takes", exact=True)).to_be_visible()
+    page.get_by_role("button", name="Start").dblclick()
+    tick(page)
+    page.get_by_role("dialog").get_by_role("button", name="Begin").dblclick()
+    phase(page, "running")
+    expect(page.get_by_role("dialog")).to_have_count(0)
+    page.locator(".live").get_by_role("button", name="Pause").dblclick()
+    phase(page, "paused")
+    page.get_by_role("button", name="Continue").dblclick()
+    phase(page, "running")
+    page.locator(".live").get_by_role("button", name="Stop").dblclick()
+    phase(page, "stopped")
+
+
 def test_two_pages_that_begin_at_once_start_one_run(workbench: Workbench) -> None:
     pages = [workbench.visit(NIGHT) for _ in range(2)]
     for page in pages:

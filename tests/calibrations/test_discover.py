@@ -72,6 +72,8 @@ def test_a_small_correction_of_the_form_is_a_refinement(cubic: float, causes: in
     both = ("quadratic-nonlinearity", "cubic-nonlinearity")
     assert names(found) == list(both)
     assert (found.causes, found.refinements) == (both[:causes], both[causes:])
+    of_form = "Of these, cubic-nonlinearity only describes the exact form of quadratic-nonlinearity."
+    assert (of_form in found.findings.given.text) == (causes == 1)
 
 
 @pytest.mark.slow

@@ -387,3 +387,15 @@ def test_the_status_of_a_killed_process_is_that_of_its_record() -> None:
     assert "it was killed" in stopped.error
     assert (complete.phase, complete.state, complete.done, complete.error) == ("ended", "complete", POSES, "")
     assert read(f"{KEY}-{part}") == stopped
+
+
+def test_of_two_answers_at_once_the_first_counts() -> None:
+    file(KEY, "answers").parent.mkdir(parents=True)
+    os.mkfifo(file(KEY, "answers"))
+    with process._pipe(KEY) as receive, file(KEY, "answers").open("w") as answers:
+        answers.write('{"name": "mounting", "text": "yes"}{"name": "mounting", "text": "no"}')
+        answers.flush()
+        assert receive() == {"name": "mounting", "text": "yes"}
+        answers.write("nonsense")
+        answers.flush()
+        assert receive() == {}

@@ -80,7 +80,7 @@ def _pipe(key: str) -> Iterator[Callable[[], Mapping[str, str]]]:
     def wait_for_answer() -> Mapping[str, str]:
         select.select([pipe], [], [])
         try:
-            document = json.loads(os.read(pipe, LONGEST))
+            document, _ = json.JSONDecoder().raw_decode(os.read(pipe, LONGEST).decode())  # the first of several
         except ValueError:
             return {}
         return document if isinstance(document, dict) else {}

@@ -194,6 +194,7 @@ class ImportPage:
             self.kind = ui.select(KINDS, label="Kind of table", value=kind, on_change=self._offer)
             self.kind.props("dense options-dense").style("min-width: 300px")
             self.button = ui.button("Import", icon="download_done", on_click=self._import)
+            self.button.disable()  # until the preview of the present choices
             ui.button("Cancel", on_click=partial(ui.navigate.to, "/record")).props("flat")
         self.fault = div("stack")
         self.question = div("")
@@ -239,7 +240,6 @@ class ImportPage:
         self.quiet = False
         self.question.clear()
         self.asked = proposed.doubt is not None
-        self.button.set_enabled(not self.asked)
         if proposed.doubt is not None:
             self._ask_unit(*proposed.doubt)
         self.look()
@@ -274,6 +274,7 @@ class ImportPage:
     def look(self) -> None:
         """Show what would be imported with the present choices."""
         if not self.quiet:
+            self.button.disable()
             with self.fault:  # the clicked element may be gone
                 ui.timer(0.0, self._preview, once=True)
 

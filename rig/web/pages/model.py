@@ -271,6 +271,8 @@ class Workbench:
 
     async def discover(self) -> None:
         """Add the missing effects step by step, and show each step, until no effect is missing or a person stops it."""
+        if self.discovering:
+            return
         self.discovering = True
         count = 0
         try:
@@ -307,8 +309,8 @@ class Workbench:
         await self.show(session)
 
     async def add(self, step: Step[Any]) -> None:
-        """Add an effect to the model."""
-        if self.session is not None:
+        """Add an effect to the model, unless it is there already."""
+        if self.session is not None and step.name not in self.session.names:
             if (effect := step.effect).expression:
                 self.session = self.session.with_own(effect)
             await self.show(self.session.with_step(step))

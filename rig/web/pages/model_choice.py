@@ -52,11 +52,11 @@ class Choice:
             )
             button("", "refresh", page.afresh, "flat dense aria-label='Read again'").tooltip("Read the data again")
             self._noise()
-            button("Parameters", "tune", page.see_parameters)
+            self.parameters = button("Parameters", "tune", page.see_parameters)
             self.undo = button("Undo", "undo", page.undo)
             self.save = button("Save model", "save", self._ask_name)
             self.report = button("Report", "description", self._report)
-        for choice in (self.undo, self.save, self.report):
+        for choice in (self.parameters, self.undo, self.save, self.report):
             choice.disable()
 
     def _open(self, data: str | None, model: str | None, noise: str = "") -> None:
@@ -80,8 +80,8 @@ class Choice:
         """Show the name of the default model, and enable the buttons for the model."""
         if not self.page.model:
             self.model.set_options(models(default=f"{session.model.name} (default)"), value="")
-        self.save.enable()
-        self.report.enable()
+        for choice in (self.parameters, self.save, self.report):
+            choice.enable()
 
     def grown(self, session: ModelSession[Any]) -> None:
         """Enable Undo if the session has steps."""

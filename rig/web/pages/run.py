@@ -113,12 +113,14 @@ class Instruments:
                     ("role", "instrument", "at"),
                     [(r, i.driver, _url_text(i.url)) for r, i in bench.instruments.items()],
                 )
-            button("Check the instruments", "fact_check", self.check)
+            self.button = button("Check the instruments", "fact_check", self.check)
 
     async def check(self) -> None:
         """Identify and self-test every instrument."""
+        self.button.disable()
         work = off_loop(check_all, self.bench)
         results = await shown(self.rows, "Connecting; nothing moves", "The bench cannot be checked", work)
+        self.button.enable()
         rows = [
             (role, f"{'✓' if test.ok else '✗ FAILED'} {test.name}", test.detail)
             for role, (_, tests) in (results or {}).items()

@@ -90,8 +90,9 @@ class Live:
         self.see = button("Open the model", "insights", self._see, "dense")
 
     def decide(self, decision: str) -> None:
-        """Send a decision or an answer to the run."""
-        control_run(lambda status: control.answer(status, decision))
+        """Send a decision, or an answer to the question that is shown: the run may ask the next one already."""
+        if (shown := self.status) is not None:
+            control_run(lambda _: control.answer(shown, decision))
 
     def pause_run(self) -> None:
         """Pause a running run. No key continues it: a key must not move anything."""
@@ -150,6 +151,7 @@ class Live:
         self.now.set_text(status.now if active else "")
         self.share.set_text(f"{100 * status.done // status.total} %" if status.total else "")
         self.bar.set_value(status.done / status.total if status.total else 0.0)
+        self.bar.set_visibility(active or bool(status.total))
         poses = f"{status.done} of {status.total} poses" if status.total else ""
         self.count.set_text("; ".join(filter(None, (poses, status.left if active else ""))))
         self._links(status)

@@ -283,15 +283,17 @@ class OneRun:
             note = ui.input("Note").props("dense").classes("grow")
 
             def keep() -> None:
-                if text := str(note.value or "").strip():
-                    try:
-                        with Record.to_read() as record:
-                            record.note(self.run.run, "note", text)
-                    except RecordError as error:  # for example the lab's record with a role that may only read
-                        ui.notify(message(error), type="negative")
-                        return
-                    note.set_value("")
-                    self._show_events()
+                if not (text := str(note.value or "").strip()):
+                    ui.notify("Write a note first.", type="warning")
+                    return
+                try:
+                    with Record.to_read() as record:
+                        record.note(self.run.run, "note", text)
+                except RecordError as error:  # for example the lab's record with a role that may only read
+                    ui.notify(message(error), type="negative")
+                    return
+                note.set_value("")
+                self._show_events()
 
             note.on("keydown.enter", keep)
             ui.button("Save", on_click=keep).props("dense outline")

@@ -1,5 +1,13 @@
-// A page whose server does not answer: clicks and keys do nothing, and text in its fields outlasts the reload.
-//
+// What each page does in the browser by itself.
+
+// A double click on a button is one click: the second would act on the button that appears in the place of the first.
+window.addEventListener("click", (event) => {
+  if (event.detail < 2 || !event.target.closest?.("button")) return;
+  event.stopImmediatePropagation();
+  event.preventDefault();
+}, true);
+
+// If the server does not answer, clicks and keys do nothing, and text in fields outlasts the reload.
 // Without this, the browser would send a click when the connection is back: a run would begin when nobody expects it.
 (() => {
   const KEPT = "typed text";
