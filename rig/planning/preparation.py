@@ -1,7 +1,8 @@
-"""Preparation of a run, for the terminal and the page: limits, checks by hand, the mounting of the sensor."""
+"""Preparation of a run, for the terminal and the page: limits, storage, checks by hand, the mounting of the sensor."""
 
 from __future__ import annotations
 
+from calibrations.text import size
 from procedures.questions import Confirm, Mounting
 from rig.bench import Bench
 from rig.drawings import Attitude, drawing_of
@@ -14,6 +15,12 @@ def stops(bench: Bench) -> list[str]:
     level_deg = bench.limits.level_deg
     tilt = [] if level_deg is None else [f"if the tilt of the table exceeds {level_deg:g} deg"]
     return [f"if the sensor is not at {low:g} to {high:g} C", *tilt]
+
+
+def storage(plan: Plan, free_bytes: int) -> str:
+    """What a run stores, and whether the disk of the record has room for it."""
+    lacking = "" if free_bytes > plan.bytes else ": not enough space"
+    return f"{size(plan.bytes)} on the disk; {size(free_bytes)} are free{lacking}"
 
 
 HAND_CHECKS = (

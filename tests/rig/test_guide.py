@@ -31,6 +31,7 @@ from rig.record import Block, Kept, Record
 from rig.runs.estimates import nearness
 from rig.runs.observer import Progress, RunView
 from rig.runs.runner import Outcome
+from rig.web.pages.run_begin import plan_facts
 from tests.rig.rigging import POSES, small_sweep
 
 TODAY = date(2026, 11, 21)
@@ -109,6 +110,11 @@ def test_before_a_run_one_screen_says_all_of_it() -> None:
 
 def test_a_disk_that_is_too_small_is_said() -> None:
     assert "not enough space" in shown(screen_before_run(planned(), SWEEP, read_bench(), 1000, TODAY))
+
+
+def test_the_page_says_it_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rig.web.pages.run_begin.free_bytes", lambda _: 1000)
+    assert plan_facts(planned(), read_bench())["Stores"].endswith("on the disk; 1.0 kB are free: not enough space")
 
 
 def test_a_certificate_that_is_expired_is_said() -> None:

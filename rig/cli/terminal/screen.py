@@ -15,13 +15,13 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from calibrations.text import duration, size
+from calibrations.text import duration
 from procedures.catalogue import Procedure
 from rig.bench import Bench
 from rig.bench.certificates import find_expired
 from rig.drawings import Attitude, orientation_map, sketch
 from rig.planning.plan import Plan, stretches
-from rig.planning.preparation import checks, stops
+from rig.planning.preparation import checks, stops, storage
 from rig.runs.estimates import Value, nearness
 from rig.runs.observer import RunView, values
 
@@ -118,8 +118,7 @@ def _facts(plan: Plan, procedure: Procedure, bench: Bench, free_bytes: int) -> I
     yield "Stops", "; ".join(stops(bench))
     if questions := Counter(re.sub(r"-\d+$", "", question.name) for question in plan.asked):
         yield "Asks you", ", ".join(f"{name} ({n} times)" if n > 1 else name for name, n in questions.items())
-    space = "" if free_bytes > plan.bytes else ": not enough space"
-    yield "Stores", f"{size(plan.bytes)} on the disk; {size(free_bytes)} are free{space}"
+    yield "Stores", storage(plan, free_bytes)
 
 
 def _action_lines(plan: Plan) -> list[str]:

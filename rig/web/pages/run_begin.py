@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 from nicegui import ui
 
-from calibrations.text import capital, duration, size
+from calibrations.text import capital, duration
 from rig.bench import Bench
 from rig.drawings import Attitude, strip
 from rig.files import free_bytes, home
 from rig.planning.plan import Plan
-from rig.planning.preparation import HAND_CHECKS, checks, first_question, mounting, stops
+from rig.planning.preparation import HAND_CHECKS, checks, first_question, mounting, stops, storage
 from rig.web.parts import dialog_with_name, div, facts, for_page, message, words
 
 
@@ -59,7 +59,7 @@ def plan_facts(plan: Plan, bench: Bench) -> dict[str, str]:
     faster = ", simulated: it passes faster" if bench.simulated else ""
     rows = {
         "Takes": f"{duration(plan.duration_s)}{faster}",
-        "Stores": f"{plan.poses} poses, {size(plan.bytes)}; {size(free_bytes(home()))} are free on the disk",
+        "Stores": f"{plan.poses} poses, {storage(plan, free_bytes(home()))}",
     }
     for role, ((low, high), (least, most)) in plan.reach.items():
         reach = f"from {low:g} to {high:g} deg; the limits are {least:g} to {most:g} deg"
