@@ -87,6 +87,7 @@ def test_a_server_that_is_to_end_waits_for_no_calculation(
             page.goto(url)
             page.goto(url.partition("/?")[0] + path.format(quote(thousand(tmp_path))))
             expect(page.locator(shown)).to_be_visible()
+            page.wait_for_load_state("networkidle")  # else a file that is being sent breaks off, a fault of the page
             server.terminate()
             assert server.wait(2) == 0
             page.context.close()
