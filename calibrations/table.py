@@ -227,7 +227,7 @@ class Table:
         h = hashlib.sha256(self.kind.encode())
         for name in sorted(self.columns):
             h.update(name.encode())
-            h.update(np.ascontiguousarray(self.columns[name]).tobytes())
+            h.update(np.ascontiguousarray(self.columns[name]).data)
         return h.hexdigest()
 
     def rows(self, selection: NDArray[np.bool_] | NDArray[np.intp]) -> Table:

@@ -29,6 +29,7 @@ READERS: Mapping[bytes, tuple[str, str]] = {  # first bytes: the reader's module
     b"\x89MCAP0\r\n": BAG,
     b"SQLite format 3\0": BAG,
 }
+BAG_STORAGE = (".db3", ".mcap")
 CANNOT = {  # files that cannot be imported, by their first bytes: the reason and the remedy
     b"schema: rig.model/": "is a model file and holds no data; give it with --model",
     b"ULogEnc": "is an encrypted PX4 ULog; decrypt it with decrypt_ulog.py of PX4-Autopilot and the log's private key",
@@ -60,7 +61,14 @@ def _topics(path: Path) -> list[Topic] | None:
     """The topics of a binary file, None for another file. Raises DataError."""
     try:
         if path.is_dir():
-            return _read_topics(BAG, path) if (path / "metadata.yaml").is_file() else None
+            if (path / "metadata.yaml").is_file():
+                return _read_topics(BAG, path)
+            if storage := next((file for file in sorted(path.iterdir()) if file.suffix in BAG_STORAGE), None):
+                raise DataError(
+                    f"{path}: is a ROS 2 bag without metadata.yaml; write it with `ros2 bag reindex`, or name the "
+                    f"file {storage}"
+                )
+            return None
         with path.open("rb") as file:
             head = file.read(MATLAB_HEADER_BYTES)
     except OSError:

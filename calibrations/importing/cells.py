@@ -75,6 +75,7 @@ def number_or_text(cell: str) -> Constant:
 MOST_SKIPPED = 0.01  # of the lines, unless a person asks for more
 MOST_ASKED = 0.5  # of the lines in any case
 SHOWN = 3
+BEYOND = 10.0  # times the largest of the other values: a number that lost its exponent
 FEWEST_OF_LOG = 100  # lines: a shorter table may be typed by hand, its last line without an end
 
 Policy = Literal["few", "skip", "refuse"]
@@ -129,17 +130,27 @@ class Lines:
             self.last = line
             yield line
 
-    def may_be_cut(self, cell: str, sample: Sequence[Sequence[str]]) -> bool:
-        """Whether the last line has no end, and its last `cell` may have lost digits, as other rows show."""
+    def may_be_cut(self, cell: str, sample: Sequence[Sequence[str]], in_doubt: bool) -> bool:
+        """Whether the last line has no end, and its last `cell` has lost digits, as other rows show.
+
+        Integers of different lengths, and numbers of which some have an exponent, do not show it: then `in_doubt`.
+        """
         others = [row[-1] for row in sample[:-1] if is_number(row[-1])]
         if self.last.endswith("\n") or not is_number(cell) or len(others) < FEWEST_OF_LOG:
             return False
-        if any("e" in other.lower() for other in others):
-            return True  # without its exponent a number is another one
-        if least := min(map(_decimals, others)):
-            return _decimals(cell) < least
-        return len(cell.lstrip("+-")) < max(len(other.lstrip("+-")) for other in others)
+        digits = _decimals if all(map(_decimals, others)) else _length
+        least, most = min(map(digits, others)), max(map(digits, others))
+        if any("e" in other.lower() for other in others):  # without its exponent a number is another one
+            is_alone = all("e" in other.lower() for other in others) and "e" not in cell.lower()
+            return in_doubt or is_alone or abs(parse_number(cell)) > BEYOND * max(abs(parse_number(o)) for o in others)
+        if least == most or digits is _decimals:
+            return digits(cell) < least - (least != most)
+        return in_doubt and digits(cell) < most
 
 
 def _decimals(cell: str) -> int:
     return len(cell.replace(",", ".").partition(".")[2])
+
+
+def _length(cell: str) -> int:
+    return len(cell.lstrip("+-"))

@@ -8,7 +8,7 @@ our names needs no mapping, for any separator; units in it are used.
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -36,6 +36,8 @@ from calibrations.tables import FILE_KINDS, TURN_MARKS
 
 TRIADS = (("ax", "ay", "az"), ("mx", "my", "mz"))
 RATES = ("gx", "gy", "gz")
+SENSORS = (TRIADS[0], RATES, TRIADS[1])
+UNIT_OF = "unit_"  # before the letter of a sensor: a constant with its unit, where it differs from that of the first
 PATH = "path"
 
 
@@ -126,7 +128,10 @@ def _import_with(
         reason = error if look_like_names(laid.header) else "a header line with column names is missing"
         raise MissingColumn(f"{laid.place}: {reason}") from None
     merged = {**laid.constants, **constants}
-    merged |= _output_unit(mapping, kind, merged.get("triad") == "m", laid.name)
+    names = {*(m.name for m in mapping), *unmapped}
+    merged |= (
+        _still_units(mapping, names, laid.name) if kind == "still" else _output_unit(mapping, kind, merged, laid.name)
+    )
     mapped_names = {m.file_column for m in mapping}
     path = next((m.file_column for m in mapping if m.name == PATH), PATH)
     first = zip(laid.header, laid.sample[0], strict=True)
@@ -267,23 +272,40 @@ def _clock(mapping: Sequence[ColumnMapping]) -> str:
     return next((m.file_column for m in mapping if m.name == "t_s"), "")
 
 
-def _output_unit(mapped: Sequence[ColumnMapping], kind: str, field: bool, source: str) -> dict[str, Constant]:
-    """The unit of the three output axes, where one is given: the magnetometer's if `field`, or without an
-    accelerometer.
-    Raises DataError if the axes have different units.
+def _output_unit(
+    mapped: Sequence[ColumnMapping], kind: str, constants: Mapping[str, Constant], source: str
+) -> dict[str, Constant]:
+    """The unit of the three output axes, where one is given: the magnetometer's with `triad: m` or without an
+    accelerometer. Raises DataError if the axes have different units.
     """
     accelerometer = any(m.name == "ax" for m in mapped)
+    field = constants.get("triad") == "m"
     for axes in (
         (RATES,) if kind in ("rates", "turns") else TRIADS[1:] if field else TRIADS[:1] if accelerometer else TRIADS
     ):
-        stated_units = {m.name: UNITS[m.unit][0] for m in mapped if m.unit}
-        units = {axis: stated_units.get(axis, "") for axis in axes}
-        if len(set(units.values())) > 1:
-            units_of_axes = ", ".join(f"{axis} in {unit or 'no unit'}" for axis, unit in units.items())
-            raise DataError(f"{source}: the three axes must have the same unit: {units_of_axes}")
-        if units[axes[0]]:
-            return {"unit": units[axes[0]]}
+        if unit := _unit_of_axes(mapped, axes, source):
+            return {"unit": unit}
     return {}
+
+
+def _still_units(mapped: Sequence[ColumnMapping], names: Collection[str], source: str) -> dict[str, Constant]:
+    """The unit of the first sensor of a still record, and of each other sensor whose unit differs. Raises DataError."""
+    units = {axes[0][0]: _unit_of_axes(mapped, axes, source) for axes in SENSORS if not set(axes).isdisjoint(names)}
+    first = next(iter(units.values()), "")
+    others: dict[str, Constant] = {
+        f"{UNIT_OF}{sensor}": unit or "count" for sensor, unit in units.items() if unit != first
+    }
+    return ({"unit": first} if first else {}) | others
+
+
+def _unit_of_axes(mapped: Sequence[ColumnMapping], axes: Sequence[str], source: str) -> str:
+    """The unit of the axes of one sensor, "" where none is given. Raises DataError for different ones."""
+    stated_units = {m.name: UNITS[m.unit][0] for m in mapped if m.unit}
+    units = {axis: stated_units.get(axis, "") for axis in axes}
+    if len(set(units.values())) > 1:
+        units_of_axes = ", ".join(f"{axis} in {unit or 'no unit'}" for axis, unit in units.items())
+        raise DataError(f"{source}: the three axes must have the same unit: {units_of_axes}")
+    return units[axes[0]]
 
 
 # Rows that occur twice in a table: a copied reading, not a repeated one.

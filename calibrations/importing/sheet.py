@@ -97,7 +97,7 @@ class Sheet:
         with self.source.lines(marked=self.skipped > 0) as opened:
             lines = Lines(islice(opened, self.first - 1, None))
             for number, cells in split_rows(lines, self.separator, self.name, self.first):
-                if len(cells) == self.width and not lines.may_be_cut(cells[-1], self.sample):
+                if len(cells) == self.width and not lines.may_be_cut(cells[-1], self.sample, self.skipped > 0):
                     yield number, cells
                     continue
                 if len(cells) == self.width:
@@ -341,7 +341,9 @@ def _at_once(sheet: Sheet) -> Array | None:
             raise
         except ValueError:
             return None
-    if lines.may_be_cut(lines.last.rstrip(BLANK).split(sheet.separator)[-1].strip(BLANK + '"'), sheet.sample):
+    if lines.may_be_cut(
+        lines.last.rstrip(BLANK).split(sheet.separator)[-1].strip(BLANK + '"'), sheet.sample, sheet.skipped > 0
+    ):
         return None
     return numbers if numbers.shape[1] == sheet.width and np.isfinite(numbers).all() else None
 

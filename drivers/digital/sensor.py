@@ -136,7 +136,8 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         if (gain := tally.gain) is not None:
             drift = f"the sensor's time is {tally.offset_s:+.3f} s from the host's and gains {1e6 * gain:+.0f} ppm"
             checks.append(Check("time", abs(gain) < RATE_OFF, drift))
-        return [*checks, *self._gravity(reception.pull(reception.count))]
+        gravity = self._gravity(reception.pull(reception.count))
+        return [*checks, *gravity, *(self._advice(decoder, begun_s) if gravity else [])]
 
     def _gravity(self, values: NDArray[np.float64]) -> list[Check]:
         """A failed check where samples of a whole accelerometer, in a known unit, do not show gravity; else none."""
@@ -148,7 +149,7 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         if STILL_G[0] <= size / one_g <= STILL_G[1]:
             return []
         unit = next((unit for unit, g in ONE_G.items() if STILL_G[0] <= size / g <= STILL_G[1]), "")
-        likely = f"the unit is probably {unit}" if unit else "check the unit in the sensor's settings"
+        likely = f"the unit is probably {unit}" if unit else "check the unit and the columns in the sensor's settings"
         shown = f"{', '.join(FORCES)} have the magnitude {size:.4g} {self.settings.units['ax']}"
         return [Check("gravity", False, f"{shown}; a sensor at rest shows {one_g:g}: {likely}")]
 

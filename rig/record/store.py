@@ -9,6 +9,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any, Self
 
@@ -219,10 +220,10 @@ class Record:
         values = {"kind": table.kind, "procedure": "import", "state": "complete", "bench": {}}
         values |= {"settings": dict(settings or {})}
         values |= {"configuration": table.digest, "constants": dict(table.constants), "source": table.source}
-        cells: list[dict[str, Any]] = [
-            *({"name": name, "numbers": column.astype("<f8").tobytes()} for name, column in table.columns.items()),
-            *({"name": name, "texts": list(column)} for name, column in table.labels.items()),
-        ]
+        cells: Iterator[dict[str, Any]] = chain(  # one column at a time: a large table has no room for two of all
+            ({"name": name, "numbers": np.asarray(column, "<f8").tobytes()} for name, column in table.columns.items()),
+            ({"name": name, "texts": list(column)} for name, column in table.labels.items()),
+        )
         with self.engine.begin() as connection:
             run = new_run(connection, values | {"ended": timestamp()})
             for position, cell in enumerate(cells):

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.errors import DataError, nearest
+from calibrations.importing.foreign import UNIT_OF
 from calibrations.noise.record import Sensed
 from calibrations.noise.samples import hidden_step
 from calibrations.table import AXES, STANDARD_GRAVITY, Array, Table
@@ -153,8 +154,7 @@ def of_table(table: Table, channel: str | None, rate_hz: float | None) -> Stream
     stated_hz = rate_hz or table.number("sample_rate_hz", 0.0)
     times = _times(table)
     rate = agree_on_rate(times.rate_hz if times else None, stated_hz, table.source)
-    unit = "V" if channel_name.endswith("_v") else str(table.constants.get("unit", "count"))
-    corner_hz = table.number("filter_corner_hz", np.inf)
+    unit, corner_hz = _unit_of_channel(table, channel_name), table.number("filter_corner_hz", np.inf)
     other_channels = tuple(name for name in channels if name != channel_name)
     samples = Stream(
         table.source, channel_name, rate, unit, iter([table.column(channel_name)]), corner_hz, other_channels,
@@ -162,6 +162,12 @@ def of_table(table: Table, channel: str | None, rate_hz: float | None) -> Stream
         logged={name: [table.column(name)] for name in _list_logged_columns(table, channel_name)},
     )  # fmt: skip
     return replace(samples, closed=list(times.gaps), uneven_s=times.uneven_s) if times else samples
+
+
+def _unit_of_channel(table: Table, name: str) -> str:
+    """The unit of a channel: its sensor's, else that of the outputs."""
+    of_outputs = "V" if name.endswith("_v") else str(table.constants.get("unit", "count"))
+    return str(table.constants.get(f"{UNIT_OF}{name[0]}", of_outputs)) if name[1:] in AXES else of_outputs
 
 
 def _no_record(subject: str) -> DataError:

@@ -130,6 +130,24 @@ def test_a_last_line_whose_number_is_complete_needs_no_line_end(tmp_path: Path) 
     assert imported(tmp_path, [*lines()[:30]], end=b"").table.n == 29
 
 
+@pytest.mark.parametrize("scale", [1.0, 1e-3])
+def test_numbers_of_different_lengths_are_taken_without_a_line_end_where_lines_are_refused(
+    tmp_path: Path, scale: float
+) -> None:
+    values = scale * np.random.default_rng(2).standard_normal(N)
+    given: list[str | bytes] = [
+        HEADER,
+        *(f"{k / 100:.2f},0.1,0.2,{value!r}" for k, value in enumerate(values.tolist())),
+    ]
+    assert imported(tmp_path, given, "refuse", end=b"").table.n == N
+    with_steps: list[str | bytes] = [HEADER, *(f"{k / 100:.2f},1,2,{k % 900 + 5}" for k in range(N))]
+    assert imported(tmp_path, with_steps, "refuse", end=b"").table.n == N
+    lost_its_exponent = [*given[:-1], f"{N / 100:.2f},0.1,0.2,{20 * abs(values).max():.3f}"]
+    if scale < 1:
+        with pytest.raises(DataError, match="no line end"):
+            imported(tmp_path, lost_its_exponent, "refuse", end=b"")
+
+
 def test_a_cut_last_line_of_named_values_is_shown(tmp_path: Path) -> None:
     given: list[str | bytes] = [f"t_s:{k / 100:.2f},ax:0.10{k % 7},ay:0.200,az:0.98{k % 3}" for k in range(N)]
     assert imported(tmp_path, given, end=b"").table.n == N

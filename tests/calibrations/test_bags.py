@@ -124,6 +124,14 @@ def test_a_bag_without_its_schema_or_under_another_name_is_refused(tmp_path: Pat
         open_sheet(tmp_path / "empty")
 
 
+def test_a_ros_2_bag_without_its_metadata_is_refused_with_a_remedy(tmp_path: Path) -> None:
+    folder = tmp_path / "unfinished"
+    folder.mkdir()
+    (folder / "unfinished_0.db3").write_bytes(b"SQLite format 3\0")
+    with pytest.raises(DataError, match=r"without metadata\.yaml; write it with `ros2 bag reindex`, or name .*_0\.db3"):
+        open_sheet(folder)
+
+
 def test_a_missing_library_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path, "ros1", "/imu")
     for each in [name for name in sys.modules if name.partition(".")[0] == "rosbags"]:

@@ -91,12 +91,13 @@ def test_a_sensor_may_begin_to_send_another_number_of_columns() -> None:
 
 @pytest.mark.parametrize(("unit", "sent"), [("g", "m/s^2"), ("m/s^2", "g"), ("g", "count")])
 def test_the_self_test_names_a_unit_in_which_gravity_cannot_be(connect: Connect, unit: Any, sent: Any) -> None:
-    *others, gravity = connect(unit=unit, sends=imu_lines.Settings(NUMBERED, unit=sent)).self_test()
+    *others, gravity, proposal = connect(unit=unit, sends=imu_lines.Settings(NUMBERED, unit=sent)).self_test()
     assert [check.name for check in others] == ["lines", "rate", "time"]
     assert all(check.ok for check in others)
     assert not gravity.ok
     advice = "check the unit" if sent == "count" else f"the unit is probably {sent}"
     assert advice in gravity.detail
+    assert f"unit: {sent}, " in proposal.detail
     assert len(connect(unit=unit).self_test()) == 3
     assert len(connect(unit="count", sends=imu_lines.Settings(NUMBERED, unit=sent)).self_test()) == 3
 
@@ -199,6 +200,14 @@ def test_the_self_test_proposes_settings_for_lines_that_do_not_fit(
     expected = ", ".join(f"{name}: {column}" for name, column in sends.columns.items())
     rest = f"format: {style}, unit: {unit}, rate_hz: 100.0, time_unit_s: 0.001"
     assert f"{{columns: {{{expected}}}, {rest}}}" in proposal.detail
+
+
+def test_columns_that_show_no_gravity_are_proposed_anew(connect: Connect) -> None:
+    """The lines begin with the time, and the settings take it as ax."""
+    sends = imu_lines.Settings(NUMBERED, "csv", "g", time_unit_s=1e-3)
+    checks = {check.name: check for check in connect(sends=sends, columns={"ax": 1, "ay": 2, "az": 3}).self_test()}
+    assert "check the unit and the columns" in checks["gravity"].detail
+    assert "{columns: {time: 1, ax: 3, ay: 4, az: 5}, format: csv, unit: g" in checks["proposal"].detail
 
 
 def test_six_axes_are_proposed_in_the_usual_order() -> None:

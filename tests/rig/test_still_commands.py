@@ -267,3 +267,18 @@ def test_a_ramp_at_rest_is_calibrated_in_less_than_ten_lines(rig: Rig, folder: P
     again = document(rig("discover", "ramp.csv", "--model", "ramp.yaml", "--json"))
     assert (again["verdict"], again["causes"]) == ("adequate", [])
     assert rig("report", "ramp.csv", "--model", "ramp.yaml", "--out", "ramp.html").status == 0
+
+
+def test_each_sensor_of_a_still_record_has_its_own_unit(
+    rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a ROS bag has them: an accelerometer in m/s2, a gyroscope in rad/s, a magnetometer without a unit."""
+    monkeypatch.chdir(tmp_path)
+    random, names = np.random.default_rng(6), ["ax (m/s2)", "ay (m/s2)", "az (m/s2)"]
+    names += ["gx (rad/s)", "gy (rad/s)", "gz (rad/s)", "mx", "my", "mz"]
+    write("six.csv", np.arange(N) / RATE_HZ, **{name: white(random, N) for name in names})
+    taken = document(rig("import", "six.csv", "--kind", "still", "--json"))
+    for channel, unit, noise in (("ax", "m/s2", 1.0), ("gy", "deg/s", 180 / np.pi), ("mz", "count", 1.0)):
+        found = document(rig("noise", taken["run"], "--channel", channel, "--json"))
+        assert found["unit"] == unit
+        assert found["allan"]["deviation"][0] == pytest.approx(noise, rel=0.1)
