@@ -20,6 +20,8 @@ from rig.record import Record, Run
 from rig.runs.background import control
 
 if TYPE_CHECKING:
+    from calibrations.discovery.findings import Findings
+    from rig.services.load import Loaded
     from rig.services.session import ModelSession
 
 MOST_OPEN = 6  # sessions in memory, each with its data
@@ -74,6 +76,16 @@ class Desk:
         while len(self.sessions) > MOST_OPEN:
             self.sessions.popitem(last=False)
         keep_effects(data, model, session.added, noise)
+
+    def search_of(self, data: str) -> tuple[Loaded | None, Findings[Any] | None]:
+        """Data with the default model, and the search of the page Model on them; (None, None) where there is none."""
+        from rig.services.content import content_of
+        from rig.services.load import Loaded
+
+        session = self.sessions.get((data, "", ""))
+        if session is None or session.search_made is None or session.content.key != content_of(data, None).key:
+            return None, None
+        return Loaded(session.data, session.model, session.effects), session.search_made
 
     def keep_report(self, key: str, text: str) -> None:
         """Store a report by the content that it is of."""

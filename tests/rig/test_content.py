@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
+from calibrations.discovery.findings import Findings
 from calibrations.errors import DataError
 from rig.record import Record
 from rig.services.content import content_of
@@ -50,6 +52,19 @@ def test_a_session_of_changed_data_is_made_anew_with_its_effects(run: str) -> No
     assert again.names == ("axis-misalignment",)
     assert again.end.table.n == session.end.table.n - 2
     assert "have changed" in again.notes[0]
+
+
+def test_a_report_takes_the_search_of_the_page_while_the_data_are_the_same(run: str) -> None:
+    desk = Desk(None)
+    session = desk.open(run, "")
+    assert desk.search_of(run) == (None, None)
+    session.plans[()] = (made := cast(Findings[Any], object()))
+    question, found = desk.search_of(run)
+    assert question is not None
+    assert (question.data, question.model, found) == (session.data, session.model, made)
+    with Record() as record:
+        exclude(record, run, [3, 4], "a bump")
+    assert desk.search_of(run) == (None, None)
 
 
 def test_effects_are_restored_from_texts_also_by_another_server(run: str) -> None:

@@ -213,6 +213,7 @@ class Workbench:
 
     async def show(self, session: ModelSession[Any]) -> None:
         """Show pictures and error of the present model, then its missing effects."""
+        self.visit.cancel()  # the results for the previous model are not needed
         self.turn += 1
         turn = self.turn
         self.session = session
@@ -232,7 +233,6 @@ class Workbench:
         await asyncio.gather(self.parameters.show(session), self._diagnose(session, turn))
 
     async def _diagnose(self, session: ModelSession[Any], turn: int) -> None:
-        self.visit.cancel()  # the result of the previous search is not needed
         key = session.names
         if key not in self.diagnoses:
             search = self.visit.searched(session.effects)
@@ -287,7 +287,7 @@ class Workbench:
             self.discovering = False
             self.missing.discovered()
         diagnosis = self.diagnoses.get(self.session.names) if self.session is not None else None
-        if diagnosis is not None and diagnosis.missing:  # stopped: offer the rest again
+        if diagnosis is not None:  # stopped: offer the rest again; at the end: plan the next experiment
             await self.missing.show(diagnosis)
 
     async def remove(self, name: str) -> None:

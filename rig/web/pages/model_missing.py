@@ -17,6 +17,7 @@ from calibrations.presentation.report.report import next_takes, next_words
 from calibrations.presentation.views import view_of
 from calibrations.text import capital, probability, rounded
 from procedures.settings import setting_text
+from rig.services.search import Cancelled
 from rig.web.calculations import off_loop
 from rig.web.parts import (
     PROGRESS_S,
@@ -145,7 +146,7 @@ class Missing:
         if missing and cards:
             cards[0].open()
             await self.look_at(cards[0].c)
-        if result.next_experiment is not None:
+        if result.next_experiment is not None and not self.page.discovering:  # the steps do not wait for a plan
             with candidate_box:
                 await self._next(result)
 
@@ -175,7 +176,9 @@ class Missing:
             with place:
                 waiting("Planning on the bench")
         try:
-            planned = await off_loop(page.session.with_next, result, notes.append)
+            planned = await page.visit.work(page.session.with_next, result, notes.append)
+        except Cancelled:  # a person adds an effect, which must not wait
+            return
         except Exception as error:
             if not place.is_deleted:  # else the page shows another model by now
                 with afresh(place):

@@ -320,7 +320,7 @@ class OneRun:
 
     async def _report(self, data: str) -> None:
         request = Request(data, None, self.desk.bench_file)
-        await download_report(request, self.visit, f"{data.replace('/', '-')}.html")
+        await download_report(request, self.visit, f"{data.replace('/', '-')}.html", *self.desk.search_of(data))
 
 
 def _results(run: Run) -> None:

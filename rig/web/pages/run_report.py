@@ -72,7 +72,8 @@ class RunReport:
         """The report as HTML. Raises what `make_report` raises, Cancelled."""
         key = content_of(data, None).key
         if key not in self.desk.reports:
-            _, make = make_report(Request(data, None, self.desk.bench_file), lambda _: None, self.visit.searched)
+            request, searched = Request(data, None, self.desk.bench_file), self.visit.searched
+            _, make = make_report(request, lambda _: None, searched, *self.desk.search_of(data))
             self.desk.keep_report(key, make())
         return self.desk.reports[key]
 
