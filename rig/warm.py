@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from calibrations.fitting.budget import make_budget
+from calibrations.fitting.fit import fit
+from calibrations.loop import diagnose
+from calibrations.model.file import read_model
+from calibrations.noise.analysis import analyse
+from calibrations.noise.record import Samples, reduce_record
+from calibrations.table import Table
+from drivers.labjack_t7.stream import Calibration
+from drivers.labjack_t7.twin import codes_of_volts
+from drivers.world.config import WorldConfig
+from drivers.world.world import World
+
 
 def main() -> None:
     """Run every compiled kernel once on a small sweep of the simulated rig."""
-    from calibrations.fitting.budget import make_budget
-    from calibrations.fitting.fit import fit
-    from calibrations.loop import diagnose
-    from calibrations.model.file import read_model
-    from calibrations.noise.analysis import analyse
-    from calibrations.noise.record import Samples, reduce_record
-    from calibrations.table import Table
-    from drivers.labjack_t7.stream import Calibration
-    from drivers.labjack_t7.twin import codes_of_volts
-    from drivers.world.config import WorldConfig
-    from drivers.world.world import World
-
     world = World(WorldConfig.adxl203(), seed=1)
     beta = np.tile(np.arange(0.0, 360.0, 30.0), 3)
     columns = world.dwell_mean(np.repeat([90.0, 30.0, 150.0], 12), beta, direction=np.ones(36, dtype=int))

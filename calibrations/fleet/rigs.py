@@ -140,37 +140,46 @@ def _effect(
 ) -> _Found:
     """The errors of one effect, of every rig, after the corrections made already."""
     own_rows = [k for k, name in enumerate(names) if name[0] == effect]
-    sensors, values, variances, scores, informations = [], [], [], [], []
-    for measured in fleet:
-        A = measured.stage.information
-        own_information = A[own_rows][:, own_rows]
-        size = np.diag(own_information)
-        if not np.all(size > 0) or np.linalg.cond(own_information / np.sqrt(np.outer(size, size))) > 1 / DETERMINED:
-            continue
-        score = measured.stage.score[own_rows] + A[own_rows] @ corrections[measured.rig]
-        inverse = np.linalg.inv(own_information)
-        sensors.append(measured)
-        values.append(-inverse @ score)  # the residual falls as the prediction grows
-        scores.append(score)
-        variances.append(np.diag(inverse))
-        informations.append(own_information)
-    if not sensors:
+    own = [e for measured in fleet if (e := _own_estimate(measured, own_rows, corrections[measured.rig])) is not None]
+    if not own:
         return _Found()
-    y, v = np.array(values), np.array(variances)
+    sensors = [e.measured for e in own]
+    # the residual falls as the prediction grows
+    y, v = np.array([-e.inverse @ e.score for e in own]), np.array([np.diag(e.inverse) for e in own])
     errors_of_parameters = [_parameter(sensors, y[:, j], v[:, j], names[k]) for j, k in enumerate(own_rows)]
-    least = min(
-        len(own_rows) * min((e.p_value for rig_errors in errors_of_parameters for e in rig_errors), default=1.0), 1.0
-    )
+    p_values = [error.p_value for rig_errors in errors_of_parameters for error in rig_errors]
+    least = min(len(own_rows) * min(p_values, default=1.0), 1.0)
     errors = tuple(replace(error, p_value=least) for rig_errors in errors_of_parameters for error in rig_errors)
     off = {rig: np.zeros(len(own_rows)) for rig in corrections}
     for error in errors:
         if error.beyond:
             off[error.rig][[names[k][1] for k in own_rows].index(error.parameter)] = error.value
-    falls = (
-        -2 * score @ off[measured.rig] - off[measured.rig] @ own_information @ off[measured.rig]
-        for measured, score, own_information in zip(sensors, scores, informations, strict=True)
-    )
-    return _Found(errors, float(sum(falls)))
+    return _Found(errors, sum(e.fall(off[e.measured.rig]) for e in own))
+
+
+@dataclass(frozen=True)
+class _OwnEstimate:
+    """The score and the information of one sensor on the parameters of one effect, shapes (p,) and (p, p)."""
+
+    measured: Measured
+    score: Array
+    information: Array
+    inverse: Array
+
+    def fall(self, off: Array) -> float:
+        """The fall of the sum of squares when the parameters are corrected by `off`."""
+        return float(-2 * self.score @ off - off @ self.information @ off)
+
+
+def _own_estimate(measured: Measured, own_rows: list[int], corrections: Array) -> _OwnEstimate | None:
+    """The estimate after the corrections of its rig; None if the sensor does not determine the parameters."""
+    A = measured.stage.information
+    information = A[own_rows][:, own_rows]
+    size = np.diag(information)
+    if not np.all(size > 0) or np.linalg.cond(information / np.sqrt(np.outer(size, size))) > 1 / DETERMINED:
+        return None
+    score = measured.stage.score[own_rows] + A[own_rows] @ corrections
+    return _OwnEstimate(measured, score, information, np.linalg.inv(information).astype(float))
 
 
 def _parameter(sensors: Sequence[Measured], y: Array, v: Array, name: tuple[str, str, str]) -> list[RigError]:

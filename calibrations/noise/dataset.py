@@ -8,9 +8,10 @@ model itself describes it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from calibrations.design.experiment import Experiment
 from calibrations.discovery.dataset import Dataset
 from calibrations.discovery.findings import Candidate, Findings, Place, Step
 from calibrations.discovery.results import Comparison
@@ -19,7 +20,7 @@ from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import ModelError
 from calibrations.model import Model
-from calibrations.noise.calibration import calibrate
+from calibrations.noise.calibration import Calibration, calibrate
 from calibrations.noise.comparison import compared_deviations, evaluate, mismatch, places
 from calibrations.noise.doubts import (
     alternatives,
@@ -35,6 +36,7 @@ from calibrations.noise.doubts import (
     structure_of,
 )
 from calibrations.noise.fit import NoiseFit, fit
+from calibrations.noise.patterns import Pattern
 from calibrations.noise.record import Still, of_record
 from calibrations.noise.search import Search, candidates, search, without_patterns
 from calibrations.noise.signal import TEMPERATURE, acts_on_record, fit_signal
@@ -46,6 +48,32 @@ class NoiseFindings(Findings[NoiseFit]):
     """Findings with the search that they come from."""
 
     search: Search
+
+
+@dataclass(frozen=True)
+class _SignalFindings:
+    """The part of the findings that the temperature causes; empty without effects of temperature."""
+
+    steps: tuple[Step[NoiseFit], ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    causes: tuple[str, ...] = ()
+    alternatives: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    separations: Mapping[str, Experiment] = field(default_factory=dict)
+    patterns: tuple[Pattern, ...] = ()
+    lags: tuple[str, ...] = ()
+
+
+def _signal_findings(calibration: Calibration, baseline: NoiseFit, missing: Search) -> _SignalFindings:
+    steps = calibration.steps(baseline, missing.patterns)
+    return _SignalFindings(
+        steps,
+        calibration.candidates(steps),
+        calibration.signal.causes,
+        calibration.alternatives,
+        calibration.separations,
+        calibration.patterns,
+        calibration.signal.lags,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,42 +147,40 @@ class StillRecord(Dataset[NoiseFit]):
         return (*planned, *sorted(processes, key=lambda c: c.name not in plan.names[:1]))
 
     def _search(self, start: NoiseFit, effects: Mapping[str, Effect], origin: NoiseFit | None = None) -> NoiseFindings:
-        missing = search(start.still, start.model, effects)
-        calibration = calibrate(missing, start, effects)
-        missing = calibration.after if calibration else missing
+        first = search(start.still, start.model, effects)
+        calibration = calibrate(first, start, effects)
+        missing = calibration.after if calibration else first
         baseline = fit(start.model, without_patterns(start.still, missing.patterns)) if missing.patterns else start
-        signal = calibration.steps(baseline, missing.patterns) if calibration else ()
-        present = signal[-1].after if signal else baseline
-        signal_patterns = calibration.patterns if calibration else ()
+        signal = _signal_findings(calibration, baseline, missing) if calibration else _SignalFindings()
+        present = signal.steps[-1].after if signal.steps else baseline
         structure = structure_of(missing)
         names = () if missing.still.hidden else tuple(missing.gains)
-        doubts = alternatives(missing, names) | (calibration.alternatives if calibration else {})
+        doubts = {**alternatives(missing, names), **signal.alternatives}
         of_noise = {name: rivals for name, rivals in doubts.items() if name in names}
         is_spoilt = structure is not None and (missing.still.hidden or has_disturbance(missing))
+        found = (*map(as_disturbance, signal.patterns), *disturbances(missing))
         result = NoiseFindings(
             data=self,
             start=start,
             origin=origin or start,
             baseline=baseline,
-            steps=(*signal, *_steps(present, missing, names)),
+            steps=(*signal.steps, *_steps(present, missing, names)),
             candidates=(
-                *(calibration.candidates(signal) if calibration else ()),
+                *signal.candidates,
                 *candidates(missing, present, alternatives(missing, tuple(missing.gains))),
             ),
-            causes=(*(calibration.signal.causes if calibration else ()), *names),
+            causes=(*signal.causes, *names),
             alternatives=doubts,
             left=structure,
             spoilt=is_spoilt,
             reason=reason_of(missing, doubts, structure),
-            disturbances=tuple(
-                map(disturbance_document, (*map(as_disturbance, signal_patterns), *disturbances(missing)))
-            ),
-            separations=calibration.separations if calibration else {},
+            disturbances=tuple(map(disturbance_document, found)),
+            separations=signal.separations,
             further=next_of(missing, {} if is_spoilt else of_noise, structure),
-            remarks=(*(calibration.signal.lags if calibration else ()), *_remarks(missing, doubts)),
+            remarks=(*signal.lags, *_remarks(missing, doubts)),
             search=missing,
         )
-        if names and not (signal or is_spoilt) and result.given.verdict is Verdict.UNEXPLAINED:
+        if names and not (signal.steps or is_spoilt) and result.given.verdict is Verdict.UNEXPLAINED:
             return result.without_steps()
         return result
 
