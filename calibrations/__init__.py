@@ -8,15 +8,15 @@ A library of its own: tables in, frozen results out, no instrument needed.
     found = cal.fit(data, "linear")
     found.params["scale-factor.x"].value
 
-    read, table      data            fit, compare       a model beside data
+    read, table      data            fit, compare       a model compared with data
     diagnose         missing effects discover           missing effects, added one by one
     noise            noise of a still sensor
     compensate       outputs back to specific force
     add              a model with one effect more
-    Effect, Parameter, Constant, Values  what a class of your own needs to be an effect
+    Effect, Parameter, Constant, Values  the names that your own effect class needs
     Table            what `read` and `table` give
 
-The functions are in `calibrations.face`, and load what they need when they are called.
+The functions are in `calibrations.face`, and load their modules when they are called.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> str:
-    """`__version__`, read when it is asked for. Raises AttributeError."""
+    """`__version__`, read at the first use. Raises AttributeError."""
     if name == "__version__":
         from importlib.metadata import version  # the import of the library stays short
 

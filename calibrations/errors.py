@@ -3,7 +3,7 @@
 CalibrationError
 ├── DataError            a table: its file, line and column
 │   ├── MissingColumn    a column that the question needs
-│   ├── MissingConstant  a number that the rows do not tell
+│   ├── MissingConstant  a number that the rows do not contain
 │   ├── TooFewRows       fewer rows than parameters
 │   └── UnusableData     an output that does not respond, two sensors in one table, exchanged channels
 ├── ModelError           a model file: its key
@@ -31,7 +31,7 @@ class MissingColumn(DataError):
 
 
 class MissingConstant(DataError):
-    """A constant that is needed is not given; `likely` is the value that the file speaks for, None without one."""
+    """A constant that is needed is not given; `likely` is the value that the file suggests, None without one."""
 
     def __init__(self, message: str, name: str, likely: float | None = None) -> None:
         super().__init__(message)
@@ -43,7 +43,7 @@ class TooFewRows(DataError):
 
 
 class UnusableData(DataError):
-    """Outputs that contradict the stated mounting of the sensor: there is no result."""
+    """Outputs that contradict the stated mounting of the sensor, so that there is no result."""
 
 
 class ModelError(CalibrationError):

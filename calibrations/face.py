@@ -1,4 +1,4 @@
-"""The functions of `import calibrations as cal`. Each imports what it needs when it is called: the import is quick."""
+"""The functions of `import calibrations as cal`. Each loads its modules when it is called, so the import is quick."""
 
 from __future__ import annotations
 

@@ -17,8 +17,8 @@ MEASURED = "noise_inflation_"  # constants that each table measured for itself
 def join_tables(tables: Sequence[Table]) -> Table:
     """One table with the rows of all, in the order given, and the columns that all have.
 
-    Time goes on: a table whose clock began anew begins where the one before it ended. Constants are those on which all
-    agree; the noise that each measured is their mean. Raises DataError for tables of different kinds or axes.
+    Time is continuous: a table whose clock restarted begins at the end of the table before it. Constants are those
+    on which all agree; the measured noise is the mean of theirs. Raises DataError for different kinds or axes.
     """
     first = tables[0]
     if len(tables) == 1:

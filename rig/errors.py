@@ -19,7 +19,7 @@ from __future__ import annotations
 
 
 class RigError(Exception):
-    """Bad usage or bad input. The message says what is wrong, where, and what to do."""
+    """Bad usage or bad input. The message names the fault, its place and the remedy."""
 
     exit_status = 2
 

@@ -5,7 +5,7 @@
     v^ = R v, R = [[c, s], [-s, c]]                        (17.13), (17.14): the ellipse along its axes
     S = q / r, along the major axis                        (17.15): q the least radius; then back by the transpose of R
 
-What it cannot see: iron also turns the field that stands upright, Z, into the level axes, by a constant that looks
+Blind to: iron also turns the field that stands upright, Z, into the level axes, by a constant that looks
 like hard iron; and how much it makes of a level field on average. Neither shows in the plane. Iron of no preferred
 direction has five components of one size, of which the plane shows two, as e = (r - q) / (r + q): another one is
 e / sqrt(2) times a t of two degrees of freedom. Uncertainties are half of its 95 % interval, `UNSEEN` e, of Z and of

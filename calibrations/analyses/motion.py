@@ -55,7 +55,7 @@ from calibrations.tables import KINDS
 def acceleration(table: Table, model: Model) -> Array:
     """Acceleration along x, m/s^2, shape (n,), that instantaneous outputs mean under a model: gravity taken off.
 
-    Axes that were not measured feel what the attitude gives them. Raises ModelError for a model without values.
+    Axes that were not measured have the specific force of the attitude. Raises ModelError for a model without values.
     """
     still = replace(table, kind="poses")  # each sample by itself
     model = model.for_table(still)
@@ -135,7 +135,7 @@ class MotionResult:
 
     @cached_property
     def excess(self) -> float:
-        """The physical model's error over what the sensor's noise allows."""
+        """The physical model's error over the error that the sensor's noise alone gives."""
         return self.rmse_physical.value / self.noise_limit.value
 
     @property

@@ -207,7 +207,7 @@ HOUR_S = 3600.0
 class Course:
     """One quantity of one axis at each reversal, in V or V/g, with white standard errors; times since power-on, s.
 
-    No `state` where the reversals are too few to tell drift from noise.
+    No `state` if there are too few reversals to separate drift from noise.
     """
 
     quantity: str  # bias or scale

@@ -101,7 +101,7 @@ def _largest(stds: Stds, spans: Mapping[str, Span]) -> tuple[Inputs, float]:
 
 
 def _stds(model: Model, forward: Forward, table: Table, a: Array, inputs: Inputs) -> Array:
-    """Standard uncertainties (n, axes) of what is sensed: u^2 = d^T R d, with d = J^-1 dG/dp u(p) and J = dG/da.
+    """Standard uncertainties (n, axes) of the sensed quantity: u^2 = d^T R d, with d = J^-1 dG/dp u(p) and J = dG/da.
 
     R are the correlations of the parameters, 1 on the diagonal and 0 elsewhere where the model has none.
     """
@@ -158,7 +158,7 @@ def _with(model: Model, i: int, j: int, change: float) -> Model:
 
 
 def memory_at(table: Table, a: Array, forward: Forward) -> dict[str, Array]:
-    """By its names, shape (n,), for what is sensed at the rows, `a` (n, 3); nothing where nothing is remembered.
+    """By its names, shape (n,), for the sensed quantity at the rows, `a` (n, 3); empty without stored values.
 
     Rows in order of time.
     """
@@ -207,7 +207,7 @@ class ErrorSize:
 @dataclass(frozen=True)
 class Cost:
     """`left_out` by effect, None where a sweep does not show it; `out_of_gravity` of an axis found from the others;
-    `parameters` the standard uncertainty of what is sensed by those of the parameters.
+    `parameters`: the standard uncertainty of the sensed quantity, from those of the parameters.
     """
 
     left_out: Mapping[str, ErrorSize | None]
@@ -238,7 +238,7 @@ def compensation_costs(
 
 @dataclass(frozen=True)
 class _Trial:
-    """A sweep on which the program is tried: its specific force `a` (n, 3), and what is remembered at each row."""
+    """A sweep on which the program is tried: its specific force `a` (n, 3), and the stored values at each row."""
 
     forward: Forward
     program: Program

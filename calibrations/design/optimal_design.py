@@ -71,7 +71,7 @@ def _noise(fit: Fit, problem: Problem) -> Noise:
 # Poses with the most information on a model: D- and I-optimal designs, by exchange of one pose after another.
 #
 #     D   the greatest det M: the smallest volume of the parameters' joint uncertainty
-#     I   the least mean variance of what the model predicts over a range of poses: tr(M^-1 W)
+#     I   the least mean variance of the prediction over a range of poses: tr(M^-1 W)
 #
 # M is the information of the chosen poses, W the mean of J' J over the range. A pose is taken out and the best of all
 # candidates put in its place until no exchange helps, from several random beginnings: the optimum of each is local.

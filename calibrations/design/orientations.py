@@ -38,7 +38,7 @@ ORIENTATIONS: Array = np.array(
 class Next:
     """The next orientation: `up` (3,) is the direction upward in the sensor's frame, one of ORIENTATIONS.
 
-    `words`: what is upward. `turn`: how to turn the sensor from its last position; empty if that is not known.
+    `words`: the side that is upward. `turn`: how to turn the sensor from its last position; empty if that is not known.
     """
 
     up: Array
@@ -79,7 +79,7 @@ def gain(measured: Array, candidates: Array) -> Array:
 
 
 def is_worth(up: Array, proposed: Array, measured: Array) -> bool:
-    """Whether a rest with `up` (3,) upward is worth taking: it is the `proposed` one, or tells about as much."""
+    """Whether a rest with `up` (3,) upward is useful: it is the `proposed` one, or gives about as much information."""
     if up @ proposed >= np.cos(np.radians(NEAR_DEG)):
         return True
     gains = gain(measured, np.array([up, proposed]))

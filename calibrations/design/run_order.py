@@ -23,7 +23,7 @@ from calibrations.table import Array
 
 PROPOSALS = 250  # for each pose
 WARM_S, COLD_S = 10.0, 0.05  # rig time that is given away for a better order later: at the beginning, at the end
-DEGREES = (1, 2)  # of time: what a drift may be
+DEGREES = (1, 2)  # of time: the forms that a drift may have
 Order = NDArray[np.intp]
 
 
@@ -31,7 +31,7 @@ Order = NDArray[np.intp]
 class Tour:
     """Poses to be ordered.
 
-    start_s   from where the stages stand to each pose, shape (n,)
+    start_s   from the present position of the stages to each pose, shape (n,)
     move_s    from pose to pose, shape (n, n), not the same both ways
     rows      their information, shape (n, axes, p), white; 0 for a pose that no fit sees
     dwell_s   of all poses together

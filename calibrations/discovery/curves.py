@@ -70,7 +70,7 @@ class PlaceCurve:
 
     @cached_property
     def symmetry(self) -> str:
-        """The symmetry of the largest curve, in words; "" where it has none that can be said."""
+        """The symmetry of the largest curve, in words; "" without one."""
         axis = self.largest
         return _symmetry(self.driver, self.at[axis], self.value[axis])
 

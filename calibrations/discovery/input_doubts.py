@@ -27,7 +27,6 @@ from calibrations.criteria import (
     VISIBLE_STEP,
 )
 from calibrations.fitting.table_noise import excess_over_ellipsoid, scatter
-from calibrations.geometry.clipped_turns import clipped_turns_warning
 from calibrations.geometry.sphere import sphere_radius
 from calibrations.importing.plausible import find_time_doubt
 from calibrations.means.noise import norm_std, rms, robust_std, white_std
@@ -113,7 +112,11 @@ def _equal_values(table: Table) -> Iterator[str]:
 
 def _clipped_turns(table: Table) -> Iterator[str]:
     """Turns in which an output reached the end of its range."""
-    if table.kind == "turns" and (warning := clipped_turns_warning(table)):
+    if table.kind != "turns":
+        return
+    from calibrations.geometry.clipped_turns import clipped_turns_warning  # other tables have no turns
+
+    if warning := clipped_turns_warning(table):
         yield warning
 
 

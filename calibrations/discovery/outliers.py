@@ -97,7 +97,7 @@ def fit_without(model: Model, table: Table) -> tuple[Fit, tuple[int, ...]]:
 
 
 def outlier_text(numbers: tuple[int, ...], row_word: str = "poses", limit: int | None = None) -> str:
-    """Rows that stand out, the first `limit` of them by their numbers."""
+    """The outlying rows, the first `limit` of them by their numbers."""
     listed = ", ".join(f"#{number}" for number in numbers[:limit])
     unlisted = f" and {len(numbers) - limit} more" if limit is not None and len(numbers) > limit else ""
     subject = f"{row_word.removesuffix('s')} stands" if len(numbers) == 1 else f"{row_word} stand"

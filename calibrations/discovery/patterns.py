@@ -38,7 +38,7 @@ class Pattern:
 
     `expression` adds the pattern to a model ("" if none can), `finer` gives patterns between it and its neighbours,
     `price` is the cost of its choice by the data, as twice a log-likelihood. A `slow` pattern looks like slow noise.
-    `poses` are rows that stand out.
+    `poses` are outlying rows.
     """
 
     text: str

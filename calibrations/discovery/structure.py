@@ -1,8 +1,8 @@
-"""The structure of a residual, in words: the best pattern, the poses that stand out, or more noise than a sensor has.
+"""The structure of a residual, in words: the best pattern, the outlying poses, or more noise than a sensor has.
 
 The fitted noise decides which patterns are significant. The likelihood under the noise without its slow part compares
 them, because slow noise would absorb steps and ramps. The best few are sharpened first: the row of a step, the width of
-a sector, one side or both. Poses that stand out compete with them; each pose and the choice of it has a price.
+a sector, one side or both. Outlying poses compete with them; each pose and the choice of it has a price.
 
 Patterns compete with effects as well: a step in time looks like a drift to a catalogue without steps. A pattern that
 describes the residual better than all effects found means that the cause is not in the catalogue.
@@ -98,7 +98,7 @@ def sharpen(pattern: Pattern, screen: Screen) -> Pattern:
 
 
 def _outlier_pattern(fit: Fit) -> list[Pattern]:
-    """The poses that stand out, as one pattern; empty if there are none, or too many."""
+    """The outlying poses, as one pattern; empty if there are none, or too many."""
     rows, n = find_outlying_rows(fit.residual, np.hypot(fit.noise.floor, fit.noise.wander)), fit.table.n
     if fit.table.type.moving or not 0 < len(rows) <= max(1, MOST_ROWS_STAND_OUT * n):
         return []

@@ -84,7 +84,7 @@ class Evidence:
 
 @dataclass(frozen=True, kw_only=True)
 class Judgement(Evidence):
-    """The facts on a model from which its verdict follows, and what a sentence on it names.
+    """The facts on a model that decide its verdict, with the names for its text.
 
     model         its name
     missing       effects that it lacks, in the order in which a search adds them

@@ -5,9 +5,9 @@
 
             V += slope (T - T0)                   the formula, with units
 
-        Symptom   what the residual looks like.
-        Excited by  what the data must contain.
-        Confused with  what else looks like it, and what separates them.
+        Symptom   the form of the residual.
+        Excited by  the changes that the data must contain.
+        Confused with  effects with the same symptom, and how to separate them.
         Source    where it is described.
         \"\"\"
 
@@ -113,7 +113,7 @@ class Effect:
     after      effects without which it has no meaning in a model
     contains   effects that it becomes where its shape vanishes
     exact      its form follows from geometry alone: no other effect refines it
-    rounds     its output is a staircase, whose slope says nothing
+    rounds     its output is a staircase, whose slope has no information
     left_out   why a compensation in the sensor's product cannot undo it; "" where it can
     incidental  no experiment is planned for it: there is no remark if a table cannot show it
     of_force   it adds what the sensor makes of the force, which changes of the sensitivity multiply
@@ -221,7 +221,7 @@ class Effect:
     # then how it is used
 
     def follow(self, a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[Array, Sequence[Array]]:
-        """`transduction` of one sample more, for an effect with a history: (what is added, the memory after it).
+        """`transduction` of one sample more, for an effect with a history: (the added output, the memory after it).
 
         `before` and after: `memory` arrays (n, 3), 0 at first.
         """

@@ -141,7 +141,7 @@ def nodes(node: Node) -> Iterator[Node]:
 def evaluate(node: Node, values: Mapping[str, Array]) -> Array:
     """The value of `node` where the names have `values`; the shapes are those of numpy's broadcasting.
 
-    Too large numbers are cut off, so that a fit can turn back; what is no number, such as log(-1), stays none.
+    Too large numbers are cut off, so that a fit can turn back; an invalid value, such as log(-1), stays NaN.
     """
     with np.errstate(all="ignore"):
         return np.asarray(_evaluate(node, values), dtype=np.float64)

@@ -46,7 +46,7 @@ def unseen_variance(leverage: Array) -> float:
 
 
 def explain_undetermined(fit: Fit) -> str | None:
-    """Why a small residual is no proof on this data, in words; None where the data determine the model."""
+    """Why a small residual proves nothing on this data, in words; None if the data determine the model."""
     if reason := magnetometer_coverage_warning(fit.table):
         return reason
     leverage = leverages(fit)

@@ -211,7 +211,7 @@ def with_least_white(result: Fit, white: Array) -> Fit:
 
 
 def scales(fitted: Fit) -> Array:
-    """Output per g, or deg/s, of each channel; 1 for a residual in what is sensed, or where that is not known."""
+    """Output per g, or deg/s, of each channel; 1 if the residual is in the unit of the input, or if it is not known."""
     if fitted.table.type.from_output:
         return np.ones(len(fitted.channels))
     if one_orientation(fitted.table):

@@ -1,7 +1,7 @@
 """Which parameters the data determine, and with what standard uncertainty.
 
 A direction of the parameter space that changes nothing in the data is not identified, nor is a parameter whose
-standard uncertainty is no smaller than what a sensor may typically show: the data then say nothing new about it.
+standard uncertainty is no smaller than what a sensor may typically show: the data then give no information about it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def covariance(jacobian: Array, typical: Array) -> tuple[Array, Array]:
 
 
 def gain(jacobian: Array, typical: Array) -> Array:
-    """The pseudo-inverse (p, rows) of the whitened jacobian: what a change of each row does to each parameter."""
+    """The pseudo-inverse (p, rows) of the whitened jacobian: the change of each parameter by a change of each row."""
     U, root, _ = _directions(jacobian, typical)
     return root @ U.T
 

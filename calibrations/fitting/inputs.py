@@ -1,7 +1,7 @@
 """Inputs of a calibration that no fit can know, and what their errors do to the residual: GUM type B.
 
-A table says how well it knows them by constants, standard uncertainties all; the bench file gives them to every run, a
-data file has them in its header. What it does not say is not given, and not zero.
+Constants of a table give their standard uncertainties; the bench file gives these constants to every run, a
+data file has them in its header. A missing constant is unknown, not zero.
 
     alpha_std_deg, beta_std_deg   true angle of a stage, from its error table or its dial: alike at one angle
     repeat_std_deg                true angle of either stage, from pose to pose: each on its own
@@ -92,7 +92,7 @@ def step_derivative(effect: Effect, step: float) -> Derivative:
 
 
 def input_contributions(table: Table) -> tuple[Contribution, ...]:
-    """Every input that this kind of table has. Raises DataError for a constant that is no number."""
+    """Every input that this kind of table has. Raises DataError for a constant that is not a number."""
     of_kind = {"poses": _of_poses, "rates": _of_rates}.get(table.kind, list)
     contributions = [*_of_any(table), *of_kind()]
     return tuple(replace(c, std=_stated_std(table, constant)) for constant, c in contributions)
@@ -130,7 +130,7 @@ def _of_the_mount() -> list[tuple[str, Contribution]]:
 
 
 def _rate_derivative(problem: Problem, theta: Array) -> Array:
-    """With respect to the share by which the stage turns faster than it says."""
+    """With respect to the share by which the stage turns faster than it reports."""
     share = 1e-4
     change = share * problem.table.column("rate_deg_s")
     forward, backward = (_shift_input(problem, "rate_deg_s", by).residual(theta) for by in (change, -change))

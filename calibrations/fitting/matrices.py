@@ -90,7 +90,7 @@ def _covariance(fit: Fit) -> Array:
 
 
 def _deviation(slopes: Array, cov: Array) -> Array:
-    """Standard deviations (k,) of what has the derivatives `slopes` (p, k); NaN only where it follows a NaN."""
+    """Standard deviations (k,) of quantities with the derivatives `slopes` (p, k); NaN only if one depends on a NaN."""
     finite = np.isfinite(np.diag(cov))
     variance = np.einsum("pk,pq,qk->k", slopes[finite], cov[np.ix_(finite, finite)], slopes[finite])
     return np.where(slopes[~finite].any(axis=0), np.nan, np.sqrt(np.maximum(variance, 0.0)))

@@ -226,7 +226,7 @@ class NoiseSearch:
         return columns * fast, tuple(origin.tolist())
 
     def _extend_basis(self, group: Array, smooth: list[Array], first: Array) -> Array:
-        """Orthonormal columns (channels * n, rank) for what a group adds."""
+        """Orthonormal columns (channels * n, rank) of the part that a group adds."""
         free, shape = group / self.noise.fast[:, :, None], (self.residual.size, group.shape[2])
         size = np.linalg.norm(free.reshape(shape), axis=0)
         free = np.stack([free[c] - Q @ (Q.T @ free[c]) for c, Q in enumerate(smooth)]).reshape(shape)

@@ -60,7 +60,7 @@ class Problem:
 
     @property
     def signal_rms(self) -> Array:
-        """The size of what the model predicts, in the unit of the residual, (channels,) or (1,)."""
+        """The rms of the prediction, in the unit of the residual, (channels,) or (1,)."""
         return np.asarray(self.table.outputs.std(axis=0))
 
     def residual(self, theta: Array) -> Array:

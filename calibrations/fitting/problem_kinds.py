@@ -82,7 +82,7 @@ class PositionProblem(Problem):
         return sensed(backward(self.table, steps), self.table, steps)
 
     def _chain_at(self, steps: Sequence[Step]) -> LinearisedChain:
-        """From the outputs back to what is sensed."""
+        """From the outputs back to the sensed quantity."""
         return LinearisedChain(self.table, steps, backward(self.table, steps))
 
     def of_output(self, theta: Array, changes: Array) -> Array:

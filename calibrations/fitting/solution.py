@@ -111,8 +111,8 @@ class Solution:
     def in_white_noise(self) -> Self:
         """The same in the white noise of its rows, if that is known.
 
-        Its slow noise contains what the next effect explains. And a fit that begins in white noise depends on the model
-        and the data alone, not on the fits before it.
+        Its slow noise contains the part that the next effect explains. A fit that begins in white noise depends only on
+        the model and the data, not on the fits before it.
         """
         return self if self.problem.white is None else replace(self, noise=white_noise(self.problem))
 

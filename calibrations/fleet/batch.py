@@ -3,7 +3,7 @@
 Two tests of each effect, both with the sensors as replicates, so that neither leans on any one sensor's noise model:
 
     common   its sensors have the same value: Hotelling's T^2 of their scores against no effect. Scores are bounded (no
-             sensor counts more than twice as much as the median one), so that one defect does not speak for a batch.
+             sensor counts more than twice as much as the median one), so that one defect does not decide for a batch.
     own      each sensor has a value of its own: how many gain more by it than it costs (Mallows: the fall of the sum of
              squares above twice the parameters), against how many would on noise alone. Half of them must.
 
@@ -55,7 +55,7 @@ class BatchEffect:
 def find_batch_effects(looks: Sequence[Screening], of_stage: Container[str] = ()) -> list[BatchEffect]:
     """The significant effects of a batch in addition to the model of `looks`, best first; none in a batch of too few.
 
-    Effects `of_stage` are of the rig, which every sensor finds as it is: they are asked for in common only.
+    Effects `of_stage` are of the rig, which every sensor finds as it is: they are tested only in common.
     """
     if len(looks) < FEWEST_SENSORS:
         return []
@@ -131,7 +131,7 @@ def _sensor_chance(statistics: Array, ranks: Array) -> float:
     return float(bdtrc(gaining - 1, n, chance))
 
 
-# What a fleet turned out to be: batches with what they miss, rigs with their errors, sensors with their verdicts.
+# The result for a fleet: batches with their missing effects, rigs with their errors, sensors with their verdicts.
 
 WITH_BATCH, FULL_SEARCH = "beside its batch", "in full"
 

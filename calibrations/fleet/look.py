@@ -118,7 +118,7 @@ def _key(table: Table, required: tuple[str, ...]) -> Key:
 
 
 def _ranges(table: Table, channels: int) -> Array:
-    """The range of each channel's output, (channels, 1, 1); 1 where the residual is none of an output."""
+    """The range of each channel's output, (channels, 1, 1); 1 if the residual is not one of an output."""
     ranges = np.asarray(np.ptp(table.outputs, axis=0))
     return (ranges if len(ranges) == channels else np.ones(channels))[:, None, None]
 

@@ -172,7 +172,7 @@ WIDE = 1e4  # spread, in typical sizes, before anything is known
 class Pooled:
     """For each parameter its siblings; `scale` (p,) is what their values are given in.
 
-    `alone` (n, p): standard uncertainties without siblings; inf where the sensor's own data do not tell.
+    `alone` (n, p): standard uncertainties without siblings; inf if the sensor's own data do not determine them.
     """
 
     parameters: tuple[Siblings, ...]

@@ -1,4 +1,4 @@
-"""The earth: its rotation, and the normal gravity of its ellipsoid, from which real places differ by 0.0005 m/s^2.
+"""Normal gravity: that of the earth's ellipsoid at a latitude and height; real places differ by some 0.0005 m/s^2.
 
 Source  H. Moritz, Geodetic Reference System 1980: Somigliana's formula, and the second-order formula for the height.
 """
@@ -7,9 +7,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-EARTH_DEG_S = np.degrees(7.292115e-5)
 EQUATOR_M_S2 = 9.7803267715
 K, E2 = 0.001931851353, 0.00669438002290
 A_M, F, M = 6378137.0, 0.00335281068118, 0.00344978600308

@@ -16,9 +16,10 @@ import numpy as np
 
 from calibrations.criteria import LEAST_MAIN_SLOPE, LEAST_OTHER_AXIS, MOST_MAGNITUDE_SPREAD, UPRIGHT_COSINE
 from calibrations.errors import DataError
-from calibrations.geometry.earth import EARTH_DEG_S
 from calibrations.geometry.sphere import estimate_faces
 from calibrations.table import AXES, Array, Table
+
+EARTH_DEG_S = np.degrees(7.292115e-5)
 
 
 def rate_deg_s(table: Table) -> Array:

@@ -27,10 +27,9 @@ from calibrations.importing.plausible import (
     find_unit_doubts,
 )
 from calibrations.importing.raw_logs import is_raw_log
-from calibrations.importing.sessions import RATE, is_session, sample_rates
+from calibrations.importing.sessions import RATE, TURN, is_session, is_whole_turn_log, sample_rates
 from calibrations.importing.sheet import Sheet, look_like_names, read_cells, read_sheet
 from calibrations.importing.units import UNITS, ColumnMapping, column_unit
-from calibrations.importing.whole_turns import TURN, cut_whole_turns, is_whole_turn_log
 from calibrations.table import NUMBERS, Array, Constant, Table, guess_kind
 from calibrations.tables import FILE_KINDS, TURN_MARKS
 
@@ -146,6 +145,8 @@ def _import_with(
     if is_session(kind, columns, labels.get(PATH)):
         columns[RATE] = sample_rates(columns, labels[PATH], merged, laid.name)
     elif is_whole_turn_log(kind, columns, merged):
+        from calibrations.importing.whole_turns import cut_whole_turns  # few tables are such logs
+
         columns, labels = cut_whole_turns(columns, merged, laid.name)
     if kind == "turns" and TURN_MARKS.isdisjoint(columns) and all(name in columns for name in (*RATES, *TRIADS[0])):
         from calibrations.importing.turn_logs import cut_turns  # few tables are such logs

@@ -19,15 +19,26 @@ import numpy as np
 from calibrations.criteria import FEWEST_SECTION_SAMPLES, LEAST_TURN_NOISE, LEAST_TURN_SHARE
 from calibrations.errors import DataError, MissingConstant
 from calibrations.importing.plausible import log_rate_hz
-from calibrations.table import Array, Constant, Table
+from calibrations.table import AXES, Array, Constant, Table
 
 OUTPUTS = ("gx", "gy", "gz")
-RATE = "rate_deg_s"
+RATE, TURN = "rate_deg_s", "turn_deg"
 
 
 def is_session(kind: str | None, columns: Mapping[str, Array], sections: Sequence[str] | None) -> bool:
     """Whether the rows are samples of rests and turns without a rate column."""
     return kind == "rates" and RATE not in columns and bool(sections) and all(name in columns for name in OUTPUTS)
+
+
+def is_whole_turn_log(kind: str | None, columns: Mapping[str, Array], constants: Mapping[str, Constant]) -> bool:
+    """Whether the rows are samples of a gyroscope alone with a stated angle of each turn."""
+    known = (RATE, *(f"a{axis}" for axis in AXES))
+    return (
+        kind == "rates"
+        and TURN in constants
+        and all(name in columns for name in OUTPUTS)
+        and not any(name in columns for name in known)
+    )
 
 
 def sample_rates(
@@ -68,7 +79,7 @@ def average_sections(log: Table) -> Table:
     columns = {name: np.array([values[a:b].mean() for a, b in bounds]) for name, values in log.columns.items()}
     columns["n"] = np.array([float(b - a) for a, b in bounds])
     labels = {name: tuple(words[a] for a, _ in bounds) for name, words in log.labels.items()}
-    constants = {name: value for name, value in log.constants.items() if name != "turn_deg"}
+    constants = {name: value for name, value in log.constants.items() if name != TURN}
     return Table.from_columns("rates", columns, constants, log.source, labels)
 
 
@@ -79,12 +90,12 @@ def _bounds(sections: Sequence[str]) -> list[tuple[int, int]]:
 
 
 def _turn_deg(constants: Mapping[str, Constant], source: str) -> float:
-    turn = constants.get("turn_deg")
+    turn = constants.get(TURN)
     if not isinstance(turn, (int, float)) or not turn:
         raise MissingConstant(
             f"{source}: the angle of each turn is unknown; give the constant turn_deg, "
             "such as --constant turn_deg=360 (-360 for the other sense of rotation), or a column of rates",
-            "turn_deg",
+            TURN,
         )
     return float(turn)
 

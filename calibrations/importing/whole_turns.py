@@ -22,10 +22,10 @@ from calibrations.criteria import LEAST_OF_WHOLE_TURN, MOST_TURN_DEVIATION
 from calibrations.errors import DataError, MissingConstant
 from calibrations.importing.plausible import log_rate_hz
 from calibrations.importing.raw_logs import still_intervals
+from calibrations.importing.sessions import OUTPUTS, RATE, TURN
 from calibrations.table import AXES, Array, Constant
 
-OUTPUTS = tuple(f"g{axis}" for axis in AXES)
-TURN, RATE, PATH = "turn_deg", "rate_deg_s", "path"
+PATH = "path"
 
 
 @dataclass(frozen=True)
@@ -45,17 +45,6 @@ class Movement:
     def size(self) -> float:
         """Its integral about that axis."""
         return float(abs(self.integral[self.axis]))
-
-
-def is_whole_turn_log(kind: str | None, columns: Mapping[str, Array], constants: Mapping[str, Constant]) -> bool:
-    """Whether the rows are samples of a gyroscope alone with a stated angle of each turn."""
-    known = (RATE, *(f"a{axis}" for axis in AXES))
-    return (
-        kind == "rates"
-        and TURN in constants
-        and all(name in columns for name in OUTPUTS)
-        and not any(name in columns for name in known)
-    )
 
 
 def cut_whole_turns(

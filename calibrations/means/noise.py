@@ -96,7 +96,7 @@ class Noise:
 
     @cached_property
     def effective_rows(self) -> Array:
-        """The number of independent rows that tell as much of each channel's noise, (channels,) (Satterthwaite)."""
+        """The number of independent rows with the same information on the noise, (channels,) (Satterthwaite)."""
         step = max(1, len(self.gap_s) // MOST_CORRELATED_ROWS)
         time_s = np.cumsum(self.gap_s)[::step]
         apart_s, rows = np.abs(time_s[:, None] - time_s), []
@@ -114,7 +114,7 @@ class Noise:
         return same_shape and bool(np.all(np.abs(rms(self.fast) / rms(noise.fast) - 1) < 1e-2))
 
     def prolonged(self) -> Noise:
-        """Flicker noise goes on at times longer than a record: with time constants up to BEYOND times its length.
+        """Flicker noise continues at times longer than a record: with time constants up to BEYOND times its length.
 
         What wanders so slowly looks like a bias in the record, which is then known no better than it wanders.
         """

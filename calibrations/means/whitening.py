@@ -88,7 +88,7 @@ def whiten_transposed(columns: Array, gap_s: Array, white: Array, slow: Array, t
             for q in range(m):
                 P[p, q] -= gain[p] * gain[q] / total
     transposed = np.empty_like(columns)
-    later = np.zeros((m, k))  # what the rows after this one add to the state
+    later = np.zeros((m, k))  # the part of the state from later rows
     for i in range(n - 1, -1, -1):
         for j in range(k):
             transposed[i, j] = columns[i, j] * scales[i]

@@ -3,7 +3,7 @@
     pose -> force -> transduction -> output
 
 Forward for `poses`, where the orientation is known, and for samples of `motion`, where the reference acceleration adds
-to gravity and the output filter and the converter's skew stand behind the transduction; backward for `positions`, where
+to gravity and the output filter and the converter's skew come after the transduction; backward for `positions`, where
 only the magnitude of gravity is known. The backward way solves the same functions, so that an effect is written once.
 What is a specific force for an accelerometer is the angular rate for a gyroscope, in deg/s, and for a magnetometer the
 field as a share of its strength.
@@ -31,7 +31,7 @@ LITTLE = 1e-5  # of the largest force, and rad: steps of derivatives with respec
 
 
 class Stage(IntEnum):
-    """The stages of the response to the force; each changes what the one before makes of the force."""
+    """The stages of the response to the force; each changes the result of the one before."""
 
     RESPONSE = 0  # adds to it, as a nonlinearity does, or to the output alone
     SCALE = 1  # scales it over other forces

@@ -4,7 +4,7 @@ The paper's: a second-order Butterworth low-pass at 20 Hz, freed of its delay an
 then two differentiations (Ang V). It lets noise through that grows with the square of frequency up to the corner, and
 its correction holds at one frequency.
 
-The better one: lines that stand out are fitted as sines and differentiated exactly; what they leave goes through a
+The better one: strong lines are fitted as sines and differentiated exactly; what they leave goes through a
 Kalman smoother whose noise is fitted, so that starts, stops and motion of any form are followed.
 """
 
@@ -142,7 +142,7 @@ def _density_near(residual: Array, rate_hz: float, frequency_hz: float) -> float
     return float(np.mean(power[lines])) if len(lines) else float(np.mean(residual**2) * 2 / rate_hz)
 
 
-# Smoothing of motion that is no sine: the Kalman smoother of an integrated random walk, its noise fitted.
+# Smoothing of motion that is not a sine: the Kalman smoother of an integrated random walk, its noise fitted.
 #
 #     x_k = s_k + e_k        D^3 s = w        e of variance r, w of variance q white
 #

@@ -157,7 +157,7 @@ def skew_s(table: Table, axis: int) -> float:
 
 
 def nominal_response(table: Table, axis: int) -> Response:
-    """From the transducer's output to the samples of one axis. A sample taken later shows what is later: an advance."""
+    """From the transducer's output to the samples of one axis. A later sample is an advance."""
     low_pass, advance = first_order(corner_hz(table)), delay(-skew_s(table, axis))
     return lambda f: np.asarray(low_pass(f) * advance(f))
 

@@ -183,7 +183,7 @@ class NoiseAnalysis(Result):
         return [{"axis": axis, "process": name, **_coefficient(coefficient)} for axis, (name, coefficient) in processes]
 
     def spoils(self, disturbance: Disturbance) -> tuple[str, ...]:
-        """The coefficients that a disturbance changes, or would change had it not been removed."""
+        """The coefficients that a disturbance changes, or would change if it were not removed."""
         cleaned = self.channels[disturbance.axis].coefficients
         identified = tuple(name for name, coefficient in cleaned.items() if coefficient.identified)
         if disturbance.pattern is not None and self.uncleaned is not None:

@@ -58,7 +58,7 @@ class Calibration:
 
     @property
     def alternatives(self) -> dict[str, tuple[str, ...]]:
-        """By cause, what the record cannot separate from it."""
+        """By cause, the effects that the record cannot separate from it."""
         names = self.signal.names
         rivals = {CAUSES.get((r.kind, r.cause)) for pattern in self.patterns for r in pattern.rivals}
         by_search = self.signal.findings.alternatives

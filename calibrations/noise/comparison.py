@@ -1,4 +1,4 @@
-"""A noise model beside a record: the Allan deviation that it expects, and where it fails.
+"""A noise model compared with a record: the Allan deviation that it expects, and where it fails.
 
     sigma^2(m) = int S(f) 2 sin^4(pi f m dt) / (m sin(pi f dt))^2 df        over all frequencies of the sampled process
 

@@ -1,7 +1,7 @@
-"""Still records in the loop: a noise model, its spectrum by Whittle's likelihood, and what is not noise.
+"""Still records in the loop: a noise model, its spectrum by Whittle's likelihood, and the disturbances.
 
 In the documents `rmse` is the rms mismatch of the spectrum, as a share of it, each band weighted by its degrees of
-freedom; `noise_floor` is what chance alone leaves of that, and `excess` their ratio. There is no `slow_noise`: the
+freedom; `noise_floor` is its expectation by chance, and `excess` their ratio. There is no `slow_noise`: the
 model itself describes it.
 """
 
@@ -78,7 +78,7 @@ def _signal_findings(calibration: Calibration, baseline: NoiseFit, missing: Sear
 
 @dataclass(frozen=True, eq=False)
 class StillRecord(Dataset[NoiseFit]):
-    """The samples of a still sensor, reduced to what a likelihood needs."""
+    """The samples of a still sensor, reduced for the likelihood."""
 
     still: Still
 

@@ -53,7 +53,7 @@ class Disturbance:
 
     kind     such as `step`, `follows`, `wild-samples`, `level`
     matters  whether it changes the noise coefficients by more than their uncertainty
-    pattern  what was removed from the record, if it was
+    pattern  the part removed from the record, if any
     """
 
     kind: str

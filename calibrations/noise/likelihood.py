@@ -121,7 +121,7 @@ LEAST_DENSITY = 1e-18  # of the greatest density: rounding
 
 @dataclass(frozen=True)
 class ChannelFit:
-    """One channel beside a model: the lines taken off, and the values of every effect. Arrays over all bands (b,)."""
+    """One channel and a model: the lines taken off, and the values of every effect. Arrays over all bands (b,)."""
 
     channel: Channel
     parts: tuple[Bands, ...]

@@ -38,7 +38,7 @@ PLAYS = (0.03, 0.1, 0.3)  # widths of a hysteresis that are tried, of the range 
 
 @dataclass(frozen=True)
 class Pattern:
-    """A part of one channel's means that is no noise: a form (m,), its amount, and how uncertain that is.
+    """A part of one channel's means that is not noise: a form (m,), its amount, and how uncertain that is.
 
     `make` computes the form, which few patterns need. `words` has a place for the amount. `gain`: twice the
     log-likelihood; `price`: of its search. `cause` is the logged

@@ -1,4 +1,4 @@
-"""A still record, reduced in one pass and in constant memory to what the likelihood of a noise model needs.
+"""A still record, reduced in one pass and in constant memory for the likelihood of a noise model.
 
 A column that is logged with the sensor (temperature, supply) is kept as read and without its reader's own scatter
 (`estimators.scatter`). If the sensor feels the scatter too, the readings fit better, and the likelihood decides. The
@@ -132,12 +132,12 @@ def require_numbers(samples: Array, count_before: int, source: str) -> Array:
     return samples
 
 
-# A still record, reduced in one pass to what the likelihood of a noise model needs.
+# A still record, reduced in one pass for the likelihood of a noise model.
 
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One output: its means (m,) less their mean, and the spectra of what is faster.
+    """One output: its means (m,) less their mean, and the spectra of the faster part.
 
     `corner_hz` is that of the output's first-order low-pass, infinite where there is none or it is not known.
     """

@@ -1,4 +1,4 @@
-"""Fit, comparison, diagnosis and discovery in words: what a terminal prints and a notebook shows."""
+"""Fit, comparison, diagnosis and discovery in words, for a terminal and a notebook."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SELF_JUDGED = "The noise is known from this residual only, so that the error alo
 
 
 def fit_text(result: Fit) -> str:
-    """The parameters with their uncertainties, and the error of each channel beside the noise floor."""
+    """The parameters with their uncertainties, and the error of each channel with the noise floor."""
     unit, noise = result.problem.unit, result.noise
     errors = [
         (name, quantity(result.rmse[c], unit), quantity(noise.floor[c], unit), f"{result.excess[c]:.2f}")

@@ -81,7 +81,7 @@ def drawing(effect: Effect) -> str:
 
 
 def write(folder: Path) -> None:
-    """Write all pages and pictures, and remove those of effects that are no more."""
+    """Write all pages and pictures, and remove those of removed effects."""
     effects = catalogue()
     files = pages(effects) | {f"pictures/{effect.name}.svg": drawing(effect) for effect in effects.values()}
     for stale in {*folder.glob("*.md"), *folder.glob("pictures/*.svg")} - {folder / name for name in files}:

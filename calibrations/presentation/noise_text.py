@@ -55,7 +55,7 @@ def coefficient_table(noise: ChannelNoise, sensed: Sensed | None) -> Cells:
 
 
 def _disturbances(analysis: NoiseAnalysis) -> Iterable[str]:
-    """Disturbances that are no noise process, and the coefficients that they change."""
+    """Disturbances that are not a noise process, and the coefficients that they change."""
     for disturbance in analysis.disturbances:
         if disturbance.kind in NOISE:
             yield f"{sentence(disturbance.text)}\n"

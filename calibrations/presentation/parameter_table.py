@@ -19,7 +19,7 @@ from calibrations.table import Array
 from calibrations.text import add_prefix, minus, rounded, unit, value_text
 
 HEAD = ("effect", "parameter", "axis", "value", "standard uncertainty", "unit", "last change")
-LEAST_CHANGE = 0.05  # standard uncertainties: a smaller change is none
+LEAST_CHANGE = 0.05  # standard uncertainties: a smaller change does not count
 WHOLE = 10.0  # a value keeps its unit down to a tenth of it: 0.97 V/g, 97 mV/g
 STRONG = 0.1  # correlations that are listed
 NEW, SAME, NOT_IDENTIFIED = "new", "unchanged", "not identified"

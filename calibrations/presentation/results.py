@@ -80,7 +80,7 @@ class FitPresentation(ResultPresentation[Fit]):
     """A model fitted to a table."""
 
     def report(self) -> str:
-        """The parameters with their uncertainties, and the error of each channel beside the noise floor."""
+        """The parameters with their uncertainties, and the error of each channel with the noise floor."""
         return fit_text(self.result)
 
     def to_dict(self) -> dict[str, Any]:

@@ -72,7 +72,7 @@ class PictureError(CalibrationError):
 
 
 class NotebookFigure(Figure):
-    """A figure that a notebook shows, also where nothing has imported pyplot, which tells a notebook how to."""
+    """A figure that a notebook shows without pyplot, which otherwise registers the display of figures."""
 
     def _repr_png_(self) -> bytes:
         return _savefig(self, "png", dpi="figure")

@@ -1,4 +1,4 @@
-"""How the sensor stands: angles of both stages, turn on the table, face up or down; and where its axes point then."""
+"""The attitude of the sensor: angles of both stages, turn on the table, face up or down; directions of its axes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The whole drawing: the rig as it stands, alpha from the front, the table of beta, and what the sensor feels."""
+"""The whole drawing: the rig, alpha from the front, the table of beta, and the specific force on the sensor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rig as it stands on its bench: alpha tilts, beta turns on it, the sensor lies on beta's table."""
+"""The rig on its bench: alpha tilts, beta turns on it, the sensor lies on beta's table."""
 
 from __future__ import annotations
 

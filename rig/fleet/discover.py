@@ -108,7 +108,7 @@ def _screen_members(
 ) -> Iterator[tuple[Member, Screening | None]]:
     """Every sensor with its screening, batch by batch; without one, the reason is added to `faults`.
 
-    `step` says in the progress what the screening is for.
+    `step` is the name of the screening in the progress.
     """
     questions = [(m, stand.question("look", m)) for members in batches.values() for m in members if m not in faults]
     for member, answer in fleet.ask(questions, step):

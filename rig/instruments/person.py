@@ -1,6 +1,6 @@
 """The simulated technician: does the work of a question in the simulated world, and answers.
 
-There is none on a bench with a real instrument: `answer` returns None.
+On a bench with a real instrument `answer` returns None.
 """
 
 from __future__ import annotations

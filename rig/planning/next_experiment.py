@@ -150,7 +150,7 @@ def best_of(experiments: Sequence[Experiment], criteria: Sequence[str]) -> Exper
 
 
 def _will_separate(e: Experiment, probability: str) -> bool:
-    """Whether it separates the explanations; `probability` names the attribute of what is expected."""
+    """Whether it separates the explanations; `probability` is the name of the attribute of `Expected`."""
     return bool(getattr(e.expected, probability) >= CERTAIN_PROBABILITY)
 
 

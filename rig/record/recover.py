@@ -206,7 +206,7 @@ def _copy_rows(old: sqlite3.Connection, new: sqlite3.Connection, table: str) -> 
 
 
 def _writable(value: object) -> object:
-    """The value. A text with unreadable bytes gets replacement characters, one of them first: it is no JSON then."""
+    """The value. A text with unreadable bytes gets replacement characters, one of them first: it is then not JSON."""
     if isinstance(value, str) and not value.isascii():
         data = value.encode("utf-8", "surrogateescape")
         decoded = data.decode("utf-8", "replace")
@@ -252,7 +252,7 @@ def rewrite_schema(path: Path) -> None:
     """Write the schema of the file anew. Raises sqlite3.Error if its first page cannot be read."""
     with closing(sqlite3.connect(path, isolation_level=None)) as file:
         file.text_factory = lambda data: data.decode("utf-8", "replace")
-        file.execute("PRAGMA writable_schema = ON")  # entries that cannot be read are no error then
+        file.execute("PRAGMA writable_schema = ON")  # then unreadable entries are not an error
         tables = dict(_tables(file.execute("SELECT name, rootpage, sql FROM sqlite_master").fetchall()))
         file.execute("DELETE FROM sqlite_master")
         for name, root in tables.items():

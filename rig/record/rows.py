@@ -105,7 +105,7 @@ def runs_of_sensor(runs: Sequence[Run], name: str) -> list[Run]:
 
 
 def known_names(connection: Connection, name: str) -> list[str]:
-    """The ids of all runs, or the procedures after `last `, oldest first: what a wrong name may have meant."""
+    """The ids of all runs, or the procedures after `last `, oldest first: suggestions for a wrong name."""
     query = select(runs.c.procedure if name.startswith(f"{LAST} ") else runs.c.run)
     return list(dict.fromkeys(connection.execute(query).scalars()))
 

@@ -144,9 +144,9 @@ poses = Table(
     Column("t_s", Float, nullable=False),  # middle of the dwell
     Column("temperature_c", Float),
     Column("excluded", String),  # why a person took it out of every analysis; it stays in the record
-    Column("alpha_read_deg", Float),  # what the dial of a stage that is turned by hand showed
+    Column("alpha_read_deg", Float),  # the reading of the dial of a stage that is turned by hand
     Column("beta_read_deg", Float),
-    Column("up", String, nullable=False, server_default="z"),  # the edge that stands along the table's normal
+    Column("up", String, nullable=False, server_default="z"),  # the edge along the table's normal
     Column("rate_deg_s", Float, nullable=False, server_default="0"),  # of beta, in a turn that was kept
     Column("checksum", BigInteger),
 )
@@ -176,7 +176,7 @@ blocks = Table(
     Column("checksum", BigInteger),
 )
 
-dwells = Table(  # what a page draws of a night without reading its samples
+dwells = Table(  # for the pages, which draw a soak without its samples
     "dwells",
     metadata,
     Column("run", ForeignKey("runs.run"), primary_key=True),
@@ -216,7 +216,7 @@ events = Table(
     Index("events_of_run", "run"),
 )
 
-log = Table(  # of what happened in a run, step by step; and of messages on the wires, where they were asked for
+log = Table(  # events of a run, step by step; and messages on the wires, if requested
     "log",
     metadata,
     Column("line", Counter, primary_key=True),

@@ -178,7 +178,7 @@ class Record:
     def exclude(self, run: str, number: int, reason: str | None) -> None:
         """Exclude a pose from every analysis, with a reason that stays as an event; None includes it again.
 
-        For a row of an imported table the event alone says it. Raises RecordError for an unknown pose.
+        For a row of an imported table only the event is written. Raises RecordError for an unknown pose.
         """
         is_pose = (poses.c.run == run) & (poses.c.number == number)
         with self.engine.begin() as connection:

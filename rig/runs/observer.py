@@ -43,7 +43,7 @@ class Outcome:
 
 
 class Observer:
-    """The observer of a run: a terminal, a page, a test. This one shows nothing, and nobody is there to decide.
+    """The observer of a run: a terminal, a page, a test. This one shows nothing and has no person to decide.
 
     `ignored_when_paused`: signals that do not end the question of `interrupted`.
     """
@@ -141,7 +141,7 @@ class RunView:
 
     `usual`: usual scatter of dwells of this kind, by channel. `tilt`: readings of the level by name, deg. `estimates`:
     those of the sensor so far. `range`: range of the converter, or of the digital sensor. `simulated`: the rig's time
-    is simulated. `guidance`: what a person with the sensor in the hand does next.
+    is simulated. `guidance`: the next step for a person with the sensor in the hand.
     """
 
     title: str

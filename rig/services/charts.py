@@ -108,7 +108,7 @@ def kind_of(dwell: Dwell) -> str:
     return head if number.isdigit() else ""
 
 
-# Charts of what the record knows: a run over time, a sensor's life, and two runs compared.
+# Charts of the record: a run over time, a sensor's life, and two runs compared.
 
 
 DAY_S = 86400.0

@@ -1,4 +1,4 @@
-"""The content of data and model: what an analysis was computed from, and whether it is still the same."""
+"""The content of data and model of an analysis, and whether it has changed since."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from rig.lease import lease
 from rig.record import Record, Run
 from rig.results import judge_results
 
-RESULTS = "results"  # the event that says how they were made anew
+RESULTS = "results"  # the event with the reason for the new results
 
 
 def exclude(record: Record, name: str, numbers: Sequence[int], reason: str | None) -> Run:

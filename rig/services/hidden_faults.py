@@ -5,7 +5,7 @@ mechanism, at the same poses and without noise. The size of an effect is the rms
 the effect. Bias and scale factor are free in both, because every calibration fits them.
 
 Nothing compares the name of an effect with that of a mechanism. A fault belongs to the fewest effects whose values, if
-changed, would make its curve. Faults that share an effect cannot be told apart in this data: they are one group, and
+changed, would make its curve. This data cannot separate faults that share an effect: they are one group, and
 its faults together must agree in curve and size with its effects together.
 """
 
@@ -45,7 +45,7 @@ def _paths_of_axes(part: str, *names: str) -> tuple[str, ...]:
     return tuple(f"sensor.{axis}.{part}.{name}" for axis in AXES for name in names)
 
 
-# Mechanisms by what a technician calls them: the settings of the world that make them.
+# Mechanisms by the technician's names: the settings of the world that make them.
 MECHANISMS: Mapping[str, tuple[str, ...]] = {
     "sensor soldered at an angle": tuple(f"sensor.package.turn_{axis}_deg" for axis in "xyz"),
     "sensing axes not square": ("sensor.package.beams_off_square_deg",),
@@ -76,7 +76,7 @@ MECHANISMS: Mapping[str, tuple[str, ...]] = {
 class Curve:
     """A change of the output, (n, channels), free of bias and scale factor.
 
-    `span`: of an effect, what a change of its values would add to the output, (n, channels, values).
+    `span`: of an effect, the change of the output by a change of its values, (n, channels, values).
     """
 
     name: str
@@ -170,7 +170,7 @@ class Faults:
 
 
 def hidden_faults(bench: Bench, fitted: Fit, start: Fit) -> Faults:
-    """The faults of a simulated bench beside the effects that `fitted` has and `start` has not.
+    """The faults of a simulated bench, and the effects that only `fitted` has, not `start`.
 
     The poses are those of the fit's table, visited once more in a world without noise. Raises what the world raises.
     """

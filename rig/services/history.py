@@ -67,7 +67,7 @@ def lives(run: Run, runs: Iterable[Run]) -> dict[str, int]:
 # A sensor's calibrations over its life: each complete run of it that determines a model, in the order of time.
 
 
-STALE_DAYS = 365.0  # where no limit says when a calibration is due
+STALE_DAYS = 365.0  # without a limit that decides when a calibration is due
 Limit = float | tuple[float, float]
 
 
@@ -128,7 +128,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class History:
-    """A sensor's life. `passed_over` are runs of it that are no calibration by this model, and why."""
+    """A sensor's life. `passed_over`: runs of it that are not a calibration by this model, with the reasons."""
 
     sensor: str
     model: str
@@ -270,7 +270,7 @@ def _calibration(record: Record, data: str, run: Run, model: Model) -> Calibrati
 
 
 def date_of(run: Run) -> datetime:
-    """When the sensor was as the run found it. Raises DataError for a constant `date` that is none."""
+    """The date of the measurement. Raises DataError for an invalid constant `date`."""
     stated_date = run.constants.get("date")
     try:
         moment = (

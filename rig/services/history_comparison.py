@@ -33,7 +33,7 @@ class Compared:
 
 
 def compare_sensors(life: History, other_sensor: str, last: Calibration) -> Compared:
-    """The last calibration of a life beside that of another sensor. Raises DataError, see `compare`."""
+    """The last calibrations of two sensors. Raises DataError, see `compare`."""
     own_last = life.calibrations[-1]
     return Compared(
         f"{life.sensor}, {own_last.day}",

@@ -52,7 +52,7 @@ class Preview:
 def open_file(path: Path, topic: str | None = None, bad_lines: Policy = "few") -> Sheet:
     """The sheet in a file, of the topic `topic` where it has several.
 
-    `bad_lines` says what to do with damaged lines of a text: skip a few, skip them, or refuse them. Raises DataError,
+    `bad_lines`: the treatment of damaged lines of a text: skip a few, skip them, or refuse them. Raises DataError,
     SeveralTopics.
     """
     return replace(open_sheet(path, topic), skipped=SHARES[bad_lines])

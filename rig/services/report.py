@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def of_run(data: str) -> tuple[MotionResult | None, Mapping[str, Any]]:
-    """Both models beside the displacement sensor, None where the run is of something else, and the run's results.
+    """Both models compared with the displacement sensor, None for a run of another procedure; and the run's results.
 
     (None, {}) where `data` is a file. Raises SensorFault, RecordError, DataError.
     """
@@ -45,7 +45,7 @@ Page = tuple[list["Picture"], Callable[[], str]]
 
 
 def soak_report_of(data: str, date: str, program: str) -> Page | None:
-    """The pictures of a soak and what makes its page; None where `data` is no run of a soak.
+    """The pictures of a soak and the function that makes its page; None if `data` is not a run of a soak.
 
     Raises RecordError, DataError where it holds too little.
     """

@@ -8,7 +8,10 @@ from calibrations.effects import Effect
 
 
 class Cancelled(BaseException):
-    """The search was cancelled: nobody waits for its result. No effect of a user takes it for a fault of its own."""
+    """The search was cancelled: nobody waits for its result.
+
+    It is not an Exception, so that it is not reported as a fault of a user's effect.
+    """
 
 
 class Counted(Mapping[str, Effect]):

@@ -36,7 +36,7 @@ class ModelSession(Generic[F]):
     """`model` on `data`, and the `steps` taken from there.
 
     `kept` are the data without gross outliers, `start` the fit to them. `effects` are those that may be added, `notes`
-    is what a person should know of the data, `plans` are the searches so far by the effects added before them.
+    is the note on the data, `plans` are the searches so far by the effects added before them.
     `content` is that of data and model when they were read.
     """
 

@@ -171,7 +171,7 @@ def _unit_of_channel(table: Table, name: str) -> str:
 
 
 def _no_record(subject: str) -> DataError:
-    """The error for data that are no still record."""
+    """The error for data that are not a still record."""
     return DataError(
         f"{subject}; a noise analysis needs single samples of a sensor at rest: give a still record, or `rig run "
         "noise-floor`"
@@ -328,7 +328,7 @@ BLOCK = 1 << 17
 
 
 def stream(record: Record | None, data: str, channel: str | None, rate_hz: float | None) -> Stream:
-    """The samples that `data` names. `rate_hz` is for what does not say its own.
+    """The samples that `data` names. `rate_hz` is for data without a rate of their own.
 
     Raises DataError and RecordError: no such file, run or channel; a rate that is missing or disagrees; gaps.
     """

@@ -97,7 +97,7 @@ def _estimates(fit: FittedModel) -> Iterator[tuple[str, Estimate]]:
 # One model fitted to both, and the measurements at common poses.
 
 
-POSE = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")  # what a pose is, as far as it is known
+POSE = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")  # the columns that define a pose
 SAME_DECIMALS = 2  # of a degree: nearer, gravity along an axis differs by 0.2 mg at most
 
 

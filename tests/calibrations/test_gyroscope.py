@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError
 from calibrations.fitting.fit import Fit, fit
-from calibrations.geometry.earth import EARTH_DEG_S
-from calibrations.geometry.rate_table import earth_rate_warning, rate_deg_s, turn_axes
+from calibrations.geometry.rate_table import EARTH_DEG_S, earth_rate_warning, rate_deg_s, turn_axes
 from calibrations.geometry.sphere import estimate_faces
 from calibrations.loop import discover
 from calibrations.model.file import dump_model, parse_model, read_model

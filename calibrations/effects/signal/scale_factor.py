@@ -5,7 +5,7 @@ from calibrations.table import Array, Table
 
 
 def _slope(table: Table) -> Array:
-    """Half the range of each output; in a table of motion what the motion shows."""
+    """Half the range of each output; in a table of motion the slope over the motion."""
     spread: Array = np.ptp(table.outputs, axis=0) / 2
     return np.full(len(spread), table.number("output_per_g", 0.0)) if table.type.moving else spread
 

@@ -31,7 +31,7 @@ from calibrations.errors import ModelError, UnusableData
 from calibrations.fitting.budget import SLOW_NOISE, Budget, make_budget, parameter_correlation, row_gains
 from calibrations.fitting.fit import Fit, evaluate, in_milli, milli_unit
 from calibrations.fitting.inputs import Contribution, input_contributions
-from calibrations.geometry.earth import EARTH_DEG_S
+from calibrations.geometry.rate_table import EARTH_DEG_S
 from calibrations.means.noise import Noise, rms
 from calibrations.model import Model
 from calibrations.presentation.budget import sources

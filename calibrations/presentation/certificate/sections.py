@@ -121,7 +121,7 @@ def _environment(c: Certificate) -> Section:
 
 
 def results_table(c: Certificate) -> Table:
-    """The results as left: what a certificate is asked for first."""
+    """The results as left."""
     rows = tuple(
         (_name(o), expand_uncertainty(o.value, o.expanded), unit(o.unit), _coverage(o), freedom_text(o.freedom),
          *(("–", "–") if o.decision is None else (_limits(o.decision), _statement(o.decision))))

@@ -183,7 +183,7 @@ def shares_chart(steps: Falling) -> Chart:
 def shares_by_place(steps: Falling) -> tuple[list[str], Array]:
     """Places, and the part of the first model's excess variance that each still holds, (models, places).
 
-    The last place is what no step explains. A step's part is the fall of the variance when it is added.
+    The last place is the part that no step explains. A step's part is the fall of the variance when it is added.
     """
     errors = np.array([steps.start.pooled_excess, *(step.after.pooled_excess for step in steps.steps)]) ** 2
     gains = np.maximum(-np.diff(errors), 0.0)

@@ -108,7 +108,7 @@ def _headline(soak: Soak, forecasts: Mapping[str, ForecastHistory]) -> str:
 
 
 def _summary(soak: Soak) -> str:
-    """How much was measured, and what may have disturbed it."""
+    """The amount of data, and possible disturbances."""
     held_h = float(np.sum(soak.holds.column("n"))) / soak.table.number("sample_rate_hz", 1.0) / HOUR_S
     reversals = len(next(iter(soak.courses.values())).t_s)
     text = f"The record holds every sample of {rounded(held_h)} h at rest, and {reversals} reversals."

@@ -1,4 +1,4 @@
-"""Poses, positions, fields, rates and motion: errors beside the noise floor, bars of the error, residual charts."""
+"""Poses, positions, fields, rates and motion: errors and noise floor, bars of the error, residual charts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Still records: mismatch of the spectrum and of the Allan deviation beside what chance leaves."""
+"""Still records: mismatch of the spectrum and of the Allan deviation, compared with chance."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class Attendant(StatusWriter):
         self.publish()
 
     def ask(self, question: Question, instead: str | None) -> str:
-        """The answer of a person, or of the simulated technician if nobody attends the run."""
+        """The answer of a person, or of the simulated technician in an unattended run."""
         if question.name in self._order.answers:
             return self._order.answers[question.name]
         if instead is not None and not self._order.attended:
