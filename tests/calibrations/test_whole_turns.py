@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 
 from calibrations.analyses.hand_turns import fit_turns
 from calibrations.errors import DataError, MissingColumn, MissingConstant, ModelError
-from calibrations.importing.foreign import read_foreign
+from calibrations.importing.binary import open_sheet
+from calibrations.importing.foreign import needs_mapping, read_foreign
+from calibrations.importing.proposal import missing_columns
 from calibrations.importing.raw_logs import average_raw_log
 from calibrations.presentation.certificate.results import figures, require_reference
 from calibrations.table import Table
@@ -104,3 +107,12 @@ def test_whole_turns_are_certified_and_turns_between_rests_are_not(tmp_path: Pat
     assert abs(scale.value - np.linalg.norm(MATRIX[0])) < scale.coverage * scale.std < 5e-3
     with pytest.raises(ModelError, match=r"come from an accelerometer .* Certify known rates .* or whole turns"):
         require_reference("a log", "turns")
+
+
+def test_the_angle_of_each_turn_takes_the_place_of_a_column_of_rates(tmp_path: Path) -> None:
+    sheet = open_sheet(log(tmp_path))
+    assert needs_mapping(sheet, "rates", [])
+    assert missing_columns("rates", sheet, []) == ["rate_deg_s"]
+    stated = replace(sheet, constants={"turn_deg": 360.0})
+    assert not needs_mapping(stated, "rates", [])
+    assert missing_columns("rates", stated, []) == []

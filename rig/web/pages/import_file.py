@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from urllib.parse import urlencode
@@ -297,7 +298,8 @@ class ImportPage:
         if duplicate := next((name for name in names if names.count(name) > 1), ""):
             self._show_fault("", f'Two columns have the meaning {duplicate}. Choose another one, or "other".')
             return
-        if lacks := lacking(self.sheet, kind, mappings):
+        sheet = replace(self.sheet, constants={**self.sheet.constants, **self.constants})
+        if lacks := lacking(sheet, kind, mappings):
             self._show_fault("", f"Still needed: {', '.join(lacks)}. Choose the columns that hold them.")
             return
         try:
