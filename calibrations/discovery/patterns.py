@@ -37,8 +37,8 @@ class Pattern:
     """Columns, shape (channels, n, k), and their meaning in words.
 
     `expression` adds the pattern to a model ("" if none can), `finer` gives patterns between it and its neighbours,
-    `price` is the cost of its choice by the data, as twice a log-likelihood. A `slow` pattern looks like slow noise.
-    `poses` are outlying rows.
+    `price` is the cost of its choice by the data, as twice a log-likelihood. A `slow` pattern looks like slow noise,
+    unless it is one `sudden` change. `poses` are outlying rows.
     """
 
     text: str
@@ -47,6 +47,7 @@ class Pattern:
     finer: Callable[[], list[Pattern]] = list
     price: float = 0.0
     slow: bool = False
+    sudden: bool = False
     poses: tuple[int, ...] = ()
 
     @property
@@ -183,7 +184,7 @@ def _step(table: Table, k: int) -> Pattern:
     has_time = "t_s" in table
     text = f"step at t = {position:.0f} s" if has_time else f"step at row {position:.0f}"
     expression = f"a*step(t - {position:.7g})" if has_time else ""
-    return Pattern(text, np.where(np.arange(table.n) >= k, 1.0, 0.0)[:, None], expression, slow=True)
+    return Pattern(text, np.where(np.arange(table.n) >= k, 1.0, 0.0)[:, None], expression, slow=True, sudden=True)
 
 
 def _in_columns(table: Table) -> Iterator[Pattern]:

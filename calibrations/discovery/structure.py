@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln, ndtri
+from scipy.special import fdtrc, gammaln, ndtri
 
 from calibrations.criteria import (
     MATERIAL,
@@ -28,9 +28,10 @@ from calibrations.criteria import (
 )
 from calibrations.discovery.outliers import outlier_text
 from calibrations.discovery.patterns import Pattern, at_attitudes, one_sided, patterns, per_channel
-from calibrations.discovery.significance import Screen, Search
+from calibrations.discovery.significance import Screen, Search, of_search
 from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.fitting.fit import Fit
+from calibrations.fitting.noise_fit import gains
 from calibrations.means.noise import correlation_known, rms, robust_std
 from calibrations.table import Array
 
@@ -41,9 +42,12 @@ NAMED = 6  # poses that the text lists one by one
 def structure_of(fit: Fit) -> Pattern | None:
     """The best pattern in a fit's residual; None if the residual is noise."""
     screen, noise = Screen(without_slow(fit)), _excess_noise(fit)
-    all_patterns = patterns(fit.table, fit.channels)
-    significant = _significant(all_patterns, Screen(fit)) or ([p for p in all_patterns if p.slow] if noise else [])
-    significant = sorted(significant, key=lambda p: score(p, screen), reverse=True)[:FINALISTS]
+    all_patterns = sorted(patterns(fit.table, fit.channels), key=lambda p: score(p, screen), reverse=True)
+    significant = (
+        _significant(all_patterns, Screen(fit))
+        or _significant_in_other_noise(all_patterns, fit)
+        or ([p for p in all_patterns if p.slow] if noise else [])
+    )[:FINALISTS]
     finalists = [sharpen(pattern, screen) for pattern in (*significant, *_outlier_pattern(fit))]
     finalists = [
         p for p in finalists if not (p.slow and noise) or _remaining_share(p, screen) < MOST_UNDER_SLOW_PATTERN
@@ -87,6 +91,26 @@ def _significant(all_patterns: list[Pattern], screen: Screen) -> list[Pattern]:
     tested = [(p, basis) for p, basis in tested if basis.shape[1]]
     chances = Search(screen, [basis for _, basis in tested]).p_values
     return [p for (p, _), chance in zip(tested, chances, strict=True) if chance < SIGNIFICANT]
+
+
+def _significant_in_other_noise(ranked: list[Pattern], fit: Fit) -> list[Pattern]:
+    """The best patterns that are significant when the noise is fitted again beside each.
+
+    The noise that is fitted without a pattern contains it, so that one step makes a random walk of it. A trend, a ramp
+    or an oscillation is left out, because slow noise has such parts.
+    """
+    rows, significant = fit.residual.size, []
+    finalists = [p for p in ranked if p.sudden or not p.slow][:FINALISTS]
+    gains_by_pattern = gains(
+        fit.noise, fit.residual, fit.jacobian, [p.columns for p in finalists], np.zeros((fit.table.n, 0))
+    )
+    for pattern, gain in zip(finalists, gains_by_pattern, strict=True):
+        k = pattern.columns.shape[2]
+        free = max(rows - len(fit.theta) - k, 1)
+        F = np.expm1(gain / rows) * free / k
+        if of_search(float(fdtrc(k, free, F)), len(ranked)) < SIGNIFICANT:
+            significant.append(pattern)
+    return significant
 
 
 def sharpen(pattern: Pattern, screen: Screen) -> Pattern:

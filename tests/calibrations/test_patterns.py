@@ -38,6 +38,25 @@ def test_the_pattern_of_a_residual_is_named(misfit: Array, says: str) -> None:
     assert says in found.text
 
 
+@pytest.mark.parametrize("floors", [3.0, 8.0])
+def test_a_step_of_one_axis_is_found_although_the_fitted_noise_contains_it(floors: float) -> None:
+    coarse = synthetic.turns((90, 30, 150, 60, 120), step_deg=15)
+    a_x, a_y, _ = synthetic.components(coarse)
+    step = floors * synthetic.NOISE_V * (coarse["t_s"] > coarse["t_s"][137])
+    stepped = fit(read_model("linear"), synthetic.poses(coarse, a_x + 2.5 + step, a_y + 2.5))
+    assert stepped.noise.ratio[0] > 1  # slow noise over white noise
+    found = structure_of(stepped)
+    assert found is not None
+    assert found.text.startswith("step at t = 10")
+
+
+def test_a_random_walk_is_no_step() -> None:
+    walk = np.cumsum(np.random.default_rng(8).standard_normal(len(BETA)))
+    walked = fit(read_model("linear"), table(0.8 * (walk - walk.mean()) / np.ptp(walk)))
+    assert walked.pooled_excess > 1.5
+    assert structure_of(walked) is None
+
+
 def test_noise_has_no_pattern() -> None:
     assert structure_of(fit(read_model("linear"), table(0 * BETA))) is None
 
