@@ -97,8 +97,10 @@ def _significant_in_other_noise(ranked: list[Pattern], fit: Fit) -> list[Pattern
     """The best patterns that are significant when the noise is fitted again beside each.
 
     The noise that is fitted without a pattern contains it, so that one step makes a random walk of it. A trend, a ramp
-    or an oscillation is left out, because slow noise has such parts.
+    or an oscillation is left out, because slow noise has such parts. A motion has too few stretches for this.
     """
+    if fit.table.type.moving:
+        return []
     rows, significant = fit.residual.size, []
     finalists = [p for p in ranked if p.sudden or not p.slow][:FINALISTS]
     gains_by_pattern = gains(
