@@ -42,7 +42,7 @@ class Strip:
             self.link = ui.link("", "/run")
             self.pause = button("Pause", "pause", lambda: control_run(control.pause))
             self.stop = ui.button("Stop", icon="stop", color="negative", on_click=lambda: control_run(control.stop))
-            self.stop.props("unelevated dense")
+            self.stop.props("unelevated dense").classes("stops")
             with self.stop:
                 ui.tooltip(f"Key {STOP_KEY}")
         ui.timer(LOOK_S, self.look)

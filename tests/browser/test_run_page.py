@@ -135,6 +135,20 @@ def test_a_plan_that_cannot_be_says_why_and_does_not_start(workbench: Workbench)
     expect(page.get_by_role("button", name="Start")).to_be_disabled()
 
 
+@pytest.mark.parametrize("way", ["key", "button"])
+def test_a_stop_while_the_connection_is_lost_acts_when_it_is_back(workbench: Workbench, way: str) -> None:
+    page = started(workbench, NIGHT)
+    phase(page, "running")
+    page.evaluate("socket.disconnect()")
+    expect(page.get_by_text("The workbench does not answer")).to_be_visible()
+    if way == "key":
+        page.keyboard.press("F8")
+    else:
+        page.locator(".live").get_by_role("button", name="Stop").click()
+    page.evaluate("socket.connect()")
+    phase(page, "stopped")
+
+
 def test_the_key_escape_closes_the_checks_and_forgets_them(workbench: Workbench) -> None:
     page = workbench.visit("/run?procedure=sweep&step_deg=45")
     for _ in range(2):

@@ -85,7 +85,7 @@ class Live:
         self.resume = button("Continue", "play_arrow", lambda: self.decide("resume"), "dense")
         self.repeat = button("Repeat the last pose", "replay", lambda: self.decide("repeat"))
         self.stop = ui.button("Stop", icon="stop", color="negative", on_click=lambda: control_run(control.stop))
-        self.stop.props("unelevated dense")
+        self.stop.props("unelevated dense").classes("stops")
         self.resume_button = button("Resume", "play_arrow", self.go_on)
         self.see = button("Open the model", "insights", self._see, "dense")
 

@@ -9,6 +9,7 @@ window.addEventListener("click", (event) => {
 
 // If the server does not answer, clicks and keys do nothing, and text in fields outlasts the reload.
 // Without this, the browser would send a click when the connection is back: a run would begin when nobody expects it.
+// A stop is sent when the connection is back, because a late stop is better than none.
 (() => {
   const KEPT = "typed text";
   const PATIENCE_MS = 60000; // until a field appears, of a page that computes before it shows all fields
@@ -22,9 +23,10 @@ window.addEventListener("click", (event) => {
   const label = (field) => field.getAttribute("aria-label") || field.placeholder;
   const named = (name) => fields().find((field) => label(field) === name);
 
+  const stops = (event) => event.key === "F8" || event.target.closest?.(".stops");
   const hold = (event) => {
-    const writes = event.type === "keydown" && isText(event.target) && !["Enter", "F8"].includes(event.key);
-    if (!lost() || writes) return;
+    const writes = event.type === "keydown" && isText(event.target) && event.key !== "Enter";
+    if (!lost() || writes || stops(event)) return;
     event.stopImmediatePropagation();
     event.preventDefault();
   };
