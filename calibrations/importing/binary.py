@@ -30,6 +30,7 @@ READERS: Mapping[bytes, tuple[str, str]] = {  # first bytes: the reader's module
     b"SQLite format 3\0": BAG,
 }
 BAG_STORAGE = (".db3", ".mcap")
+ZIP_ENCRYPTED = 1  # bit of the flags of a local file header (PKWARE APPNOTE 4.4.4)
 CANNOT = {  # files that cannot be imported, by their first bytes: the reason and the remedy
     b"schema: rig.model/": "is a model file and holds no data; give it with --model",
     b"ULogEnc": "is an encrypted PX4 ULog; decrypt it with decrypt_ulog.py of PX4-Autopilot and the log's private key",
@@ -83,6 +84,8 @@ def _topics(path: Path) -> list[Topic] | None:
     elif head.startswith(b"MATLAB 7.3"):
         reader_name = READERS[HDF5_MARK]
     elif head.startswith(b"PK\x03\x04"):
+        if int.from_bytes(head[6:8], "little") & ZIP_ENCRYPTED:
+            raise DataError(f"{path}: is a zip archive with a password; unpack it and import a file of it")
         reader_name = ("arrays", _zip_reader(path))
     if reader_name is None:
         return None

@@ -219,6 +219,7 @@ def test_what_no_library_reads_is_refused_with_a_remedy(tmp_path: Path) -> None:
         b"PARE" + bytes(200): "encrypted Parquet",
         b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600): r"old Excel workbook \(.xls\), or one with a password",
         b"PK\x03\x04" + bytes(200): "cut zip archive",
+        b"PK\x03\x04\x14\x00\x01\x00" + bytes(200): "is a zip archive with a password; unpack it",
         b"schema: rig.model/1\nname: mine\n": "is a model file and holds no data; give it with --model",
     }.items():
         path.write_bytes(content)
