@@ -199,7 +199,7 @@ def test_kalibr_and_openvins_read_densities_in_si_units() -> None:
         (
             "ardupilot",
             [of({**LINEAR, "bias": {"bias": (4.0, 0.0, 0.0)}})],
-            "accepts for offset values from -3.5 to 3.5",
+            "ArduPilot accepts offset from -3.5 to 3.5",
         ),
         ("imucal", [of(LINEAR)], "one of each"),
         ("imu_tk", [gyroscope()], "one accelerometer"),

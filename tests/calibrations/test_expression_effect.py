@@ -105,7 +105,7 @@ def entry(**content: object) -> str:
         ({"effect": "hysteresis", "expression": "a*t"}, "hysteresis is already the name of an effect"),
         ({"effect": "Own One", "expression": "a*t"}, "cannot name an effect"),
         ({"effect": "bias", "columns": ["humidity"]}, "bias has columns but no expression"),
-        ({"effect": "own", "expression": "sin(beta)"}, "nothing to be fitted"),
+        ({"effect": "own", "expression": "sin(beta)"}, "it has no parameter to fit"),
     ],
 )
 def test_a_model_file_with_a_bad_expression_is_refused(content: dict[str, object], says: str) -> None:
@@ -116,7 +116,7 @@ def test_a_model_file_with_a_bad_expression_is_refused(content: dict[str, object
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("a*vx_v", "column 3: vx_v is what is measured"),
+        ("a*vx_v", "column 3: vx_v is the measured output"),
         ("beta_deg += a*ax", "column 15: ax follows from the stage angles"),
         ("a*temperature", "column 3: needs the column temperature_c; made has: alpha_deg"),
         ("a*humidty", 'column 3: "humidty" is not a column; did you mean "humidity"?'),

@@ -101,7 +101,7 @@ def test_nothing_is_stated_of_hidden_noise() -> None:
     x[0] = 3 * STEP
     analysis = analyse(reduce_record([Samples("x", [x], RATE_HZ, "V")], "made", every_deviation=True))
     assert [each.kind for each in analysis.disturbances] == [COARSE]
-    assert "have 4 values 0.002 apart" in analysis.disturbances[0].text
+    assert "have 4 values in steps of 0.002" in analysis.disturbances[0].text
     coefficients = noise_document(analysis)["coefficients"]
     assert not any(each["identified"] for each in coefficients.values())
     assert 0.15 * STEP / 10 < coefficients["white-noise"]["upper"] < STEP / 10

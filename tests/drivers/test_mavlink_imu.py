@@ -76,16 +76,16 @@ def test_the_self_test_shows_messages_rate_time_and_temperature(connect: Connect
         (Fault("wrong-checksum"), {}, BadFrame, "have a wrong checksum"),
         (Fault("refuses"), {}, Refused, "refuses HIGHRES_IMU at 100 Hz: unsupported"),
         (Fault("refuses", size=2), {}, Refused, "denied"),
-        (Fault("mute"), {}, LinkTimeout, "no HIGHRES_IMU came"),
+        (Fault("mute"), {}, LinkTimeout, "received no HIGHRES_IMU"),
         (Fault("half-message", at_s=4.0), {}, BadFrame, "have a wrong checksum"),
         (Fault("wrong-baud", at_s=4.0), {}, BadFrame, "The baud rate is probably wrong"),
         (Fault("lost-message", at_s=4.0, for_s=0.2), {}, StreamError, "samples were lost"),
         (Fault("stuck-axis"), {}, SensorFault, "ax gave the same value"),
-        (Fault("restart", at_s=3.5), {}, LinkTimeout, "no HIGHRES_IMU came"),
+        (Fault("restart", at_s=3.5), {}, LinkTimeout, "received no HIGHRES_IMU"),
         (None, {"range": 9.0}, OverRange, "az reached the end of its range, 9 m/s"),
         (None, {"rate_hz": 5000.0}, Refused, "at 5000 Hz: denied"),
         (None, {"outputs": ("ax", "az"), "sends": mavlink_imu.Settings(outputs=("ax",))}, SensorFault, "sends no az"),
-        (None, {"imu": 1, "sends": mavlink_imu.Settings()}, LinkTimeout, "no HIGHRES_IMU came"),
+        (None, {"imu": 1, "sends": mavlink_imu.Settings()}, LinkTimeout, "received no HIGHRES_IMU"),
         (None, {"sends": mavlink_imu.Settings("SCALED_IMU")}, Refused, "unsupported"),
     ],
 )
@@ -100,7 +100,7 @@ def test_faults_of_a_mavlink_sensor_are_named(
 def test_a_check_reports_what_is_wrong(connect: Connect) -> None:
     (check,) = connect(Fault("mute")).self_test()
     assert not check.ok
-    assert "no HIGHRES_IMU came" in check.detail
+    assert "received no HIGHRES_IMU" in check.detail
 
 
 def test_lost_and_doubled_messages_are_counted_and_those_of_other_kinds_are_not(connect: Connect) -> None:

@@ -75,7 +75,7 @@ def test_a_tracker_that_already_sends_is_not_configured(connect: Connect) -> Non
         (Fault("silence"), {}, LinkTimeout, "no answer of the tracker to message 0x30"),
         (Fault("deaf"), {"rate_hz": 200.0}, LinkTimeout, "no answer of the tracker to message 0x30"),
         (Fault("refuses"), {"rate_hz": 200.0}, Refused, r"invalid parameter \(0x21\)"),
-        (Fault("mute"), {"rate_hz": 200.0}, LinkTimeout, "no MTData2 with Acceleration came"),
+        (Fault("mute"), {"rate_hz": 200.0}, LinkTimeout, "received no MTData2 with Acceleration"),
         (Fault("wrong-checksum"), {}, BadFrame, "have a wrong checksum"),
         (Fault("half-message", at_s=2.0), {}, BadFrame, "are not XBus"),
         (Fault("wrong-baud"), {"rate_hz": 200.0}, BadFrame, "The baud rate is probably wrong"),

@@ -156,7 +156,7 @@ def test_a_reading_outside_the_calibration_curve_fails_the_run_and_gives_no_resu
         outcome = shaken(record, bench(QUIET | {"d63": {"standoff_um": 290.0}}), **BRIEF)
         kept = list(record.kept(outcome.run.run))
     assert isinstance(outcome.error, SensorFault)
-    assert "it is on the optical peak" in str(outcome.error)
+    assert "the reading is near the optical peak" in str(outcome.error)
     assert "Move the tip closer" in str(outcome.error)
     assert (outcome.run.state, outcome.run.results) == ("failed", {})
     assert len(kept) == 58  # what was measured stays

@@ -84,7 +84,7 @@ def test_what_is_not_computed_is_null() -> None:
     e = diagnosis_document(found, "linear")["next_experiment"]
     assert (e["procedure"], e["settings"], e["expected"]) == ("level-check", {"on": "base"}, None)
     assert e["command"] == "rig run level-check --on base --bench b.yaml"
-    assert "the base alone" in e["why"]
+    assert "only the tilt of the base" in e["why"]
 
 
 def dispute(temperature: bool) -> Dispute:

@@ -52,7 +52,9 @@ def test_a_fault_that_cannot_be_is_refused(
 
 def test_a_real_instrument_is_given_no_faults(bench_file: Callable[..., Path]) -> None:
     path = bench_file(with_faults("alpha", {"what": "alarm"}, url="serial:/dev/ttyUSB0"))
-    with pytest.raises(BenchError, match=r"key instruments\.alpha\.faults: only a simulated instrument takes faults"):
+    with pytest.raises(
+        BenchError, match=r"key instruments\.alpha\.faults: only a simulated instrument can have faults"
+    ):
         read_bench(path)
 
 

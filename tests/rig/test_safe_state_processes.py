@@ -63,7 +63,10 @@ def process(*command: str) -> Iterator[subprocess.Popen[str]]:
 def said(child: subprocess.Popen[str]) -> str:
     """The next line that a process prints."""
     assert child.stdout
-    return child.stdout.readline().strip()
+    assert child.stderr
+    line = child.stdout.readline().strip()
+    assert line, child.stderr.read()
+    return line
 
 
 def test_who_is_refused_is_told_who_holds_it_and_a_kill_sets_it_free(tmp_path: Path) -> None:

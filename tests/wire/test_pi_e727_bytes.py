@@ -180,8 +180,8 @@ def test_a_slow_oscillation_holds_each_point_longer(positioner: Positioners) -> 
     [
         (60.0, 30.0, r"x = 0 um is outside its limits"),
         (60.0, 70.0, r"x = 100 um is outside its limits"),
-        (0.0, 50.0, r"an oscillation of 0 um is none"),
-        (math.nan, 50.0, r"an oscillation of nan um is none"),
+        (0.0, 50.0, r"an oscillation of 0 um is not possible"),
+        (math.nan, 50.0, r"an oscillation of nan um is not possible"),
     ],
 )
 def test_an_oscillation_stays_within_the_limits(
