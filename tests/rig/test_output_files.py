@@ -111,11 +111,11 @@ def test_a_write_that_fails_leaves_the_old_file(old: Path) -> None:
 def test_kernels_are_cached_by_the_record_where_no_other_place_can_be_written(
     writable: bool, rig_home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "")  # what is set below is undone after the test
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
     monkeypatch.setattr("rig.files.os.access", lambda _place, _mode: writable)
     files.choose_kernel_cache()
     assert os.environ.get("NUMBA_CACHE_DIR") == (None if writable else str(rig_home / "kernels"))
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
 
 
 def _commands(group: click.Group, context: click.Context) -> Iterator[tuple[str, click.Command]]:
