@@ -33,7 +33,7 @@ REMEDIES = (
         "separate",
         "sort",
     ),
-    *("state", "take", "turn", "used once"),
+    *("state", "turn", "use values", "used once"),
 )
 SILENT_TODAY = [(kind, name) for kind, cases in UNSEEN.items() for name in cases]
 
