@@ -17,7 +17,8 @@ from calibrations.compensation.forward import known_at_run_time
 from calibrations.effects import Effect, Parameter
 from calibrations.effects.catalogue import catalogue
 from calibrations.presentation.charts.signature import noise_signature_chart, shown_noise, shown_value, signature_chart
-from calibrations.presentation.static import compact_svg, svg
+from calibrations.presentation.smaller_svg import compact_svg
+from calibrations.presentation.static import svg
 
 ACTS_ON = {
     "pose": "the pose: the true position of the stages and of the vertical",

@@ -18,6 +18,7 @@ from calibrations.result import Presentation, Result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from calibrations.discovery.dataset import Dataset
     from calibrations.noise.analysis import NoiseAnalysis
     from calibrations.presentation.chart import Chart, Picture
 
@@ -76,7 +77,26 @@ class ResultPresentation(ABC, Generic[R]):
         return result_html(self.report(), self.pictures())
 
 
-class FitPresentation(ResultPresentation[Fit]):
+class FittedPresentation(ResultPresentation[R]):
+    """The forms of a result whose pictures are those of one fit."""
+
+    @property
+    @abstractmethod
+    def fitted(self) -> tuple[Dataset[Any], Any]:
+        """The data and the fit that the pictures show."""
+
+    def chart(self) -> Chart:
+        """The residual, or the Allan deviations."""
+        data, fit = self.fitted
+        return view_of(data).fit_chart(fit)
+
+    def pictures(self) -> Sequence[Picture]:
+        """Measurement and model, the residual, and its pattern."""
+        data, fit = self.fitted
+        return view_of(data).fit_album(fit)
+
+
+class FitPresentation(FittedPresentation[Fit]):
     """A model fitted to a table."""
 
     def report(self) -> str:
@@ -87,16 +107,13 @@ class FitPresentation(ResultPresentation[Fit]):
         """`rig.fit/1`."""
         return fit_document(dataset(self.result.table), self.result, None)
 
-    def chart(self) -> Chart:
-        """The residual."""
-        return view_of(dataset(self.result.table)).fit_chart(self.result)
-
-    def pictures(self) -> Sequence[Picture]:
-        """Measurement and model, the residual, and its pattern."""
-        return view_of(dataset(self.result.table)).fit_album(self.result)
+    @property
+    def fitted(self) -> tuple[Dataset[Any], Any]:
+        """The data, and the fit."""
+        return dataset(self.result.table), self.result
 
 
-class ComparisonPresentation(ResultPresentation[Comparison[Any]]):
+class ComparisonPresentation(FittedPresentation[Comparison[Any]]):
     """A model against data."""
 
     def report(self) -> str:
@@ -107,16 +124,13 @@ class ComparisonPresentation(ResultPresentation[Comparison[Any]]):
         """`rig.comparison/1`."""
         return comparison_document(self.result, self.result.fit.model.name)
 
-    def chart(self) -> Chart:
-        """The residual, or the Allan deviations."""
-        return view_of(self.result.data).fit_chart(self.result.fit)
-
-    def pictures(self) -> Sequence[Picture]:
-        """The model and the data."""
-        return view_of(self.result.data).fit_album(self.result.fit)
+    @property
+    def fitted(self) -> tuple[Dataset[Any], Any]:
+        """The data, and the fit of the model."""
+        return self.result.data, self.result.fit
 
 
-class DiagnosisPresentation(ResultPresentation[Diagnosis[Any]]):
+class DiagnosisPresentation(FittedPresentation[Diagnosis[Any]]):
     """The effects that a model misses."""
 
     def report(self) -> str:
@@ -127,13 +141,10 @@ class DiagnosisPresentation(ResultPresentation[Diagnosis[Any]]):
         """`rig.diagnosis/1`."""
         return diagnosis_document(self.result, self.result.fit.model.name)
 
-    def chart(self) -> Chart:
-        """The residual of the given model, or its Allan deviations."""
-        return view_of(self.result.findings.data).fit_chart(self.result.fit)
-
-    def pictures(self) -> Sequence[Picture]:
-        """The given model and the data."""
-        return view_of(self.result.findings.data).fit_album(self.result.fit)
+    @property
+    def fitted(self) -> tuple[Dataset[Any], Any]:
+        """The data, and the fit of the given model."""
+        return self.result.findings.data, self.result.fit
 
 
 class DiscoveryPresentation(ResultPresentation[Discovery[Any]]):

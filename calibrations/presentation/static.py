@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import re
-from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import singledispatch
 from html import escape
@@ -22,6 +21,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator, NullF
 
 from calibrations.errors import CalibrationError
 from calibrations.presentation import chart as c
+from calibrations.presentation.smaller_svg import compact
 from calibrations.text import tick_text
 
 RC: Any = {
@@ -65,6 +65,7 @@ SYMBOLS = {"circle": "o", "diamond": "D", "triangle-up": "^", "triangle-down": "
 FEW_MARKS, LONG_MARK = 4, 200.0  # marks of an axis whose values are so many times its range
 MOST_LEVEL = 8  # names on a horizontal axis; more are written aslant
 DROPPED = (r"<metadata>.*?</metadata>", r"<style.*?</style>", r' xmlns(:\w+)?="[^"]*"', r' (width|height)="[\d.]+pt"')
+REFERENCE = re.compile(r'(?:(?<=url\()|(?<=href="))#([\w.-]+)')
 
 
 class PictureError(CalibrationError):
@@ -343,59 +344,3 @@ def _note(s: c.Note, ax: Axes) -> None:
     ax.annotate(s.text, (s.x, s.y), (offset_px, up), xycoords=places, textcoords="offset points", ha=s.horizontal,
                 va="center" if s.vertical == "middle" else s.vertical, color=s.colour, fontsize=8.5,
                 rotation=90 if s.upright else 0, zorder=5)  # fmt: skip
-
-
-# Smaller SVG: fewer digits, each style once, no indentation
-
-
-MARKERS = re.compile(r'<g([^>]*)>\s*((?:<use [^>]*? style="([^"]*)"/>\s*)(?:<use [^>]*? style="\3"/>\s*)*)</g>')
-COORDINATES = re.compile(r' (?:x|y|d|width|height)="[^"]*"')
-POINTS = re.compile(r"(<g[^>]*>)<use [^>]*/>\s*</g>\s*(?:\1<use [^>]*/>\s*</g>\s*)+")
-REFERENCE = re.compile(r'(?:(?<=url\()|(?<=href="))#([\w.-]+)')
-OFTEN = 3  # times the same style
-FINE = re.compile(r"(\.\d\d)\d+")
-
-
-def compact(text: str) -> str:
-    """The same drawing in about a third of the bytes."""
-    text = MARKERS.sub(_hoist_style, text)
-    text = POINTS.sub(_merge_groups, text)
-    text = COORDINATES.sub(_round_attribute, text)
-    return re.sub(r">\n\s+<", ">\n<", text)
-
-
-def _hoist_style(match: re.Match[str]) -> str:
-    """The markers of one line, their common style given once."""
-    attributes, markers, style = match.groups()
-    repeated = f' style="{style}"'
-    return f"<g{attributes}{repeated}>{markers.replace(repeated, '')}</g>"
-
-
-def _merge_groups(match: re.Match[str]) -> str:
-    """Neighbouring markers of the same style in one group."""
-    opening, markers = match[1], match[0]
-    return f"{opening}{markers.replace(opening, '').replace('</g>', '')}</g>"
-
-
-def _round_attribute(match: re.Match[str]) -> str:
-    """One attribute with its numbers cut to two decimals, on one line."""
-    return " " + " ".join(FINE.sub(r"\1", match[0]).split())
-
-
-def compact_svg(text: str) -> str:
-    """The same drawing for a page that holds many: digits beyond 0.1 pt, names and words for machines left out."""
-    text = re.sub(r"<!DOCTYPE.*?>\s*|<metadata>.*?</metadata>\s*|<\?xml.*?\?>\s*", "", text, flags=re.DOTALL)
-    text = re.sub(r'<g id="[^"]*"', "<g", text).replace("font-family: 'DejaVu Sans', Verdana, sans-serif; ", "")
-    text = re.sub(r' transform="rotate\(-0 [^"]*"', "", text)
-    text = COORDINATES.sub(lambda match: re.sub(r"\.0(?=[ \"])", "", re.sub(r"(\.\d)\d+", r"\1", match[0])), text)
-    text = re.sub(r' d="M [-\d. L]*"', lambda path: path[0].replace(" L ", " "), text)
-    text = text.replace("<svg ", "<svg font-family=\"'DejaVu Sans', Verdana, sans-serif\" ", 1)
-    return re.sub(r">\n(?=</?[a-z])", ">", _classes(text)) + "\n"
-
-
-def _classes(text: str) -> str:
-    """Repeated styles are written once."""
-    often = [s for s, n in Counter(re.findall(r' style="([^"]*)"', text)).items() if n >= OFTEN]
-    for k, style in enumerate(often):
-        text = text.replace(f' style="{style}"', f' class="s{k}"')
-    return text.replace("</style>", "".join(f".s{k}{{{style}}}" for k, style in enumerate(often)) + "</style>", 1)

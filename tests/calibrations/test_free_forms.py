@@ -363,23 +363,3 @@ def test_the_hash_seed_of_the_process_changes_no_result() -> None:
     ]
     assert ends[0] == ends[1] == ends[2]
     assert "temperature-hysteresis" in ends[0]
-
-
-def bent_converter(vibration: float, bow: float, bend: float) -> Table:
-    """An unknown response of its own and rectified vibration of size `vibration`, V, before a bent converter."""
-    forces = forces_of_sweep()
-    n = len(forces)
-    level = 1 + 2 * np.abs(np.sin(0.37 * np.arange(n))) * np.random.default_rng(7).uniform(size=n)
-    added = 2e-3 * np.sin(4 * forces[:, :2]) + vibration * level[:, None] ** 2
-    v = np.array([2.5, 2.52]) + np.array([1.0, 0.97]) * forces[:, :2] + added
-    u = 2 * (v - (v.max() + v.min()) / 2) / np.ptp(v)
-    made = poses(added + bow * u**2 + bend * u**3)
-    return replace(made, columns={**made.columns, "vx_std_v": 8e-4 * level, "vy_std_v": 8e-4 * level})
-
-
-@pytest.mark.slow
-def test_an_unknown_response_before_a_bent_converter_gets_no_names_of_four_effects() -> None:
-    found = discover(bent_converter(vibration=3e-4, bow=7e-3, bend=-5e-3))
-    assert found.causes == ("vibration-rectification",)  # no saturation, dead zone or polynomial beside it
-    assert found.verdict is Verdict.UNEXPLAINED
-    assert found.findings.places[0].name == "own-response"
