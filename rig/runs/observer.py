@@ -11,14 +11,14 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from signal import Signals
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from calibrations.text import duration, in_milli
 from procedures.errors import NoAnswer
 from procedures.level_check import reversal
-from procedures.questions import Question
+from procedures.questions import Choice, Question
 from procedures.session import Guidance, Limits, Reading
 from rig.bench import Bench
 from rig.planning.plan import Plan
@@ -29,6 +29,7 @@ UNUSUAL = 2.0  # ratio to the usual scatter, up or down, above which it is shown
 REMEMBERED = 200  # dwells of a kind for the usual scatter
 
 Decision = Literal["resume", "repeat", "end"]
+NEXT_STEP = Choice("interrupted", "What should the run do next?", choices=get_args(Decision))
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ TEXTS = """() => [document.body.innerText, ...Array.from(document.querySelectorA
   each => each.contentDocument ? each.contentDocument.body.innerText : each.textContent)].join("\\n")"""
 GRAVE = ("serious", "critical")
 SWEEP, NOISE = "20260101-120000-sweep-000", "20260131-120000-noise-floor-000"
-PAGES = {  # address: what it shows when it is complete, and what the tab of the browser says
+PAGES = {  # address: an element of the complete page, and the title in the tab of the browser
     f"/?data={SWEEP}": (".card", f"Model of {SWEEP}"),
     f"/?data={NOISE}": ("[aria-label='The record'] .lines", f"Model of {NOISE}"),
     "/run": ("text=Turns alpha", "Run"),

@@ -10,6 +10,7 @@ import pexpect
 import pytest
 
 from rig.record import Record, Run
+from rig.runs.observer import NEXT_STEP
 from rig.runs.runner import REPEATED
 from tests.rig.rigging import POSES, SMALL_ARGUMENTS
 from tests.slow import first_fast
@@ -137,6 +138,6 @@ def test_sigterm_ends_a_guided_run_without_a_menu() -> None:
         terminal.kill(signal.SIGTERM)
         terminal.expect("stopped by another program")
         terminal.expect(pexpect.EOF)
-        assert "Continue?" not in (terminal.before or "")
+        assert NEXT_STEP.text not in (terminal.before or "")
     assert terminal.exitstatus == 4
     assert only_run()[0].state == "stopped"

@@ -25,11 +25,10 @@ from rig.files import free_bytes, home, write_whole
 from rig.planning.plan import Plan
 from rig.planning.preparation import mounting
 from rig.record import Kept
-from rig.runs.observer import RunViewer
+from rig.runs.observer import NEXT_STEP, RunViewer
 from rig.runs.runner import Decision, Outcome
 
 BEGIN = Choice("begin", "Begin?", choices=("go", "cancel"))
-NEXT = Choice("interrupted", "Continue?", choices=("resume", "repeat", "end"))
 FRAMES_HZ = 8
 
 
@@ -100,7 +99,7 @@ class Guide(RunViewer):
         self._console.print(str(outcome.error), style="yellow", highlight=False)
         self._console.print(_choices(self.view.kept, outcome))
         try:
-            return cast(Decision, self._prompt(NEXT, "resume"))
+            return cast(Decision, self._prompt(NEXT_STEP, "resume"))
         except NoAnswer:
             return "end"
 

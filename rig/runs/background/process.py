@@ -14,7 +14,7 @@ from typing import cast
 
 from procedures.catalogue import find
 from procedures.errors import BadAnswer
-from procedures.questions import Choice, Question
+from procedures.questions import Question
 from procedures.settings import parse
 from rig.bench import Bench
 from rig.errors import Stopped
@@ -23,12 +23,12 @@ from rig.lease import lease
 from rig.record import Record
 from rig.record.push import push_after
 from rig.runs.background.status import Order, StatusWriter, file, lock, open_question
+from rig.runs.observer import NEXT_STEP
 from rig.runs.runner import Decision, Outcome, resume, start
 from rig.runs.signals import who_stopped
 
 PAUSE = signal.SIGINT  # by which a page pauses a run
 LONGEST = 4096  # bytes of an answer, which a pipe hands over in one piece
-NEXT_STEP = Choice("interrupted", "What now?", choices=("resume", "repeat", "end"))
 
 
 class Attendant(StatusWriter):
