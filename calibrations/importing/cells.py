@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import date, timedelta
+from itertools import chain, islice
 from typing import Literal
 
 from calibrations.errors import DataError
@@ -76,6 +77,7 @@ MOST_SKIPPED = 0.01  # of the lines, unless a person asks for more
 MOST_ASKED = 0.5  # of the lines in any case
 SHOWN = 3
 BEYOND = 10.0  # times the largest of the other values: a number that lost its exponent
+BATCH = 1000  # lines
 FEWEST_OF_LOG = 100  # lines: a shorter table may be typed by hand, its last line without an end
 
 Policy = Literal["few", "skip", "refuse"]
@@ -129,6 +131,15 @@ class Lines:
         for line in self.lines:
             self.last = line
             yield line
+
+    def in_batches(self) -> Iterator[str]:
+        """The lines for a reader that needs `last` at the end alone: without work in Python for each line."""
+        return chain.from_iterable(self._batches())
+
+    def _batches(self) -> Iterator[list[str]]:
+        while batch := list(islice(self.lines, BATCH)):
+            self.last = batch[-1]
+            yield batch
 
     def may_be_cut(self, cell: str, sample: Sequence[Sequence[str]], in_doubt: bool) -> bool:
         """Whether the last line has no end, and its last `cell` has lost digits, as other rows show.

@@ -327,7 +327,7 @@ def _at_once(sheet: Sheet) -> Array | None:
     comma = sheet.separator != "," and any("," in cell for row in sheet.sample for cell in row)
     with sheet.source.lines() as opened:
         lines = Lines(opened)
-        numeric = (line.replace(",", ".") for line in lines) if comma else iter(lines)
+        numeric = (line.replace(",", ".") for line in lines) if comma else lines.in_batches()
         try:
             for _ in range(sheet.first - 1):
                 next(numeric)
