@@ -1,4 +1,4 @@
-"""Turns in which an output of the gyroscope reached the end of its range. Its integral is too small by an unknown amount.
+"""Turns in which an output reached the end of its range: the integral is too small by an unknown amount.
 
 A clipped output repeats its extreme value, and leaves it steeply. An output of coarse steps repeats it too, at the peak
 of a turn, but leaves it as a parabola does: twice as far from the peak it is four steps lower.
