@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from matplotlib.text import Annotation
 
 from calibrations.analyses.hand_turns import fit_turns
 from calibrations.discovery.findings import Step
@@ -299,6 +300,10 @@ def test_the_diamond_of_unseen_rows_covers_no_text_of_a_short_bar() -> None:
     assert [bool(text.strip()) for text in bars["text"]] == [True, False, False]
     starts = [(note["text"].strip(), 10 ** note["x"], note["y"]) for note in shown["layout"]["annotations"]]
     assert starts == [("1.00 × (0.1 mg)", pytest.approx(1.6), 1), ("1.20 × (0.1 mg)", pytest.approx(1.2), 2)]
+    printed = [
+        text for text in draw(chart).axes[0].texts if isinstance(text, Annotation) and "0.1 mg" in text.get_text()
+    ]
+    assert [text.xy for text in printed] == [(pytest.approx(1.6), 1), (pytest.approx(1.2), 2)]
 
 
 def test_the_name_of_a_model_with_many_effects_leaves_room_for_bars() -> None:
