@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import sys
 from collections.abc import Callable
@@ -17,6 +18,7 @@ from tests.slow import first_fast
 
 pytestmark = pytest.mark.sockets
 
+MENU = f"{re.escape(NEXT_STEP.text)}.*:"
 LONG = ("--step-deg", "10", "--dwell-s", "0.2", "--inclinations-deg", "90,45")  # time to press a key
 LONG_POSES = 148
 UNDER_WAY = rf"deg.*[1-9]\d*/{LONG_POSES} poses"
@@ -64,7 +66,7 @@ def test_a_guided_run_asks_shows_and_ends() -> None:
         terminal.expect("answer with yes or no")
         terminal.sendline("no")
         terminal.expect("is no; correct this")
-        terminal.expect("Continue.*:")
+        terminal.expect(MENU)
         terminal.sendline("resume")
         terminal.expect("Is the sensor mounted face up.*:")
         terminal.sendline("yes")
@@ -94,7 +96,7 @@ def test_ctrl_c_stops_and_a_person_has_it_go_on(wish: str, excluded: list[str]) 
     with begun(*LONG) as terminal:
         terminal.expect(UNDER_WAY)
         press_ctrl_c(terminal)
-        terminal.expect("Continue.*:")
+        terminal.expect(MENU)
         assert only_run()[0].state == "stopped"
         terminal.sendline(wish)
         terminal.expect(f"complete, {LONG_POSES + len(excluded)} poses", timeout=120)
@@ -121,7 +123,7 @@ def test_the_menu_ends_a_run_that_can_be_resumed(end: str) -> None:
     with begun(*LONG) as terminal:
         terminal.expect(UNDER_WAY)
         press_ctrl_c(terminal)
-        terminal.expect("Continue.*:")
+        terminal.expect(MENU)
         ENDS[end](terminal)
         terminal.expect("`rig resume .*` continues the run")
         terminal.expect(pexpect.EOF)
