@@ -146,8 +146,10 @@ class Lines:
 
         Integers of different lengths, and numbers of which some have an exponent, do not show it: then `in_doubt`.
         """
+        if self.last.endswith("\n") or not is_number(cell):
+            return False
         others = [row[-1] for row in sample[:-1] if is_number(row[-1])]
-        if self.last.endswith("\n") or not is_number(cell) or len(others) < FEWEST_OF_LOG:
+        if len(others) < FEWEST_OF_LOG:
             return False
         digits = _decimals if all(map(_decimals, others)) else _length
         least, most = min(map(digits, others)), max(map(digits, others))
