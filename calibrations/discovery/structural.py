@@ -7,7 +7,7 @@ and so does a place without a cause: the error falls, and the cause remains unkn
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from calibrations.criteria import MATERIAL, MOST_UNEXPLAINED, SIGNIFICANT
@@ -90,45 +90,61 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     """The effects and free forms that the model of `start` misses."""
     basic = [name for name in BASIC if name in effects and not start.model.holds(name)]
     base = _fit_each_axis(start, basic, effects)
-    from_stairs, remaining_share = _fit_before_stairs(base, effects)
-    remarks: tuple[str, ...] = ()
     stated_white = start.problem.white
-    if from_stairs is not None and (from_stairs.end.held_out_excess <= MATERIAL or remaining_share < MOST_UNEXPLAINED):
-        best = from_stairs
-    else:
-        places = structure(base, effects)
-        if places.floor_source is not FloorSource.SAMPLES and start.noise.known:
-            start, base = (fit(f.model, with_white(f.table, places.white)) for f in (start, base))
-            remarks = (f"The noise floor is that of the residual: {places.floor_source}.",)
-        best = _fit_structure(base, places, effects)
-        if (
-            from_stairs is not None
-            and not remarks
-            and from_stairs.end.held_out_excess < min(best.end.held_out_excess, NEARLY)
-        ):
-            best = from_stairs
-    places, causes, forms, end = best.structure, best.causes, best.forms, best.end
-    needed_effects = [name for name in basic if chance(*first_order_cost(end, name, shared=True)) < SIGNIFICANT]
-    selected = [*largest_first(at_values_of(end, causes), end, places), *at_values_of(end, forms)]
+    base, best, floor = _best_structure(base, effects)
+    remarks: tuple[str, ...] = ()
+    if floor is not None:
+        start = fit(start.model, with_white(start.table, best.structure.white))
+        remarks = (f"The noise floor is that of the residual: {floor}.",)
+    needed = [name for name in basic if chance(*first_order_cost(best.end, name, shared=True)) < SIGNIFICANT]
     report("fitting the model with one effect more at a time")
-    if needed_effects != basic:
-        base = _fit_each_axis(start, needed_effects, effects)
-        end = fit_together(base, selected)
-    accepted_additions, fits = fit_gradually(base, selected, end)
-    if fits[-1].pooled_excess < NO_WORSE * end.pooled_excess:
-        selected, end = accepted_additions, fits[-1]
-    else:
-        fits = [base, *fit_successively(base, end, selected)]
-    selected, fits = _without_idle_additions(selected, fits, places.causes)
-    if remarks and stated_white is not None:
+    if needed != basic:
+        base = _fit_each_axis(start, needed, effects)
+    selected, fits = _fit_each_addition(base, best, renew=needed != basic)
+    if floor is not None and stated_white is not None:
         fits[-1] = with_least_white(fits[-1], stated_white)
-    end = fits[-1]
-    forms = [a for a in selected if a.effect.name.startswith(PREFIX)]
-    steps = _steps(start, needed_effects, base, effects)
+    steps = _steps(start, needed, base, effects)
     steps += [Step(a.effect.name, *pair) for a, pair in zip(selected, pairwise(fits), strict=True)]
     report("testing each effect alone")
     ranked = _first(start, steps, candidates(start, effects))
-    return StructuralSearch(start, tuple(steps), places, ranked, causes_alone(end, forms), remarks)
+    forms = [a for a in selected if a.effect.name.startswith(PREFIX)]
+    return StructuralSearch(start, tuple(steps), best.structure, ranked, causes_alone(fits[-1], forms), remarks)
+
+
+def _best_structure(base: Fit, effects: Mapping[str, Effect]) -> tuple[Fit, _StructureFit, FloorSource | None]:
+    """The structure that leaves the smaller error: of the outputs, or of the outputs before a coarse converter.
+
+    With the fit that it is based on, and the source of the noise floor if the stated floor does not hold.
+    """
+    from_stairs, remaining_share = _fit_before_stairs(base, effects)
+    if from_stairs is not None and (from_stairs.end.held_out_excess <= MATERIAL or remaining_share < MOST_UNEXPLAINED):
+        return base, from_stairs, None
+    places = structure(base, effects)
+    if places.floor_source is not FloorSource.SAMPLES and base.noise.known:
+        base = fit(base.model, with_white(base.table, places.white))
+        return base, _fit_structure(base, places, effects), places.floor_source
+    best = _fit_structure(base, places, effects)
+    if from_stairs is not None and from_stairs.end.held_out_excess < min(best.end.held_out_excess, NEARLY):
+        best = from_stairs
+    return base, best, None
+
+
+def _fit_each_addition(base: Fit, best: _StructureFit, renew: bool) -> tuple[list[Addition], list[Fit]]:
+    """The additions of a structure in their order, and the fits from `base` to the last: one addition more in each.
+
+    `renew`: whether `base` is another one than that of the structure's fit.
+    """
+    end = best.end
+    causes = largest_first(at_values_of(end, best.causes), end, best.structure)
+    selected = [*causes, *at_values_of(end, best.forms)]
+    if renew:
+        end = fit_together(base, selected)
+    accepted, fits = fit_gradually(base, selected, end)
+    if fits[-1].pooled_excess < NO_WORSE * end.pooled_excess:
+        selected = accepted
+    else:
+        fits = [base, *fit_successively(base, end, selected)]
+    return _without_idle_additions(selected, fits, best.structure.causes)
 
 
 def _without_idle_additions(
@@ -175,42 +191,56 @@ class _StructureFit:
 def _fit_structure(base: Fit, places: Structure, effects: Mapping[str, Effect]) -> _StructureFit:
     """Fit of the causes and free forms of a structure; if its residual is more than noise, with the forms renewed."""
     report("fitting the effects and curves that were found")
-    all_additions = additions(places, base.model, effects)
-    causes = fit_separately(base, places, all_additions)
-    forms = free_additions(places, base.model)
+    joint = _fit_jointly(base, places, additions(places, base.model, effects))
+    renewed = _with_renewed_forms(base, joint, effects)
+    if renewed.end.held_out_excess > MATERIAL:
+        small = start_small_at_forms(at_values_of(renewed.end, renewed.causes), renewed.forms)
+        end = fit_together(base, [*small, *renewed.forms]) if small else renewed.end
+        if end.held_out_excess < renewed.end.held_out_excess:
+            return replace(renewed, causes=small, end=end)
+    return renewed
+
+
+def _fit_jointly(base: Fit, places: Structure, found: list[Addition]) -> _StructureFit:
+    """The fit of all causes and free forms together, or one after another where the joint fit diverges.
+
+    A converter rounds the whole output, not the remainder of other places: its companions also start as they were
+    found, and the model without the converter is kept if it is as good.
+    """
+    causes, forms = fit_separately(base, places, found), free_additions(places, base.model)
     end = fit_together(base, [*causes, *forms])
-    if any(
-        a.effect.rounds for a in all_additions
-    ):  # the converter rounds the whole output, and not the remainder of other places
-        as_searched = [a if a.effect.rounds else separate for a, separate in zip(all_additions, causes, strict=True)]
-        alternative = fit_together(base, [*as_searched, *forms])
+    if any(a.effect.rounds for a in found):
+        as_found = [a if a.effect.rounds else separate for a, separate in zip(found, causes, strict=True)]
+        alternative = fit_together(base, [*as_found, *forms])
         if alternative.pooled_excess < end.pooled_excess:
-            causes, end = as_searched, alternative
+            causes, end = as_found, alternative
         smooth = [a for a in causes if not a.effect.rounds]
         alternative = fit_together(base, [*smooth, *forms])
-        if alternative.pooled_excess < NO_WORSE * end.pooled_excess:  # as well without
+        if alternative.pooled_excess < NO_WORSE * end.pooled_excess:
             causes, end = smooth, alternative
     if end.pooled_excess > base.pooled_excess:  # the joint fit diverged
-        accepted_additions, fits = fit_gradually(base, [*causes, *forms])
-        causes, forms = (
-            [a for a in accepted_additions if a.effect.name.startswith(PREFIX) is free] for free in (False, True)
-        )
+        accepted, fits = fit_gradually(base, [*causes, *forms])
+        causes, forms = ([a for a in accepted if a.effect.name.startswith(PREFIX) is free] for free in (False, True))
         end = fits[-1]
-    reached = places.follows_noise and float(rms(end.residual.ravel())) <= AS_SEARCHED * places.result.error
-    given = any(a.effect.name not in BASE for a in causes)  # bias, scale factor and geometry are free in every search
-    if given and end.held_out_excess > MATERIAL and not end.problem.rounds and not reached:
-        # a new search, given the fitted causes, so that the forms describe the remainder of these
-        places_beside = structure(causes_alone(end, forms), effects)
-        refined = fit_separately(base, places_beside, additions(places_beside, end.model, effects))
-        forms_beside = [*refined, *free_additions(places_beside, base.model)]
-        alternative = fit_together(base, [*at_values_of(end, causes), *forms_beside])
-        if alternative.held_out_excess < end.held_out_excess:
-            causes, forms, end = at_values_of(end, causes), forms_beside, alternative
-    if end.held_out_excess > MATERIAL and (small := start_small_at_forms(at_values_of(end, causes), forms)):
-        alternative = fit_together(base, [*small, *forms])
-        if alternative.held_out_excess < end.held_out_excess:
-            causes, end = small, alternative
     return _StructureFit(places, causes, forms, end)
+
+
+def _with_renewed_forms(base: Fit, found: _StructureFit, effects: Mapping[str, Effect]) -> _StructureFit:
+    """The fit with the free forms of a new search that is given the fitted causes, if that lowers the unseen error.
+
+    The forms then describe the remainder of these causes. Bias, scale factor and geometry are free in every search, so
+    that a new one needs another cause.
+    """
+    end, places = found.end, found.structure
+    reached = places.follows_noise and float(rms(end.residual.ravel())) <= AS_SEARCHED * places.result.error
+    given = any(a.effect.name not in BASE for a in found.causes)
+    if not given or reached or end.problem.rounds or end.held_out_excess <= MATERIAL:
+        return found
+    places_beside = structure(causes_alone(end, found.forms), effects)
+    refined = fit_separately(base, places_beside, additions(places_beside, end.model, effects))
+    causes, forms = at_values_of(end, found.causes), [*refined, *free_additions(places_beside, base.model)]
+    renewed = replace(found, causes=causes, forms=forms, end=fit_together(base, [*causes, *forms]))
+    return renewed if renewed.end.held_out_excess < end.held_out_excess else found
 
 
 def _fit_before_stairs(base: Fit, effects: Mapping[str, Effect]) -> tuple[_StructureFit | None, float]:

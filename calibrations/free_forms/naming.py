@@ -82,33 +82,49 @@ def places(result: SearchResult) -> list[ActingPlace]:
         place: _project_off(Q, np.sum([_part(result, n, b) for n in names], axis=0))
         for place, names in by_place.items()
     }
-    sizes = {place: float(np.sqrt(np.mean(curve**2))) for place, curve in curves.items()}
-    largest = max(sizes.values(), default=0.0)
-    acting_places = []
-    for place, names in by_place.items():
-        causes, share = _name_effects(result, place, names, curves[place], Q, b)
-        walks = all("/walk-" in name for name in names)  # they follow anything, the errors of readings too
-        curved = walks or not any(result.component(name).cause for name in names)  # no form of the catalogue acts
-        followed = _find_followed_column(result, curves, place, Q, 0.0 if walks else share) if curved else None
-        if followed is not None:
-            causes, share = (followed[0].cause,), followed[1]
-        gain, alternatives = gain_and_rivals(
-            result, names, {larger_place for larger_place in sizes if sizes[place] < FORM_OF * sizes[larger_place]}
-        )
-        replacements = [replacements_of(result, names, causes, cause) for cause in causes] if len(names) > 1 else []
-        alternatives = tuple(sorted({*alternatives, *(name for each in replacements for name in each)} - set(causes)))
-        least = LEAST_SHARE * largest
-        if walks:
-            least = max(LEAST_UNKNOWN_SHARE * largest, READING_ERRORS * _reading_errors(result, sizes))
-        # a place without a form of the catalogue, or smaller than the excess of the residual, is more often a remainder
-        least_own = min(LEAST_SIZE, max(LEAST_OWN, _excess(result))) if causes else LEAST_SIZE
-        own_size = _size_of_unshared_part(result, gain)
-        material = own_size >= least_own and sizes[place] >= max(LEAST_SIZE, least)
-        curve = curves[place].reshape(result.white.shape) * result.white
-        constants = followed[0].constants if followed else ()
-        details = tuple(names), causes, share, material, gain, alternatives, curve, constants
-        acting_places.append(ActingPlace(place, sizes[place], own_size, largest, *details))
+    acting_places = [_acting_place(result, place, names, curves, Q) for place, names in by_place.items()]
     return _with_substitutes(result, sorted(acting_places, key=lambda p: -p.size))
+
+
+def _acting_place(
+    result: SearchResult, place: str, names: Sequence[str], curves: Mapping[str, Array], Q: Array
+) -> ActingPlace:
+    """One place, of which the components `names` act, with its causes and what the data cannot separate from them."""
+    sizes = {each: float(np.sqrt(np.mean(curve**2))) for each, curve in curves.items()}
+    size, largest = sizes[place], max(sizes.values())
+    causes, share, constants = _causes_of_place(result, place, names, curves, Q)
+    gain, alternatives = gain_and_rivals(result, names, {other for other in sizes if size < FORM_OF * sizes[other]})
+    replacements = [replacements_of(result, names, causes, cause) for cause in causes] if len(names) > 1 else []
+    alternatives = tuple(sorted({*alternatives, *(name for each in replacements for name in each)} - set(causes)))
+    own = _size_of_unshared_part(result, gain)
+    least = LEAST_SHARE * largest
+    if _all_walk(names):
+        least = max(LEAST_UNKNOWN_SHARE * largest, READING_ERRORS * _reading_errors(result, sizes))
+    # a place without a form of the catalogue, or smaller than the excess of the residual, is more often a remainder
+    least_own = min(LEAST_SIZE, max(LEAST_OWN, _excess(result))) if causes else LEAST_SIZE
+    material = own >= least_own and size >= max(LEAST_SIZE, least)
+    curve = curves[place].reshape(result.white.shape) * result.white
+    return ActingPlace(
+        place, size, own, largest, tuple(names), causes, share, material, gain, alternatives, curve, constants
+    )
+
+
+def _all_walk(names: Sequence[str]) -> bool:
+    """Whether the components are random walks, which follow anything, the errors of readings too."""
+    return all("/walk-" in name for name in names)
+
+
+def _causes_of_place(
+    result: SearchResult, place: str, names: Sequence[str], curves: Mapping[str, Array], Q: Array
+) -> tuple[tuple[str, ...], float, tuple[tuple[str, float], ...]]:
+    """The causes of a place's curve, their share of its variance, and constants of a cause that is of another place."""
+    causes, share = _name_effects(result, place, names, curves[place], Q, result.setting.base_size)
+    walks = _all_walk(names)
+    if walks or not any(result.component(name).cause for name in names):  # no form of the catalogue acts
+        followed = _find_followed_column(result, curves, place, Q, 0.0 if walks else share)
+        if followed is not None:
+            return (followed[0].cause,), followed[1], followed[0].constants
+    return causes, share, ()
 
 
 def _size_of_unshared_part(result: SearchResult, gain: float) -> float:
