@@ -203,6 +203,11 @@ class Chart:
     share_y: bool = False
     bar: Scale | None = None  # of the colours, to the right of the panels
 
+    @property
+    def heights(self) -> list[float]:
+        """Inches of each row."""
+        return [self.height] * len(self.panels) if isinstance(self.height, int | float) else list(self.height)
+
 
 @dataclass(frozen=True)
 class Picture:

@@ -101,21 +101,18 @@ def _one_bar_a_scale(data: Sequence[Trace]) -> None:
 
 def height_px(chart: c.Chart) -> int:
     """How high a chart of several rows should be."""
-    heights = [chart.height] if isinstance(chart.height, (int, float)) else chart.height
-    rows = len(chart.panels) if isinstance(chart.height, (int, float)) else 1
-    return round(rows * sum(heights) * INCH_PX + ROW_GAP)
+    return round(sum(chart.heights) * INCH_PX + ROW_GAP)
 
 
 def _places(chart: c.Chart) -> Iterator[tuple[c.Panel, list[float] | None, list[float] | None]]:
-    rows = len(chart.panels)
-    heights = [chart.height] * rows if isinstance(chart.height, (int, float)) else list(chart.height)
-    total, top = sum(heights), 1.0
+    total, top = sum(chart.heights), 1.0
     gap = ROW_GAP / (total * INCH_PX)
-    for row, height in zip(chart.panels, heights, strict=True):
+    for row, height in zip(chart.panels, chart.heights, strict=True):
         bottom = top - height / total
         for j, panel in enumerate(row):
             x = None if len(row) == 1 else [j / len(row) + COLUMN_GAP * (j > 0), (j + 1) / len(row)]
-            yield panel, x, None if rows == 1 else [min(max(bottom, 0.0) + gap * (bottom > 1e-9), top), top]
+            y = None if len(chart.panels) == 1 else [min(max(bottom, 0.0) + gap * (bottom > 1e-9), top), top]
+            yield panel, x, y
         top = bottom
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
 from calibrations.documents import comparison_document, diagnosis_document, discovery_document, fit_document
@@ -19,50 +19,23 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from calibrations.discovery.dataset import Dataset
-    from calibrations.noise.analysis import NoiseAnalysis
     from calibrations.presentation.chart import Chart, Picture
-
-R = TypeVar("R", bound=Result)
-
-
-def presentation_of(result: Result) -> Presentation:
-    """The forms of a result. Raises TypeError for a class that has none."""
-    if isinstance(result, Fit):
-        return FitPresentation(result)
-    if isinstance(result, Comparison):
-        return ComparisonPresentation(result)
-    if isinstance(result, Diagnosis):
-        return DiagnosisPresentation(result)
-    if isinstance(result, Discovery):
-        return DiscoveryPresentation(result)
-    from calibrations.noise.analysis import NoiseAnalysis  # the noise engine takes 0.3 s to load; tables need none
-
-    if isinstance(result, NoiseAnalysis):
-        return NoisePresentation(result)
-    raise TypeError(f"calibrations.presentation.results has no presentation of a {type(result).__name__}")
 
 
 @dataclass(frozen=True)
-class ResultPresentation(ABC, Generic[R]):
-    """The forms of one result. Text loads no charts, and charts load no matplotlib before they are drawn."""
+class ResultPresentation:
+    """The forms of one result. Text loads no charts, and charts load no matplotlib before they are drawn.
 
-    result: R
+    report    the result as text for people
+    to_dict   the JSON document of the result
+    chart     the chart that shows the result best
+    pictures  the pictures of the report
+    """
 
-    @abstractmethod
-    def report(self) -> str:
-        """The result as text for people."""
-
-    @abstractmethod
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the result."""
-
-    @abstractmethod
-    def chart(self) -> Chart:
-        """The chart that shows the result best."""
-
-    @abstractmethod
-    def pictures(self) -> Sequence[Picture]:
-        """The pictures of the report."""
+    report: Callable[[], str]
+    to_dict: Callable[[], dict[str, Any]]
+    chart: Callable[[], Chart]
+    pictures: Callable[[], Sequence[Picture]]
 
     def plot(self) -> Figure:
         """The chart, drawn by matplotlib."""
@@ -77,120 +50,52 @@ class ResultPresentation(ABC, Generic[R]):
         return result_html(self.report(), self.pictures())
 
 
-class FittedPresentation(ResultPresentation[R]):
-    """The forms of a result whose pictures are those of one fit."""
-
-    @property
-    @abstractmethod
-    def fitted(self) -> tuple[Dataset[Any], Any]:
-        """The data and the fit that the pictures show."""
-
-    def chart(self) -> Chart:
-        """The residual, or the Allan deviations."""
-        data, fit = self.fitted
-        return view_of(data).fit_chart(fit)
-
-    def pictures(self) -> Sequence[Picture]:
-        """Measurement and model, the residual, and its pattern."""
-        data, fit = self.fitted
-        return view_of(data).fit_album(fit)
-
-
-class FitPresentation(FittedPresentation[Fit]):
-    """A model fitted to a table."""
-
-    def report(self) -> str:
-        """The parameters with their uncertainties, and the error of each channel with the noise floor."""
-        return fit_text(self.result)
-
-    def to_dict(self) -> dict[str, Any]:
-        """`rig.fit/1`."""
-        return fit_document(dataset(self.result.table), self.result, None)
-
-    @property
-    def fitted(self) -> tuple[Dataset[Any], Any]:
-        """The data, and the fit."""
-        return dataset(self.result.table), self.result
+def presentation_of(result: Result) -> Presentation:
+    """The forms of a result. Raises TypeError for a class that has none."""
+    if isinstance(result, Fit):
+        data = dataset(result.table)
+        return _fitted(data, result, partial(fit_text, result), partial(fit_document, data, result, None))
+    if isinstance(result, Comparison):
+        document = partial(comparison_document, result, result.fit.model.name)
+        return _fitted(result.data, result.fit, partial(comparison_text, result), document)
+    if isinstance(result, Diagnosis):
+        document = partial(diagnosis_document, result, result.fit.model.name)
+        return _fitted(result.findings.data, result.fit, partial(diagnosis_text, result), document)
+    if isinstance(result, Discovery):
+        view, document = view_of(result.findings.data), partial(discovery_document, result, None)
+        return ResultPresentation(
+            partial(_discovery_report, result), document, partial(view.steps_chart, result),
+            partial(view.steps_album, result),
+        )  # fmt: skip
+    return _noise(result)
 
 
-class ComparisonPresentation(FittedPresentation[Comparison[Any]]):
-    """A model against data."""
-
-    def report(self) -> str:
-        """The error of each channel, and the places where the model fails."""
-        return comparison_text(self.result)
-
-    def to_dict(self) -> dict[str, Any]:
-        """`rig.comparison/1`."""
-        return comparison_document(self.result, self.result.fit.model.name)
-
-    @property
-    def fitted(self) -> tuple[Dataset[Any], Any]:
-        """The data, and the fit of the model."""
-        return self.result.data, self.result.fit
+def _fitted(
+    data: Dataset[Any], fit: Any, report: Callable[[], str], document: Callable[[], dict[str, Any]]
+) -> ResultPresentation:
+    """A result whose pictures are those of one fit."""
+    view = view_of(data)
+    return ResultPresentation(report, document, partial(view.fit_chart, fit), partial(view.fit_album, fit))
 
 
-class DiagnosisPresentation(FittedPresentation[Diagnosis[Any]]):
-    """The effects that a model misses."""
-
-    def report(self) -> str:
-        """The verdict on the given model, its candidates, and the best of them."""
-        return diagnosis_text(self.result)
-
-    def to_dict(self) -> dict[str, Any]:
-        """`rig.diagnosis/1`."""
-        return diagnosis_document(self.result, self.result.fit.model.name)
-
-    @property
-    def fitted(self) -> tuple[Dataset[Any], Any]:
-        """The data, and the fit of the given model."""
-        return self.result.findings.data, self.result.fit
+def _discovery_report(result: Discovery[Any]) -> str:
+    """The error after each step, the verdict, and the final model."""
+    return f"{result.findings.data.description}\n\n{discovery_text(result)}\n\n{result.model.params}"
 
 
-class DiscoveryPresentation(ResultPresentation[Discovery[Any]]):
-    """The effects that were missing, and the final model."""
+def _noise(result: Result) -> ResultPresentation:
+    """Coefficients, density and Allan deviation of each channel of a still record."""
+    from calibrations.noise.analysis import NoiseAnalysis, noise_document  # takes 0.3 s to load; tables need none
+    from calibrations.presentation.noise_text import summary
 
-    def report(self) -> str:
-        """The error after each step, the verdict, and the final model."""
-        result = self.result
-        return f"{result.findings.data.description}\n\n{discovery_text(result)}\n\n{result.model.params}"
+    if not isinstance(result, NoiseAnalysis):
+        raise TypeError(f"calibrations.presentation.results has no presentation of a {type(result).__name__}")
 
-    def to_dict(self) -> dict[str, Any]:
-        """`rig.discovery/1`."""
-        return discovery_document(self.result, None)
-
-    def chart(self) -> Chart:
-        """Error by model."""
-        return view_of(self.result.findings.data).steps_chart(self.result)
-
-    def pictures(self) -> Sequence[Picture]:
-        """Error by model, and the signal of each effect."""
-        return view_of(self.result.findings.data).steps_album(self.result)
-
-
-class NoisePresentation(ResultPresentation[Any]):
-    """The noise of a still record."""
-
-    result: NoiseAnalysis
-
-    def report(self) -> str:
-        """Coefficients, density and Allan deviation of each channel."""
-        from calibrations.presentation.noise_text import summary
-
-        return summary(self.result)
-
-    def to_dict(self) -> dict[str, Any]:
-        """`rig.noise/1`."""
-        from calibrations.noise.analysis import noise_document
-
-        return noise_document(self.result)
-
-    def chart(self) -> Chart:
-        """The Allan deviation of the first channel."""
-        return self.pictures()[0].chart
-
-    def pictures(self) -> Sequence[Picture]:
-        """Allan deviation and spectrum of each channel."""
+    def album() -> Sequence[Picture]:
         from calibrations.presentation.charts.noise import noise_album
 
-        return noise_album(self.result)
+        return noise_album(result)
+
+    return ResultPresentation(
+        partial(summary, result), partial(noise_document, result), lambda: album()[0].chart, album
+    )

@@ -82,11 +82,10 @@ class NotebookFigure(Figure):
 def draw(chart: c.Chart) -> Figure:
     """The chart as a matplotlib figure."""
     rows, columns = len(chart.panels), max(map(len, chart.panels))
-    heights = [chart.height] * rows if isinstance(chart.height, (int, float)) else list(chart.height)
     with rc_context(RC):
-        figure = NotebookFigure(figsize=(chart.width, sum(heights) + 0.5))
+        figure = NotebookFigure(figsize=(chart.width, sum(chart.heights) + 0.5))
         share: Any = {"sharex": "col" if chart.share_x else False, "sharey": "row" if chart.share_y else False}
-        axes = figure.subplots(rows, columns, squeeze=False, height_ratios=heights, **share)
+        axes = figure.subplots(rows, columns, squeeze=False, height_ratios=chart.heights, **share)
         for k, row in enumerate(chart.panels):
             for j in range(columns):
                 if j < len(row):

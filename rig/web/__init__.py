@@ -4,8 +4,9 @@
     guard      the token of the user; token, host and origin of every request and websocket
     frame      what all pages share: navigation, the run under way, light and dark, keys
     desk       state that all pages share: open data, models with their added effects, reports
+    parts      boxes, tables, messages
+    pictures   charts that Plotly draws, with their downloads
     pages      one a file, in pages/
-    figures    pictures as values that Plotly draws, in figures/
 
-No page computes: what is asked for is done by `calibrations`, `procedures` and the rest of `rig`, off the event loop.
+No page computes. It calls `calibrations`, `procedures` and the rest of `rig`, outside the event loop.
 """

@@ -158,7 +158,6 @@ def lab_read() -> str | None:
 
 def models(selected: str = "", default: str | None = "by kind of data") -> dict[str, str]:
     """The available models by name or file, with their labels; "" is the default model, where there is one."""
-
     labels = {} if default is None else {"": default}
     labels |= {name: name for name in shipped_names()} | saved_models()
     return labels if selected in labels else {**labels, selected: selected}

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import log10
 
 import numpy as np
 
 from calibrations.analyses.motion import MotionResult
-from calibrations.discovery.findings import Step
+from calibrations.discovery.findings import F, Step
 from calibrations.discovery.results import Comparison, Discovery
 from calibrations.fitting.fit import Fit, milli_unit, pool_in_milli
 from calibrations.presentation.chart import (
@@ -74,13 +74,13 @@ class Measure:
 
 def levels(steps: Falling) -> list[Level]:
     """The model as it was, then each effect added."""
-    start = Level(
-        brief(steps.start.model.name), steps.start.pooled_excess, steps.start.held_out_excess, error_text(steps.start)
-    )
-    later_levels = [
-        Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, error_text(s.after)) for s in steps.steps
-    ]
-    return [start, *later_levels]
+    return model_levels(steps.start, steps.steps, error_text)
+
+
+def model_levels(start: F, steps: Sequence[Step[F]], text: Callable[[F], str]) -> list[Level]:
+    """The model as it was, then each effect added; `text` writes the error of a fit with its unit."""
+    first = Level(brief(start.model.name), start.pooled_excess, start.held_out_excess, text(start))
+    return [first, *(Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, text(s.after)) for s in steps)]
 
 
 def brief(model: str) -> str:

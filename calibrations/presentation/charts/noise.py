@@ -41,7 +41,7 @@ from calibrations.presentation.chart import (
     side_by_side,
     single_chart,
 )
-from calibrations.presentation.charts.discovery import Level, Measure, waterfall
+from calibrations.presentation.charts.discovery import Measure, model_levels, waterfall
 from calibrations.spectrum import GAUSS_MARKOV
 from calibrations.table import MILLI, Array, in_time
 from calibrations.text import rounded
@@ -191,18 +191,9 @@ def record(channel: Channel, scaled: Scaled) -> Panel:
     return Panel((line,), Axis(x), Axis(y))
 
 
-def levels(start: NoiseFit, steps: Sequence[Step[NoiseFit]]) -> list[Level]:
-    """Error by model of a noise model: the mismatch of its spectrum, and that of its Allan deviation."""
-    first = Level(start.model.name, start.pooled_excess, start.held_out_excess, _mismatch_text(start))
-    return [
-        first,
-        *(Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, _mismatch_text(s.after)) for s in steps),
-    ]
-
-
 def steps_chart(start: NoiseFit, steps: Sequence[Step[NoiseFit]]) -> Chart:
-    """Error by model."""
-    return waterfall(levels(start, steps), MEASURE)
+    """Error by model: the mismatch of its spectrum, with that of its Allan deviation."""
+    return waterfall(model_levels(start, steps, _mismatch_text), MEASURE)
 
 
 def fit_chart(fit: NoiseFit) -> Chart:

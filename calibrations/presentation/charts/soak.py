@@ -193,14 +193,8 @@ def _gaps(soak: Soak) -> tuple[Span, ...]:
 
 def _begin_h(soak: Soak) -> float | None:
     """Left end of the axes of time: power-on, unless the record began long after it."""
-    first, last = (t / HOUR_S for t in _span_s(soak))
-    return 0.0 if first < last - first else None
-
-
-def _span_s(soak: Soak) -> tuple[float, float]:
-    """First and last time of the table, since power-on, s."""
-    times_s = soak.table.time_s
-    return float(times_s.min()), float(times_s.max())
+    times_s = soak.table.time_s  # since power-on
+    return 0.0 if times_s.min() < np.ptp(times_s) else None
 
 
 def _final(course: Course) -> float:

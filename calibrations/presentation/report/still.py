@@ -11,7 +11,7 @@ from calibrations.noise.record import of_record
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.document import Block, Code, Items, Page, Remark, Section, Table
 from calibrations.presentation.page import html
-from calibrations.presentation.report.parameters import estimate_cells
+from calibrations.presentation.report.parameters import estimate_cells, name_of_file
 from calibrations.presentation.report.report import model_facts
 from calibrations.presentation.views.still import gains
 from calibrations.text import capital, join_words, probability, rounded
@@ -133,7 +133,7 @@ def _step(name: str, gained: float | None, loss: float | None, fit: NoiseFit) ->
 def _provenance(discovery: Discovery[NoiseFit], date: str, program: str) -> dict[str, str]:
     still, model = discovery.start.still, discovery.start.model
     return {
-        "data": still.source.replace("\\", "/").rpartition("/")[2],
+        "data": name_of_file(still.source),
         "kind and size": f"still record, {still.n} samples of {len(still.channels)} channels at {still.rate_hz:.6g} Hz",
         "SHA-256 of the samples": still.digest,
         **{f"constant {name}": str(value) for name, value in still.constants.items()},

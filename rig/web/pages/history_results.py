@@ -30,6 +30,7 @@ from rig.services.history_words import (
     summary,
 )
 from rig.services.provenance import today
+from rig.web.address import ModelState
 from rig.web.calculations import off_loop
 from rig.web.parts import Link, box, button, div, for_page, shown, table, words
 from rig.web.pictures import draw, plot_with_title
@@ -180,11 +181,6 @@ CLICKED = "(e) => { const k = e && e.points && e.points[0].customdata; if (k) em
 FEW = "A control chart needs two calibrations, a drift three: measure this sensor again."
 
 
-def model_of(data: str, model: str) -> str:
-    """The address of a run on the page Model."""
-    return f"/?{urlencode({'data': data, 'model': model})}"
-
-
 class HistoryPictures:
     """Pictures of one quantity. A point links to the page of its run with `model`."""
 
@@ -223,7 +219,7 @@ class HistoryPictures:
         return plot_with_title(title, legend).on("plotly_click", self._open_clicked, js_handler=CLICKED)
 
     def _open_clicked(self, event: events.GenericEventArguments) -> None:
-        ui.navigate.to(model_of(str(event.args), self.model))
+        ui.navigate.to(ModelState(str(event.args), self.model).address)
 
 
 def without_title(panel: Panel) -> Chart:
@@ -309,7 +305,7 @@ class ClosestBox:
             if staleness is not None:
                 with box("note"):
                     words(for_page(but_stale(staleness)), "small")
-            ui.link("Open its model", model_of(calibration.data, self.model)).classes("small")
+            ui.link("Open its model", ModelState(calibration.data, self.model).address).classes("small")
 
 
 def quantities_table(history: History) -> None:
@@ -351,7 +347,7 @@ def _calibration(calibration: Calibration, history: History, model: str) -> tupl
     value_texts = ("—" if value is None else estimate_text(value.value, value.std) for value in values)
     return (
         calibration.day,
-        Link(calibration.data, model_of(calibration.data, model)),
+        Link(calibration.data, ModelState(calibration.data, model).address),
         calibration.rig,
         *value_texts,
         calibration.expired or "",

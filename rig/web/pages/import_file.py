@@ -22,6 +22,7 @@ from calibrations.table import Constant
 from calibrations.text import unit as unit_text
 from rig.services.importing import Preview, data_chart, lacking, open_file, preview, proposal, store_sheet, units_for
 from rig.services.page_words import IMPORT, address, page_step
+from rig.web.address import ModelState
 from rig.web.calculations import off_loop
 from rig.web.desk import Desk
 from rig.web.frame import frame
@@ -360,7 +361,7 @@ class ImportPage:
             self.button.enable()
             self._show_fault("The file was not imported", error)
             return
-        ui.navigate.to(f"/?{urlencode({'data': run})}")
+        ui.navigate.to(ModelState(run).address)
 
 
 def _sample_text(sheet: Sheet, name: str) -> str:

@@ -146,19 +146,16 @@ class Choice:
         dialog.open()
 
     def _text(self) -> str:
-
         session = self.page.session
         assert session is not None  # noqa: S101 the button is enabled with the session
         return dump_model(session.complete_model())
 
     def _write(self, path: Path) -> None:
-
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, self._text())
 
     async def _report(self) -> None:
         """Download the report, as from `rig report`."""
-
         page, session = self.page, self.page.session
         question = Loaded(session.data, session.model, session.effects) if session is not None else None
         request = Request(page.data, page.model or None, page.desk.bench_file, page.noise or None)

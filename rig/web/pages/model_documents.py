@@ -18,7 +18,6 @@ from rig.web.desk import models
 from rig.web.parts import dialog_with_name, div, for_page, message, words
 
 if TYPE_CHECKING:
-    from calibrations.compensation.inverse import Range
     from calibrations.model import Model
     from rig.services.session import ModelSession
 
@@ -111,7 +110,6 @@ class CompensationDialog(Asking):
             "that they are enough over the whole range.",
         )
         self.model: Model = session.complete_model()
-
         self.default = Range.for_model(self.model)
         with self.fields:
             languages = {"c": "C99", "python": "Python", "json": "JSON, for writers of other languages"}
@@ -143,7 +141,6 @@ class CompensationDialog(Asking):
 
     def _range(self) -> Range:
         """The range of the proof. Raises RigError for ends that are not in order."""
-
         ends = {name: (float(low.value), float(high.value)) for name, (low, high) in self.inputs.items()}
         for name, (low, high) in ends.items():
             if not low < high:

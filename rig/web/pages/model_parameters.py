@@ -104,7 +104,6 @@ class ParametersBox:
 
     def download(self) -> None:
         """Download the model file."""
-
         if (session := self.page.session) is None:
             return
         try:

@@ -11,6 +11,7 @@ from nicegui import events, ui
 from rig.record import Run
 from rig.services.history import calibrating, members
 from rig.services.tables import SEPARATOR
+from rig.web.address import ModelState
 from rig.web.desk import Desk, runs
 from rig.web.frame import frame
 from rig.web.pages.history_results import HistoryRequest
@@ -88,7 +89,7 @@ class Runs:
 
     def _model(self) -> None:
         """Open the model page for the selected runs as one table."""
-        ui.navigate.to(f"/?{urlencode({'data': SEPARATOR.join(self._marked_names())})}")
+        ui.navigate.to(ModelState(SEPARATOR.join(self._marked_names())).address)
 
     def _compare(self) -> None:
         """Compare the selected runs; the older one is the first."""

@@ -9,7 +9,6 @@ import re
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
-from urllib.parse import urlencode
 
 from nicegui import ui
 
@@ -18,6 +17,7 @@ from rig.drawings import Attitude, orientation_drawing, page, strip
 from rig.runs.background import control
 from rig.runs.background.status import NOT_BEGUN, OpenQuestion, Status
 from rig.runs.signals import STOPPED_BY
+from rig.web.address import ModelState
 from rig.web.calculations import off_loop
 from rig.web.frame import control_run
 from rig.web.pages.run_begin import BeginDialog, before_resume
@@ -114,7 +114,7 @@ class Live:
     def _see(self) -> None:
         """Open the model page for the data of the run; without poses the page of the run, which has its results."""
         if (status := self.status) is not None:
-            ui.navigate.to(f"/?{urlencode({'data': status.run})}" if status.done else f"/record/{status.run}")
+            ui.navigate.to(ModelState(status.run).address if status.done else f"/record/{status.run}")
 
     def go_on(self) -> None:
         """Open the checks before an incomplete run resumes."""

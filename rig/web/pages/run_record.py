@@ -1,4 +1,4 @@
-"""Poses that a person leaves out of every analysis, with a reason that stays, and takes in again."""
+"""Page of one run: results, excluded poses, values over time, notes, export and report."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
-from urllib.parse import urlencode
 
 from nicegui import ui
 
@@ -24,6 +23,7 @@ from rig.services.export import export
 from rig.services.history import lives
 from rig.services.next_steps import page_steps, result_rows
 from rig.services.request import Request
+from rig.web.address import ModelState
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk
 from rig.web.frame import frame
@@ -48,6 +48,8 @@ from rig.web.parts import (
 from rig.web.pictures import downloads, empty_plot, remember
 
 MOST_NAMED = 8
+
+# Poses that a person excludes from every analysis, with a reason, and includes again.
 
 
 def left_out(data: str) -> dict[int, str]:
@@ -271,7 +273,7 @@ class OneRun:
             words(f"{run.extent}, {run.created[:19].replace('T', ' ')} UTC", "quiet grow")
             for data in run.data if run.rows else ():
                 title = f"Model of {data.rpartition('/')[2]}" if "/" in data else "Model"
-                button(title, "insights", partial(ui.navigate.to, f"/?{urlencode({'data': data})}"), "dense")
+                button(title, "insights", partial(ui.navigate.to, ModelState(data).address), "dense")
                 button("Report", "description", partial(self._report, data))
             for kind, (label, _) in FORMATS.items() if run.rows else ():
                 button(label, "download", partial(self._export, kind))
