@@ -22,6 +22,7 @@ import numpy as np
 
 from calibrations.errors import DataError
 from calibrations.files import LARGEST_BYTES
+from calibrations.importing.cells import number_or_text
 from calibrations.importing.topics import Cells, Topic, library, require_size
 from calibrations.importing.units import parse_unit
 from calibrations.table import AXES, Array, Constant
@@ -281,18 +282,11 @@ def parquet_topics(path: Path) -> list[Topic]:
         require_size(path, sum(file.metadata.row_group(k).total_byte_size for k in range(file.metadata.num_row_groups)))
     require_size(path, 8 * rows * len(schema.names))
     constants = {
-        key.decode("utf-8", "replace"): _number_or_text(value.decode("utf-8", "replace"))
+        key.decode("utf-8", "replace"): number_or_text(value.decode("utf-8", "replace"))
         for key, value in (schema.metadata or {}).items()
         if key not in (b"pandas", b"ARROW:schema")
     }
     return [Topic("table", tuple(schema.names), rows, lambda: _parquet_cells(parquet, path), constants=constants)]
-
-
-def _number_or_text(text: str) -> Constant:
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 def _parquet_cells(parquet: Any, path: Path) -> Cells:

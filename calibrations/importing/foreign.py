@@ -74,25 +74,13 @@ class ImportedTable:
         }
 
 
-def read_foreign(
-    path: Path,
-    kind: str | None,
-    mapped: Sequence[ColumnMapping] = (),
-    constants: Mapping[str, Constant] | None = None,
-    topic: str | None = None,
-) -> Table:
-    """The table in the file `path`, of the topic `topic` where a file has several. Mapped columns take our names; the
-    others keep their names in the header.
-
-    Raises DataError with file, line and column.
-    """
-    return import_sheet(open_sheet(path, topic), kind, mapped, constants).table
-
-
 def import_sheet(
     laid: Sheet, kind: str | None, mapped: Sequence[ColumnMapping] = (), constants: Mapping[str, Constant] | None = None
 ) -> ImportedTable:
-    """The table in a sheet. Raises DataError; the message of MissingColumn ends with a likely import command."""
+    """The table in a sheet. Mapped columns take our names; the others keep their names in the header.
+
+    Raises DataError with file, line and column; the message of MissingColumn ends with a likely import command.
+    """
     mapping = complete_mapping(laid, mapped)
     try:
         return _import_with(laid, kind, mapping, constants or {})
@@ -104,16 +92,9 @@ def import_sheet(
             kind,
             mapping,
             constants or {},
-            lambda *meant: _import_with(laid, *_complete_mapping(laid, *meant)).table,
+            lambda kind, meant, merged: _import_with(laid, kind, complete_mapping(laid, meant), merged).table,
         )
         raise MissingColumn(f"{error}{tail}") from None
-
-
-def _complete_mapping(
-    laid: Sheet, kind: str, mapped: Sequence[ColumnMapping], constants: Mapping[str, Constant]
-) -> tuple[str, list[ColumnMapping], Mapping[str, Constant]]:
-    """The given mapping, completed from the header."""
-    return kind, complete_mapping(laid, mapped), constants
 
 
 def _import_with(
@@ -145,7 +126,7 @@ def _import_with(
     if is_session(kind, columns, labels.get(PATH)):
         columns[RATE] = sample_rates(columns, labels[PATH], merged, laid.name)
     elif is_whole_turn_log(kind, columns, merged):
-        from calibrations.importing.whole_turns import cut_whole_turns  # few tables are such logs
+        from calibrations.importing.turn_logs import cut_whole_turns  # few tables are such logs
 
         columns, labels = cut_whole_turns(columns, merged, laid.name)
     if kind == "turns" and TURN_MARKS.isdisjoint(columns) and all(name in columns for name in (*RATES, *TRIADS[0])):
@@ -356,11 +337,11 @@ def _rows_at_shared_times(t_s: Array) -> NDArray[np.intp]:
 
 
 def read_csv(path: Path | str, kind: str | None = None, topic: str | None = None) -> Table:
-    """The table in the file `path`, of text or of a known binary format; without `kind` it is guessed from the columns.
+    """The table in the file `path`, of text or of a known binary format, of the topic `topic` where it has several.
 
-    Raises DataError with file, line and column.
+    Without `kind` it is guessed from the columns. Raises DataError with file, line and column.
     """
-    return read_foreign(Path(path), kind, topic=topic)
+    return import_sheet(open_sheet(Path(path), topic), kind).table
 
 
 def parse_csv(content: str, source: str, kind: str | None = None) -> Table:

@@ -25,11 +25,11 @@ from calibrations.criteria import (
     SHOWN_OF_RATE,
     STILL_G,
 )
-from calibrations.errors import DataError
+from calibrations.errors import DataError, MissingConstant
 from calibrations.geometry.rate_table import turn_axes
 from calibrations.geometry.sphere import sphere_centre
 from calibrations.importing.units import UNITS, ColumnMapping, column_unit
-from calibrations.table import NUMBERS, Array, Table
+from calibrations.table import NUMBERS, Array, Constant, Table
 
 ARC_MINUTE_DEG = 1 / 60
 ROUNDING_DEG = 1e-3
@@ -219,6 +219,17 @@ def log_rate_hz(time_s: Array | None, stated_hz: float, source: str) -> float:
             f"sample_rate_hz={1 / step:.4g}"
         )
     return 1 / step if step else max(stated_hz, 0.0)
+
+
+def required_rate_hz(columns: Mapping[str, Array], constants: Mapping[str, Constant], source: str) -> float:
+    """The sample rate of a log of turns, Hz. Raises MissingConstant without times and rate, DataError as above."""
+    stated_hz = constants.get("sample_rate_hz", 0.0)
+    rate_hz = log_rate_hz(columns.get("t_s"), stated_hz if isinstance(stated_hz, float) else 0.0, source)
+    if rate_hz <= 0:
+        raise MissingConstant(
+            f"{source}: a log of turns needs the column t_s, or the constant sample_rate_hz", "sample_rate_hz"
+        )
+    return rate_hz
 
 
 def check_stated_rate(table: Table, clock: ColumnMapping) -> None:

@@ -11,7 +11,7 @@ import re
 from array import array
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain, islice
 from math import isfinite
 from operator import and_
@@ -21,7 +21,7 @@ import numpy as np
 from calibrations.errors import DataError
 from calibrations.files import Source
 from calibrations.importing.cells import BadLines, Lines, is_number, number_or_text, parse_cell
-from calibrations.importing.line_logs import as_table
+from calibrations.importing.other_texts import as_lines
 from calibrations.importing.units import parse_unit, split_unit
 from calibrations.table import Array, Constant
 
@@ -29,7 +29,7 @@ EMPTY = "the file is empty: a header line with column names is missing; export t
 
 # How a separated text is laid out, as its first lines show: separator, header, units, constants above the header.
 #
-# Any separator, or JSON (`json_arrays.py`); a header or none, units in the header's names or in a row below it,
+# Any separator, or JSON (`other_texts.py`); a header or none, units in the header's names or in a row below it,
 # decimal commas.
 
 HEAD_LINES = 200  # lines that the layout is taken from
@@ -68,10 +68,6 @@ class Sheet:
     notes: tuple[str, ...] = ()
     skipped: float = 0.0  # the most of its lines that are skipped as damaged
     topics: tuple[str, ...] = ()  # all that the file has
-
-    def of_topic(self, topic: str, notes: tuple[str, ...]) -> Sheet:
-        """The same sheet as a topic of a file that has several, with remarks for the person."""
-        return replace(self, topic=topic, notes=notes)
 
     @property
     def place(self) -> str:
@@ -160,18 +156,6 @@ def _remove_damaged_rows(rows: list[tuple[str, ...]]) -> tuple[tuple[str, ...], 
     numeric = [sum(column) <= MOST_WORDS * len(rows) for column in zip(*is_word, strict=True)]
     fits = [row for row, words in zip(rows, is_word, strict=True) if not any(map(and_, words, numeric))]
     return tuple(fits or rows)
-
-
-def as_lines(source: Source) -> Source:
-    """The source itself, or its JSON document or lines of named values as comma-separated lines. Raises DataError."""
-    with source.lines(marked=True) as lines:
-        first = next((line for line in lines if line.strip()), "").lstrip()
-    if first.startswith(("{", "[")):
-        from calibrations.importing.json_arrays import json_as_lines
-
-        if (document := json_as_lines(source)) is not source:
-            return document
-    return as_table(first, source)
 
 
 def split_rows(lines: Iterable[str], separator: str | None, name: str, first: int) -> Iterator[Row]:

@@ -88,19 +88,18 @@ def topic_sheet(path: Path, topics: Sequence[Topic], name: str | None) -> Sheet:
         )
     topic_name = topic.name if unread else ""
     if topic.text is not None:
-        sheet = read_sheet(text_source(topic.text(), str(path))).of_topic(topic_name, notes)
-        return replace(sheet, topics=tuple(t.name for t in topics))
-    if topic.cells is None or topic.rows < 1:
+        sheet = read_sheet(text_source(topic.text(), str(path)))
+    elif topic.cells is None or topic.rows < 1:
         raise DataError(f"{path}, topic {topic.name}: has no rows; record the measurements again")
-    sheet = column_sheet(str(path), topic.cells(), topic.constants, topic_name, notes)
-    return replace(sheet, topics=tuple(t.name for t in topics))
+    else:
+        sheet = _column_sheet(str(path), topic.cells(), topic.constants, topic_name)
+    return replace(sheet, topic=topic_name, notes=notes, topics=tuple(t.name for t in topics))
 
 
-def column_sheet(
-    name: str, cells: Cells, constants: Mapping[str, Constant], topic: str = "", notes: tuple[str, ...] = ()
-) -> Sheet:
-    """Columns in memory as a sheet. Columns without any finite number are left out. Raises DataError without a
-    column of numbers.
+def _column_sheet(name: str, cells: Cells, constants: Mapping[str, Constant], topic: str) -> Sheet:
+    """Columns in memory as a sheet. Columns without any finite number are left out.
+
+    Raises DataError without a column of numbers.
     """
     columns = {k: v for k, v in cells.items() if isinstance(v, tuple) or bool(np.isfinite(v).any())}
     if all(isinstance(v, tuple) for v in columns.values()):
@@ -111,9 +110,8 @@ def column_sheet(
     has_names = not all(column.isdigit() for column in header)
     units = tuple(split_unit(column)[1] for column in header)
     return Sheet(
-        Source(name, _no_text), None, header, units, has_names, len(header), 1, 1, sample, dict(constants), columns,
-        topic, notes,
-    )  # fmt: skip
+        Source(name, _no_text), None, header, units, has_names, len(header), 1, 1, sample, dict(constants), columns
+    )
 
 
 def library(module: str, extra: str, path: Path, description: str) -> Any:

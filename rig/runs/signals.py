@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from rig.record import Record
+if TYPE_CHECKING:
+    from rig.record import Record
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 STOPPED_BY = {
@@ -22,6 +23,7 @@ COMPILED = "drivers.world"  # its compiled code calls Python generators; an exce
 COUNTING = (("drivers.clock", "step"), ("drivers.transport.link", "put"), ("drivers.transport.link", "take"))
 SCREEN = "rich"  # an exception while its console writes would block the console
 AGAIN_S = 0.001
+Handler = Callable[[int, FrameType | None], object]
 
 
 def who_stopped(name: str) -> str:
@@ -30,61 +32,84 @@ def who_stopped(name: str) -> str:
 
 
 @contextmanager
+def handled_by(handler: Handler, *numbers: signal.Signals) -> Iterator[None]:
+    """Inside the context `handler` receives these signals."""
+    earlier = {number: signal.signal(number, handler) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, earlier_handler in earlier.items():
+            signal.signal(number, earlier_handler)
+
+
+@contextmanager
 def stoppable(ignored: Collection[signal.Signals] = (), inner: bool = False) -> Iterator[None]:
     """Inside the context the first signal raises KeyboardInterrupt with its name. Later signals are ignored.
 
     `ignored` signals raise nothing. `inner`: the context lies in another one; after a SIGINT the next ones stay ignored
     there, because a person who presses twice wants one pause. A further context hears them again.
-
-    A signal during a computation of the simulated world, a count of bytes or a write to the screen waits a moment. If
-    Python discards the exception, as in a finaliser, it is raised again.
     """
-
-    put_off: list[int] = []
-    raised: list[int] = []
-    fired: list[int] = []
-
-    def later(number: int) -> None:
-        put_off[:] = [number]
-        signal.setitimer(signal.ITIMER_REAL, AGAIN_S)  # not a thread: the interrupted code may hold its locks
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        if _indivisible(frame):
-            later(number)
-            return
-        for signal_number in SIGNALS:
-            signal.signal(signal_number, signal.SIG_IGN)
-        raised[:] = [number]
-        fired.append(number)
-        raise KeyboardInterrupt(signal.Signals(number).name)
-
-    def again(_: int, frame: FrameType | None) -> None:
-        if put_off:
-            stop(put_off.pop(), frame)
-
-    def lost(unraisable: sys.UnraisableHookArgs) -> None:
-        if raised and isinstance(unraisable.exc_value, KeyboardInterrupt):
-            later(raised.pop())
-        else:
-            hook(unraisable)
-
-    hook, sys.unraisablehook = sys.unraisablehook, lost
+    interrupter = _Interrupter()
+    hook, sys.unraisablehook = sys.unraisablehook, interrupter.recover
     nohup = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # then a closed terminal must not stop the run
     handlers = {
-        signal_number: signal.signal(signal_number, signal.SIG_IGN if signal_number in ignored else stop)
-        for signal_number in SIGNALS
-        if not (nohup and signal_number == signal.SIGHUP)
+        number: signal.signal(number, signal.SIG_IGN if number in ignored else interrupter.stop)
+        for number in SIGNALS
+        if not (nohup and number == signal.SIGHUP)
     }
-    handlers[signal.SIGALRM] = signal.signal(signal.SIGALRM, again)
+    handlers[signal.SIGALRM] = signal.signal(signal.SIGALRM, interrupter.stop_again)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         sys.unraisablehook = hook
-        if inner and signal.SIGINT in fired:
+        if inner and signal.SIGINT in interrupter.fired:
             handlers[signal.SIGINT] = signal.SIG_IGN
-        for signal_number, handler in handlers.items():
-            signal.signal(signal_number, handler)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+
+
+class _Interrupter:
+    """Raises KeyboardInterrupt for the first signal, where an exception breaks nothing.
+
+    A signal during a computation of the simulated world, a count of bytes or a write to the screen waits a moment. If
+    Python discards the exception, as in a finaliser, it is raised again.
+    """
+
+    def __init__(self) -> None:
+        self.fired: list[int] = []  # the signals that have raised
+        self._delayed: int | None = None  # waits for the timer
+        self._raised: int | None = None  # its exception may be discarded
+        self._hook = sys.unraisablehook
+
+    def stop(self, number: int, frame: FrameType | None) -> None:
+        """Raise KeyboardInterrupt, or delay the signal."""
+        if _indivisible(frame):
+            self._delay(number)
+            return
+        for signal_number in SIGNALS:
+            signal.signal(signal_number, signal.SIG_IGN)
+        self._raised = number
+        self.fired.append(number)
+        raise KeyboardInterrupt(signal.Signals(number).name)
+
+    def stop_again(self, _: int, frame: FrameType | None) -> None:
+        """The timer: stop by the delayed signal."""
+        if (number := self._delayed) is not None:
+            self._delayed = None
+            self.stop(number, frame)
+
+    def recover(self, unraisable: sys.UnraisableHookArgs) -> None:
+        """Raise a discarded KeyboardInterrupt once more."""
+        if self._raised is not None and isinstance(unraisable.exc_value, KeyboardInterrupt):
+            number, self._raised = self._raised, None
+            self._delay(number)
+        else:
+            self._hook(unraisable)
+
+    def _delay(self, number: int) -> None:
+        self._delayed = number
+        signal.setitimer(signal.ITIMER_REAL, AGAIN_S)  # not a thread: the interrupted code may hold its locks
 
 
 def _indivisible(frame: FrameType | None) -> bool:

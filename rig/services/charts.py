@@ -49,16 +49,16 @@ class Part:
     low: dict[str, float] = field(default_factory=dict)
     high: dict[str, float] = field(default_factory=dict)
 
-    def take(self, t_s: float, values: dict[str, float]) -> None:
-        """One dwell more."""
-        self.n, self.t_s = self.n + 1, self.t_s + t_s
-        for name, value in values.items():
-            self.sums[name] = self.sums.get(name, 0.0) + value
-            self.low[name] = min(self.low.get(name, value), value)
-            self.high[name] = max(self.high.get(name, value), value)
+    @classmethod
+    def of(cls, dwell: Dwell) -> Part:
+        """The part of one dwell."""
+        values = dict(dwell.means) | {f"rms {name}": std for name, std in dwell.stds.items()}
+        if dwell.temperature_c is not None:
+            values["temperature"] = dwell.temperature_c
+        return cls(1, dwell.t_s, values, dict(values), dict(values))
 
     def join(self, other: Part) -> None:
-        """All dwells of another part more."""
+        """Add the dwells of another part."""
         self.n, self.t_s = self.n + other.n, self.t_s + other.t_s
         for name, value in other.sums.items():
             self.sums[name] = self.sums.get(name, 0.0) + value
@@ -74,15 +74,12 @@ class Course:
     dwells_per_part: int = 1  # dwells in a part that is full
 
     def add(self, dwell: Dwell) -> None:
-        """One dwell more."""
-        values = dict(dwell.means) | {f"rms {name}": std for name, std in dwell.stds.items()}
-        if dwell.temperature_c is not None:
-            values["temperature"] = dwell.temperature_c
+        """Add a dwell."""
         if not self.parts or self.parts[-1].n >= self.dwells_per_part:
             if len(self.parts) == MOST:
                 self._join()
             self.parts.append(Part())
-        self.parts[-1].take(dwell.t_s, values)
+        self.parts[-1].join(Part.of(dwell))
 
     def _join(self) -> None:
         for first, second in zip(self.parts[::2], self.parts[1::2], strict=True):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,8 @@ def origin_of(model: str, name: str | None, text: str) -> Origin:
 
 def source_files(compensation: Compensation, language: str, origin: Origin) -> dict[str, str]:
     """The files by name. `language`: c, python or json."""
-    return _writer(language)(compensation, origin, make_vectors(compensation))
+    writers = {"c": sources.c_files, "python": sources.python_files, "json": document.files}
+    return writers[language](compensation, origin, make_vectors(compensation))
 
 
 def identifier(name: str) -> str:
@@ -103,8 +104,3 @@ def export_document(exported: Exported, form: str, models: Sequence[str], out: P
         ],
         "notes": list(exported.notes),
     }
-
-
-def _writer(language: str) -> Callable[..., dict[str, str]]:
-
-    return {"c": sources.c_files, "python": sources.python_files, "json": document.files}[language]

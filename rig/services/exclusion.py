@@ -1,4 +1,7 @@
-"""A person takes a pose out of every analysis, or in again: the pose stays, with the reason; results are made anew."""
+"""Exclude poses from every analysis, or include them again.
+
+The record keeps the pose, its samples and the reason. The results of a complete run are computed again.
+"""
 
 from __future__ import annotations
 

@@ -327,7 +327,6 @@ def limits_of(bench_file: Path | None) -> dict[str, Limit]:
     """The ranges in the bench file's `limits.results`; a magnitude does not limit a change. Raises BenchError."""
     if bench_file is None:
         return {}
-
     return {name: limit for name, limit in read_bench(bench_file).result_limits.items() if isinstance(limit, tuple)}
 
 

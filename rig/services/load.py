@@ -42,7 +42,7 @@ TRIADS = ({"ax", "ay", "az"}, {"mx", "my", "mz"})  # with times: a raw log of po
 
 @dataclass(frozen=True)
 class Loaded:
-    """Data, the model to hold against them, and the effects that may be missing."""
+    """Data, the model to compare with them, and the effects that may be missing."""
 
     data: Dataset[Any]
     model: Model
@@ -81,7 +81,7 @@ def with_known_noise(table: Table, noise: str | None, effects: Mapping[str, Effe
     return table if noise is None else with_noise(table, read_model(noise, effects))
 
 
-def rows_of(request: Request, effects: Mapping[str, Effect], notify: Tell) -> Table:
+def _rows(request: Request, effects: Mapping[str, Effect], notify: Tell) -> Rows:
     """The table of a request, with remarks on its noise."""
     if request.channel or request.rate_hz:
         raise DataError(
@@ -98,11 +98,7 @@ def rows_of(request: Request, effects: Mapping[str, Effect], notify: Tell) -> Ta
     remarks = (earth_rate_warning(table), table_noise.scatter_remark(table), doubt(table), *doubts(table))
     for remark in filter(None, remarks):
         notify(f"{table.source}: {remark}.")
-    return table
-
-
-def _rows(request: Request, effects: Mapping[str, Effect], notify: Tell) -> Rows:
-    return Rows(rows_of(request, effects, notify))
+    return Rows(table)
 
 
 def _load_still(request: Request, model: Model | None, notify: Tell) -> Dataset[Any]:
@@ -137,9 +133,8 @@ def still_of(
         first = next(iter(streams.values()))
         samples = (_samples(axis, axis_stream, keep) for axis, axis_stream in streams.items())
         still = reduce_record(samples, first.source, first.constants, every_deviation)
-    sensed = {
-        axis: scale for axis, axis_stream in streams.items() if (scale := axis_stream.sensed) is not None
-    }  # known when read
+    scales = {axis: axis_stream.sensed for axis, axis_stream in streams.items()}  # known when read
+    sensed = {axis: scale for axis, scale in scales.items() if scale is not None}
     channels = {axis_stream.channel for axis_stream in streams.values()}
     if other_names := [name for name in first.others if name not in channels]:
         notify(f"{still.source}: {', '.join(channels)}; --channel takes another: {', '.join(other_names)}.")

@@ -50,12 +50,16 @@ LONGER = 4  # times as long halves a statistical uncertainty
 
 def next_steps(run: Run, excluded: Mapping[int, str]) -> list[str]:
     """The next steps after a run: for each verdict that is not a pass, and with the measured data."""
+    return [*_advice(run, excluded), *_commands(run)]
+
+
+def _advice(run: Run, excluded: Mapping[int, str]) -> list[str]:
+    """The steps that concern the measurement itself."""
     return [
         *_advise_on_excluded(excluded),
         *_advise_on_failures(run),
         *_marginal(run),
         *_advise_on_limits(run.results),
-        *_commands(run),
     ]
 
 
@@ -116,13 +120,8 @@ def _commands(run: Run) -> Iterator[str]:
 
 def page_steps(run: Run, excluded: Mapping[int, str]) -> list[PageStep]:
     """`next_steps` for a page."""
-    lines = [
-        *_advise_on_excluded(excluded),
-        *_advise_on_failures(run),
-        *_marginal(run),
-        *_advise_on_limits(run.results),
-    ]
-    steps = [page_step(line.replace(f" {run.run}", ""), run.run, run.procedure) for line in lines]
+    lines = (line.replace(f" {run.run}", "") for line in _advice(run, excluded))
+    steps = [page_step(line, run.run, run.procedure) for line in lines]
     if run.state != "complete":
         steps.append(PageStep("The run is not complete. Resume it on the page Run.", {"Run": "/run"}))
     elif run.procedure == "check-standard":

@@ -188,7 +188,7 @@ def _list_logged_columns(table: Table, channel: str) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class _Times:
-    """Result of a column of times: the rate, its gaps, and the largest deviation from even times, s."""
+    """The rate by a column of times, its gaps (begin, length), and the largest deviation from even times, s."""
 
     rate_hz: float
     gaps: tuple[tuple[float, float], ...] = ()

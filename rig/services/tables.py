@@ -34,15 +34,12 @@ def average_log(log: Table, notify: Callable[[str], None]) -> Table:
     """
     table = average_raw_log(log)
     if table is not log:
-        notify(f"{log.source} is a log of raw samples: the table has {_row_count_text(table)}, from {log.n} samples.")
+        rows = table.type.taken.format(table.n)
+        notify(f"{log.source} is a log of raw samples: the table has {rows}, from {log.n} samples.")
     table, copies = drop_duplicate_rows(table)
     if copies is not None:
         notify(copies)
     return _without_excluded_rows(table, notify)
-
-
-def _row_count_text(table: Table) -> str:
-    return table.type.taken.format(table.n)
 
 
 def _without_excluded_rows(table: Table, notify: Callable[[str], None]) -> Table:
@@ -80,7 +77,7 @@ def _of_run(data: str) -> Table:
     from rig.record.measured import table_of
     from rig.record.store import Record  # a file needs no database
 
-    if _is_path(data):
+    if data.startswith(("/", "./", "../")) or data.count("/") > 1:  # else it may be RUN/SENSOR
         raise UnknownRun(_no_file(Path(data)))
     try:
         with Record.to_find(data) as record:
@@ -89,13 +86,8 @@ def _of_run(data: str) -> Table:
         raise UnknownRun(f"{data}: there is no such file, and {error}") from None
 
 
-def _is_path(data: str) -> bool:
-    """Whether `data`, which may also be RUN/SENSOR, can only be the path of a file."""
-    return data.startswith(("/", "./", "../")) or data.count("/") > 1
-
-
 def _no_file(path: Path) -> str:
-    """What is wrong with a path without a file: its folder, or its name, with the most similar one there."""
+    """The message for a path without a file: its folder is missing, or the nearest name there."""
     if not path.parent.is_dir():
         return f"{path}: there is no such file, and no folder {path.parent}"
     names = [entry.name for entry in path.parent.iterdir()]

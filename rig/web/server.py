@@ -6,10 +6,8 @@ import atexit
 import logging
 import signal
 import socket
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
-from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI
@@ -17,6 +15,7 @@ from nicegui import core, run, ui
 from nicegui.translations import translations
 
 from rig.errors import RigError
+from rig.runs.signals import handled_by
 from rig.web.calculations import leave_calculations
 from rig.web.desk import Desk
 from rig.web.frame import TITLE
@@ -73,7 +72,8 @@ def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[
         guarded, log_level="warning", access_log=False, timeout_graceful_shutdown=0, ws_max_size=1 << 24
     )  # open pages keep their connections, so there is nothing to wait for
     logging.getLogger("uvicorn.error").addFilter(lambda entry: "graceful shutdown" not in entry.getMessage())
-    with _ignore_signals(), listener:
+    ignored = handled_by(lambda *_: None, signal.SIGINT, signal.SIGTERM)  # uvicorn raises them again after its end
+    with ignored, listener:
         _Server(config, lambda: ready(place)).run(sockets=[listener])
     atexit.register(leave_calculations)
 
@@ -113,17 +113,3 @@ def _open_listening_socket(host: str, port: int) -> socket.socket:
         listener.close()
         raise
     return listener
-
-
-@contextmanager
-def _ignore_signals() -> Iterator[None]:
-    """Ignore the signals that uvicorn raises again after it has ended the server."""
-
-    def ignore(number: int, frame: FrameType | None) -> None: ...
-
-    handlers = {number: signal.signal(number, ignore) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)

@@ -17,9 +17,9 @@ from scipy.io import savemat
 from calibrations.errors import DataError
 from calibrations.importing import topics
 from calibrations.importing.binary import open_sheet
-from calibrations.importing.foreign import read_foreign
 from calibrations.importing.topics import SeveralTopics
 from calibrations.importing.units import ColumnMapping
+from tests.foreign_files import read_foreign
 
 N = 40
 ACC = np.random.default_rng(1).normal(size=(N, 3))

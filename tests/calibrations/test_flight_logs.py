@@ -12,8 +12,9 @@ import pytest
 from calibrations.errors import DataError
 from calibrations.importing import flight_logs
 from calibrations.importing.binary import open_sheet
-from calibrations.importing.foreign import import_sheet, read_foreign
+from calibrations.importing.foreign import import_sheet
 from calibrations.importing.topics import SeveralTopics
+from tests.foreign_files import read_foreign
 
 N = 30
 DIRECTIONS = np.random.default_rng(2).normal(size=(N, 3))

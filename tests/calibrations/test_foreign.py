@@ -12,10 +12,11 @@ import pytest
 
 from calibrations import files
 from calibrations.errors import DataError, MissingColumn
-from calibrations.importing.foreign import read_csv, read_foreign, write_csv
+from calibrations.importing.foreign import read_csv, write_csv
 from calibrations.importing.units import ColumnMapping
 from calibrations.table import Table
 from tests.calibrations.synthetic import components, poses, turns
+from tests.foreign_files import read_foreign
 
 THREE = [ColumnMapping(name, str(k)) for k, name in enumerate(("ax", "ay", "az"), start=1)]
 

@@ -13,12 +13,12 @@ from calibrations.discovery.results import Discovery
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit, fit
-from calibrations.importing.foreign import read_foreign
 from calibrations.importing.raw_logs import average_still_positions
 from calibrations.importing.units import ColumnMapping
 from calibrations.loop import diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.table import Table
+from tests.foreign_files import read_foreign
 
 DATA = Path(__file__).parent.parent / "data"
 

@@ -9,13 +9,14 @@ import pytest
 
 from calibrations.analyses.hand_turns import fit_turns
 from calibrations.errors import DataError, MissingConstant
-from calibrations.importing.foreign import read_foreign, write_csv
+from calibrations.importing.foreign import write_csv
 from calibrations.importing.units import ColumnMapping
 from calibrations.loop import dataset, discover
 from calibrations.model.file import read_model
 from calibrations.table import Table
 from tests.calibrations.test_turns import BIAS, GAINS, samples
 from tests.calibrations.test_turns import table as turns_table
+from tests.foreign_files import read_foreign
 
 XSENS = Path(__file__).parents[1] / "data" / "imu_tk_xsens"
 FACTORY_PER_RAD_S = (4778, 4758, 4766)  # counts, of the manufacturer

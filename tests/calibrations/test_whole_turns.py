@@ -11,11 +11,12 @@ import pytest
 from calibrations.analyses.hand_turns import fit_turns
 from calibrations.errors import DataError, MissingColumn, MissingConstant, ModelError
 from calibrations.importing.binary import open_sheet
-from calibrations.importing.foreign import needs_mapping, read_foreign
+from calibrations.importing.foreign import needs_mapping
 from calibrations.importing.proposal import missing_columns
 from calibrations.importing.raw_logs import average_raw_log
 from calibrations.presentation.certificate.results import figures, require_reference
 from calibrations.table import Table
+from tests.foreign_files import read_foreign
 
 RATE_HZ = 100.0
 BIAS = np.array([0.3, -0.2, 0.1])

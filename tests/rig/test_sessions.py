@@ -12,9 +12,9 @@ import pytest
 
 from calibrations.errors import DataError
 from calibrations.files import text_source
-from calibrations.importing.foreign import read_foreign
-from calibrations.importing.sheet import as_lines
+from calibrations.importing.other_texts import as_lines
 from tests.calibrations.turned import DATA
+from tests.foreign_files import read_foreign
 
 Rig = Callable[..., Any]
 NAMES = [f"{ours}{axis}={theirs}_{axis}" for ours, theirs in (("a", "acc"), ("g", "gyr")) for axis in "xyz"]

@@ -5,12 +5,10 @@ from __future__ import annotations
 import json
 import math
 import signal
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import ExitStack, nullcontext
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from types import FrameType
 
 import click
 
@@ -30,6 +28,7 @@ from rig.errors import BenchError
 from rig.files import write_whole
 from rig.instruments.instruments import check_all
 from rig.instruments.wiring import on_a_network, serve, world_of
+from rig.runs.signals import handled_by
 
 NOT_MET, FAILED = 1, 3
 
@@ -131,8 +130,9 @@ def simulate_command(bench_file: Path | None, as_json: bool) -> None:
     In the bench file, `url: simulated:rtu+tcp://127.0.0.1:5021` sets a port, `simulated:pty:` a pseudo-terminal.
     """
     bench = read_bench(bench_file)
+    stop_signals: list[int] = []
     with ExitStack() as stack:
-        stop_signals = stack.enter_context(_catch_signals())
+        stack.enter_context(handled_by(lambda number, _: stop_signals.append(number), signal.SIGINT, signal.SIGTERM))
         clock = WallClock()
         servers = list(serve(bench, world_of(bench)).values())
         for server in servers:
@@ -141,22 +141,6 @@ def simulate_command(bench_file: Path | None, as_json: bool) -> None:
         documents = {role: _address_document(bench, role, asdict(address)) for role, address in addresses.items()}
         _print_addresses(documents, as_json)
         serve_forever(servers, lambda: bool(stop_signals), clock)
-
-
-@contextmanager
-def _catch_signals() -> Iterator[list[int]]:
-    """The stop signals received so far; inside, they do not end the process."""
-    received: list[int] = []
-
-    def end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
-        received.append(number)
-
-    handlers = {caught: signal.signal(caught, end) for caught in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield received
-    finally:
-        for caught, handler in handlers.items():
-            signal.signal(caught, handler)
 
 
 def _addresses(bench: Bench, servers: list[Server]) -> dict[str, Address]:

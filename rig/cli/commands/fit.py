@@ -40,7 +40,7 @@ def fit_command(request: Request, out: Path | None, check: bool, as_json: bool) 
     from calibrations.discovery.verdict import Verdict
     from calibrations.documents import fit_document
     from calibrations.presentation.views import view_of
-    from rig.cli.terminal.words import parameters, table, warning
+    from rig.cli.terminal.words import parameters, warning
     from rig.services.load import load_request
     from rig.services.provenance import write_model
 
@@ -60,7 +60,7 @@ def fit_command(request: Request, out: Path | None, check: bool, as_json: bool) 
         if reason is not None:
             remarks = [f"This data cannot be used: {reason.verdict}: {reason.text}."]
         click.echo(f"{fitted.model.name} fitted to {data.description}\n\n{parameters(fitted.model)}\n")
-        click.echo("\n".join([table(view_of(data).error_table(fitted)), *(f"\n{line}" for line in remarks)]))
+        click.echo("\n".join([columns(*view_of(data).error_table(fitted)), *(f"\n{line}" for line in remarks)]))
         if further.paper:
             click.echo(f"\n{further.paper}")
         if path is not None:

@@ -27,7 +27,6 @@ from rig.record import Record
 
 if TYPE_CHECKING:
     from rig.fleet.members import Member
-    from rig.fleet.questions import Fleet
 
 
 @click.group("fleet")
@@ -119,7 +118,6 @@ def calibrate(request: Request) -> None:
 
 def _write_report(request: Request, paths: list[Path], page: Callable[[], str]) -> None:
     """Write the `page` if --report is given, and add it to the `paths` files."""
-
     if request.report is not None:
         write_whole(request.report, page())
         paths.append(request.report)
@@ -128,7 +126,6 @@ def _write_report(request: Request, paths: list[Path], page: Callable[[], str]) 
 @contextmanager
 def _fleet(request: Request) -> Iterator[tuple[Fleet, list[Member]]]:
     """The workers and the sensors; progress goes to standard error. Raises OutputError for an unusable report file."""
-
     if request.out is not None:
         require_outputs(*sorted(request.out.glob("*.yaml")))
     members = fleet_of(request.sources)

@@ -33,8 +33,6 @@ from rig.services.history_words import (
 from rig.services.request import effects_of
 
 Near = tuple[Calibration, float] | None  # the calibration closest to a day, and its age on that day in days
-
-
 DAY = click.DateTime(["%Y-%m-%d"])
 
 
@@ -115,7 +113,6 @@ def history_command(
 
 def _select_quantities(life: History, names: Sequence[str], limited: Iterable[str]) -> History:
     """The history of the chosen quantities. Raises UsageError for an unknown quantity."""
-
     quantity_names = [q.name for q in life.quantities]
     for name in (*names, *limited):
         if name not in quantity_names:

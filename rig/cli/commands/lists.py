@@ -45,7 +45,6 @@ def effects_command(effect: str | None, bench_file: Path | None, as_json: bool) 
 
     EFFECT may be a free form, free:PLACE: a smooth curve of unknown form at a place of the signal chain.
     """
-
     effects_by_name = effects_of(bench_file)
 
     def document(e: Effect) -> dict[str, object]:

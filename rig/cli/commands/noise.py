@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -71,10 +72,6 @@ def noise_command(
 
 def _record(data: str, channel: str | None, rate_hz: float | None, tau_s: tuple[float, ...]) -> Still:
     """The still record; with Allan deviations at the given averaging times, if there are some."""
-    from dataclasses import replace
-
-    import numpy as np
-
     from rig.services.load import still_of
 
     blocks: dict[str, list[Any]] | None = {} if tau_s else None

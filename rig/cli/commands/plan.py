@@ -133,7 +133,6 @@ def _optimal(bench: Bench, procedure: Procedure, settings: Mapping[str, Any], op
 
 
 def _write_poses(out: Path, planned: Plan) -> None:
-
     write_whole(out, "\n".join([*format_poses(dwell.pose for dwell in planned.held), ""]))
 
 

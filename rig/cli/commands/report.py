@@ -28,7 +28,6 @@ from rig.services.request import Request
 
 if TYPE_CHECKING:
     from calibrations.presentation.certificate.content import Certificate
-    from rig.services.request import Request
 
 
 @click.command("report", cls=DataCommand)

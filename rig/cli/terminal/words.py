@@ -17,7 +17,7 @@ from calibrations.errors import DataError
 from calibrations.model import Model, Term
 from calibrations.presentation.answers import discovery_text, discovery_verdict
 from calibrations.table import Table
-from calibrations.text import Cells, columns, duration, quantity
+from calibrations.text import columns, duration, quantity
 from rig.cli.terminal.output import note
 from rig.services import next_experiment
 from rig.services.next_experiment import Answer
@@ -57,11 +57,6 @@ def _line(term: Term) -> str:
     ]
     parts += [f"curve {axis} of {n} coefficients" for axis, n in term.coefficients.items()]
     return f"  {term.name}: {', '.join(parts)}"
-
-
-def table(cells: Cells) -> str:
-    """A table of text."""
-    return columns(*cells)
 
 
 def with_planned_experiment(result: Answer, request: Request, effects: Mapping[str, Effect]) -> Answer:
