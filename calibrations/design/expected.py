@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtr
 
-from calibrations.criteria import INSEPARABLE, NAMED_GAIN
+from calibrations.criteria import CERTAIN_PROBABILITY, INSEPARABLE, NAMED_GAIN
 from calibrations.design.optimal_design import noise_on_rows
 from calibrations.errors import DataError, MissingColumn
 from calibrations.fitting.fit import Fit
@@ -59,6 +59,21 @@ class Expected:
     def probability_alone(self) -> float:
         """Of finding the missing effect by its own data alone."""
         return min(pairs_separated(self.alone), _exceedance(self.visible, NAMED_GAIN))
+
+    @property
+    def suffices_alone(self) -> bool:
+        """Whether its own data are enough to find the missing effect."""
+        return self.probability_alone >= CERTAIN_PROBABILITY
+
+    @property
+    def decisive(self) -> float:
+        """Lambda of the data that decide: its own data if they are enough, else all data together."""
+        return self.alone if self.suffices_alone else self.together
+
+    @property
+    def percent(self) -> str:
+        """The probability that these data separate the explanations, as text."""
+        return f"{min(100 * pairs_separated(self.decisive), 99.9):.3g} %"
 
 
 def expected_gain(best: Fit, rival: Fit, table: Table) -> Expected:

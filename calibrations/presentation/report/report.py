@@ -13,8 +13,7 @@ import numpy as np
 from markupsafe import Markup
 
 from calibrations.analyses.motion import MotionResult
-from calibrations.criteria import CERTAIN_PROBABILITY, SIGNIFICANT
-from calibrations.design.expected import pairs_separated
+from calibrations.criteria import SIGNIFICANT
 from calibrations.design.experiment import Experiment
 from calibrations.discovery.findings import Candidate
 from calibrations.discovery.results import Comparison, Discovery
@@ -92,10 +91,8 @@ def next_takes(e: Experiment) -> str:
     duration = f"It takes {minutes:.0f} min" if minutes < LONG_MIN else f"It takes {minutes / 60:.1f} h"
     if e.expected is None:
         return f"{duration}. Its result cannot be predicted."
-    suffices_alone = e.expected.probability_alone >= CERTAIN_PROBABILITY
-    percent = 100 * pairs_separated(e.expected.alone if suffices_alone else e.expected.together)
-    source = "its own data" if suffices_alone else "all data together"
-    return f"{duration} and separates them with a probability of {min(percent, 99.9):.3g} %, from {source}."
+    source = "its own data" if e.expected.suffices_alone else "all data together"
+    return f"{duration} and separates them with a probability of {e.expected.percent}, from {source}."
 
 
 EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only

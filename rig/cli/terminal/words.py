@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from calibrations.criteria import CERTAIN_PROBABILITY
 from calibrations.discovery.patterns import Pattern
 from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
@@ -95,16 +94,10 @@ def _brings(expected: Expected | None, data: str) -> str:
     """Expected result of an experiment, from its own data if they are enough."""
     if expected is None:
         return "its result cannot be predicted"
-    from calibrations.design.expected import pairs_separated
-
-    suffices_alone = expected.probability_alone >= CERTAIN_PROBABILITY
-    value = expected.alone if suffices_alone else expected.together
-    source = (
-        "from its own data" if suffices_alone else f"from all data: rig discover {data.replace(' + ', ' ')} NEW-RUN"
-    )
-    chance = min(100 * pairs_separated(value), 99.9)
+    all_data = f"all data: rig discover {data.replace(' + ', ' ')} NEW-RUN"
     return (
-        f"separation {math.sqrt(value):.3g} standard deviations, correct with a probability of {chance:.3g} %, {source}"
+        f"separation {math.sqrt(expected.decisive):.3g} standard deviations, correct with a probability of "
+        f"{expected.percent}, from {'its own data' if expected.suffices_alone else all_data}"
     )
 
 
