@@ -42,36 +42,36 @@ class Wire(Protocol):
 
 
 class Peer(Protocol):
-    """A passive server: it acts only when it is given the time."""
+    """A passive server: it acts only when the clock calls it."""
 
     def filenos(self) -> Sequence[int]:
         """Descriptors to listen on."""
 
     def advance(self, now_s: float) -> None:
-        """Compute all that happened up to `now_s`; comes before any exchange at that time."""
+        """Compute the state at `now_s`. Called before any exchange at that time."""
 
     def receive(self, fileno: int, now_s: float) -> None:
-        """Accept, or read and act on, what has arrived."""
+        """Accept connections, read the bytes that have arrived, and act on them."""
 
     def emit(self, now_s: float) -> None:
-        """Write all that is due by `now_s`."""
+        """Write all bytes that are due by `now_s`."""
 
     def due_s(self) -> float:
-        """When it acts next by itself; infinity for never."""
+        """Time of its next action without a request, s; infinity for none."""
 
     def progress(self, key: str) -> tuple[int, int] | None:
-        """Bytes (received, emitted) on that connection; None if it has none of that name."""
+        """Bytes (received, emitted) on the connection of this name; None without such a connection."""
 
 
 class Clock(Protocol):
-    """Seconds since an instant of the clock's own choice."""
+    """Seconds since a fixed instant that the clock chooses."""
 
     def now(self) -> float: ...
 
     def sleep(self, seconds: float) -> None: ...
 
     def wait_readable(self, wire: Wire, timeout_s: float) -> bool:
-        """Wait until bytes (or the end of the connection) can be read; False when the time is over."""
+        """Wait until bytes, or the end of the connection, can be read. False after the time limit."""
 
 
 class WallClock:
@@ -99,11 +99,11 @@ class SimulatedClock:
         self._bases: WeakKeyDictionary[Wire, tuple[int, int]] = WeakKeyDictionary()
 
     def attach(self, peer: Peer) -> None:
-        """Pump `peer` from now on."""
+        """Include `peer` in the simulation from now on."""
         self._peers.append(peer)
 
     def restore(self, now_s: float) -> None:
-        """Continue an earlier run at `now_s`; called with its twins' states, while nothing is under way."""
+        """Continue an earlier run at `now_s`, together with the states of its twins, while no byte is in flight."""
         self._now_s = now_s
 
     def now(self) -> float:
@@ -143,7 +143,7 @@ class SimulatedClock:
         return 0, 0
 
     def _in_flight(self, wire: Wire) -> tuple[int, int]:
-        """Bytes on their way to the server, and from it."""
+        """Bytes in flight to the server, and from it."""
         received, emitted = self._progress(wire)
         base_received, base_emitted = self._bases[wire]
         return wire.sent - (received - base_received), emitted - base_emitted - wire.received
@@ -178,9 +178,9 @@ class SimulatedClock:
 
 
 def step(peers: Sequence[Peer], now_s: float) -> None:
-    """One turn of all servers: what happened, what has arrived, what is due.
+    """One turn of all servers: compute the state, read what has arrived, write what is due.
 
-    All advance before any acts, so that none sees a world that another has already changed.
+    All servers compute their state before any acts, so that no server sees changes of another at this instant.
     """
     ready = set(_readable(list(_filenos(peers)), 0.0))
     for peer in peers:
@@ -195,9 +195,9 @@ def step(peers: Sequence[Peer], now_s: float) -> None:
 def serve_forever(
     peers: Sequence[Peer], is_over: Callable[[], bool] = lambda: False, clock: Clock | None = None
 ) -> None:
-    """Serve any client in real time until `until()`; the same servers that a simulated clock pumps.
+    """Serve any client in real time until `until()` is true, with the servers that a simulated clock uses too.
 
-    `clock` starts where the servers' world stands; by default at 0.
+    `clock` starts at the time of the servers' world; by default at 0.
     """
     clock = clock or WallClock()
     while not is_over():
@@ -212,12 +212,12 @@ def _filenos(peers: Sequence[Peer]) -> Iterator[int]:
 
 
 def _pending(fileno: int) -> int:
-    """Bytes that can be read now."""
+    """Number of bytes that can be read now."""
     return int.from_bytes(fcntl.ioctl(fileno, termios.FIONREAD, bytes(4)), sys.byteorder)
 
 
 def _readable(filenos: list[int], timeout_s: float) -> list[int]:
-    """The `filenos` that can be read; poll, since select ends at descriptor 1023."""
+    """The `filenos` that can be read. With poll, because select stops at descriptor 1023."""
     poll = select.poll()
     for fileno in filenos:
         poll.register(fileno, select.POLLIN)

@@ -28,7 +28,7 @@ from collections.abc import Iterable
 
 
 class DriverError(Exception):
-    """`what` happened, and the `remedy` as an instruction to a person."""
+    """An error of an instrument: `what` happened, and the `remedy` as an instruction to a person."""
 
     def __init__(self, what: str, remedy: str) -> None:
         remedy = remedy.strip().removesuffix(".")
@@ -42,7 +42,7 @@ class LimitError(DriverError):
 
 
 class LinkError(DriverError):
-    """The wire, not the instrument, is at fault."""
+    """A fault of the link, not of the instrument."""
 
 
 class LinkRefused(LinkError):
@@ -118,7 +118,7 @@ class ClockStuck(DriverError):
 
 
 def did_you_mean(name: object, known_names: Iterable[str], unlisted: Iterable[str] = ()) -> str:
-    """The end of a message about an unknown `name`, after a space: the most similar name, else all that are known.
+    """The end of a message about an unknown `name`, after a space: the most similar known name, else all known names.
 
     `unlisted`: names of another kind, which are only suggested.
     """

@@ -33,7 +33,7 @@ class Check:
 
 
 class Instrument(Protocol):
-    """The part that is the same for stages, converters and ovens."""
+    """The common interface of stages, converters and ovens."""
 
     @property
     def name(self) -> str: ...
@@ -46,7 +46,7 @@ class Instrument(Protocol):
 
 
 class Alarm(Protocol):
-    """An alarm of a drive, its cause in words, and what a person does about it."""
+    """An alarm of a drive, its cause in words, and the remedy."""
 
     @property
     def code(self) -> int: ...

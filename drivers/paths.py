@@ -11,7 +11,7 @@ LEAD_S, TAIL_S = 0.2, 0.5  # at constant rate before a turn, for the motor to se
 
 
 def move_s(distance_deg: float, speed_deg_s: float, acceleration_deg_s2: float) -> float:
-    """How long a move takes: a trapezoid of speed, or a triangle when the way is short."""
+    """Duration of a move, s: a trapezoid of speed, or a triangle for a short way."""
     if distance_deg < speed_deg_s**2 / acceleration_deg_s2:
         return 2 * math.sqrt(distance_deg / acceleration_deg_s2)
     return distance_deg / speed_deg_s + speed_deg_s / acceleration_deg_s2

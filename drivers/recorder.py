@@ -1,4 +1,4 @@
-"""Records of a converter: what every converter does with the stream that its own driver makes."""
+"""Records of a converter, from the stream of its driver: the common part of all converters."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Inputs(Generic[Input]):
-    """The inputs of a converter, as its settings name them: {name: input}.
+    """The inputs of a converter, as in its settings: {name: input}.
 
     Those `on_request` are wired too, and are measured only for who asks for them. Both are fields of the settings of
     each converter, with its own defaults.
@@ -102,7 +102,7 @@ class Recorder(Generic[Settings]):
     settings: Settings
 
     def close(self) -> None:
-        """Nothing to release: the wire belongs to the bench."""
+        """Does nothing: the bench closes the link."""
 
     def power(self, on: bool) -> None:  # noqa: ARG002
         """Raises LimitError: no line of it switches the sensor."""
@@ -111,7 +111,7 @@ class Recorder(Generic[Settings]):
         )
 
     def only(self, *outputs: str) -> Self:
-        """The same device with these channels and no others. Raises LimitError for one that is not there."""
+        """The device with these channels only. Raises LimitError for an unknown channel."""
         device = copy(self)
         device.settings = self.settings.only(self.name, outputs)
         return device
@@ -130,7 +130,7 @@ class Recorder(Generic[Settings]):
         return samples
 
     def acquire_with(self, duration_s: float, reading: Callable[[], Read]) -> tuple[Samples, Read]:
-        """The same, and what `reading` gives in the middle of it, while the device records on."""
+        """As `acquire`, with the result of `reading`, which is called in the middle of the record."""
         with contextlib.closing(self.stream(duration_s, duration_s / 2)) as stream:
             blocks = [next(stream)]
             value = reading()

@@ -1,1 +1,1 @@
-"""What drivers of digital sensors share: settings, records, counts of samples, frames, and the base of their twins."""
+"""Shared parts of drivers of digital sensors: settings, records, counts of samples, frames, base of the twins."""

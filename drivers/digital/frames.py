@@ -1,4 +1,4 @@
-"""Frames of bytes with a checksum, out of a stream that may begin and be damaged anywhere.
+"""Frames of bytes with a checksum, from a stream that may begin anywhere and may be damaged.
 
 Frames are found and checked many at a time. After a damaged one, the search goes on with its second byte.
 """
@@ -19,13 +19,13 @@ BAD, GOOD, UNKNOWN = 0, 1, 2
 
 
 class Framing(Protocol):
-    """What a frame is. Its first `head` bytes determine its length."""
+    """The format of a frame. Its first `head` bytes determine its length."""
 
     starts: re.Pattern[bytes]
     head: int
 
     def length(self, text: bytes, at: int) -> int | None:
-        """Bytes of the frame that begins at `at`; 0 if none does, None if the end of `text` hides it."""
+        """Length of the frame that begins at `at`, bytes; 0 without one, None if `text` ends too early to know."""
 
     def judge(self, frames: Bytes) -> Ints:
         """GOOD, BAD, or UNKNOWN for a kind whose checksum is not known, of each frame, shape (n, length) -> (n,)."""
@@ -33,7 +33,7 @@ class Framing(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Whole frames in `data`, in their order. `known`: the checksum is checked."""
+    """Complete frames in `data`, in their order. `known`: the checksum is checked."""
 
     data: Bytes
     starts: Ints
@@ -41,7 +41,7 @@ class Found:
     known: NDArray[np.bool_]
 
     def heads(self, count: int) -> Ints:
-        """The first `count` bytes of each frame, shape (n, count); what is beyond the data is its last byte."""
+        """The first `count` bytes of each frame, shape (n, count); after the data, its last byte again."""
         places = np.minimum(self.starts[:, None] + np.arange(count), len(self.data) - 1)
         return np.asarray(self.data[places], dtype=np.int64)
 
@@ -55,7 +55,7 @@ class Found:
 
 
 def groups(values: Ints) -> Iterator[tuple[int, Any]]:
-    """Each different value, and an index of where it is."""
+    """Each different value, and the index of the frames that have it."""
     if len(values) and (values == values[0]).all():
         yield int(values[0]), slice(None)
         return
@@ -105,7 +105,7 @@ class Frames:
         return Found(array, starts, lengths, verdicts == GOOD)
 
     def _walk(self, text: bytes, array: Bytes, start: int) -> tuple[Ints, Ints, NDArray[np.bool_], int, bool]:
-        """Begin and length of each whole frame from `start` on, and whether bytes were skipped before it.
+        """Begin and length of each complete frame from `start` on, and whether bytes were skipped before it.
 
         And the end of them all, and whether bytes were skipped before it.
         """
@@ -145,7 +145,7 @@ class Frames:
         return n
 
     def _missed(self, gap: bool) -> bool:
-        """Count bytes without a good frame, once until the next one."""
+        """Count a damaged part once, up to the next good frame."""
         self.damaged += int(gap and self._ends_in_frame)
         return gap
 
@@ -173,7 +173,7 @@ _NONE = np.empty(0, dtype=np.int64)
 
 
 def _count_alike(array: Bytes, length: int, head: int) -> int:
-    """How many whole frames with the head of the first one follow each other."""
+    """Number of successive complete frames with the head of the first one."""
     rows = array[: len(array) // length * length].reshape(-1, length)
     if not len(rows):
         return 0

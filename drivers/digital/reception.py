@@ -24,13 +24,13 @@ FINE = 10  # counts of the sensor's time in a period of the samples: its steps c
 
 @dataclass(frozen=True)
 class TimeBase:
-    """The sensor's time: counts of `unit_s`, which begin again after one of `wraps` counts."""
+    """The sensor's time in counts of `unit_s`, which restart at 0 after one of the numbers in `wraps`."""
 
     unit_s: float
     wraps: tuple[int, ...] = ()
 
     def steps(self, counts: Floats) -> Floats:
-        """Counts from each to the next, shape (n - 1,); negative where the sensor's time went back."""
+        """Counts from each time to the next, shape (n - 1,); negative where the sensor's time went back."""
         steps = np.diff(counts)
         for wrap in self.wraps if (steps < 0).any() else ():
             wrapped = steps + wrap
@@ -66,7 +66,7 @@ class Numbers:
     _missing: int = 0  # messages that did not arrive since the last sample
 
     def gaps(self, numbers: Ints, samples: Ints) -> Ints:
-        """Messages missing before each sample, -1 for a repeated one: the numbers, and which of them are samples."""
+        """Number of missing messages before each sample; -1 for a repeated sample. `samples`: indices of `numbers`."""
         if not len(numbers):
             return numbers
         last = int(numbers[0]) - 1 if self._last is None else self._last
@@ -137,7 +137,7 @@ class Reception:
     _sensor: float = 0.0  # the same, counted on over its wraps
 
     def take(self, batch: Batch, now_s: float) -> None:
-        """Add samples that arrived by `now_s`, without repeated ones."""
+        """Add the samples that arrived by `now_s`. Repeated samples are left out."""
         values = batch.values
         if not len(values):
             return
@@ -159,7 +159,7 @@ class Reception:
         self._keep(values[~repeated], now_s, timed=batch.time is not None)
 
     def pull(self, n: int) -> Floats:
-        """The next `n` samples, which are not kept any longer, shape (n, outputs)."""
+        """Remove and return the next `n` samples, shape (n, outputs)."""
         parts: list[Floats] = []
         while n > 0:
             values = self._waiting.popleft()
@@ -171,12 +171,12 @@ class Reception:
 
     @property
     def length_s(self) -> float:
-        """From the first arrival to the last."""
+        """Time from the first arrival to the last, s."""
         return self.end_s - self.start_s
 
     @property
     def measured_rate_hz(self) -> float:
-        """Samples a second, by the host's clock."""
+        """Sample rate by the host's clock, Hz."""
         return (self.count - self._first) / self.length_s if self.length_s else 0.0
 
     @property
@@ -230,7 +230,7 @@ class Tally:
     last: Moment | None = None
 
     def add(self, reception: Reception, damaged: int) -> None:
-        """Add a record, at its end."""
+        """Add the counts of a record that has ended."""
         self.samples += reception.count
         self.lost += reception.lost
         self.doubled += reception.doubled
@@ -240,7 +240,7 @@ class Tally:
 
     @property
     def offset_s(self) -> float | None:
-        """The sensor's time minus the host's, at the last moment."""
+        """The sensor's time minus the host's time at the last measurement, s."""
         return None if self.last is None else self.last.sensor_s - self.last.host_s
 
     @property
@@ -251,7 +251,7 @@ class Tally:
         return (self.last.sensor_s - self.first.sensor_s) / (self.last.host_s - self.first.host_s) - 1
 
     def values(self) -> dict[str, tuple[float, str]]:
-        """The numbers by name, each with its unit."""
+        """The numbers by name, each as (value, unit)."""
         counts = {"samples": self.samples, "samples-lost": self.lost, "samples-doubled": self.doubled}
         counts |= {f"{self.carrier}-damaged": self.damaged, "sensor-restarts": self.restarts}
         clock = {} if self.gain is None else {"sensor-clock-gain": (1e6 * self.gain, "ppm")}

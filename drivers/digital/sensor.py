@@ -1,4 +1,4 @@
-"""A digital sensor in the role of the converter: it sends its samples by itself, in its own units.
+"""A digital sensor in the role of the converter: it sends samples without requests, in its own units.
 
 Old samples in the buffers are discarded before a record. A record is refused if too many of its samples are lost, if
 its rate is wrong, or if an axis is stuck or at the end of its range.
@@ -33,29 +33,29 @@ SHOWN = 3  # damaged lines or messages before a share of them can be judged
 
 
 class Decoder(Protocol):
-    """Makes samples of bytes as they arrive. The first line or message may be cut, and is not counted."""
+    """Converts bytes to samples as they arrive. The first line or message may be incomplete and is not counted."""
 
     def take(self, data: bytes) -> Batch:
         """The samples that `data` completes."""
 
     @property
     def good(self) -> int:
-        """Lines or messages that could be read."""
+        """Number of lines or messages that could be read."""
 
     @property
     def damaged(self) -> int:
-        """Those that could not."""
+        """Number of lines or messages that could not be read."""
 
     @property
     def unread(self) -> int:
-        """Bytes after the last line or message."""
+        """Number of bytes after the last complete line or message."""
 
 
 Decoding = TypeVar("Decoding", bound=Decoder)
 
 
 class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
-    """A sensor that sends its samples by itself.
+    """A sensor that sends samples without requests.
 
     A driver defines the members down to `_advice`. `carrier` is the word for what carries a sample, `longest` the most
     bytes without one.
@@ -87,7 +87,7 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         """The error for bytes without a sample."""
 
     def _no_frames(self, stream: Frames) -> BadFrame:
-        """The error for bytes that are no message of the protocol, or only damaged ones."""
+        """The error for bytes without a valid message of the protocol."""
         if stream.misfits > 2:
             return BadFrame(
                 f"{self.name}: {stream.misfits} messages on {self._link.url} have a wrong checksum",
@@ -104,14 +104,14 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
 
     @abstractmethod
     def _content(self, decoder: Decoding) -> str:
-        """What the lines or messages contain, for a self-test."""
+        """The content of the lines or messages in words, for a self-test."""
 
     def _begin(self) -> None:
-        """Let the sensor send its samples, and discard old ones. Raises DriverError."""
+        """Start the samples of the sensor, and discard old ones. Raises DriverError."""
         self._link.discard()
 
     def _advice(self, decoder: Decoding, begun_s: float) -> list[Check]:  # noqa: ARG002
-        """Checks after a failed one."""
+        """Further checks after a failed check, with advice."""
         return []
 
     def self_test(self) -> list[Check]:
@@ -162,11 +162,11 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
 
     @property
     def _warm(self) -> str:
-        """The temperature of the sensor, as the end of a sentence; nothing if it does not report one."""
+        """The temperature of the sensor as the end of a sentence; "" if the sensor does not report it."""
         return "" if self._warmth.last_c is None else f"; the sensor is at {self._warmth.last_c:.1f} C"
 
     def power(self, on: bool) -> None:  # noqa: ARG002 - as the converter's
-        """Raises LimitError: the program cannot switch its power."""
+        """Raises LimitError: the program cannot switch the power of this sensor."""
         raise LimitError(f"{self.name}: the program cannot switch the power of a digital sensor", "Switch it by hand")
 
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
@@ -202,7 +202,7 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
             self._tally.add(reception, decoder.damaged)
 
     def _pause(self, reception: Reception, total: int) -> None:
-        """Let samples gather. The first sample and the last are read as they arrive, for the time of each."""
+        """Wait while samples collect. The first and the last one are read at once, for their times of arrival."""
         period_s = 1 / self.settings.rate_hz
         pause_s = min(POLL_S, (total - reception.count - 2) * period_s)
         if reception.count and pause_s > 2 * period_s:
@@ -251,7 +251,7 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
             )
 
     def _lost(self, reception: Reception, decoder: Decoding) -> int:  # noqa: ARG002
-        """Samples that the record lacks so far."""
+        """Number of samples that are missing in the record so far."""
         return reception.lost
 
     def _require_alive(self, values: NDArray[np.float64], names: Sequence[str], reception: Reception) -> None:
@@ -279,7 +279,7 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
             )
 
     def _stuck(self, values: NDArray[np.float64], names: Sequence[str]) -> str:
-        """The first output that gave STUCK equal samples; "" for none. Short records count together."""
+        """The first output with STUCK equal samples; "" for none. Successive short records count together."""
         still = np.ptp(values, axis=0) == 0
         if still.all():  # of a coarse sensor at rest; it says nothing
             return ""

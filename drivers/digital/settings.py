@@ -29,7 +29,7 @@ class DigitalSettings(NoDigitalLines):
 
     @property
     def wired(self) -> Mapping[str, int | str]:
-        """All outputs by name, with the place where the driver finds each."""
+        """All outputs by name, each with its place in a line or message."""
         raise NotImplementedError
 
     @property
@@ -56,7 +56,7 @@ class DigitalSettings(NoDigitalLines):
         return {name: unit for names, unit in groups for name in names if name in self.wired}
 
     def lag_s(self, channel: str) -> float:  # noqa: ARG002 - as the converter's
-        """All outputs are sampled at once."""
+        """Delay between outputs, s: 0, because all are sampled at once."""
         return 0.0
 
     def only(self, name: str, outputs: Sequence[str]) -> Self:

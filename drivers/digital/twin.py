@@ -46,7 +46,7 @@ FRAME_FAULTS = {  # of a sensor that sends frames when they are requested
 
 
 class World(Protocol):
-    """What a sensor knows of physics."""
+    """The part of the simulated world that a sensor uses."""
 
     def sensed(self, outputs: Sequence[str], start_s: float, interval_s: float, n: int) -> Floats: ...
     def die_c(self) -> float: ...
@@ -58,7 +58,7 @@ S = TypeVar("S", bound=DigitalSettings)
 
 @dataclass
 class Clock:
-    """The sensor's clock: its tick `tick` is at `tick_s` of the true time, and it gains `gain` from there on."""
+    """The sensor's clock: tick number `tick` is at the true time `tick_s`; from there on its rate error is `gain`."""
 
     period_s: float  # of a tick, nominal
     tick: int = 0
@@ -66,30 +66,30 @@ class Clock:
     gain: float = 0.0
 
     def run(self, gain: float, tick: int) -> None:
-        """Gain this much from `tick` on."""
+        """Set the rate error from `tick` on."""
         if gain != self.gain:
             self.tick, self.tick_s, self.gain = tick, self.true_s(tick), gain
 
     @property
     def interval_s(self) -> float:
-        """True time from tick to tick."""
+        """True time between two ticks, s."""
         return self.period_s / (1 + self.gain)
 
     def true_s(self, tick: int) -> float:
-        """The true time of a tick."""
+        """True time of a tick, s."""
         return self.tick_s + (tick - self.tick) * self.interval_s
 
     def local_s(self, now_s: float) -> float:
-        """The clock's own time since its tick 0."""
+        """Time by this clock since its tick 0, s."""
         return self.period_s * (self.tick + (now_s - self.tick_s) / self.interval_s)
 
     def ticks(self, now_s: float) -> int:
-        """The number of the last tick by then."""
+        """Number of the last tick at `now_s`."""
         return self.tick + int(np.floor((now_s - self.tick_s) / self.interval_s + 1e-6))
 
 
 class DigitalTwin(Twin):
-    """One sensor on a line of its own. It samples from power-on; what finds no listener is lost.
+    """One sensor with its own line. It samples from power-on; samples without a listener are lost.
 
     `carrier` is the word in the names of its faults.
     """
@@ -137,25 +137,25 @@ class DigitalTwin(Twin):
         self._clock = Clock(**state["clock"])
 
     def _begin_at(self, now_s: float, rate_hz: float) -> None:
-        """Begin anew: the sensor's time is 0."""
+        """Restart: the sensor's time is 0."""
         self._clock, self._zero_s, self._count = Clock(1 / rate_hz, 0, now_s, self._clock.gain), 0.0, 1
 
     def _change_rate(self, now_s: float, rate_hz: float) -> None:
-        """Sample at another rate; the sensor's time goes on."""
+        """Change the sample rate; the sensor's time continues."""
         time_s = self._zero_s + self._clock.local_s(now_s)
         self._begin_at(now_s, rate_hz)
         self._zero_s = time_s
 
     def _sensor_s(self, ticks: NDArray[np.int64]) -> Floats:
-        """The sensor's time of samples, s."""
+        """The times of samples by the sensor's clock, s."""
         return np.asarray(self._zero_s + self._clock.period_s * ticks)
 
     def _listeners(self, now_s: float) -> list[Connection]:
-        """Connections that have read what was sent so far."""
+        """Connections that have read all bytes sent so far."""
         return [c for c in self._port.connections.values() if not c.is_behind(now_s)]
 
     def _send(self, values: Floats, ticks: NDArray[np.int64], at_s: Floats, listeners: Sequence[Connection]) -> None:
-        """Send samples: in one piece, or with faults each by itself."""
+        """Send samples: together, or one by one while there are faults."""
         if not self.faults:
             pieces = [(float(at_s[-1]), b"".join(self._messages(values, ticks)))]
         else:
@@ -168,13 +168,13 @@ class DigitalTwin(Twin):
                 connection.send(data, now_s)
 
     def _spoil(self, row: Floats, now_s: float) -> None:
-        """Change the values of a sample by the faults of the moment."""
+        """Apply the present faults to the values of a sample."""
         if self.faults.size("stuck-axis", now_s) is not None:
             self._stuck_value = float(row[0]) if self._stuck_value is None else self._stuck_value
             row[0] = self._stuck_value
 
     def _spoilt(self, message: bytes, now_s: float) -> bytes:
-        """A line or message with the faults of the moment."""
+        """Apply the present faults to a line or message."""
         if self.faults.size(f"lost-{self.carrier}", now_s) is not None:
             return b""
         if self.faults.size("wrong-baud", now_s) is not None:
@@ -192,11 +192,11 @@ class FramedTwin(DigitalTwin):
 
     @abstractmethod
     def _answer(self, connection: Connection, now_s: float) -> None:
-        """Act on what has arrived."""
+        """Act on the bytes that have arrived."""
 
     @abstractmethod
     def _power_on(self, now_s: float) -> None:
-        """Begin with the settings of power-on."""
+        """Restart with the settings of power-on."""
 
     def advance(self, now_s: float) -> None:
         if self.faults and self.faults.once("restart", now_s):
@@ -214,7 +214,7 @@ class FramedTwin(DigitalTwin):
         return self._checked(super()._spoilt(message, now_s), now_s)
 
     def _checked(self, message: bytes, now_s: float) -> bytes:
-        """A message, with a wrong checksum or half of it by the faults of the moment."""
+        """A message; by the present faults its checksum is wrong, or half of it is missing."""
         if not self.faults or not message:
             return message
         if self.faults.size("half-message", now_s) is not None:
@@ -224,14 +224,14 @@ class FramedTwin(DigitalTwin):
 
 
 def talking_port(listen: str) -> Port:
-    """A port for a sensor that sends without requests. The system buffers only little unread data."""
+    """A port for a sensor that sends without requests. The system buffers only a little unread data."""
     return Port(listen, capacity=HELD)
 
 
 def serve_sensors(
     sensor: Callable[[W, S, Port], DigitalTwin], world: W, roles: Mapping[str, tuple[int, S]], listen: str
 ) -> Server:
-    """A link with a sensor for each role: role -> (unit id, which such a sensor has not, settings)."""
+    """A link with a sensor for each role: role -> (unit id, not used by such a sensor; settings)."""
     ports = {role: talking_port(listen) for role in roles}
     twins = {role: sensor(world, roles[role][1], port) for role, port in ports.items()}
     return Server(list(ports.values()), twins, {role: Address(port.url) for role, port in ports.items()})

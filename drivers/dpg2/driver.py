@@ -82,7 +82,7 @@ class Level:
         return Identity("MEAS DPG2", serial, version)
 
     def self_test(self) -> list[Check]:
-        """Whether it shows an angle, at rest."""
+        """Check that the level shows an angle at rest."""
         try:
             reading = self.read()
         except InstrumentError as fault:
@@ -93,7 +93,7 @@ class Level:
         return [Check("reading", True, reading_text)]
 
     def close(self) -> None:
-        """Nothing to release: the wire belongs to the bench."""
+        """Does nothing: the bench closes the link."""
 
     def read(self) -> Reading:
         """The mean of `settings.readings` readings, once they agree.
@@ -116,7 +116,7 @@ class Level:
         return Reading(float(x_deg), float(y_deg), std_deg, len(readings), self.settings.accuracy_deg)
 
     def _settled(self, readings: list[tuple[float, float]], deadline: float) -> bool:
-        """Whether the last readings make a mean; raises once they should. One and the same is not settled but stuck."""
+        """Whether the last readings agree. Raises NotSettled after the patience, InstrumentError for equal readings."""
         recent = readings[-self.settings.readings :]
         if len(recent) < self.settings.readings:
             return False
@@ -185,5 +185,5 @@ def _std_deg(readings: list[tuple[float, float]]) -> float:
 
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> Level:
-    """The level at `address`, which falls silent. Raises LinkRefused when its wire cannot be opened."""
+    """The level at `address`, with its output stopped. Raises LinkRefused if the link cannot be opened."""
     return Level(links.link(address.url, name), settings, name)

@@ -1,4 +1,4 @@
-"""The simulated DPG2: talks unasked until it is stopped, and shows what the world's level does."""
+"""The simulated DPG2: it sends readings of the world's level without requests until it is stopped."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ WHO = b"DPL2 V1.8.0\r\nSN:123456789\r\n"
 
 
 class World(Protocol):
-    """What a level knows of physics."""
+    """The part of the simulated world that a level uses."""
 
     @property
     def now_s(self) -> float: ...
@@ -46,12 +46,12 @@ class Inclinometer(Twin):
         port.answer = self._answer
 
     def advance(self, now_s: float) -> None:
-        """The level is the world's; it looks at it only when it speaks, since the converter may still be sampling."""
+        """Does nothing: the level is read only when a line is sent, because the converter may still be sampling."""
         if strike := self.faults.once("restart", now_s):
             self._running, self._next_s = True, max(strike.at_s, self._next_s)
 
     def speak(self, now_s: float) -> None:
-        """Say what is due by `now_s`."""
+        """Send the lines that are due by `now_s`."""
         while self._running and self._next_s <= now_s:
             if listeners := [c for c in self._port.connections.values() if self._has_sent_all(c)]:
                 lines = self._reading(self._next_s)
@@ -69,7 +69,7 @@ class Inclinometer(Twin):
         self._running, self._next_s = state["running"], state["next_s"]
 
     def _answer(self, connection: Connection, now_s: float) -> None:
-        """Obey letter by letter; it does not know most of them, and but two of them while it talks."""
+        """Act on each letter. Only a few are commands, and only two of them while it sends readings."""
         for letter in bytes(connection.inbox):
             self._obey(bytes([letter]), connection, now_s)
         connection.inbox.clear()
@@ -87,7 +87,7 @@ class Inclinometer(Twin):
             self._send_lines(connection, WHO.splitlines(keepends=True), began_s)
 
     def _reading(self, t_s: float) -> list[bytes]:
-        """Both lines at `t_s`, or as soon after it as the world still can."""
+        """Both lines at `t_s`, or at the present time of the world if that is later."""
         self._world.advance(max(t_s, self._world.now_s))
         x_deg, y_deg = self.faults.held("stale", t_s, list(self._world.level_deg()))
         x_deg += self.faults.size("lies", t_s) or 0.0
@@ -104,14 +104,14 @@ class Inclinometer(Twin):
         return not connection.is_behind(self._next_s)
 
     def _send_lines(self, connection: Connection, lines: list[bytes], began_s: float) -> None:
-        """Send line by line, each when its last character is through."""
+        """Send each line at the time at which its last character would have arrived."""
         for line in lines:
             began_s += len(line) * self._port.timing.character_s
             connection.send(line, began_s)
 
 
 class LevelServer(Server):
-    """A server whose twins speak when all others have caught up with the time."""
+    """A server whose twins send after all other servers have reached the present time."""
 
     def __init__(self, ports: Mapping[str, Port], twins: Mapping[str, Inclinometer]) -> None:
         super().__init__(list(ports.values()), twins, {role: Address(port.url) for role, port in ports.items()})
@@ -124,6 +124,6 @@ class LevelServer(Server):
 
 
 def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> LevelServer:
-    """A line with a level for each role: role -> (unit id, which such a level has not, settings)."""
+    """A line with a level for each role: role -> (unit id, not used by such a level; settings)."""
     ports = {role: Port(listen) for role in roles}
     return LevelServer(ports, {role: Inclinometer(world, roles[role][1], port) for role, port in ports.items()})

@@ -52,7 +52,7 @@ class Settings(Inputs[str], NoDigitalLines):
         self.require_different_names()
 
     def lag_s(self, channel: str) -> float:  # noqa: ARG002
-        """All channels are read at once."""
+        """Delay between channels, s: 0, because all are read at once."""
         return 0.0
 
 
@@ -71,7 +71,7 @@ class AnalogRecords(Recorder[Settings]):
         return Identity(f"EPICS records {self._records.beginning}{', '.join(self.settings.channels.values())}")
 
     def self_test(self) -> list[Check]:
-        """Alarms, and how old the readings are."""
+        """Check the alarms of the records and the age of the readings."""
         checks = []
         for channel, reading in self._scan().items():
             ok = not reading.is_worse_than(self.settings.highest_severity)
@@ -152,14 +152,14 @@ class AnalogRecords(Recorder[Settings]):
 
 
 class Freshness:
-    """How many readings of each channel repeated the one before."""
+    """Number of readings of each channel that repeat the reading before."""
 
     def __init__(self, channels: Sequence[str]) -> None:
         self._stamps: dict[str, float] = {}
         self._repeated = dict.fromkeys(channels, 0)
 
     def note(self, readings: Mapping[str, Reading]) -> None:
-        """Count those of the readings that have the time stamp of the last one."""
+        """Count the readings whose time stamp is that of the reading before."""
         for channel, reading in readings.items():
             self._repeated[channel] += self._stamps.get(channel) == reading.stamp_s
             self._stamps[channel] = reading.stamp_s

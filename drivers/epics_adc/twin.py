@@ -27,7 +27,7 @@ FAULTS = {
 
 
 class World(Protocol):
-    """What a converter knows of physics."""
+    """The part of the simulated world that a converter uses."""
 
     def advance(self, t_s: float) -> None: ...
 
@@ -35,7 +35,7 @@ class World(Protocol):
 
 
 class Ioc(Twin):
-    """The records, by name; all are processed together."""
+    """The records by name. All are processed at the same time."""
 
     def __init__(self, world: World, settings: Settings) -> None:
         self.faults = Faults()
@@ -55,7 +55,7 @@ class Ioc(Twin):
         return Field(self._volts[self._wiring[name]], self._stamp_s, int(severity or 0), status, "V")
 
     def put(self, name: str, value: float, now_s: float) -> None:
-        """An input is not written."""
+        """Does nothing: an input record is not written."""
 
     def _process(self, now_s: float) -> None:
         names = list(self._wiring.values())
@@ -65,7 +65,7 @@ class Ioc(Twin):
 
 
 def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
-    """One IOC: role -> (unit id, which it has not, settings). Its channels are the world's inputs."""
+    """One IOC: role -> (unit id, not used by an IOC; settings). Its channels are the world's inputs."""
     ((role, (unit, settings)),) = roles.items()
     ioc = Ioc(world, settings)
     port = records_port(listen, [ioc])

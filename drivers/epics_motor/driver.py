@@ -85,14 +85,14 @@ class MotorRecord:
         ]
 
     def close(self) -> None:
-        """Nothing to release: the wire belongs to the bench."""
+        """Does nothing: the bench closes the link."""
 
     def angle_deg(self) -> float:
         """The readback position, deg."""
         return self._angle_deg(self._read(mr.READBACK))
 
     def referenced(self) -> bool:
-        """Whether the motor knows where zero is; without `home` in the bench file the IOC is trusted with it."""
+        """Whether the zero of the angle is known. Without `home` in the bench file, the zero of the IOC is used."""
         (status,) = self._records.read(mr.STATUS)
         return self.settings.home == "none" or bool(int(status.value) & mr.HOMED)
 
@@ -111,7 +111,7 @@ class MotorRecord:
             )
 
     def move_to(self, angle_deg: float) -> None:
-        """Turn to `angle_deg` and return when it is at rest there.
+        """Turn to `angle_deg`. Returns when the stage is at rest there.
 
         Raises LimitError before anything is written, StageAlarm, Interlocked, NotSettled, the errors of the link.
         """
@@ -126,7 +126,7 @@ class MotorRecord:
         self._start(angle_deg, self.settings.speed_deg_s)
 
     def wait(self) -> None:
-        """Return when the move that was started has ended where it should. Raises StageAlarm, NotSettled."""
+        """Wait until the started move has ended at its target. Raises StageAlarm, NotSettled."""
         if math.isnan(self._target_deg):
             return
         begun_s = self._clock.now()
@@ -139,7 +139,7 @@ class MotorRecord:
         self._require_at_target(state, "Remove what blocks the stage, check the load's balance, then resume the run")
 
     def rate_deg_s(self, asked_deg_s: float) -> float:
-        """The rate asked for."""
+        """The rate as requested: the record takes any number."""
         return self.settings.rate_deg_s(asked_deg_s)
 
     @contextmanager
@@ -180,17 +180,17 @@ class MotorRecord:
             )
 
     def look(self) -> None:
-        """Raises StageAlarm, Interlocked: what others do not wait for, while they wait."""
+        """Check the stage while the program waits for another one. Raises StageAlarm, Interlocked."""
         self._require_no_alarm(state := self._read(*STATE))
         self._require_mode(state)
 
     def halt(self) -> None:
-        """Let it brake, whatever it is doing, and return at once; `stop` must follow."""
+        """Start braking and return at once. `stop` must follow."""
         self._target_deg = math.nan
         self._records.write(mr.STOP, 1.0)
 
     def stop(self) -> None:
-        """Brake to a standstill, whatever the stage is doing. A stage with an alarm can be at a standstill as well."""
+        """Brake, and wait for the standstill. A stage with an alarm counts as stopped if it does not move."""
         self.halt()
         deadline = self._clock.now() + STOPPING_S
         while not self._read(mr.DONE)[mr.DONE].value:

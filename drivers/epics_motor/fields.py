@@ -63,11 +63,11 @@ class Settings:
             raise ValueError(f"speed_deg_s must be at most speed_limit_deg_s, {self.speed_limit_deg_s:g}")
 
     def rate_deg_s(self, asked_deg_s: float) -> float:
-        """The rate asked for: the record takes any number."""
+        """The rate as requested: the record takes any number."""
         return asked_deg_s
 
     def way_of_turn(self, name: str, rate_deg_s: float, first_deg: float, last_deg: float) -> tuple[float, float]:
-        """Where run-up begins and braking ends, deg, of a turn at a constant rate from one angle to another.
+        """Angles where the run-up begins and the braking ends, deg, for a turn at a constant rate between two angles.
 
         Raises LimitError for a rate or a way that the stage has not.
         """
@@ -75,5 +75,5 @@ class Settings:
         return TurnPath(rate_deg_s, self.acceleration_deg_s2, first_deg, last_deg).within(name, self.limits_deg)
 
     def move_s(self, distance_deg: float) -> float:
-        """How long a move takes."""
+        """Duration of a move, s."""
         return move_s(distance_deg, self.speed_deg_s, self.acceleration_deg_s2)

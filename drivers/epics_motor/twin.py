@@ -33,7 +33,7 @@ BRAKES = ("stopped", "limit-switch")
 
 
 class World(Protocol):
-    """The physics that a motor moves."""
+    """The part of the simulated world that a motor moves."""
 
     def advance(self, t_s: float) -> None: ...
 
@@ -61,13 +61,13 @@ class Motor(Twin):
         }
 
     def advance(self, now_s: float) -> None:
-        """Brake where something stops it. The world's time is not touched: the converter may still be sampling."""
+        """Brake after a fault. The world's time stays unchanged, because the converter may still be sampling."""
         for fault in BRAKES:
             if strike := self.faults.once(fault, now_s):
                 self._brake(max(strike.at_s, self._plan.start_s))
 
     def state(self) -> dict[str, Any]:
-        """The plan of the motion, and what has been written."""
+        """The plan of the motion, and the written fields."""
         return {"plan": asdict(self._plan), "own": self._fields, "homed": self._homed}
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -113,7 +113,7 @@ class Motor(Twin):
         return computed.get(field, self._fields[field])
 
     def _move(self, target_deg: float, now_s: float) -> None:
-        """Begin a move; one beyond the limits is not begun, which LVIO shows."""
+        """Begin a move. A move beyond the limits does not begin, and LVIO is set."""
         low, high = self._fields[mr.LOW_LIMIT], self._fields[mr.HIGH_LIMIT]
         self._fields[mr.LIMIT_VIOLATION] = float(low < high and not low <= target_deg <= high)
         is_blocked = any(self.faults.size(fault, now_s) is not None for fault in BRAKES)

@@ -44,7 +44,7 @@ class Hand:
 
 
 class Script:
-    """What a hand does from now on: segments in the order of time. It is picked up again at the end of the last."""
+    """The coming movements of a hand, segments in the order of time. After the last one it picks the sensor up."""
 
     def __init__(self, hand: Hand, random: np.random.Generator, up: Floats) -> None:
         self._hand, self._random = hand, random
@@ -87,13 +87,13 @@ class Script:
         return Motion(*(np.concatenate(values) for values in fields))
 
     def state(self) -> dict[str, Any]:
-        """What it remembers, as JSON. An endless segment has no end."""
+        """The state as JSON. A segment without end has no end time."""
         segments = [asdict(s) | {"end_s": None if math.isinf(s.end_s) else s.end_s} for s in self.segments]
         north = None if self._wanted_north is None else self._wanted_north.tolist()
         return {"wanted": self._wanted.tolist(), "north": north, "table": self._table.tolist(), "segments": segments}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Continue from what `state` gave."""
+        """Continue from a result of `state`."""
         self._wanted, self._table = np.array(state["wanted"]), np.array(state["table"])
         self._wanted_north = None if state["north"] is None else np.array(state["north"])
         self.segments = [

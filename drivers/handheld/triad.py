@@ -33,7 +33,7 @@ class Mass:
 
 @dataclass(frozen=True)
 class Triad:
-    """The three masses, and what is common to their outputs."""
+    """The three masses, and the common parts of their outputs."""
 
     x: Mass = field(default_factory=Mass)
     y: Mass = field(default_factory=Mass)

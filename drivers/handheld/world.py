@@ -137,7 +137,7 @@ class HandheldWorld(World):
         return np.array([self._field_ut(x_mm, y_mm) for x_mm, y_mm in places])[which.ravel()]
 
     def _field_ut(self, x_mm: float, y_mm: float) -> Floats:
-        """Magnet and iron are at their place of the laboratory as seen from the middle of the table."""
+        """The field at the sensor, uT. Magnet and iron have their places relative to the middle of the table."""
         place = self._place
         magnet = replace(place.magnet, x_mm=place.magnet.x_mm - x_mm, y_mm=place.magnet.y_mm - y_mm)
         iron = replace(place.iron, x_mm=place.iron.x_mm - x_mm, y_mm=place.iron.y_mm - y_mm)
@@ -150,7 +150,7 @@ class HandheldWorld(World):
         return {**super().state(), "hand": {"script": self.script.state(), "generators": generators, **noise}}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Continue from what `state` gave."""
+        """Continue from a result of `state`."""
         super().restore(state)
         hand = state["hand"]
         self.script.restore(hand["script"])

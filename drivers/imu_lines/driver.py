@@ -109,7 +109,7 @@ class LineSensor(DigitalSensor[Settings, LineDecoder]):
     longest = LONGEST
 
     def identify(self) -> Identity:
-        """Only what is known: such lines have no name."""
+        """A general name: such lines do not identify the sensor."""
         return Identity(f"{self.settings.format} lines at {self.settings.rate_hz:g} Hz, in {self.settings.unit}")
 
     @property

@@ -26,7 +26,7 @@ Column = int | str
 
 
 def checksum(text: str) -> int:
-    """XOR of the bytes of `text`, which stands between $ and * of an NMEA line."""
+    """XOR of the bytes of `text`, the part between $ and * of an NMEA line."""
     return reduce(xor, text.encode("latin-1"), 0)
 
 
@@ -71,7 +71,7 @@ def _refuse_line(line: str) -> dict[Column, float]:
 
 @dataclass
 class Assembly:
-    """Makes samples of bytes as they come. The first line may be cut, so it is dropped without being counted.
+    """Converts bytes to samples as they arrive. The first line may be incomplete and is dropped without being counted.
 
     A line that lost its end continues with the next one. Without a checksum (csv), a line is damaged if it has not as
     many columns as the samples before it, unless the next line has as many.

@@ -107,7 +107,7 @@ def _grows_evenly(values: NDArray[np.float64]) -> bool:
 
 
 def _fit(force: Sequence[NDArray[np.float64]]) -> tuple[float, str]:
-    """How far the norm of a force at rest is from 1 g, as a share of it, and in which unit; only counts are whole."""
+    """The deviation of the norm at rest from 1 g, as a share of 1 g, and the unit. Only counts are whole numbers."""
     norm = float(np.median(np.linalg.norm(np.stack(force), axis=0)))
     is_integer = all(np.array_equal(axis, np.rint(axis)) for axis in force)
     sizes = ((size, unit) for unit, sizes in ONE_G.items() for size in sizes if is_integer == (unit == "count"))
@@ -115,6 +115,6 @@ def _fit(force: Sequence[NDArray[np.float64]]) -> tuple[float, str]:
 
 
 def _round(rate_hz: float) -> float:
-    """The rate to two digits: 99.3 is 99 or, where that is near, 100."""
+    """The rate rounded to a usual one: 99.3 becomes 100, or else two digits."""
     usual = min((10.0, 20.0, 25.0, 50.0, 100.0, 200.0, 250.0, 400.0, 500.0, 1000.0), key=lambda u: abs(rate_hz / u - 1))
     return usual if abs(rate_hz / usual - 1) < NEAR / 2 else float(f"{rate_hz:.2g}")

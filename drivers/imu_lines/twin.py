@@ -20,7 +20,7 @@ VOLTAGE = 6
 
 
 class Talker(DigitalTwin):
-    """One sensor on a line of its own. It sends from power-on."""
+    """One sensor with its own line. It sends from power-on."""
 
     carrier = "line"
 

@@ -193,12 +193,12 @@ class T7(Recorder[Settings]):
         self._write_block(*((t7.scan_list(k), t7.ain(number).address) for k, number in enumerate(inputs)))
 
     def _stop(self) -> None:
-        """Stop the stream. What is still on its way comes before the next one is set up, and is dropped then."""
+        """Stop the stream. Packets in flight arrive before the next stream is set up, and are discarded then."""
         with contextlib.suppress(Refused):  # it has stopped by itself
             self._unit.write(t7.ENABLE, 0)
 
     def _write_block(self, *values: tuple[Register, float], retries: int = RETRIES) -> None:
-        """As the unit's, but a refusal is explained in the device's own words."""
+        """Write a block as the unit does. A refusal has the error text of the device."""
         try:
             self._unit.write_block(*values, retries=retries)
         except Refused as refusal:

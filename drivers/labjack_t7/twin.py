@@ -105,7 +105,7 @@ class World(Protocol):
 
 
 class Inputs:
-    """The analog inputs: which of them is wired to what in the world, and the converter behind them."""
+    """The analog inputs: their connections to the world, and the converter behind them."""
 
     def __init__(self, world: World, wiring: Mapping[int, str]) -> None:
         self._world, self._wiring = world, wiring
@@ -261,7 +261,7 @@ class Converter(Twin):
             self._stream = self._new_stream(now_s) if on else None
 
     def _new_stream(self, now_s: float) -> Stream:
-        """A stream as the registers ask for. Only endless ones are simulated."""
+        """A stream with the settings of the registers. Only continuous streams are simulated."""
         channels, per_packet = int(self._value(t7.NUM_ADDRESSES)), int(self._value(t7.SAMPLES_PER_PACKET))
         rate_hz, buffer = self._value(t7.SCAN_RATE), int(self._value(t7.BUFFER_SIZE))
         if not 0 < channels <= t7.MOST_ADDRESSES or self._value(t7.NUM_SCANS):
@@ -303,7 +303,7 @@ class Converter(Twin):
         return FLASH_WORDS[first : first + count]
 
     def _range_v(self, number: int) -> float:
-        """The least range that holds the one asked for; 0 asks for the widest."""
+        """The smallest range that contains the requested one; 0 requests the widest."""
         range_v = self._value(t7.ain_range(number))
         return min((r for r in t7.RANGES_V if r >= round(range_v, 6) > 0), default=t7.RANGES_V[0])
 

@@ -38,11 +38,11 @@ class Settings:
         require_range(self, "limits_deg")
 
     def move_s(self, distance_deg: float) -> float:  # noqa: ARG002 a hand is as quick on any way
-        """How long a move takes."""
+        """Duration of a move, s."""
         return self.seconds_per_move
 
     def rate_deg_s(self, asked_deg_s: float) -> float:
-        """The rate asked for: `way_of_turn` refuses it."""
+        """The rate as requested: `way_of_turn` refuses it."""
         return asked_deg_s
 
     def way_of_turn(self, name: str, rate_deg_s: float, first_deg: float, last_deg: float) -> NoReturn:
@@ -65,18 +65,18 @@ class ManualStage:
         self.read_deg: float | None = None  # what the dial showed last
 
     def identify(self) -> Identity:
-        """The person is not asked: a dial has no name."""
+        """A general name, without a question to the person: a dial has no name."""
         return Identity("stage turned by hand")
 
     def self_test(self) -> list[Check]:
-        """The resolution of the dial; the person is not asked."""
+        """The resolution of the dial, without a question to the person."""
         return [Check("dial", True, f"read by a person to {60 * self.settings.resolution_deg:g} arcmin")]
 
     def close(self) -> None:
         """Nothing to release."""
 
     def angle_deg(self) -> float:
-        """The last reading of the dial; asks a person if there is none yet."""
+        """The last reading of the dial. Asks the person if there is none yet."""
         if self.read_deg is None:
             low, high = self.settings.limits_deg
             text = f"What does the dial of {self.name} show?"
@@ -84,14 +84,14 @@ class ManualStage:
         return self.read_deg
 
     def referenced(self) -> bool:
-        """A dial knows where zero is."""
+        """Always true: a dial is absolute."""
         return True
 
     def home(self) -> None:
         """There is nothing to seek."""
 
     def move_to(self, angle_deg: float) -> None:
-        """Have a person turn it to `angle_deg`; asks nobody if it is set to that angle already.
+        """Ask a person to turn the stage to `angle_deg`. Asks nothing if the stage is at this angle already.
 
         Raises LimitError before anybody is asked, NotSettled for a reading elsewhere, and what comes from the person.
         """
@@ -113,7 +113,7 @@ class ManualStage:
         self._set_deg, self.read_deg = angle_deg, read_deg
 
     def rate_deg_s(self, asked_deg_s: float) -> float:
-        """The rate asked for: `turning` refuses it."""
+        """The rate as requested: `turning` refuses it."""
         return asked_deg_s
 
     def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> NoReturn:
@@ -125,7 +125,7 @@ class ManualStage:
 
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> ManualStage:
-    """The stage that the person at the rig turns; asks nothing. Raises LinkRefused for any other address."""
+    """The stage that the person at the rig turns, without a question. Raises LinkRefused for any other address."""
     if address.url != PERSON:
         raise LinkRefused(
             f"{name}: {address.url!r} is not the address of a person", f"Write `url: {PERSON}` in the bench file"

@@ -26,7 +26,7 @@ NANO = 1e-9
 
 
 class World(Protocol):
-    """What a hand knows of physics."""
+    """The part of the simulated world that a hand uses."""
 
     @property
     def now_s(self) -> float: ...
@@ -65,5 +65,5 @@ class Hand:
 
 
 def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:  # noqa: ARG001
-    """No port at all: in each role, the address is that of a person."""
+    """Serves no port: the address of each role is that of a person."""
     return Server([], {}, {role: Address(PERSON) for role in roles})

@@ -205,7 +205,7 @@ def frames(
 
 
 def fields(message: Message, **values: Any) -> NDArray[np.void]:
-    """The fields of one message, shape (1,); those that are not given are 0."""
+    """The fields of one message, shape (1,). Fields that are not given are 0."""
     record = np.zeros(1, dtype=message.dtype)
     for name, value in values.items():
         record[name] = value

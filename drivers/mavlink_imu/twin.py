@@ -69,7 +69,7 @@ class Autopilot(FramedTwin):
             connection.send(self._checked(data[0], now_s), now_s)
 
     def _answer(self, connection: Connection, now_s: float) -> None:
-        """Act on the commands in what has arrived."""
+        """Act on the commands that have arrived."""
         messages = self._heard.setdefault(connection.key, Frames(mav.Mavlink())).take(bytes(connection.inbox))
         connection.inbox.clear()
         heads = mav.heads(messages)

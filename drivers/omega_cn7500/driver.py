@@ -59,7 +59,7 @@ class Oven:
         self._shown_c, self._since_s = math.nan, 0.0  # the last temperature, and since when
 
     def identify(self) -> Identity:
-        """The controller has no register that names it: that it answers is all there is to know."""
+        """A general name, after an exchange: the controller has no register with its name."""
         self._unit.read(CONTROL_METHOD)
         return Identity("Omega CN7500")
 
@@ -74,10 +74,10 @@ class Oven:
         return [thermometer, Check("control", method == 0, f"{name} control")]
 
     def close(self) -> None:
-        """Nothing to release: the wire belongs to the bench."""
+        """Does nothing: the bench closes the link."""
 
     def temperature_c(self) -> float:
-        """What the thermocouple shows, in C.
+        """The temperature of the thermocouple, C.
 
         Raises SensorFault when it shows none, or one that stands still where it should change; OverTemperature.
         """

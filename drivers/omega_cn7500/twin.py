@@ -48,7 +48,7 @@ class Controller(Twin):
         self._set_point_c, self._running = AT_POWER_ON
 
     def advance(self, now_s: float) -> None:
-        """The oven is the world's; the controller's registers do not change by themselves, but for what befalls it."""
+        """Apply faults. The oven is part of the world, and registers change by commands only."""
         if self.faults.once("restart", now_s):
             self._set_point_c, self._running = AT_POWER_ON
         if self.faults:

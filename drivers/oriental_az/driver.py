@@ -57,7 +57,7 @@ class RotaryStage:
         self._limited = not settings.own_limits  # whether the drive has its limits, where it is to have them
 
     def identify(self) -> Identity:
-        """The drive has no register that names it: that it answers is all there is to know."""
+        """A general name, after an exchange: the drive has no register with its name."""
         self._unit.read(az.OUTPUTS)
         return Identity("Oriental Motor AZ")
 
@@ -75,7 +75,7 @@ class RotaryStage:
         ]
 
     def _parameters(self) -> Iterator[Check]:
-        """The parameters that the settings make the driver write: whether they hold what such a parameter can hold.
+        """Check that the parameters that the driver is to write have plausible values.
 
         A wrong address would change another parameter of the drive.
         """
@@ -90,14 +90,14 @@ class RotaryStage:
             yield Check("own limits", is_action, f"action {action:g}, {low:g} .. {high:g} steps in {az.OVERTRAVEL}")
 
     def close(self) -> None:
-        """Nothing to release: the wire belongs to the bench."""
+        """Does nothing: the bench closes the link."""
 
     def angle_deg(self) -> float:
         """Motor angle measured by the drive, in deg."""
         return self._unit.read(az.FEEDBACK_POSITION) / self.settings.steps_per_turn * 360
 
     def referenced(self) -> bool:
-        """Whether the drive knows where zero is."""
+        """Whether the zero of the angle is known to the drive."""
         return bool(self._outputs() & az.HOME_END)
 
     def alarm(self) -> Alarm | None:
@@ -140,7 +140,7 @@ class RotaryStage:
         self._require_at_target("Remove what blocks the stage, check the load's balance, then repeat the move")
 
     def rate_deg_s(self, asked_deg_s: float) -> float:
-        """The rate nearest to the one asked for that the drive can have: a whole number of steps a second."""
+        """The possible rate nearest to the requested one: a whole number of steps a second."""
         return self.settings.rate_deg_s(asked_deg_s)
 
     @contextmanager
@@ -187,16 +187,16 @@ class RotaryStage:
         )
 
     def look(self) -> None:
-        """Raises StageAlarm: what others do not wait for, while they wait."""
+        """Check the stage while the program waits for another one. Raises StageAlarm."""
         self._status()
 
     def halt(self) -> None:
-        """Let it brake, whatever it is doing, and return at once; `stop` must follow."""
+        """Start braking and return at once. `stop` must follow."""
         self._holds_target = False
         self._unit.write(az.INPUTS, az.STOP, retries=0)  # the other drives wait for their commands
 
     def stop(self) -> None:
-        """Brake to a standstill, whatever the stage is doing. A stage with an alarm can be at a standstill as well."""
+        """Brake, and wait for the standstill. A stage with an alarm counts as stopped if it does not move."""
         self._holds_target = False
         self._unit.write(az.INPUTS, az.STOP)
         try:
@@ -227,7 +227,7 @@ class RotaryStage:
         self._watch(False)
 
     def _require_at_target(self, remedy: str) -> None:
-        """Raises NotSettled where the encoder's angle is not that of the last move's command."""
+        """Raises NotSettled if the encoder's angle is not the target of the last move."""
         angle_deg = self.angle_deg()
         if abs(angle_deg - self._target_deg) > self.settings.settle_deg:
             raise NotSettled(
@@ -265,7 +265,7 @@ class RotaryStage:
             outputs = self._status()
 
     def _limit(self) -> None:
-        """Have the drive keep the limits too, once; what it does not take is found when it is read back."""
+        """Write the limits to the drive, once, and read them back. Raises Interlocked if they differ."""
         if self._limited:
             return
         low, high = (round(deg * self.settings.steps_per_turn / 360) for deg in self.settings.limits_deg)
@@ -336,11 +336,11 @@ class RotaryStage:
 
     @property
     def _beat_s(self) -> float:
-        """How often a drive has to hear of its controller if it watches over it."""
+        """Largest interval between messages to a drive with a communication timeout, s."""
         return self.settings.communication_timeout_s / BEATS or math.inf
 
     def _wait_until(self, end_s: float) -> None:
-        """Let a move take its time until `end_s`, and let the drive hear of its controller meanwhile."""
+        """Wait for a move until `end_s`, and send messages meanwhile, because of the communication timeout."""
         while (left_s := end_s - self._clock.now()) > self._beat_s:
             self._clock.sleep(self._beat_s)
             self._status()

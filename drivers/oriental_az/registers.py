@@ -76,7 +76,7 @@ RESETTABLE_BY_POWER_ONLY = frozenset({0x20, 0x28, 0x2A, 0x41, 0x42, 0x45, 0xF0})
 
 @dataclass(frozen=True)
 class Alarm:
-    """A drive's alarm in words, and what a person does about it."""
+    """A drive's alarm in words, and the remedy."""
 
     code: int
     text: str
@@ -175,16 +175,16 @@ class Settings:
 
     @property
     def communication_timeout(self) -> Register:
-        """The drive's own parameter."""
+        """The parameter of the drive for its communication timeout."""
         return Register(self.communication_timeout_register, "uint32", "communication time-out", "s", 0.001)
 
     def rate_deg_s(self, asked_deg_s: float) -> float:
-        """The rate nearest to the one asked for that is a whole number of steps a second."""
+        """The rate nearest to the requested one that is a whole number of steps a second."""
         per_deg = self.steps_per_turn / 360
         return round(asked_deg_s * per_deg) / per_deg
 
     def way_of_turn(self, name: str, rate_deg_s: float, first_deg: float, last_deg: float) -> tuple[float, float]:
-        """Where run-up begins and braking ends, deg, of a turn at a constant rate from one angle to another.
+        """Angles where the run-up begins and the braking ends, deg, for a turn at a constant rate between two angles.
 
         Raises LimitError for a rate or a way that the stage has not.
         """
@@ -202,5 +202,5 @@ class Settings:
         return all(map(math.isinf, self.limits_deg))
 
     def move_s(self, distance_deg: float) -> float:
-        """How long a move takes."""
+        """Duration of a move, s."""
         return move_s(distance_deg, self.speed_deg_s, self.acceleration_deg_s2)

@@ -35,7 +35,7 @@ TRIGGERS = dict(zip(range(-7, 0), (r.address for r in az.DIRECT[:-1]), strict=Tr
 
 
 class World(Protocol):
-    """What a drive knows of physics."""
+    """The part of the simulated world that a drive moves."""
 
     def advance(self, t_s: float) -> None: ...
 
@@ -62,7 +62,7 @@ class Drive(Twin):
         self._heard_s = 0.0
 
     def advance(self, now_s: float) -> None:
-        """A drive does nothing between exchanges that is not in its plan, but for what befalls it.
+        """Apply faults. Between exchanges a drive only follows its plan.
 
         The world's time is not touched: the converter may still be sampling.
         """
@@ -91,7 +91,7 @@ class Drive(Twin):
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Without its alarm: who goes on with a run has reset it."""
+        """Continue from `state`, without the alarm: a person has reset it before the run continues."""
         self._plan = Trajectory(**state["plan"])
         self._alarm, self._referenced, self._homing = 0, state["referenced"], state["homing"]
         self._was_limited = state.get("beyond", False)  # states of before there were limits
@@ -169,7 +169,7 @@ class Drive(Twin):
         return TRIGGERS.get(trigger) in addresses
 
     def _start(self, now_s: float) -> None:
-        """Begin the move of the direct data; what is not allowed raises the drive's alarm."""
+        """Begin the move of the direct data. A move that is not allowed sets the drive's alarm."""
         if self._alarm or self._is_stop_on(now_s) or self._words.get(az.INPUTS.address, 0) & az.STOP:
             return
         kind = int(self._value(az.TYPE))
@@ -193,7 +193,7 @@ class Drive(Twin):
             self._was_limited = limited_deg != target
 
     def _limit_deg(self, target_deg: float) -> float:
-        """The target, or the drive's own limit before it; limits are kept once coordinates and an action are set."""
+        """The target, or the drive's limit before it. Limits apply after coordinates and an action are set."""
         if not self._referenced or self._value(az.OVERTRAVEL) != az.BRAKE_AND_ALARM:
             return target_deg
         low, high = (self._value(limit) / self._steps_per_deg for limit in (az.LOW_LIMIT, az.HIGH_LIMIT))

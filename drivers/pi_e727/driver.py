@@ -123,7 +123,7 @@ class Positioner:
         ]
 
     def close(self) -> None:
-        """Nothing to release: the wire belongs to the bench."""
+        """Does nothing: the bench closes the link."""
 
     def servo(self, on: bool) -> None:
         """Close or open the loop of every axis; moves and oscillations need it closed."""
@@ -172,7 +172,7 @@ class Positioner:
         return wave.frequency_hz
 
     def recorded(self, axis: str) -> Recording:
-        """The recorded values of the axis' last oscillation so far. Raises StreamError if there are none."""
+        """The values of the axis' last oscillation that are recorded so far. Raises StreamError if there are none."""
         place = self._place(axis)
         count = int(self._gcs.number(f"{e727.RECORDED_POINTS} {place}"))
         if not count:
@@ -201,7 +201,7 @@ class Positioner:
         self._gcs.tell_byte(e727.STOP)
 
     def stop(self) -> None:
-        """Stop all axes and waves at once, whatever they are doing, and return when nothing moves."""
+        """Stop all axes and waves at once. Returns when nothing moves."""
         self.halt()
         self._gcs.error()  # 10, stopped: that is what was asked for
         self._poll_until(self._still, STOPPING_S, "an axis still moves after a stop")

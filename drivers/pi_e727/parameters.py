@@ -58,5 +58,5 @@ ERRORS: dict[int, tuple[str, str]] = {
 
 
 def explain(code: int) -> tuple[str, str]:
-    """What an error number means, and what a person does about it."""
+    """The meaning of an error number, and the remedy."""
     return ERRORS.get(code, ("an error that this program does not know", "Look it up in the controller's manual"))

@@ -108,7 +108,7 @@ class Controller(Twin):
         self._recorder.restore(state["recorder"])
 
     def _urgent(self, number: int, now_s: float) -> str | None:
-        """A command of one byte; those that do not exist are passed over."""
+        """Act on a command of one byte. Unknown commands are ignored."""
         questions: dict[int, Callable[[], str]] = {
             e727.MOVING: lambda: _hexadecimal(self._axes.moving(axis, now_s) for axis in self._axes.ids),
             e727.READY: lambda: e727.IS_READY,

@@ -74,11 +74,11 @@ class Axes:
         self._velocity_um_s = dict(state["velocity_um_s"])
 
     def asked(self, arguments: Sequence[str]) -> list[str]:
-        """The axes that a question names; without a name, all."""
+        """The axes in a query; all axes without a name."""
         return [one_of(axis, self.ids, e727.BAD_AXIS) for axis in arguments] or self.ids
 
     def targets(self, arguments: Sequence[str]) -> dict[str, float]:
-        """Places by axis, all of which can be gone to; else nothing moves."""
+        """Targets by axis. Nothing moves unless all are within their limits."""
         positions = {one_of(axis, self.ids, e727.BAD_AXIS): number(text) for axis, text in groups(arguments, 2)}
         for axis, um in positions.items():
             self.require(axis, um, um)

@@ -1,4 +1,4 @@
-"""The simulated E-727's data recorder: tables that each follow one thing of one axis, from a trigger on."""
+"""The simulated E-727's data recorder: each table records one quantity of one axis after a trigger."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ TRIGGERS = (e727.WITH_THE_WAVE, e727.WITH_A_MOTION, e727.WITH_THE_NEXT_COMMAND, 
 
 
 class Recorder:
-    """What is recorded, and what has been: sample i of a recording is that of start + i * rate * cycle."""
+    """The settings of the recorder, and its recordings. Sample i has the time start + i * rate * cycle."""
 
     def __init__(self, axes: Axes) -> None:
         self._axes = axes
@@ -155,7 +155,7 @@ class Sine:
 
 
 def parse_sine(shape: Sequence[str]) -> Sine:
-    """The table that `X SIN_P points width lowest period first center` asks for."""
+    """The wave table for the command `X SIN_P points width lowest period first center`."""
     if len(shape) != 8:
         raise Refusal(PARAMETER_COUNT)
     for text, expected in zip(shape, ("X", e727.SINE), strict=False):

@@ -122,7 +122,7 @@ class Meter(Recorder[Settings]):
         return Identity(f"{parts[0].title()} {parts[1]}", *parts[2:4])
 
     def self_test(self) -> list[Check]:
-        """Whether the instrument takes the settings of the bench file."""
+        """Check that the instrument accepts the settings of the bench file."""
         scan = f"{', '.join(self.settings.channels)} at {self.settings.rate_hz:g} Hz, {self.settings.range_v:g} V"
         try:
             self._configure(1)
@@ -170,7 +170,7 @@ class Meter(Recorder[Settings]):
         return volts
 
     def _read_memory(self, scans: range, start_s: float) -> list[float]:
-        """The readings of these scans out of the instrument's memory, as it takes them."""
+        """The readings of these scans from the instrument's memory, while it measures."""
         width, values = len(self.settings.channels), list[float]()
         piece = max(1, MOST_VALUES // width)
         for first in range(scans.start, scans.stop, piece):
@@ -207,7 +207,7 @@ class Meter(Recorder[Settings]):
         return int(count)
 
     def _read_each(self, scans: range, start_s: float) -> list[float]:
-        """The readings of these scans, asked for one after the other at the rate. Raises StreamError if one is late."""
+        """The readings of these scans, requested one by one at the rate. Raises StreamError for a late reading."""
         width, period_s, values = len(self.settings.channels), 1 / self.settings.rate_hz, list[float]()
         for scan in scans:
             due_s = start_s + scan * period_s

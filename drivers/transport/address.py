@@ -13,7 +13,7 @@ from drivers.errors import LinkRefused
 
 @dataclass(frozen=True)
 class Address:
-    """A wire and the place on it.
+    """A link, and the unit on it.
 
     `url` is one of
         tcp://host:port                             Modbus TCP, GCS
@@ -48,7 +48,7 @@ PYVISA_PY = "@py"
 
 @dataclass(frozen=True)
 class Url:
-    """A wire's address, taken apart. `pty:` asks a server for a new pseudo-terminal.
+    """The parts of a link's address. `pty:` requests a new pseudo-terminal from a server.
 
     It has no user and no password, so that none comes into a record.
     """
@@ -65,7 +65,7 @@ class Url:
 
     @classmethod
     def parse(cls, text: str) -> Url:
-        """Take `text` apart; raises LinkRefused when it is not a wire's address."""
+        """Parse `text`. Raises LinkRefused if it is not the address of a link."""
         try:
             parts = urlsplit(text)
             options = {
@@ -99,7 +99,7 @@ class Url:
 
     @property
     def line(self) -> str:
-        """The wire's name, the same for every spelling of its address: the device's real path, or host:port."""
+        """The name of the link for any spelling of its address: the real path of the device, or host:port."""
         if self.scheme in ("serial", "pty"):
             return os.path.realpath(self.path)
         if self.scheme == "ca":
@@ -120,7 +120,7 @@ class Url:
 
     @property
     def record(self) -> str:
-        """The name of an EPICS record, or what the names of several begin with."""
+        """The name of an EPICS record, or the common beginning of several names."""
         return self.path.removeprefix("/")
 
     @property

@@ -91,7 +91,7 @@ class Circuit:
             self._channels |= channels
 
     def read(self, names: Sequence[str], device: str, timeout_s: float) -> list[Reading]:
-        """The values of these fields, all asked for at once. Raises LinkTimeout, LinkRefused, Refused, BadFrame."""
+        """The values of these fields, requested together. Raises LinkTimeout, LinkRefused, Refused, BadFrame."""
         kind = self._ca.ChannelType.TIME_DOUBLE
         return [self._decode(_reading, answer, device) for answer in self._request(names, kind, device, timeout_s)]
 
@@ -180,7 +180,7 @@ class Circuit:
             raise self._not_ours(f"{len(data)} bytes", device, error) from error
 
     def _decode(self, take: Callable[[Any], Any], answer: Any, device: str) -> Any:
-        """The result of `take` for a message, which caproto unpacks only now. Raises BadFrame."""
+        """The result of `take` for a message, which caproto unpacks here. Raises BadFrame."""
         try:
             return take(answer)
         except Exception as error:
@@ -217,7 +217,7 @@ class Records:
         self._circuit, self._who, self._timeout_s = circuit, device, timeout_s
 
     def read(self, *fields: str) -> list[Reading]:
-        """The values of fields, all asked for at once. Raises LinkTimeout, LinkRefused, Refused, BadFrame."""
+        """The values of fields, requested together. Raises LinkTimeout, LinkRefused, Refused, BadFrame."""
         return self._circuit.read([self.beginning + field for field in fields], self._who, self._timeout_s)
 
     def write(self, field: str, value: float) -> None:
@@ -225,7 +225,7 @@ class Records:
         self._circuit.write(self.beginning + field, value, self._who, self._timeout_s)
 
     def written(self, field: str, value: float) -> float:
-        """Write a field; its value afterwards. A server goes by the order of requests, so it has the write by then."""
+        """Write a field, and read it. A server handles requests in their order, so this is the value afterwards."""
         self.write(field, value)
         return self.read(field)[0].value
 

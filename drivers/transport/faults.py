@@ -1,4 +1,4 @@
-"""Faults of simulated instruments: what goes wrong, when, and for how long.
+"""Faults of simulated instruments: their kinds, their times and durations.
 
 A fault of the wire happens between a server's connections and its twins, so every twin has them all (see wire_faults).
 A fault of the instrument itself is its twin's own: a twin module declares them by name as `FAULTS`, and a twin that has
@@ -24,7 +24,7 @@ from drivers.transport.person import PERSON
 
 @dataclass(frozen=True)
 class Fault:
-    """What goes wrong, from `at_s` on for `for_s`, and from the request after the first `after` on for `times` of them.
+    """A fault from `at_s` on for `for_s`, and after the first `after` requests for `times` requests.
 
     Times are the simulated clock's. None is for ever; a `size` of None is the usual one of its kind. Each time that it
     could be there it is, with a `probability` of less than 1 only now and then, as the `seed` has it.
@@ -60,7 +60,7 @@ class Fault:
         return now_s >= self.at_s and (self.after == 0 or requests > self.after)
 
     def has_ended(self, now_s: float, requests: int) -> bool:
-        """Whether it has gone by then."""
+        """Whether the fault has ended at this time."""
         in_time = self.for_s is None or now_s < self.at_s + self.for_s
         return not (in_time and (self.times is None or requests <= self.after + self.times))
 
@@ -96,7 +96,7 @@ class Faults:
     """The faults of one instrument, and their state."""
 
     def __init__(self, faults: Iterable[Fault] = (), kinds: Mapping[str, Kind] | None = None) -> None:
-        """`kinds` are all that it can have. Raises KeyError for another one."""
+        """`kinds` are all possible faults. Raises KeyError for another one."""
         self._faults = [(f, (kinds or {})[f.what].size if f.size is None else f.size) for f in faults]
         self._request_count = 0
         self._struck: list[int] = []
@@ -127,7 +127,7 @@ class Faults:
         return None
 
     def held(self, name: str, now_s: float, value: Any) -> Any:
-        """`value`, which is JSON-able; as long as the fault is there, the one that it began with."""
+        """`value`, of a type that JSON has; during the fault, the value at its beginning."""
         if self.size(name, now_s) is None:
             self._repeated_values.pop(name, None)
             return value
@@ -164,7 +164,7 @@ class Message(NamedTuple):
 
 @dataclass(frozen=True)
 class Wire:
-    """What faults have to know of a wire.
+    """The properties of a link that faults need.
 
     `mends` is whether it has checksums of its own, as TCP has. Where several units share it, `unit_of` gives that of a
     message; `of_unit` is the same message of another unit.
@@ -194,7 +194,7 @@ def later(sent: Message, size: float, _wire: Wire) -> list[Message]:
 
 
 def noise(sent: Message, size: float, _wire: Wire) -> list[Message]:
-    """So many other bytes; the same ones for the same message."""
+    """`size` random bytes; equal for equal messages."""
     return [Message(Random(sent.data).randbytes(int(size)), sent.due_s)]  # noqa: S311 - nothing is secret
 
 
@@ -242,7 +242,7 @@ def flip_bit(sent: Message, size: float, wire: Wire) -> list[Message]:
 
 
 def other_unit(sent: Message, size: float, wire: Wire) -> list[Message]:
-    """The message of another unit; on a wire with one instrument, one about something else."""
+    """A message of another unit; on a link with one instrument, a message with other content."""
     return [Message(wire.of_unit(sent.data, (wire.unit_of(sent.data) or 0) + int(size)), sent.due_s)]
 
 
@@ -284,7 +284,7 @@ def _effect(effect: Effect, message: Message, size: float, wire: Wire) -> list[M
 
 
 def kinds_of(driver: str) -> dict[str, Kind]:
-    """All faults that the twin of a driver can have, by name; those of a wire where it has one."""
+    """All faults of the twin of a driver by name, with the faults of the link if it has one."""
     twin = importlib.import_module(f"drivers.{driver}.twin")
     own_faults: dict[str, Kind] = getattr(twin, "FAULTS", {})
     return own_faults if twin.LISTEN == PERSON else {name: kind for name, (kind, _) in EFFECTS.items()} | own_faults

@@ -21,7 +21,7 @@ REMEDY = "Check power and cable, and that no other program uses the controller"
 
 
 class Gcs:
-    """One controller on its wire. `explain` gives the words for an error number: (what it means, what to do)."""
+    """One controller on its link. `explain` gives (meaning, remedy) for an error number."""
 
     def __init__(self, link: Link, name: str, explain: Callable[[int], tuple[str, str]]) -> None:
         self.name, self.link = name, link

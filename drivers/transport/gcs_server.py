@@ -1,4 +1,4 @@
-"""PI General Command Set 2.0, the instrument's side: takes the commands apart, and knows when answers are due."""
+"""PI General Command Set 2.0, the instrument's side: parses the commands, and schedules the answers."""
 
 from __future__ import annotations
 

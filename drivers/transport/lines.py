@@ -27,14 +27,14 @@ class TextLines(Protocol):
     """A wire to one instrument."""
 
     def write(self, command: str) -> None:
-        """Send a command. Raises LinkRefused when the connection is gone."""
+        """Send a command. Raises LinkRefused if the connection is lost."""
 
     def query(self, command: str, timeout_s: float) -> str:
         """Send a command and return the answer without its end of line. Raises LinkTimeout, LinkRefused, BadFrame."""
 
 
 class LinkLines:
-    """Lines on one of our own links."""
+    """Lines on one of our links."""
 
     def __init__(self, link: Link, name: str) -> None:
         self._link, self._name = link, name

@@ -1,4 +1,4 @@
-"""Byte links: TCP, UDP and serial, opened by url, read only by way of the clock.
+"""Byte links: TCP, UDP and serial, opened by url. Reads wait by the clock.
 
     tcp://host:port                           a socket
     rtu+tcp://host:port                       a socket; the frames on it are RTU's
@@ -33,7 +33,7 @@ LOST = (OSError, termios.error, serial.SerialException)  # what a dead connectio
 
 
 class Port(Protocol):
-    """What a link needs of a socket or a serial line; a dead one raises one of LOST.
+    """The interface of a socket or a serial line for a link. A lost connection raises one of LOST.
 
     `chunk` is the most that one read takes, and less than the kernel can hold.
     """
@@ -57,7 +57,7 @@ class Port(Protocol):
 
 
 class Connected(Wire):
-    """An open connection. `key` names it, the same at both ends."""
+    """An open connection. Its name `key` is the same at both ends."""
 
     def __init__(self, port: Port) -> None:
         self.port, self.key, self.chunk, self.lossy = port, port.key, port.chunk, port.lossy
@@ -71,14 +71,14 @@ class Connected(Wire):
         self.sent += self.port.write(data)
 
     def take(self) -> bytes:
-        """The bytes that have arrived, counted; empty at the end."""
+        """Read and count the bytes that have arrived; empty at the end of the connection."""
         data = self.port.read()
         self.received += len(data)
         return data
 
 
 class Link:
-    """The controller's end of a wire.
+    """The controller's end of a link.
 
     A connection that is lost is an error once; what is sent after that opens it anew, so that a stop can be sent.
     """
@@ -92,7 +92,7 @@ class Link:
         self._line: Connected | None = self._connect()
 
     def write(self, data: bytes) -> None:
-        """Send all of `data`; raises LinkRefused when the connection is gone."""
+        """Send all of `data`. Raises LinkRefused if the connection is lost."""
         line = self._connected()
         try:
             line.put(data)
@@ -119,7 +119,7 @@ class Link:
         return data
 
     def discard(self, quiet_s: float = 0.0) -> int:
-        """Throw away what arrives until it has been quiet for `quiet_s`; the number of bytes.
+        """Discard bytes until none has arrived for `quiet_s`. Returns their number.
 
         Stops after DISCARD_S on a line that keeps sending; the next answer shows whether it is usable.
         """
@@ -272,12 +272,12 @@ class DatagramPort:
 
 
 def datagram_key(number: int) -> str:
-    """The name of a wire of datagrams to a port, the same seen from both ends."""
+    """The name of a link of datagrams to a port; the same at both ends."""
     return f"datagrams > {number}"
 
 
 def connection_key(client: tuple[str, int], server: tuple[str, int]) -> str:
-    """The name of a TCP connection, the same seen from both ends."""
+    """The name of a TCP connection; the same at both ends."""
     return f"{client[0]}:{client[1]} > {server[0]}:{server[1]}"
 
 

@@ -13,7 +13,7 @@ from drivers.transport.person import PersonLink
 
 
 class Links:
-    """Opens every wire once: instruments with the same url share it, as two drives share their RS-485 line."""
+    """Opens every link once: instruments with the same url share it, as two drives share an RS-485 line."""
 
     def __init__(self, clock: Clock, tap: Tap | None = None) -> None:
         """`tap` is called with every message."""

@@ -233,7 +233,7 @@ class Unit:
 
 
 def _fits(request: ModbusPDU, answer: ModbusPDU) -> bool:
-    """Whether the answer is that of this request: on a serial line a late answer to another may arrive first."""
+    """Whether the answer belongs to this request: on a serial line a late answer to another may come first."""
     if answer.function_code != request.function_code:
         return False
     if isinstance(request, ReadHoldingRegistersRequest):

@@ -1,4 +1,4 @@
-"""Modbus slave: answers the requests on a port out of simulated devices, with the wire's delays.
+"""Modbus slave: simulated devices answer the requests on a port, with the delays of the line.
 
 A unit that is not there is silent, as on RS-485. So is one that is asked with a wrong checksum.
 """
@@ -78,7 +78,7 @@ TCP = Wire(mends=True, unit_of=_place(6), of_unit=_tcp_of_unit)
 
 
 class Responder:
-    """Turns what came in on a connection into answers that are due after their line time."""
+    """Makes answers to the requests of a connection, each due after its line time."""
 
     def __init__(self, devices: Mapping[int, Device], timing: Url) -> None:
         self._devices, self._timing = devices, timing

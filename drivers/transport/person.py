@@ -1,4 +1,4 @@
-"""The wire to a person: some instruments are set and read by hand.
+"""The link to a person: some instruments are set and read by hand.
 
 A driver asks for a number and cannot know who answers: whoever runs the rig says who stands at it, for as long as
 somebody does.
@@ -17,7 +17,7 @@ class Person(Protocol):
     """A person who follows instructions and reports readings."""
 
     def ask(self, name: str, text: str, unit: str, low: float, high: float, expected: float | None = None) -> float:
-        """What they read, in `unit` and from `low` to `high`; `name` is the question's key in a file of answers.
+        """Ask for a reading in `unit`, between `low` and `high`. `name` is the question's key in a file of answers.
 
         A confirmation means the `expected` number. Without an answer, raises the error of the calling program.
         """

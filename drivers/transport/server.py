@@ -29,10 +29,10 @@ SILENCE_S = 0.05  # ends an RTU frame: generous, since a computer sends a frame 
 
 
 class Twin:
-    """A simulated instrument, as its server sees it, except its answers: one that acts only when it is asked."""
+    """The interface of a simulated instrument for its server, without answers. This default acts on requests only."""
 
     def advance(self, now_s: float) -> None:
-        """Compute what happened up to `now_s`; nothing unless the instrument says what."""
+        """Compute the state at `now_s`; by default nothing."""
 
     def due_s(self) -> float:
         """When it next sends by itself, s; infinity for never."""
@@ -109,11 +109,11 @@ class Connection:
         return self._outbox[0][0] if self._outbox and not self._full else math.inf
 
     def progress(self, key: str) -> tuple[int, int] | None:
-        """Bytes (received, emitted) of the client of that name; None if there is none."""
+        """Bytes (received, emitted) of the client of this name; None without such a client."""
         return (self.received, self.emitted) if key == self.key else None
 
     def is_behind(self, now_s: float) -> bool:
-        """Whether data that was due by `now_s` is still unwritten."""
+        """Whether data that was due by `now_s` is not written yet."""
         return bool(self._outbox) and self._outbox[0][0] <= now_s
 
     def _write(self, data: bytes) -> int:
@@ -126,7 +126,7 @@ class Connection:
 
 
 class Datagrams(Connection):
-    """A UDP socket: its client is at `to`, or is the last who sent something."""
+    """A UDP socket. Its client is at `to`, or is the last sender."""
 
     def __init__(
         self, udp_socket: socket.socket, peer: tuple[str, int] | None, leaving: Callable[[Message], Iterable[Message]]
@@ -149,7 +149,7 @@ class Datagrams(Connection):
         return True
 
     def is_behind(self, now_s: float) -> bool:
-        """As that of a connection; nobody is there before the first datagram."""
+        """As for a connection; False before the first datagram."""
         return self._client is None or super().is_behind(now_s)
 
     def progress(self, key: str) -> tuple[int, int] | None:
@@ -277,7 +277,7 @@ class Port:
             self.connections[client.fileno()] = Connection(client.fileno(), key, client.close, self._leaving)
 
     def _open_datagrams(self) -> str:
-        """A UDP socket, which sends to an address, or listens at one; the url is that of the other end."""
+        """A UDP socket that sends to an address or listens at one, and the url of the other end."""
         udp_socket, sends = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), self.timing.scheme == "udpout"
         udp_socket.setblocking(False)
         place = (self.timing.host, self.timing.port)
@@ -288,7 +288,7 @@ class Port:
         return f"udpout://{self.timing.host}:{udp_socket.getsockname()[1]}"
 
     def _open_pty(self) -> str:
-        """A raw pseudo-terminal; its far end stays open, so that clients can reconnect."""
+        """A raw pseudo-terminal. Its other end stays open, so that clients can reconnect."""
         inner, far = pty.openpty()
         tty.setraw(far)
         os.set_blocking(inner, False)
@@ -316,7 +316,7 @@ class Server:
         return self._ports[0].url
 
     def afflict(self, role: str, faults: Faults) -> None:
-        """Let the instrument in `role` have `faults` from now on, of its wires and of its own."""
+        """Give the instrument in `role` these `faults` from now on, of its links and of itself."""
         self._faults[role] = faults
         address, twin = self.addresses[role], self._twins[role]
         for port in self._ports:
@@ -350,7 +350,7 @@ class Server:
         return next((progress_now for connection in connections if (progress_now := connection.progress(key))), None)
 
     def state(self) -> dict[str, Any]:
-        """The twins' states by role, and those of their faults, JSON-able; taken between exchanges."""
+        """The states of the twins and of their faults by role, of types that JSON has; called between exchanges."""
         twins = {role: twin.state() for role, twin in self._twins.items()}
         faults = {f"{FAULTS_OF} {role}": faults.state() for role, faults in self._faults.items()}
         return twins | faults

@@ -1,4 +1,4 @@
-"""Several sensors on one table: a world for each, alike in all that they share.
+"""Several sensors on one table: a world for each, with equal common parts.
 
 Stages, room, oven, supply, carriage and level are the same in every world, since they follow the same commands and the
 same chance; what a sensor has of its own differs. Inputs are named by sensor and output: `a1.vx`.
@@ -110,12 +110,12 @@ class Batch:
         return {name: world.state() for name, world in self._worlds.items()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Continue from what `state` gave."""
+        """Continue from a result of `state`."""
         for name, world in self._worlds.items():
             world.restore(state[name])
 
     def _sensor(self, wired: str) -> str:
-        """Whose output an input is wired to; what belongs to no sensor is seen by the first."""
+        """The sensor whose output is connected to an input; the first sensor for inputs that belong to no sensor."""
         sensor, dot, _ = wired.partition(".")
         if dot and sensor not in self._worlds:
             raise UnknownInput(

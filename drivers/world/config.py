@@ -150,7 +150,7 @@ def _value(present: Any, value: Any, path: str) -> Any:
 
 
 def _noises(present: Noises, value: Mapping[str, Any], path: str) -> Noises:
-    """A setting that names no output holds for both."""
+    """Settings of noise for both outputs; a setting without an output applies to both."""
     common = {name: settings for name, settings in value.items() if name not in ("x", "y")}
     both_outputs = Noises(
         changed_settings(present.x, common, f"{path}."), changed_settings(present.y, common, f"{path}.")

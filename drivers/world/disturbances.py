@@ -51,7 +51,7 @@ def rock(world: State, odd: Oddities, gx: float, gy: float) -> None:
 
 @kernel
 def displacement_nm(world: State, odd: Oddities, beta_deg: float, t_s: float) -> float:
-    """The faults' displacement, the same for both axes."""
+    """Displacement by the faults, nm, equal for both axes."""
     pm = odd.seat_pm * world.seat + odd.lid_pm * world.lid_in
     if t_s >= odd.charge_s:
         pm += odd.charge_pm
@@ -63,7 +63,7 @@ def displacement_nm(world: State, odd: Oddities, beta_deg: float, t_s: float) ->
 
 @kernel
 def stopped_nm(odd: Oddities, x_nm: float) -> float:
-    """Travel that a grain of dust takes away."""
+    """Travel that a grain of dust prevents, nm."""
     return -odd.dust_fraction * max(0.0, x_nm - odd.dust_nm)
 
 

@@ -1,4 +1,4 @@
-"""What can go wrong in the simulated world.
+"""Errors of the simulated world.
 
 DriverError
 └── SimulationError
@@ -30,4 +30,4 @@ class UnknownInput(SimulationError):
 
 
 class TimeReversal(SimulationError):
-    """The world was asked about a time that has passed."""
+    """A request for a time before the present time of the world."""

@@ -1,4 +1,4 @@
-"""Gravity as the sensor's package feels it: base, stages, mount, package.
+"""Gravity in the frame of the sensor's package: base, stages, mount, package.
 
     a = P E F Rz(mount) Rz(beta) Ry(alpha) up        in g, with the true angles
 
@@ -96,7 +96,7 @@ ON_THE_PLATE = np.eye(3)
 
 @dataclass(frozen=True)
 class Level:
-    """The level's own faults."""
+    """Errors of the level itself."""
 
     offset_x_deg: float = 0.0  # what it shows on a level plate
     offset_y_deg: float = 0.0

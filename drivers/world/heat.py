@@ -45,7 +45,7 @@ class Oven:
 
 @dataclass
 class Warmth:
-    """The present temperatures, in C; what the sensor's own heat adds, in K; the oven's controller."""
+    """The present temperatures, C; the rise by the sensor's own heat, K; the state of the oven's controller."""
 
     wander_k: float = 0.0  # of the room
     chamber_c: float = 0.0

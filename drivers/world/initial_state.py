@@ -42,7 +42,7 @@ def beginning(config: WorldConfig, numbers: WorldConfig, room: np.random.Generat
 
 
 def _stir(world: State, numbers: WorldConfig, slow: np.random.Generator) -> None:
-    """White noise of both outputs, then what is slow in each, then what each picks up."""
+    """Draw the initial state of both outputs: white noise, slow noise, pickup."""
     outputs = (world.x, numbers.noise.x, world.pickup_x), (world.y, numbers.noise.y, world.pickup_y)
     for fluctuation, _, _ in outputs:
         fluctuation.white = slow.standard_normal()
@@ -69,7 +69,7 @@ EXACT = {"resonance_hz", "sag_resonance_hz", "charging_s", "gap_um", "zero_g_v",
 
 
 def individual(config: WorldConfig, seed: int, place: int = 0) -> WorldConfig:
-    """One rig drawn from `config.spread`, and the sensor at `place` of its table; the same seed draws the same."""
+    """One rig drawn from `config.spread`, and the sensor at `place` of its table. Equal seeds give equal results."""
     random = np.random.default_rng([seed, 0])
     trims = random.standard_normal((2, 2))
     fraction = config.spread.imperfection_fraction

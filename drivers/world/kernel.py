@@ -40,7 +40,7 @@ def kernel(function: Function) -> Function:
 
 
 def share_with_kernels(function: Function) -> Function:
-    """A function that kernels compile as a part of them, and that Python runs as it is: on settings and on records."""
+    """Make a function usable in kernels, which compile it, and in Python: on settings and on records."""
     return register_jitable(function)
 
 

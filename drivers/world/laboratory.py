@@ -20,7 +20,7 @@ UT_PER_MOMENT = 1e5  # mu_0 / 4 pi, for a moment in mA m^2 at a distance in mm
 
 @dataclass(frozen=True)
 class Magnet:
-    """A small permanent magnet: where it is, seen from the sensor, and its moment."""
+    """A small permanent magnet: its position relative to the sensor, and its moment."""
 
     x_mm: float = 30.0
     y_mm: float = 0.0
@@ -32,7 +32,7 @@ class Magnet:
 
 @dataclass(frozen=True)
 class Iron:
-    """A ball of soft iron: where it is, seen from the sensor."""
+    """A ball of soft iron and its position relative to the sensor."""
 
     x_mm: float = 0.0
     y_mm: float = 20.0
@@ -94,7 +94,7 @@ def rotation_deg_s(place: Laboratory, base: Base) -> Floats:
 
 
 def field_ut(place: Laboratory, base: Base) -> Floats:
-    """The magnetic field where the sensor is, in the frame of the base, shape (3,): the earth's and what bends it."""
+    """The magnetic field at the sensor with iron and magnets, in the frame of the base, uT, shape (3,)."""
     dip = np.radians(place.dip_deg)
     azimuth_deg = place.declination_deg - place.heading_deg
     earth = _in_base(base, place.field_ut, np.cos(dip), azimuth_deg, -np.sin(dip))

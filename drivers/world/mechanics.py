@@ -1,4 +1,4 @@
-"""The mechanisms composed: what happens at an event, and which event comes next.
+"""The mechanisms together: the changes at an event, and the next event.
 
 Slow processes (heat, supply, flicker) advance in ticks of 0.1 s on an absolute grid of time; the
 mechanics are brought up to date at every tick and, while a stage turns or the carriage moves, at
@@ -32,7 +32,7 @@ REFERENCE_C = 25.0  # at which the factory trimmed the sensor
 
 @kernel
 def run_to(world: State, config: WorldConfig, t_ns: int, step_ns: int, room: Generator, slow: Generator) -> None:
-    """Let everything due up to `t_ns` happen; ticks draw from `room` what all sensors share, the rest from `slow`."""
+    """Advance to `t_ns`. Random numbers of ticks are from `room` for common parts, else from `slow`."""
     event_ns = next_event_ns(world, step_ns)
     while event_ns <= t_ns:
         charge(world, config, event_ns)
@@ -61,13 +61,13 @@ def next_event_ns(world: State, step_ns: int) -> int:
 
 @kernel
 def interrupt(world: State, config: WorldConfig) -> None:
-    """Let the filters follow what has been until now, before the carriage gets another motion."""
+    """Advance the filters to the present time, before the carriage gets another motion."""
     charge(world, config, world.now_ns)
 
 
 @kernel
 def charge(world: State, config: WorldConfig, t_ns: int) -> None:
-    """Let the filters of both outputs follow what has stood in front of them until `t_ns`."""
+    """Advance the filters of both outputs to `t_ns` with their present inputs."""
     noise.charge(world.x, config.noise.x, world.volts[0], t_ns)
     noise.charge(world.y, config.noise.y, world.volts[1], t_ns)
 
@@ -213,7 +213,7 @@ def update_turned(world: State, config: WorldConfig, t_ns: int, warmer_k: float)
 
 @kernel
 def rate_deg_s(world: State, alpha: float, beta: float, t_ns: int) -> tuple[float, float, float]:
-    """Angular rate of the board in its own frame, deg/s, as the mean since the last step."""
+    """Mean angular rate of the board since the last step, in its own frame, deg/s."""
     x, y, z = gravity.felt_g(world.earth_deg_s, world.board, alpha, beta)
     if t_ns > world.turned_ns:
         per_s = 1e9 / (t_ns - world.turned_ns)

@@ -91,7 +91,7 @@ def trap_v(noise: Noise, release_s: float) -> float:
 
 @share_with_kernels
 def ticked_v(noise: Noise) -> float:
-    """Rms of the wander where it advances in ticks, else 0."""
+    """Rms of the wander if it advances in ticks, else 0, V."""
     return noise.wander_v if noise.wander_s >= TICKED_S else 0.0
 
 
@@ -106,7 +106,7 @@ def begin(state: Fluctuation, noise: Noise, random: Generator) -> None:
 
 @kernel
 def tick(x: Fluctuation, y: Fluctuation, noise: Noises, t_s: float, step_s: float, random: Generator) -> None:
-    """Advance what is slow in both outputs by one tick that ends at `t_s`."""
+    """Advance the slow noise of both outputs by one tick that ends at `t_s`."""
     release(x, noise.x, step_s, random)
     release(y, noise.y, step_s, random)
     stray(x, noise.x, step_s, random)

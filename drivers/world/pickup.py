@@ -146,7 +146,7 @@ def sinusoid_mean(hz: float, lag: float, middle_s: Floats, interval_s: float, n:
 
 
 def sinusoid_variance(hz: float, lag: float, middle_s: Floats, interval_s: float, n: int) -> Floats:
-    """Of the same samples about their mean: of a slow sinusoid they see a part."""
+    """Variance of the samples about their mean; of a slow sinusoid it is only a part."""
     square = (1 - sinusoid_mean(2 * hz, 2 * lag - math.pi / 2, middle_s, interval_s, n)) / 2
     return np.maximum(square - sinusoid_mean(hz, lag, middle_s, interval_s, n) ** 2, 0.0)
 

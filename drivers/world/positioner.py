@@ -97,7 +97,7 @@ def _settled_response(positioner: Positioner, command: Command) -> tuple[float, 
 
 
 def _begin(positioner: Positioner, piece: Floats, earlier: Floats) -> None:
-    """Set the exponential of `piece` so that place and speed go on where `earlier` is at its start."""
+    """Set the exponential of `piece` so that position and speed are continuous with `earlier` at its start."""
     decay, swing = _poles(positioner)
     before_move, new_move = (motion(positioner, pieces, piece[0]) for pieces in (earlier, piece[None, :]))
     piece[6] = before_move[0] - new_move[0]
@@ -106,7 +106,7 @@ def _begin(positioner: Positioner, piece: Floats, earlier: Floats) -> None:
 
 @kernel
 def _poles(positioner: Positioner) -> tuple[float, float]:
-    """Decay and angular frequency of the loop's own motion, in 1/s."""
+    """Decay rate and angular frequency of the free motion of the loop, 1/s."""
     natural = 2 * math.pi * positioner.servo_hz
     return positioner.damping_fraction * natural, natural * math.sqrt(1 - positioner.damping_fraction**2)
 
@@ -150,7 +150,7 @@ def read_um(positioner: Positioner, pieces: Floats, times_s: ArrayLike, salt: in
 
 
 def normal_at(times_ns: Ints, salt: int) -> Floats:
-    """Standard normal numbers that belong to instants: asked twice, the same. Box-Muller on mixed bits."""
+    """Standard normal numbers as a function of the time: equal times give equal numbers. Box-Muller on mixed bits."""
     words = times_ns.astype(np.uint64) * np.uint64(2) + _mix_bits(np.array([salt], dtype=np.uint64))
     first, second = (1.0 - _mix_bits(words + np.uint64(k)) / 2.0**64 for k in range(2))
     return np.asarray(np.sqrt(-2 * np.log(first)) * np.cos(2 * math.pi * second))

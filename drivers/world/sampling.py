@@ -1,4 +1,4 @@
-"""Samples as the converter takes them: scans in time order, the channels of a scan in turn."""
+"""Samples of the converter: scans in the order of time, the channels of a scan one after the other."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def sample(
 def convert(
     world: State, config: WorldConfig, channels: Ints, late_ns: Ints, times_ns: Ints, random: Generator, volts: Floats
 ) -> None:
-    """Fill `volts` with scans between which nothing happens: only filters and noise go on."""
+    """Fill `volts` with scans without an event between them: only filters and noise advance."""
     steady = steady_v(world, config)
     for i in range(len(times_ns)):
         for k in range(len(channels)):

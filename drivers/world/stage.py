@@ -121,7 +121,7 @@ PIECES = 5  # a trapezoid has three pieces and a rest; a stop adds one
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage's imperfections; the drive's own speed and resolution are not the world's."""
+    """Imperfections of one stage. Speed and resolution of the drive belong to its twin."""
 
     zero_offset_deg: float = 0.0  # true angle at motor angle 0
     play_deg: float = 0.0  # full width of the gear play
