@@ -17,7 +17,7 @@ def report(text: str) -> None:
 
 @contextmanager
 def shown_by(show: Callable[[str], None]) -> Iterator[None]:
-    """Call `show` with what the analyses in this block do, also in threads that copy its context."""
+    """Call `show` with the present step of the analyses in this block, also in threads that copy its context."""
     before = _SHOW.set(show)
     try:
         yield

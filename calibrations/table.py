@@ -194,7 +194,7 @@ class Table:
 
     @property
     def input_unit(self) -> str:
-        """Unit of what is sensed: g, the local field as 1, or deg/s."""
+        """Unit of the sensed quantity: g, the local field as 1, or deg/s."""
         return self.type.input_unit
 
     @property
@@ -231,18 +231,18 @@ class Table:
         return h.hexdigest()
 
     def rows(self, selection: NDArray[np.bool_] | NDArray[np.intp]) -> Table:
-        """The same table with some of its rows."""
+        """The table with some of its rows."""
         row_indices: NDArray[np.intp] = np.arange(self.n)[selection]
         labels = {name: tuple(values[i] for i in row_indices) for name, values in self.labels.items()}
         columns = {name: values[row_indices] for name, values in self.columns.items()}
         return replace(self, columns=MappingProxyType(columns), labels=labels, numbers=self.numbered(row_indices))
 
     def with_outputs(self, outputs: Array) -> Table:
-        """The same table with other outputs, shape (n, axes)."""
+        """The table with other outputs, shape (n, axes)."""
         return replace(self, columns={**self.columns, **dict(zip(self.output_names, outputs.T, strict=True))})
 
     def numbered(self, rows: NDArray[np.intp]) -> NDArray[np.intp]:
-        """The numbers by which a person knows these rows: those of a run's poses, or of a file's rows, from 0."""
+        """The numbers of these rows for a person: of the poses of a run, or of the rows of a file, from 0."""
         return rows if self.numbers is None else self.numbers[rows]
 
 

@@ -83,7 +83,7 @@ class Goal:
         return course.count >= self.most_positions or course.uncertainty[0] <= self.target
 
     def progress(self, course: HandCourse) -> str:
-        """What is known so far, in words; empty before that is known."""
+        """The uncertainty so far, in words; "" before it is known."""
         worst, parameter = course.uncertainty
         if not parameter:
             return ""

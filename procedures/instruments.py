@@ -1,4 +1,4 @@
-"""What a procedure needs of each instrument, by its role on the bench. A driver with these methods can play it."""
+"""The interface of each instrument by its role on the bench. A driver with these methods can have the role."""
 
 from __future__ import annotations
 

@@ -117,11 +117,11 @@ class HandCourse(Protocol):
 
     @property
     def up(self) -> tuple[float, ...]:
-        """What shall be upward for it."""
+        """The direction in the sensor that must point upward for it."""
 
     @property
     def north(self) -> tuple[float, ...]:
-        """What shall point to the north for it; empty if this has no effect."""
+        """The direction in the sensor that must point to the north for it; empty if this has no effect."""
 
     @property
     def words(self) -> str:
@@ -137,7 +137,7 @@ class HandCourse(Protocol):
 
     @property
     def doubt(self) -> str:
-        """What contradicts the assumptions of the calibration, in words; empty if nothing does."""
+        """A contradiction to the assumptions of the calibration, in words; "" without one."""
 
     def is_new(self, mean: NDArray[np.float64]) -> bool:
         """Whether a rest with this mean (3,) is worth taking."""
@@ -153,10 +153,10 @@ class HandAnalysis(Protocol):
         """The test of the last of successive windows, each (n, 3)."""
 
     def course(self, dwells: Sequence[Dwell], noise: NoiseAtRest, skipped: Sequence[str]) -> HandCourse:
-        """The positions of an accelerometer so far. Orientations that were `skipped` (their words) are not wanted."""
+        """The positions of an accelerometer so far. Orientations in `skipped` (their words) are not requested again."""
 
     def field_course(self, dwells: Sequence[Dwell], noise: NoiseAtRest, skipped: Sequence[str]) -> HandCourse:
-        """The same of a magnetometer."""
+        """The positions of a magnetometer so far, as `course`."""
 
     def clipped(self, turn: NDArray[np.float64], rest: NDArray[np.float64]) -> int | None:
         """The number of an output that a turn (n, outputs) clips; None if none does. `rest`: samples at rest."""
@@ -167,7 +167,7 @@ class HandAnalysis(Protocol):
 
 @dataclass(frozen=True)
 class Guidance:
-    """What a person with a sensor in the hand does next. Nobody answers it: the program sees when it is done.
+    """The next action of a person with a sensor in the hand. It needs no answer: the program sees when it is done.
 
     `up` is the direction that shall be upward in the sensor's frame, and `north` that to the north, if it matters.
     `taken`: directions of the positions so far, of gravity or of the magnetic field; `wanted`: the next one, if it is

@@ -86,7 +86,7 @@ class FieldCourse(Course):
 
     @property
     def doubt(self) -> str:
-        """What contradicts one field in all positions; empty if nothing does."""
+        """A contradiction to one field in all positions, in words; "" without one."""
         return "" if self.fitted is None else field_doubt(self.fitted)
 
 

@@ -1,4 +1,4 @@
-"""Calibration by hand as it goes on: which orientations are there, which one is next, and when the positions suffice.
+"""Progress of a calibration by hand: the orientations so far, the next one, and whether the positions are enough.
 
 The positions suffice when the standard uncertainty of every parameter, as an error at full scale (1 g), is at most the
 wanted one. It comes from a fit to the positions so far. A fit that misses more than the noise is less certain, so a

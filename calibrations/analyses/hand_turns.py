@@ -1,4 +1,4 @@
-"""Calibration of a gyroscope by hand as it goes on: the rests so far, and when the turns between them suffice.
+"""Progress of a calibration of a gyroscope by hand: the rests so far, and whether the turns between them are enough.
 
 The orientations are those of an accelerometer (`calibrations.analyses.hand_positions`): turns between sides, edges and
 corners have axes in all directions. The turns suffice when the standard uncertainty of every scale factor, as a share

@@ -81,7 +81,7 @@ def _measured_span(name: str, stated_span: Span, model: Model) -> Span:
 
 
 def _corners(spans: Mapping[str, Span]) -> list[Inputs]:
-    """Lowest, middle and highest of every input with those of all others."""
+    """Every combination of the lowest, middle and highest value of each input."""
     levels = [dict.fromkeys((low, (low + high) / 2, high)) for low, high in spans.values()]
     return [dict(zip(spans, values, strict=True)) for values in product(*levels)]
 

@@ -47,17 +47,17 @@ class Expected:
 
     @property
     def deviations(self) -> float:
-        """How many standard deviations the explanations will lie apart, all data together."""
+        """Expected distance of the explanations in standard deviations, from all data together."""
         return float(np.sqrt(self.together))
 
     @property
     def probability(self) -> float:
-        """Of telling them apart, all data together."""
+        """Probability that all data together separate them."""
         return pairs_separated(self.together)
 
     @property
     def probability_alone(self) -> float:
-        """Of finding the missing effect by its own data alone."""
+        """Probability that its own data alone show the missing effect."""
         return min(pairs_separated(self.alone), _exceedance(self.visible, NAMED_GAIN))
 
     @property

@@ -148,7 +148,7 @@ def evaluate(node: Node, values: Mapping[str, Array]) -> Array:
 
 
 def may_be_column(name: str) -> bool:
-    """Whether a name that only a table has is a column of it: how its means were taken is none."""
+    """Whether an unknown name may be a column of a table. Columns that describe the means (n, std) are excluded."""
     return name not in KNOWN and name not in OF_THE_MEAN
 
 

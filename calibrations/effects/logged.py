@@ -122,7 +122,7 @@ def temperature_rate_c_s(table: Table) -> Array:
 
 @lru_cache(maxsize=64)
 def leading_temperature(table: Table, lead_s: float) -> Array:
-    """The same from the readings without their scatter; as logged where no time changes."""
+    """As `sensor_temperature_c`, from readings without their scatter; as logged if no time changes."""
     logged = table.column("temperature_c")
     if "t_s" not in table or not np.ptp(table.time_s) > 0:
         return logged

@@ -42,7 +42,7 @@ class Correction:
 
     @property
     def log_likelihood(self) -> Array:
-        """Of the measurement, given those before, (...)."""
+        """Log-likelihood of the measurement, given the earlier ones, shape (...)."""
         return np.asarray(-(self.nis + np.linalg.slogdet(2 * np.pi * self.innovation_covariance)[1]) / 2)
 
 

@@ -58,7 +58,7 @@ def least_squares(matrix: Array, measured: Array, variances: Array | float = 1.0
 
 
 def shortest_solution(matrix: Array, measured: Array, variances: Array) -> Estimate:
-    """The same where columns may depend on each other: of all solutions the one of least length."""
+    """As above for columns that may depend on each other: the solution of least length."""
     weight = 1 / np.sqrt(variances)
     weighted, values = matrix * weight[:, None], measured * weight
     covariance = np.asarray(np.linalg.pinv(weighted.T @ weighted, rcond=1e-10, hermitian=True))

@@ -1,4 +1,4 @@
-"""Outputs of a calibrated model over the range of its data: what a format of another program is fitted to."""
+"""Outputs of a calibrated model over the range of its data, to which the format of another program is fitted."""
 
 from __future__ import annotations
 

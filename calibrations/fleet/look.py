@@ -135,7 +135,7 @@ def _derivatives(fit: Fit, effect: Effect) -> Iterator[Group]:
 
 
 def _patterns(fit: Fit) -> Iterator[Group]:
-    """Of poses those that angles and the order of rows can show: they are the same for all sensors of a design."""
+    """Effects of poses that angles and the order of rows can show: equal for all sensors of a design."""
     table = fit.table
     if table.type.stage_angles:
         names = [name for name in (*ANGLES, *table.output_names) if name in table]

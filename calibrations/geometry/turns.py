@@ -86,7 +86,7 @@ class Turns(Table):
         return np.array([self.samples.column("duration_s")[a + 1 : b - 1].sum() for a, b in self.bounds])
 
     def residual(self, rates_deg_s: Array) -> Array:
-        """What the rates of the samples (samples, 3) leave, shape (channels, n)."""
+        """Residual of the rates of the samples (samples, 3), shape (channels, n)."""
         predicted = _turned(self.before, self._steps(rates_deg_s))
         error = np.degrees(np.cross(predicted, self.after)) / self.duration_s[:, None]
         rests = (rates_deg_s[self.bounds[:, 0]] + rates_deg_s[self.bounds[:, 1] - 1]) / 2

@@ -51,7 +51,7 @@ class ImportedTable:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a person must know of the import: damaged lines, and a second sensor that is not imported."""
+        """Remarks on the import: damaged lines, and a second sensor that is not imported."""
         from calibrations.importing.proposal import second_sensor
 
         mapping = [*self.mapped, *(ColumnMapping(name, name) for name in self.sheet.header if name in NUMBERS)]

@@ -99,7 +99,7 @@ def _json_as_lines(source: Source) -> Source:
 
 
 def _by_lines(text: str) -> Any:
-    """The documents of single lines as a list; None if a line is none."""
+    """The documents of single lines as a list; None if a line is not a document."""
     try:
         return [json.loads(line) for line in text.splitlines() if line.strip()]
     except (ValueError, RecursionError):

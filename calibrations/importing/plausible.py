@@ -253,7 +253,7 @@ def check_stated_rate(table: Table, clock: ColumnMapping) -> None:
 
 
 def _step_s(time_s: Array) -> float:
-    """The time from one sample to the next, also of a clock that began again; 0 for times that do not go on."""
+    """The time between samples, also of a clock that restarted; 0 for times that do not increase."""
     return max(float(np.median(np.diff(time_s))), 0.0) if len(time_s) > 1 else 0.0
 
 

@@ -1,4 +1,4 @@
-"""The import that may be meant, which has been tried: the tail of a message about a column that is missing.
+"""A likely import, which was tried: the end of a message about a missing column.
 
 The columns are those that names and values suggest (`proposal.py`). They are converted and averaged as `rig import`
 does it. A constant that only a person knows is tried with an example value, and is a placeholder in the command.

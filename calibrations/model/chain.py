@@ -51,7 +51,7 @@ def force(table: Table, steps: Sequence[Step]) -> Array:
 
 
 def static_force(table: Table, steps: Sequence[Step]) -> Array:
-    """The same along the reference axes."""
+    """The specific force along the reference axes."""
     if table.type.turning:
         return rate_deg_s(table)
     pose = true_pose(table, steps)
@@ -282,7 +282,7 @@ class LinearisedChain:
         return self._gains[stage_of(effect)] if effect.of_force and self._scales else np.ones((1, 3))
 
     def _contribution(self, effect: Effect, values: Values) -> Array:
-        """Contribution of one effect, with the others in the model."""
+        """Contribution of one effect to the output, together with the other effects of the model."""
         stage = stage_of(effect)
         part = staged_part(
             stage, partial(_apply_transduction, effect, self.table, values), self._sensed, self._forces[stage]

@@ -36,7 +36,7 @@ class Source:
     freedom: float
 
     def cells(self, combined: float, factor: float = 1.0) -> tuple[str, ...]:
-        """Texts in the order of `SOURCE_HEAD`, beside a `combined` standard uncertainty; `factor`: from the result's
+        """Texts in the order of `SOURCE_HEAD`, for a `combined` standard uncertainty. `factor`: from the result's
         unit to the one that is shown."""
         return (
             self.name,

@@ -41,7 +41,7 @@ BAR = {"thickness": 10, "outlinewidth": 0, "xpad": 4, "exponentformat": "none"}
 
 
 def figure(chart: c.Chart, keep: str, drag: Literal["select", "zoom", False] = "zoom") -> Figure:
-    """Data, layout and configuration for Plotly. `drag`: what drawing a box does."""
+    """Data, layout and configuration for Plotly. `drag`: the effect of drawing a box."""
     data: list[Trace] = []
     layout: dict[str, Any] = {
         "barmode": "overlay",  # as the static renderer draws bars: the later over the earlier
@@ -330,7 +330,7 @@ def _whole_side(direction: c.Along) -> dict[str, Any]:
 
 
 def _list(values: Any, axis: c.Axis | None = None) -> list[Any]:
-    """Numbers as JSON has them: None where there is none; dates as Plotly reads them."""
+    """Numbers for JSON, None for NaN; dates as texts for Plotly."""
     numbers = np.asarray(values, float).tolist()
     if axis is not None and axis.ticks == "dates":
         return _dates(numbers)

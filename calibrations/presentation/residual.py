@@ -189,7 +189,7 @@ class ChannelResidual:
 
     @property
     def thinned(self) -> str:
-        """Says so where not all rows are drawn."""
+        """A remark if not all rows are drawn, else ""."""
         n = self.fit.table.n
         return f"{len(self.rows):,} of {n:,} rows are drawn, the worst among them" if n > MOST else ""
 

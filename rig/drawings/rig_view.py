@@ -27,7 +27,7 @@ class Camera:
 
     @property
     def toward(self) -> Vectors:
-        """The unit vector to who looks."""
+        """The unit vector towards the viewer."""
         return np.array(self.direction) / float(np.linalg.norm(self.direction))
 
     def project(self, points: Vectors) -> Vectors:

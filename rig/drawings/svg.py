@@ -40,7 +40,7 @@ def circle(centre: Point, radius: float, fill: str = "none", stroke: str = INK, 
 
 
 def arrow(start: Point, end: Point, colour: str, width: float = 2.2) -> str:
-    """A line with a head at `end`; a dot where it points at who looks."""
+    """An arrow with its head at `end`; a dot if it points at the viewer."""
     a, b = np.asarray(start, float), np.asarray(end, float)
     length = float(np.hypot(*(b - a)))
     if length < HEAD_PX:
@@ -88,7 +88,7 @@ def rotate(centre: Point, deg: float, content: Iterable[str]) -> str:
 
 
 def document(width: float, height: float, title: str, content: Iterable[str]) -> str:
-    """A whole file; `title` is read out to who cannot see it."""
+    """A complete file. `title` is the text for screen readers."""
     space = {"xmlns": "http://www.w3.org/2000/svg", "viewBox": f"0 0 {width:g} {height:g}"}
     paper = element("rect", width=width, height=height, fill=PAPER)
     body = "\n".join([element("title", escape(title)), paper, *content])

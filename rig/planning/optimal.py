@@ -141,13 +141,13 @@ def _choose_poses(design_range: Range, criterion: Criterion, poses: int) -> tupl
 
 
 def _equal_poses(poses: Sequence[Pose]) -> Array:
-    """1 where two poses are the same but for their paths, else 0, (n, n)."""
+    """1 where two poses differ in their paths at most, else 0, shape (n, n)."""
     places = [replace(pose, path="") for pose in poses]
     return np.array([[float(a == b) for b in places] for a in places])
 
 
 def _dwell_s(design_range: Range, design: Sequence[Pose]) -> float:
-    """All dwells together at equal worst standard error: in any order about the same. Raises PlanError."""
+    """Sum of all dwells at equal worst standard error; the order changes it little. Raises PlanError."""
     unordered = design_range.judged(_listing(design_range.settings, design))
     if undetermined := [
         design_range.name(int(k)) for k in np.flatnonzero(design_range.standard.determined & ~unordered.determined)

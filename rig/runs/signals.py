@@ -27,7 +27,7 @@ Handler = Callable[[int, FrameType | None], object]
 
 
 def who_stopped(name: str) -> str:
-    """Who stopped a run, by the name of the signal; a person where it has none."""
+    """Who stopped a run, by the name of the signal; a person without a name."""
     return STOPPED_BY[name or "SIGINT"]
 
 

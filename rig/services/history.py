@@ -198,7 +198,7 @@ def _of_one_kind(calibrations: list[Calibration]) -> tuple[list[Calibration], di
 
 
 def latest(record: Record, sensor: str, model: Model) -> Calibration:
-    """The last calibration of `sensor` alone: those before it are not fitted. Raises RecordError as `history`."""
+    """The last calibration of `sensor`. Earlier runs are not fitted. Raises RecordError as `history`."""
     passed_over: dict[str, str] = {}
     for data, run in reversed(_runs(record, sensor)):
         try:
@@ -209,7 +209,7 @@ def latest(record: Record, sensor: str, model: Model) -> Calibration:
 
 
 def judge_history(life: History, limits: Mapping[str, Limit], baseline: int = BASELINE_RUNS) -> History:
-    """The same calibrations by other limits, and charts of another baseline. `limits` by result's name: a number is the
+    """The history with other limits, and with charts of another baseline. `limits` by result's name: a number is the
     greatest change since the last calibration, a pair the lowest and highest value."""
     calibrations = life.calibrations
     names = dict.fromkeys(name for calibration in calibrations for name in calibration.values)

@@ -28,7 +28,7 @@ class Compared:
 
     @property
     def agree(self) -> bool:
-        """Whether all of them do."""
+        """Whether all quantities agree."""
         return all(agreement.agrees for _, agreement in self.rows.values())
 
 
@@ -61,7 +61,7 @@ def compare_rigs(calibrations: Sequence[Calibration], first_rig: str, second_rig
 
 
 def compare(a: Calibration, b: Calibration) -> dict[str, tuple[str, Agreement]]:
-    """Two calibrations, by the names that both have: unit and agreement. Raises DataError where there is none."""
+    """Unit and agreement of each quantity that both calibrations have, by name. Raises DataError if there is none."""
     return _compare_parameters(a.values, b.values, a.data, b.data)
 
 

@@ -19,7 +19,7 @@ OF_THE_SENSOR = ("sensor", "serial", "gravity_m_s2")  # constants of the data th
 
 
 def today() -> str:
-    """The date, for a page that a person reads."""
+    """The date of today, ISO 8601, UTC."""
     return datetime.now(UTC).date().isoformat()
 
 

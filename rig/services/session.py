@@ -67,11 +67,11 @@ class ModelSession(Generic[F]):
         return tuple(step.name for step in self.steps)
 
     def with_effects(self, effects: Mapping[str, Effect]) -> ModelSession[F]:
-        """The same with other effects to be added."""
+        """The session with other effects that may be added."""
         return replace(self, effects=effects)
 
     def with_own(self, effect: Effect) -> ModelSession[F]:
-        """The same with an effect that a user wrote, in the place of an earlier one of its name.
+        """The session with an effect that a user wrote. It replaces an earlier one of its name.
 
         Searches that know the earlier one are forgotten.
         """
@@ -85,7 +85,7 @@ class ModelSession(Generic[F]):
         return replace(self, effects={**self.effects, effect.name: effect}, plans=plans)
 
     def tried(self, effect: Effect) -> Step[F]:
-        """The present model with one effect more, fitted. Raises ModelError where that says nothing new."""
+        """The present model with one more effect, fitted. Raises ModelError if it cannot be added."""
         if self.end.model.holds(effect.name):
             raise ModelError(f"{effect.name} is already in the model")
         plan = self._plan()
@@ -107,7 +107,7 @@ class ModelSession(Generic[F]):
         return self.data.expression(name, text)
 
     def with_step(self, step: Step[F]) -> ModelSession[F]:
-        """One step further."""
+        """The session with one more step."""
         return self._with((*self.steps, step))
 
     def undone(self) -> ModelSession[F]:
@@ -115,7 +115,7 @@ class ModelSession(Generic[F]):
         return self._with(self.steps[:-1])
 
     def removed(self, name: str) -> ModelSession[F]:
-        """The same without the added effect `name`; the later ones are fitted again.
+        """The session without the added effect `name`. The later ones are fitted again.
 
         An effect that the data cannot have without it is left out as well, with a note.
         """
@@ -137,7 +137,7 @@ class ModelSession(Generic[F]):
         return tuple(f"{effect.name}={effect.expression}" if effect.expression else effect.name for effect in effects)
 
     def with_added(self, texts: Sequence[str]) -> ModelSession[F]:
-        """The same with exactly these added effects, given as `added` writes them.
+        """The session with exactly these added effects, in the form of `added`.
 
         The common beginning stays. An effect that the data cannot have is left out, with a note.
         """
@@ -171,7 +171,7 @@ class ModelSession(Generic[F]):
         return with_provenance(self.data, self.end, self.model)
 
     def compared(self) -> Comparison[F]:
-        """The present model beside the data: as given, where it came with values."""
+        """Compare the present model with the data. A given model with values keeps them."""
         report(f"Testing the model on {self.data.unseen}")
         return self.kept.compare(self.end.model if self.steps else self.model)
 
@@ -207,7 +207,7 @@ class ModelSession(Generic[F]):
 
 
 def model_session(request: Request) -> ModelSession[Any]:
-    """The beginning: data (a file or a run) and a model by name or file. Raises what `load_request` and `fit` raise."""
+    """A new session of data (a file or a run) and a model. Raises what `load_request` and `fit` raise."""
     notes: list[str] = []
     content = Content("")
     with suppress(RecordError, OSError):  # `loaded` says better what is wrong
@@ -222,7 +222,7 @@ def model_session(request: Request) -> ModelSession[Any]:
 
 
 def brought_up_to_date(old: ModelSession[Any]) -> ModelSession[Any]:
-    """The same request and the same added effects on the present data; a note says what changed.
+    """The session with its request and added effects on the present data. A note names the change.
 
     Raises what `model_session` raises. An effect that the present data cannot have is left out, with a note.
     """

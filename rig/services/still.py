@@ -74,7 +74,7 @@ class Stream:
 
     @property
     def scale_per_g(self) -> float | None:
-        """From poses of the same run at +1 and -1 g; None where it has none."""
+        """Output per g, from poses of the same run at +1 and -1 g; None without these poses."""
         if {1, -1} <= self.upright.keys() and self.upright[1] != self.upright[-1]:
             return abs(self.upright[1] - self.upright[-1]) / 2
         return None
@@ -107,7 +107,7 @@ def _number(constant: str | float | None) -> float:
 
 
 def channel_of(channels: tuple[str, ...], channel: str | None, source: str) -> str:
-    """The channel asked for, or the first. Raises DataError."""
+    """The requested channel, or the first one. Raises DataError."""
     if not channels:
         raise DataError(f"{source}: has no channel except the time; add a column with the sensor's output")
     channel_name = channel or channels[0]
@@ -118,7 +118,7 @@ def channel_of(channels: tuple[str, ...], channel: str | None, source: str) -> s
 
 
 def agree_on_rate(measured: float | None, stated_hz: float, source: str) -> float:
-    """The rate, Hz. Raises DataError where two disagree, or there is none."""
+    """The sample rate, Hz. Raises DataError if the measured and the stated rate differ, or if none is known."""
     if measured is None and not stated_hz > 0:
         raise DataError(
             f"{source}: its sample rate is unknown; give --rate HZ, or a line `# sample_rate_hz: 100` above the header"
@@ -196,7 +196,7 @@ class _Times:
 
 
 def _times(table: Table) -> _Times | None:
-    """None without a column of times. Raises DataError where they do not go on, or are too uneven."""
+    """The rate and the gaps; None without a column of times. Raises DataError for decreasing or uneven times."""
     if "t_s" not in table or table.n < 2:
         return None
     t_s = table.column("t_s")
@@ -271,7 +271,7 @@ def _is_still(recorded: Kept) -> bool:
 
 
 def _still_blocks(measured: Measured, stream: Stream) -> Iterator[NDArray[Any]]:
-    """Blocks of the still record one after the other; what else is met on the way is noted in `stream`."""
+    """Blocks of the still record in order. Gaps, logged columns and poses along gravity are added to `stream`."""
     next_s = None
     for recorded in measured.kept():
         samples = recorded.samples
@@ -336,7 +336,7 @@ def stream(record: Record | None, data: str, channel: str | None, rate_hz: float
 
 
 def axes(record: Record | None, data: str, channel: str | None, rate_hz: float | None) -> dict[str, Stream]:
-    """The samples of one sensor's axes by their names: the one asked for, or the first axis and those that go with it.
+    """The samples of one sensor's axes by name: the requested axis alone, or all axes of the first sensor.
 
     A channel whose name has no axis in it is called x. Raises what `stream` raises.
     """

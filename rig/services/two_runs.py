@@ -45,7 +45,7 @@ class Pair:
 
     @property
     def std(self) -> float | None:
-        """Of the difference; None where neither uncertainty is known."""
+        """Standard uncertainty of the difference; None if neither uncertainty is known."""
         return hypot(self.first_std or 0.0, self.second_std or 0.0) or None
 
     @property
@@ -55,12 +55,12 @@ class Pair:
 
     @property
     def differ(self) -> bool:
-        """Whether the difference is hardly chance."""
+        """Whether the difference is significant."""
         return self.deviations is not None and abs(self.deviations) > DIFFERENT
 
 
 def results_of(first: Run, second: Run, sensors: tuple[str, str] = ("", "")) -> list[Pair]:
-    """The results that both have; of a batch those of the sensors named."""
+    """Results that both runs have; of a batch, the results of the named sensors."""
     first_results, second_results = (
         _results_of_sensor(run.results, sensor) for run, sensor in zip((first, second), sensors, strict=True)
     )

@@ -37,7 +37,7 @@ class ModelState:
 
 
 def parse_state(query: QueryParams) -> ModelState:
-    """The state of an address. A selection that cannot be read is none."""
+    """The state in an address. An unreadable selection is empty."""
     added_effects = tuple(text for text in query.getlist("add") if text) if "add" in query else None
     selected = numbers(query.get("select", ""))
     return ModelState(query.get("data", ""), query.get("model", ""), added_effects, selected, query.get("noise", ""))

@@ -51,7 +51,7 @@ MOST_CURVES = 4
 
 @dataclass(frozen=True)
 class Level:
-    """The error of one model, in multiples of the noise floor (of noise: of chance), on rows of the fit and on others.
+    """The error of a model in multiples of the noise floor (for noise: of chance), on rows of the fit and on others.
 
     `rms` is the same error in its unit, such as "3.8 mg".
     """

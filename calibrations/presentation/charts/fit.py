@@ -329,7 +329,7 @@ def select_telling_column(step: Step[Fit]) -> Column:
 
 
 def explained_share(change: Array, values: Array, sides: Array) -> float:
-    """Part of the change's variance that is a function of the column, for each side apart; shapes (channels, n)."""
+    """Share of the change's variance that is a function of the column, by side; shapes (channels, n)."""
     unexplained = 0.0
     for y, x in zip(change, values, strict=True):
         part = _parts(x, sides)
@@ -376,7 +376,7 @@ def _sides(step: Step[Fit]) -> Array:
 
 
 def _parts(x: Array, sides: Array) -> NDArray[np.intp]:
-    """Number of the part that each row is in: stretches of the column with equal numbers of rows, each side apart."""
+    """Part number of each row. Parts are ranges of the column with equal numbers of rows, for each side separately."""
     most = min(MOST_PARTS, max(len(x) // ROWS_IN_A_PART, 2))
     edges = np.unique(np.quantile(x, np.linspace(0, 1, most + 1)[1:-1]))
     keys = np.stack([np.searchsorted(edges, x, side="right"), sides])

@@ -96,7 +96,7 @@ def model_curves(end: Fit) -> list[PlaceCurve]:
 
 
 def forms_through(end: Fit, curve: PlaceCurve) -> list[FittedForm]:
-    """Forms of the catalogue fitted to the curve of unknown form at a place, the best first; none beside no such curve.
+    """Forms of the catalogue fitted to the curve of unknown form at a place, the best first; none without such a curve.
 
     They are fitted to what bias, scale factor and this place predict, without noise.
     """

@@ -1,4 +1,4 @@
-"""What a view has, whatever its kind of data: figures, tables of text, charts and albums."""
+"""The interface of a view for any kind of data: figures, tables of text, charts and albums."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ LONGEST = 4096  # bytes of an answer, which a pipe hands over in one piece
 
 
 class Attendant(StatusWriter):
-    """The observer of a background run, which asks through a pipe. A second wish for a pause changes nothing."""
+    """The observer of a background run, which asks through a pipe. A second request for a pause changes nothing."""
 
     ignored_when_paused = (PAUSE,)
 

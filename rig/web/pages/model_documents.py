@@ -56,7 +56,7 @@ class Asking:
             self.make.enable()
 
     def made(self) -> tuple[bytes | str, str, list[str]]:
-        """Content, file name, and what to know of it."""
+        """Content, file name, and remarks."""
         raise NotImplementedError
 
 

@@ -187,7 +187,7 @@ class Pictures(AxisAndUnit):
         self._show_hint(channel)
 
     def _legends(self, channel: ChannelResidual, abscissa: Column) -> None:
-        """Say what marks, lines and bands mean."""
+        """Explain marks, lines and bands."""
         kind = channel.fit.table.type
         sides = "; filled clockwise, open anticlockwise" if np.any(channel.side) else ""
         model = "line" if abscissa.name == "beta" or kind.magnitude or kind.moving else "+"

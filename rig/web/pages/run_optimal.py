@@ -1,4 +1,4 @@
-"""Poses of a sweep chosen for a model, beside the standard sweep; a click makes them the settings of the run."""
+"""Poses of a sweep chosen for a model, compared with the standard sweep; a click makes them the settings of the run."""
 
 from __future__ import annotations
 
