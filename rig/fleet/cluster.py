@@ -10,19 +10,22 @@ import logging
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from distributed import Worker, WorkerPlugin
 
 from rig.errors import RigError
+from rig.runs.signals import stoppable
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, LocalCluster
 
 AHEAD = 3  # chunks on their way for each thread of a worker
 PATIENCE_S = 10  # for a scheduler to answer
 FEW = 10  # messages that Dask keeps of each connection: they hold the tables that were sent, and memory would grow
 
+NOT_STARTED = "the workers did not start ({}); free memory, or ask for fewer --workers"
 LOST = "the connection to the scheduler is lost; finished work is in the record: run the same command again"
 
 T = TypeVar("T")
@@ -42,8 +45,7 @@ def connect_workers(scheduler: str | None, workers: int | None) -> Iterator[Clie
     """
     try:
         import dask
-        from distributed import Client, LocalCluster
-
+        from distributed import Client
     except ImportError:
         raise FleetError("fleets need Dask; install it with: pip install 'inertial-rig[fleet]'") from None
     silence_dask()
@@ -62,14 +64,31 @@ def connect_workers(scheduler: str | None, workers: int | None) -> Iterator[Clie
             with client:
                 yield client
             return
-        with (
-            LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", host="127.0.0.1"
-            ) as cluster,
-            Client(cluster) as client,
-        ):
-            client.register_plugin(QuietWorker())
+        with stoppable(), start_cluster(workers) as cluster, Client(cluster) as client:
+            try:
+                client.register_plugin(QuietWorker())
+            except OSError as error:
+                raise FleetError(NOT_STARTED.format(error)) from None
             yield client
+
+
+def start_cluster(workers: int | None) -> LocalCluster:
+    """A local cluster whose processes do not hear Ctrl-C and the end of a terminal: the command alone handles these.
+
+    A cluster that has half started cannot be closed, so `stoppable` lets a signal wait for the end of this function.
+    Raises FleetError if a worker ends before it has started.
+    """
+    from distributed import LocalCluster
+
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})
+    resource_tracker.ensure_running()  # it unblocks SIGINT where it is started, which must not be a thread of Dask
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # threads of Dask and the workers inherit both
+    try:
+        return LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", host="127.0.0.1")
+    except RuntimeError as error:
+        raise FleetError(NOT_STARTED.format(error)) from None
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGHUP})
 
 
 def run_tasks(
@@ -115,13 +134,11 @@ def run_tasks(
         raise FleetError(LOST) from None
 
 
-# A terminal sends Ctrl-C to local workers too. They ignore it and print nothing, because the command handles both.
-
-
 def silence_dask() -> None:
     """Suppress the messages of Dask, because the command reports each fault once."""
     for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
         logging.getLogger(name).setLevel(logging.CRITICAL)
+    logging.getLogger("tornado.application").setLevel(logging.CRITICAL)  # a call of Dask that a signal ended
 
 
 class QuietWorker(WorkerPlugin):
@@ -129,4 +146,3 @@ class QuietWorker(WorkerPlugin):
 
     def setup(self, worker: Worker) -> None:  # noqa: ARG002 Dask calls it so
         silence_dask()
-        signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -21,6 +21,7 @@ STOPPED_BY = {
 COMPILED = "drivers.world"  # its compiled code calls Python generators; an exception there would break it
 # Between bytes and their count: the simulated clock would wait for bytes that have come already.
 COUNTING = (("drivers.clock", "step"), ("drivers.transport.link", "put"), ("drivers.transport.link", "take"))
+STARTING = ("rig.fleet.cluster", "start_cluster")
 SCREEN = "rich"  # an exception while its console writes would block the console
 AGAIN_S = 0.001
 Handler = Callable[[int, FrameType | None], object]
@@ -72,8 +73,8 @@ def stoppable(ignored: Collection[signal.Signals] = (), inner: bool = False) -> 
 class _Interrupter:
     """Raises KeyboardInterrupt for the first signal, where an exception breaks nothing.
 
-    A signal during a computation of the simulated world, a count of bytes or a write to the screen waits a moment. If
-    Python discards the exception, as in a finaliser, it is raised again.
+    A signal during a computation of the simulated world, a count of bytes, a write to the screen or the start of a
+    fleet's workers waits a moment. If Python discards the exception, as in a finaliser, it is raised again.
     """
 
     def __init__(self) -> None:
@@ -116,7 +117,7 @@ def _indivisible(frame: FrameType | None) -> bool:
     """Whether an exception here would break the interrupted code."""
     while frame is not None:
         module = str(frame.f_globals.get("__name__"))
-        if module.startswith(COMPILED) or (module, frame.f_code.co_name) in COUNTING:
+        if module.startswith(COMPILED) or (module, frame.f_code.co_name) in (*COUNTING, STARTING):
             return True
         if module.partition(".")[0] == SCREEN:
             return frame.f_code.co_name != "input"  # here it waits for a person

@@ -5,16 +5,21 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import dask
+import psutil
 import pytest
 from distributed import Client, LocalCluster
 
 from calibrations.importing.foreign import write_csv
 from calibrations.model.file import dump_model, read_model
+from drivers.clock import WallClock
 from rig.errors import RigError
 from rig.fleet.cluster import FleetError, connect_workers, run_tasks
 from rig.fleet.discover import discover_fleet
@@ -149,11 +154,36 @@ def fragile(tasks: list[int]) -> list[int]:
 
 @pytest.mark.slow
 def test_a_task_that_kills_its_worker_fails_alone_and_all_others_are_computed() -> None:
-    with connect_workers(None, 1) as client:
+    with mock.patch.dict(os.environ), connect_workers(None, 1) as client:  # Dask sets variables for its workers here
         found = list(run_tasks(client, fragile, iter([[0, 1], [], [2, 3], [4]])))
     assert sorted(task for chunk, _ in found for task in chunk) == [0, 1, 2, 3, 4]
     assert [chunk for chunk, said in found if said is None] == [[1]]
     assert all(said == chunk for chunk, said in found if said is not None)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("number", "started"),
+    [(signal.SIGINT, False), (signal.SIGTERM, False), (signal.SIGTERM, True), (signal.SIGHUP, True)],
+)
+def test_a_signal_ends_a_fleet_with_one_message(number: signal.Signals, started: bool, folder: Path) -> None:
+    """A terminal sends it to all processes of the command; none of them complains or leaves semaphores behind."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "rig", "fleet", "discover", str(folder), "--workers", "1"],
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+    ) as command:  # fmt: skip
+        assert command.stderr
+        first = command.stderr.readline()
+        if started:
+            first += command.stderr.readline()
+        else:
+            while len(psutil.Process(command.pid).children()) < 2:  # one is multiprocessing's own
+                WallClock().sleep(0.02)
+        os.kill(command.pid if number == signal.SIGTERM else -command.pid, number)
+        said = command.stderr.read()
+    assert "sensors of" in first
+    assert [line for line in said.splitlines() if not line.startswith("searching")] == ["rig: stopped"]
+    assert command.returncode == 4
 
 
 def test_no_scheduler_is_one_message(rig: Command, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
