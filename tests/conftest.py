@@ -1,4 +1,7 @@
-"""For every test: a record of its own; and where RIG_NO_SKIP is set, a skipped test fails the session."""
+"""For every test: a record of its own, and an environment that it leaves as it found it.
+
+Where RIG_NO_SKIP is set, a skipped test fails the session.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ import os
 import platform
 import signal
 import sys
+from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
@@ -20,6 +24,8 @@ if platform.machine() == "x86_64":  # one arithmetic everywhere: its last bits d
 # A shell that runs the tests in the background lets SIGINT be ignored, and every process they start inherits that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
+SET_BY_LIBRARIES = {"PYTEST_CURRENT_TEST", "KMP_DUPLICATE_LIB_OK"}  # pytest itself; threadpoolctl where it is imported
+
 # The same examples in every run, however slow the machine.
 hypothesis.settings.register_profile("steady", derandomize=True, deadline=None, database=None)
 hypothesis.settings.load_profile("steady")
@@ -30,7 +36,20 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 @pytest.fixture(autouse=True)
-def rig_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def unchanged_environment() -> Iterator[None]:
+    """What a test leaves in the environment changes the tests after it: their order would decide what fails.
+
+    The fixtures below ask for this one before `monkeypatch`, which then undoes its changes before they are compared.
+    """
+    before = dict(os.environ)
+    yield
+    names = (before.keys() | os.environ.keys()) - SET_BY_LIBRARIES
+    changed = sorted(name for name in names if os.environ.get(name) != before.get(name))
+    assert not changed, f"the test leaves other values in the environment: {', '.join(changed)}"
+
+
+@pytest.fixture(autouse=True)
+def rig_home(unchanged_environment: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The record's folder; nothing is written outside the test's own."""
     home = tmp_path / "home"
     monkeypatch.setenv("RIG_HOME", str(home))
@@ -38,7 +57,7 @@ def rig_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+def no_progress(unchanged_environment: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands called in this process say no progress, however slow the machine."""
     monkeypatch.setattr("rig.cli.terminal.progress.EVERY_S", 3600.0)
 
