@@ -162,6 +162,7 @@ STUCK_CHANGE = 0.1  # of the expected change: a healthy output changes as expect
 LEAST_OTHER_SIDE = 0.1  # of the stuck rows: a saturated output has none on the other side
 LEAST_ASIDE = 0.1  # of the output's range, off the stuck value: a dead zone is a hundredth of that
 LEAST_STAGE_SCALE = 3e-3  # of an angle: 1 deg in a turn, which no stage is off by
+LEAST_STAGE_ZERO_DEG = 1.0  # zeros of stages, and edges of sensors, are set to tenths
 LEAST_RESPONSE_CHANGE = 0.05  # of the slopes, in mid-run: 3 deg; sensors drift by thousandths
 UNTOUCHED_BY_READINGS = 1e-5  # of an output's variance: with less left no other reading is searched for
 LARGEST_MISFIT = 0.06  # of an output's variation: effects of a sensor leave less of it

@@ -2,6 +2,7 @@
 
 floor        the error is far below the noise floor, or far above it without any pattern: std, n or a constant is wrong
 misfit       the residual is larger than effects of a sensor
+zero         the zero of a stage is off by degrees, and the model has no effect for it
 response     a scale factor that is 0 within its uncertainty, negative, unlike the other axes, or unlike the unit
 
 Source  von Neumann, Ann. Math. Statist. 12 (1941): the mean square of successive differences shows a pattern.
@@ -24,6 +25,7 @@ from calibrations.criteria import (
     WRONG_FLOOR,
 )
 from calibrations.discovery.outliers import outlier_text
+from calibrations.discovery.readings import zero_doubt
 from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.fitting.fit import Fit
 from calibrations.geometry.orientation import one_orientation
@@ -46,7 +48,7 @@ RATE_UNITS = {"rad/s": 180 / np.pi, "revolutions a minute": 6.0, "revolutions a 
 
 def fit_doubts(fit: Fit) -> tuple[str, ...]:
     """All doubts about the input of a fit, () for a healthy one."""
-    return (*_response(fit), *_floor(fit), *_outliers(fit), *_misfit(fit))
+    return (*_response(fit), *_floor(fit), *_outliers(fit), *_misfit(fit), *_zero(fit))
 
 
 def _floor(fit: Fit) -> Iterator[str]:
@@ -165,12 +167,26 @@ def _misfit(fit: Fit) -> Iterator[str]:
         yield finding.text
 
 
+def _zero(fit: Fit) -> Iterator[str]:
+    """A stage zero that is off, at poses of many orientations."""
+    table = fit.table
+    if not table.type.stage_angles or table.n < FEWEST_RESPONSE_ROWS or one_orientation(table):
+        return
+    if fit.pooled_excess > MUCH_MORE_THAN_NOISE and (doubt := zero_doubt(table, _residual_share(fit) ** 2)) is not None:
+        yield doubt
+
+
+def _residual_share(fit: Fit) -> float:
+    """The rms of the residual as a share of that of the signal, of the output for which it is largest."""
+    return float(np.max(fit.rmse / np.maximum(fit.problem.signal_rms, np.finfo(float).tiny)))
+
+
 def misfit(fit: Fit) -> Finding | None:
     """A residual at known poses, rates or magnitudes that is larger than the effects of a sensor; None if it is not."""
     table = fit.table
     if table.n < FEWEST_RESPONSE_ROWS or table.type.moving or one_orientation(table):
         return None  # an output at rest varies only by effects that the model may lack
-    share = float(np.max(fit.rmse / np.maximum(fit.problem.signal_rms, np.finfo(float).tiny)))
+    share = _residual_share(fit)
     if share <= LARGEST_MISFIT:
         return None
     return Finding(

@@ -27,6 +27,7 @@ from calibrations.criteria import (
     FOLLOWS_GRAVITY,
     LEAST_RESPONSE_CHANGE,
     LEAST_STAGE_SCALE,
+    LEAST_STAGE_ZERO_DEG,
     TURNED_DEG,
     UNTOUCHED_BY_READINGS,
 )
@@ -82,6 +83,35 @@ def geometry_finding(table: Table, stated_response: Response) -> Finding | None:
     return Finding(Verdict.UNEXPLAINED, f"the outputs do not follow the poses as stated; they do if {angle_readings}")
 
 
+def zero_doubt(table: Table, residual_share: float) -> str | None:
+    """Stage zeros that are off by some degrees and explain the outputs far better than a fit; None if there are none.
+
+    `residual_share`: residual share of variance after the fit, of the output for which it is largest. Each output
+    follows its own axis here: a response to all axes would contain a turn of the sensor, as by a zero of beta.
+    """
+    if residual_share < UNTOUCHED_BY_READINGS:
+        return None
+    sample = _some_rows(table)
+    size = np.maximum(sample.outputs.std(axis=0), np.finfo(float).tiny)
+
+    def error(zeros_deg: Array) -> Array:
+        moved = {name: sample.column(name) + zero for name, zero in zip(COLUMNS, zeros_deg, strict=True)}
+        a = specific_force(nominal_pose(replace(sample, columns={**sample.columns, **moved})))
+        own = [response(sample.outputs[:, [k]], a[:, [k]]).residual[0] / size[k] for k in range(len(size))]
+        return np.concatenate(own)
+
+    zeros_deg = scipy.optimize.least_squares(error, np.zeros(2), x_scale=10.0).x
+    share = float(np.max(np.mean(error(zeros_deg).reshape(len(size), -1) ** 2, axis=1)))
+    found = [_Angle(name, 1.0, float(zero)) for name, zero in zip(COLUMNS, zeros_deg, strict=True)]
+    off = [_zero_text(angle) for angle in found if LEAST_STAGE_ZERO_DEG < abs(angle.zero_deg) < TURNED_DEG]
+    if share > FAR_BETTER_GEOMETRY * residual_share or not off:
+        return None
+    return (
+        f"the outputs follow the poses far better if {' and '.join(off)}; check the zero of the stage, the level of "
+        "its base and the mount of the sensor, and add the offset to the column, or fit stage-zero-offset too"
+    )
+
+
 def _find_better_columns(table: Table, residual_shares: Array) -> str | None:
     """The reading of the table that explains its outputs far better, with a check to make; None if there is none.
 
@@ -133,11 +163,7 @@ def _check_angle_scale(table: Table, limit: float) -> str | None:
     unscaled = [item for item in angles if item[1].scale == 1.0]
     scales = [item for item in angles if abs(item[1].scale - 1) > LEAST_STAGE_SCALE]
     if zeros:
-        angle = min(zeros)[1]
-        return (
-            f"the zero of {angle.column} is {angle.zero_deg:+.3g} deg off; check the zero of the stage and add it to "
-            "the column"
-        )
+        return f"{_zero_text(min(zeros)[1])}; check the zero of the stage and add it to the column"
     if scales and not unscaled and min(scales)[0] < _by_sensor(table):
         angle = min(scales)[1]
         return (
@@ -145,6 +171,10 @@ def _check_angle_scale(table: Table, limit: float) -> str | None:
             "unit of this stage"
         )
     return None
+
+
+def _zero_text(angle: _Angle) -> str:
+    return f"the zero of {angle.column} is {angle.zero_deg:+.3g} deg off"
 
 
 def _some_rows(table: Table) -> Table:

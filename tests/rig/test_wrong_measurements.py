@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from calibrations.effects.catalogue import catalogue
+from calibrations.model.file import dump_model, read_model
 from tests.rig.measurement_files import GOOD
 from tests.rig.wrong_answers import HARMLESS, REFUSED, SILENT, WARNED, answer
 from tests.rig.wrong_measurements import UNSEEN, WRONG
@@ -76,6 +78,20 @@ SAID = {
     "time in milliseconds": "in which no stage turns",
     "both outputs are saturated at the supply": "at its highest value the output or the converter is saturated",
 }
+
+
+@pytest.mark.parametrize(("command", "stage"), [("fit", "alpha"), ("fit", "beta"), ("compare", "alpha")])
+def test_a_stage_zero_that_is_off_is_named_unless_the_model_has_it(
+    rig: Callable[..., Any], tmp_path: Path, command: str, stage: str
+) -> None:
+    wrong = WRONG["poses"][f"the zero of {stage} is off by 3 deg"](GOOD["poses"]())
+    (tmp_path / "wrong.csv").write_text(wrong.text())
+    extended = read_model("linear").with_effect(catalogue()["stage-zero-offset"])
+    (tmp_path / "extended.yaml").write_text(dump_model(extended))
+    linear = rig(command, str(tmp_path / "wrong.csv"), "--model", "linear")
+    assert f"if the zero of {stage}_deg is -3 deg off" in linear.out
+    complete = rig(command, str(tmp_path / "wrong.csv"), "--model", str(tmp_path / "extended.yaml"))
+    assert "deg off" not in complete.out + complete.err
 
 
 @pytest.mark.parametrize(

@@ -75,6 +75,8 @@ WRONG: Mapping[str, Mapping[str, Spoil]] = {
         "steps a turn off by 1 %": lambda f: f.scaled("beta_deg", 1.01),
         "the zero of beta is off by 90 deg": lambda f: f.scaled("beta_deg", 1.0, 90.0),
         "the zero of alpha is off by 30 deg": lambda f: f.scaled("alpha_deg", 1.0, 30.0),
+        "the zero of alpha is off by 3 deg": lambda f: f.scaled("alpha_deg", 1.0, 3.0),
+        "the zero of beta is off by 3 deg": lambda f: f.scaled("beta_deg", 1.0, 3.0),
         "beta lost a turn's tenth in mid-run": lambda f: f.changed(
             beta_deg=f.columns["beta_deg"] + np.where(np.arange(f.n) > f.n // 2, 36.0, 0.0)
         ),
