@@ -16,7 +16,7 @@ from scipy.special import chdtrc
 from calibrations.criteria import MATERIAL, MOST_SLOW_NOISE, ONE_SIDED, SIGNIFICANT, STANDS_OUT
 from calibrations.discovery.findings import Place
 from calibrations.fitting.fit import Fit, axis_of, milli_unit, scales
-from calibrations.means.noise import rms
+from calibrations.means.noise import most_scatter, rms
 from calibrations.model.chain import backward
 from calibrations.table import Array, Table, in_time, time_origin
 from calibrations.text import interval
@@ -77,7 +77,8 @@ def fails_by_scatter_only(fit: Fit) -> bool:
     """
     if not fit.noise.known or fit.noise.given or not np.any(fit.noise.scatter):
         return False
-    beyond_white = np.minimum(np.hypot(fit.noise.slow, fit.noise.scatter), MOST_SLOW_NOISE * fit.noise.floor)
+    most = MOST_SLOW_NOISE * most_scatter(fit.table) * fit.noise.floor
+    beyond_white = np.minimum(np.hypot(fit.noise.slow, fit.noise.scatter), most)
     return not _find_failing_stretches(fit, fit.residual / np.hypot(fit.noise.floor, beyond_white)[:, None])
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from calibrations.criteria import (
     FEWEST_FOR_PLACES,
+    LARGER_NOISE,
     LEAST_NOISE,
     MATERIAL,
     MOST_EFFECTS,
@@ -39,11 +40,12 @@ from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.determined import explain_undetermined
-from calibrations.fitting.fit import Fit, refit
+from calibrations.fitting.fit import Fit, fit, refit
 from calibrations.free_forms.place_names import is_visible_at_rest, place_of_effect
 from calibrations.geometry.orientation import one_orientation
-from calibrations.means.noise import correlation_known, neighbours_contradict
-from calibrations.table import Table
+from calibrations.means.noise import correlation_known, neighbours_contradict, rms, with_white
+from calibrations.progress import report
+from calibrations.table import Array, Table
 from calibrations.text import sentence
 
 if TYPE_CHECKING:
@@ -52,6 +54,10 @@ if TYPE_CHECKING:
     from calibrations.discovery.patterns import Pattern
     from calibrations.discovery.structural import StructuralSearch
 
+SCATTER_IS_NOISE = (
+    "The noise floor is the scatter of the poses. It is larger than the standard deviation and the number of samples "
+    "of a mean say, as if the samples were correlated."
+)
 ONE_ORIENTATION = (
     "all rows have one orientation, which shows the bias, and not the scale factor, the geometry or any other response "
     "to the specific force; to calibrate these, measure at several inclinations and turns, as `rig run sweep` does"
@@ -71,8 +77,14 @@ class RowSearch:
         """The effects that the model of `start` misses; `outliers` are the rows that its fit excludes."""
         effects = self._searchable(effects)
         findings = self._search_model(start, outliers, origin, effects)
+        remarks = list[str]()
+        if (white := _white_with_scatter(findings)) is not None:
+            report("searching with the scatter of the poses as their noise")
+            scattered = fit(start.model, with_white(start.table, white))
+            findings = self._search_model(scattered, outliers, scattered if origin is start else origin, effects)
+            remarks.append(SCATTER_IS_NOISE)
         excluded_places = self.table.left_out
-        remarks = [f"Places left out of the search: {', '.join(excluded_places)}."] if excluded_places else []
+        remarks += [f"Places left out of the search: {', '.join(excluded_places)}."] if excluded_places else []
         remarks += [sentence(ONE_ORIENTATION)] if one_orientation(self.table) else []
         return replace(findings, remarks=(*findings.remarks, *remarks))
 
@@ -225,6 +237,18 @@ class RowSearch:
             "outliers": outliers,
         }
         return Findings(data=self.data, start=start, baseline=start, **common | members)
+
+
+def _white_with_scatter(findings: Findings[Fit]) -> Array | None:
+    """The noise of each mean with the scatter of the poses, (channels, n), if that is the larger part of it; else None.
+
+    Means of correlated samples scatter more than their samples say, and only the filter would tell how much. Scatter
+    beside an unexplained part may belong to it.
+    """
+    noise = findings.end.noise
+    if findings.left is not None or not noise.known or correlation_known(findings.end.table):
+        return None
+    return noise.fast if np.any(rms(noise.fast) > LARGER_NOISE * rms(noise.white)) else None
 
 
 def _with_outliers(findings: Findings[Fit]) -> Findings[Fit]:

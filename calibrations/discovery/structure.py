@@ -32,7 +32,7 @@ from calibrations.discovery.significance import Screen, Search, of_search
 from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.noise_fit import gains
-from calibrations.means.noise import correlation_known, rms, robust_std
+from calibrations.means.noise import correlation_known, most_scatter, rms, robust_std
 from calibrations.table import Array
 
 FINALISTS = 6  # patterns that are sharpened
@@ -152,23 +152,14 @@ def find_unexplained_scatter(fit: Fit) -> Finding | None:
     return Finding(Verdict.UNEXPLAINED, pattern.text)
 
 
-def _fully_correlated_ratio(fit: Fit) -> float:
-    """Noise of a mean over the noise floor if all its samples are fully correlated: the upper limit."""
-    return float(np.sqrt(np.median(fit.table.optional("n", 1.0))))
-
-
 def _excess_noise(fit: Fit) -> Pattern | None:
     """Noise above that of any sensor, as a pattern. On positions it is the repeatability of the hand, and no effect."""
     excess = rms(fit.rmse / np.hypot(fit.noise.floor, fit.noise.known_slow))
     if fit.table.type.magnitude or not fit.noise.known or excess <= MOST_SLOW_NOISE:
         return None
     slow, scatter = (float(np.max(noise / fit.noise.floor)) for noise in (fit.noise.slow, fit.noise.scatter))
-    if (
-        scatter > slow
-        and not correlation_known(fit.table)
-        and scatter <= MOST_SLOW_NOISE * _fully_correlated_ratio(fit)
-    ):
-        return None  # the means may be of so few independent samples
+    if scatter > slow and not correlation_known(fit.table) and scatter <= MOST_SLOW_NOISE * most_scatter(fit.table):
+        return None
     noise_name = "slow drift" if slow > scatter else "scatter"
     return Pattern(f"{noise_name} without a pattern, {max(slow, scatter):.1f} x the noise floor", np.zeros((0, 0, 0)))
 

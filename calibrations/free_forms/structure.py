@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.special import chdtri  # scipy.stats takes 0.4 s to load
 
-from calibrations.criteria import LEAST_NOISE, SIGNIFICANT
+from calibrations.criteria import LARGER_NOISE, LEAST_NOISE, SIGNIFICANT
 from calibrations.free_forms.bases import Line
 from calibrations.free_forms.chain import Coefficients, ModelEffects
 from calibrations.free_forms.descent import SearchResult
@@ -27,7 +27,6 @@ from calibrations.geometry.smooth import smooth_columns
 from calibrations.means.noise import neighbour_std, neighbours_contradict, robust_std
 from calibrations.table import Array, Table
 
-LARGER_NOISE = 1.5  # times the stated: less may be forms that are nearly right
 FLOOR_ROUNDS = 2  # in which the noise floor is found from the residual
 NO_NOISE = 1e-3  # of the noise of all rows: all samples of a mean are one code of the converter
 RESOLVED = 1e-9  # of the range of an output: no converter resolves less, and rounding of numbers is no noise

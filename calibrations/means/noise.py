@@ -290,6 +290,14 @@ def correlation_known(table: Table) -> bool:
     return measured or filtered or "n" not in table or bool(np.all(table.column("n") == 1))
 
 
+def most_scatter(table: Table) -> float:
+    """The most by which means can scatter more than their samples say: those of n fully correlated samples, sqrt(n).
+
+    1 if the correlation is known.
+    """
+    return 1.0 if correlation_known(table) else float(np.sqrt(np.median(table.column("n"))))
+
+
 def measured_inflation(blocks: Array) -> tuple[Array, Array]:
     """The inflation of each channel and its standard error, shape (channels,).
 
