@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -40,12 +41,17 @@ class Columns(Protocol):
 def read(path: Path | str, kind: str | None = None, topic: str | None = None) -> Table:
     """The table in a data file: CSV, JSON, HDF5, MATLAB, NumPy, Parquet, Excel, ULog, DataFlash, ROS bags; `topic`
     names the group, worksheet or topic of a file that has several. The rows of a raw log are averaged over its dwells
-    or still intervals, as `rig.load` does it. Raises DataError naming file, line and column.
+    or still intervals, as `rig.load` does it; copied rows count once, and the clock continues where it starts again,
+    with a warning. Raises DataError naming file, line and column.
     """
     from calibrations.importing.foreign import read_csv
     from calibrations.importing.raw_logs import average_raw_log
+    from calibrations.importing.rows import sort_out_rows
 
-    return average_raw_log(read_csv(path, kind, topic))
+    found, remarks = sort_out_rows(average_raw_log(read_csv(path, kind, topic)))
+    for remark in remarks:
+        warnings.warn(remark, stacklevel=3)
+    return found
 
 
 def table(columns: Columns, kind: str, constants: Mapping[str, Constant] | None = None) -> Table:

@@ -12,9 +12,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from calibrations.errors import DataError, MissingColumn, nearest
 from calibrations.files import text_source
 from calibrations.importing.binary import open_sheet
@@ -288,47 +285,6 @@ def _unit_of_axes(mapped: Sequence[ColumnMapping], axes: Sequence[str], source: 
         units_of_axes = ", ".join(f"{axis} in {unit or 'no unit'}" for axis, unit in units.items())
         raise DataError(f"{source}: the three axes must have the same unit: {units_of_axes}")
     return units[axes[0]]
-
-
-# Rows that occur twice in a table: a copied reading, not a repeated one.
-
-MOST_ROWS_LISTED = 3
-
-
-def drop_duplicate_rows(table: Table) -> tuple[Table, str | None]:
-    """The table without rows that equal an earlier row in every number, time included; and a message that lists them.
-
-    A repeated pose has another time and another reading. Without times, equal rows may be real repetitions: they
-    stay.
-    """
-    if "t_s" not in table:
-        return table, None
-    among = _rows_at_shared_times(table.column("t_s"))
-    if not len(among):
-        return table, None
-    rows = np.column_stack([values[among] for values in table.columns.values()])
-    _, first, group = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    copies = np.setdiff1d(np.arange(len(among)), first)
-    if not len(copies):
-        return table, None
-    earlier = among[first[group.ravel()]]
-    pairs = [f"{among[k] + 1} (as {earlier[k] + 1})" for k in copies[:MOST_ROWS_LISTED]]
-    rest_words = f" and {len(copies) - MOST_ROWS_LISTED} more" if len(copies) > MOST_ROWS_LISTED else ""
-    verb = "copies an earlier row" if len(copies) == 1 else "copy earlier rows"
-    rows_said = f"row{'s' if len(copies) > 1 else ''} {', '.join(pairs)}{rest_words}"
-    return table.rows(np.delete(np.arange(table.n), among[copies])), (
-        f"{table.source}: {rows_said} {verb} (same time, same values); each is used once."
-    )
-
-
-def _rows_at_shared_times(t_s: Array) -> NDArray[np.intp]:
-    """Numbers of the rows whose time another row has too."""
-    order = np.argsort(t_s, kind="stable")
-    is_same = np.diff(t_s[order]) == 0
-    is_shared = np.zeros(len(t_s), dtype=bool)
-    is_shared[order[1:]] = is_same
-    is_shared[order[:-1]] |= is_same
-    return np.flatnonzero(is_shared)
 
 
 # Read and write a table as CSV: `# key: value` lines, a header, numbers; text only in columns of text.

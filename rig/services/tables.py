@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calibrations.errors import DataError
-from calibrations.importing.foreign import drop_duplicate_rows, read_csv
+from calibrations.importing.foreign import read_csv
 from calibrations.importing.raw_logs import average_raw_log
+from calibrations.importing.rows import sort_out_rows
 from calibrations.table import Table
 from rig.errors import RecordError, UnknownRun
 
@@ -30,15 +31,16 @@ BESIDE = ("t_s", *FOLLOWED, "n", "direction", "path")  # columns that are not ch
 def average_log(log: Table, notify: Callable[[str], None]) -> Table:
     """The table; a raw log is averaged over its still intervals, with a remark to `notify`.
 
-    Duplicate rows count once. Raises DataError without any still interval.
+    Duplicate rows count once, and the clock continues where it starts again. Raises DataError without any still
+    interval.
     """
     table = average_raw_log(log)
     if table is not log:
         rows = table.type.taken.format(table.n)
         notify(f"{log.source} is a log of raw samples: the table has {rows}, from {log.n} samples.")
-    table, copies = drop_duplicate_rows(table)
-    if copies is not None:
-        notify(copies)
+    table, remarks = sort_out_rows(table)
+    for remark in remarks:
+        notify(remark)
     return _without_excluded_rows(table, notify)
 
 
