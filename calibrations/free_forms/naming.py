@@ -17,6 +17,7 @@ FIRST_FORM = 0.2  # of a place's variance: the least that the first form must ex
 NEXT_FORM = 0.05  # of a place's variance: the least that a second form must explain; less may be the form of the first
 LEAST_NEEDED = 0.02  # of a place's variance: the least that the other forms must lose without this one
 NAMED = 0.9  # of a place's variance: the least that the forms must explain together
+NAMED_ALONE = 0.7  # the same at a place of one catalogue effect: the place itself tells the mechanism
 MOST_FORMS = 2  # forms, at most, that only approximate a curve
 MOST_NAMES = 3  # causes of one curve, at most: four forms, each with a shape of its own, approximate any curve
 LEAST_SIZE = 0.6  # noise floors: a smaller place is a refinement
@@ -190,7 +191,14 @@ def _name_effects(
     first = [cause for cause in acting_causes if cause and cause not in walks] if walks else []  # walks follow anything
     chosen_causes, share = _select_causes(tuple(columns), acting_causes, first, curve, options_of)
     causes = _one_name(result, names, chosen_causes, curve, Q)
-    return (causes, share) if share >= NAMED and len(causes) <= MOST_NAMES else ((), share)
+    if share >= NAMED and len(causes) <= MOST_NAMES:
+        return causes, share
+    narrow = [cause for cause, comps in forms.items() if not any(comp.contains in forms for comp in comps)]
+    if len(narrow) == 1:
+        alone, share_alone = _select_causes(narrow, acting_causes, (), curve, options_of)
+        if share_alone >= NAMED_ALONE:
+            return alone, share_alone
+    return (), share
 
 
 def _forms_by_cause(result: SearchResult, place: str, names: Sequence[str]) -> dict[str, list[Component]]:

@@ -1,0 +1,66 @@
+"""Sensors whose cause has another form than the catalogue's, and whose noise is not what their columns say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calibrations.discovery.results import Discovery
+from calibrations.loop import compare, discover
+from calibrations.model.file import read_model
+from calibrations.table import Array
+from tests.hidden import sampled
+
+VOLTS = 1e-3
+
+
+def heated(poses: sampled.Sweep) -> Array:
+    """The temperature from its mean, 1 at one and a half standard deviations, (n, 1)."""
+    t = poses.temperature_c
+    return np.asarray((t - t.mean()) / (1.5 * t.std()))[:, None]
+
+
+def leaking(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """A leakage current that grows exponentially with the temperature."""
+    return v + VOLTS * np.expm1(1.5 * heated(poses)) * np.array([1.0, -0.6])
+
+
+def rippling(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """A bias that goes up and down three times over the temperature."""
+    return v + VOLTS * np.cos(6.0 * heated(poses)) * np.array([1.0, -0.6])
+
+
+def bent(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    return v + VOLTS * poses.a**3 * np.array([1.0, 0.8])
+
+
+def found_with(cause: sampled.Cause, filter_stated: bool = True) -> Discovery:
+    table = sampled.measured(4, cause)
+    return discover(table if filter_stated else replace(table, constants={}), read_model("linear"))
+
+
+@pytest.mark.slow
+def test_a_place_of_one_effect_names_it_in_another_form() -> None:
+    found = found_with(leaking)
+    assert found.causes == ("temperature-bias",)
+    assert found.steps[-1].name == "free:temperature-bias"
+    assert found.steps[-1].held_out_after < 1.15
+
+
+@pytest.mark.slow
+def test_a_curve_that_no_line_follows_has_no_name() -> None:
+    found = found_with(rippling)
+    assert (found.verdict, found.causes) == ("unexplained", ())
+    assert [place.name for place in found.findings.places if place.unknown] == ["temperature-bias"]
+
+
+@pytest.mark.slow
+def test_means_of_correlated_samples_have_the_scatter_of_the_poses_as_noise_floor() -> None:
+    """Without the filter the means seem to have a fifth of their noise."""
+    stated, found = found_with(bent), found_with(bent, filter_stated=False)
+    assert found.causes == stated.causes == ("cubic-nonlinearity",)
+    assert found.steps[-1].held_out_after == pytest.approx(stated.steps[-1].held_out_after, rel=0.1)
+    assert "The noise floor is the scatter of the poses." in found.judgement.text
+    assert not compare(replace(sampled.measured(4, bent), constants={}), found.model).fails
