@@ -202,13 +202,18 @@ def _name_effects(
 
 
 def _forms_by_cause(result: SearchResult, place: str, names: Sequence[str]) -> dict[str, list[Component]]:
-    """The catalogue forms of a place that may explain its curve, by cause; `names` are the components that act."""
+    """The catalogue forms of a place that may explain its curve, by cause; `names` are the components that act.
+
+    A wider effect that does not act is left out where the effect that it contains acts: the search preferred a curve.
+    """
     forms: dict[str, list[Component]] = {}
+    acting_causes = {result.component(name).cause for name in names}
     jumps = any(_jumps(result, name) for name in names if "/walk-" in name)
     for comp in result.components:
         if comp.place == place and comp.cause and (comp.name in names or not _has_better_shape(comp, result, names)):
             smooth = comp.cause == "bias-drift" or (comp.cause == "warm-up-bias" and comp.name not in names)
-            if (smooth and jumps) or (_follows_many(comp) and comp.name not in names):
+            preferred = bool(comp.contains) and comp.contains in acting_causes
+            if (smooth and jumps) or ((_follows_many(comp) or preferred) and comp.name not in names):
                 continue
             forms.setdefault(comp.cause, []).append(comp)
     return forms

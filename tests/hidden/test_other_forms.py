@@ -50,6 +50,19 @@ def test_a_place_of_one_effect_names_it_in_another_form() -> None:
 
 
 @pytest.mark.slow
+def test_a_curve_over_the_temperature_is_no_hysteresis() -> None:
+    """A play resembles a curve where the temperature hardly falls; the search tries both, and the curve is likelier."""
+    table = sampled.measured(5)
+    share = np.linspace(0.0, 1.0, table.n)
+    q = 2 * share - 1 + 0.1 * np.sin(40 * share)
+    outputs = table.outputs + VOLTS * np.outer(q + 0.4 * q**2, [1.0, -0.6])
+    warming = replace(table, columns={**table.columns, "temperature_c": 24 + 4 * q}).with_outputs(outputs)
+    found = discover(warming, read_model("linear"))
+    assert found.causes == ("temperature-bias",)
+    assert found.steps[-1].held_out_after < 1.15
+
+
+@pytest.mark.slow
 def test_a_curve_that_no_line_follows_has_no_name() -> None:
     found = found_with(rippling)
     assert (found.verdict, found.causes) == ("unexplained", ())
