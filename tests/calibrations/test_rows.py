@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -53,7 +55,7 @@ def test_a_file_that_stands_twice_in_itself_is_used_once() -> None:
     assert remarks[0].startswith("two days: rows 41 (as 1), 42 (as 2), 43 (as 3) and 37 more copy earlier rows")
 
 
-def test_a_library_user_is_warned(tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_a_library_user_is_warned(tmp_path: Path) -> None:
     write_csv(table(np.concatenate([DAY_S, DAY_S])), tmp_path / "days.csv")
     with pytest.warns(UserWarning, match="t_s starts again at row 41"):
         assert cal.read(tmp_path / "days.csv").column("t_s")[-1] == 790.0
