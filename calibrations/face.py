@@ -44,9 +44,8 @@ def read(path: Path | str, kind: str | None = None, topic: str | None = None) ->
     or still intervals, as `rig.load` does it; copied rows count once, and the clock continues where it starts again,
     with a warning. Raises DataError naming file, line and column.
     """
-    from calibrations.importing.foreign import read_csv
+    from calibrations.importing.foreign import read_csv, sort_out_rows
     from calibrations.importing.raw_logs import average_raw_log
-    from calibrations.importing.rows import sort_out_rows
 
     found, remarks = sort_out_rows(average_raw_log(read_csv(path, kind, topic)))
     for remark in remarks:

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calibrations.errors import DataError
-from calibrations.importing.foreign import read_csv
+from calibrations.importing.foreign import read_csv, sort_out_rows
 from calibrations.importing.raw_logs import average_raw_log
-from calibrations.importing.rows import sort_out_rows
 from calibrations.table import Table
 from rig.errors import RecordError, UnknownRun
 

@@ -10,10 +10,9 @@ import pytest
 
 from calibrations.errors import DataError
 from calibrations.files import text_source
-from calibrations.importing.foreign import import_sheet
+from calibrations.importing.foreign import drop_duplicate_rows, import_sheet
 from calibrations.importing.plausible import gravity_unit, log_rate_hz, looks_like_radians
 from calibrations.importing.raw_logs import average_raw_log
-from calibrations.importing.rows import drop_duplicate_rows
 from calibrations.importing.sheet import read_sheet
 from calibrations.importing.units import ColumnMapping
 from calibrations.table import Table

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import calibrations as cal
-from calibrations.importing.foreign import write_csv
-from calibrations.importing.rows import sort_out_rows
+from calibrations.importing.foreign import sort_out_rows, write_csv
 from calibrations.table import Table
 
 DAY_S = np.arange(40) * 10.0
