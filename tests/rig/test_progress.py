@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import re
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -29,31 +31,56 @@ class Stream(io.StringIO):
 
 
 class Seconds:
-    """An end of work that comes after some seconds."""
+    """An end of work that comes after some seconds; `begins` is called in each of them with its number."""
 
-    def __init__(self, count: int) -> None:
-        self.left = count
+    def __init__(self, count: int, begins: Callable[[int], None] = lambda second: None) -> None:
+        self.count, self.second, self.begins = count, 0, begins
 
     def wait(self, timeout: float) -> bool:
         assert timeout == progress.EVERY_S
-        self.left -= 1
-        return self.left < 0
+        self.second += 1
+        self.begins(self.second)
+        return self.second > self.count
 
 
-def shown(terminal: bool, monkeypatch: pytest.MonkeyPatch, seconds: int = 2) -> str:
+def shown(
+    terminal: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    seconds: int = 2,
+    begins: Callable[[progress.Progress, int], None] = lambda work, second: None,
+) -> str:
     """Standard error after some seconds of work and a remark."""
-    stream = Stream(terminal)
+    stream, work = Stream(terminal), progress.Progress("searching", 0.5)
     monkeypatch.setattr(sys, "stderr", stream)
-    progress._show(progress.Progress("searching", 0.5), stream, terminal, Seconds(seconds))
+    progress._show(work, stream, terminal, Seconds(seconds, partial(begins, work)))
     note("a remark")
     return stream.getvalue()
 
 
 def test_a_pipe_receives_plain_lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    """After 1, 10, 20 and 30 seconds."""
+    """After 1, 11, 21 and 31 seconds."""
     lines = shown(False, monkeypatch, 35).splitlines()
     assert [("searching" in line) for line in lines] == [True, True, True, True, False]
     assert not any(sign in "".join(lines) for sign in "\r\x1b")
+
+
+def test_a_pipe_receives_a_line_in_each_second_in_which_the_work_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    def begins(work: progress.Progress, second: int) -> None:
+        if second in (3, 4, 7):
+            work.text = f"effect {second}"
+        if second == 9:
+            work.share = 0.75
+
+    *lines, remark = shown(False, monkeypatch, 12, begins).splitlines()
+    assert remark == "a remark"
+    assert [re.sub(r".*%  |, .*", "", line) for line in lines] == [
+        "searching",
+        "effect 3",
+        "effect 4",
+        "effect 7",
+        "effect 7",
+    ]
+    assert " 75 %" in lines[-1]
 
 
 def test_a_terminal_shows_one_line_that_a_remark_replaces(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,7 +1,8 @@
 """Progress of work that takes longer than a second, on standard error.
 
-In a terminal: one line that is written again every second and then removed. In a pipe or a file: a line after the first
-second and every ten seconds, since a log keeps all of them.
+In a terminal: one line that is written again every second and then removed. In a pipe or a file, which keeps all lines:
+a line in each second in which the work has changed, and otherwise one every ten seconds, so that a reader sees that the
+work goes on.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from rig.services.search import Counted
 
 EVERY_S = 1.0
-LOG_EVERY = 10  # of these, in a pipe or a file
+UNCHANGED_S = 10  # in a pipe or a file, between two lines about the same work
 WIDTH = 30  # characters of a bar
 ERASE = "\r\x1b[K"
 
@@ -34,14 +35,20 @@ class Progress:
     search: Counted | None = None
     at_end: ExitStack = field(default_factory=ExitStack)  # what ends with the work
 
-    def line(self) -> str:
-        """The present state in one line."""
-        seconds = f"{time.monotonic() - self.began_s:.0f} s"
+    @property
+    def state(self) -> tuple[str, str]:
+        """The bar with the share, "" where it is not known, and the work, both as text."""
         text = self.text if isinstance(self.text, str) else self.text()
         if self.share is None:
-            return f"{text}: {seconds}"
+            return "", text
         filled = round(WIDTH * min(max(self.share, 0.0), 1.0))
-        return f"[{'#' * filled}{'.' * (WIDTH - filled)}] {100 * self.share:3.0f} %  {text}, {seconds}"
+        return f"[{'#' * filled}{'.' * (WIDTH - filled)}] {100 * self.share:3.0f} %", text
+
+    def line(self) -> str:
+        """The present state and the time in one line."""
+        seconds = f"{time.monotonic() - self.began_s:.0f} s"
+        bar, text = self.state
+        return f"{bar}  {text}, {seconds}" if bar else f"{text}: {seconds}"
 
     def searched(self, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
         """The effects for a search, whose progress is shown from now on."""
@@ -86,11 +93,13 @@ _DRAWN = threading.Event()  # a line of progress is on the terminal
 
 
 def _show(progress: Progress, stream: TextIO, terminal: bool, stop_event: threading.Event) -> None:
-    seconds = 0
+    written, unchanged_s = ("", ""), 0
     while not stop_event.wait(EVERY_S):
-        seconds += 1
-        if not (terminal or seconds == 1 or seconds % LOG_EVERY == 0):
+        unchanged_s += 1
+        state = progress.state
+        if not terminal and state == written and unchanged_s < UNCHANGED_S:
             continue
+        written, unchanged_s = state, 0
         stream.write(f"{ERASE}{progress.line()}" if terminal else f"{progress.line()}\n")
         stream.flush()
         if terminal:
