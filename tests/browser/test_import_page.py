@@ -68,6 +68,10 @@ def test_a_file_is_imported_by_drop_downs(workbench: Workbench, tmp_path: Path) 
     expect(button).to_be_enabled()
     choose(page, "meaning of table", "other")
     expect(page.get_by_text("Still needed: beta_deg")).to_be_visible()
+    expect(page).to_have_url(re.compile("column=table&meaning=&unit=$"))
+    page.reload()
+    expect(page.get_by_text("Still needed: beta_deg")).to_be_visible()
+    expect(page.get_by_label("meaning of table", exact=True)).to_have_value("other")
     choose(page, "meaning of table", "beta_deg")
     page.get_by_label("Serial number").fill("17")
     expect(page).to_have_url(re.compile(r"/import\?file=.*theirs\.csv&serial=17$"))
@@ -98,6 +102,10 @@ def test_a_time_that_fits_minutes_is_asked_about(workbench: Workbench, tmp_path:
     question.get_by_role("button", name="min", exact=True).click()
     expect(question).to_have_count(0)
     expect(page.get_by_text("0 to 744 s")).to_be_visible()
+    page.reload()
+    expect(page.get_by_text("0 to 744 s")).to_be_visible()  # the answer is kept
+    expect(page.get_by_label("unit of time")).to_have_value("min")
+    expect(question).to_have_count(0)
     button.click()
     page.wait_for_url("**/?data=*")
     with Record() as record:
@@ -182,8 +190,14 @@ def test_a_unit_that_does_not_fit_the_values_is_asked_for(workbench: Workbench, 
     expect(page.get_by_text("24 rows of poses")).to_be_visible()
     expect(page.get_by_text("1.5 to 3.5 V")).to_be_visible()
     page.reload()
+    expect(page.get_by_text("1.5 to 3.5 V")).to_be_visible()
+    expect(page.get_by_label("unit of vx_v")).to_have_value("mV")
+    page.goto(f"{workbench.origin}/import?file={quote(str(path))}")
     question.get_by_role("button", name="V", exact=True).click()
     expect(page.get_by_text("1500 to 3500 V")).to_be_visible()
+    page.reload()  # also the unit that was asked about and confirmed is kept
+    expect(page.get_by_text("1500 to 3500 V")).to_be_visible()
+    expect(question).to_have_count(0)
 
 
 def test_an_import_can_be_cancelled(workbench: Workbench, tmp_path: Path) -> None:

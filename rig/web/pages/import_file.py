@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 from fastapi import Request
 from nicegui import ui
 from numpy.typing import NDArray
+from starlette.datastructures import QueryParams
 
 from calibrations.importing.proposal import column_names, sample_values
 from calibrations.importing.sheet import Sheet
@@ -43,6 +43,9 @@ from rig.web.pictures import draw, plot_with_title
 from rig.web.upload import upload
 
 UNUSED = ""
+TIME = "t_s"
+Meaning = tuple[str, str]  # our name of a column, and its unit in the file
+MEANING = ("column", "meaning", "unit")  # fields of the address, once for each column with a person's choice
 KINDS = {
     "poses": "Poses: the stage angles are known",
     "positions": "Positions: still, in unknown directions",
@@ -128,6 +131,8 @@ class Column:
     def __init__(self, file_column: str, sample_text: str, page: ImportPage) -> None:
         self.file_column, self.page = file_column, page
         self.stated = ""
+        self.proposed: Meaning = "", ""
+        self.confirmed = False  # a person has answered a question about it
         with ui.element("tr"):
             with ui.element("td"):
                 words(file_column)
@@ -142,10 +147,20 @@ class Column:
 
     def offer(self, names: list[str], proposed: ColumnMapping | None, stated_unit: str) -> None:
         """Offer the names of a kind of table, and select the proposal."""
-        self.stated = stated_unit
         self.name.set_options({UNUSED: "other", **{name: name for name in names}})
         self.name.set_value(proposed.name if proposed is not None and proposed.name in names else UNUSED)
+        self.stated, self.confirmed = stated_unit, False  # after the name, whose change forgets them
         self._offer_units(proposed.unit if proposed is not None else "")
+        self.proposed = self.chosen
+
+    def choose(self, meaning: Meaning) -> None:
+        """Select what a person has chosen before, if it is still offered."""
+        name, unit = meaning
+        if name not in self.name.options:
+            return
+        self.name.set_value(name)
+        self.stated, self.confirmed = unit, True
+        self._offer_units(unit)
 
     def _offer_units(self, unit: str) -> None:
         name = str(self.name.value or "")
@@ -156,13 +171,13 @@ class Column:
         self.unit.set_visibility(bool(offered))
 
     def _rename_column(self) -> None:
-        self.stated = ""
+        self.stated, self.confirmed = "", False
         self._offer_units("")
         self.page.look()
 
     def state(self, unit: str) -> None:
         """Set the unit that a person gives, also if it is the present one."""
-        self.stated = unit
+        self.stated, self.confirmed = unit, True
         self.unit.set_value(unit)
         self.page.look()
 
@@ -175,13 +190,25 @@ class Column:
         is_default = unit == column_unit(name) and not self.stated
         return ColumnMapping(name, self.file_column, "" if is_default else unit)
 
+    @property
+    def chosen(self) -> Meaning:
+        """Meaning and unit as chosen; the unit is "" where it is that of the meaning, and no person has stated it."""
+        mapping = self.mapping
+        return (mapping.name, mapping.unit) if mapping is not None else (UNUSED, "")
+
+    @property
+    def by_person(self) -> bool:
+        """Whether the choice is a person's: another one than the proposal, or the answer to a question."""
+        return self.confirmed or self.chosen != self.proposed
+
 
 class ImportPage:
     """The table of columns with proposals, the constants, the picture, and the button that imports."""
 
-    def __init__(self, sheet: Sheet, path: Path, given: Mapping[str, str]) -> None:
+    def __init__(self, sheet: Sheet, path: Path, given: QueryParams) -> None:
         """`given`: the fields of the address, as `_tell_address` writes them."""
         self.sheet, self.path, self.given = sheet, path, given
+        self.restored = _meanings(given)  # until the kind of table changes
         self.turn, self.quiet, self.address = 0, True, ""
         self.asked = False  # the unit of the time is in doubt and no person has stated it
         proposed = proposal(sheet)
@@ -237,18 +264,22 @@ class ImportPage:
         for name, column in self.columns.items():
             stated_unit = self.sheet.units[self.sheet.header.index(name)]
             column.offer(column_names(kind), proposed.columns[name], stated_unit)
+            if name in self.restored:
+                column.choose(self.restored[name])
         for name, field in self.fields.items():
             field.set_visibility(kind in OF_KIND.get(name, KINDS))
         self.quiet = False
         self.question.clear()
-        self.asked = proposed.doubt is not None
-        if proposed.doubt is not None:
-            self._ask_unit(*proposed.doubt)
+        answered = any(unit for name, unit in self.restored.values() if name == TIME)
+        clock = next((column for column in self.columns.values() if column.name.value == TIME), None)
+        self.restored = {}
+        self.asked = proposed.doubt is not None and clock is not None and not answered
+        if proposed.doubt is not None and clock is not None and self.asked:
+            self._ask_unit(clock, *proposed.doubt)
         self.look()
 
-    def _ask_unit(self, doubt: str, fits: str) -> None:
+    def _ask_unit(self, clock: Column, doubt: str, fits: str) -> None:
         """Ask for the unit of the time; nothing is imported before the answer."""
-        clock = next(column for column in self.columns.values() if column.name.value == "t_s")
         with self.question, box("question stack").props("role=group aria-label='Unit of the time'"):
             words(f'What is the unit of the time "{clock.file_column}"?', "title")
             words(f"It {doubt}; no stage does that." + (f" It fits {fits}." if fits else ""), "quiet")
@@ -281,12 +312,14 @@ class ImportPage:
                 ui.timer(0.0, self._preview, once=True)
 
     def _tell_address(self) -> None:
-        """Write what a person typed into the address, so that it survives a reload and a lost server."""
+        """Write what a person typed and chose into the address, so that it survives a reload and a lost server."""
         typed = {name: str(field.value or "").strip() for name, field in self.fields.items()}
         kind = {"kind": str(self.kind.value)} if self.kind.value != self.proposed_kind else {}
         topic = {"topic": self.sheet.topic} if len(self.sheet.topics) > 1 else {}
         query = {"file": str(self.path)} | topic | kind | {name: text for name, text in typed.items() if text}
-        address = f"/import?{urlencode(query)}"
+        chosen = [(name, *column.chosen) for name, column in self.columns.items() if column.by_person]
+        columns = [pair for meaning in chosen for pair in zip(MEANING, meaning, strict=True)]
+        address = f"/import?{urlencode([*query.items(), *columns])}"
         if address != self.address:
             self.address = address
             ui.navigate.history.replace(address)
@@ -362,6 +395,12 @@ class ImportPage:
             self._show_fault("The file was not imported", error)
             return
         ui.navigate.to(ModelState(run).address)
+
+
+def _meanings(given: QueryParams) -> dict[str, Meaning]:
+    """By column of the file, the meaning and unit in an address."""
+    columns, names, units = (given.getlist(field) for field in MEANING)
+    return {column: (name, unit) for column, name, unit in zip(columns, names, units, strict=False)}
 
 
 def _sample_text(sheet: Sheet, name: str) -> str:
