@@ -10,7 +10,7 @@ import difflib
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from types import MappingProxyType
 from typing import Any
 
@@ -246,6 +246,7 @@ class Table:
         return rows if self.numbers is None else self.numbers[rows]
 
 
+@lru_cache(maxsize=8)
 def time_origin(table: Table) -> tuple[float, str]:
     """(zero of a time axis on the clock of the table in s, its name): power-on of a soak, else the run's first row.
 

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Colormap, LinearSegmentedColormap, ListedColormap, Normalize
+from matplotlib.colors import Colormap, LinearSegmentedColormap, ListedColormap, Normalize, to_rgba_array
 from matplotlib.figure import Figure
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator, NullFormatter
@@ -76,7 +77,7 @@ class NotebookFigure(Figure):
     """A figure that a notebook shows without pyplot, which otherwise registers the display of figures."""
 
     def _repr_png_(self) -> bytes:
-        return _savefig(self, "png", dpi="figure")
+        return _savefig(self, dpi="figure")
 
 
 def draw(chart: c.Chart) -> Figure:
@@ -101,13 +102,18 @@ def draw(chart: c.Chart) -> Figure:
 
 def svg(chart: c.Chart) -> bytes:
     """The chart as an SVG document; its text stays text, in a font that is as wide where the first is not there."""
-    text = _bytes(chart, "svg", {"Date": None, "Creator": None}).decode()
+    page, figure = io.BytesIO(), draw(chart)
+    figure.set_dpi(RC["savefig.dpi"])  # of pictures inside of it, such as the bar of a colour scale
+    with rc_context(RC):  # `savefig` gives the same bytes, but draws the figure twice
+        canvas: Any = FigureCanvasSVG(figure)  # it has no types
+        canvas.print_svg(page, metadata={"Date": None, "Creator": None})
+    text = page.getvalue().decode()
     return compact(text.replace("'DejaVu Sans'", "'DejaVu Sans', Verdana, sans-serif")).encode()
 
 
 def png(chart: c.Chart) -> bytes:
     """The chart as a PNG, 150 dots an inch."""
-    return _bytes(chart, "png", {"Software": None})
+    return _savefig(draw(chart), metadata={"Software": None})
 
 
 def inline(chart: c.Chart, name: str, words: str) -> str:
@@ -155,14 +161,10 @@ def save_all(charts: Mapping[str, c.Chart], folder: Path, form: str) -> list[Pat
     return list(paths)
 
 
-def _bytes(chart: c.Chart, form: str, metadata: dict[str, None]) -> bytes:
-    return _savefig(draw(chart), form, metadata=metadata)
-
-
-def _savefig(figure: Figure, form: str, **layout: Any) -> bytes:
+def _savefig(figure: Figure, **layout: Any) -> bytes:
     page = io.BytesIO()
     with rc_context(RC):
-        figure.savefig(page, format=form, **layout)
+        figure.savefig(page, format="png", **layout)
     return page.getvalue()
 
 
@@ -274,7 +276,7 @@ def _points(s: c.Points, ax: Axes) -> None:
     for symbol in dict.fromkeys(symbols.tolist()):
         rows = np.flatnonzero(symbols == symbol)
         shape, hollow = symbol.removesuffix("-open"), symbol.endswith("-open")
-        point_colours = [edges[k] for k in rows]
+        point_colours = edges[rows]
         colours: dict[str, Any] = {"facecolors": "none" if hollow else point_colours}
         if shape != "cross":  # a cross has no edge, and matplotlib warns of one
             colours["edgecolors"] = point_colours
@@ -283,11 +285,12 @@ def _points(s: c.Points, ax: Axes) -> None:
         label = ""
 
 
-def _edges(s: c.Points, n: int) -> list[Any]:
+def _edges(s: c.Points, n: int) -> Any:
+    """The colour of each point, shape (n, 4)."""
     if s.values is not None and s.scale is not None:
         colours, norm = _map(s.scale)
-        return list(colours(norm(np.asarray(s.values, float))))
-    return [s.colour] * n if isinstance(s.colour, str) else list(s.colour)
+        return colours(norm(np.asarray(s.values, float)))
+    return to_rgba_array([s.colour] * n if isinstance(s.colour, str) else list(s.colour))
 
 
 @_series.register
