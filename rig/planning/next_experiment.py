@@ -12,7 +12,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from threading import Lock
 from typing import Any, TypeVar
+from weakref import WeakKeyDictionary
 
 from calibrations.criteria import CERTAIN_PROBABILITY
 from calibrations.design.expected import Expected, distance_alone, expected_gain, pairs_separated, predict_data
@@ -34,6 +36,9 @@ from rig.planning.sweep_range import columns
 
 ALONE, TOGETHER = "probability_alone", "probability"  # of Expected
 LEAST = 1.0  # smallest lambda that counts as information
+Question = tuple[Experiment, Mapping[str, Effect], Bench, Path | None]
+_CHOSEN: WeakKeyDictionary[Fit, list[tuple[Question, Experiment]]] = WeakKeyDictionary()  # by the final fit of a search
+_ONE_AT_A_TIME = Lock()
 Answer = TypeVar("Answer", Diagnosis[Any], Discovery[Any])
 
 
@@ -70,8 +75,15 @@ def with_next_experiment(
     frees = {a for a, _ in e.separates} & set(findings.origin.model.effects)  # a value for each axis, and adds nothing
     if not findings.data.foreseeable or frees or not e.separates:
         return replace(result, next_experiment=as_proposed(e, bench, bench_file))
-    dispute = Dispute.of(without_forms(findings.end), e.separates, effects)
-    return replace(result, next_experiment=choose_experiment(dispute, e, bench, bench_file))
+    with _ONE_AT_A_TIME:  # a page and its report ask for the same one: the second waits for the first
+        rivals = {name: effects[name] for pair in e.separates for name in pair}
+        known, question = _CHOSEN.setdefault(findings.end, []), (e, rivals, bench, bench_file)
+        chosen = next((choice for asked, choice in known if asked == question), None)
+        if chosen is None:
+            dispute = Dispute.of(without_forms(findings.end), e.separates, effects)
+            chosen = choose_experiment(dispute, e, bench, bench_file)
+            known.append((question, chosen))
+    return replace(result, next_experiment=chosen)
 
 
 def possible(experiments: Iterable[Experiment], bench: Bench, within_s: float) -> Iterator[Experiment]:

@@ -19,7 +19,7 @@ from calibrations.loop import diagnose
 from calibrations.model.file import read_model
 from procedures.catalogue import find
 from procedures.settings import parse
-from rig.bench import read_bench
+from rig.bench import Bench, read_bench
 from rig.cli import rig as commands
 from rig.cli.terminal.options import read_settings
 from rig.planning.next_experiment import Dispute, choose_experiment, command_line, plan_experiment, with_next_experiment
@@ -75,6 +75,20 @@ def test_a_turned_sensor_is_to_be_mounted_face_down() -> None:
     assert e.expected.deviations > 50
     assert e.expected.probability > 0.999
     assert e.duration_s < 3352
+
+
+def test_a_page_and_its_report_plan_an_experiment_once_for_each_bench(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = replace(turned(), findings=replace(turned().findings, steps=(), baseline=replace(turned().findings.end)))
+    benches: list[str] = []
+
+    def chosen(_: Dispute, by_physics: Experiment, bench: Bench, __: Path | None) -> Experiment:
+        benches.append(bench.name)
+        return by_physics
+
+    monkeypatch.setattr("rig.planning.next_experiment.choose_experiment", chosen)
+    for bench in (read_bench(None), read_bench(None), read_bench(None).model_copy(update={"name": "another"})):
+        with_next_experiment(found, catalogue(), bench, None)
+    assert benches == [read_bench(None).name, "another"]
 
 
 def test_what_is_not_computed_is_null() -> None:
