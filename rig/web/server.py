@@ -8,11 +8,13 @@ import signal
 import socket
 from collections.abc import Callable
 from dataclasses import dataclass
+from urllib.parse import parse_qs
 
 import uvicorn
 from fastapi import FastAPI
-from nicegui import core, run, ui
+from nicegui import Client, core, run, ui
 from nicegui.translations import translations
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from rig.errors import RigError
 from rig.runs.signals import handled_by
@@ -28,6 +30,7 @@ LOST = {  # the message of a page whose server does not answer
     "itself. If it does not, start the workbench again.",
 }
 RETURN_S = 20.0  # a browser that lost the connection may come back so long; its analyses go on
+LEFT = 1001  # the code with which a browser closes the connection of a page that it leaves (RFC 6455, 7.4.1)
 PING_S, ANSWER_S = 8.0, 20.0  # between two looks at a connection, and until it counts as lost: an analysis delays both
 PORT = 8473  # preferred, so that an open page finds a restarted server
 
@@ -67,7 +70,7 @@ def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[
         reconnect_timeout=RETURN_S,
         gzip_middleware_factory=None,
     )
-    guarded = Guard(app, place.token, names(host, place.port))
+    guarded = Guard(LeftPages(app), place.token, names(host, place.port))
     config = uvicorn.Config(
         guarded, log_level="warning", access_log=False, timeout_graceful_shutdown=0, ws_max_size=1 << 24
     )  # open pages keep their connections, so there is nothing to wait for
@@ -76,6 +79,27 @@ def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[
     with ignored, listener:
         _Server(config, lambda: ready(place)).run(sockets=[listener])
     atexit.register(leave_calculations)
+
+
+@dataclass(frozen=True)
+class LeftPages:
+    """Serves `app`, and ends a page and its analyses as soon as its browser leaves it.
+
+    A page whose connection is lost is another thing: its browser may come back.
+    """
+
+    app: ASGIApp
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async def receiving() -> Message:
+            message = await receive()
+            if message["type"] == "websocket.disconnect" and message.get("code") == LEFT:
+                for client_id in parse_qs(scope["query_string"].decode("latin-1")).get("client_id", []):
+                    if (client := Client.instances.get(client_id)) is not None:
+                        client.delete()
+            return message
+
+        await self.app(scope, receiving if scope["type"] == "websocket" else receive, send)
 
 
 class _Server(uvicorn.Server):

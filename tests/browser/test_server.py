@@ -12,12 +12,15 @@ import urllib.error
 import urllib.request
 from collections.abc import Callable
 from pathlib import Path
+from select import select
+from typing import Any
 from urllib.parse import quote
 
 import pytest
 from playwright.sync_api import BrowserContext, expect
 
-from tests.browser.conftest import Watch, Workbench
+from rig.web.server import RETURN_S
+from tests.browser.conftest import PATIENCE_MS, Watch, Workbench
 from tests.browser.held import held_up
 from tests.browser.measured import thousand
 
@@ -95,6 +98,32 @@ def test_a_server_that_is_to_end_waits_for_no_calculation(
             server.kill()
 
 
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_page_that_is_left_computes_no_more(
+    closed: bool, served: Callable[..., Any], visitor: Callable[[], BrowserContext], tmp_path: Path
+) -> None:
+    begun, ended = (_pipe(tmp_path / name) for name in ("begun", "ended"))
+    said, _ = served("--bench", str(held_up(tmp_path)))
+    page = visitor().new_page()
+    page.goto(said["url"])
+    page.goto(f"{said['url'].partition('/?')[0]}/?data={quote(thousand(tmp_path))}")
+    assert select([begun], [], [], PATIENCE_MS / 1000)[0]
+    assert not select([ended], [], [], 0)[0]
+    if closed:
+        page.close()
+    else:
+        page.get_by_role("link", name="Record").click()
+    assert select([ended], [], [], RETURN_S / 2)[0]
+    for pipe in (begun, ended):
+        os.close(pipe)
+
+
+def _pipe(path: Path) -> int:
+    """A named pipe, opened for reading; nobody waits for the other."""
+    os.mkfifo(path)
+    return os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+
+
 def test_a_page_says_that_its_server_is_lost_and_connects_again(
     visitor: Callable[[], BrowserContext], watch: Watch, tmp_path: Path
 ) -> None:
@@ -123,6 +152,36 @@ def test_a_page_says_that_its_server_is_lost_and_connects_again(
         expect(lost).to_be_hidden()
         expect(page).to_have_url(re.compile("step_deg=90"))  # what was typed meanwhile counts
         expect(page.get_by_label("step (deg)")).to_have_value("90")
+        page.context.close()
+        server.terminate()
+    watch.expects("")  # requests that no server answered
+
+
+def test_text_in_an_open_dialog_outlasts_a_restart_of_the_server(
+    visitor: Callable[[], BrowserContext], watch: Watch, tmp_path: Path
+) -> None:
+    home = {**os.environ, "RIG_HOME": str(tmp_path)}
+    with subprocess.Popen([*WEB, "--json"], stdout=subprocess.PIPE, text=True, env=home) as server:
+        assert server.stdout is not None
+        said = json.loads(server.stdout.readline())
+        page = visitor().new_page()
+        page.goto(said["url"])
+        page.get_by_role("link", name="Run").click()
+        expect(page.get_by_role("button", name="Start")).to_be_enabled()
+        page.get_by_role("button", name="Start").click()
+        page.get_by_role("dialog").get_by_label("Serial number").fill("17")
+        server.terminate()
+    expect(page.get_by_text("The workbench does not answer")).to_be_visible()
+    words = [*WEB, "--json", "--port", str(said["port"])]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=home) as server:
+        assert server.stdout is not None
+        assert server.stdout.readline()
+        kept = page.get_by_text("again: your text is kept")
+        expect(kept).to_be_visible()
+        expect(page.get_by_role("dialog")).to_have_count(0)  # no script presses Start
+        page.get_by_role("button", name="Start").click()
+        expect(page.get_by_role("dialog").get_by_label("Serial number")).to_have_value("17")
+        expect(kept).to_have_count(0)
         page.context.close()
         server.terminate()
     watch.expects("")  # requests that no server answered

@@ -11,6 +11,7 @@ from urllib.parse import quote
 import pytest
 from nicegui import Client, ui
 from nicegui.testing import user_simulation
+from starlette.types import Message, Receive, Scope, Send
 
 from procedures.catalogue import Procedure
 from rig.bench import DEFAULT, Bench
@@ -22,6 +23,7 @@ from rig.services.session import ModelSession
 from rig.web.calculations import Visit, begin, off_loop
 from rig.web.desk import Desk
 from rig.web.pages import register
+from rig.web.server import LEFT, LeftPages
 from tests.browser.measured import two_faults
 
 SEARCH = "diagnosed"  # the thread of a search has the name of what it computes
@@ -60,6 +62,37 @@ def test_a_closed_page_ends_its_search(closed: bool, tmp_path: Path, monkeypatch
     assert not searches()
     (session,) = desk.sessions.values()
     assert bool(session.plans) is not closed
+
+
+@pytest.mark.parametrize(("code", "left"), [(LEFT, True), (1005, False), (1006, False)])
+def test_a_page_ends_at_once_if_its_browser_leaves_it_but_not_if_the_connection_is_lost(code: int, left: bool) -> None:
+    async def simulated() -> None:
+        async with user_simulation() as user:
+            try:
+
+                @ui.page("/visited")
+                def visited() -> None:
+                    ui.label("visited")
+
+                client = await user.open("/visited")
+                messages = [{"type": "websocket.receive", "text": "2"}, {"type": "websocket.disconnect", "code": code}]
+
+                async def receive() -> Message:
+                    return messages.pop(0)
+
+                async def send(_: Message) -> None: ...
+
+                async def connection(_: Scope, receive: Receive, __: Send) -> None:
+                    while (await receive())["type"] != "websocket.disconnect":
+                        assert not client.is_deleted
+
+                scope = {"type": "websocket", "query_string": f"client_id={client.id}&EIO=4".encode()}
+                await LeftPages(connection)(scope, receive, send)
+                assert client.is_deleted is left
+            finally:
+                Client.page_routes.clear()
+
+    asyncio.run(simulated())
 
 
 @pytest.mark.parametrize("closed", [True, False])

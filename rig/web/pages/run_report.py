@@ -16,7 +16,7 @@ from rig.services.load import Loaded
 from rig.services.report import make_report
 from rig.services.request import Request
 from rig.services.search import Cancelled
-from rig.web.calculations import Visit, off_loop
+from rig.web.calculations import Visit
 from rig.web.desk import Desk
 from rig.web.parts import box, button, div, notify_error, shown, words
 
@@ -52,7 +52,7 @@ class RunReport:
     async def show(self) -> None:
         """Make the report, unless it is made already, and show it."""
         data, hint = self.data, "Fitting the model, searching for missing effects, drawing"
-        work = off_loop(self.text, data)
+        work = self.visit.work(self.text, data)
         text = await shown(self.place, hint, "This run has no report", work, lambda: data == self.data, self.run.run)
         if text is None:
             return
@@ -88,8 +88,8 @@ async def download_report(
     """Make a report as `rig report` does, and download it as the file `name`; `found` as in `make_report`."""
     hint = ui.notification("Making the report", spinner=True, timeout=None)
     try:
-        _, page = await off_loop(make_report, request, lambda _: None, visit.searched, question, found)
-        ui.download.content(await off_loop(page), name)
+        _, page = await visit.work(make_report, request, lambda _: None, visit.searched, question, found)
+        ui.download.content(await visit.work(page), name)
     except Cancelled:
         return
     except Exception as error:
