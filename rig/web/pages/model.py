@@ -177,7 +177,7 @@ class Workbench:
             return
         rows = compared.data.form == "rows"
         with self.places, box("row-of places").props('role=group aria-label="Where the model fails"'):
-            words("Fails at", "k")
+            words("Fails at (error / noise floor)" if rows else "Fails at", "k")
             for place in compared.fails:
                 place_text, _, description = for_page(place.text).partition(": ")
                 place_label = f"{place_text}, {place.axis}"

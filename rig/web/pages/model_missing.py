@@ -139,7 +139,7 @@ class Missing:
             if len(result.missing) > 1 and result.findings.steps and not self.page.discovering:
                 title = f"Discover: add all {len(result.missing)} effects"
                 button(title, "auto_fix_high", self.page.discover)
-            cards = [Card(self, c, result, missing and not k) for k, c in enumerate(result.candidates[:FIRST])]
+            cards = self._show_first(result)
             if len(result.candidates) > FIRST:
                 self._show_further(result)
             candidate_box = div("stack")
@@ -159,6 +159,20 @@ class Missing:
                 if is_adequate
                 else f"No effect to add.{hint} Candidates:"
             )
+
+    def _show_first(self, result: Diagnosis[Any]) -> list[Card]:
+        """The cards of the best candidates: first those that are missing, in the order in which they are added."""
+        if result.candidates:
+            order = "Missing, in the order in which they are added. " if len(result.missing) > 1 else ""
+            unseen = result.findings.data.unseen
+            words(f"{order}Right: error on {unseen}, without → with this effect alone.", "quiet small")
+        cards: list[Card] = []
+        for k, c in enumerate(result.candidates[:FIRST]):
+            is_missing = c.name in result.missing
+            if cards and not is_missing and cards[-1].c.name in result.missing:
+                words("Other candidates, which are not missing:", "quiet small")
+            cards.append(Card(self, c, result, best=bool(result.missing) and not k))
+        return cards
 
     def _show_further(self, result: Diagnosis[Any]) -> None:
         further = result.candidates[FIRST:]

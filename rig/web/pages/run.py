@@ -264,8 +264,8 @@ class Planning:
 def _show(planned: Plan, bench: Bench) -> None:
     """Show a plan."""
     rows = plan_facts(planned, bench)
-    if planned.questions:
-        rows["Asks you"] = "; ".join(dict.fromkeys(planned.questions))
+    if planned.asked:
+        rows["Asks you"] = "; ".join(dict.fromkeys(question.text for question in planned.asked))
     facts(rows)
     lines = [(duration(stretch.start_s), stretch.words) for stretch in stretches(planned)]
     if lines:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from nicegui import ui
 
-from calibrations.text import capital, duration
+from calibrations.text import capital
 from rig.bench import Bench
 from rig.drawings import Attitude, strip
 from rig.files import free_bytes, home
@@ -58,7 +58,7 @@ def plan_facts(plan: Plan, bench: Bench) -> dict[str, str]:
     """Duration, storage, reach and limits of a plan."""
     faster = ", simulated: it passes faster" if bench.simulated else ""
     rows = {
-        "Takes": f"{duration(plan.duration_s)}{faster}",
+        "Takes": f"{_duration_in_words(plan.duration_s)}{faster}",
         "Stores": f"{plan.poses} poses, {storage(plan, free_bytes(home()))}",
     }
     for role, ((low, high), (least, most)) in plan.reach.items():
@@ -66,6 +66,13 @@ def plan_facts(plan: Plan, bench: Bench) -> dict[str, str]:
         rows[f"Turns {role}"] = for_page(reach)
     rows["Stops"] = for_page("; ".join(stops(bench)))
     return rows
+
+
+def _duration_in_words(seconds: float) -> str:
+    """12 min 30 s, 1 h 2 min: on a page without a column of times, 12:30 may be hours or minutes."""
+    minutes, s = divmod(round(seconds), 60)
+    hours, m = divmod(minutes, 60)
+    return f"{hours} h {m} min" if hours else f"{m} min {s} s" if m else f"{s} s"
 
 
 Begin = Callable[[Mapping[str, str], Mapping[str, str]], Awaitable[None]]
@@ -131,8 +138,9 @@ class BeginDialog:
         try:
             await self.begin(sensor, self.content.answers)
         except Exception as error:
-            self.fault.set_text(message(error))
             self._look()
+            self.fault.set_text(message(error))
+            self.hint.set_text("")  # another run may move the stages
             return
         self.close()
 

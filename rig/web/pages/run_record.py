@@ -232,15 +232,19 @@ class OneRun:
         self._head()
         headline = div("")
         with div("two"):
-            with div("stack"), box("stack"):
-                words("Results", "title")
-                _results(run)
-                for step in page_steps(run, excluded):
-                    step_row(step, "quiet small")
-                for sensor, count in run_counts.items():
-                    ui.link(f"{count} runs of the sensor {sensor}: history", HistoryRequest(sensor).address).classes(
-                        "small"
-                    )
+            with div("stack"):
+                with box("stack"):
+                    words("Results", "title")
+                    _results(run)
+                    for step in page_steps(run, excluded):
+                        step_row(step, "quiet small")
+                    for sensor, count in run_counts.items():
+                        address = HistoryRequest(sensor).address
+                        ui.link(f"{count} runs of the sensor {sensor}: history", address).classes("small")
+                with box("stack"):
+                    words("Settings", "title")
+                    for part in _circumstances(run):
+                        facts({name: value[:SHOWN] for name, value in part.items() if value})
             with div("stack"):
                 if run.bench and run.rows:
                     self._over_time()
@@ -252,11 +256,6 @@ class OneRun:
                     self._notes()
         if run.state == "complete" and run.rows:
             RunReport(desk, run, headline)
-        with box("stack"):
-            words("Settings", "title")
-            with div("two three"):
-                for part in _circumstances(run):
-                    facts({name: value[:SHOWN] for name, value in part.items() if value})
 
     def _over_time(self) -> None:
         with box("stack"):
