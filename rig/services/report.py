@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from calibrations.discovery.findings import Findings
     from calibrations.effects import Effect
     from calibrations.presentation.chart import Picture
+    from rig.services.session import ModelSession
 
 
 def of_run(data: str) -> tuple[MotionResult | None, Mapping[str, Any]]:
@@ -92,24 +93,30 @@ def make_report(
     request: Request,
     notify: Callable[[str], None],
     searched: Searched,
-    question: Loaded | None = None,
-    found: Findings[Any] | None = None,
+    session: Callable[[], ModelSession[Any]] | None = None,
 ) -> Page:
     """On a model, or on a soak where no model is named.
 
     Raises what `load_request` and `fit` raise, UnusableData.
 
-    `searched` makes the effects of the search, which report its progress and may end it. `question`: data and model in
-    memory, so that the page and its report show the same rows. `found`: the search on these that the page has made.
+    `searched` makes the effects of the search, which report its progress and may end it. `session`: opens that of a
+    page, so that the page and its report show the same rows, and share the search.
     """
     if request.model is None and request.channel is None:
         soak_report = soak_report_of(request.data, today(), program())
         if soak_report is not None:
             return soak_report
-    question = question or load_request(request, notify)
-    return _on_a_model(
-        request, question, notify, lambda: found or question.data.search(question.model, searched(question.effects))
-    )
+    if session is None:
+        question, opened = load_request(request, notify), None
+    else:
+        opened = session()
+        question = Loaded(opened.data, opened.model, opened.effects)
+
+    def search() -> Findings[Any]:
+        shared = opened.first_search(searched) if opened is not None else None
+        return shared or question.data.search(question.model, searched(question.effects))
+
+    return _on_a_model(request, question, notify, search)
 
 
 def _on_a_model(

@@ -52,7 +52,7 @@ class Counted(Mapping[str, Effect]):
     def text(self) -> str:
         """The progress in words."""
         if not self.round:
-            return "Fitting the model"
+            return self.doing or "Fitting the model"
         if self.at == len(self):
             return f"Round {self.round}: {self.doing or 'comparing the results'}"
         return f"Round {self.round}, effect {self.at + 1} of {len(self)}: {self.now}"

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from threading import Thread, current_thread
 from typing import Any, Generic
 
 from calibrations.discovery.dataset import Dataset
@@ -29,6 +30,7 @@ from rig.services.provenance import with_provenance
 from rig.services.request import Request
 
 Names = tuple[str, ...]
+WAIT_S = 0.5  # for another thread, between two moments in which this one can be ended
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,8 @@ class ModelSession(Generic[F]):
     """`model` on `data`, and the `steps` taken from there.
 
     `kept` are the data without gross outliers, `start` the fit to them. `effects` are those that may be added, `notes`
-    is the note on the data, `plans` are the searches so far by the effects added before them.
+    is the note on the data, `plans` are the searches so far by the effects added before them, and `searching` the
+    threads that make one. Pages on the same data and model share both.
     `content` is that of data and model when they were read.
     """
 
@@ -49,6 +52,7 @@ class ModelSession(Generic[F]):
     start: F
     steps: tuple[Step[F], ...] = ()
     plans: dict[Names, Findings[F]] = field(default_factory=dict, compare=False)
+    searching: dict[Names, Thread] = field(default_factory=dict, compare=False, repr=False)
     content: Content = field(default_factory=lambda: Content(""))
 
     @property
@@ -176,10 +180,23 @@ class ModelSession(Generic[F]):
         return self.kept.compare(self.end.model if self.steps else self.model)
 
     def diagnosed(self) -> Diagnosis[F]:
-        """The effects that the present model misses."""
-        findings = self._plan() or self._search()
-        self.plans[self.names] = findings
+        """The effects that the present model misses. Of two threads that ask, the second waits for the first."""
+        self._wait_for_same_search()
+        try:
+            findings = self._plan() or self._search()
+            self.plans[self.names] = findings
+        finally:
+            self.searching.pop(self.names, None)
         return Diagnosis.of(findings)
+
+    def _wait_for_same_search(self) -> None:
+        """Wait until no other thread makes this search: it has made it then, or was ended."""
+        present = current_thread()
+        while (other := self.searching.setdefault(self.names, present)) is not present:
+            report("Waiting for the same search on another page")
+            other.join(WAIT_S)
+            if not other.is_alive():
+                self.searching.pop(self.names, None)
 
     def _plan(self) -> Findings[F] | None:
         """The rest of the longest earlier search that the steps have followed; None where they left all of them."""
@@ -195,6 +212,15 @@ class ModelSession(Generic[F]):
         """The search from the first model, if it was made among the present effects."""
         own = any(step.effect.expression for step in self.steps)
         return None if own else self.plans.get(())
+
+    def first_search(self, watched: Callable[[Mapping[str, Effect]], Mapping[str, Effect]]) -> Findings[F] | None:
+        """`search_made`, made now where it was not made yet; None with an effect that a user wrote.
+
+        `watched` makes the effects of the search, which report its progress and may end it.
+        """
+        if self.search_made is None and not any(effect.expression for effect in self.effects.values()):
+            self._with(()).with_effects(watched(self.effects)).diagnosed()
+        return self.search_made
 
     def _search(self) -> Findings[F]:
         if not self.steps:
@@ -221,12 +247,11 @@ def model_session(request: Request) -> ModelSession[Any]:
     )
 
 
-def brought_up_to_date(old: ModelSession[Any]) -> ModelSession[Any]:
-    """The session with its request and added effects on the present data. A note names the change.
+def brought_up_to_date(old: ModelSession[Any], new: ModelSession[Any]) -> ModelSession[Any]:
+    """The added effects of an old session on `new`, the present data without effects. A note names the change.
 
-    Raises what `model_session` raises. An effect that the present data cannot have is left out, with a note.
+    An effect that the present data cannot have is left out, with a note.
     """
-    new = model_session(old.request)
     extent_before, extent_now = old.content.extent, new.content.extent
     notes = [
         (

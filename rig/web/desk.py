@@ -7,7 +7,7 @@ import os
 from collections import OrderedDict
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +20,6 @@ from rig.record import Record, Run
 from rig.runs.background import control
 
 if TYPE_CHECKING:
-    from calibrations.discovery.findings import Findings
-    from rig.services.load import Loaded
     from rig.services.session import ModelSession
 
 MOST_OPEN = 6  # sessions in memory, each with its data
@@ -36,12 +34,15 @@ class Desk:
     """`bench_file`: the bench of all pages, None for the simulated rig; `benches`: those that the page Run offers.
 
     `dark`: None follows the browser. `sessions`: the open model sessions by data, model and noise model, in order of
-    use. `reports`: HTML by the content of the data."""
+    use. `beginnings`: the same without added effects, with the searches that pages and reports share. `reports`: HTML
+    by the content of the data.
+    """
 
     bench_file: Path | None
     benches: Sequence[Path | None] = ()
     dark: bool | None = None
     sessions: OrderedDict[tuple[str, str, str], ModelSession[Any]] = field(default_factory=OrderedDict)
+    beginnings: OrderedDict[tuple[str, str, str], ModelSession[Any]] = field(default_factory=OrderedDict)
     reports: OrderedDict[str, str] = field(default_factory=OrderedDict)
 
     def open(
@@ -54,16 +55,15 @@ class Desk:
         `model_session`.
         """
         from rig.services.content import content_of
-        from rig.services.request import Request
-        from rig.services.session import brought_up_to_date, model_session
+        from rig.services.session import brought_up_to_date
 
         session = self.sessions.get((data, model, noise))
         if session is None:
-            session = model_session(Request(data, model or None, self.bench_file, noise or None))
+            session = self.beginning(data, model, noise)
             if added_effects is None:
                 session = session.with_added(kept_effects(data, model, noise))
         elif session.content.key != content_of(data, model or None).key:
-            session = brought_up_to_date(session)
+            session = brought_up_to_date(session, self.beginning(data, model, noise))
         if added_effects is not None:
             session = session.with_added(added_effects)
         self.keep(data, model, session, noise)
@@ -77,15 +77,27 @@ class Desk:
             self.sessions.popitem(last=False)
         keep_effects(data, model, session.added, noise)
 
-    def search_of(self, data: str) -> tuple[Loaded | None, Findings[Any] | None]:
-        """Data with the default model, and the search of the page Model on them; (None, None) where there is none."""
-        from rig.services.content import content_of
-        from rig.services.load import Loaded
+    def beginning(self, data: str, model: str = "", noise: str = "") -> ModelSession[Any]:
+        """Data and model without added effects, as every page and report on them begins.
 
-        session = self.sessions.get((data, "", ""))
-        if session is None or session.search_made is None or session.content.key != content_of(data, None).key:
-            return None, None
-        return Loaded(session.data, session.model, session.effects), session.search_made
+        The default model has its searches in common with the model of its name. Raises the errors of `model_session`.
+        """
+        from rig.services.content import content_of
+        from rig.services.request import Request
+        from rig.services.session import model_session
+
+        for (other_data, other_model, other_noise), known in self.beginnings.items():
+            default = known.data.default_model
+            asked, other = (data, model or default, noise), (other_data, other_model or default, other_noise)
+            if asked == other and known.content.key == content_of(data, other_model or None).key:
+                request = replace(known.request, model=model or None)
+                return replace(known, request=request, content=content_of(data, model or None))
+        session = model_session(Request(data, model or None, self.bench_file, noise or None))
+        self.beginnings[data, model, noise] = session
+        self.beginnings.move_to_end((data, model, noise))
+        while len(self.beginnings) > MOST_OPEN:
+            self.beginnings.popitem(last=False)
+        return session
 
     def keep_report(self, key: str, text: str) -> None:
         """Store a report by the content that it is of."""
@@ -100,12 +112,14 @@ class Desk:
             raise RigError(f"{status.procedure} is in progress on {status.bench}; choose another bench after its end")
         self.bench_file = bench_file
         self.sessions.clear()  # their effects and limits are those of the other bench
+        self.beginnings.clear()
         self.reports.clear()
 
     def forget(self, data: str) -> None:
         """Close the sessions of `data`, which may have changed."""
-        for key in [key for key in self.sessions if key[0] == data]:
-            del self.sessions[key]
+        for sessions in (self.sessions, self.beginnings):
+            for key in [key for key in sessions if key[0] == data]:
+                del sessions[key]
 
 
 # The added effects of the last sessions, in a file: a server that starts again opens them as they were.

@@ -54,17 +54,23 @@ def test_a_session_of_changed_data_is_made_anew_with_its_effects(run: str) -> No
     assert "have changed" in again.notes[0]
 
 
-def test_a_report_takes_the_search_of_the_page_while_the_data_are_the_same(run: str) -> None:
+def test_pages_and_reports_share_the_searches_on_one_model_while_the_data_are_the_same(run: str) -> None:
     desk = Desk(None)
     session = desk.open(run, "")
-    assert desk.search_of(run) == (None, None)
     session.plans[()] = (made := cast(Findings[Any], object()))
-    question, found = desk.search_of(run)
-    assert question is not None
-    assert (question.data, question.model, found) == (session.data, session.model, made)
+    assert desk.beginning(run).search_made is made
+    assert desk.open(run, "linear").data is session.data
+    assert desk.beginning(run, "linear").first_search(pytest.fail) is made
+    assert Desk(None).open(run, "linear").search_made is None
+    assert desk.beginning(run, "physical").search_made is None
     with Record() as record:
         exclude(record, run, [3, 4], "a bump")
-    assert desk.search_of(run) == (None, None)
+    assert desk.beginning(run).search_made is None
+    changed = desk.open(run, "")
+    assert changed.data is desk.beginning(run).data
+    assert changed.search_made is None
+    desk.forget(run)
+    assert desk.beginning(run).data is not changed.data
 
 
 def test_effects_are_restored_from_texts_also_by_another_server(run: str) -> None:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from threading import Event, Thread
+from typing import Any
 
 import pytest
 
 from calibrations.errors import ExpressionError, ModelError
 from calibrations.importing.foreign import write_csv
 from calibrations.presentation.charts.discovery import levels
-from rig.services.load import Loaded
+from calibrations.progress import shown_by
 from rig.services.report import make_report
 from rig.services.request import Request
 from rig.services.session import ModelSession, model_session
+from rig.web.calculations import begin
 from tests.browser.measured import hidden, wandering
 from tests.calibrations.test_common_floor import magnetometer
 
@@ -87,10 +90,49 @@ def test_the_name_of_a_removed_effect_is_free_and_its_searches_are_forgotten(tur
 def test_a_report_takes_the_search_that_its_session_has_made(turned: ModelSession, undrawn: None) -> None:
     assert turned.search_made is None
     turned.diagnosed()
-    question = Loaded(turned.data, turned.model, turned.effects)
     assert turned.search_made is not None
-    _, page = make_report(turned.request, pytest.fail, pytest.fail, question, turned.search_made)
+    _, page = make_report(turned.request, pytest.fail, pytest.fail, lambda: turned)
     assert "misses axis-misalignment" in page()
+
+
+def test_of_two_pages_that_search_the_second_waits_for_the_first(
+    turned: ModelSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    searches, begun, go, doing = list[ModelSession](), Event(), Event(), Event()
+
+    def search(session: ModelSession) -> Any:
+        searches.append(session)
+        begun.set()
+        assert go.wait(60)
+        return real(session)
+
+    def show(text: str) -> None:
+        if text.startswith("Waiting for the same search"):
+            doing.set()
+
+    def diagnose_second() -> Any:
+        with shown_by(show):
+            return turned.with_effects(dict(turned.effects)).diagnosed()
+
+    real = ModelSession._search
+    monkeypatch.setattr(ModelSession, "_search", search)
+    first = begin(turned.diagnosed)
+    assert begun.wait(60)
+    second = begin(diagnose_second)
+    assert doing.wait(60)
+    go.set()
+    assert first.future.result(60).findings is second.future.result(60).findings
+    assert len(searches) == 1
+    assert turned.searching == {}
+
+
+def test_after_a_search_that_was_ended_the_page_that_waits_makes_its_own(turned: ModelSession) -> None:
+    ended = Thread()
+    ended.start()
+    ended.join()
+    turned.searching[()] = ended
+    assert turned.diagnosed().missing == ("axis-misalignment",)
+    assert turned.searching == {}
 
 
 def test_a_process_is_added_to_a_noise_model_and_undone(tmp_path: Path) -> None:

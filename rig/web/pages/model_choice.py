@@ -13,7 +13,6 @@ from calibrations.model.file import dump_model
 from rig.errors import RigError
 from rig.files import home, write_whole
 from rig.services.importing import needs_person, open_file
-from rig.services.load import Loaded
 from rig.services.page_words import IMPORT, address
 from rig.services.request import Request
 from rig.web.calculations import Visit, off_loop
@@ -157,11 +156,9 @@ class Choice:
     async def _report(self) -> None:
         """Download the report, as from `rig report`."""
         page, session = self.page, self.page.session
-        question = Loaded(session.data, session.model, session.effects) if session is not None else None
         request = Request(page.data, page.model or None, page.desk.bench_file, page.noise or None)
         name = f"{Path(page.data).stem}-{session.model.name if session else 'model'}.html"
-        found = session.search_made if session is not None else None
-        await download_report(request, self.visit, name, question, found)
+        await download_report(request, self.visit, name, (lambda: session) if session is not None else None)
 
 
 def _file_of(name: str) -> Path:

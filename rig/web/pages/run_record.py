@@ -321,7 +321,8 @@ class OneRun:
 
     async def _report(self, data: str) -> None:
         request = Request(data, None, self.desk.bench_file)
-        await download_report(request, self.visit, f"{data.replace('/', '-')}.html", *self.desk.search_of(data))
+        session = partial(self.desk.beginning, data)
+        await download_report(request, self.visit, f"{data.replace('/', '-')}.html", session)
 
 
 def _results(run: Run) -> None:

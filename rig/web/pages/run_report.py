@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import html
 import re
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from nicegui import ui
 from nicegui.element import Element
 
-from calibrations.discovery.findings import Findings
 from rig.record import Run
 from rig.services.content import content_of
-from rig.services.load import Loaded
 from rig.services.report import make_report
 from rig.services.request import Request
 from rig.services.search import Cancelled
+from rig.services.session import ModelSession
 from rig.web.calculations import Visit
 from rig.web.desk import Desk
 from rig.web.parts import box, button, div, notify_error, shown, words
@@ -72,23 +73,19 @@ class RunReport:
         """The report as HTML. Raises what `make_report` raises, Cancelled."""
         key = content_of(data, None).key
         if key not in self.desk.reports:
-            request, searched = Request(data, None, self.desk.bench_file), self.visit.searched
-            _, make = make_report(request, lambda _: None, searched, *self.desk.search_of(data))
+            request, session = Request(data, None, self.desk.bench_file), partial(self.desk.beginning, data)
+            _, make = make_report(request, lambda _: None, self.visit.searched, session)
             self.desk.keep_report(key, make())
         return self.desk.reports[key]
 
 
 async def download_report(
-    request: Request,
-    visit: Visit,
-    name: str,
-    question: Loaded | None = None,
-    found: Findings[Any] | None = None,
+    request: Request, visit: Visit, name: str, session: Callable[[], ModelSession[Any]] | None
 ) -> None:
-    """Make a report as `rig report` does, and download it as the file `name`; `found` as in `make_report`."""
+    """Make a report as `rig report` does, and download it as the file `name`; `session` as in `make_report`."""
     hint = ui.notification("Making the report", spinner=True, timeout=None)
     try:
-        _, page = await visit.work(make_report, request, lambda _: None, visit.searched, question, found)
+        _, page = await visit.work(make_report, request, lambda _: None, visit.searched, session)
         ui.download.content(await visit.work(page), name)
     except Cancelled:
         return
