@@ -86,7 +86,8 @@ class Link:
     def __init__(self, url: Url, clock: Clock, name: str = "", tap: Tap | None = None) -> None:
         """`name` is the instrument's, for its errors. Raises LinkRefused when nothing answers there."""
         self.url, self.clock = url.text, clock
-        self._parsed, self._place = url, f"{name}: {url.text}" if name else url.text
+        self._parsed = url
+        self._place = name if url.text in name else f"{name}: {url.text}" if name else url.text
         self.users, self._tap = [name] if name else [], tap  # instruments whose wire it is
         self._closed = False
         self._line: Connected | None = self._connect()
@@ -157,7 +158,8 @@ class Link:
         try:
             line = Connected(_open_port(self._parsed))
         except (*LOST, ValueError) as error:
-            raise LinkRefused(f"{self._place}: cannot be opened ({error})", _remedy(self._parsed)) from error
+            reason = (error.strerror if isinstance(error, OSError) else "") or error  # without the error's number
+            raise LinkRefused(f"{self._place}: cannot be opened ({reason})", _remedy(self._parsed)) from error
         self.clock.wait_readable(line, 0.0)  # a simulated clock takes its bearings before the first byte
         return line
 

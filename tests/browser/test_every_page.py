@@ -79,3 +79,14 @@ def test_every_page_fits_and_is_accessible(visitor_of: tuple[BrowserContext, str
         page.set_viewport_size(size)
         page.wait_for_function("document.documentElement.scrollWidth <= innerWidth")
     page.close()
+
+
+def test_an_address_without_a_page_leads_back(visitor_of: tuple[BrowserContext, str], watch: Watch) -> None:
+    context, origin = visitor_of
+    page = context.new_page()
+    page.goto(f"{origin}/nothing")
+    expect(page.get_by_text("There is no such page")).to_be_visible()
+    page.get_by_role("button", name="Record").click()
+    page.wait_for_url("**/record")
+    page.close()
+    watch.expects("404")

@@ -158,7 +158,10 @@ class Choice:
         page, session = self.page, self.page.session
         request = Request(page.data, page.model or None, page.desk.bench_file, page.noise or None)
         name = f"{Path(page.data).stem}-{session.model.name if session else 'model'}.html"
-        await download_report(request, self.visit, name, (lambda: session) if session is not None else None)
+        effects = session.effects.values() if session is not None else ()
+        own = [f"{effect.name}={effect.expression}" for effect in effects if effect.expression]
+        opened = (lambda: session) if session is not None else None
+        await download_report(page.desk, request, self.visit, name, opened, own)
 
 
 def _file_of(name: str) -> Path:

@@ -77,6 +77,7 @@ class CertificateDialog(Asking):
             self.before = ui.select(earlier, label="As found: model in use until now", value="")
         for field in (self.form, self.number, self.customer, self.before):
             field.props("dense options-dense")
+        self.before.style("grid-column: 1 / -1")  # its texts are long
         self.dialog.open()
 
     def made(self) -> tuple[bytes | str, str, list[str]]:

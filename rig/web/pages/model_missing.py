@@ -268,7 +268,7 @@ class Card:
             {
                 "Symptom": capital(c.effect.symptom),
                 **view_of(result.findings.data).facts(c, result),
-                "Probability": chances(c),
+                "Probability as the only effect" if len(result.missing) > 1 else "Probability": chances(c),
                 "Cannot be separated from": rivals or "nothing in the catalogue",
                 "Source": c.effect.source or "–",
             }

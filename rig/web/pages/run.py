@@ -267,7 +267,7 @@ def _show(planned: Plan, bench: Bench) -> None:
     if planned.asked:
         rows["Asks you"] = "; ".join(dict.fromkeys(question.text for question in planned.asked))
     facts(rows)
-    lines = [(duration(stretch.start_s), stretch.words) for stretch in stretches(planned)]
+    lines = [(duration(stretch.start_s), stretch.words.replace("  ", ", ")) for stretch in stretches(planned)]
     if lines:
         table(("at", "what"), lines[:MOST_STRETCHES])
     if len(lines) > MOST_STRETCHES:

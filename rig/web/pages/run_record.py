@@ -322,7 +322,7 @@ class OneRun:
     async def _report(self, data: str) -> None:
         request = Request(data, None, self.desk.bench_file)
         session = partial(self.desk.beginning, data)
-        await download_report(request, self.visit, f"{data.replace('/', '-')}.html", session)
+        await download_report(self.desk, request, self.visit, f"{data.replace('/', '-')}.html", session)
 
 
 def _results(run: Run) -> None:

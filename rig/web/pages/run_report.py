@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -70,23 +70,41 @@ class RunReport:
         ui.run_javascript("document.querySelector('.report')?.scrollIntoView({block: 'start'})")
 
     def text(self, data: str) -> str:
-        """The report as HTML. Raises what `make_report` raises, Cancelled."""
-        key = content_of(data, None).key
-        if key not in self.desk.reports:
-            request, session = Request(data, None, self.desk.bench_file), partial(self.desk.beginning, data)
-            _, make = make_report(request, lambda _: None, self.visit.searched, session)
-            self.desk.keep_report(key, make())
-        return self.desk.reports[key]
+        """The report as HTML. Raises what `report_html` raises."""
+        request = Request(data, None, self.desk.bench_file)
+        return report_html(self.desk, request, self.visit, partial(self.desk.beginning, data))
+
+
+def report_html(
+    desk: Desk,
+    request: Request,
+    visit: Visit,
+    session: Callable[[], ModelSession[Any]] | None,
+    own_effects: Sequence[str] = (),
+) -> str:
+    """A report as `rig report` makes it, once for each content of data and model, noise model and effects of a user.
+
+    `session` as in `make_report`. Raises what `make_report` raises, Cancelled.
+    """
+    key = " ".join([content_of(request.data, request.model).key, request.noise or "", *own_effects])
+    if key not in desk.reports:
+        _, make = make_report(request, lambda _: None, visit.searched, session)
+        desk.keep_report(key, make())
+    return desk.reports[key]
 
 
 async def download_report(
-    request: Request, visit: Visit, name: str, session: Callable[[], ModelSession[Any]] | None
+    desk: Desk,
+    request: Request,
+    visit: Visit,
+    name: str,
+    session: Callable[[], ModelSession[Any]] | None,
+    own_effects: Sequence[str] = (),
 ) -> None:
-    """Make a report as `rig report` does, and download it as the file `name`; `session` as in `make_report`."""
+    """Download the report as the file `name`; the other arguments as in `report_html`."""
     hint = ui.notification("Making the report", spinner=True, timeout=None)
     try:
-        _, page = await visit.work(make_report, request, lambda _: None, visit.searched, session)
-        ui.download.content(await visit.work(page), name)
+        ui.download.content(await visit.work(report_html, desk, request, visit, session, own_effects), name)
     except Cancelled:
         return
     except Exception as error:
