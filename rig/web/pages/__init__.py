@@ -10,5 +10,5 @@ from rig.web.pages import compare, fleet, history, import_file, model, not_found
 def register(desk: Desk) -> None:
     """Register all pages."""
     static_files()
-    for page in (model, run, record, run_record, compare, history, import_file, fleet, not_found):
+    for page in (model, run, record, run_record, compare, history, import_file, not_found, fleet):
         page.register(desk)
