@@ -162,5 +162,6 @@ def test_an_unknown_filter_is_no_effect(subject: str) -> None:
     table = make()
     blind = Table.from_columns(table.kind, table.columns)
     assert fit(read_model("linear"), blind).pooled_excess > 4
-    result = found(blind)
-    assert (result.verdict, result.causes) == ("adequate", causes)
+    result, informed = found(blind), found(table)
+    assert result.causes == informed.causes == causes
+    assert (result.verdict, result.alternatives) == (informed.verdict, informed.alternatives)
