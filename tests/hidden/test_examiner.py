@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 from collections import Counter
+from contextlib import nullcontext
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -69,7 +70,8 @@ def truths(folder: Path) -> dict[str, dict]:
 def test_each_layout_gives_a_table_that_the_analysis_reads(folder: Path) -> None:
     assert set(CAUSE_BY_LAYOUT) == set(LAYOUTS)
     for (name, truth), layout in zip(truths(folder).items(), LAYOUTS, strict=True):
-        table = cal.read(folder / "sets" / f"{name}.csv.gz")
+        with pytest.warns(match="t_s starts again") if layout == "two_days" else nullcontext():
+            table = cal.read(folder / "sets" / f"{name}.csv.gz")
         assert truth["design"] == layout
         assert truth["causes"] == [CAUSE_BY_LAYOUT[layout][0]]
         assert table.n == truth["poses"]
