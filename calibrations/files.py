@@ -1,4 +1,4 @@
-"""Files as text, read line by line: encodings that spreadsheets write, gzip, and refusal of binary files.
+"""Files as text, read line by line: encodings that spreadsheets write, gzip, no binary files; and safe YAML.
 
 No file is held in memory as a whole, so a log of hundreds of megabytes needs memory for its numbers only.
 """
@@ -194,11 +194,11 @@ def _reason(error: Exception) -> str:
     return getattr(error, "strerror", None) or str(error)
 
 
-# YAML of other people: data only, of bounded size however often it refers to itself.
+# YAML of other people: data only, and of limited size.
 #
-# The safe loader makes no objects but numbers, texts, dates, lists and mappings. An alias repeats a part without a
-# copy; nine levels of nine aliases are a page of text and a billion parts for whoever walks through them, so parts
-# are counted as they would be walked.
+# The safe loader makes only numbers, texts, dates, lists and mappings. An alias repeats a part without a copy: nine
+# levels of nine aliases are one page of text, but a billion parts for a program that visits all of them. The parts are
+# therefore counted with their repetitions.
 
 LONGEST_YAML = 1 << 18  # characters: the largest bench file has a hundredth of it
 MOST_YAML_PARTS = 100_000

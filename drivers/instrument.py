@@ -1,4 +1,4 @@
-"""Identity and self-test of every instrument."""
+"""Identity and self-test of every instrument, and the abilities that some instruments have."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class HasAlarm(Protocol):
         """Raises StageAlarm if it stays."""
 
 
-# Abilities that some instruments have. Waiting code and a stop of the rig use them where they exist.
+# Abilities of some instruments. Code that waits and the stop of the rig use them where they exist.
 
 
 @runtime_checkable

@@ -1,15 +1,17 @@
-"""Hard and soft iron by the method of the Book: from the extremes of a full turn, to compare with an ellipsoid fit.
+"""Hard and soft iron from the extremes of full turns (the Book), and the elements of the earth's field.
+
+The results are compared with those of an ellipsoid fit.
 
     h = (max + min) / 2                                    of each axis: hard iron
     r = sqrt(x1^2 + y1^2), theta = atan2(y1, x1)           (17.11), (17.12): the point farthest from the middle
     v^ = R v, R = [[c, s], [-s, c]]                        (17.13), (17.14): the ellipse along its axes
     S = q / r, along the major axis                        (17.15): q the least radius; then back by the transpose of R
 
-Blind to: iron also turns the field that stands upright, Z, into the level axes, by a constant that looks
-like hard iron; and how much it makes of a level field on average. Neither shows in the plane. Iron of no preferred
-direction has five components of one size, of which the plane shows two, as e = (r - q) / (r + q): another one is
-e / sqrt(2) times a t of two degrees of freedom. Uncertainties are half of its 95 % interval, `UNSEEN` e, of Z and of
-the level field. The former is gone in the mean of a turn and one turned over.
+A turn in the horizontal plane does not show two effects of soft iron: a part of the vertical field Z in the horizontal
+axes, which is constant and so looks like hard iron, and the mean gain of the horizontal field. Soft iron without a
+preferred direction has five components of equal size. The plane shows two of them, as e = (r - q) / (r + q); each other
+is e / sqrt(2) times a t of two degrees of freedom. The uncertainties are half of its 95 % interval, `UNSEEN` e, of Z
+and of the horizontal field. The first effect cancels in the mean of a turn and a turn with the sensor turned over.
 
 Source  Book 17.5; JCGM 100, 4.3.7 (rectangular), G.3 (t); Konvalin, Compensating for tilt, hard-iron and soft-iron
         effects (2009).
@@ -86,15 +88,15 @@ def correct_by_extremes(outputs: Array) -> Array:
     return np.column_stack([centred[:, :2] @ ellipse.correction, centred[:, 2:]])
 
 
-# Full turns of a magnetometer, each with an edge upright: by hand with their extremes; the elements of the field.
+# Full turns of a magnetometer, each with one axis vertical: the evaluation by hand, and the elements of the field.
 #
-# The calibrated outputs, turned back by what is known of the stages and the mount, are the field in the frame of the
-# rig: x along its base, z upward. Its elements are those of `field.py` with X = x, Y = -y, Z = -z. D is then no
-# declination, but the azimuth from the base's x axis, clockwise seen from above: the laboratory
-# states where that axis points.
+# The calibrated outputs, turned back by the angles of the stages and the mount, are the field in the frame of the rig:
+# x along its base, z upward. Its elements are those below with X = x, Y = -y, Z = -z. D is then not the
+# declination, but the azimuth from the x axis of the base, clockwise from above; the bench file has the heading of
+# that axis.
 #
-# Outputs of one turn err together, by how the sensor sits in its mount: uncertainties are from the scatter of the
-# turns.
+# The outputs of one turn have a common error, from the seat of the sensor in its mount. The uncertainties are therefore
+# from the scatter between turns.
 #
 # Source  Book 17.4-17.5, (17.6)-(17.15).
 

@@ -151,10 +151,10 @@ def _with(model: Model, i: int, j: int, change: float) -> Model:
     return replace(model, terms=(*model.terms[:i], replace(term, estimates=estimates), *model.terms[i + 1 :]))
 
 
-# The memory of a product at each row of a table, given the samples of the whole way to that row.
+# The memory of a product at each row of a table, after the samples of the whole path to that row.
 #
-# Between poses the way is that of the stages, as the effects themselves have it (`calibrations.visits`); what is
-# sensed on it replaces the product's value there, which is as close to it as at the poses.
+# Between poses the path is that of the stages, as in the effects themselves (`calibrations.visits`). The sensed values
+# on it stand for the values of the product there; the two are as close as at the poses.
 
 
 def memory_at(table: Table, a: Array, forward: Forward) -> dict[str, Array]:

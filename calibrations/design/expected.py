@@ -1,4 +1,4 @@
-"""Separation of two explanations in data not measured yet: T-optimality.
+"""Separation of two explanations in planned data (T-optimality), and the expected table of planned poses.
 
     lambda = min over theta of |W (f_best - f_rival(theta))|^2        W makes the noise white
 
@@ -143,11 +143,11 @@ def _distance(right: Fit, wrong: Fit, table: Table) -> Callable[[bool], float]:
     return least
 
 
-# A model taken to be true before any data: what a plan is made for.
+# A model that counts as true before there are data: a plan is made for it.
 #
-# Values are the model's own; where it has none, those that a sensor typically has. The noise is white, that of Ang's
-# sensor. For effects that only add their share to the output neither changes which poses are best; for others (a dead
-# zone, hysteresis) the best poses are those for these values (local optimality: Chernoff, 1953).
+# The values are those of the model, otherwise the typical ones of a sensor. The noise is white, that of Ang's sensor.
+# For effects that are linear in the output neither changes the best poses; for others (a dead zone, hysteresis) the
+# best poses are those for these values (local optimality: Chernoff, 1953).
 
 SAMPLE_STD_V = 3.1e-3 / 4  # Ang V: peak to peak is four times rms
 CALM_SPREAD = {
@@ -194,11 +194,10 @@ def _values(layout: Layout) -> Array:
     return np.where((start == 0) & unset, layout.typical, start)
 
 
-# The table that planned poses would give, before anything is measured: what a design of experiments is judged on.
+# The expected table of planned poses: a design of experiments is judged on it.
 #
-# Outputs are those of the fitted model, without noise. Noise enters as a table has it, by the standard deviation of
-# single samples and how many are averaged, both as in the data of the fit, so that a longer dwell counts for what it
-# is.
+# The outputs are those of the fitted model, without noise. As in each table, the noise is given by the standard
+# deviation of single samples and by their number, both from the data of the fit, so a longer dwell has less noise.
 
 PLANNED = ("t_s", "direction")  # a plan's own: the mean of other data does not replace them
 

@@ -1,8 +1,8 @@
-"""Information of planned poses on a model's parameters: Fisher's information, to first order.
+"""Information of planned poses on a model's parameters (Fisher, to first order), and the poses with the most of it.
 
-    M = J' Sigma^-1 J        J the model's derivatives at the fitted values, Sigma the noise foreseen
+    M = J' Sigma^-1 J        J the model's derivatives at the fitted values, Sigma the expected noise
 
-Rows of Sigma^(-1/2) J of independent data stand one below the other: the information of both is their sum.
+The rows Sigma^(-1/2) J of independent data are stacked: the information of both is the sum.
 
 Source  Fedorov, Theory of Optimal Experiments (1972); Atkinson, Donev and Tobias, Optimum Experimental Designs, with
         SAS (2007), ch. 9 to 11; Pronzato, Automatica 44 (2008), 303-325, on effects that are not linear.
@@ -73,11 +73,12 @@ def _noise(fit: Fit, problem: Problem) -> Noise:
 #     D   the greatest det M: the smallest volume of the parameters' joint uncertainty
 #     I   the least mean variance of the prediction over a range of poses: tr(M^-1 W)
 #
-# M is the information of the chosen poses, W the mean of J' J over the range. A pose is taken out and the best of all
-# candidates put in its place until no exchange helps, from several random beginnings: the optimum of each is local.
+# M is the information of the chosen poses, W the mean of J' J over the range. Each pose in turn is replaced by the best
+# of all candidates until no exchange improves the design. There are several random starts, because the optimum of each
+# is local.
 #
-# Some of the chosen are then measured again, so that the noise is known from the data themselves (pure error) and a
-# lack of fit can be separated from it; and poses far from all of them are added that no fit uses.
+# Some of the chosen poses are measured again: the data then give the noise itself (pure error), and a lack of fit can
+# be separated from it. Poses far from all others are added as check poses, which no fit uses.
 #
 # Source  Fedorov, Theory of Optimal Experiments (1972), exchange; Atkinson, Donev and Tobias, Optimum Experimental
 #         Designs, with SAS (2007), ch. 10 to 12; Kennard and Stone, Technometrics 11 (1969), 137-148, poses far from

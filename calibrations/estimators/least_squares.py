@@ -1,4 +1,4 @@
-"""Least squares, all measurements at once.
+"""Least squares: of all measurements at once, and recursive.
 
     z = H x + v        x = (H^T W H)^-1 H^T W z        W the inverse variances of v, 1 where they are not known
 
@@ -84,11 +84,10 @@ def between_variance(matrix: Array, measured: Array, variances: Array, freedom: 
     return float(brentq(excess, 0.0, high, rtol=1e-9))
 
 
-# Recursive least squares: a triangular matrix holds the information so far; a rotation adds the next measurement to it.
+# Recursive least squares: a triangular matrix has the information so far; a rotation adds the next measurement to it.
 #
-# After every measurement the answer is that of all of them at once. The square root of the information is kept, not
-# the
-# covariance: no start value is made up, and rounding cannot make a variance negative.
+# After every measurement the solution equals that of all measurements at once. The state is the square root of the
+# information, not the covariance: it needs no start value, and rounding cannot make a variance negative.
 #
 # Source  Book (18.1)-(18.8); Bierman, Factorization Methods (1977), V.
 

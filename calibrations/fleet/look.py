@@ -1,13 +1,14 @@
 """Possible contributions of effects and patterns to a residual, computed once for all sensors of one design.
 
-Derivatives of the residual cost more than all that is done with them, and at the same poses they are nearly the same
-for every sensor: an effect on pose or force goes with the range of the output, one of transduction does not depend on
-the sensor. So they are made for the first sensor of a design and scaled for the others; who came first hardly makes a
-difference. An effect that needs columns beside the angles (time, temperature), or constants of the table, is shared
-only by sensors for which these are the same, and one on the output by none. Only poses are a design: of positions and
-rates the outputs themselves tell how a sensor stood, and nothing is shared.
+Derivatives of the residual are the most expensive part, and at the same poses they are nearly the same for every
+sensor: an effect on pose or force is proportional to the range of the output, an effect on transduction does not depend
+on the sensor. They are therefore computed for the first sensor of a design and scaled for the others; the choice of the
+first sensor changes the result hardly. The derivatives of an effect that needs columns beside the angles (time,
+temperature) or constants of the table are shared only by sensors with the same ones; those of an effect on the output
+are not shared. Only poses are a design: in tables of positions and rates the outputs themselves give the orientation of
+a sensor, and nothing is shared.
 
-An effect whose start is searched for in the data itself (`Effect.searched`) is left out: it would have to be refitted.
+An effect whose start values are searched in the data (`Effect.searched`) is left out, because it needs a refit.
 """
 
 from __future__ import annotations
@@ -149,14 +150,12 @@ def _trials(fit: Fit, groups: list[Group]) -> float:
     return Search(screen, [screen.basis(group.of(fit.table)) for group in groups]).trials
 
 
-# A look at one sensor: the model fitted, and how much of the residual each effect and each pattern can explain.
+# A look at one sensor: the fitted model, and the part of the residual that each effect and each pattern can explain.
 #
-# All candidates are judged at once from one Gram matrix: columns made white under the sensor's own noise and freed of
-# the
-# model (Frisch, Waugh and Lovell), as `discovery/significance.py` does one by one. Where the noise has a slow part,
-# the candidates are also weighed against it (`noise_fit.gains`), as a diagnosis does. What is kept is small: scores
-# and
-# information add up over sensors.
+# All candidates are judged at once from one Gram matrix: their columns are made white with the noise of the sensor and
+# orthogonal to the model (Frisch, Waugh and Lovell), as `discovery/significance.py` does one by one. If the noise has a
+# slow part, the candidates are also compared with it (`noise_fit.gains`), as a diagnosis does. The results are small:
+# scores and information, which add up over sensors.
 
 LEAST_RANK = 1e-10  # eigenvalue of a Gram matrix of columns of length 1: less is rounding
 

@@ -1,7 +1,7 @@
-"""A table without the errors of its stage: the true angles, by the fleet's estimate of these errors.
+"""Errors of rigs by the sensors that they measured, and tables with the true angles by these errors.
 
-The direction of gravity is all that an orientation is to a still sensor, so any error of pose, a tilted base too, is a
-change of alpha and beta.
+A sensor at rest senses only the direction of gravity. So each error of the pose, also the tilt of the base, is a change
+of alpha and beta.
 """
 
 from __future__ import annotations

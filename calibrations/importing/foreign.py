@@ -1,4 +1,4 @@
-"""Foreign tables as ours: their names and units are mapped to our columns.
+"""Foreign tables as ours: names and units mapped to our columns, copied rows; our tables as CSV.
 
 A column is named by the file's header, or by its number from 1 in a file without one. Units are converted to those of
 the target column (V, deg, degC, s); outputs of `positions` keep any unit, which the table then carries. A header with

@@ -1,4 +1,4 @@
-"""Between transducer and sample: the output filter at its nominal corner, and the sampling's skew.
+"""From transducer to sample: output filter at its nominal corner, skew of the sampling; linear filters, noise density.
 
 The converter takes the channels of one scan in turn: the sensor's axes `skew_x_s`, `skew_y_s`, `skew_z_s` after the
 displacement (constants of the table, 0 where not given).
@@ -83,9 +83,8 @@ def _check_record(table: Table, t: Array, first: int, end: int) -> Record:
 
 # Linear filters on evenly sampled records, and the density of noise.
 #
-# A filter is given by its frequency response, analog or digital, and applied in the frequency domain: what is
-# band-limited below half the sampling rate goes through it exactly, an inverse or a delay by part of a sample as
-# well.
+# A filter is given by its frequency response, analog or digital, and applied in the frequency domain. This is exact for
+# signals below half the sampling rate, also for an inverse filter or a delay by a part of a sample.
 
 Complex = NDArray[np.complex128]
 Response = Callable[[Array], Complex]

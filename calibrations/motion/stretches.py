@@ -1,7 +1,7 @@
-"""The lines of a motion as templates of the output, and the noise near them.
+"""A record of motion as rows for a fit: the lines of the motion as templates of the output, and the noise near them.
 
-The white noise of a line is the density of the output beside it, freed of all that follows the motion: a noise model
-without parameters (Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2012).
+The white noise of a line is the density of the output beside it, without what follows the motion: a noise model without
+parameters (Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2012).
 """
 
 from __future__ import annotations
@@ -106,12 +106,12 @@ def _spectrum(samples: Table, lines: Sequence[Line], axis: int, rows: slice, rat
     return f[~excluded], density[~excluded]
 
 
-# A record of motion as rows that a model can be fitted to: what each stretch of it holds of the motion.
+# The rows of a record.
 #
-# Ten thousand samples behind an output filter are far from independent, and most of their band holds noise alone. So
-# a record is cut into some thirty stretches, each a whole number of periods, and each stretch is reduced to its mean
-# and to its parts in phase and in quadrature with each line of the motion, as a lock-in amplifier does. These parts
-# are a channel each, and their rows are independent.
+# Ten thousand samples behind an output filter are not independent, and most of their band has only noise. So a record
+# is cut into some thirty stretches of a whole number of periods. Each stretch is reduced to its mean and to its parts
+# in phase and in quadrature with each line of the motion, as in a lock-in amplifier. Each of these parts is a channel,
+# and their rows are independent.
 #
 #     weights . samples = rows            the model's prediction is reduced by the same weights as the measurement
 

@@ -1,4 +1,4 @@
-"""Oriental Motor AZ: the part of its register map that the rig uses.
+"""Oriental Motor AZ: the registers that the rig uses, the settings of a stage, and times and paths of its moves.
 
 Source: AZ function manual, HM-60262; [M] from memory.
 
@@ -134,7 +134,7 @@ def alarm_of(code: int) -> Alarm | None:
     return Alarm(code, *_WORDS.get(code, ("an alarm unknown to this program", "Look it up in the manual")))
 
 
-# Oriental Motor AZ: settings of a stage in a bench file; times and paths of its moves.
+# Settings of a stage in a bench file; times and paths of its moves.
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
-"""The simulated E-727's data recorder: each table records one quantity of one axis after a trigger."""
+"""Data recorder, wave tables and generators of the simulated E-727.
+
+Each table of the recorder has one quantity of one axis after a trigger.
+"""
 
 from __future__ import annotations
 
@@ -131,7 +134,7 @@ class Recorder:
         return [*(f"# {key} = {value}" for key, value in (fields | name_fields).items()), "# END_HEADER"]
 
 
-# The simulated E-727's wave tables and generators. Whole symmetric sines alone; played ideally smooth.
+# Wave tables and generators: only whole symmetric sines, generated without steps.
 
 MOST_CYCLES = 2**31 - 1  # of the servo for a point, and of a wave
 

@@ -1,4 +1,4 @@
-"""Where an instrument is found."""
+"""The address of an instrument: the url of its link, the unit on it, and the time of a byte on the link."""
 
 from __future__ import annotations
 
@@ -32,8 +32,6 @@ class Address:
     unit: int = 1
     stream_url: str | None = None
 
-
-# The urls of wires, and how long a byte takes on each.
 
 SCHEMES = ("tcp", "rtu+tcp", "serial", "pty", "visa", "ca", "udpin", "udpout")
 UDP = ("udpin", "udpout")

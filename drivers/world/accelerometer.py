@@ -1,8 +1,8 @@
-"""Friction inside the suspension: Maxwell slip elements parallel to the spring.
+"""The accelerometer, from specific force to volts: friction and springs of its proof mass, plates and amplifier.
 
-Each element is a weak spring that ends in a sliding contact: it follows the mass, and slips once it is
-stretched by its limit. Four of them, with limits of 1/4 to 4/4 of the largest, make a smooth loop.
-The contact may be pressed harder by the load of the neighbouring axis.
+Friction: Maxwell slip elements parallel to the spring. Each element is a weak spring that ends in a sliding contact: it
+follows the mass, and slips when its stretch is at the limit. Four of them, with limits of 1/4 to 4/4 of the largest,
+give a smooth loop. The load of the neighbouring axis can increase the pressure on the contact.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ def drag_nm(friction: Friction, seats: Floats, x_nm: float, neighbour_g: float) 
 
 # The proof mass on its springs: from specific force to displacement, in nm.
 #
-# In the plane the four folded beams balance the mass (Newton's method); the stiffness may harden with
-# deflection, differ for both directions, couple x with y, and follow temperature. A beam that bends is
-# also shortened (foreshortening), so the mass is drawn aside by the square of the neighbour's deflection
-# and of the sag; beams of unequal height tilt the mass as it sags. Package stress displaces it with temperature.
+# In the plane the four folded beams balance the mass (Newton's method). Their stiffness can change with deflection and
+# temperature, differ for both directions, and couple x with y. A bent beam is shorter (foreshortening), so the mass
+# moves by the square of the neighbour's deflection and of the sag; beams of unequal height tilt the mass as it sags.
+# Package stress displaces it with temperature.
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 
@@ -101,10 +101,10 @@ def drawn_aside_nm(springs: Springs, neighbour_nm: float, sag_nm: float, stress_
 
 # The differential capacitor and its amplifier: from displacement to volts.
 #
-# A finger between two fixed ones divides a voltage: (C1 - C2) / (C1 + C2 + stray). With equal plates and no
-# stray capacitance that is linear in the displacement, whatever the gap. Sag and the neighbour's displacement
-# change the overlap; charge that creeps into the oxide pulls the finger aside. The factory trims offset and
-# gain at zero load and 25 C; the output is a fraction of the supply.
+# A finger between two fixed ones divides a voltage: (C1 - C2) / (C1 + C2 + stray). With equal plates and no stray
+# capacitance this is linear in the displacement, for any gap. Sag and the neighbour's displacement change the overlap;
+# charge that creeps into the oxide displaces the finger. The factory trims offset and gain at zero load and 25 C; the
+# output is a fraction of the supply.
 
 TRIM_SUPPLY_V = 5.0
 RAIL_V = 0.05

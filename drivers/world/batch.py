@@ -1,7 +1,7 @@
 """Several sensors on one table: a world for each, with equal common parts.
 
-Stages, room, oven, supply, carriage and level are the same in every world, since they follow the same commands and the
-same chance; what a sensor has of its own differs. Inputs are named by sensor and output: `a1.vx`.
+Stages, room, oven, supply, carriage and level are the same in every world, since they have the same commands and the
+same random numbers. Only the properties of the sensors differ. Inputs are named by sensor and output: `a1.vx`.
 """
 
 from __future__ import annotations

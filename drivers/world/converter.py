@@ -1,7 +1,7 @@
-"""The analog side of the converter: channels in turn, input noise, a bowed characteristic.
+"""The analog side of the converter: channels in turn, input noise, a characteristic in the form of a parabola.
 
-Codes and their rounding belong to the converter's twin; `step_v` is their size, so that the mean and
-the spread of rounded samples can be told without rounding any.
+Codes and their rounding belong to the twin of the converter. `step_v` is the size of a code: it gives the mean and the
+spread of rounded samples without samples.
 """
 
 from __future__ import annotations

@@ -1,21 +1,20 @@
-"""The fibre-optic displacement sensor: from the gap between its tip and the carriage to volts.
+"""The fibre-optic displacement sensor: from the gap between tip and carriage to volts, and its calibration curve.
 
-Fibres light the target through the gap, other fibres beside them catch what comes back. The returned spot widens
-with the gap: w = w0 + 2 gap tan(divergence). A receiving fibre at the distance s from the spot's middle catches
+Fibres light the target through the gap, and other fibres beside them receive the reflected light. The reflected spot
+widens with the gap: w = w0 + 2 gap tan(divergence). A fibre at the distance s from the middle of the spot receives
 
     exp(-2 s^2 / w^2) / w^2
 
-of a Gaussian spot: more and more as the spot reaches it (near side), most at w^2 = 2 s^2 (optical peak), and less
-again as the same light is spread over a larger spot (far side).
+of a Gaussian spot. This grows until the spot reaches the fibre (near side), is largest at w^2 = 2 s^2 (optical peak),
+and falls as the same light is spread over a larger spot (far side).
 
-The probe is held by the turning table, behind the carriage: the gap grows with the carriage's x.
+The probe is on the turning table, behind the carriage: the gap grows with the carriage's x.
 """
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,18 +42,17 @@ def seen_v(probe: FibreProbe, gap_um: float) -> float:
     return probe.peak_v * reach * math.exp(1 - reach)
 
 
-# The calibration of the simulated D63, as a laboratory would make it: gaps set, volts read, both rounded.
+# The calibration of the simulated D63, as in a laboratory: gaps are set and volts are read, both rounded.
 #
 #     python -m drivers.world.displacement_sensor > drivers/philtec_d63_simulated.yaml
 #
-# The target is driven away from the tip in steps, its gap read off an interferometer to 0.01 um, the output off a
-# voltmeter to 0.1 mV as the mean of many readings. Points at the foot and near the peak, where the curve has no
-# slope, are left out.
+# The target moves away from the tip in steps. An interferometer gives the gap to 0.01 um, a voltmeter the output to
+# 0.1 mV, as the mean of many readings. Points at the foot and near the peak, where the curve has no slope, are omitted.
 
 SERIAL, DATE = "SIM-0063", "2026-11-21"
 GAPS_UM = np.concatenate([np.arange(20.0, 420.0, 10.0), np.arange(420.0, 2001.0, 40.0)])
-WANDER_UM = 0.4  # by which a hand misses a step
-READINGS = 1000  # that are averaged at each
+WANDER_UM = 0.4  # standard deviation of a gap that is set by hand
+READINGS = 1000  # averaged at each step
 FOOT_SHARE, PEAK_SHARE = 0.02, 0.95  # of the highest reading: only what is between them is used
 
 
@@ -75,13 +73,12 @@ def certificate(probe: FibreProbe, seed: int = 63) -> str:
     points = [f"  - [{gap:.2f}, {volt:.4f}]" for gap, volt in zip(gaps, volts, strict=True)]
     near = (point for point, use in zip(points[:highest], used[:highest], strict=True) if use)
     far = (point for point, use in zip(points[highest:], used[highest:], strict=True) if use)
-    return "\n".join([*_heading(), "near:  # gap in um, output in V", *near, "far:", *far]) + "\n"
-
-
-def _heading() -> Iterable[str]:
-    yield "# Calibration of the simulated D63: python -m drivers.world.displacement_sensor"
-    yield f"serial: {SERIAL}"
-    yield f'date: "{DATE}"'
+    heading = (
+        "# Calibration of the simulated D63: python -m drivers.world.displacement_sensor",
+        f"serial: {SERIAL}",
+        f'date: "{DATE}"',
+    )
+    return "\n".join([*heading, "near:  # gap in um, output in V", *near, "far:", *far]) + "\n"
 
 
 if __name__ == "__main__":

@@ -1,8 +1,7 @@
-"""Disturbances that follow no law of a good sensor. All are off by default.
+"""Disturbances of the sensor that a model of a good sensor does not have, all off by default; and its supply.
 
-Each displaces the mass a little: charge that arrives on the plates at one moment; a cable that tugs
-in one sector of beta; a mount with two seats, which gravity rocks from one to the other; a lid that
-pops at random; a grain of dust between the fingers.
+Each displaces the mass: charge on the plates from a certain time on; a cable that pulls in one sector of beta; a mount
+with two seats, of which gravity decides; a lid that pops in and out at random times; dust between the fingers.
 """
 
 from __future__ import annotations

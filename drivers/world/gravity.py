@@ -1,4 +1,4 @@
-"""Gravity in the frame of the sensor's package: base, stages, mount, package.
+"""Gravity in the frame of the sensor's package: base, stages, mount, package; a level on the table; each mounting.
 
     a = P E F Rz(mount) Rz(beta) Ry(alpha) up        in g, with the true angles
 
@@ -86,10 +86,10 @@ def across(turn: Floats, x: float, y: float, z: float) -> tuple[float, float, fl
     )
 
 
-# A digital level on the turntable: the angle between its liquid's surface and the plate below it.
+# A digital level on the turntable: the angle between the surface of its liquid and the plate below it.
 #
-# The liquid is at right angles to the specific force, so an axis shows by how much its positive end is the higher one:
-# atan2(a_x, a_z) and atan2(a_y, a_z). Upside down that is more than 90 deg.
+# The surface is perpendicular to the specific force. The reading of an axis is the elevation of its positive end:
+# atan2(a_x, a_z) and atan2(a_y, a_z), more than 90 deg upside down.
 
 ON_THE_PLATE = np.eye(3)
 
@@ -116,11 +116,11 @@ def shown_deg(level: Level, inclined_deg: tuple[float, float], seed: int, t_ns: 
     return float(x + level.offset_x_deg + noise[0]), float(y + level.offset_y_deg + noise[1])
 
 
-# No two mountings are alike: how the package sits on the table, and how its clamp grips it, is anew each time.
+# Every mounting differs: the seat of the plate on the table, and the force of the clamp on the package.
 #
-# A grip bends the package, which displaces the proof mass; each sensor of a batch has its own clamp on one plate.
+# The clamp bends the package, which displaces the proof mass. Each sensor of a batch has its own clamp on one plate.
 
-TILT, GRIP = 4, 5  # of the seeds: what belongs to the plate, and to each clamp
+TILT, GRIP = 4, 5  # parts of the seeds: for the plate, and for each clamp
 
 
 @dataclass(frozen=True)

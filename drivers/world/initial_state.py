@@ -1,4 +1,4 @@
-"""The world at time 0: both stages at motor angle 0, the sensor powered for a while, slow noise in full swing."""
+"""The world at time 0: stages at motor angle 0, sensor powered for some time, stationary noise; individuals of rigs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from drivers.world.state import State
 def beginning(config: WorldConfig, numbers: WorldConfig, room: np.random.Generator, slow: np.random.Generator) -> State:
     """A record of the state; `numbers` is the record of `config`.
 
-    Where slow noise stands is drawn from `room` for what all sensors share, from `slow` for the sensor's own.
+    The values of slow noise are drawn from `room` for all that the sensors share, from `slow` for the sensor's own.
     """
     world = record(State())
     world.powered_ns = -round(1e9 * config.heat.powered_for_s)
@@ -61,10 +61,10 @@ def _warm_up(warmth: Warmth, heat: Heat) -> None:
     warmth.glue_c = warmth.body_c + warmth.board_k + warmth.package_k
 
 
-# No two rigs are alike: an individual drawn around its settings.
+# Every rig differs: an individual is drawn around its settings.
 
 Axis = TypeVar("Axis", SensingAxis, OutOfPlane)
-# What a factory or a designer fixes: no imperfection, so no scatter.
+# Fixed by the factory or the design: no imperfections, so without scatter.
 EXACT = {"resonance_hz", "sag_resonance_hz", "charging_s", "gap_um", "zero_g_v", "sensitivity_v_per_g", "worm_cycles"}
 
 

@@ -1,7 +1,7 @@
-"""Kernels: functions over records, compiled once and kept on disk.
+"""Kernels: functions of records, compiled once and kept on disk; processes of first order.
 
-A record is a flat piece of memory with named numbers. A frozen dataclass of settings becomes one with
-the same names (`record`), so that a kernel reads `config.heat.ambient_c` as the rest of the program does.
+A record is a flat piece of memory with named numbers. `record` makes one with the same names from a frozen dataclass of
+settings, so a kernel reads `config.heat.ambient_c` like the rest of the program.
 """
 
 from __future__ import annotations
@@ -25,6 +25,11 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 Values = TypeVar("Values")
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+
+def zeros(*shape: int, dtype: type = float) -> Callable[[], Any]:
+    """The default factory of an array of zeros, for the field of a dataclass."""
+    return lambda: np.zeros(shape, dtype)
 
 
 def kernel(function: Function) -> Function:
@@ -72,7 +77,7 @@ def _contents(values: Any) -> Any:
     return tuple(_contents(getattr(values, f.name)) for f in fields(values)) if is_dataclass(values) else values
 
 
-# Processes of first order: what follows a target with a lag, and what wanders about zero with a memory.
+# Processes of first order: a value that follows a target with a lag, and a random one with a correlation time.
 
 
 @kernel

@@ -1,7 +1,7 @@
-"""Iron and magnets near a magnetometer, as dipoles where the field of one point is asked for.
+"""The place of the rig on the earth: rotation and magnetic field, with iron and magnets near the sensor as dipoles.
 
-A magnet has its moment whatever the field is. A ball of iron gets its moment from the field that it lies in,
-m = 4 pi a^3 / mu_0 (mu - 1) / (mu + 2) B, and adds a dipole's field to it. Source: Jackson, Classical Electrodynamics,
+The moment of a magnet is constant. The moment of a ball of iron comes from the field around it,
+m = 4 pi a^3 / mu_0 (mu - 1) / (mu + 2) B; it adds the field of a dipole. Source: Jackson, Classical Electrodynamics,
 5.6 and 5.11.
 """
 
@@ -66,10 +66,8 @@ def near_iron_ut(iron: Iron, bx: float, by: float, bz: float) -> tuple[float, fl
     return bx + dx, by + dy, bz + dz
 
 
-# Place of the rig on the earth: earth's rotation and magnetic field, changed by iron and magnets of the rig.
-#
-# The frame is the rig's: x along its base, at `heading_deg` from true north, y to the left of it, z upward. A turn
-# of the base about its tilts is that of `gravity.vertical`.
+# Rotation of the earth and its magnetic field, in the frame of the rig: x along its base, at `heading_deg` from true
+# north, y to the left, z upward. The tilt of the base is that of `gravity.vertical`.
 
 SIDEREAL_DAY_S = 86164.0905
 

@@ -1,13 +1,11 @@
 """The mechanisms together: the changes at an event, and the next event.
 
-Slow processes (heat, supply, flicker) advance in ticks of 0.1 s on an absolute grid of time; the
-mechanics are brought up to date at every tick and, while a stage turns or the carriage moves, at
-finer steps. Between events nothing changes but the filter, which is exact. So no result depends on
-how time is cut.
+Slow processes (heat, supply, flicker) advance in ticks of 0.1 s on an absolute grid of time. The mechanics are updated
+at every tick and, while a stage turns or the carriage moves, at finer steps. Between events only the filter changes,
+exactly. So no result depends on the division of time into calls.
 
-A moving carriage shakes the sensor at frequencies that the filter sees. Each step of it takes the
-acceleration of its middle: of a sinusoid the steps then keep the phase, and all but (w step)^2 / 24
-of the amplitude, 1e-5 at 10 Hz.
+A moving carriage shakes the sensor at frequencies that pass the filter. Each step has the acceleration of its middle:
+the steps of a sinusoid then keep the phase, and the amplitude but for (w step)^2 / 24, 1e-5 at 10 Hz.
 """
 
 from __future__ import annotations
@@ -112,7 +110,7 @@ def load_g(world: State, config: WorldConfig, t_ns: int) -> tuple[float, float, 
 
 @kernel
 def force_g(world: State, config: WorldConfig, t_ns: int) -> tuple[float, float, float]:
-    """Specific force in the frame of the package, where the tables are now."""
+    """Specific force in the frame of the package at the present angles of the tables."""
     alpha, beta = true_angles_rad(world, config.stages)
     gx, gy, gz = gravity.felt_g(world.up, world.mount, alpha, beta)
     for axis in range(3):
@@ -137,7 +135,7 @@ def out_of_plane_v(world: State, config: WorldConfig) -> float:
 
 @kernel
 def true_angles_rad(world: State, stages: Stages) -> tuple[float, float]:
-    """Where alpha and beta really point."""
+    """True angles of alpha and beta."""
     alpha = stage.true_angle_rad(stages.alpha, world.table_deg[0])
     return alpha, stage.true_angle_rad(stages.beta, world.table_deg[1])
 
@@ -185,7 +183,7 @@ def moved_nm(
     neighbour_g: float,
     sag_nm: float,
 ) -> float:
-    """Where a finger ends up, given where the springs alone would balance the loads."""
+    """Displacement of a finger; `own_nm` and `neighbour_nm` are those where the springs alone balance the loads."""
     stuck = accelerometer.drag_nm(axis.friction, seats_nm, own_nm, neighbour_g)
     attraction_nm = accelerometer.drawn_aside_nm(axis.springs, neighbour_nm, sag_nm, world.warmth.glue_c - REFERENCE_C)
     charged = 1e-3 * axis.plates.charging_pm * world.charged
@@ -201,8 +199,7 @@ def moved_nm(
 @kernel
 def update_turned(world: State, config: WorldConfig, t_ns: int, warmer_k: float) -> None:
     """Volts of both sensors at the angles of the tables at `t_ns`, without noise."""
-    alpha = stage.true_angle_rad(config.stages.alpha, world.table_deg[0])
-    beta = stage.true_angle_rad(config.stages.beta, world.table_deg[1])
+    alpha, beta = true_angles_rad(world, config.stages)
     fx, fy, fz = gravity.felt_g(world.field_ut, world.board, alpha, beta)
     turned_sensors.magnetometer_v(config.magnetometer, world.plates, fx, fy, fz, warmer_k, world.field_v)
     lx, ly, lz = gravity.felt_g(world.up, world.board, alpha, beta)

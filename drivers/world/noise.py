@@ -3,25 +3,23 @@
     white noise     of air and amplifier: behind the filter an Ornstein-Uhlenbeck process, exact over any interval
     traps           that catch and release charge, one kind per decade of release time: together flicker noise, whose
                     one-sided spectrum is flicker_v^2 / (f ln 10)
-    walk            the sum of small steps that nothing takes back
-    wander          with a memory of its own
-    ramp            what leaks or creeps at a constant rate
+    walk            the sum of small independent steps
+    wander          an Ornstein-Uhlenbeck process
+    ramp            a leak or creep at a constant rate
 
-All but the white noise is slow, and advances in ticks (see mechanics). What is faster, or comes from the leads, is
-picked up behind the filter (see pickup). A wander that is off draws no chance.
+All but the white noise is slow, and advances in ticks (see mechanics). Faster noise, and the noise of the leads, is
+added behind the filter (see pickup). A wander that is off draws no random numbers.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.random import Generator
 
-from drivers.world.kernel import Floats, kernel, share_with_kernels, step_wander
+from drivers.world.kernel import Floats, kernel, share_with_kernels, step_wander, zeros
 
 FLICKER_S = (1.0, 10.0, 100.0, 1e3, 1e4)  # release times of traps
 TICKED_S = 0.5  # a wander of a longer memory advances in ticks
@@ -53,11 +51,6 @@ class Noises:
 
     x: Noise = field(default_factory=Noise)
     y: Noise = field(default_factory=Noise)
-
-
-def zeros(*shape: int) -> Callable[[], Any]:
-    """The default factory of an array of zeros."""
-    return lambda: np.zeros(shape)
 
 
 @dataclass

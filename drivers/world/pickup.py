@@ -1,7 +1,8 @@
-"""The floor: it shakes the rig at one frequency, as a machine next door does.
+"""Disturbances behind the filter of an output, sample by sample: fast noise, hum, pulses, and vibration of the floor.
 
-To first order: the shaking's share along a sensing beam times the sensitivity, behind the output filter. The carriage's
-own motion, which is large, goes through the whole mechanics (see mechanics).
+The floor vibrates at one frequency, as from a machine in the next room. Its effect is of first order: the component
+along a sensing beam times the sensitivity, behind the output filter. The motion of the carriage, which is large, goes
+through the whole mechanics (see mechanics).
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.random import Generator
 
-from drivers.world.kernel import Floats, kernel, mean_variance, share_with_kernels
-from drivers.world.noise import TICKED_S, Noise, filter_s, trap_v, zeros
+from drivers.world.kernel import Floats, kernel, mean_variance, share_with_kernels, zeros
+from drivers.world.noise import TICKED_S, Noise, filter_s, trap_v
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ def acceleration_g(floor: Floor) -> Floats:
 
 @kernel
 def shakes(floor: Floor) -> bool:
-    """Whether it does at all."""
+    """Whether the floor vibrates."""
     return floor.shaking_up_g != 0 or floor.shaking_along_g != 0
 
 
@@ -44,14 +45,14 @@ def low_pass(floor: Floor, filter_s: float) -> tuple[float, float]:
     return 1 / math.hypot(1.0, turn), math.atan(turn)
 
 
-# What an output picks up behind its filter, sample by sample.
+# Disturbances of an output behind its filter.
 #
 # fast traps      of the buffer: the decades of flicker noise above the slow ones (see noise)
-# fast wander     whose memory is shorter than a few ticks
+# fast wander     with a correlation time of less than a few ticks
 # hum             of the leads
-# shaking         of the floor (see floor)
-# pulses          of an output that charge balances: it gives whole pulses since the last sample, and what is left of
-#                 one stays on its integrator. So the rounding of one sample is taken back in the next.
+# shaking         of the floor
+# pulses          of an output with charge balance: the whole pulses since the last sample. The rest of a pulse stays on
+#                 the integrator, so the rounding of one sample is corrected in the next.
 
 FAST_S = (0.01, 0.1)  # release times of the buffer's traps
 FAST = len(FAST_S) + 1  # and the wander
@@ -65,7 +66,7 @@ class Pickup:
     t_ns: int = 0  # of the last sample
     fast_v: Floats = field(default_factory=zeros(FAST))
     left_v_s: float = 0.0  # on the integrator
-    shaken_v: float = 0.0  # amplitude of what the floor does
+    shaken_v: float = 0.0  # amplitude of the effect of the floor
     gap_ns: int = 0  # the last step of the fast processes, and its answers
     kept: Floats = field(default_factory=zeros(FAST))
     fresh_v: Floats = field(default_factory=zeros(FAST))
@@ -114,7 +115,7 @@ def stir(state: Pickup, noise: Noise, gap_ns: int, random: Generator) -> None:
 
 @kernel
 def hum_v(noise: Noise, t_ns: int) -> float:
-    """Of the leads."""
+    """Hum of the leads, V."""
     return noise.hum_v * math.sin(2 * math.pi * noise.hum_hz * 1e-9 * t_ns)
 
 

@@ -1,13 +1,13 @@
-"""The nano-positioner's carriage: what the servo makes of a command, in um along each axis.
+"""The carriage of the nano-positioner: its motion after a command of the servo, in um along each axis.
 
-The carriage stands on the turning table and carries the sensor's mount: its axes x, y, z are the table's,
-which are the sensor's own at mount 0. A closed loop around a piezo on its flexure is a lag of second order,
+The carriage is on the turning table and carries the sensor's mount. Its axes x, y, z are those of the table, and at
+mount 0 those of the sensor. A closed loop around a piezo on its flexure is a lag of second order,
 
     x'' + 2 d w x' + w^2 x = w^2 u(t)        w = 2 pi servo_hz, d the damping, u the command
 
-and all commands are straight lines and sinusoids. So the motion is known in closed form for all times: what the
-loop settles to, and an exponential that remembers how it began. Nothing is stepped, nothing depends on how time
-is cut, and a carriage at rest costs nothing. `Positioner` is handed over as its record (see kernel).
+and all commands are straight lines and sinusoids. So the motion has a closed form for all times: the settled response
+of the loop, and an exponential by its initial state. It needs no time steps, and a carriage at rest no computation.
+`Positioner` is passed as its record (see kernel).
 """
 
 from __future__ import annotations

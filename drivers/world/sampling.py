@@ -11,7 +11,8 @@ from drivers.world import converter, displacement_sensor, noise, positioner
 from drivers.world.config import WorldConfig
 from drivers.world.kernel import Floats, Ints, kernel
 from drivers.world.mechanics import STEP_NS, next_event_ns, out_of_plane_v, run_to
-from drivers.world.pickup import with_pickup_v
+from drivers.world.noise import Fluctuation, Noise
+from drivers.world.pickup import Floor, Pickup, with_pickup_v
 from drivers.world.state import State
 
 INPUTS = ("vx", "vy", "supply", "thermistor", "ground", "d63", "vz", "mx", "my", "mz", "gx", "gy", "gz")
@@ -51,15 +52,9 @@ def convert(
         for k in range(len(channels)):
             t_ns = times_ns[i] + late_ns[k]
             if channels[k] == VX:
-                normal = random.standard_normal()
-                analog = noise.output_v(world.x, config.noise.x, world.volts[0], t_ns, normal)
-                if world.pickup_x.is_any:
-                    analog = with_pickup_v(world.pickup_x, config.noise.x, config.floor, analog, t_ns, random)
+                analog = output_v(world.x, world.pickup_x, config.noise.x, config.floor, world.volts[0], t_ns, random)
             elif channels[k] == VY:
-                normal = random.standard_normal()
-                analog = noise.output_v(world.y, config.noise.y, world.volts[1], t_ns, normal)
-                if world.pickup_y.is_any:
-                    analog = with_pickup_v(world.pickup_y, config.noise.y, config.floor, analog, t_ns, random)
+                analog = output_v(world.y, world.pickup_y, config.noise.y, config.floor, world.volts[1], t_ns, random)
             elif channels[k] == D63:
                 analog = displacement_v(world, config, t_ns, random.standard_normal())
             elif channels[k] == VZ:
@@ -72,6 +67,16 @@ def convert(
                 analog = steady[channels[k]]
             noisy = analog + config.converter.noise_v * random.standard_normal()
             volts[i, k] = converter.bowed_v(config.converter, noisy)
+
+
+@kernel
+def output_v(
+    fluctuation: Fluctuation, picked_up: Pickup, settings: Noise, floor: Floor, volts: float, t_ns: int,
+    random: Generator,
+) -> float:  # fmt: skip
+    """One of the filtered outputs at `t_ns`, with its noise; `volts` at the input of the filter."""
+    filtered = noise.output_v(fluctuation, settings, volts, t_ns, random.standard_normal())
+    return with_pickup_v(picked_up, settings, floor, filtered, t_ns, random) if picked_up.is_any else filtered
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""A rotary stage: from the motor's angle to where the table really points.
+"""A rotary stage: the motor's angle over time, and the true angle of its table.
 
 motor angle -> gear play (the table lags in the direction of approach) -> zero offset, wobble, worm gear
 """
@@ -14,10 +14,9 @@ import numpy as np
 
 from drivers.world.kernel import Floats, kernel
 
-# The motor angle of a stage against time: a trapezoid of speed, cut short by a stop.
+# The motor angle of a stage over time: a trapezoid of speed, or a part of one if there is a stop.
 #
-# The drive's twin plans it (speed and acceleration are the drive's), the world follows it
-# (gear, play and tilt are the world's).
+# Speed and acceleration belong to the twin of the drive; gear, play and tilt to the world.
 
 
 @dataclass(frozen=True)
@@ -157,7 +156,7 @@ def engaged_deg(stage: Stage, table_deg: float, motor_deg: float) -> float:
 
 @kernel
 def true_angle_rad(stage: Stage, table_deg: float) -> float:
-    """The angle that the table really has in the laboratory."""
+    """The true angle of the table in the laboratory."""
     wobble = stage.wobble_deg * math.sin(math.radians(table_deg - stage.wobble_phase_deg))
     worm = stage.worm_deg * math.sin(math.radians(stage.worm_cycles * table_deg))
     return math.radians(table_deg + stage.zero_offset_deg + wobble + worm)

@@ -1,8 +1,7 @@
-"""Everything that the world remembers. The kernels see it as one record (see kernel)."""
+"""The state of the world. For the kernels it is one record (see kernel)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
@@ -11,16 +10,11 @@ import numpy as np
 from drivers.world import accelerometer, positioner, stage
 from drivers.world.errors import BadSetting
 from drivers.world.heat import Warmth
-from drivers.world.kernel import Floats, Ints, record
+from drivers.world.kernel import Floats, Ints, record, zeros
 from drivers.world.noise import Fluctuation
 from drivers.world.pickup import Pickup
 
 JSON = dict[str, "JSON"] | list["JSON"] | str | float | int | bool | None
-
-
-def zeros(*shape: int, dtype: type = float) -> Callable[[], Any]:
-    """The default factory of an array of zeros."""
-    return lambda: np.zeros(shape, dtype)
 
 
 @dataclass
@@ -86,11 +80,11 @@ def from_json(values: dict[str, Any]) -> State:
 
 
 def _as_json(part: Any, template: Any) -> dict[str, Any]:
-    """`part` is a record with the names of the dataclass `like`."""
+    """`part` is a record with the names of the dataclass `template`."""
     pairs = [(f.name, getattr(part, f.name), getattr(template, f.name)) for f in fields(template)]
     return {
-        name: _as_json(value, field_type) if is_dataclass(field_type) else np.asarray(value).tolist()
-        for name, value, field_type in pairs
+        name: _as_json(value, default) if is_dataclass(default) else np.asarray(value).tolist()
+        for name, value, default in pairs
     }
 
 

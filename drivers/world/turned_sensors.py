@@ -1,9 +1,10 @@
-"""A gyroscope: for each axis two proof masses that swing against each other, and are pushed aside by Coriolis forces.
+"""The sensors of rotation and field on the board: a gyroscope and a magnetometer.
 
-The drive keeps the masses swinging at its resonance. A rate about the input axis pushes them to opposite sides, at the
-same frequency; the sense mode, a little above it, answers. Springs that are not square to each other push as well
-(quadrature), a quarter period apart, and an imperfect demodulator lets some of it through. A load along the sense
-direction displaces both masses alike, but for their unbalance; the springs of a displaced mass are less square.
+A gyroscope has for each axis two proof masses that oscillate in opposite directions at the resonance of the drive. A
+rate about the input axis deflects them to opposite sides at the same frequency by Coriolis forces, near the resonance
+of the sense mode. Springs that are not perpendicular deflect them too (quadrature), a quarter of a period later; an
+imperfect demodulator passes a part of it. A load along the sense direction displaces both masses equally, but for their
+unbalance, and a displacement of a mass changes the angle between its springs.
 
 Source  Acar and Shkel, MEMS Vibratory Gyroscopes (2009), chapters 3 and 4.
 """
@@ -95,7 +96,7 @@ def gyroscope_volts(
 #
 # field of the place -> changed by iron and a magnet -> part along each plate's normal -> Hall voltage -> amplifier
 #
-# A Hall plate's sensitivity falls as the field bends the carriers' way (magnetoresistance), and with temperature.
+# The sensitivity of a Hall plate falls with the field (magnetoresistance) and with the temperature.
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
-"""The mean of a dwell as a table holds it, with the noise that a mean of samples has.
+"""A visit of poses: the motions and dwells, and the means of the dwells as in a table, with the noise of such a mean.
 
-The slow processes were run tick by tick; the fast noise of the samples is replaced by one number with
-the distribution that the mean of the filtered, converted and rounded samples has.
+The slow processes run tick by tick. One random number replaces the fast noise of the samples; it has the distribution
+of the mean of the filtered, converted and rounded samples.
 """
 
 from __future__ import annotations
@@ -25,8 +25,6 @@ from drivers.world.noise import Noise, filter_s
 from drivers.world.pickup import Floor
 from drivers.world.stage import Trajectory, at_rest, motion
 from drivers.world.state import State
-
-# A visit of poses: planned as motions and dwells, then run through in one go by the same mechanics.
 
 STEP_NS = 25_000_000  # of the mechanics while a stage turns: half a degree at 20 deg/s
 # Of a dwell: both outputs without noise; their slow noise, its mean square; what the floor does; thermocouple; supply

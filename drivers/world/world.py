@@ -1,7 +1,7 @@
-"""The world that the simulated instruments share: all that they know of physics.
+"""The world that the simulated instruments share: all of their physics.
 
-Deterministic by its seed; `state` and `restore` continue it sample for sample. Times are kept in whole
-nanoseconds, so that a long acquisition gives the same samples however it is cut into blocks.
+It is deterministic by its seed; `state` and `restore` continue it sample by sample. Times are whole nanoseconds, so a
+long acquisition gives the same samples for any division into blocks.
 """
 
 from __future__ import annotations

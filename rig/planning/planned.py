@@ -1,4 +1,4 @@
-"""Planned instruments: stages, converter, oven and others that record their steps and durations without moving."""
+"""Planned instruments: they record the steps and durations of a procedure, and nothing moves."""
 
 from __future__ import annotations
 

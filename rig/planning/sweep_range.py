@@ -1,4 +1,4 @@
-"""The columns of poses that are only planned: angles, mounting, time, and the temperature where an oven makes it."""
+"""The range of a sweep for a model, and the columns of planned poses: angles, mounting, time, and oven temperature."""
 
 from __future__ import annotations
 
@@ -62,13 +62,11 @@ def _oven_c(settings: Mapping[str, Any], path: str) -> float:
     return float(settings["oven_c"] if "oven_c" in settings else path.split()[1])
 
 
-# The range of a sweep for a model: candidates for its poses, and what a fit to the poses of a plan will know.
+# The range of a sweep for a model: the candidates for its poses, and the accuracy of a fit to the poses of a plan.
 #
-# The range is that of a sweep: its inclinations and what lies between them, its turn of beta, both directions, the
-# faces
-# that it has. A plan is judged by the standard error of each parameter as what it does to the output where it does
-# most:
-# so that volts and degrees are comparable. The greatest of them is the worst standard error.
+# The range has the inclinations of the sweep and those between them, its turn of beta, both directions and its faces. A
+# plan is judged by the standard error of each parameter, as the largest change of the output by this error: volts and
+# degrees are then comparable. The largest of them is the worst standard error.
 
 GRID_DEG = 15.0
 MOST_ERROR = 0.01  # of the output per g: a plan that leaves more at full scale does not determine the parameter

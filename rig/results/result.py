@@ -1,4 +1,4 @@
-"""One measured quantity, and its verdict by a limit and the uncertainty.
+"""A result: one measured quantity, and its verdict by a limit and the uncertainty; the register of the evaluations.
 
 pass      within the limit by more than the expanded uncertainty (k = 2)
 fail      beyond it by more than that
