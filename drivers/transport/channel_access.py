@@ -101,7 +101,7 @@ class Circuit:
         return str(self._decode(_units, answer, device))
 
     def write(self, name: str, value: float, device: str, timeout_s: float) -> None:
-        """Write a field and do not wait until its record is processed: a motor's is so at the end of its move."""
+        """Write a field, without waiting until its record is processed: a motor record is so at the end of its move."""
         self.open([name], device, timeout_s)
         channel = self._channels[name]
         if not (channel.access_rights or 0) & WRITE:
@@ -132,13 +132,13 @@ class Circuit:
         return answers
 
     def _begin(self) -> None:
-        """Greet the server on a new connection."""
+        """Open a new connection with the greeting of the protocol."""
         if self._circuit is not None:
             return
         self._circuit = self._ca.VirtualCircuit(self._ca.CLIENT, self.place, 0)
         self._send(
             self._ca.VersionRequest(0, self._ca.DEFAULT_PROTOCOL_VERSION),
-            self._ca.HostNameRequest(socket.gethostname()),  # access security of the IOC goes by these two
+            self._ca.HostNameRequest(socket.gethostname()),  # access security of the IOC uses these two
             self._ca.ClientNameRequest(_user()),
         )
 
@@ -151,7 +151,7 @@ class Circuit:
             raise
 
     def _receive_until(self, complete: Any, field: str, device: str, timeout_s: float) -> None:
-        """Take in messages until one of them makes `complete` true."""
+        """Receive messages until one of them makes `complete` true."""
         deadline = self.link.clock.now() + timeout_s
         while True:
             left_s = deadline - self.link.clock.now()
@@ -176,7 +176,7 @@ class Circuit:
             return any(complete(command) for command in commands)
         except DriverError:
             raise
-        except Exception as error:  # caproto has many, and those of struct and ctypes
+        except Exception as error:  # caproto has many, also those of struct and ctypes
             raise self._not_ours(f"{len(data)} bytes", device, error) from error
 
     def _decode(self, take: Callable[[Any], Any], answer: Any, device: str) -> Any:
@@ -210,19 +210,19 @@ class Circuit:
 
 
 class Records:
-    """The fields of the records with one beginning of a name, for the instrument `who`."""
+    """The fields of the records with one beginning of a name, for the instrument `device`."""
 
     def __init__(self, circuit: Circuit, beginning: str, device: str, timeout_s: float) -> None:
         self.beginning = beginning
-        self._circuit, self._who, self._timeout_s = circuit, device, timeout_s
+        self._circuit, self._device, self._timeout_s = circuit, device, timeout_s
 
     def read(self, *fields: str) -> list[Reading]:
         """The values of fields, requested together. Raises LinkTimeout, LinkRefused, Refused, BadFrame."""
-        return self._circuit.read([self.beginning + field for field in fields], self._who, self._timeout_s)
+        return self._circuit.read([self.beginning + field for field in fields], self._device, self._timeout_s)
 
     def write(self, field: str, value: float) -> None:
         """Write a field; returns at once. Raises LinkTimeout, LinkRefused, Refused without write access."""
-        self._circuit.write(self.beginning + field, value, self._who, self._timeout_s)
+        self._circuit.write(self.beginning + field, value, self._device, self._timeout_s)
 
     def written(self, field: str, value: float) -> float:
         """Write a field, and read it. A server handles requests in their order, so this is the value afterwards."""
@@ -231,7 +231,7 @@ class Records:
 
     def units(self, field: str) -> str:
         """The engineering units."""
-        return self._circuit.units(self.beginning + field, self._who, self._timeout_s)
+        return self._circuit.units(self.beginning + field, self._device, self._timeout_s)
 
 
 def found_server(record: str, device: str, timeout_s: float) -> tuple[str, int]:

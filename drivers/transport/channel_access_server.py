@@ -1,6 +1,6 @@
-"""A simulated server of EPICS records: answers Channel Access on a port, out of the records of twins.
+"""A simulated server of EPICS records: answers Channel Access on a port, with the records of twins.
 
-caproto packs and unpacks the messages here too, in its role of a server; it has no part in their content.
+caproto packs and unpacks the messages, here in the role of a server. Their content is ours.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def records_port(listen: str, hosts: Sequence[RecordHost]) -> Port:
         try:
             reply = session.answers(data, now_s)
         except ValueError:
-            connection.ended = True  # as a server does with a stranger
+            connection.ended = True  # as a real server does with another protocol
             return
         if reply:
             connection.send(reply, now_s + THINKING_S + port.timing.line_s(len(reply)))

@@ -1,18 +1,19 @@
 """Faults of simulated instruments: their kinds, their times and durations.
 
-A fault of the wire happens between a server's connections and its twins, so every twin has them all (see wire_faults).
-A fault of the instrument itself is its twin's own: a twin module declares them by name as `FAULTS`, and a twin that has
-any looks into its `faults`.
+A fault of the link happens between the connections of a server and its twins, so every twin can have all of them. The
+faults of an instrument itself belong to its twin: the twin's module declares them by name as `FAULTS`, and the twin
+reads its `faults`.
 
-A fault begins at a time of the simulated clock or after so many requests, and lasts a time or a number of requests.
-With a `probability` it is there now and then: drawn from its `seed`, the time and the number of requests, so that the
-same run meets it at the same moments. What it has to remember is part of its server's state: a resumed run meets it
-as an undisturbed one would.
+A fault begins at a time of the simulated clock or after a number of requests, and lasts a time or a number of requests.
+With a `probability` it is present at random: drawn from its `seed`, the time and the number of requests, so the same
+run has it at the same times. Its state is a part of the state of the server: a resumed run has the same faults as an
+uninterrupted one.
 """
 
 from __future__ import annotations
 
 import importlib
+import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -26,9 +27,9 @@ from drivers.transport.person import PERSON
 class Fault:
     """A fault from `at_s` on for `for_s`, and after the first `after` requests for `times` requests.
 
-    Times are the simulated clock's. None is for ever; a `size` of None is the usual one of its kind. Each time that it
-    could be there it is, with a `probability` of less than 1 only now and then, as the `seed` has it.
-    Raises ValueError for a time or a number that cannot be.
+    Times are those of the simulated clock. None means without end; a `size` of None is the usual one of its kind. With
+    a `probability` below 1 it is present only at some of these times, by the `seed`.
+    Raises ValueError for an impossible time or number.
     """
 
     what: str
@@ -56,7 +57,7 @@ class Fault:
         return self.probability == 1 or Random(draw).random() < self.probability  # noqa: S311 - nothing is secret
 
     def has_begun(self, now_s: float, requests: int) -> bool:
-        """Whether it acts by `now_s`, after so many `requests` to its instrument."""
+        """Whether it has begun at `now_s`, after this number of `requests` to its instrument."""
         return now_s >= self.at_s and (self.after == 0 or requests > self.after)
 
     def has_ended(self, now_s: float, requests: int) -> bool:
@@ -75,7 +76,7 @@ class Kind:
     least: float = -math.inf
 
     def refusal(self, size: float | None) -> str | None:
-        """Why it cannot have this size; None where it can."""
+        """The reason why it cannot have this size; None if it can."""
         if size is None or (self.size and size >= self.least):
             return None
         return (
@@ -110,7 +111,7 @@ class Faults:
         self._request_count += 1
 
     def size(self, name: str, now_s: float) -> float | None:
-        """The size of a fault that is there now; None where it is not."""
+        """The size of a fault that is present now, otherwise None."""
         for fault, size in self._faults:
             active = fault.has_begun(now_s, self._request_count) and not fault.has_ended(now_s, self._request_count)
             if fault.what == name and active and fault.happens(now_s, self._request_count):
@@ -146,17 +147,17 @@ class Faults:
         )
 
 
-# Faults of a wire: one pure function each, applied to the bytes that a simulated instrument sends.
+# Faults of a link: each is a function of the bytes that a simulated instrument sends.
 
 
-END = b""  # as a read that finds nothing
-MENDED_S = 0.2  # until TCP sends a spoilt segment again
-BABBLE_S = 60.0  # how long it babbles for one message
+END = b""  # as the read of a closed connection
+MENDED_S = 0.2  # until TCP sends a damaged segment again
+BABBLE_S = 60.0  # duration of the babble for one message
 MOST_PIECES = 1000  # of a message
 
 
 class Message(NamedTuple):
-    """A message of an instrument, and when its last byte is through."""
+    """A message of an instrument, and the time of its last byte."""
 
     data: bytes
     due_s: float
@@ -166,8 +167,8 @@ class Message(NamedTuple):
 class Wire:
     """The properties of a link that faults need.
 
-    `mends` is whether it has checksums of its own, as TCP has. Where several units share it, `unit_of` gives that of a
-    message; `of_unit` is the same message of another unit.
+    `mends`: the link has its own checksums, as TCP. If several units share it, `unit_of` gives the unit of a message,
+    and `of_unit` the same message of another unit.
     """
 
     mends: bool
@@ -189,7 +190,7 @@ def the_end(sent: Message, _size: float, _wire: Wire) -> list[Message]:
 
 
 def later(sent: Message, size: float, _wire: Wire) -> list[Message]:
-    """The same, `size` s later."""
+    """The message, `size` s later."""
     return [Message(sent.data, sent.due_s + size)]
 
 
@@ -205,7 +206,7 @@ def babble(sent: Message, size: float, wire: Wire) -> list[Message]:
 
 
 def truncate(sent: Message, size: float, _wire: Wire) -> list[Message]:
-    """The first `size` bytes of it."""
+    """The first `size` bytes of the message."""
     return [Message(sent.data[: int(size)], sent.due_s)]
 
 
@@ -222,17 +223,17 @@ def trickle(sent: Message, size: float, _wire: Wire) -> list[Message]:
 
 
 def after_noise(sent: Message, size: float, wire: Wire) -> list[Message]:
-    """The message behind so many other bytes, in one piece."""
+    """`size` random bytes and the message, in one piece."""
     return [Message(noise(sent, size, wire)[0].data + sent.data, sent.due_s)]
 
 
 def before_noise(sent: Message, size: float, wire: Wire) -> list[Message]:
-    """The message before so many other bytes, in one piece."""
+    """The message and `size` random bytes, in one piece."""
     return [Message(sent.data + noise(sent, size, wire)[0].data, sent.due_s)]
 
 
 def flip_bit(sent: Message, size: float, wire: Wire) -> list[Message]:
-    """One bit turned over; on TCP the segment comes again."""
+    """One bit inverted; TCP sends the segment again."""
     if wire.mends:
         return later(sent, MENDED_S, wire)
     byte, bit_number = divmod(int(size) % (8 * len(sent.data)), 8)
@@ -274,13 +275,9 @@ def disturb(sent: Message, faults: Faults, wire: Wire) -> list[Message]:
     messages = [sent]
     for name, (_, effect) in EFFECTS.items() if faults else ():
         if (size := faults.size(name, sent.due_s)) is not None:
-            messages = [part for message in messages for part in _effect(effect, message, size, wire)]
+            parts = ([m] if m.data == END else effect(m, size, wire) for m in messages)
+            messages = list(itertools.chain.from_iterable(parts))
     return messages
-
-
-def _effect(effect: Effect, message: Message, size: float, wire: Wire) -> list[Message]:
-    """One message after one fault; the end of a connection is unchanged."""
-    return [message] if message.data == END else effect(message, size, wire)
 
 
 def kinds_of(driver: str) -> dict[str, Kind]:
@@ -291,5 +288,5 @@ def kinds_of(driver: str) -> dict[str, Kind]:
 
 
 def faults_of(driver: str, faults: Iterable[Fault]) -> Faults:
-    """The faults of a twin of `driver`. Raises KeyError for one that it cannot have."""
+    """`faults` of a twin of `driver`. Raises KeyError for a fault that this twin cannot have."""
     return Faults(faults, kinds_of(driver))

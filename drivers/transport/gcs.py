@@ -14,8 +14,8 @@ from drivers.errors import BadFrame, LinkTimeout, Refused
 from drivers.transport.link import Link
 
 TIMEOUT_S = 1.0  # without a byte; the longest answers arrive in many pieces
-LONGEST_S = 300.0  # of one answer: all that a recorder holds, over a serial line
-QUIET_S = 0.02  # after which nothing more of an interrupted answer comes
+LONGEST_S = 300.0  # of one answer: a full recorder over a serial line
+QUIET_S = 0.02  # without bytes: the end of an interrupted answer
 LATIN = "latin-1"  # one character is one byte
 REMEDY = "Check power and cable, and that no other program uses the controller"
 
@@ -26,7 +26,7 @@ class Gcs:
     def __init__(self, link: Link, name: str, explain: Callable[[int], tuple[str, str]]) -> None:
         self.name, self.link = name, link
         self._explain = explain
-        self._owed = False  # whether the answer to an earlier question may still arrive
+        self._late_expected = False  # whether the answer to an earlier question may still arrive
 
     def tell(self, command: str) -> None:
         """Send a command that has no answer. Raises Refused with the controller's error."""
@@ -45,23 +45,23 @@ class Gcs:
         return lines
 
     def ask_byte(self, number: int) -> str:
-        """The answer to a command of one byte; it does not touch the error."""
+        """The answer to a command of one byte; it does not change the error number."""
         self._send(chr(number))
         return self._lines(f"#{number}")[0]
 
     def tell_byte(self, number: int) -> None:
-        """Send a command of one byte that has no answer, at once; an answer that it interrupts is thrown away."""
+        """Send a command of one byte without an answer, at once; the answer that it interrupts is discarded."""
         self.link.write(bytes([number]))
         self.link.discard(QUIET_S)
 
     def error(self) -> int:
-        """The controller's error number, which it forgets by telling it; 0 is none."""
+        """The controller's error number, 0 for none. The controller resets it with this answer."""
         self._send("ERR?\n")
         answer = self._lines("ERR?")[0]
         try:
             return int(answer)
         except ValueError:
-            raise self._odd("ERR?", answer) from None
+            raise self._unexpected("ERR?", answer) from None
 
     def values(self, question: str) -> dict[str, float]:
         """An answer of lines `key=value`, by key."""
@@ -81,19 +81,19 @@ class Gcs:
     def _pairs(self, question: str) -> list[tuple[str, str]]:
         parted = [(line, line.partition("=")) for line in self.ask(question)]
         if bad_lines := [line for line, (_, equals, _) in parted if not equals]:
-            raise self._odd(question, bad_lines[0])
+            raise self._unexpected(question, bad_lines[0])
         return [(key.strip(), text) for _, (key, _, text) in parted]
 
     def _number(self, question: str, text: str) -> float:
         try:
             return float(text)
         except ValueError:
-            raise self._odd(question, text) from None
+            raise self._unexpected(question, text) from None
 
     def _send(self, text: str) -> None:
         """Send `text`; discard earlier bytes: they are not the answer to it."""
-        self.link.discard(TIMEOUT_S if self._owed else 0.0)
-        self._owed = False
+        self.link.discard(TIMEOUT_S if self._late_expected else 0.0)
+        self._late_expected = False
         self.link.write(text.encode(LATIN))
 
     def _lines(self, question: str) -> list[str]:
@@ -101,7 +101,7 @@ class Gcs:
         while not data.endswith(b"\n") or data.endswith(b" \n"):
             next_bytes = self.link.read(TIMEOUT_S)
             if not next_bytes or self.link.clock.now() > deadline:
-                self._owed = True
+                self._late_expected = True
                 raise self._silent(question, data)
             data += next_bytes
         return [line.rstrip() for line in data.decode(LATIN).splitlines()]
@@ -111,7 +111,7 @@ class Gcs:
             return BadFrame(f"{self.name}: the answer to {question} breaks off after {len(data)} bytes", REMEDY)
         return LinkTimeout(f"{self.name}: no answer to {question} within {TIMEOUT_S:g} s on {self.link.url}", REMEDY)
 
-    def _odd(self, question: str, answer: str) -> BadFrame:
+    def _unexpected(self, question: str, answer: str) -> BadFrame:
         return BadFrame(f"{self.name}: {answer[:40]!r} is not an answer to {question}", REMEDY)
 
     def _require_no_error(self, command: str) -> None:

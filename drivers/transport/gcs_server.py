@@ -44,7 +44,7 @@ def gcs_port(listen: str, device: Device) -> Port:
 
 
 def commands(inbox: bytearray) -> Iterable[str]:
-    """Take all whole commands out of `inbox`: bytes below space at once, lines at their LF."""
+    """Remove all complete commands from `inbox`: single bytes below space, and lines that end with LF."""
     while inbox:
         if inbox[0] < ord(" "):
             length = 1

@@ -57,7 +57,7 @@ class LinkLines:
 class VisaLines:
     """Lines through a VISA resource.
 
-    A connection that is lost is an error once; the next command opens it anew, so that a stop can be sent.
+    A lost connection raises an error once. The next command opens it again, so that a stop can be sent.
     """
 
     def __init__(self, url: Url, clock: Clock, name: str, tap: Tap | None = None) -> None:
@@ -88,7 +88,7 @@ class VisaLines:
         return text
 
     def close(self) -> None:
-        """For good."""
+        """Close the connection finally: each later command raises LinkRefused."""
         self._closed = True
         self._drop()
 
@@ -102,7 +102,7 @@ class VisaLines:
     def _open(self) -> Any:
         try:
             resource = self._visa.ResourceManager(self._url.library).open_resource(self._url.path)
-        except Exception as error:  # each backend has its own: no such interface, host, bus, library
+        except Exception as error:  # each backend has its own errors: of interface, host, bus, library
             remedy = (
                 "`pyvisa-info` lists the interfaces that PyVISA can open, and the libraries that are missing for others"
             )
@@ -112,7 +112,7 @@ class VisaLines:
         return resource
 
     def _failed(self, error: Exception, command: str, timeout_s: float) -> LinkError:
-        """The error in our words. A late answer would be taken for that of the next question, so it is cleared."""
+        """The error as ours. A late answer is cleared, because it would count as that of the next question."""
         timeout = self._visa.constants.StatusCode.error_timeout
         if getattr(error, "error_code", None) == timeout and timeout_s:
             with contextlib.suppress(Exception):  # the time-out is reported

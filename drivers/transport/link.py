@@ -3,10 +3,10 @@
     tcp://host:port                           a socket
     rtu+tcp://host:port                       a socket; the frames on it are RTU's
     serial:/dev/ttyUSB0?baud=115200&parity=E  a serial line, 8 data bits; parity N, E or O; stop=1 or 2
-    udpin://0.0.0.0:14550                     datagrams to this port of the computer, from the first who sends some
+    udpin://0.0.0.0:14550                     datagrams to this port of the computer, from the first sender
     udpout://host:port                        datagrams to and from this address
 
-A link counts its bytes, so that a simulated clock knows what is still under way.
+A link counts its bytes: a simulated clock needs the number that has not arrived yet.
 """
 
 from __future__ import annotations
@@ -26,24 +26,23 @@ CONNECT_TIMEOUT_S = 5.0
 DISCARD_S = 1.0
 LARGEST = 1 << 16  # bytes of a datagram
 BUFFER = 1 << 22  # bytes that the kernel may keep of datagrams; it allows less
-Tap = Callable[
-    [float, str, Literal["sent", "heard"], bytes], None
-]  # called with every message: time, instrument, direction, bytes
-LOST = (OSError, termios.error, serial.SerialException)  # what a dead connection raises
+# Called with every message: time, instrument, direction, bytes.
+Tap = Callable[[float, str, Literal["sent", "heard"], bytes], None]
+LOST = (OSError, termios.error, serial.SerialException)  # raised by a lost connection
 
 
 class Port(Protocol):
     """The interface of a socket or a serial line for a link. A lost connection raises one of LOST.
 
-    `chunk` is the most that one read takes, and less than the kernel can hold.
+    `chunk` is the largest number of bytes of one read, less than the kernel's buffer.
     """
 
     chunk: int
-    lossy: bool  # the kernel drops what finds no room
+    lossy: bool  # the kernel discards data when its buffer is full
 
     @property
     def key(self) -> str:
-        """Names the connection."""
+        """The name of the connection."""
 
     def fileno(self) -> int: ...
 
@@ -51,7 +50,7 @@ class Port(Protocol):
         """The bytes that have arrived, at least one; empty at the end."""
 
     def write(self, data: bytes) -> int:
-        """Send all of `data`; the number of bytes that are on their way to somebody."""
+        """Send all of `data`; the number of bytes that were sent, 0 without a receiver."""
 
     def close(self) -> None: ...
 
@@ -80,7 +79,7 @@ class Connected(Wire):
 class Link:
     """The controller's end of a link.
 
-    A connection that is lost is an error once; what is sent after that opens it anew, so that a stop can be sent.
+    A lost connection raises an error once. The next write opens it again, so that a stop can be sent.
     """
 
     def __init__(self, url: Url, clock: Clock, name: str = "", tap: Tap | None = None) -> None:
@@ -88,7 +87,7 @@ class Link:
         self.url, self.clock = url.text, clock
         self._parsed = url
         self._place = name if url.text in name else f"{name}: {url.text}" if name else url.text
-        self.users, self._tap = [name] if name else [], tap  # instruments whose wire it is
+        self.users, self._tap = [name] if name else [], tap  # names of the instruments on it
         self._closed = False
         self._line: Connected | None = self._connect()
 
@@ -131,12 +130,14 @@ class Link:
 
     def hang_up(self) -> None:
         """Close the connection; the next write opens it again."""
-        self._drop()
+        if self._line is not None:
+            self._line.port.close()
+            self._line = None
 
     def close(self) -> None:
-        """For good."""
+        """Close the connection finally: each later read or write raises LinkRefused."""
         self._closed = True
-        self._drop()
+        self.hang_up()
 
     @property
     def _names(self) -> str:
@@ -149,22 +150,17 @@ class Link:
             self._line = self._connect()
         return self._line
 
-    def _drop(self) -> None:
-        if self._line is not None:
-            self._line.port.close()
-            self._line = None
-
     def _connect(self) -> Connected:
         try:
             line = Connected(_open_port(self._parsed))
         except (*LOST, ValueError) as error:
             reason = (error.strerror if isinstance(error, OSError) else "") or error  # without the error's number
             raise LinkRefused(f"{self._place}: cannot be opened ({reason})", _remedy(self._parsed)) from error
-        self.clock.wait_readable(line, 0.0)  # a simulated clock takes its bearings before the first byte
+        self.clock.wait_readable(line, 0.0)  # a simulated clock finds the other end before the first byte
         return line
 
     def _connection_lost(self, cause: object) -> LinkRefused:
-        self._drop()
+        self.hang_up()
         return LinkRefused(
             f"{self._place}: the connection is lost ({cause})", "Check cable and power, then connect again"
         )
@@ -198,7 +194,7 @@ class SocketPort:
 
 
 class SerialPort:
-    """A serial line, 8 data bits, opened for one program alone."""
+    """A serial line, 8 data bits, opened for this program only."""
 
     chunk, lossy = 4095, False
 
@@ -227,9 +223,9 @@ class SerialPort:
 
 
 class DatagramPort:
-    """A UDP socket: to a `host` and its port, or at a port of this computer for the first who sends something there.
+    """A UDP socket: to a `host` and its port, or at a port of this computer, for the first sender to it.
 
-    What is sent before anybody is known goes nowhere.
+    Before the first sender, data to send are lost.
     """
 
     chunk, lossy = 0, True

@@ -47,9 +47,9 @@ class Links:
         return visa
 
     def records(self, address: Address, name: str, first: str, timeout_s: float) -> Records:
-        """The records of EPICS whose names begin as `address` says; a search on the network looks for `first`.
+        """The EPICS records whose names begin with that of `address`; `first` is searched on the network.
 
-        The records of one server share a connection, as Channel Access wants it. Raises LinkRefused.
+        The records of one server share a connection, as Channel Access requires. Raises LinkRefused.
         """
         url = Url.parse(address.url)
         if url.scheme != "ca":

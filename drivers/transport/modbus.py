@@ -26,8 +26,6 @@ from drivers.errors import BadFrame, LinkError, LinkRefused, LinkTimeout, Refuse
 from drivers.transport.address import Url
 from drivers.transport.link import Link
 
-# A register, declared: where it is, how its words are read, and what one count is worth.
-
 Kind = Literal["int16", "uint16", "int32", "uint32", "float32"]
 CODES: dict[Kind, str] = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
 
@@ -71,10 +69,10 @@ class Register:
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # our errors describe bad frames
 
 TIMEOUT_S = 0.5  # for one answer; the slowest instrument needs a tenth of it
-LATE_S = 2 * TIMEOUT_S  # of quiet, after which no answer to an earlier request comes any more
+LATE_S = 2 * TIMEOUT_S  # of silence: then no answer to an earlier request arrives any more
 REPEATED = (LinkTimeout, BadFrame, WrongUnit)  # after these a request is repeated
-RETRIES = 2  # every request of ours may be repeated, but for those that say otherwise
-ON_A_LINE = (  # what to look at after silence, and after noise
+RETRIES = 2  # of a request, unless it may not be repeated
+ON_A_LINE = (  # what to check after silence, and after noise
     "that baud rate and parity are the instrument's",
     "shielding, termination, baud rate and parity of the line",
 )
@@ -100,9 +98,9 @@ class Bus:
         self._url = Url.parse(link.url)
         decoder = DecodePDU(is_server=False)
         self._framer = FramerRTU(decoder) if self._url.rtu else FramerSocket(decoder)
-        self._look_at = ON_A_LINE if self._url.rtu else ON_A_NETWORK
+        self._checks = ON_A_LINE if self._url.rtu else ON_A_NETWORK
         self._transaction = 0
-        self._owed = False  # whether answers to earlier requests may still arrive
+        self._late_expected = False  # whether answers to earlier requests may still arrive
 
     def ask(self, request: ModbusPDU, unit: int, action: str, retries: int = RETRIES) -> ModbusPDU:
         """The answer of `unit`; `action` begins every error, as in 'alpha: reading register 0x0080 (alarm)'.
@@ -126,9 +124,9 @@ class Bus:
 
         The echo of a write names its register, so a write, which may be a stop, need not wait.
         """
-        if self._owed and not isinstance(request, WRITES):
+        if self._late_expected and not isinstance(request, WRITES):
             self.link.discard(LATE_S)
-            self._owed = False
+            self._late_expected = False
 
     def _attempt(self, request: ModbusPDU, action: str) -> ModbusPDU:
         self._transaction = request.transaction_id = self._transaction % 0xFFFF + 1
@@ -158,16 +156,16 @@ class Bus:
             if answer is not None:
                 return answer
             data = data[used:]
-        self._owed = self._url.rtu
+        self._late_expected = self._url.rtu
         if data:
             raise self._bad_frame(action, f"received {len(data)} bytes that are not an answer ({data[:16].hex(' ')})")
         raise LinkTimeout(
             f"{action}: no answer within {TIMEOUT_S:g} s on {self.link.url}",
-            f"Check power, cable and unit id, and {self._look_at[0]}",
+            f"Check power, cable and unit id, and {self._checks[0]}",
         )
 
     def _decode(self, data: bytes, action: str) -> tuple[int, ModbusPDU | None]:
-        """Bytes used up, and the answer if there is one; a TCP frame of an earlier request is passed over."""
+        """Number of decoded bytes, and the answer if there is one; a TCP frame of an earlier request is skipped."""
         expected = 0 if self._url.rtu else self._transaction
         try:
             used, answer = self._framer.handleFrame(data, 0, expected)
@@ -178,7 +176,7 @@ class Bus:
         return used, answer
 
     def _bad_frame(self, action: str, fault: str) -> LinkError:
-        return BadFrame(f"{action}: {fault}", f"Check {self._look_at[1]}")
+        return BadFrame(f"{action}: {fault}", f"Check {self._checks[1]}")
 
 
 class Unit:
@@ -198,7 +196,7 @@ class Unit:
         return [r.decode(words[r.address - first.address :][: r.count]) for r in registers]
 
     def read_words(self, address: int, count: int, doc: str) -> Sequence[int]:
-        """`count` words as they are on the wire."""
+        """`count` words as on the wire."""
         request = ReadHoldingRegistersRequest(address=address, count=count)
         return self._bus.ask(request, self._unit, f"{self.name}: reading {doc}").registers
 
@@ -217,7 +215,7 @@ class Unit:
         self.write_words(values[0][0].address, words, str(values[0][0]), retries)
 
     def write_words(self, address: int, words: Sequence[int], doc: str, retries: int = RETRIES) -> None:
-        """Set neighbouring words as they are on the wire."""
+        """Set neighbouring words as on the wire."""
         request = WriteMultipleRegistersRequest(address=address, registers=words)
         self._bus.ask(request, self._unit, f"{self.name}: writing {doc}", retries)
 

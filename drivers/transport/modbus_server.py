@@ -1,6 +1,6 @@
 """Modbus slave: simulated devices answer the requests on a port, with the delays of the line.
 
-A unit that is not there is silent, as on RS-485. So is one that is asked with a wrong checksum.
+An absent unit sends nothing, as on RS-485. The same holds after a request with a wrong checksum.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Device(Protocol):
     """A unit's registers. Raises Refusal for a register that it does not have."""
 
     faults: Faults
-    functions: frozenset[int]  # the Modbus functions it knows: no other is asked of it
+    functions: frozenset[int]  # the Modbus functions of the unit; others are refused before they reach it
     thinking_s: float  # from the end of a request to the start of its answer
 
     def read_words(self, address: int, count: int, now_s: float) -> Sequence[int]: ...
@@ -59,7 +59,7 @@ def modbus_port(listen: str, devices: Mapping[int, Device]) -> Port:
 
 
 def _place(place: int) -> Callable[[bytes], int | None]:
-    """Reads the unit's number at its place in a frame."""
+    """A function that reads the unit's number at its place in a frame."""
     return lambda frame: frame[place] if len(frame) > place else None
 
 
@@ -91,7 +91,7 @@ class Responder:
             data = bytes(connection.inbox)
             try:
                 used, request = self._framer.handleFrame(data, 0, 0)
-            except ModbusException:  # a function that pymodbus cannot take apart: nothing to answer to
+            except ModbusException:  # pymodbus does not know the function: no answer
                 used, request = len(data), None
             del connection.inbox[:used]
             if request is None:

@@ -1,7 +1,6 @@
 """The link to a person: some instruments are set and read by hand.
 
-A driver asks for a number and cannot know who answers: whoever runs the rig says who stands at it, for as long as
-somebody does.
+A driver asks for a number, whoever answers: the program that runs the rig connects the person who is at it.
 """
 
 from __future__ import annotations

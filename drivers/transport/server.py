@@ -1,8 +1,8 @@
 """The servers of the simulated instruments: passive, without threads, on TCP ports and pseudo-terminals.
 
-A `Port` listens and holds its connections; a `Server` is one instrument's (or one bus') ports together with
-the twins behind them. It acts only when the clock passes it the time, so one and the same server is
-deterministic under a simulated clock and serves anybody's client in real time.
+A `Port` listens and has its connections. A `Server` has the ports of one instrument, or of one bus, and their twins. It
+acts only when the clock gives it the time, so the same server is deterministic with a simulated clock, and serves any
+client in real time.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Twin:
         return math.inf
 
     def state(self) -> dict[str, Any]:
-        """What a resumed run needs, JSON-able; nothing where a driver that connects sets all that it relies on."""
+        """The state for a resumed run, as JSON values; empty if a driver sets all that it needs when it connects."""
         return {}
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -47,7 +47,7 @@ class Twin:
 
 
 class Connection:
-    """One client: bytes that came, and bytes that go out when they are due."""
+    """One client: received bytes, and bytes to send at their times."""
 
     def __init__(
         self, fileno: int, key: str, close: Callable[[], None], leaving: Callable[[Message], Iterable[Message]]
@@ -55,8 +55,8 @@ class Connection:
         self.fileno, self.key, self.close = fileno, key, close
         self.inbox = bytearray()
         self.received = self.emitted = 0
-        self._leaving = leaving  # what becomes of a message on its way
-        self._outbox: list[tuple[float, int, bytes]] = []  # a heap: when, in which order, what
+        self._leaving = leaving  # a message after the faults of the link
+        self._outbox: list[tuple[float, int, bytes]] = []  # a heap: time, order, data
         self._order = itertools.count()
         self._last_s = -math.inf
         self._full = False
@@ -64,7 +64,7 @@ class Connection:
         self.ended = False  # whether it is to be closed
 
     def read(self, now_s: float, patience_s: float) -> bool:
-        """Take in what is there; False at the end of the connection.
+        """Read the received bytes; False at the end of the connection.
 
         Bytes received more than `patience_s` earlier are an incomplete request and are discarded.
         """
@@ -82,14 +82,14 @@ class Connection:
         return bool(data)
 
     def send(self, data: bytes, due_s: float) -> None:
-        """Send `data` at `due_s`, after all that was sent before; a fault of the wire may make it other data, later."""
+        """Send `data` at `due_s`, after all earlier data; a fault of the link can change or delay them."""
         if not data:
             return
         self._last_s = max(self._last_s, due_s)
         pieces = list(self._leaving(Message(data, self._last_s)))
         for piece in pieces:
             heapq.heappush(self._outbox, (piece.due_s, next(self._order), piece.data))
-        if pieces and b"".join(piece.data for piece in pieces) == data:  # what is only late is not overtaken
+        if pieces and b"".join(piece.data for piece in pieces) == data:  # data that are only late keep their order
             self._last_s = pieces[-1].due_s
 
     def emit(self, now_s: float) -> None:
@@ -105,7 +105,7 @@ class Connection:
                 heapq.heappush(self._outbox, (due_s, order, data[count:]))
 
     def due_s(self) -> float:
-        """When it must write next; never while the client does not read."""
+        """The time of its next write; infinity while the client does not read."""
         return self._outbox[0][0] if self._outbox and not self._full else math.inf
 
     def progress(self, key: str) -> tuple[int, int] | None:
@@ -121,7 +121,7 @@ class Connection:
             return os.write(self.fileno, data)
         except BlockingIOError:
             return 0
-        except OSError:  # the client is gone: what it does not read is lost
+        except OSError:  # the client is gone: its data are lost
             return len(data)
 
 
@@ -136,7 +136,7 @@ class Datagrams(Connection):
         self._earlier: dict[str, tuple[int, int]] = {}  # clients before this one
 
     def read(self, now_s: float, patience_s: float) -> bool:  # noqa: ARG002 - a datagram is whole
-        """Take in what is there; True, since datagrams have no end."""
+        """Read the received datagrams; True, because they have no end."""
         with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
             while True:
                 data, sender = self._socket.recvfrom(LARGEST)
@@ -171,10 +171,10 @@ class Datagrams(Connection):
 
 
 class Port:
-    """A place to connect to. `answer` is called with a connection whenever bytes have come in on it.
+    """A port for clients. `answer` is called with a connection after each read from it.
 
-    `wire` is what faults have to know of it. `held` are the bytes, about, that the system keeps for a client that does
-    not read; by default as many as it likes.
+    `wire` has the properties that faults need. `capacity`: approximate number of bytes that the system buffers for a
+    client that does not read; None for the system's default.
     """
 
     def __init__(
@@ -214,7 +214,7 @@ class Port:
             self.answer(connection, now_s)
 
     def afflict(self, unit: int, faults: Faults) -> None:
-        """Let the instrument of this number have `faults` of its wire."""
+        """Give the instrument of this number `faults` of its link."""
         self._faults[unit] = faults
 
     def hang_up(self) -> None:
@@ -303,7 +303,7 @@ class Port:
 
 
 class Server:
-    """One wire's worth of simulated instruments, by role."""
+    """The simulated instruments of one link, by role."""
 
     def __init__(self, ports: Sequence[Port], twins: Mapping[str, Twin], addresses: Mapping[str, Address]) -> None:
         self.addresses = dict(addresses)
@@ -312,7 +312,7 @@ class Server:
 
     @property
     def url(self) -> str:
-        """Where its first port listens."""
+        """The url of its first port."""
         return self._ports[0].url
 
     def afflict(self, role: str, faults: Faults) -> None:
@@ -356,7 +356,7 @@ class Server:
         return twins | faults
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Put every twin back into the `state` it had; faults that are new since then have not happened yet."""
+        """Continue every twin from `state`; a fault that `state` does not have has not happened yet."""
         for role, twin in self._twins.items():
             twin.restore(state[role])
         for role, faults in self._faults.items():
@@ -369,5 +369,5 @@ class Server:
             port.close()
 
 
-def _ignore(connection: Connection, now_s: float) -> None:  # noqa: ARG001 - a port that only talks
+def _ignore(connection: Connection, now_s: float) -> None:  # noqa: ARG001 - a port that only sends
     connection.inbox.clear()
