@@ -93,7 +93,7 @@ def diagnosis_document(result: Diagnosis[F], model: str) -> Document:
         "missing": list(result.missing),
         "provisional": result.judgement.provisional,
         "candidates": [_candidate(c, result) for c in result.candidates],
-        **_in_doubt(result),
+        **_doubt_fields(result),
     }
 
 
@@ -108,7 +108,7 @@ def discovery_document(result: Discovery[F], path: str | None) -> Document:
         "summary": _summary(result),
         "causes": list(result.causes),
         "refinements": list(result.refinements),
-        **_in_doubt(result),
+        **_doubt_fields(result),
         "model": path,
     }
 
@@ -139,7 +139,7 @@ def _summary(result: Discovery[F]) -> list[Document]:
     ]
 
 
-def _in_doubt(result: Diagnosis[F] | Discovery[F]) -> Document:
+def _doubt_fields(result: Diagnosis[F] | Discovery[F]) -> Document:
     """The fields on undecided matters, which both documents have."""
     return {
         "alternatives": {name: list(names) for name, names in result.alternatives.items()},

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     GivenEffect = Effect | type[Effect] | str | Path  # a name is that of an effect of the catalogue; a path, its file
 
 MOST_UNEVEN = 0.5  # of a step, by which steps of time may differ
-NOT_CHANNELS = ("t_s", "temperature_c", "supply_v")
+CONDITIONS = ("t_s", "temperature_c", "supply_v")
 AXIS_OF = {name: axis for kind in KINDS.values() for name, axis in zip(kind.outputs, AXES, strict=False)} | {"v": "x"}
 
 
@@ -222,6 +222,6 @@ def _channels(table: Table, rate_hz: float | None) -> Iterator[Samples]:
         if np.ptp(steps_s) * rate_hz > MOST_UNEVEN:
             raise DataError(f"{table.source}: t_s is uneven; `rig noise` can close gaps")
     corner_hz = table.number("filter_corner_hz", np.inf)
-    for name in (name for name in table.columns if name not in NOT_CHANNELS):
+    for name in (name for name in table.columns if name not in CONDITIONS):
         unit = "V" if name.endswith("_v") else str(table.constants.get("unit", "count"))
         yield Samples(AXIS_OF.get(name, name), [table.column(name)], rate_hz, unit, corner_hz, name=name)

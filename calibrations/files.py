@@ -24,7 +24,7 @@ from calibrations.errors import DataError
 LARGEST_BYTES = 1 << 30
 LONGEST_LINE_BYTES = 1 << 24
 SMALL_BYTES = 1 << 26  # unpacked; up to here a file may be packed however tightly
-TIGHTEST = 50  # unpacked bytes for a packed one; logs of sensors, which are noise, have less than 10
+LARGEST_RATIO = 50  # unpacked bytes for a packed one; logs of sensors, which are noise, have less than 10
 HEAD_BYTES = 1 << 16
 MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 KNOWN_BINARY = (  # first bytes, name, and a way to CSV with the tools of the field
@@ -149,9 +149,9 @@ class _Unpacked(gzip.GzipFile):
         if self._of_line > LONGEST_LINE_BYTES:
             most = LONGEST_LINE_BYTES >> 20
             raise DataError(f"{self.name}: a line has more than {most} MiB; is it really a CSV file?")
-        if self._taken > max(SMALL_BYTES, TIGHTEST * self._packed):
+        if self._taken > max(SMALL_BYTES, LARGEST_RATIO * self._packed):
             raise DataError(
-                f"{self.name}: the unpacked file is more than {TIGHTEST} times larger, which is unusual for "
+                f"{self.name}: the unpacked file is more than {LARGEST_RATIO} times larger, which is unusual for "
                 "measurements; is it really a table? If it is, unpack it and import the unpacked file"
             )
         if self._taken > LARGEST_BYTES:

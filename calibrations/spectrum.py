@@ -144,7 +144,7 @@ class Bands:
     def _column(self, process: str, time_constant_s: float = 0.0) -> Array:
         f = self.frequency_hz
         if process == "quantisation-noise":
-            return np.asarray(LINEAR[process](f, self.sampling) + self._of_the_ends())
+            return np.asarray(LINEAR[process](f, self.sampling) + self._end_contribution())
         if process == "flicker-noise":
             return np.asarray(flicker(f, self.sampling, self.corner_hz) * flickering(self.number))
         if process == "white-noise" and np.isfinite(self.corner_hz):
@@ -155,7 +155,7 @@ class Bands:
             return np.asarray(passed * gauss_markov(f, self.sampling, time_constant_s))
         return np.asarray(passed * LINEAR[process](f, self.sampling))
 
-    def _of_the_ends(self) -> Array:
+    def _end_contribution(self) -> Array:
         """The contribution of the first and the last error of quantisation to every cosine coefficient."""
         half_turn = np.pi * self.frequency_hz * self.sampling.interval_s
         n = self.number / (2 * self.frequency_hz * self.sampling.interval_s)

@@ -157,12 +157,12 @@ class Table:
     @property
     def output_names(self) -> tuple[str, ...]:
         """The columns of outputs that an axis each was measured in."""
-        return tuple(name for name in self._sensing if name in self)
+        return tuple(name for name in self._output_columns if name in self)
 
     @cached_property
     def axes(self) -> tuple[str, ...]:
         """The sensing axes that were measured, of "x", "y", "z"."""
-        return tuple(axis for axis, name in zip(AXES, self._sensing, strict=False) if name in self)
+        return tuple(axis for axis, name in zip(AXES, self._output_columns, strict=False) if name in self)
 
     @property
     def digital(self) -> bool:
@@ -170,7 +170,7 @@ class Table:
         return bool(self.type.digital) and self.type.outputs[0] not in self
 
     @property
-    def _sensing(self) -> tuple[str, ...]:
+    def _output_columns(self) -> tuple[str, ...]:
         """The columns that outputs of this table can have, in the order of the axes."""
         return self.type.digital if self.digital else self.type.outputs
 
@@ -181,7 +181,7 @@ class Table:
 
     def output_name(self, axis: str) -> str:
         """The column of the output of one axis."""
-        return self._sensing[AXES.index(axis)]
+        return self._output_columns[AXES.index(axis)]
 
     def output(self, axis: str) -> Array:
         """The measured output of one axis, shape (n,). Raises MissingColumn."""
@@ -365,11 +365,11 @@ def _check_columns(table: Table) -> None:
     unused_columns = [name for name in present if name not in required]
     raise MissingColumn(
         f'{table.source}: a table of {table.kind} needs the column "{missing[0]}"'
-        f"{_nearest_given(missing[0], unused_columns)}; it has: {', '.join(present)}"
+        f"{_nearest_column(missing[0], unused_columns)}; it has: {', '.join(present)}"
     )
 
 
-def _nearest_given(missing: str, other_names: list[str]) -> str:
+def _nearest_column(missing: str, other_names: list[str]) -> str:
     hint = nearest(missing, other_names) if other_names else ""
     return hint if hint.startswith("; did you mean") else ""
 

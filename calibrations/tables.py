@@ -188,4 +188,4 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
 )
 FILE_KINDS: Mapping[str, Kind] = MappingProxyType({name: kind for name, kind in KINDS.items() if kind.file == name})
 MEANS = tuple(name for name, kind in FILE_KINDS.items() if kind.means)
-FITTED = tuple(name for name, kind in FILE_KINDS.items() if kind.fitted)
+FITTED_KINDS = tuple(name for name, kind in FILE_KINDS.items() if kind.fitted)

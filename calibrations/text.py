@@ -15,7 +15,7 @@ Cells = tuple[Sequence[str], Sequence[Sequence[str]]]  # head and rows of a tabl
 
 SMALL, LARGE = -4, 6  # powers of ten beyond which a number is written with one
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-PREFIXED = ("V", "g", "deg", "K", "h", "s")  # units that take a prefix
+PREFIX_UNITS = ("V", "g", "deg", "K", "h", "s")  # units that take a prefix
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"), (1e12, "p"))
 MOST_DECIMALS = 12  # of the concise form; smaller uncertainties are written out
 INFINITE_FREEDOM = 1e4  # degrees of freedom from which on ∞ is written
@@ -213,7 +213,7 @@ def unit(text: str) -> str:
 
 def add_prefix(unit_name: str, reach: float) -> tuple[float, str]:
     """(factor, unit with prefix) for values up to `reach` in the unit `of`, as `unit` writes it."""
-    if not unit_name.startswith(PREFIXED):
+    if not unit_name.startswith(PREFIX_UNITS):
         return 1.0, unit_name
     factor, letter = prefix(reach)
     return factor, f"{letter}{unit_name}"

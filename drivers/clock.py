@@ -122,9 +122,9 @@ class SimulatedClock:
         self._bases.setdefault(wire, self._progress(wire))
         while True:
             step(self._peers, self._now_s)
-            outbound, inbound = self._in_flight(wire)
+            outbound, inbound = self._bytes_in_flight(wire)
             if inbound > 0 or _readable([wire.fileno()], 0.0):
-                if self._arrived(wire, inbound):
+                if self._wait_arrival(wire, inbound):
                     return True
             elif outbound > 0:
                 self._wait_for_peers(wire, start_s)
@@ -142,13 +142,13 @@ class SimulatedClock:
                 return progress
         return 0, 0
 
-    def _in_flight(self, wire: Wire) -> tuple[int, int]:
+    def _bytes_in_flight(self, wire: Wire) -> tuple[int, int]:
         """Bytes in flight to the server, and from it."""
         received, emitted = self._progress(wire)
         base_received, base_emitted = self._bases[wire]
         return wire.sent - (received - base_received), emitted - base_emitted - wire.received
 
-    def _arrived(self, wire: Wire, count: int) -> bool:
+    def _wait_arrival(self, wire: Wire, count: int) -> bool:
         """Wait until all that was emitted can be read at once: how the kernel cuts it up must not matter.
 
         A backlog comes as the kernel has room: one that is longer than one read, or one for which the kernel opens no

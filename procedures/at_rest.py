@@ -18,7 +18,7 @@ from procedures.instruments import Samples
 from procedures.session import Dwell, Guidance, HandAnalysis, HandCourse, NoiseAtRest, Pose, Session
 
 WINDOW_S = 0.5  # of a test of rest
-LEARNED = 20  # windows of rest that show the noise
+NOISE_WINDOWS = 20  # windows of rest that show the noise
 LONGEST_WAIT_S = 86_400.0
 FEWEST = 12  # positions: nine parameters, and three that check them
 KNOWN = "this position is known already"
@@ -141,14 +141,14 @@ def learn_noise(rig: Session, analysis: HandAnalysis, wait_s: float, *triads: Se
         Guidance("leave the sensor on the table for 10 s: the program measures its noise", FLAT, moves=False)
     )
     windows: list[Samples] = []
-    for _ in range(max(2 * LEARNED, round(wait_s / WINDOW_S))):
-        windows = [*windows, rig.adc.acquire(WINDOW_S)][-LEARNED:]
+    for _ in range(max(2 * NOISE_WINDOWS, round(wait_s / WINDOW_S))):
+        windows = [*windows, rig.adc.acquire(WINDOW_S)][-NOISE_WINDOWS:]
         learned = [analysis.learn([outputs_of(w, t) for w in windows], windows[-1].rate_hz) for t in triads]
         if all(noise is not None for noise in learned):
             return [noise for noise in learned if noise is not None]
     raise NoAnswer(
-        f"the sensor was not at rest for {LEARNED * WINDOW_S:g} s within {wait_s:g} s; put it on a firm table away "
-        "from motors, let it go, and resume the run"
+        f"the sensor was not at rest for {NOISE_WINDOWS * WINDOW_S:g} s within {wait_s:g} s; "
+        "put it on a firm table away from motors, let it go, and resume the run"
     )
 
 

@@ -34,7 +34,7 @@ COARSE = "coarse"
 TURN = "turn"  # of beta: brackets both axes
 AXES = {"x": 0.0, "y": 90.0}  # beta, deg, at the maximum of an output without misalignment
 QUARTER_DEG = 90.0
-CENTRED_DEG = 1  # plus half for rounding: a cubic term of 0.4 % then gives an error of 0.006 deg
+CENTRE_TOLERANCE_DEG = 1  # plus half for rounding: a cubic term of 0.4 % then gives an error of 0.006 deg
 ROUND_POSES = 16
 FEWEST_ROUNDS = 2  # one round has no scatter
 
@@ -121,7 +121,7 @@ def centre_of(extreme: NDArray[np.float64]) -> Centre:
 def is_off(new: Centre, old: Centre) -> bool:
     """Whether `old` is too far from the `new` centre."""
     sags = [abs(a - b) for a, b in zip(new.sag_deg, old.sag_deg, strict=True)]
-    return max(abs(_wrap(new.beta_deg - old.beta_deg)), *sags) > CENTRED_DEG
+    return max(abs(_wrap(new.beta_deg - old.beta_deg)), *sags) > CENTRE_TOLERANCE_DEG
 
 
 def standard_error_deg(rounds: Sequence[NDArray[np.float64]]) -> float:

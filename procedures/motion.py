@@ -67,22 +67,22 @@ def motion(
     motions = {hz: blocks(f"{KIND} {hz:g} Hz", duration_s, block_s) for hz in frequency_hz}
     later = [*still, *chain(*motions.values())]
     missing = list(rig.missing([*calibration, *later]))
-    in_sweep = calibration[0] not in missing and _missing_of_part(missing, later) == later
+    in_sweep = calibration[0] not in missing and _missing_in_part(missing, later) == later
     if not in_sweep:
         _centre_carriage(rig, centre_um)
     if calibration[0] in missing:
         _remove_history(rig)
-    for pose in _missing_of_part(missing, calibration):
+    for pose in _missing_in_part(missing, calibration):
         rig.hold(pose, dwell_s, settle_s)
     if in_sweep:  # after the sweep, so that a resumed sweep has the same steps as an undisturbed one
         _centre_carriage(rig, centre_um)
     _remove_hysteresis(rig)
     rig.wait(settle_s)
-    if todo := _missing_of_part(missing, still):
+    if todo := _missing_in_part(missing, still):
         rig.host.doing(f"recording the still sensor for {len(todo) * block_s:g} s")
         rig.keep_stretch(todo, block_s)
     for hz, poses in motions.items():
-        if todo := _missing_of_part(missing, poses):
+        if todo := _missing_in_part(missing, poses):
             with _oscillation(rig, peak_to_peak_um, hz, centre_um):
                 rig.keep_stretch(todo, block_s)
 
@@ -99,7 +99,7 @@ def blocks(path: str, duration_s: float, block_s: float) -> list[Pose]:
     return require_bounded(Pose(ALPHA_DEG, BETA_DEG, 0, f"{path} {k}") for k in range(count_parts(duration_s, block_s)))
 
 
-def _missing_of_part(missing: Sequence[Pose], part: Sequence[Pose]) -> list[Pose]:
+def _missing_in_part(missing: Sequence[Pose], part: Sequence[Pose]) -> list[Pose]:
     """The missing poses of one part of the run."""
     return [pose for pose in missing if pose in part]
 

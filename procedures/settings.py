@@ -95,7 +95,7 @@ def _value(subject: str, kind: Any, value: Value) -> Value:
         return _scalar(kind, value)
     except (ValueError, TypeError):
         listed = f"one of {', '.join(map(str, choices))}"
-        expected = listed if choices else _WANTED.get(kind, "numbers such as 90,30")
+        expected = listed if choices else _KIND_TEXTS.get(kind, "numbers such as 90,30")
         raise SettingError(f"{subject} is {value!r}; give {expected}") from None
 
 
@@ -115,7 +115,7 @@ def _lines(subject: str, path: Path) -> list[str]:
 
 
 def _scalar(kind: Any, value: Value) -> Value:
-    return _READ.get(kind, kind)(value)
+    return _READERS.get(kind, kind)(value)
 
 
 def _number(value: Value) -> float:
@@ -132,5 +132,5 @@ def _yes_or_no(value: Value) -> bool:
     return switches[text]
 
 
-_READ: Mapping[Any, Callable[[Value], Value]] = {float: _number, bool: _yes_or_no}
-_WANTED = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
+_READERS: Mapping[Any, Callable[[Value], Value]] = {float: _number, bool: _yes_or_no}
+_KIND_TEXTS = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}

@@ -15,7 +15,7 @@ from procedures.session import Session
 from procedures.tumbles import is_first, tumble
 
 SLICE_S = 60.0  # interval of the temperature checks in a soak
-DRIFTED_K = 3.0  # from the set point: the oven was off during an interruption
+LARGEST_DRIFT_K = 3.0  # from the set point: the oven was off during an interruption
 
 
 def temperature_cycle(
@@ -68,7 +68,7 @@ def _warm(rig: Session, set_c: float, soak_s: float, begins: bool) -> None:
     rig.oven.set_temperature(set_c)
     rig.oven.run(True)
     actual_c = rig.oven.temperature_c()
-    if begins or actual_c is None or abs(actual_c - set_c) > DRIFTED_K:
+    if begins or actual_c is None or abs(actual_c - set_c) > LARGEST_DRIFT_K:
         _soak(rig, soak_s)
 
 

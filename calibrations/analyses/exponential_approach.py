@@ -76,7 +76,7 @@ class Series:
 
     def likeliest(self, k: int) -> tuple[Array, float]:
         """The most likely `k` exponentials, and their -2 log likelihood averaged over the noise."""
-        taus_s, point = self._on_grid(k)
+        taus_s, point = self._best_on_grid(k)
         p = self._descend(self._start(taus_s, point), point)
         likelihood = [np.log(prior) - self._score(p, noise)[0] / 2 for noise, prior in self.points.items()]
         return _slowest_first(p), -2 * float(np.logaddexp.reduce(likelihood))
@@ -131,7 +131,7 @@ class Series:
         """Variance of the noise over that of the grid point."""
         return np.maximum(np.asarray(square) / free, 1.0 if self.known else 1e-30)
 
-    def _on_grid(self, k: int) -> tuple[tuple[float, ...], Point]:
+    def _best_on_grid(self, k: int) -> tuple[tuple[float, ...], Point]:
         """Time constants and noise of greatest likelihood on the grid."""
         taus, points = np.exp(self._ln_taus), list(self.points)
         sets = [s for s in combinations(range(TAUS), k) if k < 2 or taus[s[1]] >= LEAST_TAU_RATIO * taus[s[0]]]

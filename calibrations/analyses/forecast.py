@@ -143,7 +143,9 @@ class SoakForecast:
         filters: dict[str, QuantityFilter] = dict(self.followed)
         for axis in (axis for axis in part.axes if axis in AXES):
             filters |= (
-                self._follow_holds(part, axis) if part.labels["path"][0].startswith(HOLD) else self._turned(part, axis)
+                self._follow_holds(part, axis)
+                if part.labels["path"][0].startswith(HOLD)
+                else self._tumble_filters(part, axis)
             )
         return replace(self, followed=filters)
 
@@ -160,7 +162,7 @@ class SoakForecast:
         std = 0.0 if white is None else float(1 / np.sqrt(np.sum(white[:, part.axes.index(axis)] ** -2)))
         return {name: previous.after(t_s, value, std, offset=True)}
 
-    def _turned(self, part: Table, axis: str) -> dict[str, QuantityFilter]:
+    def _tumble_filters(self, part: Table, axis: str) -> dict[str, QuantityFilter]:
         if np.diff(part.time_s, prepend=part.time_s[0]).max() > LONGEST_MOVE_S:
             return {}
         try:

@@ -18,7 +18,7 @@ import numpy as np
 from calibrations.analyses.hand_positions import FEWEST, Course, hand_table, largest_error
 from calibrations.criteria import LEAST_FIELD_CHANGE, MOST_FIELD_EXCESS
 from calibrations.design.attitudes import Attitude, NextAttitude, assumed_field, estimate_field, next_attitude
-from calibrations.design.orientations import KNOWN_AFTER, directions_up
+from calibrations.design.orientations import CENTRE_POSITIONS, directions_up
 from calibrations.fitting.fit import Fit, fit
 from calibrations.means.noise import rms
 from calibrations.model.file import read_model
@@ -62,7 +62,7 @@ class FieldCourse(Course):
     @cached_property
     def field(self) -> Array:
         """The direction of the field in the room, (3,)."""
-        return assumed_field() if self.count < KNOWN_AFTER else estimate_field(self.directions, self.attitudes)
+        return assumed_field() if self.count < CENTRE_POSITIONS else estimate_field(self.directions, self.attitudes)
 
     @cached_property
     def next(self) -> NextAttitude:

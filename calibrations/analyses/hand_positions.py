@@ -19,8 +19,8 @@ import numpy as np
 
 from calibrations.analyses.stillness import NoiseAtRest
 from calibrations.design.orientations import (
+    CENTRE_POSITIONS,
     FIRST_SIDES,
-    KNOWN_AFTER,
     Next,
     directions_up,
     is_other_side,
@@ -102,7 +102,7 @@ class Course(ABC):
 
     def is_new(self, mean: Array) -> bool:
         """Whether a rest with this mean (3,) is worth taking."""
-        if self.count < KNOWN_AFTER - 1:
+        if self.count < CENTRE_POSITIONS - 1:
             return is_other_side(mean, self.outputs, float(self.noise.std.max()))
         wanted = np.array(self.wanted)
         direction = directions_up(np.vstack([self.outputs, mean]), np.vstack([self.directions, wanted]))[-1]

@@ -14,7 +14,7 @@ import numpy as np
 
 from calibrations.analyses.hand_positions import FEWEST, HandCourse, largest_error
 from calibrations.criteria import SMALLEST_TURN_DEG
-from calibrations.design.orientations import KNOWN_AFTER, LEAST_TURN, directions_up
+from calibrations.design.orientations import CENTRE_POSITIONS, LEAST_TURN, directions_up
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import CalibrationError
 from calibrations.fitting.fit import Fit, fit
@@ -36,7 +36,7 @@ class TurnCourse(HandCourse):
         """Whether a rest with this mean (3,) ends a turn: the sensor does not lie as before."""
         if not self.positions:
             return True
-        if len(self.positions) < KNOWN_AFTER - 1:
+        if len(self.positions) < CENTRE_POSITIONS - 1:
             points = np.vstack([self.outputs, mean])
             size = float(np.linalg.norm(points[:, None] - points[None], axis=2).max())
             least = max(LEAST_TURN * size, MOST_NOISE * float(self.noise.std.max()))

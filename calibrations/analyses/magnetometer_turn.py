@@ -124,7 +124,7 @@ def field_elements(sensed: Array, sensor_from_base: Array, turns: Sequence[str])
     in_base = np.einsum("nij,ni->nj", sensor_from_base, sensed)
     names = np.array(turns)
     means = np.array([in_base[names == turn].mean(axis=0) for turn in dict.fromkeys(turns)])
-    value = _of_field(means.mean(axis=0))
+    value = _elements(means.mean(axis=0))
     if len(means) < FEWEST_TURNS:
         return Elements(value, dict.fromkeys(value))
     covariance = np.cov(means.T) / len(means)
@@ -132,7 +132,7 @@ def field_elements(sensed: Array, sensor_from_base: Array, turns: Sequence[str])
     stds = {}
     for name in value:
         forward, backward = (
-            np.array([_of_field(means.mean(axis=0) + side * step * e)[name] for e in np.eye(3)]) for side in (1, -1)
+            np.array([_elements(means.mean(axis=0) + side * step * e)[name] for e in np.eye(3)]) for side in (1, -1)
         )
         slope = (forward - backward) / (2 * step)
         stds[name] = float(np.sqrt(slope @ covariance @ slope))
@@ -150,7 +150,7 @@ def level_elements_by_extremes(outputs: Array, sensor_from_base: Array, turn_std
     round_z = fit_ellipse(level)
     level = np.column_stack([level @ round_z.correction, np.zeros(len(level))])
     in_base = np.einsum("nij,ni->nj", sensor_from_base, level)
-    elements = _of_field(in_base.mean(axis=0))
+    elements = _elements(in_base.mean(axis=0))
     azimuths = np.radians([elements["D"], elements["D"] + 90])
     std = [float((in_base[:, :2] @ [np.cos(a), -np.sin(a)]).std(ddof=1) / np.sqrt(len(level))) for a in azimuths]
     h_std = float(np.hypot(std[0], HIDDEN_IRON * round_z.flattening * elements["H"]))
@@ -205,7 +205,7 @@ def _remaining_per_mille(outputs: Array, middle: Array, round_z: Ellipse, about_
     return float(1e3 * size.std() / size.mean())
 
 
-def _of_field(base: Array) -> dict[str, float]:
+def _elements(base: Array) -> dict[str, float]:
     x, y, z = base[0], -base[1], -base[2]
     elements = {
         "F": total(x, y, z),

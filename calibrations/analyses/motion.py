@@ -248,7 +248,7 @@ def _motion_part(x: Array, record: Record, reference: Reference) -> Array:
 
 def linear_from_turns(sweep: Table) -> Model:
     """Ang (1)-(3). Raises DataError where an axis was not held at both +1 g and -1 g."""
-    sweep = _in_plane(sweep)
+    sweep = _plane_axes(sweep)
     ends = {axis: [_mean(sweep, axis, beta_deg) for beta_deg in UPRIGHT_DEG[axis]] for axis in sweep.axes}
     unit = sweep.unit
     values = {
@@ -264,7 +264,7 @@ def linear_from_turns(sweep: Table) -> Model:
 
 def fit_physical(sweep: Table) -> Model:
     """The physical model of this sweep. Raises TooFewRows, DataError."""
-    sweep = _in_plane(sweep)
+    sweep = _plane_axes(sweep)
     is_two_way = "direction" in sweep and np.ptp(sweep.column("direction")) > 0
     model = read_model("physical")
     return fit(
@@ -272,7 +272,7 @@ def fit_physical(sweep: Table) -> Model:
     ).model
 
 
-def _in_plane(sweep: Table) -> Table:
+def _plane_axes(sweep: Table) -> Table:
     """The sweep with the axes that a table of motion has: those in the plane of the table of beta."""
     kept_names = {*KINDS["motion"].outputs, *KINDS["motion"].digital}
     dropped = {name for name in sweep.output_names if name not in kept_names}

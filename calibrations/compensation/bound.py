@@ -281,8 +281,8 @@ def prove_bound(
     if not np.isfinite(slopes).all() or abs(np.linalg.det(slopes / (np.max(np.abs(slopes)) or 1.0))) < 1e-9:
         return None
     C = np.asarray(np.linalg.inv(slopes), dtype=np.float64)
-    first = _greatest(outputs, unknowns, reach, inputs, C)
-    q = _greatest(outputs, unknowns, (1 + first) * reach, inputs, C) if first < 1 else first
+    first = _greatest_values(outputs, unknowns, reach, inputs, C)
+    q = _greatest_values(outputs, unknowns, (1 + first) * reach, inputs, C) if first < 1 else first
     if not q < 1:
         return None
     steps = max(1, math.ceil(math.log(want / reach) / math.log(max(q, SMALLEST_FACTOR))))
@@ -306,7 +306,7 @@ def _middle(ends: tuple[float, float]) -> Interval:
     return Interval(np.array([low]), np.array([high]))
 
 
-def _greatest(
+def _greatest_values(
     outputs: Sequence[Node],
     unknowns: tuple[str, ...],
     reach: float,

@@ -64,7 +64,7 @@ def result_uncertainty(
     covered = {name: _measured_span(name, span, model) for name, span in inputs.items()}
     far = reach * a / np.abs(a).max(axis=1, keepdims=True)
     stds = np.concatenate([_stds(model, forward, table, a, point) for point in _corners(covered)])
-    point, largest = _largest(lambda place: _stds(model, forward, table, far, place), inputs)
+    point, largest = _largest_error(lambda place: _stds(model, forward, table, far, place), inputs)
     rms = float(np.sqrt(np.mean(stds**2, axis=0)).max())
     return Uncertainty(covered, rms, float(stds.max()), max(largest, float(stds.max())), point)
 
@@ -86,7 +86,7 @@ def _corners(spans: Mapping[str, Span]) -> list[Inputs]:
     return [dict(zip(spans, values, strict=True)) for values in product(*levels)]
 
 
-def _largest(stds: Stds, spans: Mapping[str, Span]) -> tuple[Inputs, float]:
+def _largest_error(stds: Stds, spans: Mapping[str, Span]) -> tuple[Inputs, float]:
     """Where the greatest is: at the worst corner, from where each input is tried over its range in turn."""
 
     def most(place: Inputs) -> float:
@@ -137,14 +137,14 @@ def _stds(model: Model, forward: Forward, table: Table, a: Array, inputs: Inputs
 def _perturb_models(model: Model) -> Sequence[tuple[Model, Model]]:
     """The model with each known parameter moved a little, up and down; in the order of `params`."""
     return [
-        (_with(model, i, j, PARAMETER_STEP * e.std), _with(model, i, j, -PARAMETER_STEP * e.std))
+        (_with_change(model, i, j, PARAMETER_STEP * e.std), _with_change(model, i, j, -PARAMETER_STEP * e.std))
         for i, term in enumerate(model.terms)
         for j, e in enumerate(term.estimates)
         if e.std and e.identified
     ]
 
 
-def _with(model: Model, i: int, j: int, change: float) -> Model:
+def _with_change(model: Model, i: int, j: int, change: float) -> Model:
     term: Term = model.terms[i]
     estimate: Estimate = replace(term.estimates[j], value=term.estimates[j].value + change)
     estimates = (*term.estimates[:j], estimate, *term.estimates[j + 1 :])
@@ -229,7 +229,7 @@ def compensation_costs(
     needs_gravity = unit == "g" and len(forward.axes) == 2 and "az" in program.inputs
     return Cost(
         {name: _error_of_excluded_effect(name, model, followed, trial) for name in forward.left_out},
-        _of_gravity(followed, trial) if needs_gravity else None,
+        _gravity_error(followed, trial) if needs_gravity else None,
         result_uncertainty(
             reduced, forward, table, a, {name: spans[name] for name in program.inputs if name in spans}, reach
         ),
@@ -308,6 +308,6 @@ def _error_of_excluded_effect(name: str, model: Model, followed: Sequence[Step],
     return trial.size(trial.program.run(inputs))
 
 
-def _of_gravity(followed: Sequence[Step], trial: _Trial) -> ErrorSize:
+def _gravity_error(followed: Sequence[Step], trial: _Trial) -> ErrorSize:
     side = np.where(trial.a[:, 2] < 0, -1.0, 1.0)
     return trial.size(restore_axis_by_gravity(trial.program, trial.inputs(followed), side))

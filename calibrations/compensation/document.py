@@ -130,11 +130,11 @@ def _inputs(compensation: Compensation) -> Iterator[str]:
     for axis in compensation.forward.axes:
         yield f"  v{axis}  output of the {axis} axis, {unit_of_input(f'v{axis}', compensation)}"
     for name, (low, high) in compensation.input_limits.items():
-        yield f"  {name}  {unit_of_input(name, compensation)}, from {low:g} to {high:g}{_of_axis(name, compensation)}"
+        yield f"  {name}  {unit_of_input(name, compensation)}, from {low:g} to {high:g}{_axis_text(name, compensation)}"
     yield f"Proved for +-{compensation.range.reach:g} {compensation.unit} on each axis; not beyond these ranges."
 
 
-def _of_axis(name: str, compensation: Compensation) -> str:
+def _axis_text(name: str, compensation: Compensation) -> str:
     if name not in ("ax", "ay", "az"):
         return ""
     if (size := compensation.costs.out_of_gravity) is None:
@@ -297,14 +297,14 @@ def make_vectors(compensation: Compensation, count: int = COUNT) -> ReferenceVec
     unit = scipy.stats.qmc.Sobol(len(ranges), scramble=False).random(count)
     low, high = np.array(list(ranges.values())).T
     inputs_by_name = dict(zip(ranges, (low + unit * (high - low)).T, strict=True))
-    outputs = [np.broadcast_to(v, count) for v in _in_a_row(compensation, inputs_by_name, count)]
+    outputs = [np.broadcast_to(v, count) for v in _successive_outputs(compensation, inputs_by_name, count)]
     inputs_by_name |= {f"v{axis}": v for axis, v in zip(compensation.forward.axes, outputs, strict=True)}
     inputs = np.column_stack([inputs_by_name[name] for name in compensation.program.inputs])
     expected = np.column_stack([inputs_by_name[name] for name in compensation.forward.unknowns])
     return ReferenceVectors(inputs, expected, TOLERANCE[compensation.precision] * compensation.range.reach)
 
 
-def _in_a_row(compensation: Compensation, inputs: Mapping[str, Array], count: int) -> list[Array]:
+def _successive_outputs(compensation: Compensation, inputs: Mapping[str, Array], count: int) -> list[Array]:
     """The model's outputs for successive samples, shape (count,) each."""
     forward = compensation.forward
     if not forward.memory:

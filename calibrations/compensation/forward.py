@@ -33,7 +33,7 @@ from calibrations.tables import KINDS
 # Names that an input may have in every output language: a user's column may have any name.
 
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-TAKEN = re.compile(
+RESERVED = re.compile(
     r"t\d+|table\d+|in|out|step|math|memory|a[xyz]|v[xyz]|m\d+[xyz]"  # of the sources themselves
     r"|auto|case|char|const|default|do|double|enum|extern|float|goto|inline|int|long|register|restrict|short|signed"
     r"|sizeof|static|struct|switch|typedef|union|unsigned|void|volatile"  # of C
@@ -43,12 +43,12 @@ TAKEN = re.compile(
 
 def can_be_written(name: str) -> bool:
     """Whether an input of that name is possible in every language."""
-    return bool(IDENTIFIER.fullmatch(name)) and not iskeyword(name) and not TAKEN.fullmatch(name)
+    return bool(IDENTIFIER.fullmatch(name)) and not iskeyword(name) and not RESERVED.fullmatch(name)
 
 
 INVERTED, OF_THE_RIG, NOISE, LEFT_OUT = "inverted", "of the rig", "noise", "left out"
 NOTHING = "nothing: noise cannot be compensated"
-KNOWN = ("temperature_c", "supply_v", "t_s", RATE)  # inputs that a product may have besides the outputs
+FURTHER_INPUTS = ("temperature_c", "supply_v", "t_s", RATE)  # inputs that a product may have besides the outputs
 FORCES = ("ax", "ay", "az")
 
 
@@ -130,7 +130,7 @@ def trace_model(model: Model, without: Collection[str] = ()) -> Forward:
     """The graphs of a fitted model; the effects in `without` are left out."""
     axes, steps = measured_axes(model), steps_of(model)
     own_columns = {name for effect, _ in steps for name in effect.needs if name not in NUMBERS and can_be_written(name)}
-    table = RunTime(axes, {name: name for name in (*KNOWN, *sorted(own_columns))})
+    table = RunTime(axes, {name: name for name in (*FURTHER_INPUTS, *sorted(own_columns))})
     fates = [_fate(step, table, without) for step in steps]
     inverted = [step for step, fate in zip(steps, fates, strict=True) if fate.how == INVERTED]
     traced, memories = _outputs(inverted, table)

@@ -18,7 +18,7 @@ from calibrations.design.orientations import ALIKE, FIRST_SIDES, ORIENTATIONS, g
 from calibrations.table import Array
 
 EDGES_UP = 18  # sides and edges can be laid upward; a corner hardly keeps its heading
-PREFERRED = 0.85  # share of the best gain that is enough for a side upward, which rests on the table
+PREFERRED_SHARE = 0.85  # share of the best gain that is enough for a side upward, which rests on the table
 ASSUMED_DIP_DEG = 60.0  # of the field below the horizontal, until positions show it
 
 
@@ -85,7 +85,7 @@ def next_attitude(measured: Array, field: Array, last: Attitude | None) -> NextA
     """
     candidates = MATRICES @ field
     gains = gain(measured, candidates)
-    if len(measured) < FIRST_SIDES or gains[LIES].max() >= PREFERRED * gains.max():
+    if len(measured) < FIRST_SIDES or gains[LIES].max() >= PREFERRED_SHARE * gains.max():
         gains = np.where(LIES, gains, -np.inf)
     best = np.flatnonzero(gains >= gains.max() - ALIKE * abs(gains.max()))
     reference = FIRST if last is None else last

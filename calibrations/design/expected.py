@@ -199,7 +199,7 @@ def _values(layout: Layout) -> Array:
 # The outputs are those of the fitted model, without noise. As in each table, the noise is given by the standard
 # deviation of single samples and by their number, both from the data of the fit, so a longer dwell has less noise.
 
-PLANNED = ("t_s", "direction")  # a plan's own: the mean of other data does not replace them
+PLAN_COLUMNS = ("t_s", "direction")  # a plan's own: the mean of other data does not replace them
 
 
 def predict_data(template: Fit, columns: Mapping[str, Array]) -> Table:
@@ -231,7 +231,7 @@ def predict_data(template: Fit, columns: Mapping[str, Array]) -> Table:
 
 def _unplanned_columns(template: Fit) -> set[str]:
     """Columns of the data that the model's effects read, and that a plan need not know."""
-    return {name for term in template.model.terms for name in term.effect.needs} - set(PLANNED)
+    return {name for term in template.model.terms for name in term.effect.needs} - set(PLAN_COLUMNS)
 
 
 def _check_planned(template: Fit, table: Table) -> None:

@@ -21,7 +21,7 @@ from calibrations.geometry.sphere import harmonics, sphere_centre
 from calibrations.table import AXES, Array
 
 FIRST_SIDES = 6  # a sphere's centre is known after five positions: until then only whole sides can be named
-KNOWN_AFTER = 5
+CENTRE_POSITIONS = 5
 ALIKE = 0.02  # relative difference of gains that counts as none: the nearer orientation is chosen
 GOOD_SHARE = 0.5  # share of the best gain that makes any other position worth taking
 CELL_DEG = 30.0  # distance from a named orientation within which it counts as covered
@@ -51,7 +51,7 @@ def directions_up(outputs: Array, named_directions: Array) -> Array:
 
     The first positions do not determine the zero of the sensor: for them these are `named_directions` (n, 3).
     """
-    if len(outputs) < KNOWN_AFTER:
+    if len(outputs) < CENTRE_POSITIONS:
         return named_directions
     centred = outputs - sphere_centre(outputs)
     return np.asarray(centred / np.linalg.norm(centred, axis=1, keepdims=True))

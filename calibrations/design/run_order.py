@@ -56,7 +56,7 @@ class Tour:
         Relative: 0 if no order of time is in the poses' order.
         """
         axes, p = self.rows.shape[1:]
-        drift_part = (self._trend.T @ self._rooted[order]).reshape(len(DEGREES) * axes, p)
+        drift_part = (self._trend.T @ self._basis_rows[order]).reshape(len(DEGREES) * axes, p)
         remaining = np.eye(len(drift_part)) - drift_part @ drift_part.T
         if np.linalg.eigvalsh(remaining)[0] < RELATIVE_RANK:
             return float("inf")
@@ -77,7 +77,7 @@ class Tour:
         return np.asarray(flat / np.where(size > 0, size, 1.0))
 
     @cached_property
-    def _rooted(self) -> Array:
+    def _basis_rows(self) -> Array:
         """Rows of an orthonormal basis, (n, axes * p)."""
         return np.asarray((self._flat @ self._root).reshape(len(self.rows), -1))
 

@@ -3,6 +3,6 @@
 What the file of an effect imports: `from calibrations.effects import Effect, Parameter, Values`.
 """
 
-from calibrations.effects.effect import HOOKS, OF_ACCELEROMETERS, Constant, Effect, Parameter, Values
+from calibrations.effects.effect import ACCELEROMETER_KINDS, HOOKS, Constant, Effect, Parameter, Values
 
-__all__ = ["HOOKS", "OF_ACCELEROMETERS", "Constant", "Effect", "Parameter", "Values"]
+__all__ = ["ACCELEROMETER_KINDS", "HOOKS", "Constant", "Effect", "Parameter", "Values"]

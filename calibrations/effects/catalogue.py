@@ -20,7 +20,7 @@ from calibrations.effects.effect import HOOKS, Effect
 from calibrations.errors import ModelError, UnknownName, nearest
 
 LOG = logging.getLogger(__name__)  # warnings are printed to standard error by default
-SHIPPED = ("signal", "noise")  # folders
+SHIPPED_FOLDERS = ("signal", "noise")  # folders
 CHOSEN = "_chosen"  # of an effect that was made from a user's class
 
 
@@ -31,7 +31,9 @@ def catalogue(folder: Path | None = None) -> Mapping[str, Effect]:
     Raises ModelError for a file that is not an effect, naming what it lacks, and for one with a shipped one's name.
     """
     effects = {
-        e.name: e for part in SHIPPED for e in _read_folder(Path(__file__).parent / part, f"{__package__}.{part}")
+        e.name: e
+        for part in SHIPPED_FOLDERS
+        for e in _read_folder(Path(__file__).parent / part, f"{__package__}.{part}")
     }
     effects = dict(sorted(effects.items()))
     if folder is not None:
@@ -83,10 +85,10 @@ def load_effect(source: Effect | type[Effect] | str | Path) -> Effect:
         raise ModelError(
             f"{source!r} is not an effect; give its name, its file, or a class that derives from cal.Effect"
         )
-    return _of_class(cls)
+    return _class_effect(cls)
 
 
-def _of_class(cls: type[Effect]) -> Effect:
+def _class_effect(cls: type[Effect]) -> Effect:
     """The effect of a user's class. A message names the class and the method where something fails."""
     effect = cls()
     _require_parts(effect, cls.__name__)

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from calibrations.spectrum import Bands
 
 HOOKS = ("pose", "force", "transduction", "output", "spectrum", "lines")  # places, in the order of the signal chain
-OF_ACCELEROMETERS = tuple(name for name, kind in KINDS.items() if kind.fitted and kind.input_unit == "g")
+ACCELEROMETER_KINDS = tuple(name for name, kind in KINDS.items() if kind.fitted and kind.input_unit == "g")
 NOTHING = np.zeros((1, 3))
 
 
@@ -137,7 +137,7 @@ class Effect:
     source: str = ""
 
     needs: tuple[str, ...] = ()
-    kinds: tuple[str, ...] = OF_ACCELEROMETERS
+    kinds: tuple[str, ...] = ACCELEROMETER_KINDS
     after: tuple[str, ...] = ()
     contains: tuple[str, ...] = ()
     exact: bool = False

@@ -30,7 +30,7 @@ from calibrations.tables import KINDS
 LONGEST = 400  # characters
 DEEPEST = 40  # operations within one another
 INSTEAD = {"^": "a power is **", "&": "to join conditions multiply them", "|": "max(a, b) holds where one of two does"}
-OF_ANGLES = ("sin", "cos", "tan")
+ANGLE_FUNCTIONS = ("sin", "cos", "tan")
 TARGETS = ("v", "vx", "vy", "vz", "alpha_deg", "beta_deg")
 HUGE = 1e100  # larger than any measurement, and its square is a finite number
 MANY = 20  # arguments of min and max
@@ -47,9 +47,9 @@ COLUMNS: Mapping[str, str] = {
 }
 ANGLES = ("alpha", "beta", "mount")
 FORCES = ("ax", "ay", "az")
-MEASURED = {name for kind in KINDS.values() for name in kind.outputs} - {*FORCES}
-OF_THE_MEAN = {name for name in NUMBERS if name == "n" or "_std" in name}  # say nothing of the sensor
-KNOWN = {*COLUMNS, *FORCES, *NUMBERS} - OF_THE_MEAN  # without a table at hand
+OUTPUT_NAMES = {name for kind in KINDS.values() for name in kind.outputs} - {*FORCES}
+MEAN_NUMBERS = {name for name in NUMBERS if name == "n" or "_std" in name}  # say nothing of the sensor
+KNOWN = {*COLUMNS, *FORCES, *NUMBERS} - MEAN_NUMBERS  # without a table at hand
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ def evaluate(node: Node, values: Mapping[str, Array]) -> Array:
 
 def may_be_column(name: str) -> bool:
     """Whether an unknown name may be a column of a table. Columns that describe the means (n, std) are excluded."""
-    return name not in KNOWN and name not in OF_THE_MEAN
+    return name not in KNOWN and name not in MEAN_NUMBERS
 
 
 def variables(names: Iterable[str], table: Table) -> dict[str, Array]:
@@ -269,7 +269,7 @@ class _Reader:
             expected = f"{operation.least}" if operation.least == operation.most else f"{operation.least} or more"
             raise self._fault(syntax, f"{name} takes {expected} between its brackets, not {len(arguments)}")
         applied = self._apply(syntax, operation, arguments, depth)
-        if name in OF_ANGLES and (degrees := _degrees(applied)):
+        if name in ANGLE_FUNCTIONS and (degrees := _degrees(applied)):
             remedy = f"write {degrees.removesuffix('_deg')}, the same in rad, or {degrees}*pi/180"
             raise self._fault(syntax, f"{name} takes rad, and {degrees} is in degrees: {remedy}")
         return applied

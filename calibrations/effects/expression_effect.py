@@ -14,13 +14,13 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from calibrations.effects import OF_ACCELEROMETERS, Effect, Parameter, Values
+from calibrations.effects import ACCELEROMETER_KINDS, Effect, Parameter, Values
 from calibrations.effects.expression import (
     COLUMNS,
     FORCES,
     FUNCTIONS,
     KNOWN,
-    MEASURED,
+    OUTPUT_NAMES,
     Expression,
     evaluate,
     forces,
@@ -46,7 +46,7 @@ def effect_for(name: str, text: str, table: Table) -> Effect:
     Raises ExpressionError for text that is no expression, and for a name that looks like a misspelt column.
     """
     expression = parse(text)
-    column_names = {*COLUMNS, *FORCES, *(column for column in table.columns if column not in MEASURED)}
+    column_names = {*COLUMNS, *FORCES, *(column for column in table.columns if column not in OUTPUT_NAMES)}
     for word, column_number in expression.names.items():
         similar = difflib.get_close_matches(word, column_names | {*FUNCTIONS}, n=1, cutoff=MISSPELT)
         if similar and word not in column_names and len(word) > 3 and not word.startswith(similar[0]):
@@ -77,7 +77,7 @@ def own_effect(name: str, text: str, columns: tuple[str, ...] = ()) -> Effect:
     expression = parse(text)
     parameters = tuple(word for word in expression.names if word not in KNOWN and word not in columns)
     _check(expression, parameters)
-    return (_OnAngle if _on_angle(expression) else _OnOutput)(name, expression, parameters)
+    return (_OnAngle if _is_on_angle(expression) else _OnOutput)(name, expression, parameters)
 
 
 class _FromExpression(Effect):
@@ -96,7 +96,7 @@ class _FromExpression(Effect):
         self.name, self.expression = name, expression.text
         self.formula = expression.text if "+=" in expression.text else f"v += {expression.text}"
         self.needs = _required_columns(expression, parameters)
-        self.kinds = OF_ACCELEROMETERS if target == "v" else ("poses", "motion")
+        self.kinds = ACCELEROMETER_KINDS if target == "v" else ("poses", "motion")
         self.constants = {_scale(p): partial(_size, expression, parameters, p) for p in parameters}
         self.parameters = tuple(
             Parameter(
@@ -162,7 +162,7 @@ class _OnOutput(_FromExpression):
         return contribution
 
 
-def _on_angle(expression: Expression) -> bool:
+def _is_on_angle(expression: Expression) -> bool:
     return expression.target.endswith("_deg")
 
 
@@ -170,16 +170,16 @@ def _required_columns(expression: Expression, parameters: tuple[str, ...]) -> tu
     """Columns without which it has no value."""
     words = [word for word in expression.names if word not in {*FORCES, *parameters}]
     target = expression.target
-    of_target = [target] if _on_angle(expression) else []
+    of_target = [target] if _is_on_angle(expression) else []
     return tuple(dict.fromkeys([COLUMNS.get(word, word) for word in words] + of_target))
 
 
 def _check(expression: Expression, parameters: tuple[str, ...]) -> None:
     """Raise ExpressionError for an expression that is not an effect."""
     for word, column in expression.names.items():
-        if word in MEASURED:
+        if word in OUTPUT_NAMES:
             raise expression.fault(column, f"{word} is the measured output; write the effect in ax, ay, az")
-        if _on_angle(expression) and word in FORCES:
+        if _is_on_angle(expression) and word in FORCES:
             raise expression.fault(column, f"{word} follows from the stage angles; write this in alpha and beta")
     if not parameters:
         raise ExpressionError(

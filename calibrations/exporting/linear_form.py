@@ -20,7 +20,7 @@ from calibrations.table import Array
 SENSOR = {"g": "accelerometer", "deg/s": "gyroscope", "field": "magnetometer"}
 DIAGONAL, SYMMETRIC, FULL, OFFSETS = "diagonal", "symmetric", "full", "offsets"
 NEGLIGIBLE = 1e-8  # of the largest input: a loss below this is not named
-IN_SI = {"m/s2": 1.0, "rad/s": 1.0, "deg/s": np.pi / 180, "gauss": 1.0, "uT": 1e-2, "mgauss": 1e-3}
+SI_FACTORS = {"m/s2": 1.0, "rad/s": 1.0, "deg/s": np.pi / 180, "gauss": 1.0, "uT": 1e-2, "mgauss": 1e-3}
 CANNOT = {
     DIAGONAL: "the format has an offset and a scale for each axis",
     OFFSETS: "the format has an offset for each axis only",
@@ -93,7 +93,7 @@ def unit_factor(unit: str, target: str, gravity_m_s2: float) -> float | None:
     """Units of `target` in one `unit`; None where they are not of one kind."""
     kinds = {"m/s^2": ("m/s2", "g", "mg"), "rad/s": ("rad/s", "deg/s"), "gauss": ("gauss", "mgauss", "uT")}
     unit_name = {"gauss": "gauss", "G": "gauss", "mgauss": "mgauss", "mG": "mgauss"}.get(unit) or parse_unit(unit)
-    factors = {**IN_SI, "g": gravity_m_s2, "mg": 1e-3 * gravity_m_s2}
+    factors = {**SI_FACTORS, "g": gravity_m_s2, "mg": 1e-3 * gravity_m_s2}
     return factors[unit_name] if unit_name in kinds[target] else None
 
 

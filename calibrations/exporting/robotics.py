@@ -57,12 +57,12 @@ def imucal(sensors: Sequence[Simulated], comment: str) -> Exported:
         gains = np.linalg.norm(forward, axis=1)
         document |= {f"K_{letter}": np.diag(gains).tolist(), f"R_{letter}": (forward / gains[:, None]).tolist()}
         document[f"b_{letter}"] = form.offsets[0].tolist()
-    document["K_ga"] = _of_acceleration(rate).tolist()
+    document["K_ga"] = _acceleration_response(rate).tolist()
     parts = [export_form(acceleration, forms[0]), export_form(rate, forms[1], held_effects=(G_SENSITIVITY,))]
     return Exported.of_parts(json.dumps(document, indent=1) + "\n", parts)
 
 
-def _of_acceleration(rate: Outputs) -> Array:
+def _acceleration_response(rate: Outputs) -> Array:
     """Output of the gyroscope in rad/s by specific force in m/s^2, (3, 3)."""
     simulated = rate.simulated
     sensitivity = np.zeros((3, 3))

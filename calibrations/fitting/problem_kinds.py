@@ -23,7 +23,7 @@ from calibrations.model import Model
 from calibrations.model.chain import LinearisedChain, Step, backward, magnitude_by_output, sensed, slope_at
 from calibrations.model.parameters import Layout
 from calibrations.table import Array, Table
-from calibrations.tables import FITTED
+from calibrations.tables import FITTED_KINDS
 
 if TYPE_CHECKING:
     from calibrations.geometry.turns import Turns
@@ -315,7 +315,7 @@ def make_problem(model: Model, table: Table) -> Problem:
 
 def check_kind(kind: str, source: str) -> None:
     """Raises ModelError for tables to which no model is fitted; known before any sample of theirs is read."""
-    if kind not in FITTED:
+    if kind not in FITTED_KINDS:
         raise ModelError(
             f"{source}: models are fitted to poses, positions, motion, rates or turns, not to a table of {kind}"
         )

@@ -326,12 +326,12 @@ def _stage(groups: SearchGroups, effects: Mapping[str, Effect], gram: Array, pro
     places: list[int] = []
     start = 0
     for group in groups.all:
-        if _of_stage(group, effects):
+        if _is_of_stage(group, effects):
             names += [(group.effect, p.name, p.unit) for p in effects[group.effect].parameters]
             places += range(start, start + group.columns.shape[2])
         start += group.columns.shape[2]
     return StageScore(tuple(names), projections[places], gram[np.ix_(places, places)])
 
 
-def _of_stage(group: Group, effects: Mapping[str, Effect]) -> bool:
+def _is_of_stage(group: Group, effects: Mapping[str, Effect]) -> bool:
     return bool(group.effect) and group.start == 0 and "pose" in effects[group.effect].places

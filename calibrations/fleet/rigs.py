@@ -56,7 +56,7 @@ def correct_stage_errors(table: Table, errors: StageErrors, effects: Mapping[str
 # Inseparable: an error common to all rigs from one of the sensors' design, and an error of a rig from one of a batch
 # where each batch was on one rig. Errors are therefore relative to the median of the rigs that batches connect.
 
-DETERMINED = 1e-8  # share of an information matrix: less is not known
+LEAST_INFORMATION = 1e-8  # share of an information matrix: less is not known
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ def _own_estimate(measured: Measured, own_rows: list[int], corrections: Array) -
     A = measured.stage.information
     information = A[own_rows][:, own_rows]
     size = np.diag(information)
-    if not np.all(size > 0) or np.linalg.cond(information / np.sqrt(np.outer(size, size))) > 1 / DETERMINED:
+    if not np.all(size > 0) or np.linalg.cond(information / np.sqrt(np.outer(size, size))) > 1 / LEAST_INFORMATION:
         return None
     score = measured.stage.score[own_rows] + A[own_rows] @ corrections
     return _OwnEstimate(measured, score, information, np.linalg.inv(information).astype(float))

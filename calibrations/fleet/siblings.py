@@ -163,7 +163,7 @@ def _means(y: Array, v: Array, tau: Array) -> tuple[Array, Array]:
 
 
 SWEEPS = 6
-SETTLED = 0.01  # relative change of the spreads
+CONVERGENCE = 0.01  # relative change of the spreads
 NOTHING = 1e-10  # information, in typical sizes, of a parameter that nothing is known of
 WIDE = 1e4  # spread, in typical sizes, before anything is known
 
@@ -212,7 +212,7 @@ def pool_siblings(theta: Array, information: Array, typical: Array) -> Pooled:
         for k in range(theta.shape[1]):
             siblings.append(fit_siblings(*_estimate_alone(scaled, weighted, prior, mean, k)))
             mean[:, k], prior[:, k] = _prior(siblings[-1])
-        if np.all(np.abs(prior / previous - 1) < SETTLED):
+        if np.all(np.abs(prior / previous - 1) < CONVERGENCE):
             break
     own_covariance = np.linalg.inv(scaled)
     std = np.sqrt(np.diagonal(own_covariance, axis1=1, axis2=2))

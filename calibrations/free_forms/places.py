@@ -28,7 +28,7 @@ from calibrations.free_forms.places_in_time import over_temperature, over_time, 
 from calibrations.free_forms.places_of_columns import over_columns, over_output
 from calibrations.free_forms.poses import LOGGED_DEG, SIDES, PoseData
 from calibrations.geometry.orientation import out_of_plane
-from calibrations.geometry.stage_path import AS_STATED
+from calibrations.geometry.stage_path import STATED_APPROACH
 from calibrations.table import Array
 
 WIDTHS_G = tuple(np.geomspace(0.01, 1.8, 14).tolist())  # of slip elements
@@ -244,7 +244,7 @@ def _history(data: PoseData, first: State) -> list[Component]:
     if not data.sides:
         return []
     has_approach = "approach_deg" in data.table.constants
-    start_shape = (AS_STATED if has_approach else LOGGED_DEG,)
+    start_shape = (STATED_APPROACH if has_approach else LOGGED_DEG,)
     components = [
         _make_slip(first, "slip", "", has_approach)(start_shape),
         _make_slip(first, "pressed-slip", "pressed", has_approach)(start_shape),
@@ -268,7 +268,7 @@ def _make_slip(first: State, name: str, factor: Factor, has_approach: bool) -> M
 
     def at(shape: tuple[float, ...]) -> Component:
         widths = Play(WIDTHS_G, memory=not factor and first.data.timed)
-        approach = AS_STATED if has_approach else abs(shape[0])
+        approach = STATED_APPROACH if has_approach else abs(shape[0])
         form = Form("history", name, "way", (widths,), factor, approach_deg=approach)
         return free(form, first, "hysteresis", PRODUCT if factor else 0.0, shape=shape, step=(2.0,),
                     reshaped=None if has_approach else _make_slip(first, name, factor, has_approach),
@@ -281,7 +281,7 @@ def _loops(first: State, has_approach: bool) -> Make:
     """Hysteresis with loops that depend on the force; the shape is the start of the approach, degrees before a pose."""
 
     def at(shape: tuple[float, ...]) -> Component:
-        approach = AS_STATED if has_approach else abs(shape[0])
+        approach = STATED_APPROACH if has_approach else abs(shape[0])
         reach = 1.05 * float(np.abs(first.force).max())
         basis = Preisach(LOOPS_G, -reach, reach, LOOP_INTERVALS)
         form = Form("history", "loops", "way", (basis,), approach_deg=approach)

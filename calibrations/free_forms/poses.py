@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from calibrations.geometry.orientation import one_orientation
-from calibrations.geometry.stage_path import AS_STATED, last_turn, turning_points, with_approach
+from calibrations.geometry.stage_path import STATED_APPROACH, last_turn, turning_points, with_approach
 from calibrations.table import Array, Table
 
 USED = {"alpha_deg", "beta_deg", "mount_deg", "flip", "t_s", "direction", "temperature_c", "supply_v", "n", "path",
         "alpha_set_deg", "beta_set_deg", "excluded"}  # fmt: skip
 LOGGED_DEG = 5.0  # approach of a pose whose side is taken from the column `direction`
 
-SIDES = {0.0: "moved", LOGGED_DEG: "logged", AS_STATED: "stated"}  # names of sides by the length of the approach
+SIDES = {0.0: "moved", LOGGED_DEG: "logged", STATED_APPROACH: "stated"}  # names of sides by the length of the approach
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ def _sides(table: Table) -> dict[float, Array]:
     if "direction" not in table and "t_s" not in table:
         return {}
     if "approach_deg" in table.constants:
-        return {AS_STATED: last_turn(table)}
+        return {STATED_APPROACH: last_turn(table)}
     approach_side = last_turn(with_approach(table, 0.0))
     if "direction" not in table or not table.column("direction").any():
         return {0.0: approach_side}

@@ -15,12 +15,12 @@ from calibrations.criteria import SHORTEST_APPROACH_DEG
 from calibrations.geometry.orientation import Pose, specific_force
 from calibrations.table import Array, Table
 
-AS_STATED = -1.0  # an approach as the table states it
+STATED_APPROACH = -1.0  # an approach as the table states it
 
 
 @lru_cache(maxsize=64)
 def with_approach(table: Table, by_deg: float) -> Table:
-    """The table with an approach that begins so many degrees before each pose; the table itself for `AS_STATED`."""
+    """The table with an approach that begins so many degrees before each pose; the same table for `STATED_APPROACH`."""
     return table if by_deg < 0 else replace(table, constants={**table.constants, "approach_deg": by_deg})
 
 

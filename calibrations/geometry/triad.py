@@ -29,13 +29,13 @@ def gravity_directions(means: Array) -> Array:
         return unit_vectors(scaled)
 
     def residual(theta: Array) -> Array:
-        return np.asarray(np.linalg.norm(_corrected(scaled, theta), axis=1) - 1)
+        return np.asarray(np.linalg.norm(_correct(scaled, theta), axis=1) - 1)
 
     start = np.concatenate([np.zeros(3), np.eye(3)[LOWER]])
-    return unit_vectors(_corrected(scaled, least_squares(residual, start).x))
+    return unit_vectors(_correct(scaled, least_squares(residual, start).x))
 
 
-def _corrected(scaled: Array, theta: Array) -> Array:
+def _correct(scaled: Array, theta: Array) -> Array:
     matrix = np.zeros((3, 3))
     matrix[LOWER] = theta[3:]
     return np.asarray((scaled - theta[:3]) @ matrix.T)

@@ -97,7 +97,7 @@ class Turns(Table):
         """How the residual of its turn follows the rates of each sample, to first order, (samples, channels, 3)."""
         durations = self.samples.column("duration_s")
         result = np.zeros((self.samples.n, len(CHANNELS), 3))
-        to_end = _to_end(self._steps(rates_deg_s))
+        to_end = _frames_to_end(self._steps(rates_deg_s))
         for k, (a, b) in enumerate(self.bounds):
             share = durations[a + 1 : b - 1] / durations[a + 1 : b - 1].sum()
             result[a + 1 : b - 1, :2] = share[:, None, None] * (self.along[k] @ to_end[k, : b - a - 2])
@@ -112,7 +112,7 @@ class Turns(Table):
     def _steps(self, rates_deg_s: Array) -> Array:
         """The rotation vectors of the steps of each turn, rad, padded with zeros, shape (n, steps, 3)."""
         angles = np.radians(rates_deg_s) * self.samples.column("duration_s")[:, None]
-        return _padded([angles[a + 1 : b - 1] for a, b in self.bounds])
+        return _pad([angles[a + 1 : b - 1] for a, b in self.bounds])
 
 
 @lru_cache(maxsize=8)
@@ -204,7 +204,7 @@ def _rows(table: Table, samples: Table, bounds: NDArray[np.intp], before: Array,
     durations = samples.column("duration_s")
     bias, matrix = _rough_calibration(samples, bounds, before, after)
     rates = (np.column_stack([samples.column(name) for name in RATES]) - bias) @ matrix.T
-    steps = _padded([np.radians(rates[a + 1 : b - 1]) * durations[a + 1 : b - 1, None] for a, b in bounds])
+    steps = _pad([np.radians(rates[a + 1 : b - 1]) * durations[a + 1 : b - 1, None] for a, b in bounds])
     axis = unit_vectors(-_rotation_vectors(_products(_rotations(-steps))))
 
     def means(values: Array) -> Array:
@@ -272,7 +272,7 @@ def _rough_calibration(samples: Table, bounds: NDArray[np.intp], before: Array, 
     outputs, durations = np.column_stack([samples.column(name) for name in RATES]), samples.column("duration_s")
     bias = outputs[np.concatenate([bounds[:, 0], bounds[:, 1] - 1])].mean(axis=0)
     parts = [(outputs[a + 1 : b - 1] - bias) * durations[a + 1 : b - 1, None] for a, b in bounds]
-    steps = _padded(parts)
+    steps = _pad(parts)
     angles = np.arccos(np.clip(np.sum(before * after, axis=1), -1, 1))
     path = np.array([np.linalg.norm(part, axis=1).sum() for part in parts])
     if not np.all(path > 0):
@@ -291,7 +291,7 @@ def _rough_calibration(samples: Table, bounds: NDArray[np.intp], before: Array, 
     return bias, np.degrees(found.x.reshape(3, 3))
 
 
-def _padded(parts: Sequence[Array]) -> Array:
+def _pad(parts: Sequence[Array]) -> Array:
     """Parts (steps, 3) of different lengths in one array (n, steps, 3), with zeros behind."""
     padded = np.zeros((len(parts), max(len(part) for part in parts), 3))
     for row, part in zip(padded, parts, strict=True):
@@ -314,7 +314,7 @@ def _products(rotations: Array) -> Array:
     return np.asarray(rotations[:, 0])
 
 
-def _to_end(steps: Array) -> Array:
+def _frames_to_end(steps: Array) -> Array:
     """From the frame in the middle of each step (n, steps, 3) to the frame after the last, (n, steps, 3, 3)."""
     rotations, half = _rotations(-steps), _rotations(-steps / 2)
     result, later = np.empty_like(rotations), np.broadcast_to(np.eye(3), (len(steps), 3, 3))

@@ -37,7 +37,7 @@ ULOG_FIELDS: Mapping[str, Mapping[str, str]] = {
 RAW = {"sensor_accel": "a", "sensor_gyro": "g", "sensor_mag": "m"}  # before the autopilot's correction
 ULOG_HEADER_BYTES = 16
 BLOCK_BYTES = 1 << 20  # of a log in memory at once, while its records are walked
-CORRECTED = "values after the autopilot's own correction: the fit finds the error that it left"
+CORRECTION_NOTE = "values after the autopilot's own correction: the fit finds the error that it left"
 
 
 def ulog_topics(path: Path) -> list[Topic]:
@@ -71,7 +71,7 @@ def _ulog_topic(data: Any, is_one_of_several: bool, remarks: tuple[str, ...]) ->
     def cells() -> Cells:
         return {column: _numbers(data.data[field]) for field, column in renamed.items()}
 
-    notes = remarks if data.name in RAW or not fields else (*remarks, f"{name}: {CORRECTED}")
+    notes = remarks if data.name in RAW or not fields else (*remarks, f"{name}: {CORRECTION_NOTE}")
     constants: dict[str, Constant] = {"device_id": float(ids[0])} if fields and ids[0] else {}
     sensor = next((s for s in "amg" if any(v.startswith(f"{s}x ") for v in fields.values())), "")
     return Topic(name, tuple(renamed.values()), rows, cells, None, constants, notes, refusal, sensor)
@@ -206,6 +206,6 @@ def _dataflash_topic(
     constants: dict[str, Constant] = {**applied}
     notes = (
         *remarks,
-        f"{name}: {CORRECTED}" + (f" ({len(applied)} parameters are kept with the run)" if applied else ""),
+        f"{name}: {CORRECTION_NOTE}" + (f" ({len(applied)} parameters are kept with the run)" if applied else ""),
     )
     return Topic(name, tuple(cells), len(cells["t_s (us)"]), lambda: cells, None, constants, notes, "", sensor)

@@ -24,11 +24,11 @@ from calibrations.table import AXES
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan"
 PAIR = rf"(?P<name>[A-Za-z_][\w.]*)\s*[:=]\s*(?P<value>{NUMBER})(?=[,;\s]|$)"
-NAMED = re.compile(PAIR)
+NAMED_VALUE = re.compile(PAIR)
 _ANOTHER = re.sub(r"\?P<\w+>", "", PAIR)
 NAMED_LINE = re.compile(rf"\s*{_ANOTHER}(?:[,;\s]+{_ANOTHER})+\s*")
 LONGEST = 1 << 26  # characters: the text is held in memory
-REFUSED: Mapping[str, str] = {  # pattern of the first line -> format of the file, and what to do
+REFUSED_FORMATS: Mapping[str, str] = {  # pattern of the first line -> format of the file, and what to do
     r"FMT, ?128, ?": "is a DataFlash log as text; import the .bin log that it was made from",
     r"version https://git-lfs": "is a pointer of Git LFS, not the file; get it with `git lfs pull`",
     r"<(!doctype|html)": "is a web page, not measurements; download the file itself",
@@ -58,12 +58,12 @@ def as_lines(source: Source) -> Source:
         first = next((line for line in lines if line.strip()), "").lstrip()
     if first.startswith(("{", "[")) and (document := _json_as_lines(source)) is not source:
         return document
-    for form, reason in REFUSED.items():
+    for form, reason in REFUSED_FORMATS.items():
         if re.match(form, first, re.IGNORECASE):
             raise DataError(f"{source.name}: {reason}")
     if not NAMED_LINE.fullmatch(first):
         return source
-    names = [match["name"] for match in NAMED.finditer(first)]
+    names = [match["name"] for match in NAMED_VALUE.finditer(first)]
     with source.lines(marked=True) as lines:
         rows = list(_rows(lines, names, source.name))
     return text_source("".join([",".join(names) + "\n", *rows]), source.name)
@@ -72,7 +72,7 @@ def as_lines(source: Source) -> Source:
 def _rows(lines: Iterator[str], names: list[str], name: str) -> Iterator[str]:
     """The values of each line, with its line end; a damaged line as it is, which the table then counts."""
     for line in filter(str.strip, _limit_length(lines, name)):
-        found = {match["name"]: match["value"] for match in NAMED.finditer(line)}
+        found = {match["name"]: match["value"] for match in NAMED_VALUE.finditer(line)}
         row = ",".join(found.values()) if list(found) == names else line.strip()
         yield row + "\n" if line.endswith("\n") else row
 
@@ -90,7 +90,7 @@ def _json_as_lines(source: Source) -> Source:
     try:
         document = json.loads(text)
     except (ValueError, RecursionError):
-        document = _by_lines(text)
+        document = _line_documents(text)
     if document is None:
         if source.name.endswith(".json"):
             raise DataError(f"{source.name}: is not valid JSON; {JSON_FORM}")
@@ -98,7 +98,7 @@ def _json_as_lines(source: Source) -> Source:
     return text_source(_csv_text(document, source.name), source.name)
 
 
-def _by_lines(text: str) -> Any:
+def _line_documents(text: str) -> Any:
     """The documents of single lines as a list; None if a line is not a document."""
     try:
         return [json.loads(line) for line in text.splitlines() if line.strip()]

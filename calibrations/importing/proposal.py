@@ -90,7 +90,7 @@ NAME_PATTERNS: Mapping[str, Sequence[tuple[str, str]]] = {
         (TIME, "t_s"),
     ),
 }
-INDEXED = re.compile(r"(?P<name>.*(?:acc|gyr|mag).*)\[(?P<index>\d)\]$", re.IGNORECASE)
+INDEXED_NAME = re.compile(r"(?P<name>.*(?:acc|gyr|mag).*)\[(?P<index>\d)\]$", re.IGNORECASE)
 SECTION = r"part|section|segment|phase|activity|label|step|^path$"  # of a session by hand, in a column of words
 LONG_TABLE = 150  # rows, of the first HEAD_LINES
 STD_COLUMNS = {"poses": "v{axis}_std_v", "positions": "a{axis}_std", "rates": "g{axis}_std"}
@@ -153,13 +153,13 @@ def likely_kind(laid: Sheet, mapped: Iterable[ColumnMapping] = ()) -> str:
     """`rates` with a gyroscope's outputs and a rate or named sections; `poses` with a stage angle; `motion` with a
     displacement; `positions` with three outputs; else `poses`.
     """
-    names = {*(m.name for m in mapped), *laid.bare, *(_by_name(unitless, "poses") for unitless in laid.bare)}
-    turned = {*names, *(_by_name(unitless, "rates") for unitless in laid.bare)}
+    names = {*(m.name for m in mapped), *laid.bare, *(_meaning_of_name(unitless, "poses") for unitless in laid.bare)}
+    turned = {*names, *(_meaning_of_name(unitless, "rates") for unitless in laid.bare)}
     if {"rate_deg_s", "gx"} <= turned or (_section(laid) and {"gx", "gy", "gz"} <= turned):
         return "rates"
     if {"alpha_deg", "beta_deg"} & names:
         return "poses"
-    if "displacement_m" in {*names, *(_by_name(unitless, "motion") for unitless in laid.bare)}:
+    if "displacement_m" in {*names, *(_meaning_of_name(unitless, "motion") for unitless in laid.bare)}:
         return "motion"
     if laid.named:
         return (
@@ -190,7 +190,7 @@ def guess_by_names(laid: Sheet, values: Mapping[str, Array], kind: str) -> list[
     """(their name, our name) for the columns with a meaningful name."""
     unitless = dict(zip(laid.header, laid.bare, strict=True))
     units = dict(zip(laid.header, laid.units, strict=True))
-    guesses = [(name, _by_name_and_unit(unitless[name], units[name], kind)) for name in values]
+    guesses = [(name, _meaning_of_column(unitless[name], units[name], kind)) for name in values]
     targets = {target for _, target in guesses}
     nameless = iter(name for name in KINDS[kind].outputs if name not in targets)
     likely = [name for name, target in guesses if not target and _is_output(unitless[name])]
@@ -240,16 +240,16 @@ def sensed_by(header: Iterable[str], topic: str) -> str:
     unitless = {split_unit(name)[0] for name in header}
     if {"vx_v", "alpha_deg"} & unitless:
         return "a"
-    for names in (unitless & NUMBERS, {_by_name(f"{topic}_{name}", "positions") for name in unitless}):
+    for names in (unitless & NUMBERS, {_meaning_of_name(f"{topic}_{name}", "positions") for name in unitless}):
         for sensor in "amg":
             if names.issuperset(sensor + axis for axis in AXES):
                 return sensor
     return ""
 
 
-def _by_name(unitless: str, kind: str) -> str:
+def _meaning_of_name(unitless: str, kind: str) -> str:
     """Our name for theirs, "" for a name without a known meaning."""
-    if (match := INDEXED.match(unitless)) and int(match["index"]) < len(AXES):
+    if (match := INDEXED_NAME.match(unitless)) and int(match["index"]) < len(AXES):
         unitless = f"{match['name']}_{AXES[int(match['index'])]}"  # accSmooth[0] of Betaflight
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", unitless)
     axis = next((m["axis"] for m in re.finditer(AXIS, re.sub(r"[^a-z]", " ", words.lower()))), "")
@@ -266,10 +266,10 @@ def _by_name(unitless: str, kind: str) -> str:
     return dict(zip(AXES, KINDS[kind].outputs, strict=False)).get(axis, "")
 
 
-def _by_name_and_unit(unitless: str, unit: str, kind: str) -> str:
+def _meaning_of_column(unitless: str, unit: str, kind: str) -> str:
     """Our name for theirs; a name whose unit is that of another quantity has the meaning of the unit."""
-    target = _by_name(unitless, kind)
-    return target if target and not _contradicts(unit, target) else _by_unit(unitless, unit)
+    target = _meaning_of_name(unitless, kind)
+    return target if target and not _contradicts(unit, target) else _meaning_of_unit(unitless, unit)
 
 
 def _contradicts(unit: str, target: str) -> bool:
@@ -278,7 +278,7 @@ def _contradicts(unit: str, target: str) -> bool:
     return bool(unit and target_unit and UNITS[unit][0] != target_unit)
 
 
-def _by_unit(unitless: str, unit: str) -> str:
+def _meaning_of_unit(unitless: str, unit: str) -> str:
     """Our name by the unit alone: a temperature or a time."""
     target_unit = UNITS[unit][0] if unit else ""
     return {"degC": "temperature_c", "s": "t_s"}.get(target_unit, "") if unitless else ""

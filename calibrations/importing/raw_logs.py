@@ -162,7 +162,7 @@ def thin_by_direction(log: Table) -> Table:
 
 SETTLE_S = 0.2  # dropped at each end of a dwell where the log shows the stages moving
 MOST_BLOCKS = 256  # stretches for the noise: limits time and memory
-MOUNTING = ("direction", "mount_deg", "flip")
+MOUNTING_COLUMNS = ("direction", "mount_deg", "flip")
 
 
 def is_pose_log(table: Table) -> bool:
@@ -200,7 +200,7 @@ def average_dwells(log: Table) -> Table:
     columns["n"] = np.array([float(b - a) for a, b in bounds])
     for name in ("alpha_deg", "beta_deg"):
         columns[name] = np.round(columns[name], 3)  # a jittering encoder's mean too is that of the same pose again
-    for name in MOUNTING:
+    for name in MOUNTING_COLUMNS:
         if name in log:
             columns[name] = np.array([log.columns[name][a] for a, _ in bounds])
     if "direction" not in log:
@@ -257,7 +257,7 @@ def _find_changes(log: Table) -> NDArray[np.bool_]:
     if "t_s" in log:
         gaps = np.abs(np.diff(log.columns["t_s"]))
         is_change[1:] = gaps > max(SHORTEST_PAUSE_S, LONGEST_PAUSE * float(np.median(gaps)))
-    for name in MOUNTING:
+    for name in MOUNTING_COLUMNS:
         if name in log:
             is_change[1:] |= np.diff(log.columns[name]) != 0
     for words in log.labels.values():

@@ -275,8 +275,8 @@ def read_cells(
     Raises DataError with file, line and column.
     """
     if sheet.cells is not None:
-        return _in_memory(sheet, sheet.cells, texts, required)
-    if not texts and (numbers := _at_once(sheet)) is not None:
+        return _columns_of_arrays(sheet, sheet.cells, texts, required)
+    if not texts and (numbers := _number_array(sheet)) is not None:
         return dict(zip(sheet.header, numbers.T, strict=True)), {}
     bad_lines = BadLines(sheet.name, sheet.skipped)
     columns = _one_by_one(sheet, texts, bad_lines)
@@ -284,7 +284,7 @@ def read_cells(
     return columns
 
 
-def _in_memory(
+def _columns_of_arrays(
     sheet: Sheet, cells: Mapping[str, Array | tuple[str, ...]], texts: Collection[str], required: Collection[str]
 ) -> tuple[Mapping[str, Array], Mapping[str, tuple[str, ...]]]:
     numbers, words = {}, {}
@@ -304,7 +304,7 @@ def _in_memory(
     return numbers, words
 
 
-def _at_once(sheet: Sheet) -> Array | None:
+def _number_array(sheet: Sheet) -> Array | None:
     """All cells as numbers, shape (rows, columns); None if a cell is not a number."""
     if len(sheet.header) != sheet.width:
         return None

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.errors import DataError, nearest
-from calibrations.files import LARGEST_BYTES, SMALL_BYTES, TIGHTEST, Source, text_source
+from calibrations.files import LARGEST_BYTES, LARGEST_RATIO, SMALL_BYTES, Source, text_source
 from calibrations.importing.proposal import sensed_by
 from calibrations.importing.sheet import HEAD_LINES, Sheet, read_sheet
 from calibrations.importing.units import split_unit
@@ -134,9 +134,9 @@ def require_size(path: Path, unpacked: int) -> None:
             f"{path}: holds {unpacked / 2**30:.1f} GiB of values; the limit is {LARGEST_BYTES >> 30} GiB; "
             "export a part of the log"
         )
-    if unpacked > max(SMALL_BYTES, TIGHTEST * packed):
+    if unpacked > max(SMALL_BYTES, LARGEST_RATIO * packed):
         raise DataError(
-            f"{path}: the unpacked file is more than {TIGHTEST} times larger, which is unusual for measurements; "
+            f"{path}: the unpacked file is more than {LARGEST_RATIO} times larger, which is unusual for measurements; "
             "if it is a table, save it without compression"
         )
 

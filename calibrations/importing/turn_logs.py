@@ -36,7 +36,7 @@ def cut_turns(columns: Mapping[str, Array], constants: Mapping[str, Constant], s
     Raises MissingConstant without times and sample rate, DataError for fewer rests than a gyroscope needs.
     """
     rate_hz = required_rate_hz(columns, constants, source)
-    rests = still_intervals(np.column_stack([_in_noise(columns[name]) for name in (*OUTPUTS, *FORCES)]), rate_hz)
+    rests = still_intervals(np.column_stack([_noise_multiples(columns[name]) for name in (*OUTPUTS, *FORCES)]), rate_hz)
     if len(rests) <= FEWEST_TURNS_OF_A_GYROSCOPE:
         raise DataError(
             f"{source}: found {len(rests)} rests; a gyroscope needs {FEWEST_TURNS_OF_A_GYROSCOPE + 1} or more: keep "
@@ -56,7 +56,7 @@ def cut_turns(columns: Mapping[str, Array], constants: Mapping[str, Constant], s
     return {**{name: values[chosen] for name, values in columns.items()}, **times, **marks}
 
 
-def _in_noise(values: Array) -> Array:
+def _noise_multiples(values: Array) -> Array:
     """Samples over their noise, so that sensors of different units count alike."""
     noise = float(robust_std(np.diff(values)))
     return values / noise if noise > 0 else np.zeros_like(values)

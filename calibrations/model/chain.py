@@ -208,17 +208,17 @@ class LinearisedChain:
         return static_force(self.table, self.steps) if self.measured is None else self.measured
 
     @cached_property
-    def _sensed(self) -> Array:
+    def _sensed_force(self) -> Array:
         return sensed(self.static, self.table, self.steps)
 
     @cached_property
-    def _added(self) -> list[Array]:
-        return effect_contributions(self._sensed, self.table, self.steps)
+    def _contributions(self) -> list[Array]:
+        return effect_contributions(self._sensed_force, self.table, self.steps)
 
     @cached_property
     def _total(self) -> Array:
         """The sum of all parts, shape (n, 3)."""
-        return np.asarray(sum(self._added, np.zeros((self.table.n, 3))))
+        return np.asarray(sum(self._contributions, np.zeros((self.table.n, 3))))
 
     @cached_property
     def _has_output_stage(self) -> bool:
@@ -249,7 +249,11 @@ class LinearisedChain:
     @cached_property
     def _forces(self) -> list[Array]:
         """The force, g, that each stage of the response gets, shape (n, 3)."""
-        return _apply_stages(self._sensed, self.table, self.steps)[0] if self._scales else [self._sensed] * len(Stage)
+        return (
+            _apply_stages(self._sensed_force, self.table, self.steps)[0]
+            if self._scales
+            else [self._sensed_force] * len(Stage)
+        )
 
     @cached_property
     def _gains(self) -> list[Array]:
@@ -261,7 +265,7 @@ class LinearisedChain:
 
     def _gain_by(self, stage: Stage) -> Array:
         """Sensitivity over that of the scale factor, by the effects of one stage, which are linear in the own force."""
-        a, unit = self._sensed, np.ones((1, 3))
+        a, unit = self._sensed_force, np.ones((1, 3))
         total = np.zeros((1, 3))
         for effect, p in self.steps:
             if stage_of(effect) == stage:
@@ -271,7 +275,7 @@ class LinearisedChain:
 
     def _columns_of(self, effect: Effect) -> Mapping[str, Array] | None:
         """d contribution / d each parameter of an effect that is linear in them, shape (n, 3) each; else None."""
-        a, response, stage = self._sensed, self._forces[stage_of(effect)], stage_of(effect)
+        a, response, stage = self._sensed_force, self._forces[stage_of(effect)], stage_of(effect)
         names = effect.columns(response, self.table)
         if names is None or stage is not Stage.SCALE or response is a:
             return names
@@ -285,7 +289,7 @@ class LinearisedChain:
         """Contribution of one effect to the output, together with the other effects of the model."""
         stage = stage_of(effect)
         part = staged_part(
-            stage, partial(_apply_transduction, effect, self.table, values), self._sensed, self._forces[stage]
+            stage, partial(_apply_transduction, effect, self.table, values), self._sensed_force, self._forces[stage]
         )
         return np.asarray(part * self._drift_of(effect))
 
@@ -302,7 +306,7 @@ class LinearisedChain:
         elif not self._has_output_stage:
             parts = [self._contribution(effect, values)]
         else:
-            parts = [*self._added[:term], self._contribution(effect, values), *self._added[term + 1 :]]
+            parts = [*self._contributions[:term], self._contribution(effect, values), *self._contributions[term + 1 :]]
         return convert_output(parts, self.table.n, self.table, steps)[:, : len(self.table.axes)]
 
     def change(self, term: int, upper: Values, lower: Values) -> Array:
@@ -317,7 +321,7 @@ class LinearisedChain:
             return self._read_out(self._contribution(effect, upper) - self._contribution(effect, lower))
         force_upper, force_lower = self._force_with(term, upper), self._force_with(term, lower)
         parts = [np.einsum("nij,nj->ni", self._by_force, force_upper - force_lower)]
-        for memory_effect, values in self._remembering:
+        for memory_effect, values in self._history_steps:
             followed = (memory_effect.transduction(a, self.table, values) for a in (force_upper, force_lower))
             parts.append((next(followed) - next(followed)) * self._drift_of(memory_effect))
         return self._read_out(sum(parts[1:], parts[0]))
@@ -360,14 +364,14 @@ class LinearisedChain:
         return np.stack([specific_force(replace(self._pose, up=e)) for e in np.eye(3)], axis=2)
 
     @cached_property
-    def _remembering(self) -> list[Step]:
+    def _history_steps(self) -> list[Step]:
         """Effects that follow the force of earlier rows as well."""
         return [(effect, values) for effect, values in self.steps if effect.memory]
 
     @cached_property
     def _by_force(self) -> Array:
         """d the sum of all parts / d the force, without effects that remember, shape (n, 3, 3)."""
-        a, steps = self._sensed, [(effect, values) for effect, values in self.steps if not effect.memory]
+        a, steps = self._sensed_force, [(effect, values) for effect, values in self.steps if not effect.memory]
         h = LITTLE * (float(np.max(np.abs(a))) or 1.0)
 
         def total(a: Array) -> Array:

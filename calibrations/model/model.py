@@ -109,15 +109,17 @@ class Parameters(Mapping[str, Estimate]):
         return len(self._by_key)
 
     def __repr__(self) -> str:
-        return columns(("parameter", "value"), [(row[0], row[1].text) for row in self._shown()] + self._curves())
+        return columns(
+            ("parameter", "value"), [(row[0], row[1].text) for row in self._single_parameters()] + self._curves()
+        )
 
     def _repr_html_(self) -> str:
         curves = [(key, count, "", "") for key, count in self._curves()]
         return html_table(
-            ("parameter", "value", "standard uncertainty", "unit"), [*map(_cells, self._shown()), *curves]
+            ("parameter", "value", "standard uncertainty", "unit"), [*map(_cells, self._single_parameters()), *curves]
         )
 
-    def _shown(self) -> list[tuple[str, Estimate]]:
+    def _single_parameters(self) -> list[tuple[str, Estimate]]:
         """The parameters that mean something one by one; the coefficients of free forms do not."""
         curves = tuple(f"{term.name}." for term in self._terms if term.coefficients)
         return [(key, e) for key, e in self.items() if not key.startswith(curves)]

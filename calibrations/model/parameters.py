@@ -83,10 +83,10 @@ class Layout:
     def starts(self) -> list[Array]:
         """Vectors to start from: the model's values, and every combination of declared starts where it has none."""
         values = self._known_values()
-        choices = [(values[k],) if k in values else self._declared(s) for k, s in enumerate(self.slots)]
+        choices = [(values[k],) if k in values else self._declared_values(s) for k, s in enumerate(self.slots)]
         return self._shared_choices(choices)
 
-    def _declared(self, slot: Slot) -> tuple[float, ...]:
+    def _declared_values(self, slot: Slot) -> tuple[float, ...]:
         key = (slot.term, slot.parameter.name, slot.axis)
         if key in self.from_data:
             return self.from_data[key]

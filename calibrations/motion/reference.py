@@ -77,7 +77,7 @@ def fit_four_parameter(t_s: Array, x: Array, frequency_hz: float | None = None) 
             break
     density = _density_near(residual, rate_hz, turn / (2 * np.pi))
     cov = np.linalg.inv(columns.T @ columns) * density * rate_hz / 2
-    return _as_sine(a, b, offset, turn, cov, middle, density)
+    return _sine(a, b, offset, turn, cov, middle, density)
 
 
 def find_sines(t_s: Array, x: Array) -> tuple[Sine, ...]:
@@ -118,7 +118,7 @@ def _refit_sines(t_s: Array, x: Array, sines: list[Sine]) -> list[Sine]:
     return sines
 
 
-def _as_sine(a: float, b: float, offset: float, turn: float, cov: Array, middle: float, density: float) -> Sine:
+def _sine(a: float, b: float, offset: float, turn: float, cov: Array, middle: float, density: float) -> Sine:
     """From x = offset + a cos(turn (t - middle)) + b sin(turn (t - middle)) to amplitude and phase at t = 0."""
     amplitude = float(np.hypot(a, b))
     by_amplitude = np.array([a, b]) / amplitude

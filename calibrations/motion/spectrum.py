@@ -21,7 +21,7 @@ from calibrations.table import AXES, Array, Table
 
 # A table of motion as records: stretches of evenly spaced samples at one attitude, without a gap.
 
-SAME_RATE = ("alpha_deg", "beta_deg", "mount_deg", "flip", "record")  # throughout a record
+RECORD_COLUMNS = ("alpha_deg", "beta_deg", "mount_deg", "flip", "record")  # throughout a record
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def find_records(table: Table) -> tuple[Record, ...]:
         raise TooFewRows(f"{table.source}: {table.n} samples all have the same time; this not a record of a motion")
     step = float(np.median(np.diff(t))) or float(t[-1] - t[0]) / (table.n - 1)
     gaps = np.diff(t) > LONGEST_STEP * step
-    for name in SAME_RATE:
+    for name in RECORD_COLUMNS:
         gaps |= np.diff(table.optional(name, 0.0)) != 0
     edges = np.concatenate([[0], np.flatnonzero(gaps) + 1, [table.n]])
     long = [(int(a), int(b)) for a, b in pairwise(edges) if (b - a) * step >= SHORTEST_MOTION_S - step / 2]

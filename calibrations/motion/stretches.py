@@ -20,7 +20,7 @@ from calibrations.motion.reference import Reference, line_prominence, reference_
 from calibrations.motion.spectrum import Record, corner_hz, find_records, first_order, periodogram, sample_output
 from calibrations.table import Array, Table
 
-BESIDE_HZ = 8.0  # of a line, on each side: where its noise is taken from
+NOISE_BAND_HZ = 8.0  # of a line, on each side: where its noise is taken from
 OWN_LINES = 3  # of a record's spectrum, on each side of a line: the motion's own
 INLYING_MEAN = 0.934  # of an exponential distribution below LEAST_LINE medians
 
@@ -84,7 +84,7 @@ def noise_density(samples: Table, lines: Sequence[Line], axis: int) -> Array:
     density = np.concatenate([piece[1] for piece in pieces]) / np.abs(low_pass(f)) ** 2
 
     def density_near(at_hz: float) -> float:
-        neighbours = density[np.abs(f - at_hz) < BESIDE_HZ]
+        neighbours = density[np.abs(f - at_hz) < NOISE_BAND_HZ]
         inlying = neighbours[neighbours < LEAST_LINE * np.median(neighbours)]
         return float(np.mean(inlying) / INLYING_MEAN * np.abs(low_pass(np.array([at_hz]))[0]) ** 2)
 

@@ -19,7 +19,7 @@ INK, QUIET, FAINT, BAND = "#1f2933", "#616e7c", "#e4e7eb", "#8a96a3"
 BLUE, VERMILION, GREEN, AMBER, PURPLE = "#0072b2", "#d55e00", "#009e73", "#e69f00", "#7b5ea7"  # Okabe and Ito
 MEASURED, MODEL, CANDIDATE, GOOD, UNSEEN = BLUE, QUIET, VERMILION, "#007a5a", AMBER
 VALUES = ("#414487", "#2a788e", "#22a884", "#7ad151", "#e3c51a")  # viridis, without its ends
-SIGNED = ("#00456b", BLUE, "#ece8df", VERMILION, "#7a3300")
+SIGNED_COLOURS = ("#00456b", BLUE, "#ece8df", VERMILION, "#7a3300")
 FEW_DECADES = 2.5  # of a logarithmic axis: 2 and 5 are marked too
 
 Dash = Literal["solid", "dash", "dot"]

@@ -26,7 +26,7 @@ SIGNS = (  # of the escaped text, in this order
 )
 POWER = re.compile(r"\^(-?\w+)")
 INDEX = re.compile(rf"\b({'|'.join(GREEK)}|SF|[A-Za-z])_([a-z]{{1,2}})\b")
-NUMBERED = re.compile(rf"\b({'|'.join(GREEK)}|[A-Za-z])(\d)(&#x27;)?(?!\w)")
+NUMBERED_SYMBOL = re.compile(rf"\b({'|'.join(GREEK)}|[A-Za-z])(\d)(&#x27;)?(?!\w)")
 LETTERS = re.compile(rf"\b({'|'.join(GREEK)})(?![\w-])")
 REMARK = re.compile(r" {3,}")
 
@@ -43,6 +43,6 @@ def _line(text: str) -> str:
     for ascii_sign, sign in SIGNS:
         text = ascii_sign.sub(sign, text)
     text = INDEX.sub(r"\1<sub>\2</sub>", text)
-    text = NUMBERED.sub(lambda m: f"{m[1]}<sub>{m[2]}</sub>{'′' if m[3] else ''}", text)
+    text = NUMBERED_SYMBOL.sub(lambda m: f"{m[1]}<sub>{m[2]}</sub>{'′' if m[3] else ''}", text)
     text = POWER.sub(r"<sup>\1</sup>", text)
     return LETTERS.sub(lambda m: GREEK[m[1]], text)

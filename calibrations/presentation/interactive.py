@@ -227,7 +227,7 @@ def _marker(s: c.Points) -> dict[str, Any]:
     if s.values is None or s.scale is None:
         return marker | {"color": _visible(s.colour) if isinstance(s.colour, str) else list(s.colour)}
     scale = s.scale
-    colours: tuple[str, ...] = c.SIGNED if scale.signed else c.VALUES
+    colours: tuple[str, ...] = c.SIGNED_COLOURS if scale.signed else c.VALUES
     bar = BAR | {"title": {"text": scale.label, "side": "right", "font": {"size": SIZE}}}
     if scale.names:
         colours = (c.BLUE, c.VERMILION, c.GREEN)[: max(len(scale.names), 2)]
@@ -299,7 +299,7 @@ def _bars(s: c.Bars, panel: c.Panel) -> Parts:
 
 @_series.register
 def _cells(s: c.Cells, panel: c.Panel) -> Parts:  # noqa: ARG001
-    stops = [[k / (len(c.SIGNED) - 1), colour] for k, colour in enumerate(c.SIGNED)]
+    stops = [[k / (len(c.SIGNED_COLOURS) - 1), colour] for k, colour in enumerate(c.SIGNED_COLOURS)]
     trace = {"type": "heatmap", "z": np.asarray(s.values).tolist(), "zmin": -1, "zmax": 1, "colorscale": stops,
              "showscale": False, "text": [list(row) for row in s.texts], "texttemplate": "%{text}"}  # fmt: skip
     return [trace], [], []

@@ -12,7 +12,7 @@ from calibrations.noise.doubts import Disturbance
 from calibrations.noise.record import Sensed
 from calibrations.noise.samples import COARSE
 from calibrations.noise.telegraph import TWO_LEVELS
-from calibrations.text import PREFIXED, Cells, columns, concise, duration, prefix, rounded, sentence
+from calibrations.text import PREFIX_UNITS, Cells, columns, concise, duration, prefix, rounded, sentence
 
 MEANS = {
     "white-noise": "velocity or angle random walk",
@@ -69,10 +69,10 @@ def _disturbances(analysis: NoiseAnalysis) -> Iterable[str]:
         spoils = f"; it spoils {effect}" if effect else ""
         yield f"  {disturbance.text}{removed_words}{spoils}{'' if disturbance.matters else '; too small to matter'}"
     yield ""
-    yield from _uncleaned(analysis, removable)
+    yield from _uncleaned_lines(analysis, removable)
 
 
-def _uncleaned(analysis: NoiseAnalysis, removed: Iterable[Disturbance]) -> Iterable[str]:
+def _uncleaned_lines(analysis: NoiseAnalysis, removed: Iterable[Disturbance]) -> Iterable[str]:
     """The coefficients that the removed disturbances would change."""
     if analysis.uncleaned is None:
         return
@@ -111,7 +111,7 @@ def _coefficient_text(coefficient: Coefficient, factor: float, unit: str, base: 
 
 def _ascii_prefixed(value: float, unit: str) -> tuple[float, str]:
     """(factor, unit with prefix) in ASCII; counts and compound units take no prefix."""
-    factor, letter = prefix(value) if unit in PREFIXED else (1.0, "")
+    factor, letter = prefix(value) if unit in PREFIX_UNITS else (1.0, "")
     return factor, letter.replace("µ", "u") + unit
 
 

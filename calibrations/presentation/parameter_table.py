@@ -132,7 +132,7 @@ def _matrices(fit: FittedModel) -> Iterator[tuple[list[str], Array]]:
         listed = [k for k, (term, e) in enumerate(estimates) if e.identified and e.std and e in term.quantities]
         if listed:
             names = [_name(estimates[k][0].name, estimates[k][1].name, estimates[k][1].axis) for k in listed]
-            yield names, _of_rows(fit)[np.ix_(listed, listed)]
+            yield names, _correlation(fit)[np.ix_(listed, listed)]
     elif isinstance(fit, NoiseFit):
         for channel in fit.channels:
             if channel.effects:
@@ -140,7 +140,7 @@ def _matrices(fit: FittedModel) -> Iterator[tuple[list[str], Array]]:
                 yield [_name(effect, name, channel.channel.axis) for effect, name in keys], correlation_matrix(matrix)
 
 
-def _of_rows(fit: Fit) -> Array:
+def _correlation(fit: Fit) -> Array:
     inputs: Any = input_contributions(fit.table) if fit.table.type.budget else ()
     if inputs and (budget := make_budget(fit, inputs)).given:
         return parameter_correlation(fit, budget, inputs)

@@ -20,7 +20,7 @@ from calibrations.text import minus, rounded
 RESOLUTION_C = 0.01  # a smaller range of temperatures is that of a constant one
 MANY_VISITS = 10  # of one pose: the change over time is the question, and not the angle
 LABELS = {"temperature_c": "temperature (°C)", "supply_v": "supply voltage (V)"}
-SHOWN_OTHERWISE = ("direction", "alpha_deg", "beta_deg")
+POSE_COLUMNS = ("direction", "alpha_deg", "beta_deg")
 NAMES = {
     "alpha_deg": "α (deg)",
     "beta_deg": "β (deg)",
@@ -75,7 +75,7 @@ def select_telling_columns(fit: Fit, effect: Effect) -> list[Column]:
     An effect does not know other columns, such as time. A change over time can come from successive inclinations.
     """
     table, n = fit.table, len(fit.channels)
-    drivers = [_driver(table, name, n) for name in effect.needs if name not in SHOWN_OTHERWISE]
+    drivers = [_driver(table, name, n) for name in effect.needs if name not in POSE_COLUMNS]
     if table.type.moving:  # the explained part repeats in every stretch
         return columns(fit)[:1] + drivers
     if table.type.turning:
@@ -167,7 +167,7 @@ def column_label(column: str) -> str:
 
 MOST = 4000  # rows that are drawn; more would make a page slow and a picture no clearer
 WORST = 400  # of them are those that the model misses most
-TURNING = {1: ", clockwise", -1: ", anticlockwise"}
+TURN_TEXTS = {1: ", clockwise", -1: ", anticlockwise"}
 
 
 @dataclass(frozen=True)
@@ -266,7 +266,7 @@ def _place(table: Table, row: int) -> Iterator[str]:
     at = {name: float(values[row]) for name, values in table.columns.items()}
     number = int(table.numbers[row]) if table.numbers is not None else row
     if "beta_deg" in at:
-        turning = TURNING.get(int(at.get("direction", 0)), "")
+        turning = TURN_TEXTS.get(int(at.get("direction", 0)), "")
         yield f"pose {number}: α {at['alpha_deg']:g}°, β {at['beta_deg']:g}°{turning}"
     elif "rate_deg_s" in at:
         yield f"row {number}: {at['rate_deg_s']:g} deg/s"

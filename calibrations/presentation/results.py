@@ -54,13 +54,13 @@ def presentation_of(result: Result) -> Presentation:
     """The forms of a result. Raises TypeError for a class that has none."""
     if isinstance(result, Fit):
         data = dataset(result.table)
-        return _fitted(data, result, partial(fit_text, result), partial(fit_document, data, result, None))
+        return _fit_presentation(data, result, partial(fit_text, result), partial(fit_document, data, result, None))
     if isinstance(result, Comparison):
         document = partial(comparison_document, result, result.fit.model.name)
-        return _fitted(result.data, result.fit, partial(comparison_text, result), document)
+        return _fit_presentation(result.data, result.fit, partial(comparison_text, result), document)
     if isinstance(result, Diagnosis):
         document = partial(diagnosis_document, result, result.fit.model.name)
-        return _fitted(result.findings.data, result.fit, partial(diagnosis_text, result), document)
+        return _fit_presentation(result.findings.data, result.fit, partial(diagnosis_text, result), document)
     if isinstance(result, Discovery):
         view, document = view_of(result.findings.data), partial(discovery_document, result, None)
         return ResultPresentation(
@@ -70,7 +70,7 @@ def presentation_of(result: Result) -> Presentation:
     return _noise(result)
 
 
-def _fitted(
+def _fit_presentation(
     data: Dataset[Any], fit: Any, report: Callable[[], str], document: Callable[[], dict[str, Any]]
 ) -> ResultPresentation:
     """A result whose pictures are those of one fit."""

@@ -8,7 +8,7 @@ from collections import Counter
 MARKERS = re.compile(r'<g([^>]*)>\s*((?:<use [^>]*? style="([^"]*)"/>\s*)(?:<use [^>]*? style="\3"/>\s*)*)</g>')
 COORDINATES = re.compile(r' (?:x|y|d|width|height)="[^"]*"')
 POINTS = re.compile(r"(<g[^>]*>)<use [^>]*/>\s*</g>\s*(?:\1<use [^>]*/>\s*</g>\s*)+")
-OFTEN = 3  # times the same style
+FEWEST_USES = 3  # times the same style
 FINE = re.compile(r"(\.\d\d)\d+")
 
 
@@ -51,7 +51,7 @@ def compact_svg(text: str) -> str:
 
 def _classes(text: str) -> str:
     """Repeated styles are written once."""
-    often = [s for s, n in Counter(re.findall(r' style="([^"]*)"', text)).items() if n >= OFTEN]
+    often = [s for s, n in Counter(re.findall(r' style="([^"]*)"', text)).items() if n >= FEWEST_USES]
     for k, style in enumerate(often):
         text = text.replace(f' style="{style}"', f' class="s{k}"')
     return text.replace("</style>", "".join(f".s{k}{{{style}}}" for k, style in enumerate(often)) + "</style>", 1)

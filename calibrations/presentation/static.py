@@ -65,7 +65,12 @@ DASHES = {"solid": "-", "dash": "--", "dot": ":"}
 SYMBOLS = {"circle": "o", "diamond": "D", "triangle-up": "^", "triangle-down": "v", "cross": "+"}
 FEW_MARKS, LONG_MARK = 4, 200.0  # marks of an axis whose values are so many times its range
 MOST_LEVEL = 8  # names on a horizontal axis; more are written aslant
-DROPPED = (r"<metadata>.*?</metadata>", r"<style.*?</style>", r' xmlns(:\w+)?="[^"]*"', r' (width|height)="[\d.]+pt"')
+DROPPED_MARKUP = (
+    r"<metadata>.*?</metadata>",
+    r"<style.*?</style>",
+    r' xmlns(:\w+)?="[^"]*"',
+    r' (width|height)="[\d.]+pt"',
+)
 REFERENCE = re.compile(r'(?:(?<=url\()|(?<=href="))#([\w.-]+)')
 
 
@@ -123,7 +128,7 @@ def inline(chart: c.Chart, name: str, words: str) -> str:
     """
     text = svg(chart).decode()
     text = text[text.index("<svg") :].strip()
-    for pattern in DROPPED:
+    for pattern in DROPPED_MARKUP:
         text = re.sub(pattern, "", text, flags=re.DOTALL)
     used = {target: f"{name}-{k}" for k, target in enumerate(dict.fromkeys(REFERENCE.findall(text)))}
     text = re.sub(r' id="([^"]*)"', lambda match: f' id="{used[match[1]]}"' if match[1] in used else "", text)
@@ -224,10 +229,10 @@ def _mark_powers(ax: Axes, direction: c.Along) -> None:
     side, (low, high) = (ax.xaxis, ax.get_xlim()) if direction == "x" else (ax.yaxis, ax.get_ylim())
     side.set_major_formatter(FuncFormatter(lambda value, _: tick_text(value)))
     few_decades = abs(np.log10(high / low)) < c.FEW_DECADES
-    side.set_minor_formatter(FuncFormatter(_of_two_and_five) if few_decades else NullFormatter())
+    side.set_minor_formatter(FuncFormatter(_two_five_text) if few_decades else NullFormatter())
 
 
-def _of_two_and_five(value: float, _: int | None = None) -> str:
+def _two_five_text(value: float, _: int | None = None) -> str:
     return tick_text(value) if f"{value:.0e}"[0] in "25" else ""
 
 
@@ -247,7 +252,7 @@ def _map(scale: c.Scale) -> tuple[Colormap, Normalize]:
     if scale.names:
         colours = (c.BLUE, c.VERMILION, c.GREEN)[: len(scale.names)]
         return ListedColormap(colours), Normalize(-0.5, len(scale.names) - 0.5)
-    colours = c.SIGNED if scale.signed else c.VALUES
+    colours = c.SIGNED_COLOURS if scale.signed else c.VALUES
     return LinearSegmentedColormap.from_list("values", colours), Normalize(scale.low, scale.high)
 
 
@@ -330,7 +335,7 @@ def _bars(s: c.Bars, ax: Axes) -> None:
 
 @_series.register
 def _cells(s: c.Cells, ax: Axes) -> None:
-    colours = LinearSegmentedColormap.from_list("signed", c.SIGNED)
+    colours = LinearSegmentedColormap.from_list("signed", c.SIGNED_COLOURS)
     ax.imshow(s.values, cmap=colours, vmin=-1, vmax=1, aspect="auto")
     for (row, column), value in np.ndenumerate(np.asarray(s.values)):
         dark = "white" if value > 0.5 else c.INK

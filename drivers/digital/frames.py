@@ -88,16 +88,16 @@ class Frames:
         start, is_complete = 0, False
         while not is_complete:
             starts, lengths, gaps, end, gap = self._walk(text, array, start)
-            verdicts = self._judged(array, starts, lengths)
-            n = self._accepted(gaps, verdicts)
+            verdicts = self._verdicts(array, starts, lengths)
+            n = self._accepted_count(gaps, verdicts)
             frames.append((starts[:n], lengths[:n], verdicts[:n]))
             if is_complete := n == len(starts):
                 self.remainder = text[end:]
-                self._ends_in_frame = self._ends_in_frame and not self._missed(gap)
+                self._ends_in_frame = self._ends_in_frame and not self._count_missed(gap)
             else:
                 follows = not gaps[n + 1] if n + 1 < len(starts) else starts[n] + lengths[n] == len(text)
                 self.misfits += int(follows)
-                self._ends_in_frame = self._ends_in_frame and not self._missed(True)
+                self._ends_in_frame = self._ends_in_frame and not self._count_missed(True)
                 start = int(starts[n]) + 1
         starts, lengths, verdicts = (np.concatenate(column) for column in zip(*frames, strict=True))
         if len(good_frames := np.flatnonzero(verdicts == GOOD)):
@@ -126,13 +126,13 @@ class Frames:
             gap, start = gap or start < len(text), len(text)
         return np.concatenate(starts), np.concatenate(lengths), np.concatenate(gaps), start, gap
 
-    def _judged(self, array: Bytes, starts: Ints, lengths: Ints) -> Ints:
+    def _verdicts(self, array: Bytes, starts: Ints, lengths: Ints) -> Ints:
         verdicts = np.zeros(len(starts), dtype=np.int64)
         for length, group in groups(lengths):
             verdicts[group] = self.framing.judge(array[starts[group, None] + np.arange(length)])
         return verdicts
 
-    def _accepted(self, gaps: NDArray[np.bool_], verdicts: Ints) -> int:
+    def _accepted_count(self, gaps: NDArray[np.bool_], verdicts: Ints) -> int:
         """The number of frames before a damaged one. A frame of an unknown kind must follow a good one at once."""
         trusted = ~gaps
         trusted[:1] &= self._ends_in_frame
@@ -144,7 +144,7 @@ class Frames:
             self._ends_in_frame = True
         return n
 
-    def _missed(self, gap: bool) -> bool:
+    def _count_missed(self, gap: bool) -> bool:
         """Count a damaged part once, up to the next good frame."""
         self.damaged += int(gap and self._ends_in_frame)
         return gap

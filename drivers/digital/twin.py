@@ -211,9 +211,9 @@ class FramedTwin(DigitalTwin):
             super()._sample(now_s, listeners)
 
     def _spoilt(self, message: bytes, now_s: float) -> bytes:
-        return self._checked(super()._spoilt(message, now_s), now_s)
+        return self._with_faults(super()._spoilt(message, now_s), now_s)
 
-    def _checked(self, message: bytes, now_s: float) -> bytes:
+    def _with_faults(self, message: bytes, now_s: float) -> bytes:
         """A message; by the present faults its checksum is wrong, or half of it is missing."""
         if not self.faults or not message:
             return message

@@ -105,7 +105,7 @@ class Level:
         """
         self._silence()
         deadline, readings = self._clock.now() + self.settings.patience_s, [self._read_once()]
-        while not self._settled(readings, deadline):
+        while not self._has_settled(readings, deadline):
             self._clock.sleep(self.settings.interval_s)
             readings.append(self._read_once())
         return self._mean(readings[-self.settings.readings :])
@@ -115,7 +115,7 @@ class Level:
         std_deg = max(_std_deg(readings) / math.sqrt(len(readings)), RESOLUTION_DEG / math.sqrt(12))
         return Reading(float(x_deg), float(y_deg), std_deg, len(readings), self.settings.accuracy_deg)
 
-    def _settled(self, readings: list[tuple[float, float]], deadline: float) -> bool:
+    def _has_settled(self, readings: list[tuple[float, float]], deadline: float) -> bool:
         """Whether the last readings agree. Raises NotSettled after the patience, InstrumentError for equal readings."""
         recent = readings[-self.settings.readings :]
         if len(recent) < self.settings.readings:

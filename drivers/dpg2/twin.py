@@ -22,7 +22,7 @@ FAULTS = {
 INTERVAL_S = 0.1  # from one pair of lines to the next [M]
 THINKING_S = 0.002  # [M]
 START = b"S"
-WHO = b"DPL2 V1.8.0\r\nSN:123456789\r\n"
+IDENTITY = b"DPL2 V1.8.0\r\nSN:123456789\r\n"
 
 
 class World(Protocol):
@@ -84,7 +84,7 @@ class Inclinometer(Twin):
         elif letter == ONE_READING and not self._running:
             self._send_lines(connection, self._reading(now_s), began_s)
         elif letter == VERSION and not self._running:
-            self._send_lines(connection, WHO.splitlines(keepends=True), began_s)
+            self._send_lines(connection, IDENTITY.splitlines(keepends=True), began_s)
 
     def _reading(self, t_s: float) -> list[bytes]:
         """Both lines at `t_s`, or at the present time of the world if that is later."""

@@ -53,7 +53,7 @@ class Script:
         self._table = _perturb(np.array([0.0, 0.0, 1.0]), hand.table_deg, random)
         direction = self._on_table(up)
         north = unit(np.array(NORTH) - (direction @ NORTH) * direction)
-        self.segments = [Segment(0.0, math.inf, _as_tuple(direction), _as_tuple(direction), north=_as_tuple(north))]
+        self.segments = [Segment(0.0, math.inf, _floats(direction), _floats(direction), north=_floats(north))]
 
     def turn_to(self, up: Floats, now_s: float, north: Floats | None = None) -> None:
         """Begin to turn the sensor until `up` (3,) is upward and `north` (3,) points north, after the reaction time."""
@@ -117,7 +117,7 @@ class Script:
         chance, size = random.random(3), random.standard_normal(2)
         errs = chance[0] < hand.errs
         target = self._on_table(_err(self._wanted) if errs else self._wanted)
-        turning = Segment(0.0, 1.0, _as_tuple(direction), _as_tuple(target), 1.0, north=_as_tuple(north))
+        turning = Segment(0.0, 1.0, _floats(direction), _floats(target), 1.0, north=_floats(north))
         heading_rad, next_mm = self._aim_heading(turning, errs), place_mm
         if self._wanted_north is not None:
             across, along = hand.place_mm * random.standard_normal(2)
@@ -150,16 +150,16 @@ class Script:
         """Add a segment that ends with `after` upward; what is not given is as at the end of the last one."""
         last = self.segments[-1]
         start_s = last.end_s if now_s is None else now_s
-        before = _as_tuple(after) if now_s is not None else last.after
+        before = _floats(after) if now_s is not None else last.after
         self.segments.append(
             Segment(
                 start_s,
                 start_s + length_s,
                 before,
-                _as_tuple(after),
+                _floats(after),
                 tremor,
                 bumps,
-                _as_tuple(last_north(last) if north is None else north),
+                _floats(last_north(last) if north is None else north),
                 heading_rad,
                 last.place_mm if place_mm is None else place_mm,
             )
@@ -195,6 +195,6 @@ def _perturb(direction: Floats, std_deg: float, random: np.random.Generator) -> 
     return unit(direction + np.cross(offset, direction))
 
 
-def _as_tuple(vector: Floats) -> tuple[float, float, float]:
+def _floats(vector: Floats) -> tuple[float, float, float]:
     x, y, z = (float(part) for part in vector)
     return x, y, z

@@ -21,7 +21,7 @@ from drivers.imu_lines.lines import TIME, Column, fields
 FEWEST = 5  # samples
 NEAR = 0.1  # of 1 g, for the norm at rest
 ONE_G = {"g": (1.0,), "m/s^2": (9.80665,), "count": tuple(float(1 << k) for k in range(7, 16))}
-EVEN = 0.5  # of the median step of the time, by which a step may differ
+STEP_TOLERANCE = 0.5  # of the median step of the time, by which a step may differ
 ORDER = (TIME, *(f"{sensor}{axis}" for sensor in "agm" for axis in "xyz"), TEMPERATURE)
 NAMES = (  # of a column, in small letters; the first match
     (r"^(t|ts|time|ms|us|micros|millis|timestamp)(_?[mu]?s)?$", TIME),
@@ -39,7 +39,7 @@ def propose_settings(lines: Sequence[str], length_s: float) -> dict[str, Any] | 
     if not values:
         return None
     rate_hz = _round(max(len(column) for column in values.values()) / length_s)
-    names = _by_name(values) if style in ("named", "teleplot") else _by_value(values)
+    names = _by_name(values) if style in ("named", "teleplot") else _columns_by_value(values)
     names = {name: names[name] for name in ORDER if name in names}
     force = [values[names[name]] for name in ("ax", "ay", "az") if name in names]
     if len(force) < 3:
@@ -84,7 +84,7 @@ def _by_name(values: Mapping[Column, NDArray[np.float64]]) -> dict[str, Column]:
     return columns
 
 
-def _by_value(values: Mapping[Column, NDArray[np.float64]]) -> dict[str, Column]:
+def _columns_by_value(values: Mapping[Column, NDArray[np.float64]]) -> dict[str, Column]:
     """Time and accelerometer by their values, then the triads behind it by custom."""
     clock = next((column for column, series in values.items() if _grows_evenly(series)), None)
     other_columns = [column for column in values if column != clock]
@@ -103,7 +103,7 @@ def _by_value(values: Mapping[Column, NDArray[np.float64]]) -> dict[str, Column]
 def _grows_evenly(values: NDArray[np.float64]) -> bool:
     steps = np.diff(values)
     typical = float(np.median(steps))
-    return typical > 0 and float(np.mean(np.abs(steps - typical) <= EVEN * typical)) > 1 - NEAR
+    return typical > 0 and float(np.mean(np.abs(steps - typical) <= STEP_TOLERANCE * typical)) > 1 - NEAR
 
 
 def _fit(force: Sequence[NDArray[np.float64]]) -> tuple[float, str]:

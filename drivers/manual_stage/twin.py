@@ -20,8 +20,8 @@ LISTEN = PERSON
 TURNING_DEG_S = 30.0
 TURNING_DEG_S2 = 60.0
 SETTING = 0.25  # of a mark: standard deviation
-FURTHEST = 0.45  # of a mark, of setting: nearer than half of one it seems to be set
-READING = 0.1  # of a mark: standard deviation of telling which is nearest
+LARGEST_MISS = 0.45  # of a mark, of setting: nearer than half of one it seems to be set
+READING_STD = 0.1  # of a mark: standard deviation of telling which is nearest
 NANO = 1e-9
 
 
@@ -47,7 +47,7 @@ class Hand:
         from_deg = self._world.motor_angle_deg(self._axis)
         if abs(from_deg - angle_deg) <= self._mark_deg / 2:
             return None
-        missed = np.clip(SETTING * self._normal(self._world.now_s), -FURTHEST, FURTHEST)
+        missed = np.clip(SETTING * self._normal(self._world.now_s), -LARGEST_MISS, LARGEST_MISS)
         to_deg = angle_deg + self._mark_deg * float(missed)
         turn = Trajectory(self._world.now_s, from_deg, to_deg, TURNING_DEG_S, TURNING_DEG_S2)
         self._world.move_stage(self._axis, turn)
@@ -56,7 +56,7 @@ class Hand:
     def read_deg(self) -> float:
         """The mark of the dial that seems nearest."""
         angle_deg = self._world.motor_angle_deg(self._axis)
-        reading_deg = angle_deg / self._mark_deg + READING * self._normal(angle_deg)
+        reading_deg = angle_deg / self._mark_deg + READING_STD * self._normal(angle_deg)
         return round(reading_deg) * self._mark_deg
 
     def _normal(self, place: float) -> float:

@@ -34,7 +34,7 @@ GROUND = (255, 190)  # our own system and component: those of a ground station
 END = 32767  # of a count of 16 bits, each way
 NO_TEMPERATURE = 0  # in messages of whole numbers
 WARM = 1 << 12  # bit of `fields_updated` for the temperature
-UPDATED = {name: 1 << k for k, name in enumerate(OUTPUTS)}  # bits of `fields_updated`
+UPDATE_BITS = {name: 1 << k for k, name in enumerate(OUTPUTS)}  # bits of `fields_updated`
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,7 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
             heads = mav.heads(messages)
             beats = np.flatnonzero((heads.number == mav.HEARTBEAT.number) & messages.known)
             for k, beat in zip(beats, mav.contents(messages, heads, mav.HEARTBEAT, beats), strict=True):
-                if beat["autopilot"] != mav.INVALID and beat["type"] not in mav.NOT_VEHICLES:
+                if beat["autopilot"] != mav.INVALID and beat["type"] not in mav.OTHER_TYPES:
                     name = mav.AUTOPILOTS.get(int(beat["autopilot"]), f"autopilot {beat['autopilot']}")
                     self._autopilot = int(heads.system[k]), int(heads.component[k]), name, int(heads.version[k])
                     return self._autopilot
@@ -244,7 +244,7 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
     def _require_complete(self, reception: Reception, decoder: SampleDecoder) -> None:
         super()._require_complete(reception, decoder)
         if self.settings.message == "HIGHRES_IMU" and (
-            missing := [name for name in self.settings.channels if not decoder.updated & UPDATED[name]]
+            missing := [name for name in self.settings.channels if not decoder.updated & UPDATE_BITS[name]]
         ):
             raise SensorFault(
                 f"{self.name}: the autopilot sends no {', '.join(missing)} (fields_updated is {decoder.updated:#x})",

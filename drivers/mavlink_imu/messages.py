@@ -37,7 +37,7 @@ RESULTS = {  # of a command
 }
 AUTOPILOTS = {0: "generic autopilot", 3: "ArduPilot", 4: "OpenPilot", 9: "Paparazzi", 12: "PX4"}
 INVALID = 8  # autopilot of what is none
-NOT_VEHICLES = (6, 18, 26, 27)  # ground station, onboard controller, gimbal, ADS-B
+OTHER_TYPES = (6, 18, 26, 27)  # ground station, onboard controller, gimbal, ADS-B
 GROUND_STATION = 6
 
 

@@ -13,7 +13,7 @@ from drivers.digital.frames import Frames, Ints
 from drivers.digital.settings import OUTPUTS
 from drivers.digital.twin import FRAME_FAULTS, Floats, FramedTwin, World, common_faults, serve_sensors
 from drivers.mavlink_imu import messages as mav
-from drivers.mavlink_imu.driver import END, NO_TEMPERATURE, UPDATED, WARM, Settings
+from drivers.mavlink_imu.driver import END, NO_TEMPERATURE, UPDATE_BITS, WARM, Settings
 from drivers.transport.faults import Kind
 from drivers.transport.server import Connection, Port, Server
 
@@ -62,11 +62,11 @@ class Autopilot(FramedTwin):
     def _beat(self, now_s: float, listeners: Sequence[Connection]) -> None:
         if self.faults and self.faults.size("no-heartbeat", now_s) is not None:
             return
-        data = self._framed(
+        data = self._frames(
             mav.HEARTBEAT, mav.fields(mav.HEARTBEAT, type=QUADROTOR, autopilot=PX4, status=3, version=3)
         )
         for connection in listeners:
-            connection.send(self._checked(data[0], now_s), now_s)
+            connection.send(self._with_faults(data[0], now_s), now_s)
 
     def _answer(self, connection: Connection, now_s: float) -> None:
         """Act on the commands that have arrived."""
@@ -80,8 +80,8 @@ class Autopilot(FramedTwin):
             acknowledgement = mav.fields(
                 mav.COMMAND_ACK, command=command["command"], result=self._result(command, now_s)
             )
-            for data in self._framed(mav.COMMAND_ACK, acknowledgement):
-                connection.send(self._checked(data, now_s), now_s + ANSWER_S)
+            for data in self._frames(mav.COMMAND_ACK, acknowledgement):
+                connection.send(self._with_faults(data, now_s), now_s + ANSWER_S)
 
     def _result(self, command: Any, now_s: float) -> int:
         """Set the interval of the message: the result of a command. 0 is the usual one, -1 stops it."""
@@ -110,14 +110,14 @@ class Autopilot(FramedTwin):
         temperature_c = self._world.die_c()
         if self._message is mav.HIGHRES_IMU:
             content["temperature"], content["pressure"][:, 0] = temperature_c, 1013.25
-            content["updated"] = sum(UPDATED[name] for name in self._settings.outputs) | 1 << 9 | WARM
+            content["updated"] = sum(UPDATE_BITS[name] for name in self._settings.outputs) | 1 << 9 | WARM
         else:
             content["temperature"] = round(100 * temperature_c) or NO_TEMPERATURE + 1
         if "id" in (self._message.dtype.names or ()):
             content["id"] = self._settings.imu
-        return self._framed(self._message, content)
+        return self._frames(self._message, content)
 
-    def _framed(self, message: mav.Message, content: NDArray[np.void]) -> list[bytes]:
+    def _frames(self, message: mav.Message, content: NDArray[np.void]) -> list[bytes]:
         sequences: Ints = self._sequence + np.arange(len(content))
         self._sequence = (self._sequence + len(content)) % 256
         return mav.frames(message, content, sequences, SYSTEM, COMPONENT)

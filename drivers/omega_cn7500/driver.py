@@ -19,7 +19,7 @@ SET_POINT = Register(0x1001, "int16", "set point", "C", 0.1)
 CONTROL_METHOD = Register(0x1005, "uint16", "control method")
 METHODS = ("PID", "on/off", "manual", "ramp and soak")
 RUN_BIT = 0x0814
-ARRIVED_K = 5.0  # from the set point: closer to it the temperature may be constant
+ARRIVAL_K = 5.0  # from the set point: closer to it the temperature may be constant
 NO_TEMPERATURE = {  # what the process value shows instead of a temperature [M]
     0x8002: "it has no reading yet",
     0x8003: "no thermocouple is connected",
@@ -118,7 +118,7 @@ class Oven:
 
     def _require_fresh(self, shown_c: float) -> None:
         """On its way to a set point the temperature changes, or the heater follows a thermometer that has stuck."""
-        under_way = self._running and self._told_c is not None and abs(shown_c - self._told_c) > ARRIVED_K
+        under_way = self._running and self._told_c is not None and abs(shown_c - self._told_c) > ARRIVAL_K
         if shown_c != self._shown_c or not under_way:
             self._shown_c, self._since_s = shown_c, self._clock.now()
         elif (still_s := self._clock.now() - self._since_s) > self.settings.stale_s:

@@ -21,7 +21,7 @@ FAULTS = {
     "runaway": Kind("heats with full power while it is on"),
     "restart": Kind("loses power for a moment: off, with its first set point, once"),
 }
-AT_POWER_ON = (25.0, False)
+POWER_ON_STATE = (25.0, False)
 FULL_C = 1000.0  # a set point that takes all power
 THINKING_S = 0.005
 
@@ -45,12 +45,12 @@ class Controller(Twin):
     def __init__(self, world: World) -> None:
         self.faults = Faults()
         self._world = world
-        self._set_point_c, self._running = AT_POWER_ON
+        self._set_point_c, self._running = POWER_ON_STATE
 
     def advance(self, now_s: float) -> None:
         """Apply faults. The oven is part of the world, and registers change by commands only."""
         if self.faults.once("restart", now_s):
-            self._set_point_c, self._running = AT_POWER_ON
+            self._set_point_c, self._running = POWER_ON_STATE
         if self.faults:
             self._world.oven_set(self._goal_c(now_s), self._running)
 

@@ -20,7 +20,7 @@ LISTEN = "pty:"
 HOMING_DEG_S = 20.0
 HOMING_DEG_S2 = 40.0
 IN_POSITION_DEG = 0.018  # the width of IN-POS around the command, +-
-FOR_EVER_DEG = 1e7  # days at any speed
+ENDLESS_DEG = 1e7  # days at any speed
 THINKING_S = 0.003  # transmission waiting time of the drive
 FAULTS = {
     **MODBUS_FAULTS,
@@ -180,7 +180,7 @@ class Drive(Twin):
             az.FROM_FEEDBACK: self._angle_deg,
         }
         if kind == az.CONTINUOUS and speed != 0 and rate > 0:
-            target_deg = self._angle_deg() + math.copysign(FOR_EVER_DEG, speed)
+            target_deg = self._angle_deg() + math.copysign(ENDLESS_DEG, speed)
             self._turn(Trajectory(now_s, self._angle_deg(), target_deg, abs(speed), rate))
         elif kind not in origins or speed <= 0 or rate <= 0:
             self._fail(az.BAD_OPERATION_DATA, now_s)

@@ -13,7 +13,7 @@ from drivers.pi_e727 import parameters as e727
 from drivers.transport.faults import Faults
 from drivers.transport.gcs_server import OUT_OF_RANGE, Refusal, groups, number, one_of, parse_integer, table
 from drivers.world.kernel import Floats
-from drivers.world.positioner import Command, standing
+from drivers.world.positioner import Command, hold_command
 
 TRAVEL_UM = (0.0, 100.0)  # of the P-611.3S in closed loop
 CYCLE_S = 50e-6  # of the servo
@@ -42,7 +42,7 @@ class Axes:
         self._world = world
         self._names = {axis: name for name, axis in names.items()}
         self.ids = list(self._names)
-        self._commands = {axis: standing(float(self.measured_um(axis, 0.0)[0])) for axis in self.ids}
+        self._commands = {axis: hold_command(float(self.measured_um(axis, 0.0)[0])) for axis in self.ids}
         self._settled_s = dict.fromkeys(self.ids, 0.0)
         self._servo = dict.fromkeys(self.ids, False)
         self._velocity_um_s = dict.fromkeys(self.ids, VELOCITY_UM_S)
@@ -107,13 +107,13 @@ class Axes:
 
     def halt(self, axis: str, now_s: float) -> None:
         """Command the place where the axis is now."""
-        self.follow(axis, standing(float(self.measured_um(axis, now_s)[0]), now_s), now_s)
+        self.follow(axis, hold_command(float(self.measured_um(axis, now_s)[0]), now_s), now_s)
 
     def restart(self, at_s: float) -> None:
         """Servo off, and every axis where it is. The world's time is not touched: the converter may be sampling."""
         self._servo, self._velocity_um_s = dict.fromkeys(self.ids, False), dict.fromkeys(self.ids, VELOCITY_UM_S)
         for axis, name in self._names.items():
-            self._commands[axis] = standing(float(self.measured_um(axis, at_s)[0]), at_s)
+            self._commands[axis] = hold_command(float(self.measured_um(axis, at_s)[0]), at_s)
             self._settled_s[axis] = self._world.move_positioner(name, self._commands[axis])
 
     def commanded_um(self, axis: str, t_s: float) -> float:

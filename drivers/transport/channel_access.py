@@ -177,16 +177,16 @@ class Circuit:
         except DriverError:
             raise
         except Exception as error:  # caproto has many, also those of struct and ctypes
-            raise self._not_ours(f"{len(data)} bytes", device, error) from error
+            raise self._bad_frame(f"{len(data)} bytes", device, error) from error
 
     def _decode(self, take: Callable[[Any], Any], answer: Any, device: str) -> Any:
         """The result of `take` for a message, which caproto unpacks here. Raises BadFrame."""
         try:
             return take(answer)
         except Exception as error:
-            raise self._not_ours("a message", device, error) from error
+            raise self._bad_frame("a message", device, error) from error
 
-    def _not_ours(self, content: str, device: str, error: Exception) -> BadFrame:
+    def _bad_frame(self, content: str, device: str, error: Exception) -> BadFrame:
         self._forget()
         reason = str(error) or type(error).__name__
         return BadFrame(
@@ -250,8 +250,8 @@ def found_server(record: str, device: str, timeout_s: float) -> tuple[str, int]:
         udp.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
         udp.settimeout(timeout_s / SEARCHES)
         for _ in range(SEARCHES):
-            unreachable = [error for address in addresses if (error := _sent(udp, question, address))]
-            if answer := _answer(udp, broadcaster, number, time.monotonic() + timeout_s / SEARCHES):
+            unreachable = [error for address in addresses if (error := _send_error(udp, question, address))]
+            if answer := _find_answer(udp, broadcaster, number, time.monotonic() + timeout_s / SEARCHES):
                 return answer
     places = ", ".join(f"{host}:{port}" for host, port in addresses)
     cause_text = f"; {unreachable[0]}" if unreachable else ""
@@ -260,7 +260,7 @@ def found_server(record: str, device: str, timeout_s: float) -> tuple[str, int]:
     )
 
 
-def _sent(udp: socket.socket, question: bytes, address: tuple[str, int]) -> OSError | None:
+def _send_error(udp: socket.socket, question: bytes, address: tuple[str, int]) -> OSError | None:
     try:
         udp.sendto(question, address)
     except OSError as error:  # no network, no such host
@@ -268,7 +268,7 @@ def _sent(udp: socket.socket, question: bytes, address: tuple[str, int]) -> OSEr
     return None
 
 
-def _answer(udp: socket.socket, broadcaster: Any, number: int, deadline: float) -> tuple[str, int] | None:
+def _find_answer(udp: socket.socket, broadcaster: Any, number: int, deadline: float) -> tuple[str, int] | None:
     ca = channel_access("")
     while time.monotonic() < deadline:
         try:

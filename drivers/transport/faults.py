@@ -151,7 +151,7 @@ class Faults:
 
 
 END = b""  # as the read of a closed connection
-MENDED_S = 0.2  # until TCP sends a damaged segment again
+RESEND_S = 0.2  # until TCP sends a damaged segment again
 BABBLE_S = 60.0  # duration of the babble for one message
 MOST_PIECES = 1000  # of a message
 
@@ -184,7 +184,7 @@ def drop_message(_message: Message, _size: float, _wire: Wire) -> list[Message]:
     return []
 
 
-def the_end(sent: Message, _size: float, _wire: Wire) -> list[Message]:
+def close_connection(sent: Message, _size: float, _wire: Wire) -> list[Message]:
     """The connection closes in place of the answer."""
     return [Message(END, sent.due_s)]
 
@@ -235,7 +235,7 @@ def before_noise(sent: Message, size: float, wire: Wire) -> list[Message]:
 def flip_bit(sent: Message, size: float, wire: Wire) -> list[Message]:
     """One bit inverted; TCP sends the segment again."""
     if wire.mends:
-        return later(sent, MENDED_S, wire)
+        return later(sent, RESEND_S, wire)
     byte, bit_number = divmod(int(size) % (8 * len(sent.data)), 8)
     data = bytearray(sent.data)
     data[byte] ^= 1 << bit_number
@@ -251,7 +251,7 @@ EFFECTS: dict[str, tuple[Kind, Effect]] = {
     "silence": (Kind("receives and sends nothing, as with an unplugged cable"), drop_message),
     "disconnect": (
         Kind("closes the connection at the next message; it can be opened again"),
-        the_end,
+        close_connection,
     ),
     "lost-answers": (Kind("executes commands, but its answers are lost"), drop_message),
     "delay": (Kind("its answers come late", 0.7, "s", least=0), later),

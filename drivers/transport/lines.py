@@ -49,9 +49,9 @@ class LinkLines:
         while b"\n" not in received and len(received) < LONGEST:
             left_s = deadline - self._link.clock.now()
             if left_s <= 0 or not (next_bytes := self._link.read(left_s)):
-                raise _silence(self._name, command, self._link.url, timeout_s)
+                raise _timeout_error(self._name, command, self._link.url, timeout_s)
             received += next_bytes
-        return _text(received.partition(b"\n")[0], self._name, command)
+        return _answer_text(received.partition(b"\n")[0], self._name, command)
 
 
 class VisaLines:
@@ -71,7 +71,7 @@ class VisaLines:
         try:
             self._session().write(command)
         except (self._visa.Error, OSError) as error:
-            raise self._failed(error, command, 0.0) from error
+            raise self._error_of(error, command, 0.0) from error
         self._note("sent", command)
 
     def query(self, command: str, timeout_s: float) -> str:
@@ -82,8 +82,8 @@ class VisaLines:
             self._note("sent", command)
             received = session.read_raw()
         except (self._visa.Error, OSError) as error:
-            raise self._failed(error, command, timeout_s) from error
-        text = _text(bytes(received).rstrip(b"\r\n"), self._name, command)
+            raise self._error_of(error, command, timeout_s) from error
+        text = _answer_text(bytes(received).rstrip(b"\r\n"), self._name, command)
         self._note("heard", text)
         return text
 
@@ -111,15 +111,15 @@ class VisaLines:
         resource.read_termination = resource.write_termination = "\n"
         return resource
 
-    def _failed(self, error: Exception, command: str, timeout_s: float) -> LinkError:
+    def _error_of(self, error: Exception, command: str, timeout_s: float) -> LinkError:
         """The error as ours. A late answer is cleared, because it would count as that of the next question."""
         timeout = self._visa.constants.StatusCode.error_timeout
         if getattr(error, "error_code", None) == timeout and timeout_s:
             with contextlib.suppress(Exception):  # the time-out is reported
                 self._resource.clear()
-                return _silence(self._name, command, self._url.text, timeout_s)
+                return _timeout_error(self._name, command, self._url.text, timeout_s)
             self._drop()
-            return _silence(self._name, command, self._url.text, timeout_s)
+            return _timeout_error(self._name, command, self._url.text, timeout_s)
         self._drop()
         return LinkRefused(f"{self._name}: {self._url.text}: the connection is lost at {command!r} ({error})", GONE)
 
@@ -143,11 +143,11 @@ def _pyvisa(context: str) -> Any:
     return pyvisa
 
 
-def _silence(name: str, command: str, url: str, timeout_s: float) -> LinkTimeout:
+def _timeout_error(name: str, command: str, url: str, timeout_s: float) -> LinkTimeout:
     return LinkTimeout(f"{name}: no answer to {command!r} within {timeout_s:g} s on {url}", SILENT)
 
 
-def _text(data: bytes, name: str, command: str) -> str:
+def _answer_text(data: bytes, name: str, command: str) -> str:
     try:
         return data.decode("ascii").strip()
     except UnicodeDecodeError:

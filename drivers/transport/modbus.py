@@ -72,11 +72,11 @@ TIMEOUT_S = 0.5  # for one answer; the slowest instrument needs a tenth of it
 LATE_S = 2 * TIMEOUT_S  # of silence: then no answer to an earlier request arrives any more
 REPEATED = (LinkTimeout, BadFrame, WrongUnit)  # after these a request is repeated
 RETRIES = 2  # of a request, unless it may not be repeated
-ON_A_LINE = (  # what to check after silence, and after noise
+LINE_CHECKS = (  # what to check after silence, and after noise
     "that baud rate and parity are the instrument's",
     "shielding, termination, baud rate and parity of the line",
 )
-ON_A_NETWORK = (
+NETWORK_CHECKS = (
     "that nothing else has the instrument's address",
     "that this address and port are the instrument's, and speak Modbus TCP",
 )
@@ -98,7 +98,7 @@ class Bus:
         self._url = Url.parse(link.url)
         decoder = DecodePDU(is_server=False)
         self._framer = FramerRTU(decoder) if self._url.rtu else FramerSocket(decoder)
-        self._checks = ON_A_LINE if self._url.rtu else ON_A_NETWORK
+        self._checks = LINE_CHECKS if self._url.rtu else NETWORK_CHECKS
         self._transaction = 0
         self._late_expected = False  # whether answers to earlier requests may still arrive
 
@@ -142,7 +142,7 @@ class Bus:
             )
         if answer.isError() and answer.function_code & 0x7F == request.function_code:
             raise _refusal(action, answer.exception_code)
-        if not _fits(request, answer):
+        if not _belongs(request, answer):
             raise self._bad_frame(action, "received the answer to another request")
         return answer
 
@@ -230,7 +230,7 @@ class Unit:
         self._bus.ask(request, self._unit, f"{self.name}: writing bit 0x{address:04X} ({doc})")
 
 
-def _fits(request: ModbusPDU, answer: ModbusPDU) -> bool:
+def _belongs(request: ModbusPDU, answer: ModbusPDU) -> bool:
     """Whether the answer belongs to this request: on a serial line a late answer to another may come first."""
     if answer.function_code != request.function_code:
         return False

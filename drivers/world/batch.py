@@ -21,7 +21,7 @@ from drivers.world.positioner import Command
 from drivers.world.stage import Trajectory
 from drivers.world.world import World
 
-OWN = ("sensor", "noise", "magnetometer", "gyroscope")  # what may differ from sensor to sensor
+SENSOR_PARTS = ("sensor", "noise", "magnetometer", "gyroscope")  # what may differ from sensor to sensor
 
 
 class Batch:
@@ -126,8 +126,8 @@ class Batch:
 
 def with_own(config: WorldConfig, name: str, changes: Mapping[str, Any]) -> WorldConfig:
     """The settings of one sensor's world. Raises BadSetting for a change of something that all sensors share."""
-    if shared := [key for key in changes if key not in OWN]:
+    if shared := [key for key in changes if key not in SENSOR_PARTS]:
         raise BadSetting(
-            f"{', '.join(shared)} of sensor {name}'s world is shared by all", f"Change {' and '.join(OWN)}"
+            f"{', '.join(shared)} of sensor {name}'s world is shared by all", f"Change {' and '.join(SENSOR_PARTS)}"
         )
     return config.changed(changes)

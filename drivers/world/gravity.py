@@ -91,7 +91,7 @@ def across(turn: Floats, x: float, y: float, z: float) -> tuple[float, float, fl
 # The surface is perpendicular to the specific force. The reading of an axis is the elevation of its positive end:
 # atan2(a_x, a_z) and atan2(a_y, a_z), more than 90 deg upside down.
 
-ON_THE_PLATE = np.eye(3)
+PLATE_AXES = np.eye(3)
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class Level:
 
 def inclination_deg(up: Floats, alpha_rad: float, beta_rad: float) -> tuple[float, float]:
     """True inclination of the plate's x and y axis, in deg: the vertical in the base, the stages' true angles."""
-    x, y, z = felt_g(up, ON_THE_PLATE, alpha_rad, beta_rad)
+    x, y, z = felt_g(up, PLATE_AXES, alpha_rad, beta_rad)
     return math.degrees(math.atan2(x, z)), math.degrees(math.atan2(y, z))
 
 

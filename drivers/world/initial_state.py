@@ -16,7 +16,9 @@ from drivers.world.kernel import record
 from drivers.world.state import State
 
 
-def beginning(config: WorldConfig, numbers: WorldConfig, room: np.random.Generator, slow: np.random.Generator) -> State:
+def state_at_start(
+    config: WorldConfig, numbers: WorldConfig, room: np.random.Generator, slow: np.random.Generator
+) -> State:
     """A record of the state; `numbers` is the record of `config`.
 
     The values of slow noise are drawn from `room` for all that the sensors share, from `slow` for the sensor's own.

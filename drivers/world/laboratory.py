@@ -88,19 +88,19 @@ class Laboratory:
 def rotation_deg_s(place: Laboratory, base: Base) -> Floats:
     """Angular rate of the earth in the frame of the base, deg/s, shape (3,)."""
     latitude = np.radians(place.latitude_deg)
-    return _in_base(base, 360 / SIDEREAL_DAY_S, np.cos(latitude), -place.heading_deg, np.sin(latitude))
+    return _base_vector(base, 360 / SIDEREAL_DAY_S, np.cos(latitude), -place.heading_deg, np.sin(latitude))
 
 
 def field_ut(place: Laboratory, base: Base) -> Floats:
     """The magnetic field at the sensor with iron and magnets, in the frame of the base, uT, shape (3,)."""
     dip = np.radians(place.dip_deg)
     azimuth_deg = place.declination_deg - place.heading_deg
-    earth = _in_base(base, place.field_ut, np.cos(dip), azimuth_deg, -np.sin(dip))
+    earth = _base_vector(base, place.field_ut, np.cos(dip), azimuth_deg, -np.sin(dip))
     bent = np.array(near_iron_ut(record(place.iron), *earth))
     return np.asarray(bent + np.array(near_magnet_ut(record(place.magnet))))
 
 
-def _in_base(base: Base, size: float, level: float, azimuth_deg: float, upward: float) -> Floats:
+def _base_vector(base: Base, size: float, level: float, azimuth_deg: float, upward: float) -> Floats:
     """A vector with a horizontal part at an azimuth from the base's x axis (clockwise) and a part upward."""
     azimuth = np.radians(azimuth_deg)
     tilted = rotation(base.tilt_x_deg, base.tilt_y_deg, 0.0)

@@ -22,8 +22,8 @@ from numpy.random import Generator
 from drivers.world.kernel import Floats, kernel, share_with_kernels, step_wander, zeros
 
 FLICKER_S = (1.0, 10.0, 100.0, 1e3, 1e4)  # release times of traps
-TICKED_S = 0.5  # a wander of a longer memory advances in ticks
-NEARLY = 1 - 1e-9  # of a time that is compared
+TICK_MEMORY_S = 0.5  # a wander of a longer memory advances in ticks
+TIME_MARGIN = 1 - 1e-9  # of a time that is compared
 HOUR_S = 3600.0
 
 
@@ -79,21 +79,21 @@ def filter_s(noise: Noise) -> float:
 @share_with_kernels
 def trap_v(noise: Noise, release_s: float) -> float:
     """Rms of the traps of one release time."""
-    return noise.flicker_v if release_s > NEARLY * noise.flicker_fastest_s else 0.0
+    return noise.flicker_v if release_s > TIME_MARGIN * noise.flicker_fastest_s else 0.0
 
 
 @share_with_kernels
-def ticked_v(noise: Noise) -> float:
+def ticked_rms_v(noise: Noise) -> float:
     """Rms of the wander if it advances in ticks, else 0, V."""
-    return noise.wander_v if noise.wander_s >= TICKED_S else 0.0
+    return noise.wander_v if noise.wander_s >= TICK_MEMORY_S else 0.0
 
 
 def begin(state: Fluctuation, noise: Noise, random: Generator) -> None:
     """Draw the state of traps and wander; white noise is drawn separately."""
     traps_v = np.array([trap_v(noise, release_s) for release_s in FLICKER_S])
     state.flicker_v = traps_v * random.standard_normal(len(FLICKER_S))
-    if ticked_v(noise):
-        state.wander_v = ticked_v(noise) * random.standard_normal()
+    if ticked_rms_v(noise):
+        state.wander_v = ticked_rms_v(noise) * random.standard_normal()
     settle(state, noise, 0.0)
 
 
@@ -120,7 +120,7 @@ def release(state: Fluctuation, noise: Noise, step_s: float, random: Generator) 
 def stray(state: Fluctuation, noise: Noise, step_s: float, random: Generator) -> None:
     """Advance the random walk and the wander by one step."""
     state.walk_v += noise.walk_v_per_sqrt_h * math.sqrt(step_s / HOUR_S) * random.standard_normal()
-    if ticked_v(noise) != 0:
+    if ticked_rms_v(noise) != 0:
         state.wander_v = step_wander(state.wander_v, noise.wander_v, noise.wander_s, step_s, random.standard_normal())
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.random import Generator
 
 from drivers.world.kernel import Floats, kernel, mean_variance, share_with_kernels, zeros
-from drivers.world.noise import TICKED_S, Noise, filter_s, trap_v
+from drivers.world.noise import TICK_MEMORY_S, Noise, filter_s, trap_v
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def process(noise: Noise, k: int) -> tuple[float, float]:
     """Rms in V and correlation time in s of the `k`-th fast process; 0 V where it is off."""
     if k < len(FAST_S):
         return trap_v(noise, FAST_S[k]), FAST_S[k]
-    return noise.wander_v if noise.wander_s < TICKED_S else 0.0, noise.wander_s
+    return noise.wander_v if noise.wander_s < TICK_MEMORY_S else 0.0, noise.wander_s
 
 
 def begin(state: Pickup, noise: Noise, shaking: Floor, random: Generator) -> None:

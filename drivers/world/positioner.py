@@ -27,7 +27,7 @@ AXES = ("x", "y", "z")
 PIECES = 2  # a command, and standing where it ended
 TERMS = 8  # of a piece: start, place, rate, amplitude, angular frequency, phase, and both parts of the exponential
 FOREVER_S = 1e9
-FORGOTTEN = 25.0  # time constants after which 1e-11 of the initial deviation remains
+SETTLING_TIMES = 25.0  # time constants after which 1e-11 of the initial deviation remains
 
 
 @dataclass(frozen=True)
@@ -71,19 +71,19 @@ class Command:
         return self.start_s <= t_s < self.end_s and (self.rate_um_s != 0 or self.amplitude_um != 0)
 
 
-def standing(at_um: float, since_s: float = 0.0) -> Command:
+def hold_command(at_um: float, since_s: float = 0.0) -> Command:
     """The command to be at one place."""
     return Command(since_s, at_um, end_s=since_s)
 
 
-def following(positioner: Positioner, pieces: Floats, command: Command) -> tuple[Floats, float]:
+def follow_command(positioner: Positioner, pieces: Floats, command: Command) -> tuple[Floats, float]:
     """The motion from the command's start on, given the motion until then; and when it has decayed, in s."""
     new = np.zeros((PIECES, TERMS))
     new[0, :6] = _settled_response(positioner, command)
     _begin(positioner, new[0], pieces)
     new[1, :2] = command.end_s, command.um(command.end_s)
     _begin(positioner, new[1], new[:1])
-    return new, command.end_s + FORGOTTEN / (2 * math.pi * positioner.servo_hz * positioner.damping_fraction)
+    return new, command.end_s + SETTLING_TIMES / (2 * math.pi * positioner.servo_hz * positioner.damping_fraction)
 
 
 def _settled_response(positioner: Positioner, command: Command) -> tuple[float, ...]:

@@ -16,7 +16,7 @@ from drivers.errors import did_you_mean
 from drivers.world import digital, gravity, heat, mechanics, positioner, sampling, stage, state, visit
 from drivers.world.config import WorldConfig
 from drivers.world.errors import TimeReversal, UnknownInput
-from drivers.world.initial_state import beginning, individual
+from drivers.world.initial_state import individual, state_at_start
 from drivers.world.kernel import Floats, record
 from drivers.world.stage import Trajectory
 
@@ -38,7 +38,7 @@ class World:
             np.random.Generator(np.random.PCG64(key))
             for key in ([seed, 1, *place_key], [seed, 2, *place_key], [seed, 3])
         )
-        self._world = beginning(self.config, self._numbers, self._room, self._slow)
+        self._world = state_at_start(self.config, self._numbers, self._room, self._slow)
 
     @property
     def now_s(self) -> float:
@@ -66,7 +66,7 @@ class World:
         """
         number, numbers = _place(axis, positioner.AXES, "axis of the positioner"), self._numbers
         mechanics.interrupt(self._world, numbers)
-        pieces, rest_s = positioner.following(numbers.positioner, self._world.carriage[number], command)
+        pieces, rest_s = positioner.follow_command(numbers.positioner, self._world.carriage[number], command)
         self._world.carriage[number] = pieces
         self._world.carriage_rest_ns[number] = round(1e9 * rest_s)
         mechanics.update(self._world, numbers, int(self._world.now_ns))

@@ -27,7 +27,7 @@ from drivers.xsens_mti.messages import Packet
 
 ANSWER_S, ATTEMPTS = 0.5, 3
 TICK_S, WRAPS = 1e-4, (864_000_000, 2**32)  # of SampleTimeFine: 10 and 100 series, 1 and 600 series
-FILTERED_HZ = 400.0  # the highest rate of the filtered outputs; above it, the high-rate (HR) ones
+HIGHEST_FILTERED_HZ = 400.0  # the highest rate of the filtered outputs; above it, the high-rate (HR) ones
 PROBE_S = 0.1
 WARM_S = 1.2  # from one report of the temperature to the next, with a margin
 SAME = 0.01  # of a rate
@@ -77,14 +77,14 @@ class Settings(DigitalSettings):
     @property
     def packets(self) -> dict[int, int]:
         """The configuration for a record: identifiers and their rates."""
-        fast = self.rate_hz > FILTERED_HZ
+        fast = self.rate_hz > HIGHEST_FILTERED_HZ
         triads = {
             FORCES: xbus.ACCELERATION_HR if fast else xbus.ACCELERATION,
             RATES: xbus.RATE_HR if fast else xbus.RATE,
             FIELDS: xbus.FIELD,
         }
         rates = {kind: round(self.rate_hz) for names, kind in triads.items() if set(names) & set(self.channels)}
-        with_each = dict.fromkeys((xbus.COUNTER, xbus.TIME, xbus.STATUS), xbus.WITH_EACH)
+        with_each = dict.fromkeys((xbus.COUNTER, xbus.TIME, xbus.STATUS), xbus.MESSAGE_RATE)
         return with_each | {xbus.TEMPERATURE: 1} | rates
 
     def chosen(self, outputs: Sequence[str]) -> Settings:
@@ -153,9 +153,9 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
     def identify(self) -> Identity:
         """Product code, device identifier and firmware. It stops the tracker's data until the next record."""
         self._enter_configuration()
-        number = self._asked(xbus.DEVICE_ID).hex().upper()
-        product = self._asked(xbus.PRODUCT_CODE).decode("ascii", "replace").strip("\0 ")
-        firmware = ".".join(str(part) for part in self._asked(xbus.FIRMWARE)[:3])
+        number = self._ask(xbus.DEVICE_ID).hex().upper()
+        product = self._ask(xbus.PRODUCT_CODE).decode("ascii", "replace").strip("\0 ")
+        firmware = ".".join(str(part) for part in self._ask(xbus.FIRMWARE)[:3])
         return Identity(f"Xsens {product}", number, firmware)
 
     @property
@@ -171,7 +171,7 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
         if not self._is_sending():
             self._enter_configuration()
             self._configure()
-            self._asked(xbus.GO_TO_MEASUREMENT)
+            self._ask(xbus.GO_TO_MEASUREMENT)
         self._link.discard()
         self._await_temperature()
 
@@ -198,11 +198,11 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
 
     def _enter_configuration(self) -> None:
         """Stop the tracker's data. Raises LinkTimeout, BadFrame."""
-        self._asked(xbus.GO_TO_CONFIG)
+        self._ask(xbus.GO_TO_CONFIG)
 
     def _configure(self) -> None:
         """Set the outputs. Raises Refused, StreamError for a rate that the tracker does not have."""
-        answer = self._asked(xbus.OUTPUT_CONFIGURATION, xbus.configuration(self.settings.packets))
+        answer = self._ask(xbus.OUTPUT_CONFIGURATION, xbus.configuration(self.settings.packets))
         try:
             configured = xbus.pairs(answer)
         except ValueError as error:
@@ -215,7 +215,7 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
                     "Write a rate that this tracker has, in the sensor's settings",
                 )
 
-    def _asked(self, number: int, data: bytes = b"") -> bytes:
+    def _ask(self, number: int, data: bytes = b"") -> bytes:
         """The data of the answer to a command. Raises Refused, LinkTimeout without an answer, BadFrame."""
         stream = Frames(xbus.Xbus())
         for _ in range(ATTEMPTS):
@@ -225,7 +225,7 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
             while (left_s := begun_s + ANSWER_S - self._clock.now()) > 0 and (received := self._link.read(left_s)):
                 for kind, answer in xbus.messages(stream.take(received)):
                     if kind == xbus.ERROR:
-                        raise self._refused(number, answer)
+                        raise self._refusal(number, answer)
                     if kind == number + 1:
                         return answer
         if not stream.good and (stream.unread > xbus.LONGEST or stream.misfits > 2):
@@ -235,7 +235,7 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
             "Check power and cable, the baud rate, and that no other program talks to it",
         )
 
-    def _refused(self, number: int, answer: bytes) -> Refused:
+    def _refusal(self, number: int, answer: bytes) -> Refused:
         code = answer[0] if answer else 0
         return Refused(
             f"{self.name}: the tracker refuses message {number:#04x}: {xbus.ERRORS.get(code, 'error')} ({code:#04x})",

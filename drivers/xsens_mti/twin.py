@@ -22,7 +22,7 @@ SERIAL, PRODUCT, FIRMWARE = 0x0370_03F8, b"MTi-30-2A8G4        ", bytes([1, 8, 2
 ANSWER_S = 0.001
 EARTH_UT = 50.0  # field of one unit
 FASTEST_HZ = {xbus.ACCELERATION: 400, xbus.RATE: 400, xbus.FIELD: 100, xbus.ACCELERATION_HR: 1000, xbus.RATE_HR: 1000}
-AT_POWER_ON = dict.fromkeys((xbus.ACCELERATION, xbus.RATE, xbus.FIELD), 100)
+POWER_ON_STATE = dict.fromkeys((xbus.ACCELERATION, xbus.RATE, xbus.FIELD), 100)
 FAULTS = (
     common_faults("message")
     | FRAME_FAULTS
@@ -53,7 +53,7 @@ class MotionTracker(FramedTwin):
         self._rates = {int(kind): rate_hz for kind, rate_hz in state["rates"].items()}
 
     def _power_on(self, now_s: float) -> None:
-        self._rates, self._sending, self._first = dict(AT_POWER_ON), True, 0
+        self._rates, self._sending, self._first = dict(POWER_ON_STATE), True, 0
         self._begin_at(now_s, float(max(self._rates.values())))
 
     def _answer(self, connection: Connection, now_s: float) -> None:
@@ -63,7 +63,7 @@ class MotionTracker(FramedTwin):
         for number, data in xbus.messages(messages):
             if self.faults and self.faults.size("deaf", now_s) is not None:
                 continue
-            connection.send(self._checked(self._reply(number, data, now_s), now_s), now_s + ANSWER_S)
+            connection.send(self._with_faults(self._reply(number, data, now_s), now_s), now_s + ANSWER_S)
 
     def _reply(self, number: int, data: bytes, now_s: float) -> bytes:
         if self.faults and (code := self.faults.size("refuses", now_s)) is not None:

@@ -26,13 +26,13 @@ from rig.bench.parts import D63, ROLES, Certificate, Displacement, Folders, Inst
 from rig.bench.result_names import names_with_limits
 from rig.errors import BenchError, RecordError
 
-UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+UNKNOWN_KEYS = ("extra_forbidden", "unexpected_keyword_argument")
 
 
 def describe_error(error: ValidationError, model: type[BaseModel]) -> str:
     """The first fault with its key. A misspelt key comes before the missing key that it should be."""
     faults = error.errors()
-    fault = min(faults, key=lambda fault: fault["type"] not in UNKNOWN)
+    fault = min(faults, key=lambda fault: fault["type"] not in UNKNOWN_KEYS)
     key_path = [str(part) for part in fault["loc"] if "[" not in str(part)]  # the type of a union is not a key
     if key_path[0] == "lab":  # a URL may hold a password
         fault = {**fault, "input": "..."}
@@ -41,7 +41,7 @@ def describe_error(error: ValidationError, model: type[BaseModel]) -> str:
 
 def describe_fault(fault: Any, keys: list[str]) -> str:
     """One fault of a value; `keys` are the known keys at its place."""
-    if fault["type"] in UNKNOWN:
+    if fault["type"] in UNKNOWN_KEYS:
         return f"no such key.{did_you_mean(str(fault['loc'][-1]), keys)}"
     if fault["type"] == "missing":
         return "this key is missing; `rig check --example` prints a complete bench file"
@@ -256,15 +256,15 @@ def check_values(bench: Bench, path: Path) -> None:
 
 
 def _faults(bench: Bench) -> Iterator[KeyFault]:
-    yield from _of_sensor("sensor", bench.sensor)
+    yield from _sensor_faults("sensor", bench.sensor)
     for name, sensor in bench.sensors.items():
-        yield from _of_sensor(f"sensors.{name}", sensor)
-    yield from _of_channels(bench)
-    yield from _of_limits(bench)
-    yield from _of_result_limits(bench)
+        yield from _sensor_faults(f"sensors.{name}", sensor)
+    yield from _channel_faults(bench)
+    yield from _limit_faults(bench)
+    yield from _result_limit_faults(bench)
 
 
-def _of_sensor(key: str, sensor: Sensor) -> Iterator[KeyFault]:
+def _sensor_faults(key: str, sensor: Sensor) -> Iterator[KeyFault]:
     if fault := gravity_fault(sensor.gravity_m_s2):
         yield f"{key}.gravity_m_s2", f"is {fault}"
     corner_hz = sensor.filter_corner_hz
@@ -272,7 +272,7 @@ def _of_sensor(key: str, sensor: Sensor) -> Iterator[KeyFault]:
         yield f"{key}.filter_corner_hz", f"the corner is {corner_hz:g} Hz; give one above 0, or remove the key"
 
 
-def _of_channels(bench: Bench) -> Iterator[KeyFault]:
+def _channel_faults(bench: Bench) -> Iterator[KeyFault]:
     names: dict[int, str] = {}
     for name, number in bench.wired.items():
         if (earlier := names.setdefault(number, name)) != name:
@@ -282,7 +282,7 @@ def _of_channels(bench: Bench) -> Iterator[KeyFault]:
             )
 
 
-def _of_limits(bench: Bench) -> Iterator[KeyFault]:
+def _limit_faults(bench: Bench) -> Iterator[KeyFault]:
     limits = bench.limits
     if not limits.temperature_c[0] < limits.temperature_c[1]:
         yield "limits.temperature_c", f"{_pair(limits.temperature_c)} is not a range; give the lowest, then the highest"
@@ -293,7 +293,7 @@ def _of_limits(bench: Bench) -> Iterator[KeyFault]:
         yield "limits.level_deg", fault
 
 
-def _of_result_limits(bench: Bench) -> Iterator[KeyFault]:
+def _result_limit_faults(bench: Bench) -> Iterator[KeyFault]:
     """A misspelt limit has no effect, so it is a fault. Results of the user's own procedures are not known here."""
     for name, limit in bench.limits.results.items():
         if isinstance(limit, tuple) and not limit[0] <= limit[1]:

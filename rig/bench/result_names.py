@@ -11,12 +11,12 @@ from itertools import combinations, permutations, product
 AXES = "xyz"
 
 
-def _by_axis(meanings: Mapping[str, str]) -> dict[str, str]:
+def _names_of_axes(meanings: Mapping[str, str]) -> dict[str, str]:
     """Names in which `{axis}` stands for any axis, each written for all axes."""
     return {name.format(axis=axis): meaning for name, meaning in meanings.items() for axis in AXES}
 
 
-def _by_pair(name: str, meaning: str, pairs: Iterable[Sequence[str]]) -> dict[str, str]:
+def _names_of_pairs(name: str, meaning: str, pairs: Iterable[Sequence[str]]) -> dict[str, str]:
     """A name that ends with two axes, written for all pairs; `{0}` and `{1}` of its meaning are the axes."""
     return {f"{name}-{first}{second}": meaning.format(first, second) for first, second in pairs}
 
@@ -36,26 +36,28 @@ STEADY_STATE = {
     "steady-state-latest": "Forecast: not later than this (97.5 %).",
 }
 RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
-    "check-standard": _by_axis({"bias-{axis}": BIAS, "scale-{axis}": SCALE}),
+    "check-standard": _names_of_axes({"bias-{axis}": BIAS, "scale-{axis}": SCALE}),
     "hand-positions": {
-        **_by_axis({"bias-{axis}": BIAS, "scale-{axis}": SCALE}),
-        **_by_pair("nonorthogonality", NONORTHOGONALITY, combinations(AXES, 2)),
+        **_names_of_axes({"bias-{axis}": BIAS, "scale-{axis}": SCALE}),
+        **_names_of_pairs("nonorthogonality", NONORTHOGONALITY, combinations(AXES, 2)),
         "uncertainty": "Largest standard uncertainty of the results above, as an error at 1 g.",
     },
     "hand-fields": {
-        **_by_axis({"hard-iron-{axis}": HARD_IRON}),
-        **_by_pair("soft-iron", SOFT_IRON, SOFT_IRON_PAIRS),
+        **_names_of_axes({"hard-iron-{axis}": HARD_IRON}),
+        **_names_of_pairs("soft-iron", SOFT_IRON, SOFT_IRON_PAIRS),
         "field-total": FIELD,
         "left-by-ellipsoid": MAGNITUDE_ERROR,
         "uncertainty": "Largest standard uncertainty of the results above, as a share of the field.",
     },
     "hand-turns": {
-        **_by_axis({"gyro-bias-{axis}": "Output at rest.", "gyro-scale-{axis}": "Output for each deg/s."}),
-        **_by_pair("gyro-misalignment", "Response of {0} to a turn about {1}, as an angle.", permutations(AXES, 2)),
+        **_names_of_axes({"gyro-bias-{axis}": "Output at rest.", "gyro-scale-{axis}": "Output for each deg/s."}),
+        **_names_of_pairs(
+            "gyro-misalignment", "Response of {0} to a turn about {1}, as an angle.", permutations(AXES, 2)
+        ),
         "turn-residual": "Rms error of the angles of the turns over their duration.",
         "uncertainty": "Largest standard uncertainty of a scale factor, or of a misalignment in rad.",
     },
-    "level-check": _by_axis(
+    "level-check": _names_of_axes(
         {
             "level-{axis}": "Tilt of the table along this axis of the level.",
             "level-offset-{axis}": LEVEL_OFFSET,
@@ -64,7 +66,7 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
         }
     ),
     "magnetometer-turn": {
-        **_by_axis(
+        **_names_of_axes(
             {
                 "hard-iron-{axis}": HARD_IRON,
                 "hard-iron-by-hand-{axis}": "Constant field of the sensor, from the extremes of each turn.",
@@ -72,7 +74,7 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
         ),
         "soft-iron-by-hand": "Smallest over largest radius of the turn about z.",
         "soft-iron-angle-by-hand": "Direction in which the field appears largest.",
-        **_by_pair("soft-iron", SOFT_IRON, SOFT_IRON_PAIRS),
+        **_names_of_pairs("soft-iron", SOFT_IRON, SOFT_IRON_PAIRS),
         "field-total": FIELD,
         "field-inclination": "Angle of the field below the horizontal.",
         "field-declination": "Magnetic north, clockwise from true north.",
@@ -84,7 +86,7 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
         **dict.fromkeys(("left-by-ellipsoid", "left-by-hand"), MAGNITUDE_ERROR),
     },
     "misalignment": {
-        **_by_pair("theta", "Component of sensing axis {0} along reference axis {1}.", product("xy", AXES)),
+        **_names_of_pairs("theta", "Component of sensing axis {0} along reference axis {1}.", product("xy", AXES)),
         **{
             f"{angle}-{axis}": f"Angle {angle} from the reference axis to sensing axis {axis}."
             for angle in ("alpha", "beta")
@@ -92,7 +94,7 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
         },
         "non-orthogonality": NONORTHOGONALITY,
         "rounds": "Rounds of the search.",
-        **_by_pair("correction", "Factor of the measured {1} in the corrected {0}.", product(AXES, repeat=2)),
+        **_names_of_pairs("correction", "Factor of the measured {1} in the corrected {0}.", product(AXES, repeat=2)),
     },
     "motion": {
         "rmse-linear-x": "Rms error of the model linear in motion.",
@@ -102,7 +104,7 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
         "amplitude": "Amplitude of the acceleration.",
         "frequency": "Frequency of the motion.",
     },
-    "noise-floor": _by_axis(
+    "noise-floor": _names_of_axes(
         {
             "noise-rms-{axis}": "Rms noise of single samples at rest.",
             "noise-pp-{axis}": "Peak-to-peak noise: four times the rms noise.",
@@ -110,7 +112,7 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
         }
     ),
     "rate-turn": {
-        **_by_axis(
+        **_names_of_axes(
             {
                 "gyro-bias-{axis}": "Output at rest.",
                 "gyro-bias-rate-{axis}": "The bias as a rate.",
@@ -118,10 +120,14 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
                 "rate-residual-{axis}": "Rms error that remains over all turns and rests.",
             }
         ),
-        **_by_pair("gyro-misalignment", "Response of {0} to a turn about {1}, as an angle.", permutations(AXES, 2)),
-        **_by_pair("gyro-g-sensitivity", "Response of {0} to a specific force along {1}.", product(AXES, repeat=2)),
+        **_names_of_pairs(
+            "gyro-misalignment", "Response of {0} to a turn about {1}, as an angle.", permutations(AXES, 2)
+        ),
+        **_names_of_pairs(
+            "gyro-g-sensitivity", "Response of {0} to a specific force along {1}.", product(AXES, repeat=2)
+        ),
     },
-    "repeat": _by_axis(
+    "repeat": _names_of_axes(
         {
             f"{quantity}-{kind}-{{axis}}": f"Scatter of repetitions {change}."
             for quantity in ("bias", "scale")
@@ -134,8 +140,8 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
     ),
     "soak": {
         **STEADY_STATE,
-        **_by_axis({f"{name}-{{axis}}": meaning for name, meaning in STEADY_STATE.items()}),
-        **_by_axis(
+        **_names_of_axes({f"{name}-{{axis}}": meaning for name, meaning in STEADY_STATE.items()}),
+        **_names_of_axes(
             {
                 "bias-drift-{axis}": "Change of the bias over the soak.",
                 "scale-drift-{axis}": "Relative change of the scale factor over the soak.",
@@ -152,8 +158,8 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
         "temperature-wander": "Range of the temperature after warm-up.",
         "gap": "Total time without samples.",
     },
-    "sweep": _by_axis({"reference-drift-{axis}": "Trend of the output at the reference pose."}),
-    "temperature-cycle": _by_axis(
+    "sweep": _names_of_axes({"reference-drift-{axis}": "Trend of the output at the reference pose."}),
+    "temperature-cycle": _names_of_axes(
         {
             "bias-temperature-{axis}": "Change of the bias for each kelvin.",
             "bias-temperature-hysteresis-{axis}": "Bias on the way up less bias on the way down in temperature.",

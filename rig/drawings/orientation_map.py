@@ -41,7 +41,7 @@ def orientation_map(guidance: Guidance) -> list[str]:
 
 WIDTH, HEIGHT = 820, 300
 CUBE, CUBE_PX = (150, 180), 50.0
-BESIDE = (78, 62)  # of the cube: where the arrow to the north begins
+ARROW_START = (78, 62)  # of the cube: where the arrow to the north begins
 DISCS = (((430, 164), 1, "+z half"), ((680, 164), -1, "-z half"))
 DISC_PX = 88.0
 VIEW = np.array([0.5, -0.7, 0.6])  # from the sensor to who looks at it; z is upward
@@ -108,7 +108,7 @@ def _resting_cube(up: Array, north: Array) -> Iterator[str]:
             yield svg.text(projected(normal), f"{'+' if sign > 0 else '−'}{axis}", 15, bold=True)
     if len(north):
         middle, ahead = projected(np.zeros(3)), projected(1.1 * north)
-        start = CUBE[0] + BESIDE[0], CUBE[1] + BESIDE[1]
+        start = CUBE[0] + ARROW_START[0], CUBE[1] + ARROW_START[1]
         end = start[0] + ahead[0] - middle[0], start[1] + ahead[1] - middle[1]
         yield svg.arrow(start, end, svg.BLUE)
         yield svg.text((end[0] + 6, end[1] + 4), "north", 13, svg.BLUE, "start", bold=True)

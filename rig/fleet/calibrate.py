@@ -22,7 +22,7 @@ from rig.files import make_folder, program, write_whole
 from rig.fleet.discover import errors_of, stands_out
 from rig.fleet.members import Member
 from rig.fleet.questions import Fleet
-from rig.fleet.worker import Own, Question, effects_of, model_of, read_look
+from rig.fleet.worker import OwnEffects, Question, effects_of, model_of, read_look
 
 Names = tuple[tuple[str, str, str, str], ...]
 
@@ -37,7 +37,7 @@ class Guide:
     models: Mapping[str, str]
     otherwise: str
     errors: Mapping[str, StageErrors]
-    own: Own = ()
+    own: OwnEffects = ()
 
     def question(self, member: Member) -> Question:
         """The question for a sensor."""
@@ -162,7 +162,7 @@ def write_models(result: Calibration, folder: Path) -> list[Path]:
     return [folder / f"{sensor}.yaml" for sensor in texts]
 
 
-def read_guide(source: str, batches: set[str], effect_files: Own = ()) -> Guide:
+def read_guide(source: str, batches: set[str], effect_files: OwnEffects = ()) -> Guide:
     """The guide from a folder, or from the name or file of one model. Raises ModelError, UnknownName."""
     folder, effects = Path(source), effects_of(effect_files)
     if not folder.is_dir():

@@ -36,7 +36,7 @@ from rig.fleet.worker import Question, effects_of, read_look
 
 STANDS_OUT = 0.05  # chance, over the whole search, below which a sensor is diagnosed in full
 MOST_ROUNDS = 6
-JUDGED = ("left", "share_left", "spoilt", "unresponsive", "undetermined")  # facts of a diagnosis for the verdict
+VERDICT_FACTS = ("left", "share_left", "spoilt", "unresponsive", "undetermined")  # facts of a diagnosis for the verdict
 FEWEST = 4  # sensors of a batch for an estimate of its noise
 
 Batches = Mapping[str, Sequence[Member]]
@@ -231,7 +231,7 @@ def _verdict(member: Member, stand: Stand, diagnosis: Any | None) -> SensorVerdi
         model=stand.start.model,
         missing=(*names, *own_effects),
         alternatives=rivals,
-        **{name: facts[name] for name in JUDGED if name in facts},
+        **{name: facts[name] for name in VERDICT_FACTS if name in facts},
     )
     remark = "; ".join(filter(None, (facts.get("left"), facts.get("caution")))) or None
     scope = FULL_SEARCH if diagnosis else WITH_BATCH

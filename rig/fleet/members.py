@@ -54,7 +54,11 @@ def fleet_of(sources: Iterable[str]) -> list[Member]:
     with the same name.
     """
     source_names = list(sources)
-    members = [member for source in source_names for member in _of(source)] if source_names else list(_of_record())
+    members = (
+        [member for source in source_names for member in _members_of(source)]
+        if source_names
+        else list(_record_members())
+    )
     if not members:
         raise RigError(
             f"no sensor in {', '.join(source_names) or 'the record'}; name an index, a folder, tables or runs"
@@ -76,16 +80,16 @@ def content(member: Member) -> str:
         return "".join(lines)
 
 
-def _of(source: str) -> Iterator[Member]:
+def _members_of(source: str) -> Iterator[Member]:
     path = Path(source)
     if path.is_dir():
         index = path / INDEX
         files = sorted(path.glob("*.csv"))
-        yield from _of_index(index) if index.is_file() else (_of_file(file, {}) for file in files)
+        yield from _index_members(index) if index.is_file() else (_file_member(file, {}) for file in files)
     elif path.is_file():
-        yield from _of_index(path) if _is_index(path) else [_of_file(path, {})]
+        yield from _index_members(path) if _is_index(path) else [_file_member(path, {})]
     else:
-        yield from _of_run(source, {})
+        yield from _run_members(source, {})
 
 
 def _is_index(path: Path) -> bool:
@@ -102,7 +106,7 @@ def _head(path: Path) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([first]), [])]
 
 
-def _of_index(path: Path) -> Iterator[Member]:
+def _index_members(path: Path) -> Iterator[Member]:
     """The members of an index. Raises RigError for an unknown column and for a row without data."""
     with open_text_file(path).lines() as lines:
         rows = list(csv.DictReader(io.StringIO("".join(line for line in lines if not line.startswith("#")))))
@@ -120,12 +124,12 @@ def _of_index(path: Path) -> Iterator[Member]:
         data_path = path.parent / file_name
         cells_given = {name: cells[name] for name in ("sensor", "batch", "rig") if cells.get(name)}
         if cells.get("file") or data_path.is_file():
-            yield _of_file(data_path, cells_given)
+            yield _file_member(data_path, cells_given)
         else:
-            yield from _of_run(file_name, cells_given)
+            yield from _run_members(file_name, cells_given)
 
 
-def _of_file(path: Path, given_names: dict[str, str]) -> Member:
+def _file_member(path: Path, given_names: dict[str, str]) -> Member:
     member = Member(
         given_names.get("sensor", path.stem), given_names.get("batch", ""), given_names.get("rig", ""), str(path)
     )
@@ -149,7 +153,7 @@ def _constant(line: str) -> tuple[str, str, str]:
     return line[1:].partition(":") if line.startswith("#") else ("", "", "")
 
 
-def _of_run(name: str, given_names: dict[str, str]) -> Iterator[Member]:
+def _run_members(name: str, given_names: dict[str, str]) -> Iterator[Member]:
     """The sensors of a run, or the named sensor. Raises UnknownRun."""
     run_id, slash, sensor_name = name.partition("/")
     if not run_id:
@@ -172,7 +176,7 @@ def _of_run(name: str, given_names: dict[str, str]) -> Iterator[Member]:
         )
 
 
-def _of_record() -> Iterator[Member]:
+def _record_members() -> Iterator[Member]:
     """The last complete run of each sensor."""
     if not Record.is_there():
         return

@@ -28,7 +28,7 @@ from calibrations.loop import diagnose
 from calibrations.model import Model
 from calibrations.model.file import parse_model
 from calibrations.table import Table
-from calibrations.tables import FITTED, MEANS
+from calibrations.tables import FITTED_KINDS, MEANS
 from calibrations.text import join_words
 from rig.errors import RigError
 from rig.services.load import LONGEST_BEGINNING, channels_alone, check_unit
@@ -92,7 +92,7 @@ class Question:
     model: str
     effects: tuple[str, ...] = ()  # of the batch, in addition to the model
     errors: StageErrors = field(default_factory=dict)  # of the rig
-    own: Own = ()  # the user's effects
+    own: OwnEffects = ()  # the user's effects
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def _answer(task: Task) -> Answer:
 
 
 @lru_cache(maxsize=8)
-def _model_and_designs(model: str, effects: tuple[str, ...], effect_files: Own) -> tuple[Model, SharedDesigns]:
+def _model_and_designs(model: str, effects: tuple[str, ...], effect_files: OwnEffects) -> tuple[Model, SharedDesigns]:
     """The model, and the designs that the sensors of this worker share."""
     return model_of(Question("look", model, effects, own=effect_files)), SharedDesigns(effects_of(effect_files))
 
@@ -158,7 +158,7 @@ def _check_table(table: Table, model: Model) -> Table:
 
 
 def _unsuitable_kind(source: str, kind: str) -> str:
-    command = "discover" if kind in FITTED else "noise"
+    command = "discover" if kind in FITTED_KINDS else "noise"
     return (
         f"{source}: is a table of {kind}, and a fleet can have {join_words(list(MEANS))}; leave it out, and analyse "
         f"it alone: rig {command} {source}"
@@ -201,10 +201,10 @@ def _diagnosis_answer(diagnosis: Diagnosis[Fit]) -> Answer:
 # The user's effects as texts, because workers may have no access to the folder that the bench file names.
 
 
-Own = tuple[tuple[str, str], ...]  # names and texts of Python files
+OwnEffects = tuple[tuple[str, str], ...]  # names and texts of Python files
 
 
-def own_files(bench_file: Path | None) -> Own:
+def own_files(bench_file: Path | None) -> OwnEffects:
     """The files of the effects folder of a bench file. Raises ModelError for a file that is not an effect."""
     if bench_file is None:
         return ()
@@ -217,7 +217,7 @@ def own_files(bench_file: Path | None) -> Own:
 
 
 @lru_cache(maxsize=8)
-def effects_of(effect_files: Own) -> Mapping[str, Effect]:
+def effects_of(effect_files: OwnEffects) -> Mapping[str, Effect]:
     """The shipped effects and those of the user's files. Raises ModelError."""
     if not effect_files:
         return catalogue()

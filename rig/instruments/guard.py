@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from drivers.clock import Clock, Wire
 
-AT_ONCE_S = 0.04  # interval of interlocks and alarms: less than half of the time that a stop may take
+WATCH_S = 0.04  # interval of interlocks and alarms: less than half of the time that a stop may take
 NOW_AND_THEN_S = 10.0  # interval of temperatures
 SHORTEST_S = 0.01  # a shorter sleep may be a part of an exchange
 
@@ -24,7 +24,7 @@ class Look:
     """A check at intervals of `every_s`, in sleeps that still last `takes_s`. `look` raises the error."""
 
     look: Callable[[], object]
-    every_s: float = AT_ONCE_S
+    every_s: float = WATCH_S
     takes_s: float = 0.0
 
     def next_s(self, now_s: float) -> float:

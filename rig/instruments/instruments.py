@@ -46,7 +46,7 @@ class Technician:
         return float(self.host.ask(Dial(name, text, unit=unit, low=low, high=high, stage=stage, expected=expected)))
 
 
-OVEN_TAKES_S = 0.5  # an answer of the oven, with a margin
+OVEN_ANSWER_S = 0.5  # an answer of the oven, with a margin
 MOVING = ("alpha", "beta", "positioner")
 
 
@@ -94,7 +94,7 @@ class Rig:
         self.person.attended_by = Technician(host)
         parts: dict[str, Any] = {role: self.drivers.get(role) or absent(role) for role in ROLES}
         return Session(
-            **parts, clock=self.clock, host=host, limits=self.bench.limits, steady=_at_rest, by_hand=HandAnalysis()
+            **parts, clock=self.clock, host=host, limits=self.bench.limits, steady=_is_steady, by_hand=HandAnalysis()
         )
 
     def read_deg(self) -> dict[str, float]:
@@ -148,7 +148,7 @@ class Rig:
         checks = [Look(driver.look) for driver in self._drivers_with_check()]
         if "oven" in self.drivers:
             checks.append(
-                Look(lambda: session.check_temperature(session.oven.temperature_c()), NOW_AND_THEN_S, OVEN_TAKES_S)
+                Look(lambda: session.check_temperature(session.oven.temperature_c()), NOW_AND_THEN_S, OVEN_ANSWER_S)
             )
         return self.clock.guarded(checks)
 
@@ -203,7 +203,7 @@ def _failure(act: Callable[[], object]) -> Exception | None:
     return None
 
 
-def _at_rest(dwells: Sequence[Dwell], oven_c: float) -> bool:
+def _is_steady(dwells: Sequence[Dwell], oven_c: float) -> bool:
     from rig.results.soak import steady  # slow to import, and only a soak needs it
 
     return steady(dwells, oven_c)

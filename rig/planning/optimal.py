@@ -122,8 +122,8 @@ def optimal(
     between_s = moves_s(bench, design) + APART_S * _equal_poses(design)
     tour = Tour(from_home_s(bench, design), between_s, rows, _dwell_s(design_range, design))
     order = order_tour(tour)
-    short = design_range.judged(_listing(settings, [design[k] for k in order]))
-    equal, all_equal = (_as_good(design_range, short, ratio) for ratio in (relative, most_relative))
+    short = design_range.judged(_pose_settings(settings, [design[k] for k in order]))
+    equal, all_equal = (_equal_plan(design_range, short, ratio) for ratio in (relative, most_relative))
     return Optimal(design_range, criterion, short, equal, all_equal, tour.drift_loss(order))
 
 
@@ -148,7 +148,7 @@ def _equal_poses(poses: Sequence[Pose]) -> Array:
 
 def _dwell_s(design_range: Range, design: Sequence[Pose]) -> float:
     """Sum of all dwells at equal worst standard error; the order changes it little. Raises PlanError."""
-    unordered = design_range.judged(_listing(design_range.settings, design))
+    unordered = design_range.judged(_pose_settings(design_range.settings, design))
     if undetermined := [
         design_range.name(int(k)) for k in np.flatnonzero(design_range.standard.determined & ~unordered.determined)
     ]:
@@ -158,24 +158,27 @@ def _dwell_s(design_range: Range, design: Sequence[Pose]) -> float:
     return len(design) * _longer(unordered.dwell_s, relative(design_range.standard, unordered))
 
 
-def _listing(settings: Mapping[str, Any], poses: Sequence[Pose]) -> dict[str, Any]:
+def _pose_settings(settings: Mapping[str, Any], poses: Sequence[Pose]) -> dict[str, Any]:
     """Settings of a sweep over these poses."""
     return {**settings, "face": "up", "reference_every": 0, "pose_list": format_poses(poses)}
 
 
-def _as_good(design_range: Range, short: Judged, ratio: Callable[[Judged, Judged], float]) -> Judged:
+def _equal_plan(design_range: Range, short: Judged, ratio: Callable[[Judged, Judged], float]) -> Judged:
     """The plan with the dwell at which its `ratio` to the standard sweep is 1.
 
     With white noise it follows directly. If effects depend on time, the length of the run counts as well: by bisection.
     """
-    low, high = short, _with_dwell(design_range, short, _longer(short.dwell_s, ratio(design_range.standard, short)))
+    low, high = (
+        short,
+        _judged_with_dwell(design_range, short, _longer(short.dwell_s, ratio(design_range.standard, short))),
+    )
     while ratio(design_range.standard, high) < NEARLY and high.dwell_s - low.dwell_s > 0.15:
-        middle = _with_dwell(design_range, short, round(float(np.sqrt(low.dwell_s * high.dwell_s)), 1))
+        middle = _judged_with_dwell(design_range, short, round(float(np.sqrt(low.dwell_s * high.dwell_s)), 1))
         low, high = (low, middle) if ratio(design_range.standard, middle) <= 1 else (middle, high)
     return high
 
 
-def _with_dwell(design_range: Range, judged: Judged, dwell_s: float) -> Judged:
+def _judged_with_dwell(design_range: Range, judged: Judged, dwell_s: float) -> Judged:
     return design_range.judged({**judged.plan.settings, "dwell_s": dwell_s})
 
 

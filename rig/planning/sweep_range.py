@@ -131,13 +131,13 @@ class Range:
     @cached_property
     def white(self) -> Array:
         """Information of the candidates, scaled, shape (candidates, axes, p)."""
-        rows = information(self.fit, self._foreseen)
+        rows = information(self.fit, self._candidate_table)
         return scale_rows(rows.reshape(len(self.axes), len(self.candidates), -1).transpose(1, 0, 2))
 
     @property
     def places(self) -> Array:
         """Where the candidates are, for distances: gravity in the sensor's frame, and the side of the approach."""
-        table = self._foreseen
+        table = self._candidate_table
         return np.column_stack([reported_force(table), SIDE * table.column("direction")])
 
     def judged(self, settings: Mapping[str, Any]) -> Judged:
@@ -159,9 +159,9 @@ class Range:
         return plan(self.bench, self.sweep, self.settings)
 
     @cached_property
-    def _foreseen(self) -> Table:
+    def _candidate_table(self) -> Table:
         """Of the candidates, in no order; at one time where the model needs a time."""
-        columns = _of_poses(self.candidates)
+        columns = _pose_columns(self.candidates)
         if any("t_s" in term.effect.needs for term in self.fit.model.terms):
             columns["t_s"] = np.full(len(self.candidates), self._plan.duration_s / 2)
         return predict_data(self.fit, columns)
@@ -191,11 +191,11 @@ def _fill_gaps(angles_deg: Iterable[float]) -> list[float]:
 def _columns(planned: Plan) -> dict[str, Array]:
     """Of the poses that a plan holds, in order, with their times and dwells."""
     dwell_s = float(planned.settings["dwell_s"])
-    columns = _of_poses([dwell.pose for dwell in planned.held])
+    columns = _pose_columns([dwell.pose for dwell in planned.held])
     columns["t_s"] = np.array([dwell.start_s + dwell_s / 2 for dwell in planned.held])
     return columns | {"dwell_s": np.full(planned.poses, dwell_s)}
 
 
-def _of_poses(poses: Sequence[Pose]) -> dict[str, Array]:
+def _pose_columns(poses: Sequence[Pose]) -> dict[str, Array]:
     names = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")
     return {name: np.array([float(getattr(pose, name)) for pose in poses]) for name in names}

@@ -19,7 +19,7 @@ from rig.record.schema import DAMAGED, blocks, columns, dwells, poses, readings,
 
 # The values of a row that do not change after its insertion, without the run's name, which is different in a lab. The
 # lists stay as they are when a later schema adds columns; else the rows of today would look damaged.
-COVERED: Mapping[Table, tuple[str, ...]] = {
+CHECKED_COLUMNS: Mapping[Table, tuple[str, ...]] = {
     runs: (
         "kind", "procedure", "settings", "bench", "identities", "configuration", "constants", "source", "created",
     ),
@@ -52,7 +52,7 @@ def is_damaged(table: Table, row: Mapping[Any, Any], required: bool = False) -> 
 
 
 def _checksum(table: Table, values: Mapping[str, Any]) -> int:
-    parts = [_stored_value(table.c[name], values.get(name)) for name in COVERED[table]]
+    parts = [_stored_value(table.c[name], values.get(name)) for name in CHECKED_COLUMNS[table]]
     return zlib.crc32(json.dumps(parts).encode())
 
 

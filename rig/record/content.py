@@ -30,8 +30,8 @@ ORDER = {
     log: log.c.line,
     events: events.c.event,
 }
-GIVEN = (events.c.event, log.c.line)  # numbers given by the database
-MADE = ("run", "procedure", "created", "configuration", "source", "identities")  # set at the begin of a run
+DATABASE_NUMBERS = (events.c.event, log.c.line)  # numbers given by the database
+START_COLUMNS = ("run", "procedure", "created", "configuration", "source", "identities")  # set at the begin of a run
 
 
 def digest(connection: Connection, run: str) -> str:
@@ -63,7 +63,7 @@ def run_row(connection: Connection, run: str) -> Row[Any]:
 def uid_of(connection: Connection, run: str) -> str:
     """The identifier of a run in every record. For a run of an older program it is derived from its begin."""
     row = connection.execute(select(runs).where(runs.c.run == run)).one()._mapping
-    return row["uid"] or hashlib.sha256(_line([row[name] for name in MADE])).hexdigest()[:32]
+    return row["uid"] or hashlib.sha256(_line([row[name] for name in START_COLUMNS])).hexdigest()[:32]
 
 
 def rows_of(table: Table, run: str, counted: bool = False) -> Select[Any]:
@@ -71,7 +71,9 @@ def rows_of(table: Table, run: str, counted: bool = False) -> Select[Any]:
 
     With `counted`, bytes are replaced by their SHA-256, and checksums are omitted: older records have none.
     """
-    columns: Iterable[ColumnElement[Any]] = (column for column in table.c if column not in (*GIVEN, table.c.run))
+    columns: Iterable[ColumnElement[Any]] = (
+        column for column in table.c if column not in (*DATABASE_NUMBERS, table.c.run)
+    )
     if counted:
         columns = (
             func.sha256(column) if isinstance(column.type, LargeBinary) else column

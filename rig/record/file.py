@@ -38,8 +38,8 @@ FAILURES = {  # primary code of SQLite: fault and remedy
 }
 
 
-SIDES = ("-wal", "-shm")  # of the record's file: write-ahead log, and its index
-REMOVED = "another program removed the write-ahead log of the record during this command"
+LOG_SUFFIXES = ("-wal", "-shm")  # of the record's file: write-ahead log, and its index
+REMOVED_LOG = "another program removed the write-ahead log of the record during this command"
 
 
 def open_file(path: Path, notify: Callable[[str], None] = lambda _: None) -> Engine:
@@ -51,12 +51,12 @@ def open_file(path: Path, notify: Callable[[str], None] = lambda _: None) -> Eng
     """
     engine = create_engine(f"sqlite:///{path}", creator=lambda: _connect(path))
     event.listen(engine, "connect", lambda connection, _: give_sha256(connection))
-    event.listen(engine, "connect", lambda _, info: info.info.update(sides=_sides(path), inode=_inode(path)))
-    event.listen(engine, "checkout", lambda connection, info, _: _require_sides(connection, info.info, path, notify))
+    event.listen(engine, "connect", lambda _, info: info.info.update(sides=_log_inodes(path), inode=_inode(path)))
+    event.listen(engine, "checkout", lambda connection, info, _: _require_log(connection, info.info, path, notify))
     event.listen(engine, "checkin", lambda connection, info: _save_rows(connection, info.info, path, notify))
     event.listen(engine, "close", lambda connection, info: _save_rows(connection, info.info, path, notify))
     event.listen(engine, "handle_error", lambda context: _raise_record_error(context, path))
-    event.listen(engine, "begin", lambda connection: _require_there(connection, path))
+    event.listen(engine, "begin", lambda connection: _require_file(connection, path))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -102,15 +102,15 @@ def _inode(path: Path) -> int | None:
         return None
 
 
-def _sides(path: Path) -> tuple[int | None, ...]:
+def _log_inodes(path: Path) -> tuple[int | None, ...]:
     """The identities of the write-ahead log and its index; None for a missing file."""
-    return tuple(_inode(path.with_name(path.name + side)) for side in SIDES)
+    return tuple(_inode(path.with_name(path.name + side)) for side in LOG_SUFFIXES)
 
 
-def _require_sides(connection: Any, info: dict[str, Any], path: Path, notify: Callable[[str], None]) -> None:
+def _require_log(connection: Any, info: dict[str, Any], path: Path, notify: Callable[[str], None]) -> None:
     """Go on with a new connection if the write-ahead log was removed. Raises RecordError if rows cannot be saved."""
     if not _save_rows(connection, info, path, notify):
-        raise RecordError(f"{path}: {REMOVED}, and its rows cannot be saved; {RECOVER}")
+        raise RecordError(f"{path}: {REMOVED_LOG}, and its rows cannot be saved; {RECOVER}")
     if info.get("replaced"):
         raise InvalidatePoolError  # the pool makes a new connection
 
@@ -120,7 +120,12 @@ def _save_rows(connection: Any, info: dict[str, Any], path: Path, notify: Callab
 
     A record that was removed or exchanged itself is found at the begin of the next transaction.
     """
-    if connection is None or info.get("replaced") or _sides(path) == info["sides"] or _inode(path) != info["inode"]:
+    if (
+        connection is None
+        or info.get("replaced")
+        or _log_inodes(path) == info["sides"]
+        or _inode(path) != info["inode"]
+    ):
         return True
     if info["sides"][0] is None:  # read-only, or a file system without a write-ahead log
         return True
@@ -130,11 +135,11 @@ def _save_rows(connection: Any, info: dict[str, Any], path: Path, notify: Callab
         busy = True
     info["replaced"] = not busy
     remedy = "check the poses of this run" if busy else "all rows were saved"
-    notify(f"{path}: {REMOVED}; {remedy}; do not let a program remove files from this folder")
+    notify(f"{path}: {REMOVED_LOG}; {remedy}; do not let a program remove files from this folder")
     return not busy
 
 
-def _require_there(connection: Connection, path: Path) -> None:
+def _require_file(connection: Connection, path: Path) -> None:
     """Raises RecordError for a removed or exchanged file: SQLite would continue to write into the old one."""
     try:
         inode = path.stat().st_ino

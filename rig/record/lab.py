@@ -25,11 +25,11 @@ PREPARE = "`rig push --prepare --to URL`, run by the owner of the database,"
 # Timeouts for an absent lab; the URL can set others.
 PATIENCE = {"connect_timeout": "5", "keepalives_idle": "10", "keepalives_interval": "5", "keepalives_count": "3"}
 PATIENCE |= {"tcp_user_timeout": "20000", "application_name": "rig"}
-ENCRYPTED = {"sslmode": "require"}  # by default; the default of libpq would fall back to plain text
+TLS_DEFAULT = {"sslmode": "require"}  # by default; the default of libpq would fall back to plain text
 LOCAL_HOSTS = ("/", "@", "127.", "localhost", "::1")  # prefixes of this machine; the first two are sockets
 TLS = ("SSL", "certificate")  # words in libpq's messages on encryption
 FORBIDDEN, READ_ONLY = "42501", "25006"  # SQLSTATE: insufficient privilege, read-only transaction
-LOCKED = "55P03"  # SQLSTATE: lock not available
+LOCK_NOT_AVAILABLE = "55P03"  # SQLSTATE: lock not available
 SILENCE_S = 60.0  # longest wait for one answer of the server; the server may be stopped, and its network alive
 LOCK_S = 15  # longest wait for another push of the same run
 IDLE_S = 60  # after which the server ends the transaction of a client that is stopped, and releases its locks
@@ -96,7 +96,7 @@ def _bound_locks(connection: Any) -> None:
 def options(url: URL) -> dict[str, str]:
     """The options for libpq that the URL does not set."""
     security_options = {"service", "sslmode"} & set(url.query) or "PGSSLMODE" in os.environ or _is_here(url)
-    return {k: v for k, v in PATIENCE.items() if k not in url.query} | ({} if security_options else ENCRYPTED)
+    return {k: v for k, v in PATIENCE.items() if k not in url.query} | ({} if security_options else TLS_DEFAULT)
 
 
 def _is_here(url: URL) -> bool:
@@ -138,7 +138,7 @@ def _raise_lab_error(context: ExceptionContext, url: URL) -> None:
         role = url.username or "this role"
         raise RecordError(f"{mask_url(url)}: {role} has no permission for this ({_first_line(error)}); the owner can "
                           "grant it rig_writer, or rig_reader for reading") from None  # fmt: skip
-    if getattr(error, "sqlstate", None) == LOCKED:
+    if getattr(error, "sqlstate", None) == LOCK_NOT_AVAILABLE:
         raise RecordError(
             f"{mask_url(url)}: another push has locked this run for more than {LOCK_S} s; push it again later "
             f"(the server releases the lock of a stopped program after {IDLE_S} s)"

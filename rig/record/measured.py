@@ -36,7 +36,7 @@ from rig.record.values import CHANGED, Block, Kept, Run
 # specific force in g (ax .. az).
 
 FIELD, RATE, FORCE = ("mx", "my", "mz"), ("gx", "gy", "gz"), ("ax", "ay", "az")
-NOT_OF_THESE = ("filter_corner_hz", "approach_deg")  # constants of poses only
+POSE_CONSTANTS = ("filter_corner_hz", "approach_deg")  # constants of poses only
 PROGRAM_CHANGED = "program_changed"  # a constant: from where on another program or procedure measured
 
 
@@ -92,7 +92,7 @@ def _table(run: Run, recorded: Sequence[Kept], outputs: Sequence[str], extra_col
     columns |= {f"{name}_std": np.array([row.stds[name] for row in rows]) for name in outputs}
     columns |= {"n": np.array([float(row.n) for row in rows])}
     blocks = [pose.samples for pose in recorded[:: 1 + len(recorded) // MOST_BLOCKS]]
-    constants_kept = {name: value for name, value in run.constants.items() if name not in NOT_OF_THESE}
+    constants_kept = {name: value for name, value in run.constants.items() if name not in POSE_CONSTANTS}
     unit = stated_unit(units_of(run, outputs)) or {"unit": "V"}
     constants = {**constants_kept, **unit, "sample_rate_hz": blocks[0].rate_hz, **inflations(blocks, outputs)}
     labels = {"path": tuple(pose.pose.path for pose in recorded)}
@@ -106,13 +106,13 @@ def turns_table(run: Run, poses: Iterable[Kept]) -> Table:
     if not columns:
         raise RecordError(f"run {run.run} has no turn between two rests yet; `rig resume` continues it")
     unit = stated_unit(units_of(run, RATE)) or {"unit": "V"}
-    constants = {name: value for name, value in run.constants.items() if name not in NOT_OF_THESE}
+    constants = {name: value for name, value in run.constants.items() if name not in POSE_CONSTANTS}
     rate_hz = 1 / float(np.median(np.diff(columns["t_s"])))
     return Table.from_columns(run.kind, columns, {**constants, **unit, "sample_rate_hz": rate_hz}, run.run)
 
 
 # Tables with a row for each pose or turn; the others have a row for each sample.
-MADE = {"poses": poses_table, "positions": positions_table, "rates": rates_table, "turns": turns_table}
+ROW_TABLES = {"poses": poses_table, "positions": positions_table, "rates": rates_table, "turns": turns_table}
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ class Measured:
 
     def table(self) -> Table:
         """A row for each pose or, in a run of another kind, for each sample. Raises RecordError without a row."""
-        return self.part(self.run.kind) if (imported := self.imported()) is None else self._included(imported)
+        return self.part(self.run.kind) if (imported := self.imported()) is None else self._included_rows(imported)
 
     def imported(self) -> Table | None:
         """The table as it was imported, with the excluded rows; None for a measured run."""
@@ -177,7 +177,7 @@ class Measured:
             return None
         return Table.from_columns(self.run.kind, numbers, self.run.constants, self.run.run, labels)
 
-    def _included(self, table: Table) -> Table:
+    def _included_rows(self, table: Table) -> Table:
         """The rows without an exclusion. They keep their numbers. Raises RecordError without any."""
         excluded = list(self.record.excluded(self.run.run))
         if not excluded:
@@ -198,7 +198,7 @@ class Measured:
             for recorded in self.kept()
             if recorded.pose.path.startswith(path)
         )
-        return MADE.get(kind, samples_table)(run, poses)
+        return ROW_TABLES.get(kind, samples_table)(run, poses)
 
     def power_on_s(self) -> float:
         """The time on the run's clock when the run switched the sensor on; 0 if it did not.

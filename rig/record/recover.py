@@ -26,7 +26,7 @@ from sqlalchemy.dialects import sqlite as dialect
 
 from rig.errors import RecordError
 from rig.record import codec
-from rig.record.checksum import COVERED, is_damaged
+from rig.record.checksum import CHECKED_COLUMNS, is_damaged
 from rig.record.file import FILE, decode_text, open_file
 from rig.record.schema import DAMAGED, blocks, metadata, poses, readings, runs
 
@@ -84,7 +84,7 @@ def _recover_rows(source: Path, target: Path) -> Recovered:
                 damaged.append(table.name)
         new.commit()
         replaced_runs = tuple(_remove_damaged_rows(target))
-        damaged_samples = tuple(_spoilt(new))
+        damaged_samples = tuple(_remove_damaged_samples(new))
         for name, other_table in (("poses", "blocks"), ("blocks", "poses"), ("dwells", "poses")):
             match = f"{other_table}.run = {name}.run AND {other_table}.number = {name}.number"
             new.execute(f"DELETE FROM {name} WHERE NOT EXISTS (SELECT 1 FROM {other_table} WHERE {match})")  # noqa: S608
@@ -126,7 +126,7 @@ def _remove_damaged_rows(target: Path) -> Iterator[str]:
     try:
         with engine.begin() as connection:
             checked = set(connection.execute(select(runs.c.run).where(runs.c.checksum.is_not(None))).scalars())
-            for table in (table for table in COVERED if table is not runs):
+            for table in (table for table in CHECKED_COLUMNS if table is not runs):
                 place = "name" if "name" in table.c else "number"
                 key = (table.c.run, table.c[place])
                 rows = connection.execute(select(table))
@@ -222,7 +222,7 @@ def _readable(old: sqlite3.Connection, select: str) -> Iterator[tuple[object, ..
         yield None
 
 
-def _spoilt(new: sqlite3.Connection) -> Iterator[str]:
+def _remove_damaged_samples(new: sqlite3.Connection) -> Iterator[str]:
     """Delete the samples that are damaged. Returns their poses."""
     for run, number, samples in new.execute("SELECT run, number, samples FROM blocks").fetchall():
         try:

@@ -49,8 +49,8 @@ from rig.record.values import Block, Event, Kept, Run
 MOST_LISTED = 5
 MOST_SUGGESTED = 20  # names of a kind from which a suggestion is chosen
 LAST = "last"  # the newest run, in the place of an id
-POSE = ("alpha_deg", "beta_deg", "direction", "path", "mount_deg", "flip", "up", "rate_deg_s")
-BESIDE = ("t_s", "temperature_c", "alpha_read_deg", "beta_read_deg")
+POSE_COLUMNS = ("alpha_deg", "beta_deg", "direction", "path", "mount_deg", "flip", "up", "rate_deg_s")
+KEPT_COLUMNS = ("t_s", "temperature_c", "alpha_read_deg", "beta_read_deg")
 
 
 def select_runs() -> Select[Any]:
@@ -158,7 +158,7 @@ def excluded_rows(events: Iterable[Event]) -> dict[int, str]:
 
 def pose_of(row: Row[Any]) -> Pose:
     """The pose of a row of `poses`."""
-    return Pose(**{name: row._mapping[poses.c[name]] for name in POSE})
+    return Pose(**{name: row._mapping[poses.c[name]] for name in POSE_COLUMNS})
 
 
 def has_checksums(connection: Connection, run: str) -> bool:
@@ -277,7 +277,9 @@ def kept_of(row: Row[Any]) -> Kept:
         raise RecordError(f"{place}: {error}; restore a copy of the record") from None
     pose = pose_of(row)
     block = Block(volts, tuple(row.channels), row.rate_hz, row.start_s)
-    return Kept(pose, block, excluded=row.excluded, number=row.number, **{name: row._mapping[name] for name in BESIDE})
+    return Kept(
+        pose, block, excluded=row.excluded, number=row.number, **{name: row._mapping[name] for name in KEPT_COLUMNS}
+    )
 
 
 def put_state(connection: Connection, run: str, state: Mapping[str, Any]) -> None:

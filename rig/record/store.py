@@ -29,9 +29,9 @@ from rig.record import codec
 from rig.record.checksum import is_damaged, with_checksum
 from rig.record.file import FILE, RECOVER, open_file
 from rig.record.rows import (
-    BESIDE,
+    KEPT_COLUMNS,
     LAST,
-    POSE,
+    POSE_COLUMNS,
     damage_text,
     dwell_of,
     excluded_rows,
@@ -143,14 +143,14 @@ class Record:
     def keep(self, run: str, number: int, recorded: Kept, state: Mapping[str, Any] | None) -> None:
         """Add pose, samples and the `state` of the simulated bench, in one transaction."""
         key = {"run": run, "number": number}
-        pose = {name: getattr(recorded.pose, name) for name in POSE}
+        pose = {name: getattr(recorded.pose, name) for name in POSE_COLUMNS}
         samples = {name: getattr(recorded.samples, name) for name in ("rate_hz", "start_s")}
         samples |= {"channels": list(recorded.samples.channels), "codec": codec.CODEC}
         samples |= {"samples": codec.encode(recorded.samples.volts)}
         measured = recorded.dwell
         dwell = {"n": measured.n, "means": dict(measured.means), "stds": dict(measured.stds)}
         with self.engine.begin() as connection:
-            pose |= {name: getattr(recorded, name) for name in BESIDE}
+            pose |= {name: getattr(recorded, name) for name in KEPT_COLUMNS}
             for table, values in ((poses, pose), (blocks, samples), (dwells, dwell)):
                 connection.execute(insert(table), with_checksum(table, key | values))
             if state is not None:

@@ -98,13 +98,13 @@ def magnetometer_turn(measured: Measured) -> dict[str, Result | Missing]:
     names, std = [p.path for p in poses], _std(table)
     extremes = iron_by_extremes(table.outputs, [p.up for p in poses], names, std)
     reason = magnetometer_coverage_warning(table)
-    ellipsoid = _all_missing(reason) if reason else _by_ellipsoid(table, poses)
+    ellipsoid = _missing_results(reason) if reason else _ellipsoid_results(table, poses)
     level = [k for k, pose in enumerate(poses) if pose.path == poses[0].path]  # the turn about z, upward, is first
     attitudes = np.array([sensor_from_base(poses[k]) for k in level])
     azimuth = ellipsoid[ELEMENTS["D"]]
     std_deg = azimuth.std if isinstance(azimuth, Result) else None
     turn_std_deg = None if std_deg is None else std_deg * len(set(names)) ** 0.5
-    return ellipsoid | _by_extremes(
+    return ellipsoid | _extremes_results(
         extremes, level_elements_by_extremes(table.outputs[level], attitudes, turn_std_deg), std, table.unit
     )
 
@@ -115,7 +115,7 @@ def _std(table: Table) -> float:
     return 0.0 if white is None else float(np.sqrt(np.mean(white**2)))
 
 
-def _all_missing(reason: str) -> dict[str, Result | Missing]:
+def _missing_results(reason: str) -> dict[str, Result | Missing]:
     names = (
         *(f"hard-iron-{axis}" for axis in AXES),
         *(f"soft-iron-{pair}" for pair in SOFT_IRON_PAIRS),
@@ -125,7 +125,7 @@ def _all_missing(reason: str) -> dict[str, Result | Missing]:
     return {name: Missing(reason) for name in names}
 
 
-def _by_ellipsoid(table: Table, poses: list[Pose]) -> dict[str, Result | Missing]:
+def _ellipsoid_results(table: Table, poses: list[Pose]) -> dict[str, Result | Missing]:
     fit = fit_shipped(table, "magnetometer")
     results = {f"hard-iron-{e.axis}": result(e) for e in fit.model.estimates("hard-iron")}
     results |= {f"soft-iron-{e.name}": result(e) for e in fit.model.estimates("soft-iron")}
@@ -152,7 +152,9 @@ def _elements(fit: Fit, table: Table, poses: list[Pose]) -> dict[str, Result | M
     return results
 
 
-def _by_extremes(extremes: ExtremesEstimate, level: Elements, noise: float, unit: str) -> dict[str, Result | Missing]:
+def _extremes_results(
+    extremes: ExtremesEstimate, level: Elements, noise: float, unit: str
+) -> dict[str, Result | Missing]:
     results: dict[str, Result | Missing] = {}
     for name, unit_of_element in (("H", unit), ("D", "deg")):
         results[f"{ELEMENTS[name]}-by-hand"] = Result(level.value[name], unit_of_element, level.std[name])

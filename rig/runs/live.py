@@ -24,7 +24,7 @@ from rig.planning.next_experiment import TOGETHER, Dispute, choose_experiment, g
 STANDARD = Experiment("sweep", {}, (), "the sweep with its default settings")
 FIRST = Experiment("sweep", {"step_deg": 45.0, "inclinations_deg": [90.0, 30.0, 150.0]}, (), "a short first sweep")
 IN_BETWEEN = "poses between the known ones, to confirm the explanation"
-BETWEEN = tuple(
+SWEEPS_BETWEEN = tuple(
     Experiment("sweep", {"step_deg": step, "inclinations_deg": list(inclinations)}, (), IN_BETWEEN)
     for step, inclinations in (
         (60.0, (60.0, 120.0, 45.0, 135.0)),
@@ -82,7 +82,7 @@ class Live:
         if discovered.next_experiment is None:
             return None
         dispute = Dispute.of(discovered.end, discovered.next_experiment.separates, self.effects)
-        menu = _new((*ADDITIONS, *MENU), measurements)
+        menu = _new_experiments((*ADDITIONS, *MENU), measurements)
         return choose_experiment(dispute, discovered.next_experiment, self.bench, self.bench_file, menu, (TOGETHER,))
 
     def _next_experiment(self, telling: Experiment | None, measurements: Sequence[Measurement]) -> Experiment | None:
@@ -91,12 +91,17 @@ class Live:
         A short sweep comes before a much longer experiment: the room may show the same as the oven.
         """
         left_s = self.time_s - measurements[-1].used_s
-        intermediate = next((self.planned(e) for e in possible(_new(BETWEEN, measurements), self.bench, left_s)), None)
+        intermediate = next(
+            (self.planned(e) for e in possible(_new_experiments(SWEEPS_BETWEEN, measurements), self.bench, left_s)),
+            None,
+        )
         if telling is None or telling.duration_s is None or telling.duration_s > left_s:
             return intermediate
         if intermediate is not None and (intermediate.duration_s or 0.0) < FEW * telling.duration_s:
             return intermediate
-        return telling if _new([telling], measurements) and gives_poses(telling, self.bench) else intermediate
+        return (
+            telling if _new_experiments([telling], measurements) and gives_poses(telling, self.bench) else intermediate
+        )
 
 
 def stands(measurements: Sequence[Measurement]) -> bool:
@@ -114,7 +119,7 @@ def _kind(discovered: Discovery[Fit]) -> list[str]:
     return (discovered.residual_structure or "").split()[:2]
 
 
-def _new(experiments: Sequence[Experiment], measurements: Sequence[Measurement]) -> list[Experiment]:
+def _new_experiments(experiments: Sequence[Experiment], measurements: Sequence[Measurement]) -> list[Experiment]:
     """The experiments that were not run yet: a repetition gives no new information."""
     measured_settings = [(m.experiment.procedure, m.experiment.settings) for m in measurements]
     return [e for e in experiments if (e.procedure, e.settings) not in measured_settings]

@@ -26,7 +26,7 @@ from rig.record import Kept, Run
 from rig.runs.estimates import Value, live_estimates
 
 UNUSUAL = 2.0  # ratio to the usual scatter, up or down, above which it is shown
-REMEMBERED = 200  # dwells of a kind for the usual scatter
+SCATTER_DWELLS = 200  # dwells of a kind for the usual scatter
 
 Decision = Literal["resume", "repeat", "end"]
 NEXT_STEP = Choice("interrupted", "What should the run do next?", choices=get_args(Decision))
@@ -183,7 +183,7 @@ class RunViewer(Observer):
         self._name = procedure
         self.view = RunView(procedure, bench.limits, end, bench.simulated, bench.unit_of)
         self._estimates = live_estimates(procedure)
-        self._scatter: dict[tuple[str, str], deque[float]] = defaultdict(lambda: deque(maxlen=REMEMBERED))
+        self._scatter: dict[tuple[str, str], deque[float]] = defaultdict(lambda: deque(maxlen=SCATTER_DWELLS))
 
     def changed(self) -> None:
         """Called after each change of the view during the run."""

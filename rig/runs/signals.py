@@ -13,15 +13,15 @@ if TYPE_CHECKING:
     from rig.record import Record
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-STOPPED_BY = {
+SIGNAL_SOURCES = {
     "SIGINT": "stopped by a person (SIGINT)",
     "SIGTERM": "stopped by another program (SIGTERM)",
     "SIGHUP": "stopped because its terminal was closed (SIGHUP)",
 }
-COMPILED = "drivers.world"  # its compiled code calls Python generators; an exception there would break it
+COMPILED_PACKAGE = "drivers.world"  # its compiled code calls Python generators; an exception there would break it
 # Between bytes and their count: the simulated clock would wait for bytes that have come already.
-COUNTING = (("drivers.clock", "step"), ("drivers.transport.link", "put"), ("drivers.transport.link", "take"))
-STARTING = ("rig.fleet.cluster", "start_cluster")
+COUNTERS = (("drivers.clock", "step"), ("drivers.transport.link", "put"), ("drivers.transport.link", "take"))
+CLUSTER_START = ("rig.fleet.cluster", "start_cluster")
 SCREEN = "rich"  # an exception while its console writes would block the console
 AGAIN_S = 0.001
 Handler = Callable[[int, FrameType | None], object]
@@ -29,7 +29,7 @@ Handler = Callable[[int, FrameType | None], object]
 
 def who_stopped(name: str) -> str:
     """Who stopped a run, by the name of the signal; a person without a name."""
-    return STOPPED_BY[name or "SIGINT"]
+    return SIGNAL_SOURCES[name or "SIGINT"]
 
 
 @contextmanager
@@ -117,7 +117,7 @@ def _indivisible(frame: FrameType | None) -> bool:
     """Whether an exception here would break the interrupted code."""
     while frame is not None:
         module = str(frame.f_globals.get("__name__"))
-        if module.startswith(COMPILED) or (module, frame.f_code.co_name) in (*COUNTING, STARTING):
+        if module.startswith(COMPILED_PACKAGE) or (module, frame.f_code.co_name) in (*COUNTERS, CLUSTER_START):
             return True
         if module.partition(".")[0] == SCREEN:
             return frame.f_code.co_name != "input"  # here it waits for a person

@@ -24,7 +24,19 @@ from rig.record import Record, Run
 from rig.record.measured import table_of
 from rig.services.tables import load
 
-NOT_CSV = (".parquet", ".h5", ".hdf5", ".xlsx", ".xls", ".ods", ".mat", ".npy", ".npz", ".json", ".jsonl")  # endings
+OTHER_ENDINGS = (
+    ".parquet",
+    ".h5",
+    ".hdf5",
+    ".xlsx",
+    ".xls",
+    ".ods",
+    ".mat",
+    ".npy",
+    ".npz",
+    ".json",
+    ".jsonl",
+)  # endings
 UNITS = {"deg": "deg", "v": "V", "s": "s", "c": "degC"}
 
 
@@ -36,7 +48,7 @@ def export(data: str, kind: str, path: Path) -> int:
     """
     if kind in ("parquet", "hdf5"):
         raise ExportError(f"this version does not write {kind}; use --format csv, which {kind} programs also read")
-    if kind == "csv" and path.suffix.lower() in NOT_CSV:
+    if kind == "csv" and path.suffix.lower() in OTHER_ENDINGS:
         raise ExportError(f"{path}: this version writes CSV, and no {path.suffix}; give a name that ends in .csv")
     require_out(path)
     with draft_of(path) as draft:

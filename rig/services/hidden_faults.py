@@ -30,8 +30,8 @@ from drivers.world.world import World
 from rig.bench import Bench
 
 ALIKE = 0.9  # correlation of a group's faults with its effects
-OF_A_SIZE = 3.0  # their sizes differ by this factor at most
-LEFT = 0.3  # of a fault's curve: the largest part that its effects may not describe
+SIZE_RATIO = 3.0  # their sizes differ by this factor at most
+LARGEST_REST = 0.3  # of a fault's curve: the largest part that its effects may not describe
 WHOLE = 0.1  # of a fault's curve: with a smaller rest, no further effect is taken
 MATERIAL = 0.3  # times the noise floor: a smaller fault cannot be seen
 STEP_STD = 0.1  # of a parameter, for the derivative of a size
@@ -221,7 +221,7 @@ def _makers(fault: Curve, effects: Sequence[Curve], floor: float) -> list[Curve]
             break
         remaining_size = min(rests)
         selected.append(remaining[int(np.argmin(rests))])
-    return selected if remaining_size <= max(LEFT * fault.size, unseen) else []
+    return selected if remaining_size <= max(LARGEST_REST * fault.size, unseen) else []
 
 
 def _remainder_rms(fault: Curve, effects: Sequence[Curve]) -> float:
@@ -250,7 +250,7 @@ def _sum_curves(curves: Sequence[Curve]) -> Curve:
 
 
 def _are_alike(fault: Curve, effect: Curve) -> bool:
-    same_size = effect.size < OF_A_SIZE * fault.size and fault.size < OF_A_SIZE * effect.size
+    same_size = effect.size < SIZE_RATIO * fault.size and fault.size < SIZE_RATIO * effect.size
     return same_size and _correlation(fault, effect) >= ALIKE
 
 
@@ -284,7 +284,7 @@ def _fault(
         return None
     faultless = config
     for path, value in changes:
-        faultless = faultless.changed(_nest(path, value))
+        faultless = faultless.changed(_nested_setting(path, value))
     return Curve(name, _free(poses, poses.outputs - _simulate_poses(faultless, seed, table).outputs))
 
 
@@ -294,9 +294,9 @@ def _value(config: Any, path: str) -> float:
     return float(config)
 
 
-def _nest(path: str, value: float) -> dict[str, Any]:
+def _nested_setting(path: str, value: float) -> dict[str, Any]:
     head, _, tail = path.partition(".")
-    return {head: _nest(tail, value) if tail else value}
+    return {head: _nested_setting(tail, value) if tail else value}
 
 
 def _effect(name: str, fitted: Fit, poses: Table) -> Curve:

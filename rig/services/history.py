@@ -179,12 +179,12 @@ def history(
             passed_over[data] = str(error)
     if not calibrations:
         raise _no_calibration_error(record, sensor, passed_over)
-    calibrations, excluded = _of_one_kind(calibrations)
+    calibrations, excluded = _most_frequent_kind(calibrations)
     passed_over |= excluded
     return judge_history(History(sensor, model.name, tuple(calibrations), (), passed_over), limits, baseline)
 
 
-def _of_one_kind(calibrations: list[Calibration]) -> tuple[list[Calibration], dict[str, str]]:
+def _most_frequent_kind(calibrations: list[Calibration]) -> tuple[list[Calibration], dict[str, str]]:
     """The calibrations by the most frequent procedure, of equal ones the last; the others with the reason."""
     kinds = [calibration.kind for calibration in calibrations]
     kind = max(reversed(kinds), key=kinds.count)
@@ -299,7 +299,7 @@ def _quantity(name: str, calibrations: Sequence[Calibration], limit: Limit | Non
     numbers, stds = [calibration.value for calibration in values], [calibration.std for calibration in values]
     days = [calibration.at.timestamp() / 86400 for calibration in determined]
     chart = control_chart(numbers, baseline, float(rms(np.array(stds)))) if len(determined) >= FEWEST_RUNS else None
-    no_drift = _no_drift(determined, float(np.ptp(days)))
+    no_drift = _no_drift_text(determined, float(np.ptp(days)))
     line = None if no_drift else fit_stability(days, numbers, stds)
     limits = None
     if limit is not None:
@@ -309,7 +309,7 @@ def _quantity(name: str, calibrations: Sequence[Calibration], limit: Limit | Non
     return Quantity(name, values[0].unit, determined, chart, line, limits, due_date, no_drift)
 
 
-def _no_drift(calibrations: Sequence[Calibration], days: float) -> str:
+def _no_drift_text(calibrations: Sequence[Calibration], days: float) -> str:
     """Why these calibrations have no drift; "" where they have one."""
     if len(calibrations) < FEWEST_FOR_DRIFT:
         return f"A drift needs {FEWEST_FOR_DRIFT} calibrations at different times."

@@ -29,7 +29,11 @@ from rig.services.tables import average_log
 
 MOST_DRAWN = 4000
 COLOURS = (MEASURED, CANDIDATE, QUIET)
-SENSED = {"a": ("g", "mg", "m/s2", "counts"), "m": ("uT", "counts"), "g": ("deg/s", "rad/s", "counts")}  # of outputs
+OUTPUT_UNITS = {
+    "a": ("g", "mg", "m/s2", "counts"),
+    "m": ("uT", "counts"),
+    "g": ("deg/s", "rad/s", "counts"),
+}  # of outputs
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,7 @@ def units_for(name: str) -> list[str]:
             (unit for unit, (base_unit, _, _) in UNITS.items() if base_unit == target_unit),
             key=lambda unit: unit != target_unit,
         )
-    return list(SENSED.get(name[:1], ())) if name[1:] in AXES else []
+    return list(OUTPUT_UNITS.get(name[:1], ())) if name[1:] in AXES else []
 
 
 def lacking(sheet: Sheet, kind: str, columns: Sequence[ColumnMapping]) -> list[str]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from calibrations.tables import FITTED
+from calibrations.tables import FITTED_KINDS
 from calibrations.text import (
     bound,
     columns,
@@ -107,7 +107,7 @@ def _commands(run: Run) -> Iterator[str]:
         yield f"Next: rig resume {run.run}"
     elif run.procedure == "check-standard":
         yield "Next: rig control"
-    elif run.rows and run.kind in FITTED:
+    elif run.rows and run.kind in FITTED_KINDS:
         data = f"{run.run}/{next(iter(sensors))}" if (sensors := run.bench.get("sensors")) else run.run
         if run.procedure == "soak":
             yield f"Next: rig report {data} --out night.html"
@@ -156,7 +156,7 @@ class ResultRow:
 
 def _value_on_page(name: str, result: Mapping[str, Any]) -> str:
     if (digits := _digits(name, result)) is not None:
-        value, _, unit_text = _in_digits(result, digits).partition(" ")
+        value, _, unit_text = _digits_text(result, digits).partition(" ")
         return f"{value} {unit(unit_text)}".rstrip()
     return estimate_in_prefix(result["value"], result["std"], result["unit"])
 
@@ -196,7 +196,7 @@ def _steady_times(results: Mapping[str, Any], steady: re.Match[str]) -> dict[str
 
 def _steady_sentence(reached: bool, parts: Mapping[str, Any]) -> str:
     """Whether and when the sensor is steady. `parts`: the results of the time and of its forecast that there are."""
-    times = {end: _in_digits(r, TIME_DIGITS) for end, r in parts.items()}
+    times = {end: _digits_text(r, TIME_DIGITS) for end, r in parts.items()}
     if reached:
         if "time" not in times:
             return "Reached."
@@ -212,7 +212,7 @@ def _steady_sentence(reached: bool, parts: Mapping[str, Any]) -> str:
 
 def _value_in_terminal(name: str, result: Mapping[str, Any]) -> str:
     if (digits := _digits(name, result)) is not None:
-        return _in_digits(result, digits).replace("µ", "u").replace("−", "-")
+        return _digits_text(result, digits).replace("µ", "u").replace("−", "-")
     return concise_in_prefix(result["value"], result["std"], result["unit"])
 
 
@@ -223,6 +223,6 @@ def _digits(name: str, result: Mapping[str, Any]) -> int | None:
     return TIME_DIGITS if result["unit"] == "h" and not result["std"] else None
 
 
-def _in_digits(result: Mapping[str, Any], digits: int) -> str:
+def _digits_text(result: Mapping[str, Any], digits: int) -> str:
     factor, prefixed_unit = in_prefix(result["value"], None, result["unit"])
     return f"{rounded(result['value'] * factor, digits)} {prefixed_unit}".rstrip()

@@ -26,7 +26,7 @@ def plan_rows(optimum: Optimal) -> list[tuple[str, ...]]:
 def savings(optimum: Optimal) -> Iterator[str]:
     """How much less time the rig needs."""
     yield f"{optimum.times_less:.1f} times less rig time for the same worst standard error ({_worst(optimum)})."
-    yield f"{_times(optimum.times_less_for_all)} if no parameter becomes less certain: {_longest(optimum)}."
+    yield f"{_times(optimum.times_less_for_all)} if no parameter becomes less certain: {_standard_plan_text(optimum)}."
     if undetermined := [
         optimum.over.name(k) for k, is_determined in enumerate(optimum.standard.determined) if not is_determined
     ]:
@@ -61,5 +61,5 @@ def _times(ratio: float) -> str:
     return f"{ratio:.1f} times less" if ratio >= 1 else f"{1 / ratio:.1f} times more"
 
 
-def _longest(optimum: Optimal) -> str:
+def _standard_plan_text(optimum: Optimal) -> str:
     return f"{optimum.all_equal.dwell_s:g} s a pose, {duration(optimum.all_equal.plan.duration_s)}"

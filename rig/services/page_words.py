@@ -20,7 +20,7 @@ COMMAND = rf"rig (?P<command>{'|'.join(sorted(PAGES, key=len, reverse=True))})\b
 WORDS = r"(?: (?P<procedure>level-check|check-standard|noise-floor|soak|sweep)\b)?"
 OPTIONS = r"(?P<options>(?: --[\w-]+(?: [\w.]+)?)*)"
 BLOCK = re.compile(rf"[:\s]*\n+ {{4}}{COMMAND}[^\n]*\n*")  # a line of its own, to copy
-QUOTED = re.compile(rf"`{COMMAND}{WORDS}(?P<options>[^`]*)`")
+QUOTED_COMMAND = re.compile(rf"`{COMMAND}{WORDS}(?P<options>[^`]*)`")
 BARE = re.compile(rf"(?<!the )(?<!a ){COMMAND}{WORDS}{OPTIONS}")
 LONGER = re.compile(r" \(--([\w-]+) ([\d.e+]+)\)")
 OPTION_WORDS = (  # options of `rig import` in messages, as the fields of its page
@@ -59,7 +59,7 @@ def page_step(line: str, data: str = "", procedure: str = "") -> PageStep:
         addresses["Measure longer"] = f"/run?{urlencode(settings)}"
     text = LONGER.sub("", line)
     text = BLOCK.sub(lambda match: f" ({opened(match)}).\n", text)
-    for pattern in (QUOTED, BARE):
+    for pattern in (QUOTED_COMMAND, BARE):
         text = pattern.sub(opened, text)
     for pattern, words in OPTION_WORDS:
         text = pattern.sub(words, text)

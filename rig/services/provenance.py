@@ -15,7 +15,7 @@ from calibrations.model import Model
 from calibrations.model.file import dump_model
 from rig.files import program, write_whole
 
-OF_THE_SENSOR = ("sensor", "serial", "gravity_m_s2")  # constants of the data that a model file keeps
+SENSOR_CONSTANTS = ("sensor", "serial", "gravity_m_s2")  # constants of the data that a model file keeps
 
 
 def today() -> str:
@@ -34,7 +34,7 @@ def with_provenance(kind: Dataset[F], fitted: F, parent: Model) -> Model:
             "data": data.source,
             "data_sha256": data.digest,
             "rows": data.n,
-            **{name: data.constants[name] for name in OF_THE_SENSOR if name in data.constants},
+            **{name: data.constants[name] for name in SENSOR_CONSTANTS if name in data.constants},
             "parent": parent.name,
             "program": program(),
             "created": datetime.now(UTC).isoformat(timespec="seconds"),

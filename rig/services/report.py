@@ -116,10 +116,10 @@ def make_report(
         shared = opened.first_search(searched) if opened is not None else None
         return shared or question.data.search(question.model, searched(question.effects))
 
-    return _on_a_model(request, question, notify, search)
+    return _model_page(request, question, notify, search)
 
 
-def _on_a_model(
+def _model_page(
     request: Request, question: Loaded, notify: Callable[[str], None], search: Callable[[], Findings[Any]]
 ) -> Page:
     comparison = question.data.compare(question.model)

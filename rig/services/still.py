@@ -26,18 +26,22 @@ from rig.record.measured import Measured
 from rig.record.store import Record
 from rig.record.tables import units_of
 from rig.record.values import Kept
-from rig.services.tables import BESIDE, FOLLOWED, load
+from rig.services.tables import BESIDE, INFLUENCES, load
 
 SENSOR = tuple(chain(*OUTPUTS))  # channels of the accelerometer's outputs
-LATE = 0.5  # sampling intervals by which a sample may be off before that is a gap
+TIME_TOLERANCE = 0.5  # sampling intervals by which a sample may be off before that is a gap
 DISAGREE = 0.01  # of two rates
 AXIS = re.compile(r"(v|a|g|m|)([xyz])(|_v)")  # of a channel, by its name
-SENSED = {  # what outputs in these units are better known in
+SENSED_UNITS = {  # what outputs in these units are better known in
     "m/s^2": Sensed(1 / STANDARD_GRAVITY, "g"),
     "m/s2": Sensed(1 / STANDARD_GRAVITY, "g"),
     "deg/s": Sensed(3600.0, "deg/h"),
 }
-STATED = {"output_per_g": "g", "output_per_deg_s": "deg/s", "output_per_field": "field"}  # constants that data may have
+SENSITIVITIES = {
+    "output_per_g": "g",
+    "output_per_deg_s": "deg/s",
+    "output_per_field": "field",
+}  # constants that data may have
 
 
 @dataclass
@@ -65,11 +69,11 @@ class Stream:
         It is known by the unit, from poses along gravity, or by a constant of the data (`output_per_g`,
         `output_per_deg_s`, `output_per_field`).
         """
-        if self.unit in SENSED:
-            return SENSED[self.unit]
+        if self.unit in SENSED_UNITS:
+            return SENSED_UNITS[self.unit]
         if scale := self.scale_per_g:
             return Sensed(1 / scale, "g")
-        scales = ((_number(self.constants.get(name)), unit) for name, unit in STATED.items())
+        scales = ((_number(self.constants.get(name)), unit) for name, unit in SENSITIVITIES.items())
         return next((Sensed(1 / abs(scale), unit) for scale, unit in scales if scale), None)
 
     @property
@@ -139,11 +143,15 @@ def agree_on_rate(measured: float | None, stated_hz: float, source: str) -> floa
 MOST_MISSING = 0.1  # of a record, in gaps that are closed up
 WHOLE = 0.1  # of a step, by which steps may be off whole numbers of them where single samples were lost
 FEW_GAPS = 0.01  # of all steps
-EVEN = "record again with every sample at an even rate (interpolated samples have less white noise than the sensor)"
-UNEVEN = 1e-3  # of a record, by which times may be off an even row: those of a computer that samples reach in bursts
+EVEN_REMEDY = (
+    "record again with every sample at an even rate (interpolated samples have less white noise than the sensor)"
+)
+UNEVENNESS = (
+    1e-3  # of a record, by which times may be off an even row: those of a computer that samples reach in bursts
+)
 
 
-def of_table(table: Table, channel: str | None, rate_hz: float | None) -> Stream:
+def table_stream(table: Table, channel: str | None, rate_hz: float | None) -> Stream:
     if table.kind != "still" or "alpha_deg" in table:
         kind = "poses" if table.kind == "still" else table.kind
         raise _no_record(f"{table.source}: a table of {kind}")
@@ -182,7 +190,7 @@ def _list_logged_columns(table: Table, channel: str) -> Iterator[str]:
     """Columns that an output may follow: temperature, supply, and columns whose names are not those of outputs."""
     for name in table.columns:
         is_channel = name not in BESIDE and AXIS.fullmatch(channel) is not None and AXIS.fullmatch(name) is None
-        if name in FOLLOWED or (is_channel and name != channel):
+        if name in INFLUENCES or (is_channel and name != channel):
             yield name
 
 
@@ -205,7 +213,7 @@ def _times(table: Table) -> _Times | None:
     if step_s.min() <= 0:
         row = int(np.argmin(step_s > 0)) + 2
         raise DataError(f"{table.source}: row {row}: the time does not increase; sort the rows and remove duplicates")
-    far = np.flatnonzero(np.abs(step_s - typical) > LATE * typical)
+    far = np.flatnonzero(np.abs(step_s - typical) > TIME_TOLERANCE * typical)
     if len(far) <= FEW_GAPS * table.n and np.all(step_s[far] > typical):
         gaps = tuple((float(t_s[i]), float(step_s[i] - typical)) for i in far)
         _check_gaps(gaps, (table.n - 1) * typical, table.source)
@@ -214,13 +222,13 @@ def _times(table: Table) -> _Times | None:
     if 0 < missing_steps.sum() < table.n and np.all(np.abs(step_s / typical - 1 - missing_steps) < WHOLE):
         raise DataError(
             f"{table.source}: {missing_steps.sum():.0f} single samples are missing, the first after row {far[0] + 2}; "
-            f"{EVEN}, or analyse {_longest(far, table.n)} alone"
+            f"{EVEN_REMEDY}, or analyse {_longest(far, table.n)} alone"
         )
     off_s = float(np.max(np.abs(t_s - np.linspace(t_s[0], t_s[-1], table.n))))
-    if off_s > UNEVEN * length_s:
+    if off_s > UNEVENNESS * length_s:
         raise DataError(
             f"{table.source}: row {far[0] + 2} comes {step_s[far[0]]:.3g} s after the one before, others after "
-            f"{typical:.3g} s; samples must be evenly spaced: {EVEN}"
+            f"{typical:.3g} s; samples must be evenly spaced: {EVEN_REMEDY}"
         )
     return _Times((table.n - 1) / length_s, (), off_s)
 
@@ -281,7 +289,7 @@ def _still_blocks(measured: Measured, stream: Stream) -> Iterator[NDArray[Any]]:
         if not _is_still(recorded):
             _note_upright(recorded, volts, stream)
             continue
-        if next_s is not None and abs(samples.start_s - next_s) > LATE / stream.rate_hz:
+        if next_s is not None and abs(samples.start_s - next_s) > TIME_TOLERANCE / stream.rate_hz:
             stream.closed.append((next_s, samples.start_s - next_s))
         next_s = samples.start_s + len(volts) / stream.rate_hz
         if not stream.logged:
@@ -294,7 +302,7 @@ def _still_blocks(measured: Measured, stream: Stream) -> Iterator[NDArray[Any]]:
 def _supply_and_temperature(recorded: Kept) -> Iterator[tuple[str, list[Array]]]:
     """Temperature of a block, and supply, as means of a second each: in blocks that take no room."""
     samples, n = recorded.samples, len(recorded.samples.volts)
-    temperature, supply = FOLLOWED
+    temperature, supply = INFLUENCES
     if recorded.temperature_c is not None:
         yield temperature, [np.broadcast_to(recorded.temperature_c, n)]
     if (channel := supply.removesuffix("_v")) in samples.channels:
@@ -305,11 +313,11 @@ def _supply_and_temperature(recorded: Kept) -> Iterator[tuple[str, list[Array]]]
 
 def coarse(recorded: Kept) -> dict[str, float]:
     """The steps of the supply's readings, where its noise does not smooth them in means."""
-    channel = FOLLOWED[1].removesuffix("_v")
+    channel = INFLUENCES[1].removesuffix("_v")
     if channel not in recorded.samples.channels:
         return {}
     step = hidden_step(recorded.samples.volts[:, recorded.samples.channels.index(channel)])
-    return {} if step is None else {FOLLOWED[1]: step}
+    return {} if step is None else {INFLUENCES[1]: step}
 
 
 def _note_upright(recorded: Kept, volts: Array, stream: Stream) -> None:
@@ -361,18 +369,18 @@ def _source(record: Record | None, data: str, rate_hz: float | None) -> Callable
     if path.suffix == ".npy":
         if not path.is_file():
             raise DataError(f"{data}: there is no such file; `rig runs` lists the names of runs")
-        return lambda _: _of_array(path, rate_hz)
+        return lambda _: _array_stream(path, rate_hz)
     if path.exists() or record is None:
         table = load(data, "still" if path.suffix != "" else None)
-        return lambda channel: of_table(table, channel, rate_hz)
+        return lambda channel: table_stream(table, channel, rate_hz)
     measured = Measured.named(record, data)
     if record.columns(measured.run.run)[0]:
         table = measured.table()
-        return lambda channel: of_table(table, channel, rate_hz)
+        return lambda channel: table_stream(table, channel, rate_hz)
     return lambda channel: of_run(measured, channel, rate_hz)
 
 
-def _of_array(path: Path, rate_hz: float | None) -> Stream:
+def _array_stream(path: Path, rate_hz: float | None) -> Stream:
     if rate_hz is None:
         raise DataError(f"{path}: an array does not contain the sample rate; give --rate HZ")
     try:

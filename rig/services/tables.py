@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 
 EXCLUDED = "excluded"
-FOLLOWED = ("temperature_c", "supply_v")  # columns that an output may follow
-BESIDE = ("t_s", *FOLLOWED, "n", "direction", "path")  # columns that are not channels
+INFLUENCES = ("temperature_c", "supply_v")  # columns that an output may follow
+BESIDE = ("t_s", *INFLUENCES, "n", "direction", "path")  # columns that are not channels
 
 
 def average_log(log: Table, notify: Callable[[str], None]) -> Table:
@@ -79,7 +79,7 @@ def _of_run(data: str) -> Table:
     from rig.record.store import Record  # a file needs no database
 
     if data.startswith(("/", "./", "../")) or data.count("/") > 1:  # else it may be RUN/SENSOR
-        raise UnknownRun(_no_file(Path(data)))
+        raise UnknownRun(_no_file_text(Path(data)))
     try:
         with Record.to_find(data) as record:
             return table_of(record, data)
@@ -87,7 +87,7 @@ def _of_run(data: str) -> Table:
         raise UnknownRun(f"{data}: there is no such file, and {error}") from None
 
 
-def _no_file(path: Path) -> str:
+def _no_file_text(path: Path) -> str:
     """The message for a path without a file: its folder is missing, or the nearest name there."""
     if not path.parent.is_dir():
         return f"{path}: there is no such file, and no folder {path.parent}"

@@ -98,7 +98,7 @@ def _estimates(fit: FittedModel) -> Iterator[tuple[str, Estimate]]:
 
 
 POSE = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip")  # the columns that define a pose
-SAME_DECIMALS = 2  # of a degree: nearer, gravity along an axis differs by 0.2 mg at most
+ANGLE_DECIMALS = 2  # of a degree: nearer, gravity along an axis differs by 0.2 mg at most
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def _visits(table: Table) -> dict[tuple[float, ...], int]:
     columns = np.column_stack([table.optional(name, 0.0) for name in POSE])
     visits: dict[tuple[float, ...], int] = {}
     rows = {}
-    for row, pose in enumerate(map(tuple, np.round(columns, SAME_DECIMALS) + 0.0)):
+    for row, pose in enumerate(map(tuple, np.round(columns, ANGLE_DECIMALS) + 0.0)):
         visits[pose] = visits.get(pose, 0) + 1
         rows[*pose, float(visits[pose])] = row
     return rows

@@ -110,7 +110,7 @@ SCRIPT = '<script src="/static/workbench.js" defer></script>'
 
 # NiceGUI resizes a picture also in the moment in which the page removes it; Plotly then rejects a promise that nobody
 # reads, which the console would show as an error.
-RESIZED = """<script>
+RESIZE_SCRIPT = """<script>
 window.addEventListener("unhandledrejection", event => {
   if (String(event.reason?.message ?? event.reason).startsWith("Resize must be passed")) event.preventDefault();
 });
@@ -178,7 +178,7 @@ def frame(desk: Desk, path: str, title: str = "") -> Iterator[dict[str, Key]]:
         str(k): Key(f"go to {name}", partial(ui.navigate.to, page_path))
         for k, (page_path, name) in enumerate(PAGES.items(), 1)
     }
-    ui.add_head_html(f'<link rel="stylesheet" href="/static/workbench.css">{SCRIPT}{TELL}{RESIZED}')
+    ui.add_head_html(f'<link rel="stylesheet" href="/static/workbench.css">{SCRIPT}{TELL}{RESIZE_SCRIPT}')
     ui.colors(primary="#0067a3", negative="#b3261e")
     with ui.element("header").classes("bar"):
         with ui.element("h1").classes("name"):

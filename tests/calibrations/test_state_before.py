@@ -11,7 +11,7 @@ from calibrations.fitting.fit import evaluate, fit
 from calibrations.free_forms.bases import Play
 from calibrations.free_forms.form import Form
 from calibrations.geometry.orientation import nominal_pose, specific_force
-from calibrations.geometry.stage_path import AS_STATED
+from calibrations.geometry.stage_path import STATED_APPROACH
 from calibrations.model import Model
 from calibrations.model.chain import respond
 from calibrations.model.file import dump_model, parse_model, read_model
@@ -29,7 +29,7 @@ HELD: Mapping[str, Numbers] = {
 
 
 def with_hysteresis(held: Mapping[str, Numbers]) -> Model:
-    return model({**LINEAR, "hysteresis": held}, constants={"approach_deg": AS_STATED})
+    return model({**LINEAR, "hysteresis": held}, constants={"approach_deg": STATED_APPROACH})
 
 
 def swept(held: Mapping[str, Numbers]) -> Table:

@@ -53,7 +53,7 @@ class SmallWorld:
         return self.plans[axis].angle_deg(self.now_s)
 
     def move_positioner(self, axis: str, command: positioner.Command) -> float:
-        self.carriages[axis], settled_s = positioner.following(LOOP, self.carriages[axis], command)
+        self.carriages[axis], settled_s = positioner.follow_command(LOOP, self.carriages[axis], command)
         return settled_s
 
     def positioner_um(self, axis: str, times_s: ArrayLike) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from drivers.oriental_az import registers as az
 from drivers.oriental_az.twin import Drive
 from drivers.transport.faults import Fault
 from rig.cli.terminal.failure import status_of
-from rig.instruments.guard import AT_ONCE_S, GuardedClock, Look
+from rig.instruments.guard import WATCH_S, GuardedClock, Look
 from rig.record import Record
 from rig.runs.runner import resume
 from rig.web.server import _listen
@@ -47,7 +47,7 @@ def test_a_sleep_looks_about_and_ends_when_it_should() -> None:
         clock.sleep(1.0)
         clock.sleep(0.001)
         assert clock.now() == pytest.approx(1.001)
-    assert seen == pytest.approx([AT_ONCE_S * k for k in range(1, 25)])
+    assert seen == pytest.approx([WATCH_S * k for k in range(1, 25)])
     clock.sleep(1.0)
     assert len(seen) == 24
 
@@ -57,7 +57,7 @@ def test_many_short_sleeps_are_looked_at_as_one_long_one() -> None:
     with clock.guarded([Look(lambda: seen.append(clock.now()))]):
         while clock.now() < 1.0:
             clock.sleep(0.021)
-    assert seen == pytest.approx([AT_ONCE_S * k for k in range(1, 26)])
+    assert seen == pytest.approx([WATCH_S * k for k in range(1, 26)])
 
 
 def test_a_sleep_that_is_part_of_an_exchange_does_not_look_about() -> None:

@@ -17,7 +17,7 @@ from calibrations.model.file import read_model
 from calibrations.table import Table
 from rig.errors import RecordError
 from rig.record import Record
-from rig.services.history import Calibration, History, Value, _of_one_kind, history, judge_history, latest
+from rig.services.history import Calibration, History, Value, _most_frequent_kind, history, judge_history, latest
 from rig.services.history_comparison import compare_rigs
 from tests.rig.lives import COLUMNS, calibrated
 
@@ -187,7 +187,7 @@ def test_calibrations_of_another_kind_or_by_an_incomplete_model_are_not_compared
         Calibration(f"r{k}", start + timedelta(days=100 * k), "A", values, None, kind, 1.0)
         for k, kind in enumerate(kinds)
     ]
-    found, others = _of_one_kind(of)
+    found, others = _most_frequent_kind(of)
     assert [each.data for each in found] == ["r0", "r2", "r3"]
     assert list(others) == ["r1"]
     life = judge_history(History("17", "linear", tuple(found), (), others), {})

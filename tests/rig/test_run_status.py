@@ -17,7 +17,7 @@ from rig.lease import lease
 from rig.record import Record
 from rig.runs.background import control
 from rig.runs.background import status as status_file
-from rig.runs.background.status import KEPT, Order, Status, file, folder, keys, lock, read, remove_old_files
+from rig.runs.background.status import KEPT_ESTIMATES, Order, Status, file, folder, keys, lock, read, remove_old_files
 from rig.runs.runner import start
 from rig.web.pages.run_live import stop_words
 from tests.rig.rigging import POSES, SMALL
@@ -43,7 +43,7 @@ def test_only_the_last_ones_are_kept() -> None:
     for number in range(25):
         Status(f"{KEY}-{number:02}", 4711, "sweep", "a bench", phase="ended").write()
     remove_old_files()
-    assert [key[-2:] for key in keys()] == [f"{number:02}" for number in range(25 - KEPT, 25)]
+    assert [key[-2:] for key in keys()] == [f"{number:02}" for number in range(25 - KEPT_ESTIMATES, 25)]
 
 
 def test_of_those_that_are_kept_none_is_under_way() -> None:

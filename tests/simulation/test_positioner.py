@@ -12,12 +12,12 @@ from drivers.world.kernel import record
 from drivers.world.positioner import (
     Command,
     Positioner,
-    following,
+    follow_command,
+    hold_command,
     motion,
     normal_at,
     places_um,
     read_um,
-    standing,
 )
 from tests.carriages import at_rest
 
@@ -40,13 +40,13 @@ def integrated_um(command: Command, start_um: float, times_s: np.ndarray) -> np.
 
 @pytest.mark.parametrize("command", [SINE, RAMP, Command(0.02, 60.0, end_s=0.02)])
 def test_it_follows_its_equation_of_motion(command: Command) -> None:
-    pieces, _ = following(LOOP, at_rest(20.0), command)
+    pieces, _ = follow_command(LOOP, at_rest(20.0), command)
     times = np.linspace(0.02, 0.3, 400)
     assert places_um(LOOP, pieces, times) == pytest.approx(integrated_um(command, 20.0, times), abs=1e-5)
 
 
 def test_speed_and_acceleration_are_the_derivatives() -> None:
-    pieces, _ = following(LOOP, at_rest(20.0), SINE)
+    pieces, _ = follow_command(LOOP, at_rest(20.0), SINE)
     step = 1e-5
     for t in np.linspace(0.021, 0.4, 50):
         before, now, after = (motion(LOOP, pieces, t + k * step) for k in (-1, 0, 1))
@@ -56,7 +56,7 @@ def test_speed_and_acceleration_are_the_derivatives() -> None:
 
 def test_the_paper_s_motion_has_the_paper_s_acceleration() -> None:
     """60 um peak to peak at 10 Hz: 30 um (2 pi 10 Hz)^2 = 118.4 mm/s^2, less 1 % that the loop takes (Ang V)."""
-    pieces, _ = following(LOOP, at_rest(20.0), SINE)
+    pieces, _ = follow_command(LOOP, at_rest(20.0), SINE)
     peak = max(motion(LOOP, pieces, t)[2] for t in np.linspace(1.0, 1.1, 1001))
     ratio = 10 / LOOP.servo_hz
     lag = math.hypot(1 - ratio**2, 2 * LOOP.damping_fraction * ratio)
@@ -64,8 +64,8 @@ def test_the_paper_s_motion_has_the_paper_s_acceleration() -> None:
 
 
 def test_a_new_command_goes_on_where_the_old_one_is() -> None:
-    swinging, _ = following(LOOP, at_rest(20.0), SINE)
-    braked, rest_s = following(LOOP, swinging, standing(40.0, 1.0123))
+    swinging, _ = follow_command(LOOP, at_rest(20.0), SINE)
+    braked, rest_s = follow_command(LOOP, swinging, hold_command(40.0, 1.0123))
     before, after = motion(LOOP, swinging, 1.0123), motion(LOOP, braked, 1.0123)
     assert after[:2] == pytest.approx(before[:2], rel=1e-9)
     assert motion(LOOP, braked, rest_s) == pytest.approx((40.0, 0.0, 0.0), abs=1e-3)
@@ -74,14 +74,14 @@ def test_a_new_command_goes_on_where_the_old_one_is() -> None:
 
 def test_a_wave_of_some_cycles_ends_where_it_began() -> None:
     command = Command(0.0, 50.0, amplitude_um=30.0, frequency_hz=10.0, phase_rad=-math.pi / 2, end_s=0.3)
-    pieces, rest_s = following(LOOP, at_rest(20.0), command)
+    pieces, rest_s = follow_command(LOOP, at_rest(20.0), command)
     assert command.moving(0.299)
     assert not command.moving(0.3)
     assert motion(LOOP, pieces, rest_s)[0] == pytest.approx(20.0, abs=1e-6)
 
 
 def test_endless_waves_are_known_for_days() -> None:
-    pieces, _ = following(LOOP, at_rest(20.0), SINE)
+    pieces, _ = follow_command(LOOP, at_rest(20.0), SINE)
     assert motion(LOOP, pieces, 86400.3)[0] == pytest.approx(motion(LOOP, pieces, 1.3)[0], abs=1e-4)
 
 

@@ -11,7 +11,7 @@ import pytest
 from drivers.philtec_d63 import SIMULATED, Curve
 from drivers.world.config import WorldConfig
 from drivers.world.errors import UnknownInput
-from drivers.world.positioner import Command, standing
+from drivers.world.positioner import Command, hold_command
 from drivers.world.stage import Trajectory
 from drivers.world.world import World
 
@@ -108,7 +108,7 @@ def test_nothing_is_felt_before_the_command() -> None:
     before = World(QUIET, seed=1).adc_volts(["vx"], 5.16, 1e-3, 1)[0, 0]
     world = World(QUIET, seed=1)
     world.advance(5.16)
-    world.move_positioner("x", standing(20.0, 5.16))  # a jump, that begins with more than 1 g
+    world.move_positioner("x", hold_command(20.0, 5.16))  # a jump, that begins with more than 1 g
     assert world.adc_volts(["vx"], 5.16001, 1e-3, 1)[0, 0] == pytest.approx(before, abs=2e-3)
 
 
@@ -117,7 +117,7 @@ def test_after_it_has_settled_it_costs_nothing_and_is_as_before() -> None:
     before = world.adc_volts(["vx", "vy"], 5.0, 1e-3, 1)
     world.move_positioner("x", sine(5.0))
     world.advance(6.03)
-    rest_s = world.move_positioner("x", standing(float(world.positioner_um("x")[0]), 6.03))
+    rest_s = world.move_positioner("x", hold_command(float(world.positioner_um("x")[0]), 6.03))
     assert rest_s < 6.1
     after = world.adc_volts(["vx", "vy"], 8.0, 1e-3, 1)
     assert after == pytest.approx(before, abs=1e-12)

@@ -60,7 +60,7 @@ def test_an_output_configuration_is_that_of_the_manual() -> None:
     found = xbus.pairs(data)
     assert found[xbus.ACCELERATION] == found[xbus.RATE] == 400
     assert found[xbus.FIELD] == 100
-    assert found[xbus.COUNTER] == xbus.WITH_EACH
+    assert found[xbus.COUNTER] == xbus.MESSAGE_RATE
     assert xbus.message(number, xbus.configuration(found)) == bytes.fromhex(SET_OUTPUTS)
     with pytest.raises(ValueError, match="are not pairs"):
         xbus.pairs(data[:-1])

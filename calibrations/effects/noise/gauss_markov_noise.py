@@ -11,14 +11,14 @@ from calibrations.table import Array
 if TYPE_CHECKING:
     from calibrations.noise.record import Channel
 
-TRIED = 12  # time constants
+TIME_CONSTANTS = 12  # time constants
 FASTEST, LONGEST = 3.0, 0.1  # of them, in sampling intervals and in lengths of the record
 
 
 def _times_s(record: Channel) -> Array:
     """Time constants that a record can show, and its filter does not hide."""
     shortest = max(FASTEST / record.rate_hz, 1 / record.corner_hz)
-    return np.geomspace(shortest, max(LONGEST * record.length_s, 2 * shortest), TRIED)
+    return np.geomspace(shortest, max(LONGEST * record.length_s, 2 * shortest), TIME_CONSTANTS)
 
 
 class GaussMarkovNoise(Effect):

@@ -4,7 +4,7 @@ import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
 from calibrations.geometry.orientation import other_in_plane
-from calibrations.geometry.stage_path import AS_STATED, turning_points, with_approach
+from calibrations.geometry.stage_path import STATED_APPROACH, turning_points, with_approach
 from calibrations.table import Array, Table
 
 ELEMENTS = (np.arange(6) + 0.5) / 3 - 1  # midpoints of six equal parts of -1 .. 1
@@ -45,7 +45,7 @@ class Hysteresis(Effect):
         "1", typical=1.0, low=-1.0, high=1.0, assumed=0.0, doc="share of the slip force held before the first pose"
     )
 
-    approach_deg = Constant(lambda _: AS_STATED)  # from where beta comes; a search may find it
+    approach_deg = Constant(lambda _: STATED_APPROACH)  # from where beta comes; a search may find it
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
         path = turning_points(with_approach(table, float(p.approach_deg)))

@@ -19,7 +19,7 @@ METHOD = (
     "parameters of sensors). The parameters are estimated jointly, by least squares under the noise that the data "
     "show."
 )
-EXPANDED = (
+EXPANSION_TEXT = (
     "As left. U is the expanded uncertainty for a coverage probability of about 95 %: k = 2, or Student's factor "
     "for the effective degrees of freedom, cut to a whole number, if that is larger. Widened: k is increased so that U "
     "reaches the interval of the check by simulation. g is the local gravity."
@@ -28,7 +28,7 @@ BUDGET = (
     "After the GUM (JCGM 100). Type A: the noise of the data. Type B: the stated uncertainties of inputs that the data "
     "cannot show. Effective degrees of freedom by Welch and Satterthwaite."
 )
-CORRELATED = (
+CORRELATION_TEXT = (
     "Results from the same data are correlated. A quantity computed from several of them requires their correlation "
     "coefficients (GUM 5.2.2)."
 )
@@ -134,7 +134,7 @@ def results_table(c: Certificate) -> Table:
 
 def _results(c: Certificate) -> Section:
     words = (
-        EXPANDED,
+        EXPANSION_TEXT,
         *([RULE] if any(o.decision for o in c.figures.outcomes) else [NO_LIMITS]),
         *c.figures.remarks,
         *c.remarks,
@@ -185,7 +185,7 @@ def _uncertainty(c: Certificate) -> Section:
         BUDGET,
         *([f"Not given and not included: {', '.join(c.figures.not_given)}."] if c.figures.not_given else []),
         TRIALS.format(trials=c.figures.trials, scatter=END_SCATTER / math.sqrt(c.figures.trials)),
-        *([CORRELATED] if len(c.figures.outcomes) > 1 else []),
+        *([CORRELATION_TEXT] if len(c.figures.outcomes) > 1 else []),
     )
     checked = Table("Check by simulation", check, trials, (1, 2, 3, 4))
     return Section("Uncertainty", (*words, checked, *_correlations(c), *budgets))

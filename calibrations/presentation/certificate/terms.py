@@ -45,19 +45,19 @@ SI: Mapping[str, tuple[float, Mapping[str, int]]] = {
     "field": (1.0, {}),
 }
 PART = r"\([^)]*\)|[^/]+"  # of a unit; a group in brackets is one part
-OF_GRAVITY = ("g", "mg")
+GRAVITY_UNITS = ("g", "mg")
 
 
 def in_si(unit: str, gravity_m_s2: float) -> tuple[float, str]:
     """The factor by which a value in `unit` is multiplied, and its D-SI unit. Raises DataError for an unknown one."""
-    factor, powers = _in_si(unit, gravity_m_s2)
+    factor, powers = _si_factor(unit, gravity_m_s2)
     return factor, _unit_text(powers)
 
 
 def product_in_si(first: str, second: str) -> str:
     """The D-SI unit of the product of values in two units, as `in_si` has them. Raises DataError for an unknown one."""
-    powers = Counter(_in_si(first, 1.0)[1])
-    for name, power in _in_si(second, 1.0)[1].items():
+    powers = Counter(_si_factor(first, 1.0)[1])
+    for name, power in _si_factor(second, 1.0)[1].items():
         powers[name] += power
     return _unit_text(powers)
 
@@ -66,7 +66,7 @@ def _unit_text(powers: Mapping[str, int]) -> str:
     return "".join(f"\\{n}" + (f"\\tothe{{{p}}}" if p != 1 else "") for n, p in powers.items() if p) or "\\one"
 
 
-def _in_si(unit: str, gravity_m_s2: float) -> tuple[float, dict[str, int]]:
+def _si_factor(unit: str, gravity_m_s2: float) -> tuple[float, dict[str, int]]:
     """The factor, and the powers of the SI units."""
     factor, powers = 1.0, dict[str, int]()
     for place, part in enumerate(re.findall(PART, unit or "1")):
@@ -76,7 +76,7 @@ def _in_si(unit: str, gravity_m_s2: float) -> tuple[float, dict[str, int]]:
             raise DataError(f'the unit "{unit}" has no SI form here; convert the data to {units}')
         sign = (int(exponent) if exponent else 1) * (-1 if place else 1)
         scale, names = SI[word]
-        factor *= (scale * (gravity_m_s2 if word in OF_GRAVITY else 1.0)) ** sign
+        factor *= (scale * (gravity_m_s2 if word in GRAVITY_UNITS else 1.0)) ** sign
         for name, power in names.items():
             powers[name] = powers.get(name, 0) + sign * power
     return factor, powers

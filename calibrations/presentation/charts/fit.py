@@ -51,7 +51,7 @@ from calibrations.table import MILLI, Array
 PALE = 3.0  # times the noise floor: below, noise alone stays pale
 APART = 0.22  # of the step between rows of inclinations, by which both directions of turning are set apart
 MOST_INCLINATIONS = 16  # with a row each; more are drawn at their true angles, both directions at one place
-MISSED = 0.1  # part of the change's rms by which a curve may miss the change of single rows
+LARGEST_MISS = 0.1  # part of the change's rms by which a curve may miss the change of single rows
 SIDES: dict[int, Symbol] = {1: "circle", -1: "circle-open", 0: "circle"}
 PLACES: dict[int, Symbol] = {1: "triangle-up", -1: "triangle-down", 0: "circle"}
 TOWARDS = "towards x; left: z upwards, right: z downwards (equal-area map)"
@@ -305,7 +305,7 @@ def _map(channel: ChannelResidual) -> tuple[Array, Array, tuple[Axis, Axis]]:
 
 MOST_PARTS = 24  # of a column, for each direction
 ROWS_IN_A_PART = 6
-TELLING = 0.8  # part of the change's variance that a function of the column must give
+LEAST_EXPLAINED = 0.8  # part of the change's variance that a function of the column must give
 EQUAL = 0.02  # columns closer than this are equal: the simpler cause is drawn
 
 
@@ -322,7 +322,7 @@ def select_telling_column(step: Step[Fit]) -> Column:
     shares = np.array([explained_share(change, column.values, sides) for column in candidates])
     if step.before.table.type.moving:
         return candidates[0]
-    if shares.max() < TELLING:
+    if shares.max() < LEAST_EXPLAINED:
         label = f"change made by {step.name} ({residual_unit(step.before)})"
         return Column("change", (label,) * len(change), 1e3 * change_of(step))
     return candidates[int(np.argmax(shares >= shares.max() - EQUAL))]
@@ -367,7 +367,7 @@ def is_function(step: Step[Fit], column: Column, c: int) -> bool:
     for side, abscissas, values in curves(step, column, c):
         rows = sides == side
         missed[rows] = change[rows] - np.interp(x[rows], abscissas, values)
-    limit = max(MISSED * float(rms(change)), float(step.before.noise.floor[c]))
+    limit = max(LARGEST_MISS * float(rms(change)), float(step.before.noise.floor[c]))
     return float(rms(missed)) <= limit
 
 

@@ -31,7 +31,7 @@ from calibrations.table import AXES, Array, Table
 INCLINATIONS_DEG = (90.0, 30.0, 150.0, 60.0, 120.0)
 STEP_DEG = 9.0
 SMOOTH = 1.0  # von Neumann's ratio of a residual that is a function of a force; 2 where it is none
-SAME = 0.02  # of its range
+EQUAL_VALUES = 0.02  # of its range
 DIGITS = 4  # decimals of mV: further digits depend on the machine
 INCLINATIONS = ("#440154", "#3b528b", "#21918c", "#5ec962", "#c9d614")  # colours of 30 to 150 deg
 SMALL = 7.2  # inches: the width of a page of the catalogue
@@ -102,13 +102,15 @@ def _panel(effect: Effect, table: Table, a: Array, k: int, residual: Array) -> P
         return Part(axis, residual, table.time_s, "time (s)", (Curve("", BLUE, "-", rows),))
     if drivers := [name for name in effect.needs if name in LABELS]:
         abscissa = table.column(drivers[0]) / (60.0 if drivers[0] == "t_s" else 1.0)
-        return Part(axis, residual, abscissa, LABELS[drivers[0]], tuple(_by_inclination(table, ("-", "-"))))
+        return Part(axis, residual, abscissa, LABELS[drivers[0]], tuple(_inclination_curves(table, ("-", "-"))))
     for name, component in ((axis, a[:, k]), (other_axis, other_in_plane(a)[:, k])):
         _, rows, group = np.unique(np.round(component, 6), return_index=True, return_inverse=True)
-        if np.max(np.abs(residual - residual[rows][group])) < SAME * np.ptp(residual) and _smooth(residual[rows]):
+        if np.max(np.abs(residual - residual[rows][group])) < EQUAL_VALUES * np.ptp(residual) and _smooth(
+            residual[rows]
+        ):
             return Part(axis, residual, component, f"specific force along {name} (g)", (Curve("", BLUE, "-", rows),))
     styles = ("-", "--") if "direction" in effect.needs else ("-",)
-    return Part(axis, residual, table.column("beta_deg"), "β (deg)", tuple(_by_inclination(table, styles)))
+    return Part(axis, residual, table.column("beta_deg"), "β (deg)", tuple(_inclination_curves(table, styles)))
 
 
 def _smooth(values: Array) -> bool:
@@ -117,7 +119,7 @@ def _smooth(values: Array) -> bool:
     return float(steps @ steps) < SMOOTH * float(deviations @ deviations)
 
 
-def _by_inclination(table: Table, styles: tuple[str, ...]) -> Iterator[Curve]:
+def _inclination_curves(table: Table, styles: tuple[str, ...]) -> Iterator[Curve]:
     """The rows of each inclination, one line for each direction that has a style."""
     alpha, direction = table.column("alpha_deg"), table.column("direction")
     for inclination in sorted(INCLINATIONS_DEG):

@@ -39,7 +39,7 @@ TIME = "time since power-on (h)"
 SHOWN = 600  # means of the still record that a line is drawn through, at most
 CURVE = 400  # points of a fitted curve
 WINDOW = 1.6  # times the whole drift: height of the chart; the bounds are far wider in the beginning
-FORESEEN = (
+FORECAST_LEGEND = (
     "Final values of bias and scale factor by the Kalman filters' forecasts at each time: a line within its 95 % "
     "bounds, less the last forecast. The dotted line is the drift at that time. The broken line is the time from which "
     "the final value was known: from then on the bounds are narrow compared with the whole drift."
@@ -67,7 +67,9 @@ def soak_album(soak: Soak, histories: Mapping[str, ForecastHistory] = MappingPro
         Picture("night", "Temperature, supply and noise", surroundings_words, surroundings(soak)),
     ]
     if histories:
-        pictures.insert(1, Picture("foreseen", "Forecasts of the final values", FORESEEN, forecasts(soak, histories)))
+        pictures.insert(
+            1, Picture("foreseen", "Forecasts of the final values", FORECAST_LEGEND, forecasts(soak, histories))
+        )
     times_s, _ = soak.allan(soak.axes[0])
     return [*pictures, Picture("allan", "Allan deviation", noise, allan(soak))] if len(times_s) else pictures
 

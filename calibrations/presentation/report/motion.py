@@ -22,12 +22,12 @@ NAMES = {
     "frequency": "frequency, from the displacement sensor",
 }
 LEAST = 1e-8
-OF_THE_SWEEP = (
+SWEEP_NOTE = (
     "Both models were fitted to the sweep of this run. The uncertainties hold the noise within this record only. The "
     "uncertainties of the displacement sensor's calibration curve and of the converter's clock scale the reference and "
     "are not included."
 )
-OF_THE_MOTION = "From here on, models are fitted to the motion itself and not to the sweep."
+MOTION_NOTE = "From here on, models are fitted to the motion itself and not to the sweep."
 
 
 def motion_page(page: Page, motion: MotionResult, evaluation: Picture) -> Page:
@@ -37,7 +37,7 @@ def motion_page(page: Page, motion: MotionResult, evaluation: Picture) -> Page:
     )
     verdict = Markup('<span class="state {}">{}</span> <b>{}</b>').format(page.state, page.verdict, page.headline)
     model = page.subject.rpartition("model ")[2]
-    fitted = Section(f"The model {model}, fitted to the motion", (Remark(OF_THE_MOTION), verdict, page.summary))
+    fitted = Section(f"The model {model}, fitted to the motion", (Remark(MOTION_NOTE), verdict, page.summary))
     return replace(
         page,
         headline=f"In motion, the physical model has an rms error of {physical}, the linear model of {linear}.",
@@ -63,7 +63,7 @@ def _motion_section(motion: MotionResult, evaluation: Picture) -> Section:
         (
             evaluation,
             Table("The motion in numbers", head, quantities, (1,), headed=False),
-            Remark(OF_THE_SWEEP),
+            Remark(SWEEP_NOTE),
             Table("Errors of the filters", filters, [_bias(bias) for bias in motion.biases], range(1, 6)),
         ),
     )

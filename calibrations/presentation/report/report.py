@@ -62,17 +62,21 @@ def key_figures(discovery: Discovery[Fit]) -> list[tuple[str, str, str]]:
     """The few numbers to remember: (what, value, remark)."""
     start, floor, unit = discovery.start, pool_in_milli(discovery.start)[1], milli_unit(discovery.start)
     first = "error before" if discovery.steps else "rms error"
-    figures = [(first, f"{rounded(pool_in_milli(start)[0], 2)} {unit}", _of_floor(start, start.held_out_excess))]
+    figures = [(first, f"{rounded(pool_in_milli(start)[0], 2)} {unit}", _error_text(start, start.held_out_excess))]
     if discovery.steps:
         held_out = discovery.steps[-1].held_out_after
         figures.append(
-            ("error after", f"{rounded(pool_in_milli(discovery.end)[0], 2)} {unit}", _of_floor(discovery.end, held_out))
+            (
+                "error after",
+                f"{rounded(pool_in_milli(discovery.end)[0], 2)} {unit}",
+                _error_text(discovery.end, held_out),
+            )
         )
     kind = "white noise of one mean" if start.noise.known else "from the scatter: the white noise is not known"
     return [*figures, ("noise floor", f"{rounded(floor, 2)} {unit}", kind)]
 
 
-def _of_floor(fit: Fit, held_out: float) -> str:
+def _error_text(fit: Fit, held_out: float) -> str:
     return f"{rounded(fit.pooled_excess)} × the noise floor; held-out error {rounded(held_out)} ×"
 
 
@@ -95,11 +99,11 @@ def next_takes(e: Experiment) -> str:
     return f"{duration} and separates them with a probability of {e.expected.percent}, from {source}."
 
 
-EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
+MOST_EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
 SHOWS = 1e-3  # share of the noise floor from which on a part of the noise is shown
 SURE = 0.999  # more digits of a probability mean nothing
 NOTICEABLE_BIRGE = 1.05
-HELD_OUT = (
+HELD_OUT_TEXT = (
     "The ratio of error and noise floor is uncertain: for a complete model it is {chance} on this data (the digits in "
     "brackets are its standard uncertainty). The held-out error is the error on {rows} not used in the fit, from "
     "cross-validation."
@@ -116,10 +120,12 @@ CHANCES = (
 NO_CANDIDATE = "No effect can be tested on this data: the model already holds every effect that its columns excite."
 PLACES = "Places where the mean residual is not zero; largest first, at most one for each axis and quantity."
 NO_PLACE = "No angle, direction, time or temperature has a mean residual beyond the noise."
-ESTIMATED = (
+ESTIMATE_TEXT = (
     "Joint least-squares estimate. The digits in brackets are the standard uncertainty of the last digits (GUM 7.2.2)."
 )
-BY_BIRGE = " The residual is larger than the noise, so the uncertainties are multiplied by the Birge ratio {birge:.2f}."
+BIRGE_TEXT = (
+    " The residual is larger than the noise, so the uncertainties are multiplied by the Birge ratio {birge:.2f}."
+)
 WHITE_KNOWN = (
     "The white noise of each mean follows from the scatter of its samples and their correlation by the output filter."
 )
@@ -169,7 +175,7 @@ def _sections(
     discovery: Discovery[Fit], comparison: Comparison[Fit], pictures: Mapping[str, Picture]
 ) -> Iterable[Section]:
     end, given_model = discovery.end, brief(comparison.fit.model.name)
-    yield Section("Error by model", (pictures["waterfall"], _steps(discovery), _held_out(discovery)))
+    yield Section("Error by model", (pictures["waterfall"], _steps(discovery), _held_out_remark(discovery)))
     three = [pictures[name] for name in ("measurement", "residual", "failure")]
     yield Section(f"Residuals of the model {given_model}", (*_places(comparison), _errors(comparison.fit), *three))
     curves = [picture for name, picture in pictures.items() if name.startswith("effect-")]
@@ -203,9 +209,9 @@ def _steps(discovery: Discovery[Fit]) -> Table:
     return Table("Errors by model", head, rows, (1, 2, 3), headed=False)
 
 
-def _held_out(discovery: Discovery[Fit]) -> Remark:
+def _held_out_remark(discovery: Discovery[Fit]) -> Remark:
     chance = estimate_text(1.0, spread_of_excess(discovery.end))
-    return Remark(HELD_OUT.format(chance=chance, rows=discovery.start.table.type.rows))
+    return Remark(HELD_OUT_TEXT.format(chance=chance, rows=discovery.start.table.type.rows))
 
 
 def spread_of_excess(fit: Fit) -> float:
@@ -275,7 +281,7 @@ def _candidates(discovery: Discovery[Fit]) -> tuple[Block, ...]:
     explained = {
         rank: _explanation(c, start.table.unit)
         for rank, c in enumerate(candidates)
-        if rank == 0 or (rank < EXPLAINED and c.p_value < SIGNIFICANT)
+        if rank == 0 or (rank < MOST_EXPLAINED and c.p_value < SIGNIFICANT)
     }
     head = ("effect", "error / floor", "held-out error / floor", "p-value", "probability", "inseparable from")
     text = CANDIDATES.format(seen=rounded(start.pooled_excess), unseen=rounded(start.held_out_excess))
@@ -301,10 +307,10 @@ def _model(discovery: Discovery[Fit]) -> tuple[Block, ...]:
     end, added_effects = discovery.end, {step.name for step in discovery.steps}
     rows = [row for term in end.model.terms for row in _parameters(term, term.name in added_effects)]
     head = ("effect", "parameter", "axis", "value (standard uncertainty)", "unit")
-    birge = BY_BIRGE.format(birge=end.birge) if end.birge > NOTICEABLE_BIRGE else ""
+    birge = BIRGE_TEXT.format(birge=end.birge) if end.birge > NOTICEABLE_BIRGE else ""
     name = Markup('<b class="long">{}</b>').format(end.model.name)
     table = Table("Parameters", head, rows, headed=False, grouped=True)
-    return name, ESTIMATED + birge, table, _errors(end)
+    return name, ESTIMATE_TEXT + birge, table, _errors(end)
 
 
 def _parameters(term: Term, is_added: bool) -> Iterable[tuple[str, ...]]:

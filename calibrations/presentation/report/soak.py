@@ -17,7 +17,7 @@ from calibrations.presentation.page import html
 from calibrations.presentation.report.parameters import verdicts
 from calibrations.text import estimate_text, in_milli, join_words, minus, rounded, time_text
 
-WANDERED_K = 1.0  # peak to peak; ambient that changes by more is not constant
+LARGEST_WANDER_K = 1.0  # peak to peak; ambient that changes by more is not constant
 TOLERANCE = (
     "The digits in brackets are the standard uncertainty of the last digits, slow noise included. The tolerance is "
     "the expanded uncertainty (k = 2) of one reversal. A quantity is steady from the time after which it stays "
@@ -113,7 +113,7 @@ def _summary(soak: Soak) -> str:
     reversals = len(next(iter(soak.courses.values())).t_s)
     text = f"The record holds every sample of {rounded(held_h)} h at rest, and {reversals} reversals."
     wander_k = soak.temperature_wander_k
-    if wander_k is not None and wander_k > WANDERED_K:
+    if wander_k is not None and wander_k > LARGEST_WANDER_K:
         text += (
             f" Besides the sensor's own warming, the temperature changed by {rounded(wander_k, 2)} K. The ambient "
             "temperature was not constant and caused a part of the drift."

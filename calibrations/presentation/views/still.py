@@ -21,8 +21,8 @@ HEAD = (
     "model", "log-likelihood gained", "lost without it alone", "mismatch / chance", "other half",
     "mismatch of the Allan deviation",
 )  # fmt: skip
-LOST = 2  # a column that one step alone does not need
-CLEANED = "without non-noise signals"  # the given model on the record without disturbances
+LOST_COLUMN = 2  # a column that one step alone does not need
+CLEANED_NAME = "without non-noise signals"  # the given model on the record without disturbances
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class StillView(View[NoiseFit]):
 
     def step_table(self, discovery: Discovery[NoiseFit]) -> Cells:
         """Gains that add up, and the mismatch after each step."""
-        column_numbers = [k for k in range(len(HEAD)) if k != LOST or len(discovery.steps) > 1]
+        column_numbers = [k for k in range(len(HEAD)) if k != LOST_COLUMN or len(discovery.steps) > 1]
         rows = (_row(*row) for row in gains(discovery))
         return tuple(HEAD[k] for k in column_numbers), [tuple(row[k] for k in column_numbers) for row in rows]
 
@@ -130,7 +130,7 @@ def gains(discovery: Discovery[NoiseFit]) -> Iterator[tuple[str, float | None, f
     start, baseline = discovery.start, discovery.findings.baseline
     yield start.model.name, None, None, start
     if baseline is not start:
-        yield CLEANED, baseline.log_likelihood - start.log_likelihood, None, baseline
+        yield CLEANED_NAME, baseline.log_likelihood - start.log_likelihood, None, baseline
     for step in discovery.steps:
         yield f"+ {step.name}", step.after.log_likelihood - step.before.log_likelihood, step.alone, step.after
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rig.runs.observer import Observer
 
 SETTINGS = {"inclinations_deg": "90,30,150,60", "step_deg": "30"}  # 104 poses show the three faults
-MEASURING = 0.4  # share of the bar
+MEASURING_SHARE = 0.4  # share of the bar
 
 
 @click.command("demo")
@@ -61,7 +61,7 @@ def demo_command(folder: Path | None, realistic: bool, as_json: bool) -> None:
     )
     with working("starting; the first time takes a minute", 0.0) as progress:
         run = _measure(bench, settings, progress)
-        progress.share = MEASURING
+        progress.share = MEASURING_SHARE
         table, linear = load(run), read_model("linear")
         discovered = discover(table, linear, progress.searched(effects_of(None)))
         progress.text, progress.share = "writing the report", 0.9
@@ -107,6 +107,6 @@ def _watch(progress: Progress) -> Observer:
         def kept(self, recorded: Kept) -> None:  # noqa: ARG002
             self.done += 1
             progress.text = f"measuring, {self.done} of {self.total} poses"
-            progress.share = MEASURING * self.done / self.total
+            progress.share = MEASURING_SHARE * self.done / self.total
 
     return Bar()

@@ -143,7 +143,7 @@ def calibration_lines(fitted: Fit) -> Iterator[str]:
 
 def calibration_document(fitted: Fit) -> dict[str, Any]:
     """The keys `calibration` and `by_hand` of the fit's document; an unknown uncertainty is null."""
-    matrices, extremes = calibration_matrices(fitted), _by_hand(fitted.table)
+    matrices, extremes = calibration_matrices(fitted), _hand_document(fitted.table)
     if (faces := _accelerometer(fitted.table)) is not None:
         extremes |= {"accelerometer": {"bias": faces.bias.tolist(), "scale_per_g": faces.scale.tolist()}}
     if matrices is None:
@@ -180,7 +180,7 @@ def _accelerometer(table: Table) -> Faces | None:
     return estimate_faces(np.column_stack([table.column(f"a{axis}")[still] for axis in "xyz"])) if still.any() else None
 
 
-def _by_hand(table: Table) -> dict[str, Any]:
+def _hand_document(table: Table) -> dict[str, Any]:
     """Hard iron by the method of the Book; for a horizontal turn soft iron; then the variation of the magnitude."""
     if not table.type.field:
         return {}
@@ -199,7 +199,7 @@ def _by_hand(table: Table) -> dict[str, Any]:
 
 def _book_text(table: Table) -> str:
     """The result of the method of the Book in words."""
-    values = _by_hand(table)["by_hand"]
+    values = _hand_document(table)["by_hand"]
     iron = ", ".join(f"{value:.5g}" for value in values["hard_iron"] if value is not None)
     text = f"Method of the Book, from the extremes: hard iron {iron} {table.unit}"
     if soft := values.get("soft_iron"):

@@ -98,7 +98,7 @@ def history_command(
     compared = [] if beside is None or last is None else [compare_sensors(life, beside, last)]
     compared += [compare_days(life, *(day.date() for day in between))] if between else []
     compared += [compare_rigs(life.calibrations, *rigs)] if rigs else []
-    compared = [_of_chosen(comparison, life) for comparison in compared]
+    compared = [_chosen_rows(comparison, life) for comparison in compared]
     day = on.date() if on is not None else None
     calibration = closest(life.calibrations, day) if day is not None else None
     staleness = stale(life, *calibration) if calibration is not None else None
@@ -123,7 +123,7 @@ def _select_quantities(life: History, names: Sequence[str], limited: Iterable[st
     return replace(life, quantities=quantities)
 
 
-def _of_chosen(compared: Compared, life: History) -> Compared:
+def _chosen_rows(compared: Compared, life: History) -> Compared:
     """The rows of the chosen quantities."""
     names = {q.name for q in life.quantities}
     return replace(compared, rows={name: row for name, row in compared.rows.items() if name in names})
@@ -203,7 +203,7 @@ def document(life: History, closest: Near, staleness: str | None, compared: Sequ
              "values": {name: vars(v) for name, v in c.values.items()}}
             for c in life.calibrations
         ],
-        "quantities": [_of_quantity(q) for q in life.quantities],
+        "quantities": [_quantity_document(q) for q in life.quantities],
         "passed_over": dict(life.passed_over),
         "warnings": list(life.warnings),
         "closest": None if closest is None else {"data": closest[0].data, "age_days": closest[1], "stale": staleness},
@@ -213,7 +213,7 @@ def document(life: History, closest: Near, staleness: str | None, compared: Sequ
     }  # fmt: skip
 
 
-def _of_quantity(q: Quantity) -> dict[str, Any]:
+def _quantity_document(q: Quantity) -> dict[str, Any]:
     line = q.line
     return {
         "name": q.name,

@@ -207,10 +207,10 @@ def optimal_document(optimum: Optimal) -> dict[str, Any]:
         "criterion": optimum.criterion,
         "times_less_rig_time": optimum.times_less,
         "times_less_rig_time_for_all": optimum.times_less_for_all,
-        "standard": _of_plan(optimum, optimum.standard),
-        "same_dwell": _of_plan(optimum, optimum.short),
-        "same_worst_error": _of_plan(optimum, optimum.equal),
-        "no_parameter_worse": _of_plan(optimum, optimum.all_equal),
+        "standard": _plan_document(optimum, optimum.standard),
+        "same_dwell": _plan_document(optimum, optimum.short),
+        "same_worst_error": _plan_document(optimum, optimum.equal),
+        "no_parameter_worse": _plan_document(optimum, optimum.all_equal),
         "drift_loss": optimum.drift_loss,
         "height_correlation": optimum.height_correlation,
         "poses": [
@@ -230,7 +230,7 @@ def _explain_run(optimum: Optimal, out: str | None, bench: str | None) -> Iterat
         yield "           after the same command with --out poses.csv"
 
 
-def _of_plan(optimum: Optimal, candidate: Judged) -> dict[str, Any]:
+def _plan_document(optimum: Optimal, candidate: Judged) -> dict[str, Any]:
     with np.errstate(invalid="ignore"):  # a parameter that neither determines has infinite uncertainty
         ratios = [float(ratio) for ratio in candidate.errors / optimum.standard.errors]
     return {

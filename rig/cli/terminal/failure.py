@@ -55,7 +55,7 @@ def _report_failure(error: Exception) -> int:
     if os.environ.get("RIG_DEBUG"):
         traceback.print_exc()
     if isinstance(error, OSError) and error.strerror:
-        return _print(_of_file(error), status)
+        return _print(_file_error_text(error), status)
     if status != PROGRAM_FAULT:
         return _print(str(error), status)
     text = f"{type(error).__name__}: {error}".rstrip(": ")
@@ -73,7 +73,7 @@ def status_of(error: BaseException) -> int:
     return 2 if isinstance(error, OSError) else PROGRAM_FAULT  # a file that cannot be read or written
 
 
-def _of_file(error: OSError) -> str:
+def _file_error_text(error: OSError) -> str:
     """The message of an error of the operating system."""
     reason = (error.strerror or "").lower()
     if error.filename is None:

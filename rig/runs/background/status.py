@@ -79,7 +79,7 @@ def file(key: str, ending: str) -> Path:
 
 # The status of a background run, as one small file.
 
-KEPT = 20
+KEPT_ESTIMATES = 20
 EVERY_S = 0.5  # real time between two statuses of a simulated run
 ATTITUDE = ("alpha_deg", "beta_deg", "mount_deg", "flip")
 Phase = Literal["starting", "running", "asking", "paused", "ended"]
@@ -207,7 +207,7 @@ def folder() -> Path:
 
 def remove_old_files() -> None:
     """Remove the files of old processes, except the last KEPT. Their runs stay in the record."""
-    for key in keys()[:-KEPT]:
+    for key in keys()[:-KEPT_ESTIMATES]:
         if not is_held(home(), lock(key)):
             for ending in ("answers", "log", "json"):
                 file(key, ending).unlink(missing_ok=True)

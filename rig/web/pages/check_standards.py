@@ -12,7 +12,7 @@ from rig.errors import RecordError
 from rig.record import Run
 from rig.services.control import HEAD, OUT, PROCEDURE, make_charts, row, signals, worst
 from rig.services.history import run_date
-from rig.web.pages.history_results import CLICKED, without_title
+from rig.web.pages.history_results import CLICK_HANDLER, without_title
 from rig.web.parts import box, button, div, for_page, show_error, table, wide_table, words
 from rig.web.pictures import draw, plot_with_title
 
@@ -53,7 +53,7 @@ class CheckStandards:
                 for title in self._panels():
                     with div("picture"):
                         plot = plot_with_title(title, CONTROL_LEGENDS[title], "live-plot", f"Check standard: {title}")
-                        self.plots[title] = plot.on("plotly_click", _open_clicked_run, js_handler=CLICKED)
+                        self.plots[title] = plot.on("plotly_click", _open_clicked_run, js_handler=CLICK_HANDLER)
         self.draw()
 
     def draw(self) -> None:

@@ -88,7 +88,7 @@ def _of_rows(first: Fit, second: Fit) -> Comparison:
     return Comparison(axes, residual_units(first), titles, draw)
 
 
-def _of_noise(first: NoiseFit, second: NoiseFit) -> Comparison:
+def _noise_comparison(first: NoiseFit, second: NoiseFit) -> Comparison:
     """Allan deviations of both records."""
     axes = [axis for axis in first.still.axes if axis in second.still.axes]
     curves = [compared_deviations(fit) for fit in (first, second)]
@@ -102,7 +102,10 @@ def _of_noise(first: NoiseFit, second: NoiseFit) -> Comparison:
     return Comparison(axes, offered, [ALLAN], draw)
 
 
-PICTURES: dict[str, Callable[[Any, Any], Comparison]] = {"rows": _of_rows, "samples": _of_noise}  # by form of data
+PICTURES: dict[str, Callable[[Any, Any], Comparison]] = {
+    "rows": _of_rows,
+    "samples": _noise_comparison,
+}  # by form of data
 
 
 HEAD = ("", "first ●", "second ◇", "second − first", "in std uncertainties")

@@ -177,7 +177,7 @@ def _select(name: str, options: Sequence[str], first: int) -> ui.select:
 # Pictures: one quantity over time, and its control charts. A click on a point opens its run.
 
 LIFE = "Calibrations over time"
-CLICKED = "(e) => { const k = e && e.points && e.points[0].customdata; if (k) emit(k) }"
+CLICK_HANDLER = "(e) => { const k = e && e.points && e.points[0].customdata; if (k) emit(k) }"
 FEW = "A control chart needs two calibrations, a drift three: measure this sensor again."
 
 
@@ -216,7 +216,7 @@ class HistoryPictures:
                 draw(self.charts[title], without_title(panel), f"{title} {q.name}")
 
     def _plot(self, title: str, legend: str = "") -> ui.plotly:
-        return plot_with_title(title, legend).on("plotly_click", self._open_clicked, js_handler=CLICKED)
+        return plot_with_title(title, legend).on("plotly_click", self._open_clicked, js_handler=CLICK_HANDLER)
 
     def _open_clicked(self, event: events.GenericEventArguments) -> None:
         ui.navigate.to(ModelState(str(event.args), self.model).address)

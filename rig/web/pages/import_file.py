@@ -62,7 +62,7 @@ CONSTANTS = {  # constants that a person may know, with the labels of their fiel
     "gravity_m_s2": "Gravity (m/s²)",
     "turn_deg": "Angle of each turn (deg)",
 }
-OF_KIND = {  # kinds that have a constant; all kinds where it is not here
+CONSTANT_KINDS = {  # kinds that have a constant; all kinds where it is not here
     "turn_deg": ("rates",),
     "sample_rate_hz": ("positions", "rates", "turns", "still", "motion"),
 }
@@ -267,7 +267,7 @@ class ImportPage:
             if name in self.restored:
                 column.choose(self.restored[name])
         for name, field in self.fields.items():
-            field.set_visibility(kind in OF_KIND.get(name, KINDS))
+            field.set_visibility(kind in CONSTANT_KINDS.get(name, KINDS))
         self.quiet = False
         self.question.clear()
         answered = any(unit for name, unit in self.restored.values() if name == TIME)

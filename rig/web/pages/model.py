@@ -65,7 +65,7 @@ class Workbench:
     def build(self) -> None:
         """Build the page; long computations start when the browser shows it."""
         try:
-            self.data = self.data or _newest()
+            self.data = self.data or _newest_run()
         except RecordError as error:  # for example a lab that does not answer
             with frame(self.desk, "/"):
                 show_error("The record cannot be read", error)
@@ -331,6 +331,6 @@ def _empty_page() -> None:
         ui.button("Open a file", icon="upload_file", on_click=lambda: ui.navigate.to("/import")).props("outline")
 
 
-def _newest() -> str:
+def _newest_run() -> str:
     """The newest run of one sensor; "" without one."""
     return next((run.run for run in runs() if run.rows and not run.bench.get("sensors")), "")

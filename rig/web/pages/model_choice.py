@@ -92,10 +92,10 @@ class Choice:
             words("Open a file", "title")
             words("A table with a header. If its columns have other names or units, you choose their meaning next.",
                   "quiet small")  # fmt: skip
-            upload(self._uploaded)
+            upload(self._open_upload)
         dialog.open()
 
-    async def _uploaded(self, path: Path) -> None:
+    async def _open_upload(self, path: Path) -> None:
         """Open the file, or go to the page that asks for its columns."""
         self.page.desk.forget(str(path))
         try:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rig.services.session import ModelSession
 
 LONG = 4  # letters in a channel name
-LINKED = ("measurement", "residual", "failure")
+LINKED_PICTURES = ("measurement", "residual", "failure")
 TITLES = {
     "measurement": "Measurement and model",
     "residual": "Residuals",
@@ -91,7 +91,7 @@ class Pictures(AxisAndUnit):
                 downloads(partial(self.plots.get, name), TITLES[name])
             self.legends[name] = words("", "legend quiet")
             plot = self.plots[name] = empty_plot(TITLES[name])
-        if name in LINKED:
+        if name in LINKED_PICTURES:
             plot.on("plotly_selected", self._select_brushed, js_handler=POINTS)
             plot.on("plotly_deselect", lambda: self.select([]), js_handler="() => emit()")
 
@@ -223,7 +223,7 @@ class Pictures(AxisAndUnit):
         if self.fit is None:
             return
         self.selected = sorted({int(point) for point in points})
-        for plot in (self.plots[name] for name in LINKED):
+        for plot in (self.plots[name] for name in LINKED_PICTURES):
             number = _dots(plot.figure)
             if number is None:
                 continue

@@ -25,7 +25,7 @@ COLUMNS = sortable(
     fixed=("extent",),
 )  # fmt: skip
 PAGE = 25
-OPENED = """<q-td :props="props">
+EXPANDED_ROW = """<q-td :props="props">
   <a :href="`/record/${props.value.split('/')[0]}`" @click.stop>{{ props.value }}</a>
 </q-td>"""
 MARK_ALL = '<q-checkbox v-model="props.selected" dense aria-label="Select all runs" />'
@@ -67,10 +67,10 @@ class Runs:
             rows = [row for run in listed for row in _rows(run, runs_by_sensor)]
             self.table = ui.table(
                 rows=rows, columns=COLUMNS, row_key="name", selection="multiple", pagination=PAGE,
-                on_select=self._marked,
+                on_select=self._update_buttons,
             ).props("flat dense wrap-cells").classes("runs").on("rowClick", self._open)  # fmt: skip
             self.table.props("rows-per-page-label='Runs per page'")
-            self.table.add_slot("body-cell-name", OPENED)
+            self.table.add_slot("body-cell-name", EXPANDED_ROW)
             self.table.add_slot("body-cell-sensor", LINKED)
             self.table.add_slot("header-selection", MARK_ALL)
             self.table.add_slot("body-selection", MARK)
@@ -78,22 +78,22 @@ class Runs:
         self.compare.disable()
         self.together.disable()
 
-    def _marked(self) -> None:
+    def _update_buttons(self) -> None:
         self.compare.set_enabled(len(self.table.selected) == 2)
         self.together.set_enabled(len(self.table.selected) > 1)
 
-    def _marked_names(self) -> list[str]:
+    def _selected_names(self) -> list[str]:
         """The selected runs, oldest first."""
         names = {row["name"] for row in self.table.selected}
         return [row["name"] for row in reversed(self.table.rows) if row["name"] in names]
 
     def _model(self) -> None:
         """Open the model page for the selected runs as one table."""
-        ui.navigate.to(ModelState(SEPARATOR.join(self._marked_names())).address)
+        ui.navigate.to(ModelState(SEPARATOR.join(self._selected_names())).address)
 
     def _compare(self) -> None:
         """Compare the selected runs; the older one is the first."""
-        first, second = self._marked_names()
+        first, second = self._selected_names()
         ui.navigate.to(f"/compare?{urlencode({'first': first, 'second': second})}")
 
     def _open(self, event: events.GenericEventArguments) -> None:

@@ -195,9 +195,9 @@ class Planning:
     def _optimal(self) -> None:
         """Ask for a model; poses that are chosen for it replace the grid."""
         grid = {name: text for name, text in self.settings().items() if name != "pose_list"}
-        OptimalDialog(self.bench, self.procedure, grid, self._used)
+        OptimalDialog(self.bench, self.procedure, grid, self._fill_settings)
 
-    def _used(self, settings: Mapping[str, str]) -> None:
+    def _fill_settings(self, settings: Mapping[str, str]) -> None:
         for name, text in settings.items():
             self.inputs[name].set_value(text)
 

@@ -16,7 +16,7 @@ from procedures.session import Guidance
 from rig.drawings import Attitude, orientation_drawing, page, strip
 from rig.runs.background import control
 from rig.runs.background.status import NOT_BEGUN, OpenQuestion, Status
-from rig.runs.signals import STOPPED_BY
+from rig.runs.signals import SIGNAL_SOURCES
 from rig.web.address import ModelState
 from rig.web.calculations import off_loop
 from rig.web.frame import control_run
@@ -272,7 +272,7 @@ def stop_words(status: Status) -> str:
         return ""
     if not status.run and status.error.endswith(NOT_BEGUN):
         return STOPPED_EARLY
-    return STOPPED if status.error.startswith(tuple(STOPPED_BY.values())) else ""
+    return STOPPED if status.error.startswith(tuple(SIGNAL_SOURCES.values())) else ""
 
 
 def _drawing(attitude: Mapping[str, Any]) -> str:

@@ -247,7 +247,7 @@ class OneRun:
                         facts({name: value[:SHOWN] for name, value in part.items() if value})
             with div("stack"):
                 if run.bench and run.rows:
-                    self._over_time()
+                    self._lay_out_over_time()
                 if excluded:
                     with box("stack"):
                         words("Excluded poses", "title")
@@ -257,7 +257,7 @@ class OneRun:
         if run.state == "complete" and run.rows:
             RunReport(desk, run, headline)
 
-    def _over_time(self) -> None:
+    def _lay_out_over_time(self) -> None:
         with box("stack"):
             words("Over time", "title")
             over_time = OverTime()
