@@ -54,7 +54,7 @@ class Exponentials:
 
 
 def remaining_drift(p: Array, t_s: Array) -> Array:
-    """The drift still to come at times since the first value, s: shape (n,); `p` as in `Exponentials`."""
+    """The remaining drift at times since the first value, s: shape (n,); `p` as in `Exponentials`."""
     k = (len(p) - 1) // 2
     return np.asarray(np.exp(-t_s[:, None] / np.exp(p[1 + k :])) @ p[1 : 1 + k])
 
@@ -106,7 +106,7 @@ class Series:
 
     @cached_property
     def known(self) -> bool:
-        """Whether the white noise is known; the noise is never less."""
+        """Whether the white noise is known; it is then the least noise."""
         return bool(np.all(self.stds > 0))
 
     @cached_property

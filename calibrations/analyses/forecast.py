@@ -85,7 +85,7 @@ class Forecast:
 
 @dataclass(frozen=True)
 class QuantityFilter:
-    """Filters of one quantity: its first value, the white standard error of one value, and the bank, in units of it."""
+    """Filters of one quantity: its first value, the white standard error of one value, and the bank in this unit."""
 
     first: float
     unit: float
@@ -214,7 +214,7 @@ def steady_time(histories: Mapping[str, ForecastHistory], axis: str = "") -> Bou
 
 
 def forecast_history(table: Table, oven_c: float = 0.0) -> dict[str, ForecastHistory]:
-    """Every quantity of a soak's table by name, as known after LOOKS parts of it, closer together at the beginning."""
+    """Forecasts of every quantity of a soak's table by name after LOOKS parts of it, denser at the beginning."""
     parts = list(soak_parts(table))
     look_numbers = set(np.rint(np.geomspace(1, len(parts), FORECASTS)).astype(int).tolist()) if parts else set()
     histories: dict[str, list[Forecast]] = {}
@@ -248,7 +248,7 @@ def soak_parts(table: Table) -> Iterator[Table]:
 
 
 def _time_to_tolerance_s(remaining: Array, taus_s: Array, tolerance: float) -> Array:
-    """For each draw, how long the remaining drift is beyond the tolerance; `remaining` and `taus_s` (n, 2)."""
+    """For each draw, the time until the remaining drift is within the tolerance; `remaining` and `taus_s` (n, 2)."""
     future_drift = np.abs(
         np.sum(remaining[:, None, :] * np.exp(-HORIZON_S[None, :, None] / taus_s[:, None, :]), axis=2)
     )

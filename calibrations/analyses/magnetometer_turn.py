@@ -75,14 +75,14 @@ def estimate_hard_iron(outputs: Array) -> Array:
 
 
 def fit_ellipse(xy: Array) -> Ellipse:
-    """The ellipse of the points `xy` (n, 2) about 0, hard iron taken off."""
+    """The ellipse of the points `xy` (n, 2) about 0, without hard iron."""
     radius = np.linalg.norm(xy, axis=1)
     x, y = xy[np.argmax(radius)]
     return Ellipse(float(radius.max()), float(radius.min()), float(np.arctan2(y, x)), len(xy))
 
 
 def correct_by_extremes(outputs: Array) -> Array:
-    """Outputs (n, axes) with hard iron taken off each axis, and soft iron off the first two."""
+    """Outputs (n, axes) without the hard iron of each axis, and without the soft iron of the first two."""
     centred = outputs - estimate_hard_iron(outputs)
     ellipse = fit_ellipse(centred[:, :2])
     return np.column_stack([centred[:, :2] @ ellipse.correction, centred[:, 2:]])
@@ -103,7 +103,7 @@ def correct_by_extremes(outputs: Array) -> Array:
 
 @dataclass(frozen=True)
 class Elements:
-    """F and H in the unit of the field, D and I in deg; standard uncertainties, None where one turn is all there is."""
+    """F and H in the unit of the field, D and I in deg; standard uncertainties, None for one turn."""
 
     value: Mapping[str, float]
     std: Mapping[str, float | None]
@@ -197,7 +197,7 @@ def horizontal_per_mille(xy: Array) -> float:
 
 
 def _remaining_per_mille(outputs: Array, middle: Array, round_z: Ellipse, about_z: Array) -> float:
-    """Of the whole sphere where hard iron is known of every axis; else of the turn about z."""
+    """Of the whole sphere if the hard iron of every axis is known, otherwise of the turn about z."""
     if not np.isfinite(middle).all():
         return horizontal_per_mille((about_z - estimate_hard_iron(about_z)) @ round_z.correction)
     centred = outputs - middle

@@ -26,11 +26,11 @@ from calibrations.geometry.orientation import rotation
 from calibrations.means.noise import Noise, white_only, white_std
 from calibrations.table import AXES, Array, Table
 
-# The directions of the sensing axes from a search for the extreme output, and the correction that they call for.
+# The directions of the sensing axes from a search for the extreme output, and the correction by them.
 #
 #     Theta_x = Ry(alpha_x) Rz(beta_x) [1 0 0]^T        Theta_y = Rx(alpha_y) Rz(beta_y) [0 1 0]^T
 #
-# Ang (18)-(21), with two misprints set right: x_ref is [1 0 0], not [0 0 1], and (20) subtracts theta_xy A_y, not
+# Ang (18)-(21), with two misprints corrected: x_ref is [1 0 0], not [0 0 1], and (20) subtracts theta_xy A_y, not
 # theta_yx A_y. The printed angles for y do not give the printed Theta_y.
 
 
@@ -113,7 +113,7 @@ def estimate_directions(table: Table) -> dict[str, Direction]:
 
 
 def non_orthogonality_deg(x: Direction, y: Direction) -> tuple[float, float]:
-    """How far the angle from x to y is from 90 deg, positive where it is less; and its standard error."""
+    """90 deg minus the angle from x to y, deg, and its standard error."""
     cosine = float(x.theta @ y.theta)
     variance = y.theta @ x.covariance @ y.theta + x.theta @ y.covariance @ x.theta
     return float(np.degrees(np.arcsin(cosine))), float(np.degrees(np.sqrt(variance / (1 - cosine**2))))
@@ -132,7 +132,7 @@ def _number(path: str) -> int:
 
 @dataclass(frozen=True)
 class _Bracket:
-    """The rows of one axis: what acts on it (n, p), loads first, its output and white noise (n,)."""
+    """The rows of one axis: regressors (n, p), loads first, its output and white noise (n,)."""
 
     axis: str
     centre_deg: float  # beta from which its columns count
@@ -147,7 +147,7 @@ class _Bracket:
         return white_only(None if self.white is None else self.white[None, :], self.gap_s, 1)
 
     def slow_noise(self) -> Noise:
-        """The same with the scatter and the slow noise that the residual shows."""
+        """White noise with the scatter and the slow noise of the residual."""
         residual = self.volts - self.columns @ np.linalg.lstsq(self.columns, self.volts, rcond=None)[0]
         return estimate(self.noise(), residual[None], self.columns[None], np.zeros((len(residual), 0)))
 

@@ -47,13 +47,13 @@ from calibrations.motion.spectrum import (
 from calibrations.table import Array, Table, std_column
 from calibrations.tables import KINDS
 
-# Acceleration from the sensor's output: the output filter undone, and a model solved backwards.
+# Acceleration from the sensor's output: inverse of the output filter, then inverse of the model.
 #
-# Noise grows with frequency when a low-pass is undone; the band that follows keeps it finite.
+# The inverse of a low-pass increases the noise with frequency; the band after it limits this.
 
 
 def acceleration(table: Table, model: Model) -> Array:
-    """Acceleration along x, m/s^2, shape (n,), that instantaneous outputs mean under a model: gravity taken off.
+    """Acceleration along x, m/s^2, shape (n,), by the inverse of a model from instantaneous outputs, without gravity.
 
     Axes that were not measured have the specific force of the attitude. Raises ModelError for a model without values.
     """
@@ -92,7 +92,7 @@ def measured_acceleration(part: Table, record: Record, model: Model, band: Respo
 
 
 def inverse_response(table: Table, model: Model, axis: int, band: Response) -> Response:
-    """From samples to the transducer's output in the band: the output filter and the skew undone.
+    """From samples to the transducer's output in the band: without the output filter and the skew.
 
     A corner and a delay that the model holds take the place of the nominal ones.
     """
@@ -135,12 +135,12 @@ class MotionResult:
 
     @cached_property
     def excess(self) -> float:
-        """The physical model's error over the error that the sensor's noise alone gives."""
+        """Error of the physical model over the error by the sensor's noise alone."""
         return self.rmse_physical.value / self.noise_limit.value
 
     @property
     def results(self) -> Mapping[str, Quantity]:
-        """By the names under which a run gives them."""
+        """The results by their names in a run."""
         return {
             "rmse-linear-x": self.rmse_linear,
             "rmse-physical-x": self.rmse_physical,
@@ -208,7 +208,7 @@ def _jackknife(groups: list[list[Array]], statistic: Callable[[list[list[Array]]
 def _noise_limit(
     part: Table, record: Record, model: Model, band: Response, reference: Reference, still: Table | None
 ) -> Quantity:
-    """Rms that the sensor's noise alone leaves in the band, mm/s^2."""
+    """Rms of the sensor's noise alone in the band, mm/s^2."""
     source = part if still is None else still
     source_record = record if still is None else max(find_records(still), key=lambda r: r.end - r.first)
     x = source.column(part.output_name("x"))[source_record.rows]
@@ -241,13 +241,13 @@ def _motion_part(x: Array, record: Record, reference: Reference) -> Array:
 # The two models that the paper judges by motion, fitted to a sweep of the same sensor.
 #
 # linear     the manufacturer's, Ang (1)-(3): bias and scale factor of each axis from +1 g and -1 g
-# physical   the shipped physical model, fitted jointly; with hysteresis where the sweep goes both ways, because the
-#            loop would otherwise be taken for squares and products. A motion is met between its branches, where it
-#            adds nothing.
+# physical   the shipped physical model, fitted jointly. It has hysteresis if the sweep has both directions, because
+#            its loop would otherwise change the squares and products. A motion is between the branches of the
+#            hysteresis, where its contribution is 0.
 
 
 def linear_from_turns(sweep: Table) -> Model:
-    """Ang (1)-(3). Raises DataError where an axis was not held at both +1 g and -1 g."""
+    """Ang (1)-(3). Raises DataError if an axis was not measured at both +1 g and -1 g."""
     sweep = _plane_axes(sweep)
     ends = {axis: [_mean(sweep, axis, beta_deg) for beta_deg in UPRIGHT_DEG[axis]] for axis in sweep.axes}
     unit = sweep.unit

@@ -1,4 +1,4 @@
-"""A soak: bias and scale factor of each axis over hours since power-on, and the still record between reversals.
+"""A soak: bias and scale factor of each axis in the hours after power-on, and the record at rest between reversals.
 
 Its table has a row for each pose of a tumble (path `reversal k`) and for each block of the still record (`hold k`).
 A gap is time of which nothing was kept: any within a hold, and more than moves take elsewhere. A tumble that a gap
@@ -39,8 +39,8 @@ from calibrations.table import Array, Table, std_column
 # Steady state after switching on: its time, the drift until then, and its time constants.
 #
 # The steady-state time is the first after which the remaining drift stays within the expanded uncertainty (k = 2) of
-# one measured value, slow noise included: from then on no measurement separates the remaining drift from noise. It is
-# not reached where it lies beyond the record, or where the noise wanders for as long as the record.
+# one measured value, slow noise included: after it no measurement separates the remaining drift from noise. It is not
+# reached if it is after the end of the record, or if the time constant of the noise is as long as the record.
 #
 # Source  Ang III.B, Fig. 10: about 7 h, 2 to 12 h over eight axes; JCGM 100, 5.1: propagation, 6.2: expanded
 # uncertainty.
@@ -102,7 +102,7 @@ class SteadyState:
 
     @property
     def drift(self) -> Quantity:
-        """Change of the fitted value from the first time to the last; 0 where no drift is significant."""
+        """Change of the fitted value from the first to the last time; 0 without a significant drift."""
         if not self.terms:
             return 0.0, float(np.sqrt(2) * self.noise)
         first, last = model_derivatives(self.parameters, np.array(self.span_s) - self.span_s[0])
@@ -116,7 +116,7 @@ class SteadyState:
 
     @property
     def time_s(self) -> Quantity | None:
-        """Steady-state time since power-on; None where it is not reached, or where too few values would show it.
+        """Steady-state time since power-on; None if it is not reached, or if there are too few values for it.
 
         Its standard error is that of the exponentials, and of the noise that sets the tolerance. Where nothing drifts
         it is the record's start, at the latest: rectangular since power-on.
@@ -150,7 +150,7 @@ class SteadyState:
         return np.asarray(self.parameters[0] + remaining_drift(self.parameters, t_s - self.span_s[0]))
 
     def std_at(self, t_s: Array) -> Array:
-        """Its standard error, shape (n,)."""
+        """Standard error of the fitted value, shape (n,)."""
         derivatives = model_derivatives(self.parameters, t_s - self.span_s[0])
         return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", derivatives, self.covariance, derivatives)))
 

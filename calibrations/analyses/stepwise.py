@@ -19,10 +19,10 @@ from calibrations.importing.foreign import require_kind
 from calibrations.means.noise import rms
 from calibrations.table import Array, Table
 
-# The poses that Ang's equations single out: an axis held up and held down at each inclination, the turn at 90 deg.
+# The poses of Ang's equations: an axis up and an axis down at each inclination, and the turn at 90 deg.
 #
-# Poses are identified by the specific force at their angles, not by the angles: alpha and -alpha, a turned mount or a
-# sensor face down then find their places by themselves.
+# Poses are identified by the specific force at their angles, not by the angles: this includes alpha and -alpha, a
+# turned mount, and a sensor face down.
 
 DECIMALS = 1  # of an inclination in deg: the digital level's resolution
 UP_AND_DOWN_DEG = ((0, 180), (90, 270))  # beta where x, y are held up and down, at alpha = 90
@@ -59,7 +59,7 @@ def in_vertical_plane(a: Array) -> NDArray[np.bool_]:
 
 
 def inclination_planes(table: Table, k: int, v: Array, a: Array) -> list[Plane]:
-    """Every inclination where axis `k` (0 or 1) was held both up and down; outputs `v` (n,), repeats averaged.
+    """Every inclination at which axis `k` (0 or 1) was measured up and down; outputs `v` (n,), repetitions averaged.
 
     Raises DataError if the one at 90 deg is not among them, or fewer than three are.
     """
@@ -125,7 +125,7 @@ class AxisEstimate:
         return (v - self._bias_at(other_output, a_z)) / np.polyval(self.r, a_z)
 
     def output(self, a: Array, other_output: Array, a_z: Array) -> Array:
-        """Output, V, from the acceleration, g, and the other axis's output: Ang (14), (16) the other way round."""
+        """Output, V, from the acceleration, g, and the other axis's output: the inverse of Ang (14), (16)."""
         return a * np.polyval(self.r, a_z) + self._bias_at(other_output, a_z)
 
     def _bias_at(self, other_output: Array, a_z: Array) -> Array:
@@ -185,7 +185,7 @@ class Stepwise:
 
     @cached_property
     def predicted(self) -> Array:
-        """Output at each pose, V: each axis needs the other's output, so both are solved for together."""
+        """Output at each pose, V: each axis needs the output of the other, so both are computed together."""
         a_x, a_y, a_z = self.force.T
         v_x, v_y = self.x.line(a_x), self.y.line(a_y)
         for _ in range(60):  # cross-axis slopes are far below 1: the error falls by their product each time
@@ -194,7 +194,7 @@ class Stepwise:
 
     @cached_property
     def acceleration(self) -> Array:
-        """Acceleration from the measured outputs, g, a_z taken from the stage angle. Ang (14), (16)."""
+        """Acceleration from the measured outputs, g, with a_z from the stage angle. Ang (14), (16)."""
         v_x, v_y, a_z = self.table.output("x"), self.table.output("y"), self.force[:, 2]
         return np.column_stack([self.x.acceleration(v_x, v_y, a_z), self.y.acceleration(v_y, v_x, a_z)])
 
@@ -215,7 +215,7 @@ class Stepwise:
 
     @cached_property
     def tilts(self) -> tuple[Tilt, Tilt]:
-        """The tilt of x and of y that p1 and q1 hold."""
+        """The tilt of x and of y in p1 and q1."""
         return self._tilt(self.x, self.y, 1), self._tilt(self.y, self.x, 0)
 
     def _tilt(self, axis_estimate: AxisEstimate, other_axis: AxisEstimate, across_axis: int) -> Tilt:

@@ -1,4 +1,4 @@
-"""Whether a sensor that a person handles is at rest: a test of each window of samples against its noise at rest.
+"""The test of rest of a sensor in a hand: each window of samples is compared with the noise at rest.
 
     shake   variance of the samples about the means of short blocks     a trembling hand, a motor
     sway    variance of the block means about the mean of the window    a hand that holds the sensor
@@ -69,7 +69,7 @@ class Stillness:
 
 
 def learn_noise(windows: Sequence[Array], rate_hz: float) -> NoiseAtRest | None:
-    """The noise from `windows` of shape (n, 3), of which none may move; None if they are too few or differ.
+    """The noise from `windows` at rest, of shape (n, 3); None if they are too few or differ.
 
     The sensor must be at rest: a hand that trembles evenly looks like noise.
     """

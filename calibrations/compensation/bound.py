@@ -5,8 +5,8 @@
 G is the model from specific force to output. For each box of the range, interval arithmetic bounds the slopes of this
 step, 1 - C G'(a); p is the greatest row sum of their magnitudes on the range +-r. A true a in it is a fixed point, and
 the first step from 0 ends within p r of a. q is the same on the range widened by p: no later step leaves that range,
-and
-each reduces the error by q < 1 (Banach). So n steps leave less than q^n r in the maximum norm, for any stored history.
+and each reduces the error by q < 1 (Banach). So n steps leave less than q^n r in the maximum norm, for any stored
+history.
 
 Source  Krawczyk, Computing 4 (1969); Moore, Kearfott and Cloud (2009), chapter 8.
 """
@@ -79,7 +79,7 @@ class Interval:
         return np.asarray((self.low == 0) & (self.high == 0))
 
     def monotone(self, name: str) -> Interval:
-        """A function that only grows."""
+        """An increasing function of the interval."""
         with np.errstate(all="ignore"):
             return _outward(*(np.asarray(OPERATIONS[name].apply(end)) for end in (self.low, self.high)))
 
@@ -92,7 +92,7 @@ def point_interval(values: Array) -> Interval:
 def evaluate_interval(
     roots: Iterable[Node], ranges: Mapping[str, Interval], variables: tuple[str, ...]
 ) -> list[tuple[Interval, Interval]]:
-    """Each root's values, shape (boxes,), and its slopes by the variables `variables`, shape (len(by), boxes)."""
+    """Values of each root, shape (boxes,), and slopes by the `variables`, shape (len(variables), boxes)."""
     roots = list(roots)
     n = np.shape(next(iter(ranges.values())).low)
     values: dict[Node, tuple[Interval, Interval]] = {}
@@ -227,7 +227,7 @@ def _bound_step(name: str, inner: tuple[Pair, ...]) -> Pair:
 
 
 def _wave(x: Interval, phase: float = 0.0) -> Interval:
-    """The sine of x + ahead."""
+    """The sine of x + `phase`."""
     low, high = x.low + phase, x.high + phase
     ends = np.array([np.sin(low), np.sin(high)])
     turns = {
@@ -271,7 +271,7 @@ def prove_bound(
     want: float,
     memory: tuple[str, ...] = (),
 ) -> Bound | None:
-    """The bound for true values of `sought` within +-`reach` and of `inputs` within their ranges.
+    """The bound for true values of `unknowns` within +-`reach` and of `inputs` within their ranges.
 
     None where the contraction cannot be proved.
     """

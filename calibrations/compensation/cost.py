@@ -31,7 +31,7 @@ from calibrations.table import AXES, Array, Table
 
 PARAMETER_STEP = 1e-3  # of a standard uncertainty: steps of derivatives
 INPUT_LEVELS = 9  # of an input over its range, one after the other
-LOG_DECADES = 6  # decades towards the lower end: what happens soon after the power comes on is not missed
+LOG_DECADES = 6  # decades towards the lower end, for changes soon after power-on
 REFERENCES = {"temperature_c": "reference_c", "supply_v": "reference_v"}  # constants of models
 
 Span = tuple[float, float]
@@ -41,7 +41,7 @@ Stds = Callable[[Inputs], Array]
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Of the worst axis: rms and greatest with inputs `within`, as calibrated; `largest` of all, at `at`."""
+    """Of the worst axis: rms and maximum with inputs `within` the calibrated ranges; `largest` of all, at `at`."""
 
     within: Mapping[str, Span]
     rms: float
@@ -53,10 +53,10 @@ class Uncertainty:
 def result_uncertainty(
     model: Model, forward: Forward, table: Table, a: Array, spans: Mapping[str, Span], reach: float
 ) -> Uncertainty | None:
-    """By the standard uncertainties of the parameters and their correlations; None where there are none.
+    """By the standard uncertainties of the parameters and their correlations; None without any.
 
-    Over the specific force `a` (n, 3) of the rows of `table`, and that as far as `reach` goes on an axis; `spans` has
-    the stated range of each input besides the outputs. Source  GUM 5.2.2.
+    For the specific force `a` (n, 3) of the rows of `table`, and for `a` scaled to `reach` on its largest axis; `spans`
+    has the stated range of each input besides the outputs. Source  GUM 5.2.2.
     """
     if not any(e.std and e.identified for e in model.params.values()):
         return None
@@ -87,7 +87,7 @@ def _corners(spans: Mapping[str, Span]) -> list[Inputs]:
 
 
 def _largest_error(stds: Stds, spans: Mapping[str, Span]) -> tuple[Inputs, float]:
-    """Where the greatest is: at the worst corner, from where each input is tried over its range in turn."""
+    """Place and value of the maximum: from the worst corner, each input in turn is varied over its range."""
 
     def most(place: Inputs) -> float:
         return float(stds(place).max())
@@ -135,7 +135,7 @@ def _stds(model: Model, forward: Forward, table: Table, a: Array, inputs: Inputs
 
 
 def _perturb_models(model: Model) -> Sequence[tuple[Model, Model]]:
-    """The model with each known parameter moved a little, up and down; in the order of `params`."""
+    """The model with each known parameter increased and decreased by a small step, in the order of `params`."""
     return [
         (_with_change(model, i, j, PARAMETER_STEP * e.std), _with_change(model, i, j, -PARAMETER_STEP * e.std))
         for i, term in enumerate(model.terms)
@@ -158,7 +158,7 @@ def _with_change(model: Model, i: int, j: int, change: float) -> Model:
 
 
 def memory_at(table: Table, a: Array, forward: Forward) -> dict[str, Array]:
-    """By its names, shape (n,), for the sensed quantity at the rows, `a` (n, 3); empty without stored values.
+    """The stored values by name, shape (n,), for the sensed quantity `a` (n, 3) at the rows; empty without any.
 
     Rows in order of time.
     """
@@ -193,7 +193,7 @@ def _next_memories(steps: Sequence[Step], force: Array, row: Table, memories: li
 
 INCLINATIONS_DEG = (90, 30, 150, 60, 120, 10, 170)
 STEP_DEG = 15.0
-PASSES = 3  # by which the axis that is not measured is found in gravity
+PASSES = 3  # for the axis without measurement, from gravity
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,7 @@ def name_attitude(words: str) -> Attitude | None:
 
 
 def _turn_words(last: Attitude, attitude: Attitude) -> str:
-    """How to turn from one attitude to another: about the vertical, or over an edge and then to the north."""
+    """How to turn from one attitude to another: about the vertical, or first over an edge and then to the north."""
     if last.up @ attitude.up < 1 - 1e-6:
         return turn_words(last.up, attitude.up)
     angle_deg = np.degrees(np.arctan2(np.cross(last.north, attitude.north) @ attitude.up, last.north @ attitude.north))

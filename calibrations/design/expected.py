@@ -77,7 +77,7 @@ class Expected:
 
 
 def expected_gain(best: Fit, rival: Fit, table: Table) -> Expected:
-    """How well the predicted `table` separates two explanations of the present data, whichever is right.
+    """The expected separation of two explanations of the present data by the predicted `table`.
 
     Both are fits to the same data. Of the two cases, the best right and the rival right, the worse one counts. Times
     of `table` come after those of the data.
@@ -159,7 +159,7 @@ CALM_SPREAD = {
 def assume_sensor(
     model: Model, columns: Mapping[str, Array], constants: Mapping[str, Constant], axes: Sequence[str] = AXES[:2]
 ) -> Fit:
-    """`model` on the poses of `columns` (alpha_deg, beta_deg, ..., each of shape (n,)), as if it had been fitted there.
+    """`model` as fitted to the poses of `columns` (alpha_deg, beta_deg, ..., each of shape (n,)).
 
     Its residual is 0. Temperature and supply do not change. Raises ModelError and TooFewRows as a fit does.
     """
@@ -203,7 +203,7 @@ PLAN_COLUMNS = ("t_s", "direction")  # a plan's own: the mean of other data does
 
 
 def predict_data(template: Fit, columns: Mapping[str, Array]) -> Table:
-    """The table of poses that planned `columns` would give a sensor such as that of `like`.
+    """The expected table of a sensor such as that of `like` for planned `columns`.
 
     `columns`, each of shape (n,): alpha_deg and beta_deg; optionally direction, flip, mount_deg, t_s,
     temperature_c, ...; `n` samples a mean, or `dwell_s` at the data's sample rate, else as many as the data's. Columns
@@ -230,7 +230,7 @@ def predict_data(template: Fit, columns: Mapping[str, Array]) -> Table:
 
 
 def _unplanned_columns(template: Fit) -> set[str]:
-    """Columns of the data that the model's effects read, and that a plan need not know."""
+    """Columns that the effects of the model need and that a plan does not have."""
     return {name for term in template.model.terms for name in term.effect.needs} - set(PLAN_COLUMNS)
 
 

@@ -54,14 +54,14 @@ def covariance_of(rows: Array) -> Array:
 
 
 def noise_on_rows(noise: Noise, problem: Problem) -> Noise:
-    """The noise found on some rows, on those of another problem: white as their means have it, the rest as found."""
+    """The noise of a fit for the rows of another problem: white noise by their means, the rest as in the fit."""
     white = np.zeros((len(problem.channels), problem.table.n)) if problem.white is None else problem.white
     noise_there = replace(noise, white=white, gap_s=problem.gap_s)
     return replace(noise_there, ratio=noise.slow / rms(noise_there.fast))
 
 
 def _noise(fit: Fit, problem: Problem) -> Noise:
-    """The fit's noise on the rows of another problem; with times, it flickers on as for the fit's own uncertainties."""
+    """The fit's noise for the rows of another problem; with times, its flicker noise continues beyond the record."""
     noise = fit.noise.prolonged() if "t_s" in problem.table else fit.noise
     if "t_s" not in problem.table:
         noise = replace(noise, scatter=np.hypot(noise.scatter, noise.slow), ratio=0 * noise.ratio)
@@ -96,10 +96,10 @@ class Criterion(Protocol):
     """The criterion of a design. Covariances are of scaled parameters, (p, p)."""
 
     def gain(self, covariance: Array, rows: Array) -> Array:
-        """How much better each of `rows` (candidates, axes, p) would make a design; to be greatest."""
+        """The improvement of a design by each of `rows` (candidates, axes, p); the largest is best."""
 
     def loss(self, covariance: Array) -> float:
-        """How bad a design is; to be least."""
+        """The loss of a design; the smallest is best."""
 
 
 @dataclass(frozen=True)
@@ -115,13 +115,13 @@ class DOptimal:
 
 @dataclass(frozen=True)
 class IOptimal:
-    """The mean variance of the predictions, with `weight` (p, p) the mean of J' J over where it is."""
+    """The mean variance of the predictions; `weight` (p, p) is the mean of J' J over the range."""
 
     weight: Array
 
     @staticmethod
     def over(rows: Array) -> IOptimal:
-        """Over a range of which `rows` (poses, axes, p) are an even sample."""
+        """The criterion for a range, of which `rows` (poses, axes, p) are a uniform sample."""
         return IOptimal(np.einsum("iap,iaq->pq", rows, rows) / len(rows))
 
     def gain(self, covariance: Array, rows: Array) -> Array:
@@ -140,7 +140,7 @@ def scale_rows(rows: Array) -> Array:
 
 
 def exchange_design(rows: Array, poses: int, criterion: Criterion) -> Chosen:
-    """The best design of so many `poses` among the scaled `rows` (candidates, axes, p), shape (poses,).
+    """The best design of `poses` poses among the scaled `rows` (candidates, axes, p), shape (poses,).
 
     The same arguments give the same design.
     """
@@ -150,7 +150,7 @@ def exchange_design(rows: Array, poses: int, criterion: Criterion) -> Chosen:
 
 
 def information_gain(measured: Array, candidates: Array, criterion: Criterion) -> Array:
-    """How much each of the scaled `candidates` (candidates, axes, p) adds to the rows `measured` (n, axes, p).
+    """Information of each of the scaled `candidates` (candidates, axes, p) besides the rows `measured` (n, axes, p).
 
     Shape (candidates,). With few rows measured, or none, a small ridge makes the information solvable.
     """
@@ -158,7 +158,7 @@ def information_gain(measured: Array, candidates: Array, criterion: Criterion) -
 
 
 def choose_repeats(rows: Array, design: Chosen, count: int, criterion: Criterion) -> Chosen:
-    """Which of `design` to measure once more, each at most once: those that help most, one after another; (more,)."""
+    """The poses of `design` to measure once more, each at most once, in the order of their gain; shape (more,)."""
     remaining, repeats = [int(k) for k in np.unique(design)], list[int]()
     for _ in range(min(count, len(remaining))):
         covariance = _covariance(rows[np.concatenate([design, np.array(repeats, dtype=np.intp)])])
@@ -177,7 +177,7 @@ def farthest_poses(places: Array, design: Chosen, count: int) -> Chosen:
 
 
 def _improve(rows: Array, design: Chosen, criterion: Criterion, rng: np.random.Generator) -> Chosen:
-    """Exchange pose by pose until a whole pass changes nothing. Among equals the first of a random order is taken."""
+    """Exchange pose by pose until a whole pass changes nothing. The first one of equals in a random order is chosen."""
     shuffled = rng.permutation(len(rows))
     for _ in range(MOST_PASSES):
         previous = design.copy()
@@ -193,7 +193,7 @@ def _improve(rows: Array, design: Chosen, criterion: Criterion, rng: np.random.G
 
 
 def _covariance(rows: Array) -> Array:
-    """Of the scaled parameters, shape (p, p)."""
+    """Covariance of the scaled parameters, shape (p, p)."""
     flat = rows.reshape(-1, rows.shape[2])
     return np.asarray(np.linalg.inv(flat.T @ flat + RIDGE * np.eye(flat.shape[1])))
 

@@ -20,7 +20,7 @@ from calibrations.design.optimal_design import DOptimal, information_gain
 from calibrations.geometry.sphere import harmonics, sphere_centre
 from calibrations.table import AXES, Array
 
-FIRST_SIDES = 6  # a sphere's centre is known after five positions: until then only whole sides can be named
+FIRST_SIDES = 6  # only whole sides are requested until the centre of the sphere is known, after five positions
 CENTRE_POSITIONS = 5
 ALIKE = 0.02  # relative difference of gains that counts as none: the nearer orientation is chosen
 GOOD_SHARE = 0.5  # share of the best gain that makes any other position worth taking
@@ -114,7 +114,7 @@ def orientation_words(up: Array) -> str:
 
 
 def turn_words(last: Array, up: Array) -> str:
-    """How to turn from `last` upward to `up` upward: the angle, and the sides that rise and fall the most."""
+    """The instruction to turn from `last` upward to `up` upward: the angle, and the sides that rise and fall most."""
     angle_deg = float(np.degrees(np.arccos(np.clip(last @ up, -1.0, 1.0))))
     if angle_deg < 5:
         return "leave it as it is"

@@ -43,7 +43,7 @@ class Tour:
     dwell_s: float
 
     def cost_s(self, order: Order) -> float:
-        """Moves, and the dwell that makes up for a drift."""
+        """Time of the moves, and of the additional dwell that compensates a drift, s."""
         return self.travel_s(order) + self.dwell_s * self.drift_loss(order)
 
     def travel_s(self, order: Order) -> float:
@@ -117,7 +117,7 @@ def _nearest_neighbours(tour: Tour) -> Order:
 
 
 def _neighbour_order(order: Order, rng: np.random.Generator) -> Order:
-    """A stretch turned round, or taken out and put in elsewhere."""
+    """A part of the order reversed, or moved to another place."""
     i, j = np.sort(rng.integers(0, len(order) + 1, 2))
     if rng.random() < 0.5:
         return np.concatenate([order[:i], order[i:j][::-1], order[j:]])

@@ -23,16 +23,14 @@ from calibrations.criteria import FALSE_OUTLIER, FEWEST_SIBLINGS, MOST_USUAL
 from calibrations.means.noise import robust_std
 from calibrations.table import Array
 
-# One quantity of many siblings: its mean and spread in the batch, and what each one's own value is in their light.
+# One quantity of many siblings: its mean and spread in the batch, and the value of each sensor given these.
 #
 #     y_i ~ N(theta_i, v_i)        theta_i ~ N(mu, tau^2)        flat in mu and in tau
 #
-# The posterior is exact but for a sum over a grid of tau: given tau, all is normal, and the weight of each tau
-# follows
-# from the data. So intervals hold what mu and tau are uncertain by, also in a batch of a few sensors or of equal ones
-# (tau near 0), where an estimate of tau put in its place would make them too short. A value that is unlike all others
-# is
-# set apart: it neither moves its siblings nor is moved by them.
+# The posterior is exact except for a sum over a grid of tau: for a given tau all is normal, and the weight of each tau
+# follows from the data. So the intervals include the uncertainty of mu and tau, also for a batch of few or equal
+# sensors (tau near 0), where an estimate of tau alone gives too short intervals. An outlier is separated: it changes
+# no sibling, and no sibling changes it.
 #
 # Source  Gelman et al., Bayesian Data Analysis (3rd ed.), 5.4-5.5, (5.20)-(5.21); Efron and Morris (1975).
 

@@ -34,7 +34,7 @@ class Pose:
 
 @lru_cache(maxsize=2)
 def nominal_pose(table: Table) -> Pose:
-    """The pose that the stages report; level if a table of motion gives none."""
+    """The pose that the stages report; horizontal for a table of motion without one."""
     return Pose(
         np.radians(table.optional("alpha_deg", 0.0)),
         np.radians(table.optional("beta_deg", 0.0)),

@@ -67,7 +67,7 @@ def outputs_at_rest(table: Table) -> Array:
 
 
 def rate_scales(table: Table) -> Array:
-    """Output of each axis per deg/s about itself, shape (3,); 0 for an axis that was not turned about, or hardly.
+    """Output of each axis per deg/s about itself, shape (3,); 0 for an axis without enough rotation about it.
 
     Raises DataError where the rate never changes.
     """

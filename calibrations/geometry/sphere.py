@@ -30,7 +30,7 @@ REMEDIES = {
 
 
 def coverage_fault(table: Table, degree: int) -> str | None:
-    """Why these directions do not determine harmonics up to `degree`; None where they do."""
+    """The reason why these directions do not determine harmonics up to `degree`; None if they do."""
     ratio = worst_ratio(directions(table), degree)
     if ratio <= MOST_WORSE_COVERED:
         return None
@@ -98,7 +98,7 @@ class Faces:
 
 
 def estimate_faces(outputs: Array) -> Faces | None:
-    """From still outputs (n, 3), averaged over each face; None if an axis was not held both up and down."""
+    """From outputs at rest (n, 3), averaged over each face; None if an axis was not measured both up and down."""
     middle = (outputs.max(axis=0) + outputs.min(axis=0)) / 2
     size = np.linalg.norm(outputs - middle, axis=1, keepdims=True)
     cosine = (outputs - middle) / np.where(size > 0, size, 1.0)

@@ -47,7 +47,7 @@ def turning_points(table: Table) -> Array:
 
 @lru_cache(maxsize=8)
 def last_turn(table: Table) -> Array:
-    """Sense of beta's last move before each pose, +1 or -1, shape (n,): the side of the gear's play.
+    """Direction of beta's last move before each pose, +1 or -1, shape (n,): the side of the gear play.
 
     A pose reached without a move of beta keeps the sense of the pose before. Rows in order of time.
     """
@@ -72,7 +72,7 @@ def _needs_approach(table: Table, move: Array) -> Array:
 
 
 def _forces_between_poses(table: Table, alpha: Array, beta: Array, by_alpha: Array, by_beta: Array) -> Array:
-    """Specific force where it turns round while one of the stages moves, and at the end, shape (n, turns + 1, 3).
+    """Specific force at its turning points while one of the stages moves, and at the end, shape (n, turns + 1, 3).
 
     Along each axis it is m + A cos s + B sin s, with s the angle gone through: it turns every half turn.
     """

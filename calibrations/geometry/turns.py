@@ -66,7 +66,7 @@ class Turns(Table):
         return self.raw_digest
 
     def rows(self, selection: NDArray[np.bool_] | NDArray[np.intp]) -> Turns:
-        """Some of these turns."""
+        """The table with these turns only."""
         common = super().rows(selection)
         return replace(
             self,
@@ -94,7 +94,7 @@ class Turns(Table):
         return np.vstack([np.einsum("nji,ni->jn", self.along, error), rests.T])
 
     def by_rate(self, rates_deg_s: Array) -> Array:
-        """How the residual of its turn follows the rates of each sample, to first order, (samples, channels, 3)."""
+        """d residual of its turn / d the rates of each sample, shape (samples, channels, 3)."""
         durations = self.samples.column("duration_s")
         result = np.zeros((self.samples.n, len(CHANNELS), 3))
         to_end = _frames_to_end(self._steps(rates_deg_s))
@@ -186,7 +186,7 @@ def _rest_noise(rows: Table, begin: int, end: int, rate_hz: float) -> dict[str, 
 
 
 def _directions(samples: Table, bounds: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Directions upward before and after each turn, each (n, 3)."""
+    """Upward directions before and after each turn, shape (n, 3) each."""
     force = np.column_stack([samples.column(name) for name in FORCES])
     rests = np.vstack([force[bounds[:, 0]], force[bounds[:, 1] - 1]])
     directions = gravity_directions(rests)
@@ -194,7 +194,7 @@ def _directions(samples: Table, bounds: NDArray[np.intp]) -> tuple[Array, Array]
 
 
 def _rows(table: Table, samples: Table, bounds: NDArray[np.intp], before: Array, after: Array) -> Turns:
-    """The row of each turn, by a calibration that only serves to find axes, noise and starts of a fit."""
+    """The row of each turn by an approximate calibration, which gives axes, noise and start values of a fit."""
     angle_deg = np.degrees(np.arccos(np.clip(np.sum(before * after, axis=1), -1, 1)))
     if np.median(angle_deg) < SMALLEST_TURN_DEG:
         raise DataError(
@@ -241,7 +241,7 @@ def _sample_rates(bounds: NDArray[np.intp], columns: dict[str, Array]) -> dict[s
 
 
 def _bases(axis: Array, after: Array) -> Array:
-    """Two directions at right angles to `after`, the first next to `axis`, shape (n, 2, 3)."""
+    """Two directions perpendicular to `after`, the first one closest to `axis`, shape (n, 2, 3)."""
     along = axis - np.sum(axis * after, axis=1)[:, None] * after
     other = np.cross(after, np.eye(3)[np.argmin(np.abs(after), axis=1)])
     small = np.linalg.norm(along, axis=1) < 1e-3  # a turn about the vertical
@@ -268,7 +268,7 @@ def _white(samples: Table, bounds: NDArray[np.intp], matrix: Array) -> Array:
 
 
 def _rough_calibration(samples: Table, bounds: NDArray[np.intp], before: Array, after: Array) -> tuple[Array, Array]:
-    """Outputs at rest (3,), and the matrix (3, 3) from outputs less these to deg/s, as the turns have it."""
+    """Outputs at rest (3,), and the matrix (3, 3) from outputs without these to deg/s, by the turns."""
     outputs, durations = np.column_stack([samples.column(name) for name in RATES]), samples.column("duration_s")
     bias = outputs[np.concatenate([bounds[:, 0], bounds[:, 1] - 1])].mean(axis=0)
     parts = [(outputs[a + 1 : b - 1] - bias) * durations[a + 1 : b - 1, None] for a, b in bounds]
@@ -300,7 +300,7 @@ def _pad(parts: Sequence[Array]) -> Array:
 
 
 def _turned(before: Array, steps: Array) -> Array:
-    """Directions `before` (n, 3), which do not turn, after rotations of the sensor by vectors (n, steps, 3)."""
+    """Fixed directions `before` (n, 3) in the sensor's frame after its rotations by vectors (n, steps, 3)."""
     return np.asarray(np.einsum("nij,nj->ni", _products(_rotations(-steps)), before))
 
 

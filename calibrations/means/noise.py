@@ -1,4 +1,4 @@
-"""Noise of a table's means, as a value: white, whose level is known from the samples, scatter, and slow noise.
+"""The noise of a table's means: white noise of known level, scatter, and slow noise.
 
     Sigma = W + k^2 I + (rho w)^2 G + sum s_j^2 G_j
 
@@ -91,7 +91,7 @@ class Noise:
 
     @property
     def freedom(self) -> float:
-        """Degrees of freedom with which the noise is known: few where it is slow, as a record holds few long times."""
+        """Degrees of freedom of the noise: few for slow noise, because a record has few long times."""
         return SLOW_FREEDOM if np.any(self.slow > 0.1 * rms(self.fast)) else float(self.white.size)
 
     @cached_property
@@ -192,7 +192,7 @@ def rms(x: Array) -> Array:
 
 
 def robust_std(deviations: Array, axis: int | None = None) -> Array:
-    """Standard deviation that outliers hardly change, from `deviations` from their centre, along `axis` or of all.
+    """Robust standard deviation from `deviations` from their centre, along `axis` or of all.
 
     By the median absolute deviation, Huber and Ronchetti, Robust Statistics (2009), chapter 5.
     """
@@ -221,7 +221,7 @@ def _second_differences(rows: Array) -> Array:
 
 
 def white_only(white: Array | None, gap_s: Array, channels: int, known_noise: tuple[Processes, ...] = ()) -> Noise:
-    """The noise before anything is fitted."""
+    """The noise before a fit."""
     unit_scale = np.ones(channels)
     if white is None:
         return Noise(
@@ -255,7 +255,7 @@ def white_std(table: Table) -> Array | None:
 
 
 def with_white(table: Table, white: Array) -> Table:
-    """The table with the white noise of each mean, shape (axes, n), as a residual has shown it."""
+    """The table with the white noise of each mean by a residual, shape (axes, n)."""
     names = map(_noise_name, table.output_names)
     return replace(table, columns={**table.columns, **dict(zip(names, white, strict=True))})
 

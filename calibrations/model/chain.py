@@ -184,7 +184,7 @@ def magnitude_by_output(a: Array, table: Table, steps: Sequence[Step]) -> Array:
 
 
 def _solve(slope: Array, error: Array) -> Array:
-    """Steps (n, 3) that take off errors (n, 3); none along what a row's slope (3, 3) does not show."""
+    """Steps (n, 3) that remove errors (n, 3); none along directions without a slope (3, 3) in a row."""
     try:
         return np.asarray(np.linalg.solve(slope, error[:, :, None])[:, :, 0])
     except np.linalg.LinAlgError:
@@ -257,7 +257,7 @@ class LinearisedChain:
 
     @cached_property
     def _gains(self) -> list[Array]:
-        """By stage, the sensitivity that the later stages give it over that of the scale factor, shape (n, 3)."""
+        """By stage, its sensitivity through the later stages over that of the scale factor, shape (n, 3)."""
         gains = [np.ones((1, 3))]
         for stage in (Stage.DRIFT, Stage.SCALE):
             gains.insert(0, gains[0] * self._gain_by(stage))
@@ -365,12 +365,12 @@ class LinearisedChain:
 
     @cached_property
     def _history_steps(self) -> list[Step]:
-        """Effects that follow the force of earlier rows as well."""
+        """Effects that depend on the force of earlier rows too."""
         return [(effect, values) for effect, values in self.steps if effect.memory]
 
     @cached_property
     def _by_force(self) -> Array:
-        """d the sum of all parts / d the force, without effects that remember, shape (n, 3, 3)."""
+        """d the sum of all parts / d the force, without the effects of earlier rows, shape (n, 3, 3)."""
         a, steps = self._sensed_force, [(effect, values) for effect, values in self.steps if not effect.memory]
         h = LITTLE * (float(np.max(np.abs(a))) or 1.0)
 

@@ -162,7 +162,7 @@ def _effect(entry: _Effect, source: str, effects_by_name: Mapping[str, Effect]) 
 
 
 def _free(entry: _Effect, source: str) -> Effect:
-    """The free forms of a place: all of them is in the file, or the first fit finds their sizes."""
+    """The free forms of a place. Their data are in the file; without sizes the first fit finds them."""
     from calibrations.free_forms.effect import read_forms  # few models have one
     from calibrations.free_forms.requested import resolve_effect
 
@@ -191,7 +191,7 @@ def _catalogue_effect(entry: _Effect, source: str, effects_by_name: Mapping[str,
 
 
 def _expression_effect(entry: _Effect, source: str, effects_by_name: Mapping[str, Effect]) -> Effect:
-    """The effect of an expression: all of it is in the file, and nothing in the file is run."""
+    """The effect of an expression. The file has all of it, and no code of the file is executed."""
     if entry.effect in effects_by_name:
         raise ModelError(f"{source}: {entry.effect} is already the name of an effect; give the expression another name")
     try:

@@ -39,7 +39,7 @@ class Estimate:
 
     @property
     def text(self) -> str:
-        """Value, uncertainty and unit for people; the reason, where the data does not identify it."""
+        """Value, uncertainty and unit for people; the reason if the data do not identify it."""
         return concise_in_prefix(self.value, self.std, self.unit) if self.identified else f"not identified: {self.why}"
 
     def __repr__(self) -> str:
@@ -62,7 +62,7 @@ class Term:
 
     @property
     def quantities(self) -> tuple[Estimate, ...]:
-        """The estimates that have a meaning each: not the coefficients of a free form."""
+        """The estimates with a meaning of their own: without the coefficients of a free form."""
         coefficients = {p.name for p in self.effect.parameters if p.prior is not None}
         return tuple(e for e in self.estimates if e.name not in coefficients)
 
@@ -120,7 +120,7 @@ class Parameters(Mapping[str, Estimate]):
         )
 
     def _single_parameters(self) -> list[tuple[str, Estimate]]:
-        """The parameters that mean something one by one; the coefficients of free forms do not."""
+        """The parameters with a meaning of their own, which coefficients of free forms do not have."""
         curves = tuple(f"{term.name}." for term in self._terms if term.coefficients)
         return [(key, e) for key, e in self.items() if not key.startswith(curves)]
 
@@ -130,7 +130,7 @@ class Parameters(Mapping[str, Estimate]):
         return [(_key(name, "curve", axis), f"{n} coefficients") for name, axis, n in counts]
 
     def to_dataframe(self) -> Any:
-        """A row a parameter as a pandas.DataFrame. Raises CalibrationError where pandas is not installed."""
+        """A row for each parameter as a pandas.DataFrame. Raises CalibrationError where pandas is not installed."""
         return data_frame(self.records())
 
     def records(self) -> list[dict[str, Any]]:

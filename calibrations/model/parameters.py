@@ -1,4 +1,4 @@
-"""The parameters of a model as one vector: which entry is which, and the way back to named values."""
+"""The parameters of a model as one vector: the parameter of each entry, and the named values of a vector."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def _from_data(model: Model, table: Table) -> dict[tuple[int, str, str], tuple[f
 
 @lru_cache(maxsize=8)
 def _nominal(table: Table) -> float:
-    """Output per unit of the sensed quantity, by the range of outputs; 1 if no orientation changes the output."""
+    """Output per unit of the sensed quantity, by the range of outputs; 1 if all outputs are equal."""
     if table.type.turning:
         return float(np.max(np.abs(rate_scales(table)))) or 1.0
     if table.type.field:
@@ -182,7 +182,7 @@ def _nominal(table: Table) -> float:
 
 
 def _exists(constant: str, term: Term) -> bool:
-    """Whether a parameter exists: not where the constant that it names is 0."""
+    """Whether a parameter exists: not if the constant `where` is 0."""
     return bool(term.constants.get(constant, 1.0))
 
 

@@ -1,4 +1,4 @@
-"""Reference acceleration from displacement: the paper's way, and a better one.
+"""Reference acceleration from displacement: by the paper's method, and by a better one.
 
 The paper's: a second-order Butterworth low-pass at 20 Hz, freed of its delay and attenuation at the motion's frequency,
 then two differentiations (Ang V). It lets noise through that grows with the square of frequency up to the corner, and
@@ -134,7 +134,7 @@ def _sine(a: float, b: float, offset: float, turn: float, cov: Array, middle: fl
 
 
 def _density_near(residual: Array, rate_hz: float, frequency_hz: float) -> float:
-    """One-sided density of the residual around a frequency, the lines that the sine took up left out."""
+    """One-sided density of the residual near a frequency, without the lines of the sine."""
     f, power = periodogram(residual, rate_hz)
     k = round(frequency_hz / f[1])
     lines = np.arange(max(1, k - NEIGHBOURS), min(len(f) - 1, k + NEIGHBOURS + 1))
@@ -167,11 +167,11 @@ class Smoothed:
         return np.asarray(1 / (1 + self.ratio * (2 * np.sin(np.pi * f / rate_hz)) ** (2 * ORDER)), dtype=complex)
 
     def corner_hz(self, rate_hz: float) -> float:
-        """Frequency at which half of the amplitude remains."""
+        """Frequency with half of the amplitude."""
         return float(rate_hz / np.pi * np.arcsin(min(1.0, self.ratio ** (-1 / (2 * ORDER)) / 2)))
 
     def edge_s(self, rate_hz: float) -> float:
-        """How far from the ends fewer samples are averaged: one period at the corner."""
+        """The distance from the ends with fewer averaged samples, s: one period at the corner."""
         return 1 / self.corner_hz(rate_hz)
 
 
@@ -302,7 +302,7 @@ def line_prominence(line: Sine) -> float:
 
 
 def second_derivative(x: Array, rate_hz: float, stencil: Array) -> Array:
-    """By a symmetric stencil; the few values at each end are those of their neighbours."""
+    """Second derivative by a symmetric stencil; the few values at each end are those of their neighbours."""
     reach = len(stencil) // 2
     inner = np.convolve(x, stencil, mode="valid") * rate_hz**2
     return np.pad(inner, reach, mode="edge")

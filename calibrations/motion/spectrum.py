@@ -126,7 +126,7 @@ def butterworth(rate_hz: float) -> Response:
 
 
 def correct_at(response: Response, at_hz: float) -> Response:
-    """A low-pass freed of its attenuation and delay at one frequency, as Ang V corrects its filter.
+    """A low-pass without its attenuation and delay at one frequency, as the corrected filter of Ang V.
 
     The mean passes as it is: corrected like the motion, an offset would grow.
     """
@@ -151,7 +151,7 @@ def corner_hz(table: Table) -> float:
 
 
 def skew_s(table: Table, axis: int) -> float:
-    """By how much this axis is sampled later than the displacement."""
+    """Delay of the samples of this axis after the displacement, s."""
     return table.number(f"skew_{AXES[axis]}_s", 0.0)
 
 

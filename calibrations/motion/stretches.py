@@ -65,7 +65,7 @@ def _frequencies(references: Sequence[Reference], length_s: float) -> list[float
 
 
 def _broadband(samples: Table, residual: Array, has_lines: bool) -> Line:
-    """Motion that is no line: its own form, and its derivative; noise as at the middle of its spectrum."""
+    """Motion without a line: its own form, and its derivative; the noise is that at the middle of its spectrum."""
     slope, middle = np.zeros(samples.n), []
     for record in find_records(samples):
         slope[record.rows] = np.gradient(residual[record.rows])
@@ -92,7 +92,7 @@ def noise_density(samples: Table, lines: Sequence[Line], axis: int) -> Array:
 
 
 def _spectrum(samples: Table, lines: Sequence[Line], axis: int, rows: slice, rate_hz: float) -> tuple[Array, Array]:
-    """(frequency, density) of what does not follow the motion, without the lines' own neighbourhood and drift."""
+    """(frequency, density) of the output without what follows the motion, the regions of the lines, and drift."""
     v = samples.outputs[rows, axis]
     columns = [np.ones(len(v)), np.linspace(-1, 1, len(v))]
     columns += [t[rows] for line in lines for t in (line.in_phase, line.in_quadrature)]
@@ -250,7 +250,7 @@ def _cuts(samples: Table, length_s: float) -> Iterator[tuple[int, int]]:
 
 
 def _weights(lines: Sequence[Line], cuts: list[tuple[int, int]], n: int) -> csr_array:
-    """Rows part by part: the mean, and the amplitude along each template freed of those before it."""
+    """Rows part by part: the mean, and the amplitude along each template, orthogonal to the earlier ones."""
     templates = np.column_stack([np.ones(n), *(t for line in lines for t in (line.in_phase, line.in_quadrature))])
     values, columns = [], []
     for a, b in cuts:
