@@ -30,7 +30,7 @@ def join_tables(tables: Sequence[Table]) -> Table:
                 f"of {first.kind} along {', '.join(first.axes)}; only tables of the same kind and axes can be "
                 "analysed together"
             )
-    columns = {name: np.concatenate([_column(t, name) for t in tables]) for name in _common(tables)}
+    columns = {name: np.concatenate([t.optional(name, 0.0) for t in tables]) for name in _common(tables)}
     if "t_s" in columns:
         columns["t_s"] = np.concatenate(_times(tables))
     labels = {
@@ -50,10 +50,6 @@ def has_clock_restart(tables: Sequence[Table]) -> bool:
 def _common(tables: Sequence[Table]) -> list[str]:
     names = dict.fromkeys(name for t in tables for name in t.columns)
     return [name for name in names if all(name in t or name in ZERO_WHERE_MISSING for t in tables)]
-
-
-def _column(table: Table, name: str) -> Array:
-    return table.optional(name, 0.0)
 
 
 def _times(tables: Sequence[Table]) -> list[Array]:

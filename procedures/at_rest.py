@@ -53,7 +53,10 @@ class Windows:
 
 @dataclass(frozen=True)
 class Goal:
-    """When the positions suffice. `target` is a share of the full scale, which is shown times `shown` in `unit`."""
+    """When the positions suffice. `target` is a share of the full scale, which is shown times `shown` in `unit`.
+
+    Raises SettingError for settings that no run can have.
+    """
 
     procedure: str
     setting: str
@@ -64,8 +67,7 @@ class Goal:
     most_positions: int
     wait_s: float
 
-    def require_valid(self) -> None:
-        """Raises SettingError for settings that no run can have."""
+    def __post_init__(self) -> None:
         if (
             self.target <= 0
             or not 0 < self.wait_s <= LONGEST_WAIT_S

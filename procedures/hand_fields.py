@@ -41,5 +41,4 @@ def hand_fields(
     wait_s          The run stops after this time without a new position.
     """
     goal = Goal("hand-fields", "target_percent", target_percent / 100, 100, "%", rest_s, most_positions, wait_s)
-    goal.require_valid()
     take_positions(rig, OUTPUTS, TABLE, require_analysis(rig, goal.procedure).field_course, goal)

@@ -30,5 +30,4 @@ def hand_positions(
     wait_s          The run stops after this time without a new position.
     """
     goal = Goal("hand-positions", "target_g", target_g, 1e3, "mg", rest_s, most_positions, wait_s)
-    goal.require_valid()
     take_positions(rig, OUTPUTS, TABLE, require_analysis(rig, goal.procedure).course, goal)

@@ -58,7 +58,6 @@ def hand_turns(
     wait_s          The run stops after this time without a new rest.
     """
     goal = Goal("hand-turns", "target_percent", target_percent / 100, 100, "%", rest_s, most_positions, wait_s)
-    goal.require_valid()
     analysis = require_analysis(rig, goal.procedure)
     rig = replace(rig, adc=_only_both_triads(rig))
     rig.confirm("at-rest", TABLE)

@@ -243,7 +243,7 @@ def _check_planned(template: Fit, table: Table) -> None:
 def _noise(template: Fit, columns: Mapping[str, Array], rows: int) -> dict[str, Array]:
     """Standard deviation of samples, and the number of samples of a mean; empty if the data has none."""
     data = template.table
-    usual = {name: float(np.median(data.column(name))) for name in _std_names(data)}
+    usual = {name: float(np.median(data.column(name))) for name in data.std_names if name in data}
     if "n" in data and "n" not in columns:
         usual["n"] = float(np.median(data.column("n")))
     noise = {name: np.full(rows, value) for name, value in usual.items()}
@@ -253,7 +253,3 @@ def _noise(template: Fit, columns: Mapping[str, Array], rows: int) -> dict[str, 
     if not rate_hz:
         raise DataError(f"{data.source}: the sample rate is unknown; plan `n`, or give `# sample_rate_hz: 1000`")
     return noise | {"n": np.maximum(np.round(np.asarray(columns["dwell_s"]) * rate_hz), 1.0)}
-
-
-def _std_names(data: Table) -> list[str]:
-    return [name for name in data.std_names if name in data]

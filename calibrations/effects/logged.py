@@ -124,7 +124,7 @@ def temperature_rate_c_s(table: Table) -> Array:
 def leading_temperature(table: Table, lead_s: float) -> Array:
     """As `sensor_temperature_c`, from readings without their scatter; as logged if no time changes."""
     logged = table.column("temperature_c")
-    if "t_s" not in table or not np.ptp(table.time_s) > 0:
+    if not has_times(table):
         return logged
     temperature, t = level(table, "temperature_c"), table.time_s
     return temperature + lead_s * _rate(temperature, t) if lead_s >= 0 else _lag(temperature, t, -lead_s)

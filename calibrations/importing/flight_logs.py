@@ -19,7 +19,7 @@ import numpy as np
 
 from calibrations.errors import DataError
 from calibrations.importing.topics import Cells, Topic, library, require_size
-from calibrations.table import Array, Constant
+from calibrations.table import Constant
 
 # of a ULog message: its fields as our columns with their units
 ULOG_FIELDS: Mapping[str, Mapping[str, str]] = {
@@ -69,16 +69,12 @@ def _ulog_topic(data: Any, is_one_of_several: bool, remarks: tuple[str, ...]) ->
         )
 
     def cells() -> Cells:
-        return {column: _numbers(data.data[field]) for field, column in renamed.items()}
+        return {column: np.asarray(data.data[field], dtype=np.float64) for field, column in renamed.items()}
 
     notes = remarks if data.name in RAW or not fields else (*remarks, f"{name}: {CORRECTION_NOTE}")
     constants: dict[str, Constant] = {"device_id": float(ids[0])} if fields and ids[0] else {}
     sensor = next((s for s in "amg" if any(v.startswith(f"{s}x ") for v in fields.values())), "")
     return Topic(name, tuple(renamed.values()), rows, cells, None, constants, notes, refusal, sensor)
-
-
-def _numbers(values: Any) -> Array:
-    return np.asarray(values, dtype=np.float64)
 
 
 def _ulog_remarks(path: Path, log: Any) -> list[str]:

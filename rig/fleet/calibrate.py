@@ -18,6 +18,7 @@ from calibrations.fleet.rigs import StageErrors
 from calibrations.fleet.siblings import Pooled, pool_siblings
 from calibrations.model import Estimate, Model
 from calibrations.model.file import dump_model, read_model
+from calibrations.table import Array
 from rig.files import make_folder, program, write_whole
 from rig.fleet.discover import errors_of, stands_out
 from rig.fleet.members import Member
@@ -105,32 +106,24 @@ def _batch(
 
 def models(calibrated: Calibrated) -> dict[str, Model]:
     """The models by sensor, with pooled values and standard uncertainties."""
-    base = _base(calibrated)
+    base = replace(model_of(calibrated.question), unit=calibrated.looks[0].unit)
     values, stds = calibrated.pooled.values, calibrated.pooled.stds
     return {m.sensor: _model(base, calibrated, m, values[k], stds[k]) for k, m in enumerate(calibrated.members)}
 
 
-def _base(calibrated: Calibrated) -> Model:
-    return replace(model_of(calibrated.question), unit=calibrated.looks[0].unit)
-
-
-def _model(base: Model, calibrated: Calibrated, member: Member, values: object, stds: object) -> Model:
+def _model(base: Model, calibrated: Calibrated, member: Member, values: Array, stds: Array) -> Model:
+    estimates: dict[str, list[Estimate]] = defaultdict(list)
+    for (effect, name, axis, unit), value, std in zip(calibrated.names, values, stds, strict=True):
+        estimates[effect].append(Estimate(name, axis, float(value), float(std), unit))
+    terms = tuple(replace(term, estimates=tuple(estimates[term.name])) for term in base.terms if estimates[term.name])
     provenance: dict[str, str | float] = {
         "data": member.data,
         "sensor": member.sensor,
         "batch": member.batch,
         "pooled": len(calibrated.members),
+        "program": program(),
     }
-    return _with(base, calibrated.names, np.asarray(values), np.asarray(stds), provenance)
-
-
-def _with(base: Model, names: Names, values: object, stds: object, provenance: Mapping[str, str | float]) -> Model:
-    numbers = zip(names, np.asarray(values), np.asarray(stds), strict=True)
-    estimates: dict[str, list[Estimate]] = defaultdict(list)
-    for (effect, name, axis, unit), value, std in numbers:
-        estimates[effect].append(Estimate(name, axis, float(value), float(std), unit))
-    terms = tuple(replace(term, estimates=tuple(estimates[term.name])) for term in base.terms if estimates[term.name])
-    return replace(base, terms=terms, provenance={**provenance, "program": program()})
+    return replace(base, terms=terms, provenance=provenance)
 
 
 # The output of a discovery for a calibration: a folder with a model for each batch, and the errors of the rigs.

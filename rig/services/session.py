@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from threading import Thread, current_thread
 from typing import Any, Generic
 
@@ -123,16 +124,7 @@ class ModelSession(Generic[F]):
 
         An effect that the data cannot have without it is left out as well, with a note.
         """
-        remaining = [step.effect for step in self.steps if step.name != name]
-        first = next((k for k, step in enumerate(self.steps) if step.name == name), len(self.steps))
-        session = self._with(self.steps[:first])
-        for effect in remaining[first:]:
-            try:
-                session = session.with_step(session.tried(effect))
-            except CalibrationError as error:
-                note = f"{effect.name} is not in the model any more: {error}"
-                session = replace(session, notes=(*session.notes, note))
-        return session
+        return self.with_added([text for text, added in zip(self.added, self.names, strict=True) if added != name])
 
     @property
     def added(self) -> tuple[str, ...]:
@@ -145,10 +137,8 @@ class ModelSession(Generic[F]):
 
         The common beginning stays. An effect that the data cannot have is left out, with a note.
         """
-        first_difference = next(
-            (k for k, pair in enumerate(zip(self.added, texts, strict=False)) if pair[0] != pair[1]), None
-        )
-        common = min(len(self.steps), len(texts)) if first_difference is None else first_difference
+        equal = takewhile(lambda pair: pair[0] == pair[1], zip(self.added, texts, strict=False))
+        common = sum(1 for _ in equal)
         session = self if common == len(self.steps) else self._with(self.steps[:common])
         for text in texts[common:]:
             name, equals, expression = text.partition("=")

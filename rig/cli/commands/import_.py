@@ -11,6 +11,7 @@ from typing import Literal
 import click
 
 from calibrations.errors import DataError, nearest
+from calibrations.importing.cells import number_or_text
 from calibrations.importing.foreign import PATH, check_unit, needs_mapping
 from calibrations.importing.proposal import (
     COLUMN_NAMES,
@@ -101,10 +102,7 @@ def _constants(texts: tuple[str, ...]) -> dict[str, str | float]:
         key, equals, value = text.partition("=")
         if not equals:
             raise click.UsageError(f'"{text}": write a constant as KEY=VALUE, such as gravity_m_s2=9.81744')
-        try:
-            constants[key] = float(value)
-        except ValueError:
-            constants[key] = value
+        constants[key] = number_or_text(value)
     return constants
 
 

@@ -14,6 +14,7 @@ from nicegui import ui
 from numpy.typing import NDArray
 from starlette.datastructures import QueryParams
 
+from calibrations.importing.cells import number_or_text
 from calibrations.importing.proposal import column_names, sample_values
 from calibrations.importing.sheet import Sheet
 from calibrations.importing.topics import SeveralTopics
@@ -302,7 +303,7 @@ class ImportPage:
     def constants(self) -> dict[str, Constant]:
         """The constants as typed; numbers where they are numbers."""
         texts = {name: str(field.value or "").strip() for name, field in self.fields.items() if field.visible}
-        return {name: _number(text) if name.count("_") else text for name, text in texts.items() if text}
+        return {name: number_or_text(text) if name.count("_") else text for name, text in texts.items() if text}
 
     def look(self) -> None:
         """Show what would be imported with the present choices."""
@@ -416,10 +417,3 @@ def _range_text(values: NDArray[np.float64]) -> str:
     """`1.5 to 3.5`, or the one value that all have."""
     low, high = f"{values.min():.6g}", f"{values.max():.6g}"
     return low if low == high else f"{low} to {high}"
-
-
-def _number(text: str) -> Constant:
-    try:
-        return float(text)
-    except ValueError:
-        return text
