@@ -16,7 +16,7 @@ def report(text: str) -> None:
 
 
 @contextmanager
-def shown_by(show: Callable[[str], None]) -> Iterator[None]:
+def show_progress(show: Callable[[str], None]) -> Iterator[None]:
     """Call `show` with the present step of the analyses in this block, also in threads that copy its context."""
     before = _SHOW.set(show)
     try:

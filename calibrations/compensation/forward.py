@@ -26,7 +26,7 @@ from calibrations.effects.logged import RATE
 from calibrations.errors import ModelError
 from calibrations.free_forms.effect import FreeForm
 from calibrations.model import Model, Term
-from calibrations.model.chain import Stage, Step, add_response, stage_of, staged_part
+from calibrations.model.chain import Stage, Step, add_response, stage_contribution, stage_of
 from calibrations.table import AXES, NUMBERS
 from calibrations.tables import KINDS
 
@@ -233,7 +233,7 @@ def _scale(a: Any, force: Any, v: Any, steps: Sequence[Step], table: Any) -> Any
         response = force
         for effect, p in steps:
             if stage_of(effect) == stage:
-                part = staged_part(stage, partial(_response, effect, table=table, p=p), a, response)
+                part = stage_contribution(stage, partial(_response, effect, table=table, p=p), a, response)
                 v = v + part
                 force = add_response(force, part, steps) if effect.of_force else force
     return v

@@ -235,7 +235,7 @@ def sample_values(laid: Sheet, name: str) -> Array:
     return values if np.isfinite(values).all() else np.zeros(0)
 
 
-def sensed_by(header: Iterable[str], topic: str) -> str:
+def sensor_kind(header: Iterable[str], topic: str) -> str:
     """The sensor whose three axes, or whose poses, a topic and its columns name: a, m or g; "" for none."""
     unitless = {split_unit(name)[0] for name in header}
     if {"vx_v", "alpha_deg"} & unitless:

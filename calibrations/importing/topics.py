@@ -16,7 +16,7 @@ import numpy as np
 
 from calibrations.errors import DataError, nearest
 from calibrations.files import LARGEST_BYTES, LARGEST_RATIO, SMALL_BYTES, Source, text_source
-from calibrations.importing.proposal import sensed_by
+from calibrations.importing.proposal import sensor_kind
 from calibrations.importing.sheet import HEAD_LINES, Sheet, read_sheet
 from calibrations.importing.units import split_unit
 from calibrations.table import Array, Constant
@@ -56,7 +56,7 @@ class Topic:
     @property
     def rank(self) -> int:
         """0 for an accelerometer, 1 for a magnetometer, 2 for a gyroscope, 3 for other values."""
-        sensor = sensed_by(self.header, self.name) if self.sensor is None else self.sensor
+        sensor = sensor_kind(self.header, self.name) if self.sensor is None else self.sensor
         return "amg".index(sensor) if sensor else 3
 
     @property

@@ -97,7 +97,7 @@ def _apply_stages(a: Array, table: Table, steps: Sequence[Step]) -> tuple[list[A
     forces = [a]
     for stage in Stage:
         stage_parts = {
-            i: staged_part(stage, partial(_apply_transduction, effect, table, p), a, forces[stage])
+            i: stage_contribution(stage, partial(_apply_transduction, effect, table, p), a, forces[stage])
             for i, (effect, p) in enumerate(steps)
             if stage_of(effect) == stage
         }
@@ -109,7 +109,7 @@ def _apply_stages(a: Array, table: Table, steps: Sequence[Step]) -> tuple[list[A
     return forces, [parts[i] for i in range(len(steps))]
 
 
-def staged_part(stage: Stage, part_of: Callable[[Any], Any], a: Any, response: Any) -> Any:
+def stage_contribution(stage: Stage, part_of: Callable[[Any], Any], a: Any, response: Any) -> Any:
     """Contribution of an effect of some stage to the output, `part_of` a force, to the `response` before it, (n, 3), g.
 
     What scales the response over other forces follows the force along these, and not their response.
@@ -270,7 +270,7 @@ class LinearisedChain:
         for effect, p in self.steps:
             if stage_of(effect) == stage:
                 part_of = partial(_apply_transduction, effect, self.table, p)
-                total = total + staged_part(stage, part_of, a, a + unit) - part_of(a)
+                total = total + stage_contribution(stage, part_of, a, a + unit) - part_of(a)
         return add_response(unit, total, self.steps)
 
     def _columns_of(self, effect: Effect) -> Mapping[str, Array] | None:
@@ -288,7 +288,7 @@ class LinearisedChain:
     def _contribution(self, effect: Effect, values: Values) -> Array:
         """Contribution of one effect to the output, together with the other effects of the model."""
         stage = stage_of(effect)
-        part = staged_part(
+        part = stage_contribution(
             stage, partial(_apply_transduction, effect, self.table, values), self._sensed_force, self._forces[stage]
         )
         return np.asarray(part * self._drift_of(effect))

@@ -293,7 +293,7 @@ def _largest(values: NDArray[np.float64]) -> float:
     return float(np.abs(values).max())
 
 
-def no_samples(name: str, url: str, timeout_s: float, expected: str) -> LinkTimeout:
+def no_samples_error(name: str, url: str, timeout_s: float, expected: str) -> LinkTimeout:
     """The error for a link on which `expected` does not arrive."""
     return LinkTimeout(
         f"{name}: received no {expected} on {url} within {timeout_s:g} s",

@@ -223,7 +223,7 @@ class FramedTwin(DigitalTwin):
         return message[:-1] + bytes([message[-1] ^ 0x55]) if is_corrupted else message
 
 
-def talking_port(listen: str) -> Port:
+def sending_port(listen: str) -> Port:
     """A port for a sensor that sends without requests. The system buffers only a little unread data."""
     return Port(listen, capacity=HELD)
 
@@ -232,7 +232,7 @@ def serve_sensors(
     sensor: Callable[[W, S, Port], DigitalTwin], world: W, roles: Mapping[str, tuple[int, S]], listen: str
 ) -> Server:
     """A link with a sensor for each role: role -> (unit id, not used by such a sensor; settings)."""
-    ports = {role: talking_port(listen) for role in roles}
+    ports = {role: sending_port(listen) for role in roles}
     twins = {role: sensor(world, roles[role][1], port) for role, port in ports.items()}
     return Server(list(ports.values()), twins, {role: Address(port.url) for role, port in ports.items()})
 

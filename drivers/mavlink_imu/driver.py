@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from drivers.digital.frames import FrameDecoder, Frames, Ints, groups
 from drivers.digital.reception import Batch, Floats, Numbers, Reception, TimeBase
-from drivers.digital.sensor import DigitalSensor, no_samples
+from drivers.digital.sensor import DigitalSensor, no_samples_error
 from drivers.digital.settings import OUTPUTS, DigitalSettings, require_outputs
 from drivers.errors import DriverError, LinkTimeout, Refused, SensorFault
 from drivers.instrument import Identity
@@ -256,11 +256,11 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
         return counts_text + self._warm
 
     def _silence(self, timeout_s: float) -> DriverError:
-        return no_samples(self.name, self._link.url, timeout_s, self.settings.message)
+        return no_samples_error(self.name, self._link.url, timeout_s, self.settings.message)
 
     def _unreadable(self, decoder: SampleDecoder) -> DriverError:
         if decoder.unread <= self.longest and decoder.good:
-            return no_samples(self.name, self._link.url, 2.0, self.settings.message)
+            return no_samples_error(self.name, self._link.url, 2.0, self.settings.message)
         return self._no_frames(decoder.stream)
 
 

@@ -18,7 +18,7 @@ from typing import Any
 from drivers.errors import BadFrame, DriverError, LinkRefused, LinkTimeout, Refused
 from drivers.transport.link import Link
 
-__all__ = ["SEVERITIES", "Circuit", "Reading", "Records", "channel_access", "found_server"]
+__all__ = ["SEVERITIES", "Circuit", "Reading", "Records", "channel_access", "find_server"]
 
 NO_CAPROTO = "Install it: pip install 'inertial-rig[labs]'"
 SEVERITIES = ("none", "minor", "major", "invalid")
@@ -234,7 +234,7 @@ class Records:
         return self._circuit.units(self.beginning + field, self._device, self._timeout_s)
 
 
-def found_server(record: str, device: str, timeout_s: float) -> tuple[str, int]:
+def find_server(record: str, device: str, timeout_s: float) -> tuple[str, int]:
     """Host and port of the server that has a record, by a search on the network. Raises LinkRefused.
 
     The addresses are those of EPICS_CA_ADDR_LIST, and the broadcast address unless EPICS_CA_AUTO_ADDR_LIST is NO.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from drivers.clock import Clock
 from drivers.errors import LinkRefused
 from drivers.transport.address import CA_PORT, Address, Url
-from drivers.transport.channel_access import Circuit, Records, found_server
+from drivers.transport.channel_access import Circuit, Records, find_server
 from drivers.transport.lines import LinkLines, TextLines, VisaLines
 from drivers.transport.link import Link, Tap, open_link
 from drivers.transport.modbus import Bus, Unit
@@ -54,7 +54,7 @@ class Links:
         url = Url.parse(address.url)
         if url.scheme != "ca":
             raise LinkRefused(f"{name}: {address.url} is not an EPICS address", "Write ca:NAME, or ca://host:port/NAME")
-        place = (url.host, url.port or CA_PORT) if url.host else found_server(url.record + first, name, timeout_s)
+        place = (url.host, url.port or CA_PORT) if url.host else find_server(url.record + first, name, timeout_s)
         if place not in self._circuits:
             self._circuits[place] = Circuit(self.link(f"tcp://{place[0]}:{place[1]}", name), place)
         else:

@@ -93,7 +93,7 @@ def balanced_nm(x: Springs, y: Springs, gx: float, gy: float, warmer_k: float) -
 
 
 @kernel
-def drawn_aside_nm(springs: Springs, neighbour_nm: float, sag_nm: float, stress_k: float) -> float:
+def shift_nm(springs: Springs, neighbour_nm: float, sag_nm: float, stress_k: float) -> float:
     """Displacement that is no balance of forces: foreshortened beams, tilt by sag, package stress."""
     shortened = springs.foreshortening_per_um * neighbour_nm**2 + springs.sag_foreshortening_per_um * sag_nm**2
     return 1e-3 * (shortened + springs.stress_pm_per_k * stress_k) + springs.sag_tilt_fraction * sag_nm

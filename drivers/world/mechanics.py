@@ -185,7 +185,7 @@ def moved_nm(
 ) -> float:
     """Displacement of a finger; `own_nm` and `neighbour_nm` are those where the springs alone balance the loads."""
     stuck = accelerometer.drag_nm(axis.friction, seats_nm, own_nm, neighbour_g)
-    attraction_nm = accelerometer.drawn_aside_nm(axis.springs, neighbour_nm, sag_nm, world.warmth.glue_c - REFERENCE_C)
+    attraction_nm = accelerometer.shift_nm(axis.springs, neighbour_nm, sag_nm, world.warmth.glue_c - REFERENCE_C)
     charged = 1e-3 * axis.plates.charging_pm * world.charged
     return own_nm - stuck + attraction_nm + charged + disturbances.stopped_nm(odd, own_nm)
 

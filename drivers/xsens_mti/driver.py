@@ -17,7 +17,7 @@ import numpy as np
 
 from drivers.digital.frames import Bytes, FrameDecoder, Frames, Ints
 from drivers.digital.reception import Batch, Numbers, TimeBase
-from drivers.digital.sensor import DigitalSensor, no_samples
+from drivers.digital.sensor import DigitalSensor, no_samples_error
 from drivers.digital.settings import FIELDS, FORCES, OUTPUTS, RATES, DigitalSettings, require_outputs
 from drivers.errors import BadFrame, DriverError, LinkTimeout, Refused, StreamError
 from drivers.instrument import Identity
@@ -107,7 +107,7 @@ class SampleDecoder(FrameDecoder):
         values = np.full((n, len(self._names)), np.nan)
         self._warm_c = [np.empty(0)]
         counter, time, status = np.full(n, -1), np.zeros(n), np.zeros(n, dtype=np.int64)
-        for places, rows, packets in xbus.of_one_layout(messages):
+        for places, rows, packets in xbus.layout_groups(messages):
             for packet in packets:
                 self.kinds.add(packet.kind)
                 if packet.number == xbus.COUNTER:
@@ -249,7 +249,7 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
 
     def _silence(self, timeout_s: float) -> DriverError:
         outputs = ", ".join(NAMES[kind] for kind in self.settings.packets if kind in NAMES)
-        return no_samples(self.name, self._link.url, timeout_s, f"MTData2 with {outputs}")
+        return no_samples_error(self.name, self._link.url, timeout_s, f"MTData2 with {outputs}")
 
     def _unreadable(self, decoder: SampleDecoder) -> DriverError:
         return self._no_frames(decoder.stream) if decoder.unread else self._silence(2.0)

@@ -157,7 +157,7 @@ def data_messages(columns: Sequence[tuple[int, NDArray[np.generic]]]) -> list[by
     return [text[k * length : (k + 1) * length] for k in range(n)]
 
 
-def of_one_layout(frames: Found) -> Iterator[tuple[Ints, Bytes, list[Packet]]]:
+def layout_groups(frames: Found) -> Iterator[tuple[Ints, Bytes, list[Packet]]]:
     """The MTData2 messages in groups of one layout: their places among the frames, the messages, and the packets.
 
     Messages whose packets do not fill them are left out.

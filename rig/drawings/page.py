@@ -67,11 +67,11 @@ def dial(centre: tuple[float, float], radius: float, clockwise: bool) -> Iterato
     yield svg.circle(centre, radius, "#fafbfc", svg.FAINT, 1.0)
     for deg in range(0, 360, EVERY_DEG):
         length = 8 if deg % 30 == 0 else 4
-        ends = [svg.on_circle(centre, r, deg) for r in (radius - length, radius)]
+        ends = [svg.circle_point(centre, r, deg) for r in (radius - length, radius)]
         yield svg.line(ends, svg.QUIET if length == 8 else "#b8c2cc", 1.0)
     for deg in range(0, 360, NAMED_EVERY_DEG):
         signed_deg = deg if deg <= 180 else deg - 360
-        at = svg.on_circle(centre, radius + 13, -deg if clockwise else deg)
+        at = svg.circle_point(centre, radius + 13, -deg if clockwise else deg)
         yield svg.text(at, str(signed_deg), 12, svg.QUIET)
 
 
@@ -81,8 +81,8 @@ def mark_angle(
     """From zero to `deg`: a line at each end, and an arc between."""
     sign = -1 if clockwise else 1
     text_deg = sign * (deg if abs(deg) <= 360 else deg % 360)
-    yield svg.line([centre, svg.on_circle(centre, radius, 0)], svg.QUIET, 1.0, stroke_dasharray="3 3")
-    yield svg.line([centre, svg.on_circle(centre, radius, text_deg)], svg.ORANGE, 1.4)
+    yield svg.line([centre, svg.circle_point(centre, radius, 0)], svg.QUIET, 1.0, stroke_dasharray="3 3")
+    yield svg.line([centre, svg.circle_point(centre, radius, text_deg)], svg.ORANGE, 1.4)
     if abs(text_deg) > 1:
         points = svg.arc(centre, inner * radius, 0, text_deg)
         direction = [b - a for a, b in zip(points[-2], points[-1], strict=True)]
@@ -186,13 +186,13 @@ def _square(half: float) -> list[tuple[float, float]]:
 def _mount(attitude: Attitude, centre: tuple[float, float], radius: float) -> Iterator[str]:
     """The table's zero mark, and from it the turn of the sensor, where it has one."""
     mark_deg = -attitude.beta_deg
-    tip = svg.on_circle(centre, 0.90 * radius, mark_deg)
+    tip = svg.circle_point(centre, 0.90 * radius, mark_deg)
     yield svg.head(tip, [t - c for t, c in zip(tip, centre, strict=True)], svg.ORANGE)
     if abs(attitude.mount_deg) < 1:
         return
     points = svg.arc(centre, 0.5 * radius, mark_deg, mark_deg - attitude.mount_deg)
     direction = [b - a for a, b in zip(points[-2], points[-1], strict=True)]
-    yield svg.line([centre, svg.on_circle(centre, 0.86 * radius, mark_deg)], svg.QUIET, 1.0, stroke_dasharray="3 3")
+    yield svg.line([centre, svg.circle_point(centre, 0.86 * radius, mark_deg)], svg.QUIET, 1.0, stroke_dasharray="3 3")
     yield svg.line(points, svg.QUIET, 1.8) + svg.head(points[-1], direction, svg.QUIET)
 
 
@@ -200,5 +200,5 @@ def _axes(attitude: Attitude, centre: tuple[float, float], radius: float, x_deg:
     """x and y in the plane of the table; face down, y is on the other side of x."""
     y_deg = x_deg + (-90 if attitude.flip else 90)
     for name, deg, colour in (("x", x_deg, svg.RED), ("y", y_deg, svg.GREEN)):
-        yield svg.arrow(centre, svg.on_circle(centre, AXIS * radius, deg), colour)
-        yield svg.text(svg.on_circle(centre, (AXIS + 0.09) * radius, deg), name, 13, colour, bold=True)
+        yield svg.arrow(centre, svg.circle_point(centre, AXIS * radius, deg), colour)
+        yield svg.text(svg.circle_point(centre, (AXIS + 0.09) * radius, deg), name, 13, colour, bold=True)

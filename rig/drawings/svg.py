@@ -71,10 +71,10 @@ def text(
 def arc(centre: Point, radius: float, from_deg: float, to_deg: float) -> list[tuple[float, float]]:
     """Points on a circle; angles in deg from the right, growing anticlockwise as one sees it."""
     n = max(2, int(abs(to_deg - from_deg) // 3) + 2)
-    return [on_circle(centre, radius, float(deg)) for deg in np.linspace(from_deg, to_deg, n)]
+    return [circle_point(centre, radius, float(deg)) for deg in np.linspace(from_deg, to_deg, n)]
 
 
-def on_circle(centre: Point, radius: float, deg: float) -> tuple[float, float]:
+def circle_point(centre: Point, radius: float, deg: float) -> tuple[float, float]:
     """The point of a circle at an angle in deg from the right, anticlockwise as one sees it."""
     phi = np.radians(deg)
     return float(centre[0] + radius * np.cos(phi)), float(centre[1] - radius * np.sin(phi))

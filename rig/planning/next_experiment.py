@@ -141,7 +141,7 @@ def choose_experiment(
             predicted.append(prediction)
             if _will_separate(prediction, criteria[0]) and len(prediction.separates) == len(dispute.rivals):
                 break  # no longer experiment can be better
-    return best_of(predicted, criteria) or as_proposed(by_physics, bench, bench_file)
+    return choose_best(predicted, criteria) or as_proposed(by_physics, bench, bench_file)
 
 
 def _plans(menu: Sequence[Experiment], bench: Bench, bench_file: Path | None) -> Iterator[tuple[Experiment, Plan]]:
@@ -151,7 +151,7 @@ def _plans(menu: Sequence[Experiment], bench: Bench, bench_file: Path | None) ->
             yield plan_experiment(e, bench, bench_file)
 
 
-def best_of(experiments: Sequence[Experiment], criteria: Sequence[str]) -> Experiment | None:
+def choose_best(experiments: Sequence[Experiment], criteria: Sequence[str]) -> Experiment | None:
     """The shortest experiment that certainly separates most pairs; else that with most information per minute."""
     for probability in criteria:
         enough = [e for e in experiments if _will_separate(e, probability)]

@@ -35,7 +35,7 @@ from rig.record.values import CHANGED
 from rig.results import Result, documents, judge_results, read_returned
 from rig.runs.host import RunHost, leave_as
 from rig.runs.observer import Decision, Observer, Outcome
-from rig.runs.signals import Trace, stoppable, who_stopped
+from rig.runs.signals import Trace, stop_source, stoppable
 
 __all__ = ["REPEATED", "Decision", "Observer", "Outcome", "RunHost", "resume", "start"]
 
@@ -233,7 +233,7 @@ def _error_of(failure: BaseException, run: Run) -> Exception:
         return failure
     if isinstance(failure, KeyboardInterrupt):
         signal_name = str(failure) or "SIGINT"
-        return Stopped(f"{who_stopped(signal_name)}; `rig resume {run.run}` continues the run", signal_name)
+        return Stopped(f"{stop_source(signal_name)}; `rig resume {run.run}` continues the run", signal_name)
     return RuntimeError(f"{type(failure).__name__}: {failure}")
 
 

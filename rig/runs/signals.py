@@ -27,13 +27,13 @@ AGAIN_S = 0.001
 Handler = Callable[[int, FrameType | None], object]
 
 
-def who_stopped(name: str) -> str:
+def stop_source(name: str) -> str:
     """Who stopped a run, by the name of the signal; a person without a name."""
     return SIGNAL_SOURCES[name or "SIGINT"]
 
 
 @contextmanager
-def handled_by(handler: Handler, *numbers: signal.Signals) -> Iterator[None]:
+def signal_handlers(handler: Handler, *numbers: signal.Signals) -> Iterator[None]:
     """Inside the context `handler` receives these signals."""
     earlier = {number: signal.signal(number, handler) for number in numbers}
     try:

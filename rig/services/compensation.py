@@ -45,7 +45,7 @@ def identifier(name: str) -> str:
     return word if word[:1].isalpha() else f"sensor_{word}".rstrip("_")
 
 
-def how_to_test(language: str, folder: str, name: str) -> list[str]:
+def instruction_for_test(language: str, folder: str, name: str) -> list[str]:
     """The command that compiles and tests the written files; nothing for JSON, which has the reference vectors."""
     if language == "python":
         return [f"To test: python {shlex.quote(str(Path(folder) / name))}.py"]

@@ -18,7 +18,7 @@ from weakref import WeakSet
 from nicegui import ui
 
 from calibrations.effects import Effect
-from calibrations.progress import shown_by
+from calibrations.progress import show_progress
 from rig.services.search import Cancelled, Counted
 
 P = ParamSpec("P")
@@ -54,7 +54,7 @@ class Visit:
     async def work(self, call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Call in a thread that ends with the visit. Raises Cancelled at its end, and what `call` raises."""
         self.check()
-        with shown_by(self._show):
+        with show_progress(self._show):
             calculation = begin(call, *args, **kwargs)
         self.calculations.append(calculation)
         try:

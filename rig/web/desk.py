@@ -61,7 +61,7 @@ class Desk:
         if session is None:
             session = self.beginning(data, model, noise)
             if added_effects is None:
-                session = session.with_added(kept_effects(data, model, noise))
+                session = session.with_added(saved_effects(data, model, noise))
         elif session.content.key != content_of(data, model or None).key:
             session = brought_up_to_date(session, self.beginning(data, model, noise))
         if added_effects is not None:
@@ -125,7 +125,7 @@ class Desk:
 # The added effects of the last sessions, in a file: a server that starts again opens them as they were.
 
 
-def kept_effects(data: str, model: str, noise: str = "") -> list[str]:
+def saved_effects(data: str, model: str, noise: str = "") -> list[str]:
     """The added effects of an earlier server's session; empty without one."""
     return _stored_effects().get(_name(data, model, noise), [])
 

@@ -17,7 +17,7 @@ from nicegui.translations import translations
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from rig.errors import RigError
-from rig.runs.signals import handled_by
+from rig.runs.signals import signal_handlers
 from rig.web.calculations import leave_calculations
 from rig.web.desk import Desk
 from rig.web.frame import TITLE
@@ -75,7 +75,7 @@ def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[
         guarded, log_level="warning", access_log=False, timeout_graceful_shutdown=0, ws_max_size=1 << 24
     )  # open pages keep their connections, so there is nothing to wait for
     logging.getLogger("uvicorn.error").addFilter(lambda entry: "graceful shutdown" not in entry.getMessage())
-    ignored = handled_by(lambda *_: None, signal.SIGINT, signal.SIGTERM)  # uvicorn raises them again after its end
+    ignored = signal_handlers(lambda *_: None, signal.SIGINT, signal.SIGTERM)  # uvicorn raises them again after its end
     with ignored, listener:
         _Server(config, lambda: ready(place)).run(sockets=[listener])
     atexit.register(leave_calculations)

@@ -17,7 +17,7 @@ from rig.web.parts import div, words
 MOST_BYTES = 200_000_000
 
 
-def given_name(draft: Path, path: Path) -> Path:
+def place_upload(draft: Path, path: Path) -> Path:
     """Give an uploaded file its name. With another content than the file of that name, it has a number as well."""
     number, place = 1, path
     while place.exists() and not filecmp.cmp(place, draft, shallow=False):
@@ -35,7 +35,7 @@ def upload(on_upload: Callable[[Path], Awaitable[None]]) -> None:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             await event.file.save(draft)
-            path = given_name(draft, folder / name)
+            path = place_upload(draft, folder / name)
         except OSError as error:  # for example a full disk
             with suppress(OSError):
                 draft.unlink(missing_ok=True)

@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rig.record import Record
-from rig.web.upload import MOST_BYTES, given_name
+from rig.web.upload import MOST_BYTES, place_upload
 from tests.browser.conftest import Workbench
 from tests.calibrations.test_turn_logs import log as turn_log
 
@@ -124,7 +124,7 @@ def test_a_file_that_needs_names_leads_from_the_model_page(workbench: Workbench,
 def test_an_uploaded_file_replaces_no_other_of_its_name(tmp_path: Path) -> None:
     for content, name in (("a", "log.csv"), ("b", "log-2.csv"), ("a", "log.csv"), ("c", "log-3.csv")):
         (draft := tmp_path / "draft").write_text(content)
-        path = given_name(draft, tmp_path / "log.csv")
+        path = place_upload(draft, tmp_path / "log.csv")
         assert (path.name, path.read_text(), draft.exists()) == (name, content, False)
 
 

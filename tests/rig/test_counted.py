@@ -11,7 +11,7 @@ import pytest
 from calibrations.effects.catalogue import catalogue
 from calibrations.free_forms import search
 from calibrations.free_forms.search import MOST_MISFIT
-from calibrations.progress import report, shown_by
+from calibrations.progress import report, show_progress
 from rig.services.request import Request
 from rig.services.search import Cancelled, Counted
 from rig.services.session import model_session
@@ -41,7 +41,7 @@ def test_an_analysis_says_what_it_does(tmp_path: Path) -> None:
         if text.startswith("searching"):
             raise Cancelled
 
-    with shown_by(seen), pytest.raises(Cancelled):
+    with show_progress(seen), pytest.raises(Cancelled):
         model_session(Request(two_faults(tmp_path))).diagnosed()
     report("nobody shows this")
     assert [text.partition(" ")[0] for text in texts] == ["Reading", "Fitting", "searching"]

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.world.accelerometer import Springs, balanced_nm, drawn_aside_nm, per_g_nm, restoring_nm
+from drivers.world.accelerometer import Springs, balanced_nm, per_g_nm, restoring_nm, shift_nm
 from drivers.world.kernel import record
 
 PLAIN = Springs()
@@ -48,7 +48,7 @@ def test_springs_soften_with_temperature() -> None:
 
 def test_foreshortening_follows_squares_tilt_and_stress_their_causes() -> None:
     springs = record(Springs(foreshortening_per_um=1.0, sag_foreshortening_per_um=2.0))
-    assert drawn_aside_nm(springs, 8.0, 10.0, 5.0) == pytest.approx(0.064 + 0.2)
-    assert drawn_aside_nm(springs, -8.0, -10.0, 5.0) == pytest.approx(0.064 + 0.2)
+    assert shift_nm(springs, 8.0, 10.0, 5.0) == pytest.approx(0.064 + 0.2)
+    assert shift_nm(springs, -8.0, -10.0, 5.0) == pytest.approx(0.064 + 0.2)
     springs = record(Springs(sag_tilt_fraction=0.01, stress_pm_per_k=3.0))
-    assert drawn_aside_nm(springs, 8.0, 10.0, 5.0) == pytest.approx(0.1 + 0.015)
+    assert shift_nm(springs, 8.0, 10.0, 5.0) == pytest.approx(0.1 + 0.015)

@@ -77,7 +77,7 @@ def measurement(channel: ChannelResidual) -> Panel:
 def failure(channel: ChannelResidual) -> Panel:
     """Mean residual over one period of the strongest line; the band is the noise of a mean."""
     axis = _axis(channel)
-    period = over_a_period(channel.fit, axis)
+    period = overlay_periods(channel.fit, axis)
     hover = "%{y:.3g} at %{x:.0f} deg"
     line = Line(period.phase_deg, channel.factor * period.residual, colour=CANDIDATE, hover=hover, markers=True)
     x = Axis(f"phase of the motion {period.line} (deg)", ticks="quarters")
@@ -125,7 +125,7 @@ class Period:
     line: str
 
 
-def over_a_period(fit: Fit, axis: str) -> Period:
+def overlay_periods(fit: Fit, axis: str) -> Period:
     """All periods laid over each other, in BINS parts."""
     table = _stretches(fit)
     phase, line = _phase(table)

@@ -65,9 +65,9 @@ def _part_panel(part: Part, *, legend: bool) -> Panel:
 def signature(effect: Effect) -> list[Part]:
     """Residual of the linear model by the effect, axis by axis."""
     if effect.first_kind.field:
-        return [of_field(effect)]
+        return [field_part(effect)]
     if effect.first_kind.turning:
-        return of_rates(effect)
+        return rate_parts(effect)
     effects_by_name = catalogue()
     linear: list[Step] = [
         (effects_by_name["bias"], Values(bias=np.full(3, 2.5))),
@@ -226,7 +226,7 @@ TURN_DEG = np.arange(0.0, 361.0, 5.0)
 RATES_DEG_S = np.linspace(-100.0, 100.0, 21)
 
 
-def of_field(effect: Effect) -> Part:
+def field_part(effect: Effect) -> Part:
     """Residual of the field's magnitude by the effect, parts per thousand, over full turns of a magnetometer."""
     strength = catalogue()["field-strength"]
     table = _simulate_turns_in_field()
@@ -238,7 +238,7 @@ def of_field(effect: Effect) -> Part:
     return Part("|m|", residual, np.tile(TURN_DEG, 3), "angle of the turn (deg)", curves, "‰ of the field")
 
 
-def of_rates(effect: Effect) -> list[Part]:
+def rate_parts(effect: Effect) -> list[Part]:
     """Residual of each output by the effect, deg/s, over the rate of turns of a gyroscope about each edge."""
     ideal = catalogue()["gyro-scale-factor"]
     table = _simulate_turns_at_rates()

@@ -28,7 +28,7 @@ from rig.errors import BenchError
 from rig.files import write_whole
 from rig.instruments.instruments import check_all
 from rig.instruments.wiring import on_a_network, serve, world_of
-from rig.runs.signals import handled_by
+from rig.runs.signals import signal_handlers
 
 NOT_MET, FAILED = 1, 3
 
@@ -132,7 +132,9 @@ def simulate_command(bench_file: Path | None, as_json: bool) -> None:
     bench = read_bench(bench_file)
     stop_signals: list[int] = []
     with ExitStack() as stack:
-        stack.enter_context(handled_by(lambda number, _: stop_signals.append(number), signal.SIGINT, signal.SIGTERM))
+        stack.enter_context(
+            signal_handlers(lambda number, _: stop_signals.append(number), signal.SIGINT, signal.SIGTERM)
+        )
         clock = WallClock()
         servers = list(serve(bench, world_of(bench)).values())
         for server in servers:

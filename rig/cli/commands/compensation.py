@@ -69,7 +69,7 @@ def compensate_command(
     from calibrations.compensation.document import summary
     from calibrations.compensation.inverse import compensate_residual, invert_model
     from calibrations.model.file import dump_model, read_model
-    from rig.services.compensation import compensation_lines, how_to_test, origin_of, source_files
+    from rig.services.compensation import compensation_lines, instruction_for_test, origin_of, source_files
     from rig.services.load import check_unit
 
     if picture is not None and data is None:
@@ -98,7 +98,7 @@ def compensate_command(
         emit(summary(compensation, origin) | {"files": paths, "residual": residual.document() if residual else None})
         return
     lines = [*compensation_lines(compensation), *(residual.lines() if residual else [])]
-    lines += [*(f"written: {path}" for path in paths), *how_to_test(language, str(out), origin.name)]
+    lines += [*(f"written: {path}" for path in paths), *instruction_for_test(language, str(out), origin.name)]
     click.echo("\n".join(lines))
 
 

@@ -52,11 +52,11 @@ class Progress:
 
     def searched(self, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
         """The effects for a search, whose progress is shown from now on."""
-        from calibrations.progress import shown_by  # `rig --help` loads no calibrations
+        from calibrations.progress import show_progress  # `rig --help` loads no calibrations
         from rig.services.search import Counted
 
         self.search = counted = Counted(effects)
-        self.at_end.enter_context(shown_by(self.show))
+        self.at_end.enter_context(show_progress(self.show))
         self.text = lambda: f"searching for missing effects. {counted.text}"
         return counted
 

@@ -244,7 +244,7 @@ class Workbench:
                 return
             except Exception as error:
                 if turn == self.turn:
-                    self.verdict.not_diagnosed()
+                    self.verdict.show_no_diagnosis()
                     self.missing.fail(message(error))
                 return
         if turn == self.turn:
@@ -261,7 +261,7 @@ class Workbench:
     def cancel(self) -> None:
         """Cancel the search for missing effects."""
         self.left()
-        self.verdict.not_diagnosed()
+        self.verdict.show_no_diagnosis()
         self.missing.cancelled()
 
     async def again(self) -> None:

@@ -153,7 +153,7 @@ class CompensationDialog(Asking):
 
     def made(self) -> tuple[bytes | str, str, list[str]]:
         """All files in one archive."""
-        from rig.services.compensation import compensation_lines, how_to_test, origin_of, source_files
+        from rig.services.compensation import compensation_lines, instruction_for_test, origin_of, source_files
 
         language = str(self.language.value)
         compensation = invert_model(
@@ -168,6 +168,6 @@ class CompensationDialog(Asking):
         lines = [
             f"Files: {', '.join(files)}",
             *compensation_lines(compensation),
-            *how_to_test(language, origin.name, origin.name),
+            *instruction_for_test(language, origin.name, origin.name),
         ]
         return packed.getvalue(), f"{origin.name}.zip", lines

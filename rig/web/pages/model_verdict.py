@@ -79,7 +79,7 @@ class VerdictBox:
         self._show(" ".join(filter(None, (caution, judgement.rest, self.described))))
         self.box.classes(remove="good bad doubt", add=LOOKS[result.verdict])
 
-    def not_diagnosed(self) -> None:
+    def show_no_diagnosis(self) -> None:
         """Show that the search was cancelled or has failed."""
         self.headline.set_text("Not diagnosed")
         self.box.classes(remove="good bad doubt")
