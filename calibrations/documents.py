@@ -18,7 +18,7 @@ from calibrations.model import Model
 from calibrations.table import Array
 
 if TYPE_CHECKING:
-    from calibrations.design.expected import Expected
+    from calibrations.design.expected import ExpectedResult
     from calibrations.design.experiment import Experiment
     from calibrations.discovery.curves import PlaceCurve
 
@@ -248,7 +248,7 @@ def experiment_document(e: Experiment | None) -> Document | None:
     }
 
 
-def _expected_document(expected: Expected | None) -> Document | None:
+def _expected_document(expected: ExpectedResult | None) -> Document | None:
     """Distances in standard deviations; null where they are not computed."""
     if expected is None:
         return None

@@ -163,7 +163,7 @@ def _find_next_rest(
     wanted one. Raises NoAnswer after `wait_s` without one.
     """
     windows: list[Samples] = []
-    doing, refusals = Doing(rig), 0
+    doing, refusals = PresentStep(rig), 0
     for _ in range(round(goal.wait_s / WINDOW_S)):
         windows.append(rig.adc.acquire(WINDOW_S))
         stillness = analysis.judge([w.volts for w in windows], noise)
@@ -188,7 +188,7 @@ def _find_next_rest(
 
 
 @dataclass
-class Doing:
+class PresentStep:
     """The present step, reported once."""
 
     rig: Session

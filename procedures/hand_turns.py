@@ -18,8 +18,8 @@ from drivers.errors import LimitError
 from procedures.at_rest import (
     FEWEST,
     WINDOW_S,
-    Doing,
     Goal,
+    PresentStep,
     Windows,
     guidance,
     learn_noise,
@@ -106,7 +106,7 @@ class Watch:
 
     def next_rest(self, course: HandCourse) -> None:
         """Wait until the sensor is at rest after a turn. Raises NoAnswer after `wait_s` without one."""
-        doing = Doing(self.rig)
+        doing = PresentStep(self.rig)
         for _ in range(round(self.goal.wait_s / WINDOW_S)):
             if (motion := self._take(next(self.stream))) is not None:
                 doing.say(f"{course.words}: the sensor moves ({motion})")

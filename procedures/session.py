@@ -161,7 +161,7 @@ class HandAnalysis(Protocol):
     def clipped(self, turn: NDArray[np.float64], rest: NDArray[np.float64]) -> int | None:
         """The number of an output that a turn (n, outputs) clips; None if none does. `rest`: samples at rest."""
 
-    def turn_course(self, recorded: Sequence[Recorded], noise: NoiseAtRest, rest_s: float) -> HandCourse:
+    def turn_course(self, recorded: Sequence[RecordedPose], noise: NoiseAtRest, rest_s: float) -> HandCourse:
         """The rests and turns of an accelerometer and a gyroscope so far. A turn begins with a rest of `rest_s`."""
 
 
@@ -187,7 +187,7 @@ class Guidance:
         return self.wanted or self.up
 
 
-class Recorded(Protocol):
+class RecordedPose(Protocol):
     """A pose in the record with its samples; `number` counts all poses of the run, `t_s` is the middle."""
 
     @property
@@ -205,7 +205,7 @@ class Recorded(Protocol):
 class Host(Protocol):
     """The run or the plan that executes the procedure."""
 
-    def recorded(self) -> Sequence[Recorded]:
+    def recorded(self) -> Sequence[RecordedPose]:
         """The poses in the record with their samples, in order."""
 
     def kept(self) -> Sequence[Pose]:
@@ -350,7 +350,7 @@ class Session:
         """All measurements of this run, in order. An adaptive procedure chooses its poses by them."""
         return self.host.measured()
 
-    def recorded(self) -> Sequence[Recorded]:
+    def recorded(self) -> Sequence[RecordedPose]:
         """All poses of this run with their samples, in order."""
         return self.host.recorded()
 

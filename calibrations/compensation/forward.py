@@ -20,7 +20,7 @@ import numpy as np
 
 from calibrations.compensation.graph import Node, variable, variable_names
 from calibrations.compensation.tables import trace_free_form
-from calibrations.compensation.trace import NotTraced, RunTime, Traced, as_traced, trace_expression
+from calibrations.compensation.trace import NodeArray, NotTraced, RunTime, as_traced, trace_expression
 from calibrations.effects import Effect, Values
 from calibrations.effects.logged import RATE
 from calibrations.errors import ModelError
@@ -177,13 +177,13 @@ def _select_used_values(outputs: Sequence[Node], memories: Mapping[str, Node]) -
     return {name: stored[name] for name in memories if name in stored}
 
 
-def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[Traced, dict[str, Node]]:
+def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[NodeArray, dict[str, Node]]:
     """Outputs of all three axes, shape (1, 3), and the values stored after the sample, by name.
 
     The signal chain of `calibrations.model.chain`, without its poses.
     """
     table: Any = runtime
-    a: Any = Traced([[variable(name) for name in FORCES]])
+    a: Any = NodeArray([[variable(name) for name in FORCES]])
     for effect, p in steps:
         a = effect.force(a, table, p)
     v, of_force, memory = _response_to_force(a, steps, table)
@@ -219,7 +219,7 @@ def _follow(a: Any, step: Step, table: Any, first_slot: int) -> tuple[Any, dict[
     """Output of an effect with a history, and its stored values by name. Their numbers begin at `first_slot`."""
     effect, p = step
     slots = [[f"m{first_slot + k}{axis}" for axis in AXES] for k in range(effect.memory)]
-    slots_before: Any = [Traced([[variable(name) for name in row]]) for row in slots]
+    slots_before: Any = [NodeArray([[variable(name) for name in row]]) for row in slots]
     part, slots_after = effect.follow(a, table, p, slots_before)
     stored: dict[str, Node] = {}
     for row, values in zip(slots, slots_after, strict=True):
@@ -239,10 +239,10 @@ def _scale(a: Any, force: Any, v: Any, steps: Sequence[Step], table: Any) -> Any
     return v
 
 
-def _response(effect: Effect, a: Any, table: Any, p: Values) -> Traced:
+def _response(effect: Effect, a: Any, table: Any, p: Values) -> NodeArray:
     """Contribution of an effect to the outputs, shape (1, 3)."""
     if effect.expression:
         return trace_expression(effect, a, table, p)
     if isinstance(effect, FreeForm):
-        return trace_free_form(effect, a, Traced(as_traced(np.zeros((1, 3))).nodes), table, p)
+        return trace_free_form(effect, a, NodeArray(as_traced(np.zeros((1, 3))).nodes), table, p)
     return as_traced(effect.transduction(a, table, p))

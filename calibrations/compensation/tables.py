@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.compensation.graph import ONE, ZERO, Node, look_up, number, power
-from calibrations.compensation.trace import NotTraced, RunTime, Traced, as_nodes, as_traced
+from calibrations.compensation.trace import NodeArray, NotTraced, RunTime, as_nodes, as_traced
 from calibrations.effects import Values
 from calibrations.effects.logged import sensor_temperature_c
 from calibrations.free_forms.bases import Clips, Line, Products, Ramp, Spline
@@ -97,7 +97,7 @@ def spline_table(basis: Spline, coefficients: Array) -> CubicTable:
     return CubicTable(basis.low, step, tuple((float(p), float(q), float(r), float(s)) for p, q, r, s in c))
 
 
-def trace_free_form(effect: FreeForm, a: Traced, v: Traced, table: RunTime, p: Values) -> Traced:
+def trace_free_form(effect: FreeForm, a: NodeArray, v: NodeArray, table: RunTime, p: Values) -> NodeArray:
     """Contribution of the free form to the outputs, (1, 3), for forces a and outputs v before it, (1, 3) each.
 
     Raises NotTraced for a form that no product can follow.
@@ -106,7 +106,7 @@ def trace_free_form(effect: FreeForm, a: Traced, v: Traced, table: RunTime, p: V
     for k in range(len(table.axes)):
         for form in effect.forms:
             contribution[0, k] += _part(form, coefficients_of(form, p, k), a.nodes[0], v.nodes[0, k], table, k)
-    return as_traced(Traced(contribution))
+    return as_traced(NodeArray(contribution))
 
 
 def _part(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, k: int) -> Node:

@@ -34,7 +34,7 @@ class NotTraced(CalibrationError):
     """The function of an effect cannot be traced."""
 
 
-class Traced(NDArrayOperatorsMixin):
+class NodeArray(NDArrayOperatorsMixin):
     """Nodes in an array of any shape."""
 
     def __init__(self, nodes: Any) -> None:
@@ -49,14 +49,14 @@ class Traced(NDArrayOperatorsMixin):
         return self.nodes.ndim
 
     @property
-    def T(self) -> Traced:  # noqa: N802 as numpy has it
-        return Traced(self.nodes.T)
+    def T(self) -> NodeArray:  # noqa: N802 as numpy has it
+        return NodeArray(self.nodes.T)
 
     def __len__(self) -> int:
         return len(self.nodes)
 
-    def __getitem__(self, key: Any) -> Traced:
-        return Traced(self.nodes[key])
+    def __getitem__(self, key: Any) -> NodeArray:
+        return NodeArray(self.nodes[key])
 
     def __array__(self, *_: Any, **__: Any) -> np.ndarray:
         raise NotTraced("its function needs numbers, as np.asarray and float do")
@@ -69,7 +69,7 @@ class Traced(NDArrayOperatorsMixin):
             raise NotTraced(f"its function uses np.{ufunc.__name__}.{method} or changes an array in place")
         match ufunc.__name__:
             case "matmul":
-                return Traced(np.matmul(*map(as_nodes, inputs)))
+                return NodeArray(np.matmul(*map(as_nodes, inputs)))
             case "square":
                 return _elementwise(lambda x: power(x, 2), *inputs)
             case "power":
@@ -108,17 +108,17 @@ class RunTime:
     def __contains__(self, name: str) -> bool:
         return name in self.available
 
-    def column(self, name: str) -> Traced:
+    def column(self, name: str) -> NodeArray:
         """One column. Raises NotTraced where a product does not have it."""
         if name not in self.available:
             raise NotTraced(f"it needs {name}, which is not known at run time")
-        return Traced([variable(self.available[name])])
+        return NodeArray([variable(self.available[name])])
 
-    def optional(self, name: str, default: float) -> Traced:
-        return self.column(name) if name in self else Traced([number(default)])
+    def optional(self, name: str, default: float) -> NodeArray:
+        return self.column(name) if name in self else NodeArray([number(default)])
 
     @property
-    def time_s(self) -> Traced:
+    def time_s(self) -> NodeArray:
         return self.column("t_s")
 
     @property
@@ -134,7 +134,7 @@ class RunTime:
 
 def as_nodes(value: Any) -> np.ndarray:
     """An array of nodes out of nodes or numbers."""
-    if isinstance(value, Traced):
+    if isinstance(value, NodeArray):
         return value.nodes
     numbers = np.asarray(value)
     nodes = np.empty(numbers.shape, dtype=object)
@@ -143,17 +143,17 @@ def as_nodes(value: Any) -> np.ndarray:
     return nodes
 
 
-def _elementwise(make: Callable[..., Node], *inputs: Any) -> Traced:
+def _elementwise(make: Callable[..., Node], *inputs: Any) -> NodeArray:
     """`make` elementwise, with numpy's broadcasting."""
     arrays = np.broadcast_arrays(*(as_nodes(value) for value in inputs))
     result = np.empty(arrays[0].shape, dtype=object)
     for place in np.ndindex(result.shape):
         result[place] = make(*(array[place] for array in arrays))
-    return Traced(result)
+    return NodeArray(result)
 
 
-def _power(base: Any, exponent: Any) -> Traced:
-    e = np.unique(exponent) if not isinstance(exponent, Traced) else np.empty(0)
+def _power(base: Any, exponent: Any) -> NodeArray:
+    e = np.unique(exponent) if not isinstance(exponent, NodeArray) else np.empty(0)
     if len(e) != 1 or abs(e[0]) > HIGHEST_POWER or (e[0] != 0.5 and e[0] % 1):
         raise NotTraced(
             f"its function uses a power that is not a whole number up to {HIGHEST_POWER}; use np.exp, np.log"
@@ -161,24 +161,24 @@ def _power(base: Any, exponent: Any) -> Traced:
     return np.sqrt(base) if e[0] == 0.5 else _elementwise(lambda x: power(x, int(e[0])), base)
 
 
-def as_traced(value: Any) -> Traced:
-    return Traced(as_nodes(value))
+def as_traced(value: Any) -> NodeArray:
+    return NodeArray(as_nodes(value))
 
 
-def _select(condition: Any, yes: Any, no: Any) -> Traced:
+def _select(condition: Any, yes: Any, no: Any) -> NodeArray:
     return _elementwise(lambda *x: apply_operation("where", *x), condition, yes, no)
 
 
-def _clip(a: Any, low: Any, high: Any) -> Traced:
+def _clip(a: Any, low: Any, high: Any) -> NodeArray:
     return _elementwise(Node.clipped, a, low, high)
 
 
 FUNCTIONS: Mapping[Callable[..., Any], Callable[..., Any]] = {
     np.where: _select,
     np.clip: _clip,
-    np.outer: lambda a, b: Traced(np.outer(as_nodes(a), as_nodes(b))),
-    np.broadcast_to: lambda a, shape: Traced(np.broadcast_to(as_nodes(a), shape)),
-    np.column_stack: lambda columns: Traced(np.column_stack([as_nodes(column) for column in columns])),
+    np.outer: lambda a, b: NodeArray(np.outer(as_nodes(a), as_nodes(b))),
+    np.broadcast_to: lambda a, shape: NodeArray(np.broadcast_to(as_nodes(a), shape)),
+    np.column_stack: lambda columns: NodeArray(np.column_stack([as_nodes(column) for column in columns])),
     np.zeros_like: lambda a, **_: as_traced(np.zeros(a.shape)),
     np.ones_like: lambda a, **_: as_traced(np.ones(a.shape)),
     np.shape: lambda a: a.shape,
@@ -199,7 +199,7 @@ AS_NUMPY: Mapping[str, Callable[..., Any]] = {
 }  # fmt: skip
 
 
-def trace_expression(effect: Effect, a: Traced, table: RunTime, p: Values) -> Traced:
+def trace_expression(effect: Effect, a: NodeArray, table: RunTime, p: Values) -> NodeArray:
     """Contribution of the effect to the outputs, (1, 3). Raises NotTraced for a variable unknown at run time."""
     expression = parse(effect.expression)
     columns = {word: table.column(COLUMNS.get(word, word))[0] for word in expression.names if word not in {*FORCES, *p}}
@@ -209,7 +209,7 @@ def trace_expression(effect: Effect, a: Traced, table: RunTime, p: Values) -> Tr
     for k in target_axes:
         parameters = {q.name: p[q.name][k] if q.per_axis else p[q.name] for q in effect.parameters}
         contribution[0, k] = as_nodes(_evaluate(expression.root, {**columns, **forces, **parameters}))[()]
-    return as_traced(Traced(contribution))
+    return as_traced(NodeArray(contribution))
 
 
 def _evaluate(node: ExpressionNode, values: Mapping[str, Any]) -> Any:

@@ -35,7 +35,7 @@ ROUNDS, CLOSE_GAIN = 12, 1e-2  # steps, and the change of lambda, relative or at
 
 
 @dataclass(frozen=True)
-class Expected:
+class ExpectedResult:
     """The expected result of an experiment: lambda of its own data, and of all data together.
 
     `visible` is lambda of its own data between an explanation and nothing missing: what does not show is not named.
@@ -76,14 +76,14 @@ class Expected:
         return f"{min(100 * pairs_separated(self.decisive), 99.9):.3g} %"
 
 
-def expected_gain(best: Fit, rival: Fit, table: Table) -> Expected:
+def expected_gain(best: Fit, rival: Fit, table: Table) -> ExpectedResult:
     """The expected separation of two explanations of the present data by the predicted `table`.
 
     Both are fits to the same data. Of the two cases, the best right and the rival right, the worse one counts. Times
     of `table` come after those of the data.
     """
     variations = [vary_one_way(best, rival, table), vary_one_way(rival, best, table)]
-    return Expected(min(w.alone for w in variations), min(w.together for w in variations))
+    return ExpectedResult(min(w.alone for w in variations), min(w.together for w in variations))
 
 
 def pairs_separated(noncentrality: float) -> float:
@@ -98,10 +98,10 @@ def _exceedance(noncentrality: float, threshold: float) -> float:
     return float(ndtr((noncentrality - threshold) / (2 * np.sqrt(noncentrality))))
 
 
-def vary_one_way(right: Fit, wrong: Fit, table: Table) -> Expected:
+def vary_one_way(right: Fit, wrong: Fit, table: Table) -> ExpectedResult:
     """As `expected_gain`, where `right` is: the noise is that of `right`."""
     least = _distance(right, wrong, table)
-    return Expected(least(False), least(True))
+    return ExpectedResult(least(False), least(True))
 
 
 def distance_alone(right: Fit, wrong: Fit, table: Table) -> float:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from calibrations.table import Table
 
 if TYPE_CHECKING:
-    from calibrations.design.expected import Expected
+    from calibrations.design.expected import ExpectedResult
 
 TEMPERATURE_EFFECTS = {"temperature-bias", "temperature-scale", "temperature-hysteresis"}
 TIME_EFFECTS = {"warm-up-bias", "warm-up-scale", "bias-drift"}
@@ -41,7 +41,7 @@ class Experiment:
     why: str
     command: str = ""
     duration_s: float | None = None
-    expected: Expected | None = None
+    expected: ExpectedResult | None = None
 
 
 def _experiment(procedure: str, reason: str, **settings: object) -> Experiment:

@@ -29,7 +29,7 @@ from calibrations.exporting.linear_form import (
     fit_form,
     outputs_in,
 )
-from calibrations.exporting.simulated import Exported, Loss, Simulated
+from calibrations.exporting.simulated import ExportedFile, Loss, SimulatedSensor
 from calibrations.table import Array
 
 Value = float | int
@@ -53,7 +53,7 @@ class Slot:
     device_id: int | None = None
 
 
-def px4(sensors: Sequence[Simulated], slot: Slot) -> Exported:
+def px4(sensors: Sequence[SimulatedSensor], slot: Slot) -> ExportedFile:
     """A file of parameters for QGroundControl: tab-separated vehicle, component, name, value, type."""
     sensor_parts = [_px4_sensor(_fit_form(sensor, "PX4", None), slot) for sensor in sensors]
     lines = ["# Onboard parameters: sensor calibration", "# Vehicle-Id Component-Id Name Value Type"]
@@ -62,24 +62,24 @@ def px4(sensors: Sequence[Simulated], slot: Slot) -> Exported:
             kind = INTEGER if isinstance(value, int) else FLOAT
             lines.append(f"1\t1\t{name}\t{_value_text(value)}\t{kind}")
     parts = [part for _, part in sensor_parts]
-    return Exported.of_parts("\n".join(lines) + "\n", parts, _identity_notes(slot, "PX4"))
+    return ExportedFile.of_parts("\n".join(lines) + "\n", parts, _identity_notes(slot, "PX4"))
 
 
-def ardupilot(sensors: Sequence[Simulated], slot: Slot) -> Exported:
+def ardupilot(sensors: Sequence[SimulatedSensor], slot: Slot) -> ExportedFile:
     """A file of parameters for Mission Planner, QGroundControl and MAVProxy: NAME,VALUE."""
     sensor_parts = [_ardupilot_sensor(_fit_form(sensor, "ArduPilot", ARDUPILOT_T0), slot) for sensor in sensors]
     lines = [f"{name},{_value_text(value)}" for values, _ in sensor_parts for name, value in values.items()]
     parts = [part for _, part in sensor_parts]
-    return Exported.of_parts("\n".join(lines) + "\n", parts, _identity_notes(slot, "ArduPilot"))
+    return ExportedFile.of_parts("\n".join(lines) + "\n", parts, _identity_notes(slot, "ArduPilot"))
 
 
-def _fit_form(sensor: Simulated, program: str, t0: float | None) -> tuple[Outputs, LinearForm]:
+def _fit_form(sensor: SimulatedSensor, program: str, t0: float | None) -> tuple[Outputs, LinearForm]:
     outputs = outputs_in(sensor, UNIT[sensor.unit], program)
     degree = 0 if program == "ArduPilot" and sensor.unit == "field" else CUBIC
     return outputs, fit_form(outputs, KIND[sensor.unit], degree, t0).rounded()
 
 
-def _px4_sensor(fitted: tuple[Outputs, LinearForm], slot: Slot) -> tuple[Mapping[str, Value], Exported]:
+def _px4_sensor(fitted: tuple[Outputs, LinearForm], slot: Slot) -> tuple[Mapping[str, Value], ExportedFile]:
     outputs, form = fitted
     unit, n = outputs.simulated.unit, slot.number
     sensor = {"g": "ACC", "deg/s": "GYRO", "field": "MAG"}[unit]
@@ -97,7 +97,7 @@ def _px4_sensor(fitted: tuple[Outputs, LinearForm], slot: Slot) -> tuple[Mapping
     return values, export_form(outputs, form, ignored=list(_px4_ignored(outputs, form)))
 
 
-def _px4_thermal(form: LinearForm, simulated: Simulated, letter: str, slot: Slot) -> Iterator[tuple[str, Value]]:
+def _px4_thermal(form: LinearForm, simulated: SimulatedSensor, letter: str, slot: Slot) -> Iterator[tuple[str, Value]]:
     """T without its constant, which the offset holds."""
     n = slot.number
     low, high = simulated.spans["temperature_c"]
@@ -123,7 +123,7 @@ def _px4_ignored(outputs: Outputs, form: LinearForm) -> Iterator[Loss]:
         yield Loss("scale", f"{reason}", rms, float(size.max()), unit)
 
 
-def _ardupilot_sensor(fitted: tuple[Outputs, LinearForm], slot: Slot) -> tuple[Mapping[str, Value], Exported]:
+def _ardupilot_sensor(fitted: tuple[Outputs, LinearForm], slot: Slot) -> tuple[Mapping[str, Value], ExportedFile]:
     outputs, form = fitted
     unit, k = outputs.simulated.unit, slot.number + 1
     if unit == "field":

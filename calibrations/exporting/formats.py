@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from calibrations.exporting import autopilots, noise_files, robotics
 from calibrations.exporting.noise_files import Stream
-from calibrations.exporting.simulated import Exported, simulate
+from calibrations.exporting.simulated import ExportedFile, simulate
 from calibrations.model import Model
 
 AUTOPILOTS = {"px4": autopilots.px4, "ardupilot": autopilots.ardupilot}
@@ -22,7 +22,7 @@ def export_model(
     stream: Stream,
     reach: float | None = None,
     spans: Mapping[str, tuple[float, float]] | None = None,
-) -> Exported:
+) -> ExportedFile:
     """The models of one unit's sensors as a file of `form`, a name in AUTOPILOTS, MATRICES or NOISES.
 
     `reach` and `spans`: ranges of the input, and of temperature and others, over which errors are computed. Raises

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibrations.errors import ModelError
-from calibrations.exporting.simulated import Exported, Loss, Simulated
+from calibrations.exporting.simulated import ExportedFile, Loss, SimulatedSensor
 from calibrations.importing.units import parse_unit
 from calibrations.table import Array
 
@@ -35,7 +35,7 @@ ALWAYS = ("bias", "gyro-bias", "hard-iron", "field-strength")  # every form hold
 class Outputs:
     """Outputs `x` and inputs `a` in one unit, shape (n, 3) each; `per` units of the input in one of the model's."""
 
-    simulated: Simulated
+    simulated: SimulatedSensor
     x: Array
     a: Array
     factor: float  # units of x in one of the model's output
@@ -70,7 +70,7 @@ class LinearForm:
         return np.asarray(_powers(outputs, self.degree, self.t0) @ self.offsets)
 
 
-def outputs_in(simulated: Simulated, unit: str, program: str) -> Outputs:
+def outputs_in(simulated: SimulatedSensor, unit: str, program: str) -> Outputs:
     """Outputs and inputs in `unit`: m/s^2, rad/s or gauss. Raises ModelError if the model's unit is of another kind.
 
     The input of a magnetometer is the field by the model's field-strength.
@@ -152,11 +152,11 @@ def export_form(
     notes: tuple[str, ...] = (),
     ignored: Sequence[Loss] = (),
     held_effects: Collection[str] = (),
-) -> Exported:
+) -> ExportedFile:
     """The part of a file on one sensor: errors and losses of its form. `held_effects`: those in its other parts."""
     unit = outputs.simulated.unit
     form_losses = (loss for loss in losses(form, outputs) if loss.effect not in held_effects)
-    return Exported(text, (*form_losses, *ignored), notes, ((SENSOR[unit], *error_of(form, outputs), unit),))
+    return ExportedFile(text, (*form_losses, *ignored), notes, ((SENSOR[unit], *error_of(form, outputs), unit),))
 
 
 def _size(error: Array) -> tuple[float, float]:

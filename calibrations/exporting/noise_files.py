@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from calibrations.errors import ModelError
 from calibrations.exporting.linear_form import unit_factor
-from calibrations.exporting.simulated import Exported, Loss
+from calibrations.exporting.simulated import ExportedFile, Loss
 from calibrations.model import Model
 from calibrations.table import STANDARD_GRAVITY
 
@@ -34,14 +34,14 @@ class Stream:
     walks: Mapping[str, float]
 
 
-def kalibr(models: Sequence[Model], stream: Stream, comment: str) -> Exported:
+def kalibr(models: Sequence[Model], stream: Stream, comment: str) -> ExportedFile:
     """The file imu.yaml of Kalibr."""
     numbers, losses, notes = _densities(models, stream, "kalibr")
     lines = [f"# {comment}", *_lines(numbers), f"rostopic: {stream.topic}", f"update_rate: {stream.rate_hz:.6g}"]
-    return Exported("\n".join(lines) + "\n", losses, notes)
+    return ExportedFile("\n".join(lines) + "\n", losses, notes)
 
 
-def openvins(models: Sequence[Model], stream: Stream, comment: str) -> Exported:
+def openvins(models: Sequence[Model], stream: Stream, comment: str) -> ExportedFile:
     """The file kalibr_imu_chain.yaml of OpenVINS, with ideal intrinsics: calibrate the measurements before."""
     numbers, losses, notes = _densities(models, stream, "openvins")
     unit_rows = ["    - [1.0, 0.0, 0.0]", "    - [0.0, 1.0, 0.0]", "    - [0.0, 0.0, 1.0]"]
@@ -55,7 +55,7 @@ def openvins(models: Sequence[Model], stream: Stream, comment: str) -> Exported:
         lines += [f"  {name}:", *unit_rows]
     lines += ["  Tg:", *zeros]
     ideal = "The file has ideal axes and scale factors: give OpenVINS measurements that are already compensated."
-    return Exported("\n".join(lines) + "\n", losses, (*notes, ideal))
+    return ExportedFile("\n".join(lines) + "\n", losses, (*notes, ideal))
 
 
 def _lines(numbers: Mapping[str, float]) -> Iterator[str]:

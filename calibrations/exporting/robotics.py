@@ -16,7 +16,7 @@ import numpy as np
 
 from calibrations.errors import ModelError
 from calibrations.exporting.linear_form import FULL, LinearForm, Outputs, export_form, fit_form, outputs_in
-from calibrations.exporting.simulated import Exported, Simulated
+from calibrations.exporting.simulated import ExportedFile, SimulatedSensor
 from calibrations.table import AXES, Array
 
 ACCELEROMETER, GYROSCOPE = "g", "deg/s"
@@ -24,7 +24,7 @@ G_SENSITIVITY = "gyro-g-sensitivity"
 GYROSCOPE_OFFSET = "imu_calib measures the offset of the gyroscope at its start; the file has the accelerometer only."
 
 
-def imu_calib(sensors: Sequence[Simulated], comment: str) -> Exported:
+def imu_calib(sensors: Sequence[SimulatedSensor], comment: str) -> ExportedFile:
     """The YAML file of imu_calib."""
     outputs, form = _accelerometer(sensors, "imu_calib")
     bias = form.matrix @ form.offsets[0]
@@ -32,7 +32,7 @@ def imu_calib(sensors: Sequence[Simulated], comment: str) -> Exported:
     return export_form(outputs, form, text, (GYROSCOPE_OFFSET,))
 
 
-def imu_tk(sensors: Sequence[Simulated], comment: str) -> Exported:  # noqa: ARG001 the format has no comments
+def imu_tk(sensors: Sequence[SimulatedSensor], comment: str) -> ExportedFile:  # noqa: ARG001 the format has no comments
     """The text file of imu_tk: T (3 x 3), K (3 x 3), B."""
     outputs, form = _accelerometer(sensors, "imu_tk")
     gains = np.diag(form.matrix)
@@ -42,7 +42,7 @@ def imu_tk(sensors: Sequence[Simulated], comment: str) -> Exported:  # noqa: ARG
     return export_form(outputs, form, text)
 
 
-def imucal(sensors: Sequence[Simulated], comment: str) -> Exported:
+def imucal(sensors: Sequence[SimulatedSensor], comment: str) -> ExportedFile:
     """The JSON file of imucal; it needs an accelerometer and a gyroscope."""
     by_unit = {sensor.unit: sensor for sensor in sensors}
     if set(by_unit) != {ACCELEROMETER, GYROSCOPE} or len(sensors) != len(by_unit):
@@ -59,7 +59,7 @@ def imucal(sensors: Sequence[Simulated], comment: str) -> Exported:
         document[f"b_{letter}"] = form.offsets[0].tolist()
     document["K_ga"] = _acceleration_response(rate).tolist()
     parts = [export_form(acceleration, forms[0]), export_form(rate, forms[1], held_effects=(G_SENSITIVITY,))]
-    return Exported.of_parts(json.dumps(document, indent=1) + "\n", parts)
+    return ExportedFile.of_parts(json.dumps(document, indent=1) + "\n", parts)
 
 
 def _acceleration_response(rate: Outputs) -> Array:
@@ -72,7 +72,7 @@ def _acceleration_response(rate: Outputs) -> Array:
     return sensitivity * rate.factor / simulated.gravity_m_s2
 
 
-def _accelerometer(sensors: Sequence[Simulated], program: str) -> tuple[Outputs, LinearForm]:
+def _accelerometer(sensors: Sequence[SimulatedSensor], program: str) -> tuple[Outputs, LinearForm]:
     if len(sensors) != 1 or sensors[0].unit != ACCELEROMETER:
         raise ModelError(f"{program}: a file holds one accelerometer; give its model only")
     outputs = outputs_in(sensors[0], "m/s^2", program)

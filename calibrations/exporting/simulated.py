@@ -44,7 +44,7 @@ class Loss:
 
 
 @dataclass(frozen=True)
-class Exported:
+class ExportedFile:
     """The text of a file. `error`: rms and largest error of its outputs against the whole model, in `unit`."""
 
     text: str
@@ -53,9 +53,9 @@ class Exported:
     errors: tuple[tuple[str, float, float, str], ...] = ()  # sensor, rms, largest, unit
 
     @staticmethod
-    def of_parts(text: str, parts: Sequence[Exported], notes: Sequence[str] = ()) -> Exported:
+    def of_parts(text: str, parts: Sequence[ExportedFile], notes: Sequence[str] = ()) -> ExportedFile:
         """A file that holds several sensors."""
-        return Exported(
+        return ExportedFile(
             text,
             tuple(loss for part in parts for loss in part.losses),
             (*notes, *(note for part in parts for note in part.notes)),
@@ -64,7 +64,7 @@ class Exported:
 
 
 @dataclass(frozen=True, eq=False)
-class Simulated:
+class SimulatedSensor:
     """Outputs `v` in the model's unit for inputs `a` in `unit`, shape (n, 3) each.
 
     `parts`: what the outputs change by if an effect is removed, (n, 3), by effect. `lost`: effects that no file of
@@ -89,7 +89,7 @@ class Simulated:
 
 def simulate(
     model: Model, reach: float | None = None, spans: Mapping[str, tuple[float, float]] | None = None
-) -> Simulated:
+) -> SimulatedSensor:
     """The outputs of a model of three axes for inputs of size `reach` from all directions, at all levels of the others.
 
     `spans`: ranges of other inputs, such as temperature_c; default: those that the data of the calibration covered.
@@ -111,7 +111,7 @@ def simulate(
     inverted = [f.effect for f in forward.fates if f.how == INVERTED]
     parts = {name: outputs - _outputs(model, (*remembering, name), input_values, len(a)) for name in inverted}
     lost = tuple(_losses(compensation, remembering))
-    return Simulated(model, compensation.unit, a, outputs, ranges, other_inputs.get("temperature_c"), parts, lost)
+    return SimulatedSensor(model, compensation.unit, a, outputs, ranges, other_inputs.get("temperature_c"), parts, lost)
 
 
 def _losses(compensation: Compensation, remembering: Collection[str]) -> Iterator[Loss]:

@@ -167,7 +167,7 @@ WIDE = 1e4  # spread, in typical sizes, before anything is known
 
 
 @dataclass(frozen=True)
-class Pooled:
+class PooledParameters:
     """For each parameter its siblings; `scale` (p,) is what their values are given in.
 
     `alone` (n, p): standard uncertainties without siblings; inf if the sensor's own data do not determine them.
@@ -198,7 +198,7 @@ class Pooled:
         return np.column_stack([parameter.outliers for parameter in self.parameters])
 
 
-def pool_siblings(theta: Array, information: Array, typical: Array) -> Pooled:
+def pool_siblings(theta: Array, information: Array, typical: Array) -> PooledParameters:
     """Pool estimates `theta` (n, p) with `information` (n, p, p); `typical` (p,) magnitudes."""
     scaled = information * np.outer(typical, typical) + NOTHING * np.eye(len(typical))
     weighted = np.einsum("nij,nj->ni", scaled, theta / typical)
@@ -214,7 +214,7 @@ def pool_siblings(theta: Array, information: Array, typical: Array) -> Pooled:
             break
     own_covariance = np.linalg.inv(scaled)
     std = np.sqrt(np.diagonal(own_covariance, axis1=1, axis2=2))
-    return Pooled(tuple(siblings), typical, np.where(std < WIDE, std, np.inf) * typical)
+    return PooledParameters(tuple(siblings), typical, np.where(std < WIDE, std, np.inf) * typical)
 
 
 def _estimate_alone(scaled: Array, weighted: Array, prior: Array, mean: Array, k: int) -> tuple[Array, Array]:

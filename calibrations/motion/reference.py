@@ -155,7 +155,7 @@ LOG_RANGE = (float(np.log(1e-3)), float(np.log(1e12)))  # of r / q: noise far be
 
 
 @dataclass(frozen=True)
-class Smoothed:
+class SmoothRecord:
     """A smoothed record, r / q, and the standard deviation of the part taken as noise."""
 
     values: Array
@@ -175,7 +175,7 @@ class Smoothed:
         return 1 / self.corner_hz(rate_hz)
 
 
-def smooth(x: Array) -> Smoothed:
+def smooth(x: Array) -> SmoothRecord:
     """`x`, shape (n,), smoothed."""
     penalty = _penalty(len(x))
 
@@ -185,7 +185,7 @@ def smooth(x: Array) -> Smoothed:
     optimum = scipy.optimize.minimize_scalar(deviance, bounds=LOG_RANGE, method="bounded", options={"xatol": 0.05})
     ratio = float(np.exp(optimum.x))
     values, noise_std, _ = _smooth_with(x, penalty, ratio)
-    return Smoothed(values, ratio, noise_std)
+    return SmoothRecord(values, ratio, noise_std)
 
 
 def _smooth_with(x: Array, penalty: Array, ratio: float) -> tuple[Array, float, float]:
@@ -219,7 +219,7 @@ class Reference:
 
     acceleration_m_s2: Array
     lines: tuple[Sine, ...]
-    remainder: Smoothed
+    remainder: SmoothRecord
     rate_hz: float
 
     @property

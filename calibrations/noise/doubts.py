@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.criteria import CERTAIN_PROBABILITY, LEAST_WHITE, LONGEST_RECORD_S, SIGNIFICANT, SLOWEST_FILTER_HZ
-from calibrations.design.expected import Expected, pairs_separated
+from calibrations.design.expected import ExpectedResult, pairs_separated
 from calibrations.design.experiment import TWO_HZ, Experiment, experiment_by_physics
 from calibrations.noise.comparison import noise_levels, stretches
 from calibrations.noise.fit import fit_effects
@@ -192,7 +192,7 @@ def design_separating_record(search: Search, names: tuple[str, ...]) -> Experime
         {"duration_s": _round_up_to_tens(choice[0])},
         pairs,
         LONGER_SEPARATES,
-        expected=Expected(choice[1], choice[1]),
+        expected=ExpectedResult(choice[1], choice[1]),
     )
 
 

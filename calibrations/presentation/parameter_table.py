@@ -47,7 +47,7 @@ class ParameterRow:
 
 
 @dataclass(frozen=True)
-class Correlated:
+class CorrelatedPair:
     """Two parameters by their names, and their correlation coefficient."""
 
     first: str
@@ -76,7 +76,7 @@ def tab_separated(rows: Sequence[ParameterRow]) -> str:
     return "\n".join("\t".join(cells) for cells in (HEAD, *(row.cells for row in rows)))
 
 
-def correlations(fit: FittedModel) -> list[Correlated]:
+def correlations(fit: FittedModel) -> list[CorrelatedPair]:
     """Pairs of identified parameters with |r| of `STRONG` or more, strongest first.
 
     For data with an uncertainty budget they include the shared inputs, as in the certificate; else the noise alone.
@@ -152,8 +152,8 @@ def _name(effect: str, parameter: str, axis: str) -> str:
     return " ".join(filter(None, parts))
 
 
-def _pairs(names: Sequence[str], matrix: Array) -> Iterator[Correlated]:
+def _pairs(names: Sequence[str], matrix: Array) -> Iterator[CorrelatedPair]:
     for k, first in enumerate(names):
         for j in range(k):
             if np.isfinite(matrix[k, j]) and abs(matrix[k, j]) >= STRONG:
-                yield Correlated(names[j], first, float(matrix[k, j]))
+                yield CorrelatedPair(names[j], first, float(matrix[k, j]))

@@ -32,7 +32,7 @@ class Framing(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class FoundFrames:
     """Complete frames in `data`, in their order. `known`: the checksum is checked."""
 
     data: Bytes
@@ -79,7 +79,7 @@ class Frames:
     remainder: bytes = b""
     _ends_in_frame: bool = False  # the last byte belongs to a good frame
 
-    def take(self, data: bytes) -> Found:
+    def take(self, data: bytes) -> FoundFrames:
         """The frames that `data` completes."""
         text = self.remainder + data
         array = np.frombuffer(text, dtype=np.uint8)
@@ -102,7 +102,7 @@ class Frames:
         starts, lengths, verdicts = (np.concatenate(column) for column in zip(*frames, strict=True))
         if len(good_frames := np.flatnonzero(verdicts == GOOD)):
             self.unread = len(text) - int(starts[good_frames[-1]] + lengths[good_frames[-1]])
-        return Found(array, starts, lengths, verdicts == GOOD)
+        return FoundFrames(array, starts, lengths, verdicts == GOOD)
 
     def _walk(self, text: bytes, array: Bytes, start: int) -> tuple[Ints, Ints, NDArray[np.bool_], int, bool]:
         """Begin and length of each complete frame from `start` on, and whether bytes were skipped before it.

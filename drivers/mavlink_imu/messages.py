@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.digital.frames import BAD, GOOD, UNKNOWN, Bytes, Found, Ints, groups
+from drivers.digital.frames import BAD, GOOD, UNKNOWN, Bytes, FoundFrames, Ints, groups
 
 V1, V2 = 0xFE, 0xFD
 SIGNED, SIGNATURE = 0x01, 13  # flag of a signed frame, bytes of its signature
@@ -155,7 +155,7 @@ class Heads:
     size: Ints  # its bytes
 
 
-def heads(frames: Found) -> Heads:
+def heads(frames: FoundFrames) -> Heads:
     """The heads of the frames."""
     text = frames.heads(PLACES[V2][0])
     version = text[:, 0]
@@ -167,7 +167,7 @@ def heads(frames: Found) -> Heads:
     return Heads(version, sequence, system, component, _numbers(text), payload, text[:, 1])
 
 
-def contents(frames: Found, frame_heads: Heads, message: Message, frame_numbers: Ints) -> NDArray[np.void]:
+def contents(frames: FoundFrames, frame_heads: Heads, message: Message, frame_numbers: Ints) -> NDArray[np.void]:
     """The fields of the chosen frames of `message`, shape (n,); fields that a frame lacks are 0."""
     parts = np.zeros((len(frame_numbers), message.dtype.itemsize), dtype=np.uint8)
     for place, of_place in groups(frame_heads.payload[frame_numbers]):

@@ -55,7 +55,7 @@ class Port(Protocol):
     def close(self) -> None: ...
 
 
-class Connected(Wire):
+class OpenConnection(Wire):
     """An open connection. Its name `key` is the same at both ends."""
 
     def __init__(self, port: Port) -> None:
@@ -89,7 +89,7 @@ class Link:
         self._place = name if url.text in name else f"{name}: {url.text}" if name else url.text
         self.users, self._tap = [name] if name else [], tap  # names of the instruments on it
         self._closed = False
-        self._line: Connected | None = self._connect()
+        self._line: OpenConnection | None = self._connect()
 
     def write(self, data: bytes) -> None:
         """Send all of `data`. Raises LinkRefused if the connection is lost."""
@@ -143,16 +143,16 @@ class Link:
     def _names(self) -> str:
         return ", ".join(dict.fromkeys(self.users)) or self.url
 
-    def _connected(self) -> Connected:
+    def _connected(self) -> OpenConnection:
         if self._closed:
             raise LinkRefused(f"{self._place}: the connection is closed", "Connect again")
         if self._line is None:
             self._line = self._connect()
         return self._line
 
-    def _connect(self) -> Connected:
+    def _connect(self) -> OpenConnection:
         try:
-            line = Connected(_open_port(self._parsed))
+            line = OpenConnection(_open_port(self._parsed))
         except (*LOST, ValueError) as error:
             reason = (error.strerror if isinstance(error, OSError) else "") or error  # without the error's number
             raise LinkRefused(f"{self._place}: cannot be opened ({reason})", _remedy(self._parsed)) from error

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.digital.frames import BAD, GOOD, Bytes, Found, Ints, groups
+from drivers.digital.frames import BAD, GOOD, Bytes, FoundFrames, Ints, groups
 
 Floats = NDArray[np.float64]
 PREAMBLE, MASTER = 0xFA, 0xFF
@@ -70,7 +70,7 @@ def message(number: int, data: bytes = b"") -> bytes:
     return bytes([PREAMBLE]) + body + bytes([-sum(body) % 256])
 
 
-def messages(frames: Found) -> Iterator[tuple[int, bytes]]:
+def messages(frames: FoundFrames) -> Iterator[tuple[int, bytes]]:
     """The identifier and the data of each message."""
     text = frames.data.tobytes()
     for start, length in zip(frames.starts.tolist(), frames.lengths.tolist(), strict=True):
@@ -157,7 +157,7 @@ def data_messages(columns: Sequence[tuple[int, NDArray[np.generic]]]) -> list[by
     return [text[k * length : (k + 1) * length] for k in range(n)]
 
 
-def layout_groups(frames: Found) -> Iterator[tuple[Ints, Bytes, list[Packet]]]:
+def layout_groups(frames: FoundFrames) -> Iterator[tuple[Ints, Bytes, list[Packet]]]:
     """The MTData2 messages in groups of one layout: their places among the frames, the messages, and the packets.
 
     Messages whose packets do not fill them are left out.

@@ -15,7 +15,7 @@ from calibrations.errors import ModelError
 from calibrations.fleet.batch import BatchVerdict, Population
 from calibrations.fleet.look import NO_STAGE, Screening
 from calibrations.fleet.rigs import StageErrors
-from calibrations.fleet.siblings import Pooled, pool_siblings
+from calibrations.fleet.siblings import PooledParameters, pool_siblings
 from calibrations.model import Estimate, Model
 from calibrations.model.file import dump_model, read_model
 from calibrations.table import Array
@@ -47,14 +47,14 @@ class Guide:
 
 
 @dataclass(frozen=True)
-class Calibrated:
+class CalibratedBatch:
     """Sensors of a batch with the same parameters. `members`, `looks` and `pooled` have the same order."""
 
     batch: str
     names: Names
     members: tuple[Member, ...]
     looks: tuple[Screening, ...]
-    pooled: Pooled
+    pooled: PooledParameters
     question: Question
 
     @cached_property
@@ -68,7 +68,7 @@ class Calibrated:
 class Calibration:
     """All batches, and the faults of the sensors that are in no batch."""
 
-    batches: tuple[Calibrated, ...]
+    batches: tuple[CalibratedBatch, ...]
     faults: Mapping[Member, str]
 
 
@@ -94,24 +94,24 @@ def calibrate_fleet(fleet: Fleet, members: Sequence[Member], guide: Guide) -> Ca
 
 def _batch(
     batch: str, names: Names, members: list[Member], screenings: Mapping[Member, Screening], guide: Guide
-) -> Calibrated:
+) -> CalibratedBatch:
     batch_screenings = tuple(screenings[member] for member in members)
     pooled = pool_siblings(
         np.array([look.theta for look in batch_screenings]),
         np.array([look.information for look in batch_screenings]),
         np.median([look.typical for look in batch_screenings], axis=0),
     )
-    return Calibrated(batch, names, tuple(members), batch_screenings, pooled, guide.question(members[0]))
+    return CalibratedBatch(batch, names, tuple(members), batch_screenings, pooled, guide.question(members[0]))
 
 
-def models(calibrated: Calibrated) -> dict[str, Model]:
+def models(calibrated: CalibratedBatch) -> dict[str, Model]:
     """The models by sensor, with pooled values and standard uncertainties."""
     base = replace(model_of(calibrated.question), unit=calibrated.looks[0].unit)
     values, stds = calibrated.pooled.values, calibrated.pooled.stds
     return {m.sensor: _model(base, calibrated, m, values[k], stds[k]) for k, m in enumerate(calibrated.members)}
 
 
-def _model(base: Model, calibrated: Calibrated, member: Member, values: Array, stds: Array) -> Model:
+def _model(base: Model, calibrated: CalibratedBatch, member: Member, values: Array, stds: Array) -> Model:
     estimates: dict[str, list[Estimate]] = defaultdict(list)
     for (effect, name, axis, unit), value, std in zip(calibrated.names, values, stds, strict=True):
         estimates[effect].append(Estimate(name, axis, float(value), float(std), unit))

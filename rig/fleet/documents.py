@@ -14,7 +14,7 @@ from calibrations.presentation.document import Section, Table
 from calibrations.presentation.report.fleet import calibration_report, population_report
 from calibrations.text import estimate_text, rounded
 from rig.files import program
-from rig.fleet.calibrate import Calibrated, Calibration
+from rig.fleet.calibrate import CalibratedBatch, Calibration
 from rig.fleet.worker import effects_of
 from rig.services.provenance import today
 
@@ -64,7 +64,7 @@ def calibration_document(calibration: Calibration, model: str) -> Document:
     }
 
 
-def _batch(batch: Calibrated) -> Document:
+def _batch(batch: CalibratedBatch) -> Document:
     scale = batch.pooled.scale
     population = [
         {
@@ -81,7 +81,7 @@ def _batch(batch: Calibrated) -> Document:
     return {"batch": batch.batch, "population": population, "sensors": _sensors(batch)}
 
 
-def _sensors(batch: Calibrated) -> list[Document]:
+def _sensors(batch: CalibratedBatch) -> list[Document]:
     pooled, (low, high) = batch.pooled, batch.pooled.intervals()
     values, stds, own_stds, is_outlier = pooled.values, pooled.stds, pooled.alone, pooled.outliers
     return [
@@ -141,12 +141,12 @@ def _facts(model: str) -> dict[str, str]:
     return {"model": model, "program": program(), "made": today()}
 
 
-def _parameter_title(batch: Calibrated, name: tuple[str, str, str, str]) -> str:
+def _parameter_title(batch: CalibratedBatch, name: tuple[str, str, str, str]) -> str:
     effect, parameter, axis, unit = name
     return f"{result_name(effects_of(batch.question.own)[effect], parameter, axis)} in {unit}"
 
 
-def _spread(batch: Calibrated, k: int) -> Spread:
+def _spread(batch: CalibratedBatch, k: int) -> Spread:
     parameter, size = batch.pooled.parameters[k], batch.pooled.scale[k]
     low, high = (end[:, k] for end in batch.pooled.intervals())
     value = batch.pooled.values[:, k]
@@ -156,7 +156,7 @@ def _spread(batch: Calibrated, k: int) -> Spread:
     return Spread(batch.batch, value, expanded, [m.sensor for m in batch.members], parameter.outliers, band)
 
 
-def _rows(batch: Calibrated) -> list[tuple[object, ...]]:
+def _rows(batch: CalibratedBatch) -> list[tuple[object, ...]]:
     gains = np.median(batch.pooled.stds / batch.pooled.alone, axis=0)
     return [
         (

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.table import Table
-from procedures.session import Dwell, HandCourse, NoiseAtRest, Recorded, Stillness
+from procedures.session import Dwell, HandCourse, NoiseAtRest, RecordedPose, Stillness
 from rig.record.turns import is_turn, turn_columns
-from rig.record.values import Kept
+from rig.record.values import KeptPose
 
 
 class HandAnalysis:
@@ -66,11 +66,11 @@ class HandAnalysis:
 
         return find_clipped_output(turn, rest)
 
-    def turn_course(self, recorded: Sequence[Recorded], noise: NoiseAtRest, rest_s: float) -> HandCourse:
+    def turn_course(self, recorded: Sequence[RecordedPose], noise: NoiseAtRest, rest_s: float) -> HandCourse:
         """The rests and turns so far; the path of a rest has the orientation that was wanted, in words."""
         from calibrations.analyses.hand_turns import TurnCourse
 
-        rests = [cast(Kept, each).dwell for each in recorded if not is_turn(each.pose)]
+        rests = [cast(KeptPose, each).dwell for each in recorded if not is_turn(each.pose)]
         columns = turn_columns(recorded, rest_s)
         table = Table.from_columns("turns", columns, {}, "turns by hand") if columns else None
         course = cast(Any, self.course(rests, noise))

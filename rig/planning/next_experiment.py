@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
 from calibrations.criteria import CERTAIN_PROBABILITY
-from calibrations.design.expected import Expected, distance_alone, expected_gain, pairs_separated, predict_data
+from calibrations.design.expected import ExpectedResult, distance_alone, expected_gain, pairs_separated, predict_data
 from calibrations.design.experiment import MENU, Experiment
 from calibrations.discovery.additions import without_forms
 from calibrations.discovery.results import Diagnosis, Discovery
@@ -191,7 +191,7 @@ def _predict(dispute: Dispute, e: Experiment, planned: Plan) -> Experiment | Non
     distances = [
         distance_alone(explanation, dispute.nothing, table) for explanation in (dispute.best, *dispute.rivals.values())
     ]
-    worst = Expected(
+    worst = ExpectedResult(
         min(x.alone for x in separated.values()), min(x.together for x in separated.values()), min(distances)
     )
     return replace(e, separates=tuple(separated), expected=worst)

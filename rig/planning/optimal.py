@@ -30,7 +30,7 @@ from procedures.session import Pose
 from rig.bench import Bench
 from rig.errors import PlanError
 from rig.planning.planned import from_home_s, moves_s
-from rig.planning.sweep_range import Judged, Range
+from rig.planning.sweep_range import JudgedPlan, Range
 
 MOST_POSES = 60
 ONE_IN = 10  # share of poses that are repeated, and of check poses that the fit does not use
@@ -52,13 +52,13 @@ class Optimal:
 
     over: Range
     criterion: str
-    short: Judged
-    equal: Judged
-    all_equal: Judged
+    short: JudgedPlan
+    equal: JudgedPlan
+    all_equal: JudgedPlan
     drift_loss: float
 
     @property
-    def standard(self) -> Judged:
+    def standard(self) -> JudgedPlan:
         """The standard sweep."""
         return self.over.standard
 
@@ -79,18 +79,18 @@ class Optimal:
         times_s = [dwell.start_s for dwell in self.equal.plan.held]
         return float(np.corrcoef(heights, times_s)[0, 1]) if np.ptp(heights) else 0.0
 
-    def worst(self, judged: Judged) -> int:
+    def worst(self, judged: JudgedPlan) -> int:
         """Index of the parameter with the largest error at full scale, of those that the standard sweep determines."""
         return int(np.argmax(np.where(self.standard.determined, judged.errors, -1.0)))
 
 
-def relative(standard: Judged, judged: Judged) -> float:
+def relative(standard: JudgedPlan, judged: JudgedPlan) -> float:
     """Ratio of the worst standard errors to the standard sweep, for the parameters that it determines."""
     determined = standard.determined
     return float(np.max(judged.errors[determined]) / np.max(standard.errors[determined]))
 
 
-def most_relative(standard: Judged, judged: Judged) -> float:
+def most_relative(standard: JudgedPlan, judged: JudgedPlan) -> float:
     """The largest ratio of a standard error to that of the same parameter in the standard sweep."""
     determined = standard.determined
     return float(np.max(judged.errors[determined] / standard.errors[determined]))
@@ -163,7 +163,7 @@ def _pose_settings(settings: Mapping[str, Any], poses: Sequence[Pose]) -> dict[s
     return {**settings, "face": "up", "reference_every": 0, "pose_list": format_poses(poses)}
 
 
-def _equal_plan(design_range: Range, short: Judged, ratio: Callable[[Judged, Judged], float]) -> Judged:
+def _equal_plan(design_range: Range, short: JudgedPlan, ratio: Callable[[JudgedPlan, JudgedPlan], float]) -> JudgedPlan:
     """The plan with the dwell at which its `ratio` to the standard sweep is 1.
 
     With white noise it follows directly. If effects depend on time, the length of the run counts as well: by bisection.
@@ -178,7 +178,7 @@ def _equal_plan(design_range: Range, short: Judged, ratio: Callable[[Judged, Jud
     return high
 
 
-def _judged_with_dwell(design_range: Range, judged: Judged, dwell_s: float) -> Judged:
+def _judged_with_dwell(design_range: Range, judged: JudgedPlan, dwell_s: float) -> JudgedPlan:
     return design_range.judged({**judged.plan.settings, "dwell_s": dwell_s})
 
 

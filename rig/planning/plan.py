@@ -20,7 +20,7 @@ from calibrations.geometry.error_table import ErrorTable
 from procedures.catalogue import Procedure
 from procedures.instruments import Samples
 from procedures.questions import Dial, Question
-from procedures.session import Dwell, Guidance, Pose, Recorded, Session
+from procedures.session import Dwell, Guidance, Pose, RecordedPose, Session
 from rig.bench import ROLES, SIMULATED, TURNING, Bench
 from rig.errors import BenchError
 from rig.instruments.instruments import Rig, absent, connect_all
@@ -37,7 +37,7 @@ from rig.planning.planned import (
     Step,
 )
 from rig.record.measured import of_sensor
-from rig.record.values import Kept
+from rig.record.values import KeptPose
 
 # The plan of a procedure that depends on its measurements: a run on a simulated copy of the bench, which records
 # every step. Nothing real moves and nothing is stored; all instruments are simulated, in the world of the bench file.
@@ -74,7 +74,7 @@ class RehearsalHost(PlanHost):
     """A planned host that stores the simulated measurements of `rig` during the rehearsal."""
 
     rig: Rig
-    blocks: list[Kept] = field(default_factory=list)
+    blocks: list[KeptPose] = field(default_factory=list)
 
     def kept(self) -> Sequence[Pose]:
         return [recorded.pose for recorded in self.blocks]
@@ -82,12 +82,12 @@ class RehearsalHost(PlanHost):
     def measured(self) -> Sequence[Dwell]:
         return [recorded.dwell for recorded in self.blocks]
 
-    def recorded(self) -> Sequence[Recorded]:
+    def recorded(self) -> Sequence[RecordedPose]:
         return self.blocks
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
         self.ledger.held.append(PlannedDwell(self.ledger.now_s, pose))  # the clock of the twins differs
-        recorded = Kept(pose, samples, samples.start_s, temperature_c, number=len(self.blocks))
+        recorded = KeptPose(pose, samples, samples.start_s, temperature_c, number=len(self.blocks))
         self.blocks.append(of_sensor(recorded, self.rig.bench.first_sensor))
 
     def guide(self, guidance: Guidance) -> None:

@@ -19,7 +19,7 @@ from drivers.omega_cn7500.driver import Settings as OvenSettings
 from procedures.bounds import MOST_POSES
 from procedures.instruments import Samples
 from procedures.questions import Choice, Number, Question
-from procedures.session import SHORTEST_APPROACH_DEG, Dwell, Guidance, Pose, Reading, Recorded
+from procedures.session import SHORTEST_APPROACH_DEG, Dwell, Guidance, Pose, Reading, RecordedPose
 from rig.bench import Bench
 from rig.errors import PlanError
 from rig.record.values import Block
@@ -288,7 +288,7 @@ class PlanHost:
     def measured(self) -> Sequence[Dwell]:
         return ()
 
-    def recorded(self) -> Sequence[Recorded]:
+    def recorded(self) -> Sequence[RecordedPose]:
         return ()
 
     def readings(self) -> Sequence[Reading]:

@@ -74,7 +74,7 @@ SIDE = 0.2  # distance of the two directions of one pose, in units of the distan
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedPlan:
     """A plan and the expected standard uncertainties `errors` (p,), V at full scale, infinite if not determined."""
 
     plan: Plan
@@ -106,7 +106,7 @@ class Range:
     model: Model
 
     @cached_property
-    def standard(self) -> Judged:
+    def standard(self) -> JudgedPlan:
         """The sweep itself."""
         return self.judged(self.settings)
 
@@ -140,14 +140,14 @@ class Range:
         table = self._candidate_table
         return np.column_stack([reported_force(table), SIDE * table.column("direction")])
 
-    def judged(self, settings: Mapping[str, Any]) -> Judged:
+    def judged(self, settings: Mapping[str, Any]) -> JudgedPlan:
         """The sweep with other settings; its fit does not use the check poses. Raises what a plan raises."""
         planned = plan(self.bench, self.sweep, settings)
         fitted = replace(planned, held=tuple(dwell for dwell in planned.held if not dwell.pose.path.startswith(MARK)))
         rows = information(self.fit, predict_data(self.fit, _columns(fitted)))
         std = np.sqrt(np.diag(covariance_of(rows)))
         errors = np.multiply(std, self._full_scale, where=np.isfinite(std), out=np.full(len(std), np.inf))
-        return Judged(planned, np.where(errors < MOST_ERROR * self.fit.problem.layout.nominal, errors, np.inf))
+        return JudgedPlan(planned, np.where(errors < MOST_ERROR * self.fit.problem.layout.nominal, errors, np.inf))
 
     def name(self, k: int) -> str:
         """A parameter: `scale-factor scale x`."""

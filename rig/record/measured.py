@@ -23,7 +23,7 @@ from rig.record import tables
 from rig.record.store import Record
 from rig.record.tables import MOST_BLOCKS, inflations, poses_table, samples_table, stated_unit, units_of
 from rig.record.turns import turn_columns
-from rig.record.values import CHANGED, Block, Kept, Run
+from rig.record.values import CHANGED, Block, KeptPose, Run
 
 # The table of a magnetometer or a gyroscope.
 #
@@ -40,14 +40,14 @@ POSE_CONSTANTS = ("filter_corner_hz", "approach_deg")  # constants of poses only
 PROGRAM_CHANGED = "program_changed"  # a constant: from where on another program or procedure measured
 
 
-def positions_table(run: Run, poses: Iterable[Kept]) -> Table:
+def positions_table(run: Run, poses: Iterable[KeptPose]) -> Table:
     """A row for each position of a magnetometer or an accelerometer. Raises RecordError without one."""
     rows = list(poses)
     outputs = FORCE if rows and FORCE[0] in rows[0].dwell.means else FIELD
     return _table(run, rows, outputs, {})
 
 
-def rates_table(run: Run, poses: Iterable[Kept]) -> Table:
+def rates_table(run: Run, poses: Iterable[KeptPose]) -> Table:
     """A row for each turn or rest of a gyroscope. Raises RecordError without one."""
     turns = list(poses)
     normal = np.array([sensor_from_table(turn.pose)[:, 2] for turn in turns]).reshape(-1, 3)
@@ -81,7 +81,7 @@ def specific_force_g(pose: Pose) -> Array:
     return np.round(normal * (normal @ force) if pose.rate_deg_s else force, 12) + 0.0
 
 
-def _table(run: Run, recorded: Sequence[Kept], outputs: Sequence[str], extra_columns: Mapping[str, Array]) -> Table:
+def _table(run: Run, recorded: Sequence[KeptPose], outputs: Sequence[str], extra_columns: Mapping[str, Array]) -> Table:
     if not recorded:
         raise RecordError(f"run {run.run} has no pose yet; `rig resume` continues it")
     rows = [pose.dwell for pose in recorded]
@@ -100,7 +100,7 @@ def _table(run: Run, recorded: Sequence[Kept], outputs: Sequence[str], extra_col
     return replace(table, numbers=np.array([pose.number for pose in recorded]))
 
 
-def turns_table(run: Run, poses: Iterable[Kept]) -> Table:
+def turns_table(run: Run, poses: Iterable[KeptPose]) -> Table:
     """Every sample of a gyroscope and an accelerometer in turns between rests. Raises RecordError without a turn."""
     columns = turn_columns(poses, float(run.settings["rest_s"]))
     if not columns:
@@ -116,7 +116,7 @@ ROW_TABLES = {"poses": poses_table, "positions": positions_table, "rates": rates
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredRun:
     """A run for the analysis. `sensor` is one sensor of the batch, None without a batch."""
 
     record: Record
@@ -124,7 +124,7 @@ class Measured:
     sensor: str | None = None
 
     @classmethod
-    def named(cls, record: Record, name: str) -> Measured:
+    def named(cls, record: Record, name: str) -> MeasuredRun:
         """`RUN`, or `RUN/SENSOR` of a batch; a name of the sensor that finds the run (`last a1`) chooses it as well.
 
         Raises UnknownRun; RecordError for a batch without a sensor.
@@ -145,7 +145,7 @@ class Measured:
             raise RecordError(f"run {run_id} has the sensors {listed}; choose one, such as {run_id}/{sensor_names[0]}")
         return cls(record, run, sensor or None)
 
-    def kept(self) -> Iterator[Kept]:
+    def kept(self) -> Iterator[KeptPose]:
         """Every pose without an exclusion, in order, with the channels of the sensor and the common ones."""
         return (
             of_sensor(recorded, self.sensor) for recorded in self.record.kept(self.run.run) if recorded.excluded is None
@@ -219,8 +219,8 @@ class Measured:
 
 
 def table_of(record: Record, name: str) -> Table:
-    """The table of a measured or imported run, see `Measured`."""
-    return Measured.named(record, name).table()
+    """The table of a measured or imported run, see `MeasuredRun`."""
+    return MeasuredRun.named(record, name).table()
 
 
 def sensors_of(run: Run) -> list[str]:
@@ -228,7 +228,7 @@ def sensors_of(run: Run) -> list[str]:
     return list(run.bench.get("sensors", {}))
 
 
-def of_sensor(recorded: Kept, sensor: str | None) -> Kept:
+def of_sensor(recorded: KeptPose, sensor: str | None) -> KeptPose:
     """A pose with the channels of one sensor, without its name in them, and the common channels."""
     if sensor is None:
         return recorded

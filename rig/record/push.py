@@ -47,7 +47,7 @@ FINISHED = "complete"
 
 
 @dataclass(frozen=True)
-class Pushed:
+class PushedRun:
     """A run of the rig, and its name in the lab, which is different if a run of another rig has its name."""
 
     run: str
@@ -83,7 +83,7 @@ def unsent(local: Record, lab: Record, run_names: Sequence[str] = ()) -> list[st
     return [run for run, (uid, local_head) in heads.items() if lab_heads.get(uid) != local_head]
 
 
-def push_all(local: Record, lab: Record, run_names: Sequence[str]) -> Iterator[Pushed | RecordError]:
+def push_all(local: Record, lab: Record, run_names: Sequence[str]) -> Iterator[PushedRun | RecordError]:
     """Push each run. A run that the lab refuses does not hinder the others. Raises LabAway."""
     for run in run_names:
         try:
@@ -94,7 +94,7 @@ def push_all(local: Record, lab: Record, run_names: Sequence[str]) -> Iterator[P
             yield RecordError(f"run {run} is not pushed: {error}")
 
 
-def push(local: Record, lab: Record, run: str) -> Pushed:
+def push(local: Record, lab: Record, run: str) -> PushedRun:
     """Push the missing rows of a finished run. Raises LabAway; then the next push continues.
 
     Raises RecordError if the copy in the lab was changed there. The copy stays unchanged.
@@ -118,15 +118,15 @@ def _require_finished(local: Record, run: str) -> None:
         raise RecordError(f"run {run} is {state}, and only complete runs are pushed; `rig resume {run}` continues it")
 
 
-def _step(source: Connection, target: Connection, parcel: _Parcel) -> Pushed | None:
+def _step(source: Connection, target: Connection, parcel: _Parcel) -> PushedRun | None:
     """Push the next batch from the rig's record `source` to the lab's `target`. Returns None if there are more."""
     name, arrived = _arrival(target, parcel)
     if arrived == parcel.head:
-        return Pushed(parcel.run, name, "there", parcel.digest)
+        return PushedRun(parcel.run, name, "there", parcel.digest)
     if not _fill(source, target, parcel.run, name):
         return None
     _seal(source, target, parcel, name)
-    return Pushed(parcel.run, name, "pushed", parcel.digest)
+    return PushedRun(parcel.run, name, "pushed", parcel.digest)
 
 
 def _arrival(target: Connection, parcel: _Parcel) -> tuple[str, str | None]:
@@ -186,7 +186,7 @@ def _seal(source: Connection, target: Connection, parcel: _Parcel, name: str) ->
 
 
 @dataclass(frozen=True)
-class Verified:
+class Verification:
     """Names of runs in the lab. Readers do not see those on their way; the next push of the rig continues them."""
 
     sound: tuple[str, ...]
@@ -194,7 +194,7 @@ class Verified:
     changed: tuple[str, ...]
 
 
-def verify(lab: Record) -> Verified:
+def verify(lab: Record) -> Verification:
     """Compute the digest of every pushed run again, and compare it with the digest at its arrival. Raises LabAway."""
     with lab.engine.connect() as source:
         rows = source.execute(select(arrivals.c.run, arrivals.c.digest).order_by(arrivals.c.run)).all()
@@ -202,4 +202,4 @@ def verify(lab: Record) -> Verified:
     sound, changed_runs = (
         tuple(run for run, is_sound in is_sound_by_run.items() if is_sound is state) for state in (True, False)
     )
-    return Verified(sound, tuple(row.run for row in rows if row.digest is None), changed_runs)
+    return Verification(sound, tuple(row.run for row in rows if row.digest is None), changed_runs)

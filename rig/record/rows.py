@@ -44,7 +44,7 @@ from rig.record.schema import (
     runs,
     states,
 )
-from rig.record.values import Block, Event, Kept, Run
+from rig.record.values import Block, Event, KeptPose, Run
 
 MOST_LISTED = 5
 MOST_SUGGESTED = 20  # names of a kind from which a suggestion is chosen
@@ -266,7 +266,7 @@ def dwell_of(row: Row[Any]) -> Dwell:
     return Dwell(pose_of(row), row.t_s, row.means, row.stds, row.n, row.temperature_c)
 
 
-def kept_of(row: Row[Any]) -> Kept:
+def kept_of(row: Row[Any]) -> KeptPose:
     """A pose and its samples. Raises RecordError if the samples have an unknown format or cannot be decoded."""
     place = f"run {row.run}, pose {row.number}"
     if row.codec != codec.CODEC:
@@ -277,7 +277,7 @@ def kept_of(row: Row[Any]) -> Kept:
         raise RecordError(f"{place}: {error}; restore a copy of the record") from None
     pose = pose_of(row)
     block = Block(volts, tuple(row.channels), row.rate_hz, row.start_s)
-    return Kept(
+    return KeptPose(
         pose, block, excluded=row.excluded, number=row.number, **{name: row._mapping[name] for name in KEPT_COLUMNS}
     )
 

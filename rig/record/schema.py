@@ -39,11 +39,11 @@ SERVER = "postgresql"
 Counter = BigInteger().with_variant(Integer, "sqlite")
 
 
-class Damaged:
+class DamagedDocument:
     """A document that cannot be read."""
 
 
-DAMAGED = Damaged()
+DAMAGED = DamagedDocument()
 
 
 class Document(TypeDecorator[Any]):

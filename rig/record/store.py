@@ -68,7 +68,7 @@ from rig.record.schema import (
     runs,
     states,
 )
-from rig.record.values import Event, Kept, Line, Run
+from rig.record.values import Event, KeptPose, Line, Run
 
 MOST_LINES = 1000  # of the log in memory
 
@@ -140,7 +140,7 @@ class Record:
         with self.engine.begin() as connection:
             return new_run(connection, values | {"constants": dict(constants), "source": source})
 
-    def keep(self, run: str, number: int, recorded: Kept, state: Mapping[str, Any] | None) -> None:
+    def keep(self, run: str, number: int, recorded: KeptPose, state: Mapping[str, Any] | None) -> None:
         """Add pose, samples and the `state` of the simulated bench, in one transaction."""
         key = {"run": run, "number": number}
         pose = {name: getattr(recorded.pose, name) for name in POSE_COLUMNS}
@@ -302,7 +302,7 @@ class Record:
         rows = self._sound_rows(readings, run, readings.c.name)
         return [Reading(row.name, row.value, row.unit, row.std) for row in rows]
 
-    def kept(self, run: str) -> Iterator[Kept]:
+    def kept(self, run: str) -> Iterator[KeptPose]:
         """Every pose with its samples, in order, with the excluded ones. Only a few are in memory at a time."""
         match = (poses.c.run == blocks.c.run) & (poses.c.number == blocks.c.number)
         query = select(poses, blocks).join_from(poses, blocks, match).where(poses.c.run == run)

@@ -22,7 +22,7 @@ from calibrations.tables import KINDS
 from procedures.instruments import OUTPUTS, Samples
 from rig.bench import D63, TURNING, Bench, Instrument
 from rig.errors import RecordError
-from rig.record.values import Kept, Run
+from rig.record.values import KeptPose, Run
 
 Columns = Mapping[str, Array]
 
@@ -111,7 +111,7 @@ def constants(run: Run, sensor: str | None) -> dict[str, str | float]:
 # `motion` has the displacement in place of the displacement sensor's volts, and the attitude.
 
 
-def samples_table(run: Run, poses: Iterable[Kept]) -> Table:
+def samples_table(run: Run, poses: Iterable[KeptPose]) -> Table:
     """Every sample of the run's kind with its time. Raises RecordError without samples."""
     stretches = [recorded for recorded in poses if recorded.pose.path.split(" ")[0] == run.kind]
     if not stretches:
@@ -132,7 +132,7 @@ def samples_table(run: Run, poses: Iterable[Kept]) -> Table:
     return Table.from_columns(run.kind, columns, constants, run.run)
 
 
-def _attitude(stretches: Sequence[Kept]) -> dict[str, Array]:
+def _attitude(stretches: Sequence[KeptPose]) -> dict[str, Array]:
     """Stage angles and temperature, one value for each stretch; columns with an unknown value are omitted."""
     lengths = [len(recorded.samples.volts) for recorded in stretches]
     values: dict[str, list[float | None]] = {
@@ -145,7 +145,7 @@ def _attitude(stretches: Sequence[Kept]) -> dict[str, Array]:
     return {name: np.repeat(np.array(v, dtype=float), lengths) for name, v in values.items() if None not in v}
 
 
-def _times_s(recorded: Kept) -> Array:
+def _times_s(recorded: KeptPose) -> Array:
     """Times of the samples of a stretch on the run's clock, s."""
     n, rate_hz = len(recorded.samples.volts), recorded.samples.rate_hz
     return np.asarray(recorded.t_s + (np.arange(n) - n / 2) / rate_hz)
@@ -158,7 +158,7 @@ MOST_BLOCKS = 256  # blocks of a run for the measurement of its noise: bounds th
 SURE = 0.1  # relative standard error above which the formula of the filter is better
 
 
-def poses_table(run: Run, poses: Iterable[Kept]) -> Table:
+def poses_table(run: Run, poses: Iterable[KeptPose]) -> Table:
     """A row for each of the run's `poses`. Raises RecordError without one."""
     rows: list[dict[str, float]] = []
     paths: list[str] = []
@@ -185,7 +185,7 @@ def poses_table(run: Run, poses: Iterable[Kept]) -> Table:
     return replace(table, numbers=np.array(numbers))
 
 
-def _row(recorded: Kept, units: Mapping[str, str]) -> dict[str, float]:
+def _row(recorded: KeptPose, units: Mapping[str, str]) -> dict[str, float]:
     """The numbers of one pose by column."""
     pose, samples = recorded.pose, recorded.samples
     row: dict[str, float] = {"alpha_deg": pose.alpha_deg, "beta_deg": pose.beta_deg, "direction": pose.direction}

@@ -11,7 +11,7 @@ import numpy as np
 
 from calibrations.table import Array
 from procedures.hand_turns import FORCES, RATES, TURN
-from procedures.session import Pose, Recorded
+from procedures.session import Pose, RecordedPose
 
 
 def is_turn(pose: Pose) -> bool:
@@ -19,14 +19,14 @@ def is_turn(pose: Pose) -> bool:
     return TURN in pose.path
 
 
-def turn_columns(poses: Iterable[Recorded], rest_s: float) -> dict[str, Array]:
+def turn_columns(poses: Iterable[RecordedPose], rest_s: float) -> dict[str, Array]:
     """Columns of all samples of the turns that can be used and of their rests; empty without a turn.
 
     A turn without the rest after it does not count: the run was interrupted, or one of both is excluded. After an
     interruption the next rest does not follow in time.
     """
     parts: list[dict[str, Array]] = []
-    turn: Recorded | None = None
+    turn: RecordedPose | None = None
     for recorded in poses:
         if turn is not None and not is_turn(recorded.pose) and _follows(recorded, turn):
             parts.append(_samples(turn, recorded, rest_s))
@@ -35,13 +35,13 @@ def turn_columns(poses: Iterable[Recorded], rest_s: float) -> dict[str, Array]:
     return {name: np.concatenate([part[name] for part in parts]) for name in names}
 
 
-def _follows(rest: Recorded, turn: Recorded) -> bool:
+def _follows(rest: RecordedPose, turn: RecordedPose) -> bool:
     """Whether the samples of both are one record without a gap."""
     between_s = (len(turn.samples.volts) + len(rest.samples.volts)) / turn.samples.rate_hz / 2
     return abs(rest.t_s - turn.t_s - between_s) < 2 / turn.samples.rate_hz
 
 
-def _samples(turn: Recorded, rest: Recorded, rest_s: float) -> dict[str, Array]:
+def _samples(turn: RecordedPose, rest: RecordedPose, rest_s: float) -> dict[str, Array]:
     """The samples of a turn and of the rest after it."""
     volts = np.concatenate([turn.samples.volts, rest.samples.volts])
     rate_hz, n, moving = turn.samples.rate_hz, len(volts), len(turn.samples.volts)

@@ -87,7 +87,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Kept:
+class KeptPose:
     """A recorded pose: its samples, the middle of its dwell (s), its temperature (C, or None)."""
 
     pose: Pose

@@ -8,14 +8,14 @@ import numpy as np
 
 from calibrations.analyses.misalignment import Direction, correction_matrix, estimate_directions, non_orthogonality_deg
 from procedures.level_check import reversal
-from rig.record.measured import Measured
+from rig.record.measured import MeasuredRun
 from rig.results.result import Result, evaluates
 
 REFERENCE = "xyz"
 
 
 @evaluates("level-check", of_bench=True)
-def level_check(measured: Measured) -> dict[str, Result]:
+def level_check(measured: MeasuredRun) -> dict[str, Result]:
     """Tilt of the table or of the base along x and y of the level, and the offset of the level, deg."""
     readings = {reading.name: reading for reading in measured.readings()}
     place = "base" if measured.run.settings.get("on") == "base" else "level"
@@ -30,7 +30,7 @@ def level_check(measured: Measured) -> dict[str, Result]:
 
 
 @evaluates("misalignment")
-def misalignment(measured: Measured) -> dict[str, Result]:
+def misalignment(measured: MeasuredRun) -> dict[str, Result]:
     """theta-xx .. theta-yz, alpha-x .. beta-y in deg, and the matrix of Ang (20)-(21) that corrects accelerations.
 
     Raises DataError if no round of the search is complete.

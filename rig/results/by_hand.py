@@ -11,7 +11,7 @@ from calibrations.analyses.hand_positions import ANGLES, fit_positions, largest_
 from calibrations.geometry.sphere import magnetometer_coverage_warning
 from calibrations.means.noise import rms
 from rig.bench.result_names import SOFT_IRON_PAIRS
-from rig.record.measured import Measured
+from rig.record.measured import MeasuredRun
 from rig.results.result import Missing, Result, evaluates, result
 
 
@@ -33,7 +33,7 @@ TARGET_PERCENT = Target("target_percent", "%", 1.0, "%")
 
 
 @evaluates("hand-positions")
-def hand_positions(measured: Measured) -> dict[str, Result | Missing]:
+def hand_positions(measured: MeasuredRun) -> dict[str, Result | Missing]:
     """From all positions together, by the magnitude of gravity:
 
     bias                 output without specific force, in the unit of the outputs
@@ -53,7 +53,7 @@ def hand_positions(measured: Measured) -> dict[str, Result | Missing]:
 
 
 @evaluates("hand-fields")
-def hand_fields(measured: Measured) -> dict[str, Result | Missing]:
+def hand_fields(measured: MeasuredRun) -> dict[str, Result | Missing]:
     """From all positions together, by the magnitude of the field:
 
     hard-iron          of each axis, in the unit of the outputs
@@ -84,7 +84,7 @@ def hand_fields(measured: Measured) -> dict[str, Result | Missing]:
 
 
 @evaluates("hand-turns")
-def hand_turns(measured: Measured) -> dict[str, Result | Missing]:
+def hand_turns(measured: MeasuredRun) -> dict[str, Result | Missing]:
     """From all turns together, by the direction of gravity before and after each:
 
     gyro-bias             output at rest, in the unit of the outputs
@@ -106,7 +106,7 @@ def hand_turns(measured: Measured) -> dict[str, Result | Missing]:
 
 
 def _uncertainty(
-    measured: Measured, value: float, known: str, rows: str, target: Target
+    measured: MeasuredRun, value: float, known: str, rows: str, target: Target
 ) -> dict[str, Result | Missing]:
     """The result `uncertainty`, in the unit of the target; Missing well above it. `known`: how well, in words."""
     wanted = float(measured.run.settings.get(target.setting, math.inf))

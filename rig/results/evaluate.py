@@ -11,7 +11,7 @@ from calibrations.text import join_words
 from rig.bench import Bench
 from rig.errors import RecordError
 from rig.record import Record, Run
-from rig.record.measured import Measured, sensors_of
+from rig.record.measured import MeasuredRun, sensors_of
 from rig.results.result import EVALUATIONS, Evaluation, Missing, Result, documents
 
 MODULES = {  # with the evaluation of each procedure, imported when it is needed
@@ -57,8 +57,8 @@ def evaluate_results(record: Record, run: Run) -> dict[str, Result | Missing]:
     evaluation = _evaluation(run.procedure)
     sensors = [] if evaluation.of_bench else sensors_of(run)
     if not sensors:
-        return dict(evaluation.evaluate(Measured(record, run)))
-    by_sensor = {sensor: evaluation.evaluate(Measured(record, run, sensor)) for sensor in sensors}
+        return dict(evaluation.evaluate(MeasuredRun(record, run)))
+    by_sensor = {sensor: evaluation.evaluate(MeasuredRun(record, run, sensor)) for sensor in sensors}
     return {f"{sensor}/{name}": result for sensor, results in by_sensor.items() for name, result in results.items()}
 
 

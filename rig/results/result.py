@@ -19,7 +19,7 @@ from calibrations.model import Estimate
 from calibrations.model.file import read_model
 from calibrations.table import Table
 from procedures.errors import ProcedureError
-from rig.record.measured import Measured
+from rig.record.measured import MeasuredRun
 
 Limit = float | tuple[float, float]
 
@@ -57,12 +57,12 @@ class Evaluation:
     `of_bench`: the results are those of the bench, and the same for all sensors of a batch.
     """
 
-    evaluate: Callable[[Measured], Mapping[str, Result | Missing]]
+    evaluate: Callable[[MeasuredRun], Mapping[str, Result | Missing]]
     of_bench: bool = False
 
 
 EVALUATIONS: dict[str, Evaluation] = {}
-Evaluate = TypeVar("Evaluate", bound=Callable[[Measured], Mapping[str, Any]])
+Evaluate = TypeVar("Evaluate", bound=Callable[[MeasuredRun], Mapping[str, Any]])
 
 
 def evaluates(procedure: str, *, of_bench: bool = False) -> Callable[[Evaluate], Evaluate]:

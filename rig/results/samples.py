@@ -11,8 +11,8 @@ from calibrations.geometry.orientation import UPRIGHT_DEG
 from procedures.instruments import output_channel
 from procedures.motion import SWEEP
 from procedures.noise_floor import STILL
-from rig.record import Kept
-from rig.record.measured import Measured
+from rig.record import KeptPose
+from rig.record.measured import MeasuredRun
 from rig.record.tables import units_of
 from rig.results.result import Missing, Result, evaluates
 
@@ -20,13 +20,13 @@ PEAK_TO_PEAK = 4  # x rms: Ang V
 
 
 @evaluates("noise-floor")
-def noise_floor(measured: Measured) -> dict[str, Result | Missing]:
+def noise_floor(measured: MeasuredRun) -> dict[str, Result | Missing]:
     """Noise in the unit of the outputs, inclination in deg. The inclination needs the poses at +1 g and -1 g.
 
     Raises DataError without a still record.
     """
-    upright: list[Kept] = []
-    still: list[Kept] = []
+    upright: list[KeptPose] = []
+    still: list[KeptPose] = []
     for recorded in measured.kept():
         (still if recorded.pose.path.startswith(STILL) else upright).append(recorded)
     if not still:
@@ -43,7 +43,7 @@ def noise_floor(measured: Measured) -> dict[str, Result | Missing]:
     return results
 
 
-def _inclination(upright: list[Kept], axis: str, channel: str, rms: float, std: float) -> Result | Missing:
+def _inclination(upright: list[KeptPose], axis: str, channel: str, rms: float, std: float) -> Result | Missing:
     outputs = []
     for beta_deg in UPRIGHT_DEG[axis]:
         at_pose = [recorded.dwell.means[channel] for recorded in upright if recorded.pose.beta_deg == beta_deg]
@@ -56,7 +56,7 @@ def _inclination(upright: list[Kept], axis: str, channel: str, rms: float, std: 
 
 
 @evaluates("motion")
-def motion(measured: Measured) -> dict[str, Result]:
+def motion(measured: MeasuredRun) -> dict[str, Result]:
     """rmse-linear-x, rmse-physical-x, noise-limit-x and amplitude in mm/s^2, improvement-x, frequency in Hz.
 
     Raises SensorFault for a reading outside the curve of the displacement sensor; RecordError or DataError if a part of
@@ -66,7 +66,7 @@ def motion(measured: Measured) -> dict[str, Result]:
     return {name: Result(q.value, "" if q.unit == "1" else q.unit, q.std) for name, q in results.items()}
 
 
-def compare_with_displacement(measured: Measured) -> MotionResult:
+def compare_with_displacement(measured: MeasuredRun) -> MotionResult:
     """Both models compared with the displacement sensor, as in Ang Fig. 12. Raises as `motion`."""
     sweep = measured.part("poses", SWEEP)
     return evaluate_motion(measured.table(), linear_from_turns(sweep), fit_physical(sweep), measured.part("still"))

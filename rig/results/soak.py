@@ -15,7 +15,7 @@ from calibrations.table import Table, std_column
 from procedures.instruments import OUTPUTS, output_channel
 from procedures.session import Dwell
 from procedures.soak import REVERSAL
-from rig.record.measured import Measured
+from rig.record.measured import MeasuredRun
 from rig.results.result import Result, evaluates
 
 ENDS = {names["xyz".index(axis)] for names in OUTPUTS for axis in AXES}
@@ -23,7 +23,7 @@ FEWEST_STEADY = 3  # reversals after the steady state before it ends a soak
 
 
 @evaluates("soak")
-def soak(measured: Measured) -> dict[str, Result]:
+def soak(measured: MeasuredRun) -> dict[str, Result]:
     """Results of each axis and of all axes. Times in h are since power-on.
 
     steady-state           1 if it is reached within the soak, else 0
@@ -59,12 +59,12 @@ def soak(measured: Measured) -> dict[str, Result]:
     return results | {"gap": Result(sum(gap.length_s for gap in soak.gaps), "s")}
 
 
-def read_soak(measured: Measured) -> Soak:
+def read_soak(measured: MeasuredRun) -> Soak:
     """The soak of the run. Times are since power-on, or since the beginning if that is not known."""
     return soak_of(measured.table(), measured.run.settings["oven_c"])
 
 
-def read_forecasts(measured: Measured) -> dict[str, ForecastHistory]:
+def read_forecasts(measured: MeasuredRun) -> dict[str, ForecastHistory]:
     """The forecasts of each quantity in the course of the run."""
     return forecast_history(measured.table(), measured.run.settings["oven_c"])
 

@@ -22,14 +22,14 @@ from calibrations.table import Array, Table
 from procedures.questions import EDGES
 from procedures.session import Pose
 from rig.bench.result_names import SOFT_IRON_PAIRS
-from rig.record.measured import Measured, sensor_from_base
+from rig.record.measured import MeasuredRun, sensor_from_base
 from rig.results.result import Missing, Result, evaluates, fit_shipped, result
 
 AXES = "xyz"
 
 
 @evaluates("rate-turn")
-def rate_turn(measured: Measured) -> dict[str, Result | Missing]:
+def rate_turn(measured: MeasuredRun) -> dict[str, Result | Missing]:
     """For each axis:
 
     gyro-bias                output at rest without specific force, in the unit of the outputs
@@ -63,7 +63,7 @@ DECLINATION = "field-declination"
 
 
 @evaluates("magnetometer-turn")
-def magnetometer_turn(measured: Measured) -> dict[str, Result | Missing]:
+def magnetometer_turn(measured: MeasuredRun) -> dict[str, Result | Missing]:
     """By an ellipsoid fit to all directions (equations of Book 17):
 
     hard-iron                of each axis, in the unit of the outputs

@@ -9,7 +9,7 @@ from calibrations.analyses.tumble import bias_coefficients, estimate_tumbles, sc
 from calibrations.criteria import FEWEST_FOR_DRIFT
 from procedures.instruments import output_channel
 from procedures.sweep import REFERENCE
-from rig.record.measured import Measured
+from rig.record.measured import MeasuredRun
 from rig.record.tables import units_of
 from rig.results.result import Missing, Result, evaluates
 
@@ -18,7 +18,7 @@ HOUR_S = 3600.0
 
 
 @evaluates("check-standard")
-def check_standard(measured: Measured) -> dict[str, Result]:
+def check_standard(measured: MeasuredRun) -> dict[str, Result]:
     """bias-x in the unit of the outputs and scale-x per g, the same of y; uncertainties by white noise alone.
 
     Raises DataError.
@@ -33,7 +33,7 @@ def check_standard(measured: Measured) -> dict[str, Result]:
 
 
 @evaluates("repeat")
-def repeat(measured: Measured) -> dict[str, Result | Missing]:
+def repeat(measured: MeasuredRun) -> dict[str, Result | Missing]:
     """bias-as-is-x in the unit of the outputs, scale-power-y as a fraction, and so on.
 
     Raises DataError for fewer than two repetitions.
@@ -60,7 +60,7 @@ def _spread(estimate: tuple[float, float | None], unit: str) -> Result | Missing
 
 
 @evaluates("temperature-cycle")
-def temperature_cycle(measured: Measured) -> dict[str, Result]:
+def temperature_cycle(measured: MeasuredRun) -> dict[str, Result]:
     """Slopes of the bias per K, in the unit of the outputs, and of the scale factor in 1/K; hysteresis (up minus down)
     in the unit of the outputs and as a fraction. Raises DataError for too few steps."""
     table, results = measured.table(), {}
@@ -78,7 +78,7 @@ def temperature_cycle(measured: Measured) -> dict[str, Result]:
 
 
 @evaluates("sweep")
-def sweep(measured: Measured) -> dict[str, Result]:
+def sweep(measured: MeasuredRun) -> dict[str, Result]:
     """Trend of the outputs at the reference pose, an hour, with the standard error that its scatter gives."""
     if not measured.run.settings.get("reference_every"):
         return {}

@@ -28,8 +28,8 @@ from procedures.questions import EDGES
 from procedures.session import Dwell, Pose
 from procedures.tumbles import tumble
 from rig.planning.plan import turn_words
-from rig.record import Kept, Record
-from rig.record.measured import FIELD, RATE, Measured, of_sensor, sensor_from_table, sensors_of, specific_force_g
+from rig.record import KeptPose, Record
+from rig.record.measured import FIELD, RATE, MeasuredRun, of_sensor, sensor_from_table, sensors_of, specific_force_g
 from rig.record.tables import units_of
 from rig.results.soak import table_of
 
@@ -97,13 +97,13 @@ class RunningEstimates:
             for _, dwell in record.dwells(run) if self.law else ():
                 self._take(dwell)
 
-    def values(self, recorded: Kept) -> list[Value]:
+    def values(self, recorded: KeptPose) -> list[Value]:
         """The estimates after one more pose."""
         self._take(recorded.dwell)
         self.pose = recorded.pose
         return list(self._estimates())
 
-    def report(self, recorded: Kept) -> str:
+    def report(self, recorded: KeptPose) -> str:
         """The estimates in lines, if this pose begins a new path; they do not include this pose."""
         previous = self.pose
         turn_text = (
@@ -191,14 +191,14 @@ class Follower:
     length_s: float = 0.0  # of its samples
 
     @classmethod
-    def of(cls, measured: Measured) -> Follower:
+    def of(cls, measured: MeasuredRun) -> Follower:
         """With the poses in the record."""
         forecast = SoakForecast({}, measured.run.settings["oven_c"])
         if measured.run.rows:
             *_, forecast = [forecast, *filter_soak(measured.table(), forecast.oven_c)]
         return cls(measured.sensor, measured.constants, forecast)
 
-    def kept(self, recorded: Kept, on_s: float) -> bool:
+    def kept(self, recorded: KeptPose, on_s: float) -> bool:
         """Take one more pose; `on_s` is the time of power-on. Returns whether the pose completes a reversal."""
         dwell = of_sensor(recorded, self.sensor).dwell
         if self.part and self.part[0].pose.path != dwell.pose.path:
@@ -229,21 +229,23 @@ class SoakForecaster:
         """The run begins or continues: take the poses in the record."""
         with Record() as record:
             run_row = record.run(run)
-            sensors = [Measured(record, run_row, name) for name in sensors_of(run_row)] or [Measured(record, run_row)]
+            sensors = [MeasuredRun(record, run_row, name) for name in sensors_of(run_row)] or [
+                MeasuredRun(record, run_row)
+            ]
             self.followers = [Follower.of(sensor) for sensor in sensors]
         self.run, self.on_s = run, None
         self.unit = str(run_row.constants.get("unit", "V"))
 
-    def values(self, recorded: Kept) -> list[Value]:
+    def values(self, recorded: KeptPose) -> list[Value]:
         """The forecast of each quantity, if this pose completes a reversal."""
         forecasts = self.forecasts(recorded)
         return [Value(name, present(name, f, self.unit), outlook(name, f, self.unit)) for name, f in forecasts.items()]
 
-    def forecasts(self, recorded: Kept) -> dict[str, Forecast]:
+    def forecasts(self, recorded: KeptPose) -> dict[str, Forecast]:
         """The forecast of each quantity by name, if this pose completes a reversal."""
         if self.on_s is None:
             with Record() as record:
-                self.on_s = Measured(record, record.run(self.run)).power_on_s()
+                self.on_s = MeasuredRun(record, record.run(self.run)).power_on_s()
         turned = [follower.kept(recorded, self.on_s) for follower in self.followers]
         if not any(turned):
             return {}
@@ -253,7 +255,7 @@ class SoakForecaster:
             for name, forecast in follower.forecast.forecasts().items()
         }
 
-    def report(self, recorded: Kept) -> str:
+    def report(self, recorded: KeptPose) -> str:
         """The forecasts in lines; empty if this pose does not complete a reversal."""
         return lines(forecasts, self.unit) if (forecasts := self.forecasts(recorded)) else ""
 

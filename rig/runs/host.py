@@ -8,12 +8,12 @@ from typing import Any
 
 from procedures.instruments import Samples
 from procedures.questions import Question
-from procedures.session import Dwell, Guidance, Pose, Reading, Recorded
+from procedures.session import Dwell, Guidance, Pose, Reading, RecordedPose
 from rig.errors import RunMismatch
 from rig.instruments.instruments import Rig
 from rig.instruments.person import answer, follow
-from rig.record import Kept, Record, Run
-from rig.record.measured import Measured, of_sensor
+from rig.record import KeptPose, Record, Run
+from rig.record.measured import MeasuredRun, of_sensor
 from rig.runs.observer import Observer
 
 
@@ -49,7 +49,7 @@ class RunHost:
         self._record, self._rig, self._run, self._observer = record, rig, run.run, observer
         self._poses = record.poses(run.run)
         self._next = record.next_number(run.run)
-        self._measured = Measured(record, run, rig.bench.first_sensor)
+        self._measured = MeasuredRun(record, run, rig.bench.first_sensor)
         self._dwells: list[Dwell] | None = None  # read from the record if the procedure needs them
         self._answers = {e.what: e.text for e in record.events(run.run) if e.what.startswith("answer ")}
         self._zero_s = state["zero_s"] if state else _zero_s(rig, run)
@@ -67,7 +67,7 @@ class RunHost:
             self._dwells = [recorded.dwell for recorded in self._measured.kept()]
         return self._dwells
 
-    def recorded(self) -> Sequence[Recorded]:
+    def recorded(self) -> Sequence[RecordedPose]:
         return list(self._measured.kept())
 
     def readings(self) -> Sequence[Reading]:
@@ -81,7 +81,7 @@ class RunHost:
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
         middle_s = samples.start_s + len(samples.volts) / samples.rate_hz / 2
         dials = self._rig.read_deg()
-        recorded = Kept(
+        recorded = KeptPose(
             pose,
             samples,
             middle_s - self._zero_s,

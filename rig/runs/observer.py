@@ -22,7 +22,7 @@ from procedures.questions import Choice, Question
 from procedures.session import Guidance, Limits, Reading
 from rig.bench import Bench
 from rig.planning.plan import Plan
-from rig.record import Kept, Run
+from rig.record import KeptPose, Run
 from rig.runs.estimates import Value, live_estimates
 
 UNUSUAL = 2.0  # ratio to the usual scatter, up or down, above which it is shown
@@ -66,7 +66,7 @@ class Observer:
     def expect(self, total: int, recorded_poses: int) -> None:
         """The number of poses of the run, and how many of them are recorded."""
 
-    def kept(self, recorded: Kept) -> None:
+    def kept(self, recorded: KeptPose) -> None:
         """A pose is recorded."""
 
     def read(self, reading: Reading) -> None:
@@ -152,7 +152,7 @@ class RunView:
     unit_of: Callable[[str], str]  # of a channel
     now: str = "connecting"
     progress: Progress = field(default_factory=Progress)
-    kept: Kept | None = None
+    kept: KeptPose | None = None
     usual: Mapping[str, float] = field(default_factory=dict)
     tilt: Mapping[str, float] = field(default_factory=dict)
     estimates: Sequence[Value] = ()
@@ -206,7 +206,7 @@ class RunViewer(Observer):
     def expect(self, total: int, recorded_poses: int) -> None:
         self._change(progress=self.view.progress.expect(total, recorded_poses))
 
-    def kept(self, recorded: Kept) -> None:
+    def kept(self, recorded: KeptPose) -> None:
         """Update the values with a new pose, and the usual scatter with the poses before it."""
         kind = recorded.pose.path.partition(" ")[0]
         usual = {}

@@ -38,7 +38,7 @@ from rig.bench.certificates import EXPIRED, certificates
 from rig.files import program
 from rig.record import Record, Run
 from rig.record.codec import digest_of
-from rig.record.measured import PROGRAM_CHANGED, Measured
+from rig.record.measured import PROGRAM_CHANGED, MeasuredRun
 from rig.services.provenance import today
 
 # condition's column -> name and unit
@@ -49,7 +49,7 @@ PLACES = ("alpha_deg", "beta_deg", "direction", "path")
 
 
 @dataclass(frozen=True)
-class Certified:
+class CertificateInput:
     """The input of a certificate: a table, a model with the name that people use, and the bench.
 
     `before`: name or file of the model in use until now; None: `model`, if it has values from other data.
@@ -64,7 +64,7 @@ class Certified:
     before: str | None = None
 
 
-def certified(subject: Certified, number: str = "", customer: str = "") -> Certificate:
+def certified(subject: CertificateInput, number: str = "", customer: str = "") -> Certificate:
     """The certificate, with the laboratory of the bench (that of the run where None is given).
 
     Raises ModelError for data without a reference; UnusableData, UnknownName, RecordError.
@@ -136,7 +136,7 @@ def certificate_head(certificate: Certificate) -> str:
     return f"{certificate.headline}, No. {certificate.number}{remark}"
 
 
-def _results(subject: Certified, limits: Mapping[str, float | tuple[float, float]]) -> tuple[Fit, Figures, str]:
+def _results(subject: CertificateInput, limits: Mapping[str, float | tuple[float, float]]) -> tuple[Fit, Figures, str]:
     """The fit, its figures, and in words the model in use until now, where it has values from other data."""
     earlier, name = subject.model, subject.name
     if subject.before is not None:
@@ -149,13 +149,13 @@ def _results(subject: Certified, limits: Mapping[str, float | tuple[float, float
 
 
 @contextmanager
-def _open_run(data: str) -> Iterator[Measured | None]:
+def _open_run(data: str) -> Iterator[MeasuredRun | None]:
     """The run, while its record is open; None for a file."""
     if Path(data).is_file():
         yield None
         return
     with Record.to_find(data) as record:
-        yield Measured.named(record, data)
+        yield MeasuredRun.named(record, data)
 
 
 def _laboratory(bench: Bench | None) -> tuple[Laboratory, str]:
@@ -274,7 +274,7 @@ def _remarks(run: Run | None, bench: Bench | None) -> Iterator[str]:
         yield "The bench file does not name the laboratory (key laboratory)."
 
 
-def _samples(table: Table, measured: Measured | None) -> Iterator[Sample]:
+def _samples(table: Table, measured: MeasuredRun | None) -> Iterator[Sample]:
     """Every row of the table, with the digest of its block of samples, or of its own numbers where there is none."""
     digests: dict[int, str] = {}
     if measured is not None and measured.run.bench:  # of the whole block, also where a batch shares it

@@ -26,13 +26,13 @@ from calibrations.presentation.chart import (
     single_chart,
 )
 from calibrations.presentation.charts.history import Life
-from calibrations.presentation.charts.noise import TIME, Scaled, measured_points
+from calibrations.presentation.charts.noise import TIME, Scaling, measured_points
 from calibrations.presentation.residual import ChannelResidual, Column
 from calibrations.table import in_time
 from calibrations.text import add_prefix, axis_label, estimate_in_prefix, estimate_text, minus, unit
 from procedures.session import Dwell
 from rig.record import Record, Run
-from rig.record.measured import Measured
+from rig.record.measured import MeasuredRun
 from rig.services.history import Calibration, Quantity
 from rig.services.two_runs import DIFFERENT, Pair, RepeatedPoses
 
@@ -130,7 +130,9 @@ class RunTime:
     def of(cls, record: Record, run: Run) -> RunTime:
         """Power-on of a run that switches the sensor, else the first pose."""
         start_time = datetime.fromisoformat(run.created)
-        on_s = Measured(record, run, next(iter(run.bench.get("sensors", {})), None)).power_on_s() if run.rows else 0.0
+        on_s = (
+            MeasuredRun(record, run, next(iter(run.bench.get("sensors", {})), None)).power_on_s() if run.rows else 0.0
+        )
         first = next(record.kept(run.run), None)
         first_s = first.t_s if first is not None else 0.0
         if on_s or run.procedure == "soak":
@@ -257,7 +259,7 @@ def difference(first: ChannelResidual, repeated: RepeatedPoses) -> Chart:
     return single_chart(Panel(series, Axis("β (deg)", ticks="quarters"), y))
 
 
-def deviations(curves: Sequence[DeviationComparison], scaled: Sequence[Scaled]) -> Chart:
+def deviations(curves: Sequence[DeviationComparison], scaled: Sequence[Scaling]) -> Chart:
     """The Allan deviations of two still records, bars intervals of 95 %; lines are the model fitted to each."""
     series: list[Line | Points] = []
     styles: tuple[tuple[str, str, Symbol, Dash], ...] = (

@@ -21,7 +21,7 @@ from calibrations.compensation.document import (
 )
 from calibrations.compensation.forward import LEFT_OUT
 from calibrations.compensation.inverse import Compensation
-from calibrations.exporting.simulated import Exported
+from calibrations.exporting.simulated import ExportedFile
 from rig.files import program
 from rig.services.provenance import today
 
@@ -78,7 +78,7 @@ def compensation_lines(compensation: Compensation) -> list[str]:
     return [*lines, uncertainty_text(compensation), coverage_text(compensation)]
 
 
-def export_lines(exported: Exported) -> list[str]:
+def export_lines(exported: ExportedFile) -> list[str]:
     """Errors, losses and remarks of a file for another program, in words."""
     lines = [
         f"{sensor}: the file's outputs differ from the model's by {error_text(rms, unit)} rms, "
@@ -88,7 +88,7 @@ def export_lines(exported: Exported) -> list[str]:
     return [*lines, *(loss.text for loss in exported.losses), *exported.notes]
 
 
-def export_document(exported: Exported, form: str, models: Sequence[str], out: Path) -> dict[str, Any]:
+def export_document(exported: ExportedFile, form: str, models: Sequence[str], out: Path) -> dict[str, Any]:
     """The JSON document `rig.export-model/1`."""
     return {
         "schema": "rig.export-model/1",

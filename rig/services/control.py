@@ -24,7 +24,7 @@ HEAD = ("sensor", "quantity", "runs", "centre", "sigma", "last", "verdict")
 
 
 @dataclass(frozen=True)
-class Controlled:
+class ControlledQuantity:
     """One quantity of one check standard: its chart, and the runs that its values are of, in order."""
 
     sensor: str
@@ -36,7 +36,7 @@ class Controlled:
 
 def make_charts(
     runs: Iterable[Run], sensor: str | None = None, baseline: int = BASELINE_RUNS, since: str | None = None
-) -> list[Controlled]:
+) -> list[ControlledQuantity]:
     """The charts of `runs` (newest first, as the record gives them), of one `sensor` or of all; from run `since` on.
 
     Raises RecordError where there is nothing to chart, UnknownRun where `since` is none of the check-standard runs.
@@ -62,13 +62,13 @@ def make_charts(
 # In words, for the command and the page.
 
 
-def worst(charts: Iterable[Controlled]) -> str:
+def worst(charts: Iterable[ControlledQuantity]) -> str:
     """The worst verdict of all charts."""
     verdicts = {chart.chart.verdict for chart in charts}
     return next(verdict for verdict in (OUT, "in control", "baseline") if verdict in verdicts)
 
 
-def row(quantity: Controlled) -> tuple[str, ...]:
+def row(quantity: ControlledQuantity) -> tuple[str, ...]:
     """The cells below `HEAD`."""
     chart = quantity.chart
     last = concise(float(chart.values[-1]), chart.sigma, quantity.unit)
@@ -78,7 +78,7 @@ def row(quantity: Controlled) -> tuple[str, ...]:
     return quantity.sensor, quantity.quantity, progress, centre, sigma, last, chart.verdict
 
 
-def signals(quantity: Controlled) -> list[str]:
+def signals(quantity: ControlledQuantity) -> list[str]:
     """A line for every run outside a limit."""
     chart, name = quantity.chart, f"{quantity.sensor} {quantity.quantity}"
     jumps = [
@@ -114,8 +114,8 @@ def _points(run: Run) -> Iterator[_Point]:
         yield _Point(sensor.get("serial") or sensor["name"], quantity, run.run, result)
 
 
-def _control(sensor: str, quantity: str, points: list[_Point], baseline: int) -> Controlled:
+def _control(sensor: str, quantity: str, points: list[_Point], baseline: int) -> ControlledQuantity:
     stds = [point.result["std"] or 0.0 for point in points]
     least_sigma = float(np.sqrt(np.mean(np.square(stds[:baseline]))))
     chart = control_chart([point.result["value"] for point in points], baseline, least_sigma)
-    return Controlled(sensor, quantity, points[0].result["unit"], tuple(point.run for point in points), chart)
+    return ControlledQuantity(sensor, quantity, points[0].result["unit"], tuple(point.run for point in points), chart)

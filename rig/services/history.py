@@ -30,7 +30,7 @@ from rig.bench import read_bench
 from rig.bench.certificates import EXPIRED
 from rig.errors import RecordError, RigError
 from rig.record import Record, Run
-from rig.record.measured import Measured, sensors_of
+from rig.record.measured import MeasuredRun, sensors_of
 
 
 def members(run: Run) -> dict[str, str]:
@@ -255,7 +255,7 @@ def _calibration(record: Record, data: str, run: Run, model: Model) -> Calibrati
     """Raises CalibrationError where the run does not determine the model."""
     check_kind(run.kind, data)  # a night at rest is gigabytes of samples
     date = date_of(run)
-    table = Measured.named(record, data).table()
+    table = MeasuredRun.named(record, data).table()
     fitted = fit(model, table)
     values = {
         result_name(term.effect, e.name, e.axis): Value(e.value, e.std, e.unit)

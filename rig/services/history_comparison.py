@@ -17,7 +17,7 @@ from rig.services.history import Calibration, History, Value, closest
 
 
 @dataclass(frozen=True)
-class Compared:
+class CalibrationComparison:
     """`one` and `other` for people; unit and agreement of every quantity that both have, by its name. `data`: the two
     runs, None of means over several."""
 
@@ -32,10 +32,10 @@ class Compared:
         return all(agreement.agrees for _, agreement in self.rows.values())
 
 
-def compare_sensors(life: History, other_sensor: str, last: Calibration) -> Compared:
+def compare_sensors(life: History, other_sensor: str, last: Calibration) -> CalibrationComparison:
     """The last calibrations of two sensors. Raises DataError, see `compare`."""
     own_last = life.calibrations[-1]
-    return Compared(
+    return CalibrationComparison(
         f"{life.sensor}, {own_last.day}",
         f"{other_sensor}, {last.day}",
         compare(own_last, last),
@@ -43,15 +43,15 @@ def compare_sensors(life: History, other_sensor: str, last: Calibration) -> Comp
     )
 
 
-def compare_days(life: History, first_day: date, second_day: date) -> Compared:
+def compare_days(life: History, first_day: date, second_day: date) -> CalibrationComparison:
     """The calibrations closest to two days. Raises DataError, see `compare`."""
     a, b = (closest(life.calibrations, day)[0] for day in (first_day, second_day))
-    return Compared(a.day, b.day, compare(a, b), (a.data, b.data))
+    return CalibrationComparison(a.day, b.day, compare(a, b), (a.data, b.data))
 
 
-def compare_rigs(calibrations: Sequence[Calibration], first_rig: str, second_rig: str) -> Compared:
+def compare_rigs(calibrations: Sequence[Calibration], first_rig: str, second_rig: str) -> CalibrationComparison:
     """The means of all calibrations on two rigs. Raises RecordError for a rig that has none."""
-    return Compared(
+    return CalibrationComparison(
         first_rig,
         second_rig,
         _compare_parameters(

@@ -7,7 +7,7 @@ from datetime import date
 
 from calibrations.analyses.stability import Agreement, Stability
 from rig.services.history import Calibration, History, Quantity
-from rig.services.history_comparison import Compared
+from rig.services.history_comparison import CalibrationComparison
 
 Written = Callable[[float, int], str]
 
@@ -57,7 +57,9 @@ def chart_verdict(q: Quantity) -> str:
     return q.chart.verdict + progress
 
 
-def agreements(compared: Compared, format_number: Written) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def agreements(
+    compared: CalibrationComparison, format_number: Written
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Head and rows of a table of the shared quantities; `format_number` formats a number to a number of digits."""
     head = ("quantity", compared.one, compared.other, "difference", "U", "unit", "E_n", "")
     return head, [_agreement(name, unit, agreement, format_number) for name, (unit, agreement) in compared.rows.items()]

@@ -41,7 +41,7 @@ TRIADS = ({"ax", "ay", "az"}, {"mx", "my", "mz"})  # with times: a raw log of po
 
 
 @dataclass(frozen=True)
-class Loaded:
+class AnalysisInput:
     """Data, the model to compare with them, and the effects that may be missing."""
 
     data: Dataset[Any]
@@ -49,7 +49,7 @@ class Loaded:
     effects: Mapping[str, Effect]
 
 
-def load_request(request: Request, notify: Tell) -> Loaded:
+def load_request(request: Request, notify: Tell) -> AnalysisInput:
     """Data, model (by default that of the kind of data) and effects; `notify` receives remarks for a person.
 
     The data are a still record if their kind is still, if they are an array, or if a noise model is named.
@@ -64,7 +64,7 @@ def load_request(request: Request, notify: Tell) -> Loaded:
     )
     if model is not None:
         check_unit(model, data.unit, data.source)
-    return Loaded(data, model or read_model(data.default_model, effects), effects)
+    return AnalysisInput(data, model or read_model(data.default_model, effects), effects)
 
 
 def loaded_table(request: Request, notify: Tell) -> tuple[Table, Model, Mapping[str, Effect]]:
@@ -171,11 +171,11 @@ def is_still(data: str) -> bool:
         return True
     if path.exists():
         return path.is_file() and _has_channels_alone(path)
-    from rig.record.measured import Measured
+    from rig.record.measured import MeasuredRun
     from rig.record.store import Record  # a file needs no database
 
     with suppress(UnknownRun), Record.to_find(data) as record:
-        return Measured.named(record, data).run.kind == "still"
+        return MeasuredRun.named(record, data).run.kind == "still"
     return False
 
 

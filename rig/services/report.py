@@ -12,9 +12,9 @@ from calibrations.discovery.verdict import Verdict
 from calibrations.errors import UnusableData
 from rig.files import program
 from rig.record import Record
-from rig.record.measured import Measured
+from rig.record.measured import MeasuredRun
 from rig.results.samples import compare_with_displacement
-from rig.services.load import Loaded, load_request
+from rig.services.load import AnalysisInput, load_request
 from rig.services.next_experiment import planned
 from rig.services.provenance import today
 from rig.services.request import Request
@@ -34,7 +34,7 @@ def of_run(data: str) -> tuple[MotionResult | None, Mapping[str, Any]]:
     if Path(data).exists():
         return None, {}
     with Record.to_find(data) as record:
-        measured = Measured.named(record, data)
+        measured = MeasuredRun.named(record, data)
         motion = compare_with_displacement(measured) if measured.run.procedure == "motion" else None
         return motion, measured.run.results
 
@@ -59,13 +59,13 @@ def soak_report_of(data: str, date: str, program: str) -> Page | None:
         from calibrations.presentation.report.soak import soak_report
         from rig.results.soak import read_forecasts, read_soak
 
-        measured = Measured.named(record, data)
+        measured = MeasuredRun.named(record, data)
         result, forecasts = read_soak(measured), read_forecasts(measured)
     pictures, facts = soak_album(result, forecasts), _facts(measured, date, program)
     return pictures, lambda: soak_report(result, measured.run.results, facts, pictures, forecasts)
 
 
-def _facts(measured: Measured, date: str, program: str) -> Mapping[str, str]:
+def _facts(measured: MeasuredRun, date: str, program: str) -> Mapping[str, str]:
     run = measured.run
     sensor = [str(measured.constants[name]) for name in ("sensor", "serial") if name in measured.constants]
     texts = {
@@ -110,7 +110,7 @@ def make_report(
         question, opened = load_request(request, notify), None
     else:
         opened = session()
-        question = Loaded(opened.data, opened.model, opened.effects)
+        question = AnalysisInput(opened.data, opened.model, opened.effects)
 
     def search() -> Findings[Any]:
         shared = opened.first_search(searched) if opened is not None else None
@@ -120,7 +120,7 @@ def make_report(
 
 
 def _model_page(
-    request: Request, question: Loaded, notify: Callable[[str], None], search: Callable[[], Findings[Any]]
+    request: Request, question: AnalysisInput, notify: Callable[[str], None], search: Callable[[], Findings[Any]]
 ) -> Page:
     comparison = question.data.compare(question.model)
     if (reason := comparison.rejection) is not None and reason.verdict == Verdict.NO_RESPONSE:

@@ -14,7 +14,7 @@ class Cancelled(BaseException):
     """
 
 
-class Counted(Mapping[str, Effect]):
+class CountedEffects(Mapping[str, Effect]):
     """The effects of a search, with its progress: a search reads all of them once a round.
 
     `round` is the number of the present round, `at` the index of the effect in it. `doing` says what the search does

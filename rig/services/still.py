@@ -22,10 +22,10 @@ from procedures.instruments import OUTPUTS
 from procedures.noise_floor import STILL
 from procedures.soak import HOLD
 from rig.errors import RecordError
-from rig.record.measured import Measured
+from rig.record.measured import MeasuredRun
 from rig.record.store import Record
 from rig.record.tables import units_of
-from rig.record.values import Kept
+from rig.record.values import KeptPose
 from rig.services.tables import BESIDE, INFLUENCES, load
 
 SENSOR = tuple(chain(*OUTPUTS))  # channels of the accelerometer's outputs
@@ -257,7 +257,7 @@ def _check_gaps(gaps: Sequence[tuple[float, float]], length_s: float, source: st
 UPRIGHT = 0.999  # g: a pose that is as good as along gravity
 
 
-def of_run(measured: Measured, channel: str | None, rate_hz: float | None) -> Stream:
+def of_run(measured: MeasuredRun, channel: str | None, rate_hz: float | None) -> Stream:
     first = next((recorded for recorded in measured.kept() if _is_still(recorded)), None)
     if first is None:
         raise RecordError(f"run {measured.name} has no still record; `rig run noise-floor` or `rig run soak` makes one")
@@ -274,11 +274,11 @@ def of_run(measured: Measured, channel: str | None, rate_hz: float | None) -> St
     return samples
 
 
-def _is_still(recorded: Kept) -> bool:
+def _is_still(recorded: KeptPose) -> bool:
     return recorded.pose.path.split(" ")[0] in (STILL, HOLD)
 
 
-def _still_blocks(measured: Measured, stream: Stream) -> Iterator[NDArray[Any]]:
+def _still_blocks(measured: MeasuredRun, stream: Stream) -> Iterator[NDArray[Any]]:
     """Blocks of the still record in order. Gaps, logged columns and poses along gravity are added to `stream`."""
     next_s = None
     for recorded in measured.kept():
@@ -299,7 +299,7 @@ def _still_blocks(measured: Measured, stream: Stream) -> Iterator[NDArray[Any]]:
         yield volts
 
 
-def _supply_and_temperature(recorded: Kept) -> Iterator[tuple[str, list[Array]]]:
+def _supply_and_temperature(recorded: KeptPose) -> Iterator[tuple[str, list[Array]]]:
     """Temperature of a block, and supply, as means of a second each: in blocks that take no room."""
     samples, n = recorded.samples, len(recorded.samples.volts)
     temperature, supply = INFLUENCES
@@ -311,7 +311,7 @@ def _supply_and_temperature(recorded: Kept) -> Iterator[tuple[str, list[Array]]]
         yield supply, [np.broadcast_to(piece.mean(), len(piece)) for piece in pieces]
 
 
-def coarse(recorded: Kept) -> dict[str, float]:
+def coarse(recorded: KeptPose) -> dict[str, float]:
     """The steps of the supply's readings, where its noise does not smooth them in means."""
     channel = INFLUENCES[1].removesuffix("_v")
     if channel not in recorded.samples.channels:
@@ -320,7 +320,7 @@ def coarse(recorded: Kept) -> dict[str, float]:
     return {} if step is None else {INFLUENCES[1]: step}
 
 
-def _note_upright(recorded: Kept, volts: Array, stream: Stream) -> None:
+def _note_upright(recorded: KeptPose, volts: Array, stream: Stream) -> None:
     """The mean output of the channel's axis along gravity."""
     alpha, beta = np.radians(recorded.pose.alpha_deg), np.radians(recorded.pose.beta_deg)
     gravity: Mapping[str, float] = {"x": np.sin(alpha) * np.cos(beta), "y": np.sin(alpha) * np.sin(beta)}
@@ -373,7 +373,7 @@ def _source(record: Record | None, data: str, rate_hz: float | None) -> Callable
     if path.exists() or record is None:
         table = load(data, "still" if path.suffix != "" else None)
         return lambda channel: table_stream(table, channel, rate_hz)
-    measured = Measured.named(record, data)
+    measured = MeasuredRun.named(record, data)
     if record.columns(measured.run.run)[0]:
         table = measured.table()
         return lambda channel: table_stream(table, channel, rate_hz)

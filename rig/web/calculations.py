@@ -19,7 +19,7 @@ from nicegui import ui
 
 from calibrations.effects import Effect
 from calibrations.progress import show_progress
-from rig.services.search import Cancelled, Counted
+from rig.services.search import Cancelled, CountedEffects
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -35,14 +35,14 @@ class Visit:
 
     def __init__(self) -> None:
         self.closed = False
-        self.search = Counted({})
+        self.search = CountedEffects({})
         self.calculations: list[Calculation[Any]] = []
         self.doing = ""
         ui.context.client.on_delete(self.close)
 
-    def searched(self, effects: Mapping[str, Effect]) -> Counted:
+    def searched(self, effects: Mapping[str, Effect]) -> CountedEffects:
         """The effects for a search of this visit. Reading them raises Cancelled after the page is closed."""
-        self.search = Counted(effects)
+        self.search = CountedEffects(effects)
         self.search.cancelled = self.closed
         return self.search
 

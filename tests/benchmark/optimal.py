@@ -26,7 +26,7 @@ from procedures.session import Pose
 from procedures.settings import parse
 from rig.bench import read_bench
 from rig.planning.optimal import Optimal, optimal
-from rig.planning.sweep_range import Judged
+from rig.planning.sweep_range import JudgedPlan
 from tests.hidden import rigs
 from tests.hidden.defects import DEFECTS
 
@@ -58,7 +58,7 @@ def measured(config: WorldConfig, seed: int, poses: Sequence[Pose], dwell_s: flo
     return Table.from_columns("poses", columns, constants, "simulated", {"path": tuple(p.path for p in poses)})
 
 
-def misses(model: Model, judged: Judged, seeds: int) -> Array:
+def misses(model: Model, judged: JudgedPlan, seeds: int) -> Array:
     """Rms error of each parameter over rigs, shape (p,); check poses are kept out of the fit."""
     every_third = np.arange(0, 518, 3)
     errors = []

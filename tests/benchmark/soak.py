@@ -15,7 +15,7 @@ from drivers.transport import Links
 from drivers.world.config import WorldConfig
 from drivers.world.world import World
 from procedures.session import Pose
-from rig.record import Kept, Record
+from rig.record import KeptPose, Record
 
 SETTINGS = labjack_t7.Settings(channels={"vx": 0, "vy": 1, "supply": 2, "thermistor": 3}, rate_hz=1000.0)
 BLOCK_S = 60.0
@@ -42,7 +42,7 @@ def soak(record: Record, duration_s: float, block_s: float = BLOCK_S) -> str:
     )
     with converter() as (world, clock, adc), closing(adc.stream(duration_s, block_s)) as blocks:
         for number, samples in enumerate(blocks):
-            kept = Kept(Pose(90.0, 0.0), samples, samples.start_s, None)
+            kept = KeptPose(Pose(90.0, 0.0), samples, samples.start_s, None)
             record.keep(run, number, kept, {"world": world.state(), "clock": clock.now()})
     return run
 

@@ -27,7 +27,7 @@ import numpy as np
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from procedures.session import Pose
-from rig.record import Block, Kept, Record
+from rig.record import Block, KeptPose, Record
 from tests.browser.measured import hidden, hundred_thousand, thousand
 from tests.browser.test_run_page import begin
 
@@ -122,7 +122,7 @@ def _night() -> str:
             drift = 2.5 + 0.01 * np.exp(-number / 900)
             volts = np.round((drift + 8e-4 * rng.standard_normal((IN_A_BLOCK, 1))) / STEP_V) * STEP_V
             block = Block(volts, ("vx",), RATE_HZ, 10.0 * number)
-            record.keep(run, number, Kept(Pose(0, 0, 0, f"hold {number}"), block, 10.0 * number, 22.0), None)
+            record.keep(run, number, KeptPose(Pose(0, 0, 0, f"hold {number}"), block, 10.0 * number, 22.0), None)
         record.set_state(run, "complete")
     return run
 

@@ -16,7 +16,7 @@ from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import read_bench
 from rig.cli.terminal.watch import Quiet
-from rig.record import Kept, Record
+from rig.record import KeptPose, Record
 from rig.runs.runner import resume, start
 from tests.browser.conftest import Workbench
 from tests.browser.held import held_up
@@ -265,7 +265,7 @@ class Stopping(Quiet):
 
     left = 20
 
-    def kept(self, kept: Kept) -> None:
+    def kept(self, kept: KeptPose) -> None:
         super().kept(kept)
         self.left -= 1
         if not self.left:

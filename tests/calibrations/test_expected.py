@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from calibrations.criteria import CERTAIN_PROBABILITY
-from calibrations.design.expected import Expected, expected_gain, pairs_separated, predict_data, vary_one_way
+from calibrations.design.expected import ExpectedResult, expected_gain, pairs_separated, predict_data, vary_one_way
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit, fit, refit
 from calibrations.joined import join_tables
@@ -103,8 +103,8 @@ def test_the_probability_of_telling_apart() -> None:
 
 
 def test_what_does_not_show_by_itself_is_not_named_by_itself() -> None:
-    clear = Expected(alone=100.0, together=100.0, visible=100.0)
-    faint = Expected(alone=100.0, together=100.0, visible=15.0)
+    clear = ExpectedResult(alone=100.0, together=100.0, visible=100.0)
+    faint = ExpectedResult(alone=100.0, together=100.0, visible=15.0)
     assert clear.probability_alone == pytest.approx(1.0, abs=1e-3)
     assert faint.probability_alone < 0.5
     assert faint.probability == clear.probability

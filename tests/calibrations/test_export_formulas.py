@@ -20,7 +20,7 @@ from calibrations.compensation.inverse import Range, invert_model
 from calibrations.exporting.autopilots import Slot
 from calibrations.exporting.formats import export_model
 from calibrations.exporting.noise_files import Stream
-from calibrations.exporting.simulated import Exported
+from calibrations.exporting.simulated import ExportedFile
 from calibrations.model import Model
 from calibrations.table import Array
 from tests.calibrations.compiled import COMPILERS, DRIVER, build, through, written
@@ -142,7 +142,7 @@ FORMATS: Mapping[str, Callable[[str, Array, Array], Array]] = {
 }
 
 
-def export(form: str, *models: Model) -> Exported:
+def export(form: str, *models: Model) -> ExportedFile:
     return export_model(models, form, "a test", Slot(), Stream("/imu0", 200.0, {}))
 
 

@@ -14,7 +14,7 @@ from calibrations.errors import ModelError
 from calibrations.exporting.autopilots import Slot
 from calibrations.exporting.formats import export_model
 from calibrations.exporting.noise_files import Stream
-from calibrations.exporting.simulated import Exported
+from calibrations.exporting.simulated import ExportedFile
 from calibrations.model import Model
 from calibrations.table import Array
 from tests.calibrations.fitted import Numbers, model
@@ -51,7 +51,7 @@ def gyroscope() -> Model:
     return of(values, "rad/s")
 
 
-def export(form: str, *models: Model, slot: Slot | None = None, stream: Stream = STREAM) -> Exported:
+def export(form: str, *models: Model, slot: Slot | None = None, stream: Stream = STREAM) -> ExportedFile:
     return export_model(models, form, "a test", slot or Slot(), stream)
 
 

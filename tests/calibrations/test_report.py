@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from calibrations.design.expected import Expected
+from calibrations.design.expected import ExpectedResult
 from calibrations.design.experiment import Experiment
 from calibrations.discovery.results import Comparison, Discovery
 from calibrations.effects.catalogue import catalogue
@@ -271,7 +271,9 @@ def test_doubt_is_said_so_with_the_experiment_that_ends_it() -> None:
 
 def test_the_next_experiment_stands_with_its_command_and_what_it_brings() -> None:
     bare = Experiment("sweep", {}, (("temperature-bias", "warm-up-bias"),), "it turns")
-    e = replace(bare, command="rig run sweep --bench b.yaml", duration_s=3827.0, expected=Expected(1.0, 400.0, 1.0))
+    e = replace(
+        bare, command="rig run sweep --bench b.yaml", duration_s=3827.0, expected=ExpectedResult(1.0, 400.0, 1.0)
+    )
     assert next_takes(bare) == ""
     assert next_takes(replace(e, duration_s=50835.0, expected=None)).startswith("It takes 14.1 h. Its result cannot")
     brings = "It takes 64 min and separates them with a probability of 99.9 %, from all data together."

@@ -23,7 +23,7 @@ from drivers.philtec_d63 import Curve
 from procedures.session import Pose
 from rig.bench import DEFAULT, read_bench
 from rig.errors import RigError
-from rig.record import Kept, Record, codec
+from rig.record import KeptPose, Record, codec
 from rig.record.recover import recover
 from rig.services.still import stream
 from tests.fuzz.target import Target
@@ -96,7 +96,7 @@ def record_seed() -> bytes:
     with Record(folder() / "seed") as made:
         run = begin(made)
         for number in range(3):
-            made.keep(run, number, Kept(Pose(90, number), block([[2.0, 1.0], [1.0, 2.0]]), number, 21.5), None)
+            made.keep(run, number, KeptPose(Pose(90, number), block([[2.0, 1.0], [1.0, 2.0]]), number, 21.5), None)
     data = (folder() / "seed" / "record.db").read_bytes()
     shutil.rmtree(folder() / "seed")
     return data

@@ -18,7 +18,7 @@ from procedures.instruments import Samples
 from procedures.questions import Mounting, Question
 from procedures.session import Dwell, Guidance, Limits, Pose, Reading, Session
 from rig.planning.planned import PlannedTurn
-from rig.record.values import Block, Kept
+from rig.record.values import Block, KeptPose
 
 CHANNELS = ("vx", "vy", "supply")
 RATE_HZ = 1000.0
@@ -133,7 +133,7 @@ class Book:
 
     world: World
     dwells: list[Dwell] = field(default_factory=list)
-    blocks: list[Kept] = field(default_factory=list)
+    blocks: list[KeptPose] = field(default_factory=list)
     read: list[Reading] = field(default_factory=list)
     asked: list[str] = field(default_factory=list)
     guided: list[Guidance] = field(default_factory=list)
@@ -146,7 +146,7 @@ class Book:
     def measured(self) -> Sequence[Dwell]:
         return self.dwells
 
-    def recorded(self) -> Sequence[Kept]:
+    def recorded(self) -> Sequence[KeptPose]:
         return self.blocks
 
     def readings(self) -> Sequence[Reading]:
@@ -154,7 +154,7 @@ class Book:
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
         middle_s = samples.start_s + len(samples.volts) / samples.rate_hz / 2
-        self.blocks.append(Kept(pose, samples, middle_s, temperature_c, number=len(self.blocks)))
+        self.blocks.append(KeptPose(pose, samples, middle_s, temperature_c, number=len(self.blocks)))
         self.dwells.append(self.blocks[-1].dwell)
 
     def keep_readings(self, *readings: Reading) -> None:

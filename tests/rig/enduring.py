@@ -17,7 +17,7 @@ from procedures.errors import ProcedureError
 from procedures.session import Reading
 from rig.bench import Bench
 from rig.cli.terminal.failure import status_of
-from rig.record import Kept, Record
+from rig.record import KeptPose, Record
 from rig.runs.runner import Outcome, resume
 from tests.rig.misbehaving import (
     STRETCHES,
@@ -56,7 +56,7 @@ NEAR = {"deg": 0.05, "s": 1.0}  # of a reading; what is done again after a lost 
 @cache
 def undisturbed(
     procedure: str, guarded: bool = False, driver: str = ""
-) -> tuple[list[Any], list[Kept], list[Reading], float]:
+) -> tuple[list[Any], list[KeptPose], list[Reading], float]:
     """What a procedure measures on the sound bench: its digest, poses and readings, and when it has ended."""
     with Record() as record:
         run = short(record, bench_for(guarded, driver), procedure).run
@@ -126,7 +126,7 @@ def endured(procedure: str, role: str, fault: Fault, driver: str = "", guided: b
 
 
 def _require_right(
-    record: Record, outcome: Outcome, expected: tuple[Any, list[Kept], list[Reading], float], digital: bool
+    record: Record, outcome: Outcome, expected: tuple[Any, list[KeptPose], list[Reading], float], digital: bool
 ) -> None:
     """A run that noticed nothing has measured what an undisturbed one does, or a result of it says so."""
     assert outcome.run.state == "complete"

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.record import Kept, Record
+from rig.record import KeptPose, Record
 from rig.record.measured import table_of
 from tests.rig.misbehaving import STRETCHES
 from tests.rig.nursery import Ended, Harm, Nursery
@@ -96,7 +96,7 @@ def measured(record: Record, run: str) -> Measured:
     return Measured(table_of(record, run).digest, tuple(_pose(kept) for kept in record.kept(run)))
 
 
-def _pose(kept: Kept) -> tuple[Any, ...]:
+def _pose(kept: KeptPose) -> tuple[Any, ...]:
     samples = kept.samples
     return kept.pose, kept.t_s, kept.temperature_c, samples.start_s, samples.rate_hz, samples.volts.tobytes()
 

@@ -12,8 +12,8 @@ from calibrations.table import Table
 from procedures.session import Pose, Reading
 from rig.errors import LabAway
 from rig.lab_url import lab_url
-from rig.record import Block, Kept, Record
-from rig.record.push import Pushed, push, unsent
+from rig.record import Block, KeptPose, Record
+from rig.record.push import PushedRun, push, unsent
 
 POSES, SAMPLES = 12, 400
 CHANNELS = ("vx", "vy")
@@ -28,7 +28,7 @@ def a_run(record: Record, seed: int = 1, state: str = "complete", poses: int = P
     for number in range(poses):
         record.log(run, number / 3, "run", "kept", f"pose {number}")
         samples = Block(draw.normal(2.5, 1e-3, (SAMPLES, 2)), CHANNELS, 1000.0, number / 7)
-        kept = Kept(Pose(90, 10.0 * number / 3, 1, "A+ to B-"), samples, number / 3, 20 + number / 9)
+        kept = KeptPose(Pose(90, 10.0 * number / 3, 1, "A+ to B-"), samples, number / 3, 20 + number / 9)
         record.keep(run, number, kept, {"clock": number})
     record.keep_readings(run, [Reading("level-x", 1 / 3, "deg", None), Reading("bias-x", 2.5, "V", 1e-4)], None)
     record.note(run, "answer mounting", "yes")
@@ -63,13 +63,13 @@ def held(record: Record, run: str) -> dict[str, Any]:
     }
 
 
-def pushed(own: Record, url: str) -> list[Pushed]:
+def pushed(own: Record, url: str) -> list[PushedRun]:
     """Push whatever the lab at `url` does not have."""
     with Record(lab_url(url)) as lab:
         return [push(own, lab, run) for run in unsent(own, lab)]
 
 
-def until_there(own: Record, url: str, most: int = 500) -> tuple[list[Pushed], int]:
+def until_there(own: Record, url: str, most: int = 500) -> tuple[list[PushedRun], int]:
     """Push again after each cut; what went over by the last push, and how many were cut."""
     for cuts in range(most):
         try:

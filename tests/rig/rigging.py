@@ -18,7 +18,7 @@ from procedures.questions import Question
 from procedures.session import Guidance, Reading
 from procedures.settings import parse
 from rig.planning.plan import Plan
-from rig.record import Kept
+from rig.record import KeptPose
 from rig.runs.runner import Decision, Observer, Outcome
 
 SMALL = {"step_deg": "90", "dwell_s": "0.2", "inclinations_deg": "90,45"}
@@ -43,7 +43,7 @@ class Onlooker(Observer):
     run: str = ""
     said: list[str] = field(default_factory=list)
     expected: list[tuple[int, int]] = field(default_factory=list)
-    seen: list[Kept] = field(default_factory=list)
+    seen: list[KeptPose] = field(default_factory=list)
     wishes: list[Decision] = field(default_factory=list)
     outcomes: list[Outcome] = field(default_factory=list)
     plan: Plan | None = None
@@ -63,7 +63,7 @@ class Onlooker(Observer):
     def expect(self, total: int, done: int) -> None:
         self.expected.append((total, done))
 
-    def kept(self, kept: Kept) -> None:
+    def kept(self, kept: KeptPose) -> None:
         self.seen.append(kept)
 
     def read(self, reading: Reading) -> None:

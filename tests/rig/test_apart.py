@@ -20,7 +20,7 @@ from rig.errors import Busy, RigError
 from rig.files import home
 from rig.instruments.instruments import connect_all
 from rig.lease import lease
-from rig.record import Kept, Record
+from rig.record import KeptPose, Record
 from rig.runs.background import control, process
 from rig.runs.background import status as status_file
 from rig.runs.background.control import PublishingObserver
@@ -201,7 +201,7 @@ class Onlooker(Quiet):
         self.seen: list[Status | None] = []
         self.stop_at = stop_at
 
-    def kept(self, kept: Kept) -> None:
+    def kept(self, kept: KeptPose) -> None:
         super().kept(kept)
         self.seen.append(control.latest())
         if len(self.seen) == self.stop_at and (status := self.seen[-1]):

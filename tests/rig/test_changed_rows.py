@@ -13,7 +13,7 @@ import pytest
 
 from procedures.session import Pose, Reading
 from rig.errors import RecordError
-from rig.record import Kept, Record
+from rig.record import KeptPose, Record
 from rig.record.measured import table_of
 from rig.record.recover import is_sound, recover
 from tests.rig.test_doctor import PAGE, recorded
@@ -171,7 +171,7 @@ def test_rows_of_an_older_program_have_no_checksum_and_are_read(tmp_path: Path) 
 def test_odd_numbers_keep_their_checksum(tmp_path: Path) -> None:
     with Record(tmp_path) as record:
         run = begin(record)
-        record.keep(run, 0, Kept(Pose(90, -0.0, 1, "\u00e9\x00", 1, 1), block([[2.0, 1.0]]), 3, float("nan")), None)
+        record.keep(run, 0, KeptPose(Pose(90, -0.0, 1, "\u00e9\x00", 1, 1), block([[2.0, 1.0]]), 3, float("nan")), None)
         record.keep_readings(run, [Reading("a", 1, "m", None)], None)
         assert (len(list(record.kept(run))), len(record.readings(run)), record.damaged_rows()) == (1, 1, [])
 

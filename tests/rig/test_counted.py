@@ -13,13 +13,13 @@ from calibrations.free_forms import search
 from calibrations.free_forms.search import MOST_MISFIT
 from calibrations.progress import report, show_progress
 from rig.services.request import Request
-from rig.services.search import Cancelled, Counted
+from rig.services.search import Cancelled, CountedEffects
 from rig.services.session import model_session
 from tests.browser.measured import hidden, two_faults
 
 
 def test_a_counted_search_tells_what_it_tries() -> None:
-    counted = Counted({name: catalogue()[name] for name in ("bias", "hysteresis")})
+    counted = CountedEffects({name: catalogue()[name] for name in ("bias", "hysteresis")})
     assert (counted.text, counted.share) == ("Fitting the model", 0.0)
     effects = iter(counted.values())
     next(effects)
@@ -66,7 +66,7 @@ def test_searches_that_follow_each_other_have_different_names(monkeypatch: pytes
 
 def test_a_cancelled_search_ends(tmp_path: Path) -> None:
     found = model_session(Request(hidden(tmp_path, "package turned")))
-    counted = Counted(found.effects)
+    counted = CountedEffects(found.effects)
     counted.cancelled = True
     with pytest.raises(Cancelled):
         replace(found, effects=counted).diagnosed()

@@ -15,7 +15,7 @@ import pytest
 
 from procedures.session import Pose, Reading
 from rig.errors import RecordError
-from rig.record import Kept, Record
+from rig.record import KeptPose, Record
 from rig.record.recover import recover
 from rig.services.health import without_secrets
 from tests.rig.test_store import begin, block
@@ -88,7 +88,7 @@ def recorded(folder: Path, poses: int = 60) -> str:
         run = begin(record)
         for number in range(poses):
             volts = [[0.001 * k * k + number, 1.0] for k in range(400)]
-            record.keep(run, number, Kept(Pose(90, number), block(volts), number, 21.5), None)
+            record.keep(run, number, KeptPose(Pose(90, number), block(volts), number, 21.5), None)
         record.keep_readings(run, [Reading("level-x", 0.02, "deg", 0.001)], None)
     return run
 
@@ -127,7 +127,7 @@ def test_of_a_damaged_record_is_read_what_can_be_and_what_is_lost_is_said(
         assert kept.samples.volts.tobytes() == sound[number], "what was read is what was kept"
 
 
-def _kept(folder: Path, run: str) -> dict[int, Kept]:
+def _kept(folder: Path, run: str) -> dict[int, KeptPose]:
     with Record(folder) as record:
         return {kept.number: kept for kept in record.kept(run) if kept.number is not None}
 

@@ -27,7 +27,7 @@ from rig.errors import Stopped
 from rig.files import free_bytes
 from rig.planning.plan import Plan, plan
 from rig.planning.preparation import checks, mounting
-from rig.record import Block, Kept, Record
+from rig.record import Block, KeptPose, Record
 from rig.runs.estimates import nearness
 from rig.runs.observer import Progress, RunView
 from rig.runs.runner import Outcome
@@ -38,9 +38,9 @@ TODAY = date(2026, 11, 21)
 SWEEP = find("sweep")
 
 
-def kept(number: int, noise: float = 0.1, path: str = "") -> Kept:
+def kept(number: int, noise: float = 0.1, path: str = "") -> KeptPose:
     block = Block(np.array([[2.5 - noise, 2.5], [2.5 + noise, 2.5]]), ("vx", "vy"), 1000.0, 0.0)
-    return Kept(Pose(90, 10.0 * number, 1, path), block, 3600.0, 28.3)
+    return KeptPose(Pose(90, 10.0 * number, 1, path), block, 3600.0, 28.3)
 
 
 def shown(renderable: RenderableType) -> str:

@@ -32,7 +32,7 @@ from rig.instruments.wiring import world_of
 from rig.planning.plan import plan
 from rig.planning.preparation import checks
 from rig.record import Record
-from rig.record.measured import Measured, table_of
+from rig.record.measured import MeasuredRun, table_of
 from rig.results.by_hand import TARGET_PERCENT, _uncertainty
 from rig.results.result import Missing, Result
 from rig.runs.background import status
@@ -231,7 +231,7 @@ def test_an_accuracy_that_was_not_reached_is_a_result_that_is_missing(rig: Rig, 
 def test_a_target_that_is_reached_within_the_error_of_an_uncertainty_is_reached(
     percent: float, is_reached: bool
 ) -> None:
-    measured = cast(Measured, SimpleNamespace(run=SimpleNamespace(settings={"target_percent": 0.2})))
+    measured = cast(MeasuredRun, SimpleNamespace(run=SimpleNamespace(settings={"target_percent": 0.2})))
     known = f"gyro-scale-factor.x is known to {percent:g} % only"
     found = _uncertainty(measured, percent, known, "turns", TARGET_PERCENT)["uncertainty"]
     assert found == (

@@ -11,7 +11,7 @@ import pytest
 import rig as application
 from rig.errors import RecordError, UnknownRun
 from rig.record import Record
-from rig.record.measured import Measured
+from rig.record.measured import MeasuredRun
 from tests.rig.conftest import Ended
 
 
@@ -70,12 +70,12 @@ def test_the_name_of_a_sensor_of_a_batch_chooses_it_in_its_run() -> None:
     with Record() as record:
         run = record.begin("sweep", {}, bench=bench, identities={}, configuration="", source="a test", constants={})
         chosen = {
-            name: Measured.named(record, name).name for name in ("b", "18", "last b", "last sweep 17", f"{run}/a")
+            name: MeasuredRun.named(record, name).name for name in ("b", "18", "last b", "last sweep 17", f"{run}/a")
         }
         assert list(chosen.values()) == [f"{run}/b", f"{run}/b", f"{run}/b", f"{run}/a", f"{run}/a"]
         for both in (run[:-1], "ADXL"):
             with pytest.raises(RecordError, match="choose one"):
-                Measured.named(record, both)
+                MeasuredRun.named(record, both)
 
 
 def test_an_empty_record_has_no_last_run() -> None:

@@ -24,8 +24,8 @@ from procedures.settings import parse
 from rig.bench import Bench, read_bench
 from rig.bench.result_names import names_with_limits
 from rig.planning.plan import plan
-from rig.record import Kept, Record
-from rig.record.measured import Measured
+from rig.record import KeptPose, Record
+from rig.record.measured import MeasuredRun
 from rig.runs.runner import Outcome, resume, start
 from rig.services.report import of_run
 from tests.rig.rigging import Onlooker
@@ -122,7 +122,7 @@ def test_a_motion_run_holds_three_tables(rig_home: Path, few_swings: None, rever
         document["instruments"]["adc"]["settings"]["channels"] = dict(reversed(channels.items()))
     with Record() as record:
         outcome = shaken(record, Bench.model_validate(document), **BRIEF)
-        measured = Measured.named(record, outcome.run.run)
+        measured = MeasuredRun.named(record, outcome.run.run)
         table, sweep, still = measured.table(), measured.part("poses", SWEEP), measured.part(STILL)
     assert (table.kind, table.n, sweep.kind, sweep.n, still.n) == (KIND, 12000, "poses", 54, 4000)
     names = {"t_s", "vx_v", "vy_v", "supply_v", "displacement_m", "alpha_deg", "beta_deg", "temperature_c"}
@@ -144,7 +144,7 @@ def test_a_probe_in_front_of_the_carriage_counts_the_other_way(rig_home: Path) -
     backward = read_bench().document()["d63"] | {"direction": -1}
     with Record() as record:
         run = shaken(record, bench(QUIET, d63=backward), **BRIEF).run
-        assert Measured(record, run).table().column("displacement_m").mean() < 0
+        assert MeasuredRun(record, run).table().column("displacement_m").mean() < 0
     assert (run.state, run.rows, run.results) == ("complete", 58, {})
     assert "falls where the sensor's acceleration along x rises" in (run.message or "")
 
@@ -172,7 +172,7 @@ class StopsAt(Onlooker):
         super().__init__()
         self.at = at
 
-    def kept(self, kept: Kept) -> None:
+    def kept(self, kept: KeptPose) -> None:
         super().kept(kept)
         if len(self.seen) == self.at:
             raise KeyboardInterrupt("SIGINT")
@@ -195,7 +195,7 @@ def test_an_interrupted_motion_resumes_and_the_longest_record_is_judged(
             assert (outcome.run.state, outcome.run.rows) == ("stopped", at)
         outcome = resume(record, outcome.run.run, Onlooker())
         assert (outcome.run.state, outcome.run.rows, outcome.error) == ("complete", 58, None)
-        table = Measured.named(record, outcome.run.run).table()
+        table = MeasuredRun.named(record, outcome.run.run).table()
         whole = shaken(record, bench(QUIET), Onlooker(), **BRIEF).run.run
         for a, b in islice(zip(record.kept(whole), record.kept(outcome.run.run), strict=True), 54):
             assert (a.pose, a.t_s) == (b.pose, b.t_s)
@@ -222,7 +222,7 @@ def test_the_carriage_is_stopped_whatever_ends_the_motion(
 def test_two_frequencies_make_two_records_and_the_first_is_judged(rig_home: Path) -> None:
     with Record() as record:
         outcome = shaken(record, bench(QUIET), **BRIEF, frequency_hz="10,4")
-        table = Measured.named(record, outcome.run.run).table()
+        table = MeasuredRun.named(record, outcome.run.run).table()
     assert outcome.run.results["frequency"]["value"] == pytest.approx(10, abs=1e-4)
     for record_of, hz in zip(find_records(table), (10.0, 4.0), strict=True):
         line = fit_four_parameter(record_of.times_s(table.time_s), table.column("displacement_m")[record_of.rows])
@@ -243,7 +243,7 @@ def test_a_hidden_defect_of_the_output_is_found_added_and_right(
 ) -> None:
     with Record() as record:
         outcome = shaken(record, bench(QUIET | hidden), **BRIEF, frequency_hz="10,4")
-        table = Measured.named(record, outcome.run.run).table()
+        table = MeasuredRun.named(record, outcome.run.run).table()
     assert not compare(table, read_model("linear")).adequate
     found = diagnose(table, read_model("linear"))
     assert (found.verdict, found.candidates[0].name) == ("effect-missing", effect)
@@ -263,7 +263,7 @@ def test_a_sensor_turned_on_its_mount_is_found_by_the_axis_that_should_not_move(
     turned = QUIET | {"sensor": {"package": {"turn_z_deg": 1.0}}}
     with Record() as record:
         outcome = shaken(record, bench(turned), **BRIEF)
-        table = Measured.named(record, outcome.run.run).table()
+        table = MeasuredRun.named(record, outcome.run.run).table()
     found = diagnose(table, read_model("linear"))
     first = found.candidates[0]
     assert found.verdict == "ambiguous"  # at one attitude a product of both axes does the same
@@ -304,6 +304,6 @@ def test_every_command_takes_a_motion_run(rig: Callable[..., Any], tmp_path: Pat
 def test_an_imported_motion_has_no_sweep_to_be_judged_by(rig_home: Path) -> None:
     with Record() as record:
         outcome = shaken(record, bench(QUIET), **BRIEF)
-        imported = record.add_table(Measured.named(record, outcome.run.run).table())
+        imported = record.add_table(MeasuredRun.named(record, outcome.run.run).table())
     assert of_run(imported)[0] is None
     assert of_run(outcome.run.run)[0] is not None

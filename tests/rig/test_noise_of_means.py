@@ -11,7 +11,7 @@ from calibrations.means.noise import inflation, measured_inflation, white_std
 from drivers.world.config import WorldConfig
 from drivers.world.world import World
 from procedures.session import Pose
-from rig.record import Kept, Record
+from rig.record import KeptPose, Record
 from rig.record.measured import table_of
 
 CLEAN = WorldConfig.ideal().changed({"converter": {"noise_v": 0.0}, "noise": {"flicker_v": 0.0}})
@@ -40,7 +40,7 @@ def dwells(count: int, n: int) -> list[Samples]:
 def run_of(record: Record, blocks: list[Samples]) -> str:
     run = record.begin("sweep", {}, bench={}, identities={}, configuration="", constants=FILTER, source="test")
     for number, samples in enumerate(blocks):
-        record.keep(run, number, Kept(Pose(90.0, float(number)), samples, samples.start_s, None), None)
+        record.keep(run, number, KeptPose(Pose(90.0, float(number)), samples, samples.start_s, None), None)
     return run
 
 

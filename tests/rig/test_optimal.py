@@ -24,7 +24,7 @@ from rig.cli.commands.plan import optimal_document, optimal_lines
 from rig.errors import PlanError
 from rig.planning.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, optimal, relative
 from rig.planning.planned import EXCHANGE_S, from_home_s, moves_s
-from rig.record import Kept, Record
+from rig.record import KeptPose, Record
 from rig.runs.runner import resume, start
 from tests.rig.rigging import Onlooker
 from tests.slow import first_fast
@@ -190,7 +190,7 @@ def test_a_run_of_chosen_poses_checks_its_model(rig: Callable[..., Any], tmp_pat
 class Leaving(Onlooker):
     """Stops the run when three poses are kept."""
 
-    def kept(self, kept: Kept) -> None:
+    def kept(self, kept: KeptPose) -> None:
         super().kept(kept)
         if len(self.seen) == 3:
             raise KeyboardInterrupt

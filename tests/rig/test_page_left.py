@@ -18,7 +18,7 @@ from rig.bench import DEFAULT, Bench
 from rig.planning.plan import plan
 from rig.services.report import make_report
 from rig.services.request import Request
-from rig.services.search import Cancelled, Counted
+from rig.services.search import Cancelled, CountedEffects
 from rig.services.session import ModelSession
 from rig.web.calculations import Visit, begin, off_loop
 from rig.web.desk import Desk
@@ -36,13 +36,13 @@ def searches() -> list[threading.Thread]:
 @pytest.mark.parametrize("closed", [True, False])
 def test_a_closed_page_ends_its_search(closed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RIG_HOME", str(tmp_path / "home"))
-    data, desk, go, iterate = two_faults(tmp_path), Desk(DEFAULT), threading.Event(), Counted.__iter__
+    data, desk, go, iterate = two_faults(tmp_path), Desk(DEFAULT), threading.Event(), CountedEffects.__iter__
 
-    def held(effects: Counted) -> Iterator[str]:
+    def held(effects: CountedEffects) -> Iterator[str]:
         assert go.wait(60)
         yield from iterate(effects)
 
-    monkeypatch.setattr(Counted, "__iter__", held)
+    monkeypatch.setattr(CountedEffects, "__iter__", held)
 
     async def simulated() -> None:
         async with user_simulation() as user:

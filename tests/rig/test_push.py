@@ -17,7 +17,7 @@ from rig.record import Record
 from rig.record import lab as laboratory
 from rig.record import push as pushing
 from rig.record.content import run_row, uid_of
-from rig.record.push import Pushed, push, push_all, unsent, verify
+from rig.record.push import PushedRun, push, push_all, unsent, verify
 from rig.record.schema import arrivals, runs
 from tests.rig.cutting import Enough, Judge, after_bytes, at_random, whole, wire
 from tests.rig.postgres import Server
@@ -177,7 +177,7 @@ def test_rigs_whose_runs_share_a_name_keep_them_apart(own: Record, lab: Record, 
         assert theirs.name == f"{run}-cafe1234"
         assert held(lab, run) == held(own, run)
         assert held(lab, theirs.name) == held(other, run)
-        assert push(other, lab, run) == Pushed(run, theirs.name, "there", theirs.digest)
+        assert push(other, lab, run) == PushedRun(run, theirs.name, "there", theirs.digest)
 
 
 def test_an_excluded_row_of_an_imported_table_is_excluded_by_the_next_push(own: Record, lab: Record) -> None:
@@ -259,7 +259,7 @@ def test_a_refused_run_does_not_hinder_the_newer_ones(own: Record, lab: Record) 
     refused, sent = push_all(own, lab, unsent(own, lab))
     assert isinstance(refused, RecordError)
     assert run in str(refused)
-    assert isinstance(sent, Pushed)
+    assert isinstance(sent, PushedRun)
     assert (sent.run, sent.how) == (newer, "pushed")
 
 

@@ -16,7 +16,7 @@ import pytest
 
 from rig.bench import read_bench
 from rig.errors import RecordError
-from rig.record import Kept, Record, file
+from rig.record import KeptPose, Record, file
 from rig.runs.runner import resume, start
 from tests.rig.misbehaving import looking_on
 from tests.rig.rigging import POSES, SMALL_ARGUMENTS, Onlooker, small_sweep
@@ -32,7 +32,7 @@ class Disturber(Onlooker):
         super().__init__()
         self._harm = harm
 
-    def kept(self, kept: Kept) -> None:
+    def kept(self, kept: KeptPose) -> None:
         super().kept(kept)
         if len(self.seen) == KEPT:
             self._harm()

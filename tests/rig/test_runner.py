@@ -24,7 +24,7 @@ from rig.bench import Bench, read_bench
 from rig.errors import Busy, InstrumentFailed, RunMismatch
 from rig.instruments.wiring import open_wires
 from rig.lease import lease
-from rig.record import Kept, Record
+from rig.record import KeptPose, Record
 from rig.record.measured import table_of
 from rig.runs.runner import Outcome, resume, start
 from tests.rig.rigging import POSES, Onlooker, small_sweep
@@ -69,7 +69,7 @@ class Interrupting(Onlooker):
         super().__init__()
         self._at, self._then = at, then
 
-    def kept(self, kept: Kept) -> None:
+    def kept(self, kept: KeptPose) -> None:
         super().kept(kept)
         if len(self.seen) == self._at:
             self._then()

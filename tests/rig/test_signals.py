@@ -9,7 +9,7 @@ from types import FunctionType
 
 import pytest
 
-from drivers.transport.link import Connected
+from drivers.transport.link import OpenConnection
 from rig.runs.signals import SIGNALS, stoppable
 
 
@@ -64,9 +64,9 @@ class Interrupted:
     def close(self) -> None: ...
 
 
-@pytest.mark.parametrize("use", [Connected.take, lambda line: line.put(b"abc")], ids=["read", "write"])
-def test_a_signal_waits_until_bytes_are_counted(use: Callable[[Connected], object]) -> None:
-    line = Connected(Interrupted())
+@pytest.mark.parametrize("use", [OpenConnection.take, lambda line: line.put(b"abc")], ids=["read", "write"])
+def test_a_signal_waits_until_bytes_are_counted(use: Callable[[OpenConnection], object]) -> None:
+    line = OpenConnection(Interrupted())
 
     def use_and_wait() -> None:
         use(line)

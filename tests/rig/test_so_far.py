@@ -11,19 +11,19 @@ import pytest
 from procedures.magnetometer_turn import full_turn
 from procedures.rate_turn import turns
 from procedures.session import Pose
-from rig.record import Block, Kept, Record
+from rig.record import Block, KeptPose, Record
 from rig.record.measured import sensor_from_base, sensor_from_table, specific_force_g
 from rig.runs.estimates import RunningEstimates
 
 NOISE_V = 1e-4
 
 
-def kept(poses: Iterator[Pose], outputs: Mapping[str, Any], seed: int = 1) -> list[Kept]:
+def kept(poses: Iterator[Pose], outputs: Mapping[str, Any], seed: int = 1) -> list[KeptPose]:
     """Each pose with one sample of each channel: `outputs` by name, of a pose."""
     random, found = np.random.default_rng(seed), []
     for k, pose in enumerate(poses):
         volts = np.array([[of(pose) + NOISE_V * random.standard_normal() for of in outputs.values()]])
-        found.append(Kept(pose, Block(volts, tuple(outputs), 1.0, float(k)), float(k), None, number=k))
+        found.append(KeptPose(pose, Block(volts, tuple(outputs), 1.0, float(k)), float(k), None, number=k))
     return found
 
 
@@ -31,7 +31,7 @@ def kept(poses: Iterator[Pose], outputs: Mapping[str, Any], seed: int = 1) -> li
 def follower(rig_home: Any) -> Any:
     """Of a run of a kind that holds `before`."""
 
-    def begun(kind: str, before: list[Kept] | None = None) -> RunningEstimates:
+    def begun(kind: str, before: list[KeptPose] | None = None) -> RunningEstimates:
         with Record() as record:
             run = record.begin(
                 "made", {}, bench={}, identities={}, configuration="", constants={}, source="made", kind=kind
@@ -45,7 +45,7 @@ def follower(rig_home: Any) -> Any:
     return begun
 
 
-def last(told: RunningEstimates, poses: list[Kept]) -> dict[str, str]:
+def last(told: RunningEstimates, poses: list[KeptPose]) -> dict[str, str]:
     return {value.name: value.shown for value in [told.values(each) for each in poses][-1]}
 
 

@@ -20,7 +20,7 @@ from procedures.soak import schedule
 from rig.bench import DEFAULT, read_bench
 from rig.bench.result_names import names_with_limits
 from rig.record import Record
-from rig.record.measured import Measured
+from rig.record.measured import MeasuredRun
 from rig.results.soak import read_soak
 from rig.runs.estimates import SoakForecaster, lines, outlook
 from rig.runs.runner import resume, start
@@ -125,7 +125,7 @@ def test_until_steady_it_ends_early_and_says_when(rig: Rig, cold: str) -> None:
     assert document["poses"] < len(list(schedule(43200.0, 900.0, 450.0)))
     assert document["results"]["steady-state"]["value"] == 1.0
     with Record() as record:
-        measured = Measured.named(record, document["run"])
+        measured = MeasuredRun.named(record, document["run"])
         t_s = read_soak(measured).courses["bias-x"].t_s
     assert 0 < measured.table().time_s[0] < 30  # since power-on, ten hours after the run's beginning
     assert 0 < t_s[0] < 60
@@ -141,11 +141,11 @@ def test_a_soak_that_measures_its_first_pose_again_stays_on(rig: Rig, cold: str)
         with sigterm_at(12):
             start(record, read_bench(Path(cold)), find("soak"), settings, Onlooker())
         (stopped,) = record.runs()
-        begun = Measured.named(record, stopped.run)
+        begun = MeasuredRun.named(record, stopped.run)
         on_s, before_s = begun.readings(), begun.table().time_s
         exclude(record, stopped.run, [0], "touched")
         resume(record, stopped.run, Onlooker())
-        done = Measured.named(record, stopped.run)
+        done = MeasuredRun.named(record, stopped.run)
         assert done.readings() == on_s
         assert list(done.table().time_s[: len(before_s) - 1]) == list(before_s[1:])
 
@@ -192,7 +192,7 @@ def test_a_kill_in_a_hold_is_a_gap_in_the_results(rig_home: Path) -> None:
             run = record.runs()[0].run
         assert nursery.run(rig_home, "resume", run, "--unattended").status == 0
     with Record(rig_home) as record:
-        (gap,) = read_soak(Measured.named(record, run)).gaps
+        (gap,) = read_soak(MeasuredRun.named(record, run)).gaps
         assert gap.path == "hold 4"
         assert 0 < gap.length_s == pytest.approx(record.run(run).results["gap"]["value"])
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from calibrations.table import Table
 from procedures.session import Pose, Reading
 from rig.errors import RecordError, UnknownRun
-from rig.record import Block, Kept, Record
+from rig.record import Block, KeptPose, Record
 from rig.record.measured import table_of
 from rig.record.schema import SCHEMA
 
@@ -43,7 +43,7 @@ def test_poses_come_back_as_they_were_kept(tmp_path_factory: pytest.TempPathFact
     with Record(tmp_path_factory.mktemp("record")) as record:
         run = begin(record)
         for number, pose in enumerate(poses):
-            record.keep(run, number, Kept(pose, block([[number, 1.0]]), 3.5, 21.5), {"number": number})
+            record.keep(run, number, KeptPose(pose, block([[number, 1.0]]), 3.5, 21.5), {"number": number})
         kept = list(record.kept(run))
         assert [each.pose for each in kept] == record.poses(run) == poses
         assert [float(each.samples.volts[0, 0]) for each in kept] == list(range(len(poses)))
@@ -55,8 +55,8 @@ def test_a_run_becomes_the_table_of_its_poses() -> None:
     with Record() as record:
         run = begin(record)
         samples = block([[2.0, 1.0], [4.0, 1.0], [6.0, 1.0]])
-        record.keep(run, 0, Kept(Pose(90, 0, 1, "A+ to B-"), samples, 3.5, 21.5), None)
-        record.keep(run, 1, Kept(Pose(90, 10, 1, "A+ to B-"), samples, 9.5, None), None)
+        record.keep(run, 0, KeptPose(Pose(90, 0, 1, "A+ to B-"), samples, 3.5, 21.5), None)
+        record.keep(run, 1, KeptPose(Pose(90, 10, 1, "A+ to B-"), samples, 9.5, None), None)
         table = table_of(record, run)
     assert table.kind == "poses"
     assert {name: list(column) for name, column in table.columns.items()} == {
@@ -77,7 +77,7 @@ def test_a_run_becomes_the_table_of_its_poses() -> None:
 def test_how_the_sensor_is_mounted_is_a_column_once_it_was_changed() -> None:
     with Record() as record:
         run = begin(record)
-        record.keep(run, 0, Kept(Pose(90, 0, mount_deg=90.0, flip=1), block([[2.0, 1.0]]), 3.5, 21.5), None)
+        record.keep(run, 0, KeptPose(Pose(90, 0, mount_deg=90.0, flip=1), block([[2.0, 1.0]]), 3.5, 21.5), None)
         table = table_of(record, run)
     assert (table.column("mount_deg")[0], table.column("flip")[0]) == (90, 1)
     assert "vx_std_v" not in table
@@ -164,7 +164,7 @@ def test_a_record_whose_header_asks_for_an_unknown_format_is_damaged(tmp_path: P
 def test_a_damaged_block_names_its_pose() -> None:
     with Record() as record:
         run = begin(record)
-        record.keep(run, 0, Kept(Pose(90, 0), block([[2.0, 1.0]]), 3.5, 21.5), None)
+        record.keep(run, 0, KeptPose(Pose(90, 0), block([[2.0, 1.0]]), 3.5, 21.5), None)
         with record.engine.begin() as connection:
             connection.exec_driver_sql("UPDATE blocks SET samples = x'00'")
         with pytest.raises(RecordError, match="pose 0: its values changed on the disk"):
@@ -174,7 +174,7 @@ def test_a_damaged_block_names_its_pose() -> None:
 def test_a_record_of_the_first_version_is_brought_up_to_date(tmp_path: Path) -> None:
     with Record(tmp_path) as record:
         run = begin(record)
-        record.keep(run, 0, Kept(Pose(90, 0), block([[2.0, 1.0]]), 3.5, 21.5), None)
+        record.keep(run, 0, KeptPose(Pose(90, 0), block([[2.0, 1.0]]), 3.5, 21.5), None)
     with closing(sqlite3.connect(tmp_path / "record.db")) as connection:
         for column in ("excluded", "alpha_read_deg", "beta_read_deg", "up", "rate_deg_s"):
             connection.execute(f"ALTER TABLE poses DROP COLUMN {column}")
@@ -193,7 +193,7 @@ def test_a_record_of_the_first_version_is_brought_up_to_date(tmp_path: Path) -> 
 def test_what_dials_showed_comes_back_beside_the_pose() -> None:
     with Record() as record:
         run = begin(record)
-        kept = Kept(Pose(90, 0), block([[2.0, 1.0]]), 3.5, 21.5, alpha_read_deg=90.083, beta_read_deg=-0.083)
+        kept = KeptPose(Pose(90, 0), block([[2.0, 1.0]]), 3.5, 21.5, alpha_read_deg=90.083, beta_read_deg=-0.083)
         record.keep(run, 0, kept, None)
         (found,) = record.kept(run)
         assert (found.alpha_read_deg, found.beta_read_deg, found.pose) == (90.083, -0.083, Pose(90, 0))
@@ -212,7 +212,7 @@ def test_an_excluded_pose_stays_with_its_reason_and_is_left_out() -> None:
     with Record() as record:
         run = begin(record)
         for number in range(3):
-            kept = Kept(Pose(90, 10.0 * number), block([[number, 1.0], [number, 1.0]]), number, 21.5)
+            kept = KeptPose(Pose(90, 10.0 * number), block([[number, 1.0], [number, 1.0]]), number, 21.5)
             record.keep(run, number, kept, None)
         record.exclude(run, 1, "a lorry passed")
         assert [kept.excluded for kept in record.kept(run)] == [None, "a lorry passed", None]
@@ -230,7 +230,7 @@ def test_means_and_scatter_come_without_the_samples() -> None:
     with Record() as record:
         run = begin(record)
         for number in range(3):
-            record.keep(run, number, Kept(Pose(90, number), block([[2.0, 1.0], [4.0, number]]), 3.5, 21.5), None)
+            record.keep(run, number, KeptPose(Pose(90, number), block([[2.0, 1.0], [4.0, number]]), 3.5, 21.5), None)
         record.exclude(run, 1, "touched")
         first, last = record.dwells(run)
         assert first == (0, next(record.kept(run)).dwell)
@@ -266,7 +266,7 @@ def test_means_of_an_older_record_come_from_its_samples() -> None:
         run = begin(record)
         for number in range(3):
             samples = block([[number, 1.0], [number + 1.0, 3.0]])
-            record.keep(run, number, Kept(Pose(90, number), samples, 3.5, 21.5), None)
+            record.keep(run, number, KeptPose(Pose(90, number), samples, 3.5, 21.5), None)
         present = record.dwells(run)
         with record.engine.begin() as to:
             to.exec_driver_sql("DELETE FROM dwells WHERE number > 0")  # an older program wrote none

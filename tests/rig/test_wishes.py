@@ -17,7 +17,7 @@ from rig.bench import read_bench
 from rig.errors import InstrumentFailed
 from rig.instruments.instruments import Rig
 from rig.planning.plan import Plan
-from rig.record import Kept, Record
+from rig.record import KeptPose, Record
 from rig.runs.runner import REPEATED, Decision, Outcome, start
 from tests.rig.rigging import POSES, Onlooker, small_sweep
 from tests.slow import first_fast
@@ -32,7 +32,7 @@ class Disturbed(Onlooker):
         super().__init__(wishes=list(wishes))
         self._then, self._at = then, at
 
-    def kept(self, kept: Kept) -> None:
+    def kept(self, kept: KeptPose) -> None:
         super().kept(kept)
         if len(self.seen) == self._at:
             self._then()
@@ -162,7 +162,7 @@ def test_a_run_that_is_not_wanted_leaves_nothing() -> None:
 class DisturbedMotion(Onlooker):
     """Presses Ctrl-C in the middle of the stream in which the sensor is shaken, once."""
 
-    def kept(self, kept: Kept) -> None:
+    def kept(self, kept: KeptPose) -> None:
         super().kept(kept)
         if kept.pose.path.startswith("motion") and not self.outcomes:
             interrupt()

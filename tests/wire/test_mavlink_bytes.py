@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v10 import common as v10
 from pymavlink.dialects.v20 import common as v20
 
-from drivers.digital.frames import Found, Frames
+from drivers.digital.frames import FoundFrames, Frames
 from drivers.mavlink_imu import messages as mav
 from drivers.mavlink_imu.driver import SampleDecoder, Settings
 
@@ -34,7 +34,7 @@ def theirs(version: int, name: str, sequence: int, *values: Any) -> bytes:
     return bytes(kind(*values).pack(packer(version, sequence)))
 
 
-def found_in(data: bytes) -> tuple[Frames, Found, mav.Heads]:
+def found_in(data: bytes) -> tuple[Frames, FoundFrames, mav.Heads]:
     frames = Frames(mav.Mavlink())
     found = frames.take(data)
     return frames, found, mav.heads(found)

@@ -99,7 +99,7 @@ class Condition:
 
 
 @dataclass(frozen=True)
-class Simulated:
+class SimulatedInterval:
     """The same result by the propagation of distributions: standard deviation and 95 % interval.
 
     `verdict` on the budget: confirmed, conservative (and `why`, where it is known), or widened to the simulation.
@@ -129,7 +129,7 @@ class Outcome:
     coverage: float
     freedom: float
     sources: tuple[Source, ...]
-    simulated: Simulated
+    simulated: SimulatedInterval
     found: tuple[float, float | None] | None
     decision: Decision | None
     weights: tuple[tuple[int, float], ...]

@@ -35,7 +35,7 @@ from calibrations.geometry.rate_table import EARTH_DEG_S
 from calibrations.means.noise import Noise, rms
 from calibrations.model import Model
 from calibrations.presentation.budget import sources
-from calibrations.presentation.certificate.content import Error, Figures, Limit, Outcome, Simulated, decide
+from calibrations.presentation.certificate.content import Error, Figures, Limit, Outcome, SimulatedInterval, decide
 from calibrations.presentation.certificate.terms import name, term
 from calibrations.table import Array
 from calibrations.tables import MEANS
@@ -212,7 +212,7 @@ class _Calibration:
         """The coverage factor of the budget."""
         return max(CERTAIN_K, float(self.budget.coverage[k]))
 
-    def _simulated(self, k: int) -> Simulated:
+    def _simulated(self, k: int) -> SimulatedInterval:
         """The interval of the trials, and its verdict on that of the budget."""
         value, trial = self.fit.model.all_estimates[k][1].value, self.trials[:, k]
         std, coverage = float(self.budget.combined[k]), self._coverage(k)
@@ -220,7 +220,7 @@ class _Calibration:
         judgement = verdict(value, coverage * std, std, low, high)
         spread = float(trial.std())
         reason = _explain_wider_interval(k, coverage, std, spread, self.budget) if judgement == CONSERVATIVE else ""
-        return Simulated(spread, low, high, judgement, reason)
+        return SimulatedInterval(spread, low, high, judgement, reason)
 
 
 def _explain_wider_interval(k: int, coverage: float, std: float, simulated: float, budget: Budget) -> str:

@@ -66,7 +66,7 @@ COLOURS = {
 
 
 @dataclass(frozen=True)
-class Scaled:
+class Scaling:
     """Values of a channel are drawn `factor` times as large, in `unit`."""
 
     factor: float
@@ -84,14 +84,14 @@ class ModelCurve:
     dash: Dash = "solid"
 
 
-def choose_scale(still: Still, axis: str, in_sensed: bool) -> Scaled:
+def choose_scale(still: Still, axis: str, in_sensed: bool) -> Scaling:
     """The output's own unit; or thousandths of the sensed quantity, because noise is small."""
     sensed = still.sensed.get(axis)
     if sensed is None or not in_sensed:
-        return Scaled(1.0, still.unit)
+        return Scaling(1.0, still.unit)
     if sensed.unit not in MILLI:
-        return Scaled(sensed.factor, sensed.unit)
-    return Scaled(1e3 * sensed.factor, MILLI[sensed.unit])
+        return Scaling(sensed.factor, sensed.unit)
+    return Scaling(1e3 * sensed.factor, MILLI[sensed.unit])
 
 
 def units(still: Still) -> dict[bool, str]:
@@ -105,7 +105,7 @@ def units(still: Still) -> dict[bool, str]:
 
 
 def allan(
-    curve: Curve | DeviationComparison, scaled: Scaled, models: Sequence[ModelCurve], raw: Curve | None = None
+    curve: Curve | DeviationComparison, scaled: Scaling, models: Sequence[ModelCurve], raw: Curve | None = None
 ) -> Panel:
     """Dots are measured, bars intervals of 95 %; lines are the models, thin lines the parts of the first.
 
@@ -145,7 +145,7 @@ def ratio(curve: DeviationComparison) -> Panel:
 
 
 def spectrum(
-    fit: ChannelFit, scaled: Scaled, models: Sequence[ModelCurve], bounds: tuple[Array, Array] | None = None
+    fit: ChannelFit, scaled: Scaling, models: Sequence[ModelCurve], bounds: tuple[Array, Array] | None = None
 ) -> Panel:
     """Dots are measured; 95 % of them should be in the grey band by the model `fit`; lines are the models.
 
@@ -177,7 +177,7 @@ def spectrum(
     return Panel(tuple(series), Axis(FREQUENCY, log=True), y, legend="upper right")
 
 
-def record(channel: Channel, scaled: Scaled) -> Panel:
+def record(channel: Channel, scaled: Scaling) -> Panel:
     """A still record over time: means of its samples, less the mean of all."""
     samples_per_point = max(1, -(-len(channel.means) // MOST))
     used = len(channel.means) // samples_per_point * samples_per_point
@@ -198,7 +198,7 @@ def steps_chart(start: NoiseFit, steps: Sequence[Step[NoiseFit]]) -> Chart:
 
 def fit_chart(fit: NoiseFit) -> Chart:
     """The measured Allan deviation of each channel, and that of the model."""
-    scaled = Scaled(1.0, fit.still.unit)
+    scaled = Scaling(1.0, fit.still.unit)
     curves = (fit.still.allan[channel.channel.axis] for channel in fit.channels)
     curves_by_channel = ([ModelCurve(channel, fit.model.name, INK)] for channel in fit.channels)
     return _with_axis_titles(
@@ -237,7 +237,7 @@ def still_album(end: NoiseFit, start: NoiseFit) -> list[Picture]:
         f"grey band holds 95 % of them by the model {name}{dashed}."
     )
     curves, densities = [], []
-    scaled = Scaled(1.0, end.still.unit)
+    scaled = Scaling(1.0, end.still.unit)
     for end_fit, start_fit in zip(end.channels, start.channels, strict=True):
         axis = end_fit.channel.axis
         models = [ModelCurve(end_fit, _name(end, start), INK)]
@@ -292,7 +292,7 @@ def noise_album(analysis: NoiseAnalysis) -> list[Picture]:
     album = []
     for k, (axis, noise) in enumerate(analysis.channels.items()):
         end, of_axis = (f"-{axis}", f" of {axis}") if k else ("", "")
-        model, scaled = _present_processes(noise), Scaled(1.0, noise.unit)
+        model, scaled = _present_processes(noise), Scaling(1.0, noise.unit)
         density = single_chart(spectrum(model.fit, scaled, [model], noise.interval), 4.0)
         album.append(Picture(f"allan{end}", f"Allan deviation{of_axis}", averaging, _deviations(noise, model, scaled)))
         album.append(Picture(f"spectrum{end}", f"Spectrum{of_axis}", power, density))
@@ -306,7 +306,7 @@ def _present_processes(noise: ChannelNoise) -> ModelCurve:
     return ModelCurve(replace(noise.fit, effects=effects), effects[0].name if is_alone else SUM, INK)
 
 
-def _deviations(noise: ChannelNoise, model: ModelCurve, scaled: Scaled) -> Chart:
+def _deviations(noise: ChannelNoise, model: ModelCurve, scaled: Scaling) -> Chart:
     """The overlapping deviation with its interval, the processes and their sum; on the right the other deviations."""
     curve = noise.allan
     panel = allan(curve, scaled, [model])

@@ -16,7 +16,7 @@ from rig.services.request import effects_of
 if TYPE_CHECKING:
     from rig.bench import Bench
     from rig.cli.terminal.progress import Progress
-    from rig.record import Kept
+    from rig.record import KeptPose
     from rig.runs.observer import Observer
 
 SETTINGS = {"inclinations_deg": "90,30,150,60", "step_deg": "30"}  # 104 poses show the three faults
@@ -104,7 +104,7 @@ def _watch(progress: Progress) -> Observer:
         def expect(self, total: int, recorded_poses: int) -> None:
             self.total, self.done = max(total, 1), recorded_poses
 
-        def kept(self, recorded: Kept) -> None:  # noqa: ARG002
+        def kept(self, recorded: KeptPose) -> None:  # noqa: ARG002
             self.done += 1
             progress.text = f"measuring, {self.done} of {self.total} poses"
             progress.share = MEASURING_SHARE * self.done / self.total

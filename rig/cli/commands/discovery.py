@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from calibrations.discovery.patterns import Pattern
     from calibrations.discovery.results import Diagnosis, Discovery
     from calibrations.effects import Effect
-    from rig.services.load import Loaded
+    from rig.services.load import AnalysisInput
     from rig.services.request import Request
 
 
@@ -160,7 +160,7 @@ def add_command(request: Request, effect: str, name: str | None, out: Path, as_j
     return verdict_status(result.verdict)
 
 
-def _find_effect(effect: str, name: str | None, question: Loaded) -> Effect:
+def _find_effect(effect: str, name: str | None, question: AnalysisInput) -> Effect:
     """The effect by name, from an expression or from a file. Raises UnknownName, ModelError, ExpressionError."""
     from calibrations.effects.catalogue import read_effect
     from calibrations.errors import ModelError
@@ -297,7 +297,7 @@ def _discover(
     return _Answer(result, path, (result.pattern if len(several) == 1 else None, reached, request))
 
 
-def _join_data(several: tuple[str, ...], request: Request, question: Loaded) -> Dataset[Any]:
+def _join_data(several: tuple[str, ...], request: Request, question: AnalysisInput) -> Dataset[Any]:
     """Several data sets as one table."""
     from calibrations.discovery.rows import Rows
     from rig.services.load import with_known_noise

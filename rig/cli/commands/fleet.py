@@ -17,7 +17,7 @@ from calibrations.text import columns, concise, concise_in_prefix, count_words, 
 from rig.cli.terminal.complete import complete_model
 from rig.cli.terminal.output import FOLDER, bench_option, emit, json_option, note, out_option, require_outputs
 from rig.files import write_whole
-from rig.fleet.calibrate import Calibrated, Calibration, calibrate_fleet, read_guide, write_guide, write_models
+from rig.fleet.calibrate import CalibratedBatch, Calibration, calibrate_fleet, read_guide, write_guide, write_models
 from rig.fleet.cluster import connect_workers
 from rig.fleet.discover import discover_fleet
 from rig.fleet.members import fleet_of
@@ -227,7 +227,7 @@ def calibration(result: Calibration) -> Iterator[str]:
         yield f"{member.sensor} is not calibrated: {fault}"
 
 
-def _batch(batch: Calibrated) -> Iterator[str]:
+def _batch(batch: CalibratedBatch) -> Iterator[str]:
     unlike_model = [m.sensor for m, unlike in zip(batch.members, batch.unlike, strict=True) if unlike]
     yield f"batch {batch.batch or '-'}: {len(batch.members)} sensors"
     rows = []
@@ -244,7 +244,7 @@ def _batch(batch: Calibrated) -> Iterator[str]:
         yield f"This model does not describe: {names}; `rig fleet discover` finds their missing effects."
 
 
-def _gains(batch: Calibrated) -> list[float]:
+def _gains(batch: CalibratedBatch) -> list[float]:
     import numpy as np
 
     return list(map(float, np.median(batch.pooled.stds / batch.pooled.alone, axis=0)))

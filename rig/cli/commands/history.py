@@ -18,9 +18,9 @@ from rig.cli.terminal.complete import complete_model, complete_sensor
 from rig.cli.terminal.output import bench_option, emit, json_option, note, picture_options
 from rig.cli.terminal.progress import working
 from rig.record import Record
-from rig.services.control import HEAD, OUT, Controlled, make_charts, row, signals, worst
+from rig.services.control import HEAD, OUT, ControlledQuantity, make_charts, row, signals, worst
 from rig.services.history import Calibration, History, Quantity, changes, closest, history, latest, limits_of, stale
-from rig.services.history_comparison import Compared, compare_days, compare_rigs, compare_sensors
+from rig.services.history_comparison import CalibrationComparison, compare_days, compare_rigs, compare_sensors
 from rig.services.history_words import (
     agreements,
     but_stale,
@@ -123,7 +123,7 @@ def _select_quantities(life: History, names: Sequence[str], limited: Iterable[st
     return replace(life, quantities=quantities)
 
 
-def _chosen_rows(compared: Compared, life: History) -> Compared:
+def _chosen_rows(compared: CalibrationComparison, life: History) -> CalibrationComparison:
     """The rows of the chosen quantities."""
     names = {q.name for q in life.quantities}
     return replace(compared, rows={name: row for name, row in compared.rows.items() if name in names})
@@ -186,13 +186,15 @@ def near_lines(closest: Near, on: date | None, staleness: str | None) -> Iterato
         yield but_stale(staleness)
 
 
-def format_comparison(compared: Sequence[Compared]) -> Iterator[str]:
+def format_comparison(compared: Sequence[CalibrationComparison]) -> Iterator[str]:
     for comparison in compared:
         yield f"\n{comparison.one} compared with {comparison.other}"
         yield columns(*agreements(comparison, lambda value, digits: f"{value:.{digits}g}"))
 
 
-def document(life: History, closest: Near, staleness: str | None, compared: Sequence[Compared]) -> dict[str, Any]:
+def document(
+    life: History, closest: Near, staleness: str | None, compared: Sequence[CalibrationComparison]
+) -> dict[str, Any]:
     return {
         "schema": "rig.history/1",
         "sensor": life.sensor,
@@ -272,7 +274,7 @@ def control_command(
     return int(worst(quantities) == OUT)
 
 
-def _chart_document(controlled: Controlled) -> dict[str, Any]:
+def _chart_document(controlled: ControlledQuantity) -> dict[str, Any]:
     chart = controlled.chart
     signals = [("individuals", k) for k in chart.jumps] + [("ewma", k) for k in chart.drifts]
     return {
@@ -293,7 +295,7 @@ def _chart_document(controlled: Controlled) -> dict[str, Any]:
     }
 
 
-def _draw_charts(quantities: list[Controlled], folder: Path, form: str) -> list[Path]:
+def _draw_charts(quantities: list[ControlledQuantity], folder: Path, form: str) -> list[Path]:
     """One picture for each sensor."""
     from calibrations.presentation.charts.history import control_charts
     from calibrations.presentation.static import save_all

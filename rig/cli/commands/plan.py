@@ -31,7 +31,7 @@ from rig.files import write_whole
 from rig.planning.optimal import Optimal, relative
 from rig.planning.optimal import optimal as chosen
 from rig.planning.plan import Plan, Stretch, plan, stretches
-from rig.planning.sweep_range import Judged
+from rig.planning.sweep_range import JudgedPlan
 from rig.services.optimal_words import PLANS, plan_rows, purpose, savings
 
 FEW_STEPS = 120  # longer plans are summarised
@@ -230,7 +230,7 @@ def _explain_run(optimum: Optimal, out: str | None, bench: str | None) -> Iterat
         yield "           after the same command with --out poses.csv"
 
 
-def _plan_document(optimum: Optimal, candidate: Judged) -> dict[str, Any]:
+def _plan_document(optimum: Optimal, candidate: JudgedPlan) -> dict[str, Any]:
     with np.errstate(invalid="ignore"):  # a parameter that neither determines has infinite uncertainty
         ratios = [float(ratio) for ratio in candidate.errors / optimum.standard.errors]
     return {

@@ -16,7 +16,7 @@ from rig.files import LAB
 from rig.lab_url import lab_url, mask_url
 from rig.record import Record
 from rig.record.lab import READER, WRITER, prepare
-from rig.record.push import Pushed, push_all, unsent, verify
+from rig.record.push import PushedRun, push_all, unsent, verify
 
 
 def _check_url(context: click.Context, _: click.Parameter, url: str | None) -> str | None:
@@ -73,7 +73,7 @@ def _lab(url: str | None, bench_file: Path | None) -> URL:
 
 
 def _push(url: URL, run_names: tuple[str, ...], as_json: bool) -> int:
-    pushed_runs: list[Pushed] = []
+    pushed_runs: list[PushedRun] = []
     refusals: list[RecordError] = []
     with Record() as local, Record(url) as lab:
         waiting = unsent(local, lab, run_names)
@@ -97,7 +97,7 @@ def _push(url: URL, run_names: tuple[str, ...], as_json: bool) -> int:
     return int(bool(refusals))
 
 
-def _description(pushed: Pushed) -> str:
+def _description(pushed: PushedRun) -> str:
     return pushed.run if pushed.name == pushed.run else f"{pushed.run}, in the lab {pushed.name}"
 
 

@@ -16,9 +16,9 @@ from rig.cli.terminal.complete import complete_data, complete_run
 from rig.cli.terminal.output import emit, json_option, note, out_option
 from rig.cli.terminal.progress import working
 from rig.errors import RecordError
-from rig.record import Event, Kept, Line, Record, Run
+from rig.record import Event, KeptPose, Line, Record, Run
 from rig.record.codec import digest_of
-from rig.record.measured import Measured, sensors_of
+from rig.record.measured import MeasuredRun, sensors_of
 from rig.record.tables import units_of
 from rig.services.next_steps import next_steps, results_table
 
@@ -72,7 +72,7 @@ def _ranges(record: Record, run: Run) -> Ranges:
     sensors: list[str | None] = [*sensors_of(run)]
     for sensor in sensors or [None]:
         try:
-            table = Measured(record, run, sensor).table()
+            table = MeasuredRun(record, run, sensor).table()
         except (RecordError, CalibrationError):
             continue
         prefix = f"{sensor}." if sensor else ""
@@ -82,7 +82,7 @@ def _ranges(record: Record, run: Run) -> Ranges:
 
 def _poses(record: Record, run: Run) -> list[dict[str, Any]]:
     """Every pose as JSON, or every row of an imported table, with the reason if it is excluded."""
-    table = Measured(record, run).imported() if not run.bench and run.kind in MEANS else None
+    table = MeasuredRun(record, run).imported() if not run.bench and run.kind in MEANS else None
     if table is None:
         return list(_iterate_poses(record, run))
     reasons = record.excluded(run.run)
@@ -101,7 +101,7 @@ def _iterate_poses(record: Record, run: Run) -> Iterator[dict[str, Any]]:
         yield _pose(number, recorded, units)
 
 
-def _pose(number: int, recorded: Kept, units: Mapping[str, str]) -> dict[str, Any]:
+def _pose(number: int, recorded: KeptPose, units: Mapping[str, str]) -> dict[str, Any]:
     """One pose as JSON: means in V, and those of channels in other `units`."""
     names = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip", "up", "rate_deg_s")
     angles = {name: getattr(recorded.pose, name) for name in names}

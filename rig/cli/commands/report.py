@@ -103,7 +103,7 @@ def certificate_command(
     from calibrations.presentation.certificate.content import document
     from calibrations.presentation.certificate.results import require_reference
     from rig.bench import read_bench
-    from rig.services.certify import Certified, certified, failed_results
+    from rig.services.certify import CertificateInput, certified, failed_results
     from rig.services.load import is_still, loaded_table
 
     paths = _paths(out)
@@ -114,7 +114,7 @@ def certificate_command(
         table, stated_model, effects = loaded_table(Request(data, model, bench_file), note)
         require_reference(table.source, table.kind)
         bench = read_bench(bench_file) if bench_file is not None else None
-        request = Certified(data, table, stated_model, Path(model).name, effects, bench, before)
+        request = CertificateInput(data, table, stated_model, Path(model).name, effects, bench, before)
         certificate = certified(request, number, customer)
         for path in paths:
             progress.text = f"writing {path}"

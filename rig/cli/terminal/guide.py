@@ -24,7 +24,7 @@ from rig.drawings import Attitude, drawing_of, page
 from rig.files import free_bytes, home, write_whole
 from rig.planning.plan import Plan
 from rig.planning.preparation import mounting
-from rig.record import Kept
+from rig.record import KeptPose
 from rig.runs.observer import NEXT_STEP, RunViewer
 from rig.runs.runner import Decision, Outcome
 
@@ -138,7 +138,7 @@ class Guide(RunViewer):
         return screen(self.view, time.monotonic())
 
 
-def _choices(recorded: Kept | None, outcome: Outcome) -> Text:
+def _choices(recorded: KeptPose | None, outcome: Outcome) -> Text:
     """The meaning of each answer."""
     last = "" if recorded is None else f" (alpha {recorded.pose.alpha_deg:g}, beta {recorded.pose.beta_deg:g} deg)"
     return Text(

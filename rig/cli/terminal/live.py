@@ -20,7 +20,7 @@ from rig.cli.terminal.output import emit, note, notes, verdict_status
 from rig.cli.terminal.watch import watching
 from rig.cli.terminal.words import discovery, parameters, warning
 from rig.record import Record
-from rig.record.measured import Measured
+from rig.record.measured import MeasuredRun
 from rig.runs.live import FIRST, STANDARD, Live, Measurement, stands
 from rig.runs.runner import start
 from rig.services.provenance import write_model
@@ -59,7 +59,7 @@ class Experiments:
             note(f"The record has the measurements. Next: rig discover {' '.join(self.runs)}")
 
     def _joined_table(self) -> Table:
-        measured = [Measured(self.record, self.record.run(run), self.bench.first_sensor) for run in self.runs]
+        measured = [MeasuredRun(self.record, self.record.run(run), self.bench.first_sensor) for run in self.runs]
         return join_runs([m.part("poses") for m in measured], [begin_time(self.record, run) for run in self.runs])
 
     def _advise(self, interrupted: str) -> None:

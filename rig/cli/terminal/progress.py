@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, TextIO
 
 if TYPE_CHECKING:
     from calibrations.effects import Effect
-    from rig.services.search import Counted
+    from rig.services.search import CountedEffects
 
 EVERY_S = 1.0
 UNCHANGED_S = 10  # in a pipe or a file, between two lines about the same work
@@ -32,7 +32,7 @@ class Progress:
     text: str | Callable[[], str]
     share: float | None = None
     began_s: float = field(default_factory=time.monotonic)
-    search: Counted | None = None
+    search: CountedEffects | None = None
     at_end: ExitStack = field(default_factory=ExitStack)  # what ends with the work
 
     @property
@@ -53,9 +53,9 @@ class Progress:
     def searched(self, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
         """The effects for a search, whose progress is shown from now on."""
         from calibrations.progress import show_progress  # `rig --help` loads no calibrations
-        from rig.services.search import Counted
+        from rig.services.search import CountedEffects
 
-        self.search = counted = Counted(effects)
+        self.search = counted = CountedEffects(effects)
         self.at_end.enter_context(show_progress(self.show))
         self.text = lambda: f"searching for missing effects. {counted.text}"
         return counted

@@ -17,7 +17,7 @@ from procedures.session import Guidance
 from rig.bench import Bench
 from rig.bench.certificates import EXPIRED
 from rig.cli.terminal.output import emit, note, notes
-from rig.record import Kept, Record
+from rig.record import KeptPose, Record
 from rig.runs.background.control import PublishingObserver
 from rig.runs.estimates import live_estimates
 from rig.runs.host import SENSOR
@@ -48,7 +48,7 @@ class Quiet(Observer):
     def expect(self, total: int, recorded_poses: int) -> None:
         note(f"{total - recorded_poses} of {total} poses remain")
 
-    def kept(self, recorded: Kept) -> None:
+    def kept(self, recorded: KeptPose) -> None:
         if self._estimates and (report := self._estimates.report(recorded)):
             note(report)
 

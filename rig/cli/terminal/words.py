@@ -23,7 +23,7 @@ from rig.services.next_experiment import Answer
 from rig.services.request import Request
 
 if TYPE_CHECKING:
-    from calibrations.design.expected import Expected
+    from calibrations.design.expected import ExpectedResult
     from calibrations.design.experiment import Experiment
 
 
@@ -90,7 +90,7 @@ def experiment(e: Experiment, data: str) -> list[str]:
     return lines
 
 
-def _brings(expected: Expected | None, data: str) -> str:
+def _brings(expected: ExpectedResult | None, data: str) -> str:
     """Expected result of an experiment, from its own data if they are enough."""
     if expected is None:
         return "its result cannot be predicted"

@@ -23,7 +23,7 @@ from rig.errors import Busy, RigError
 from rig.files import home
 from rig.lease import lease
 from rig.planning.plan import Plan
-from rig.record import Kept, Record
+from rig.record import KeptPose, Record
 from rig.runs.background.status import (
     KEY_TIME,
     Order,
@@ -93,7 +93,7 @@ class PublishingObserver(Observer):
         self._observer.expect(total, recorded_poses)
         self._publish(self._writer.expect, total, recorded_poses)
 
-    def kept(self, recorded: Kept) -> None:
+    def kept(self, recorded: KeptPose) -> None:
         self._observer.kept(recorded)
         self._publish(self._writer.kept, recorded)
 

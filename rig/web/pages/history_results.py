@@ -19,7 +19,7 @@ from rig.errors import RigError
 from rig.services.charts import life_of
 from rig.services.control import OUT
 from rig.services.history import Calibration, History, Quantity, changes, closest, stale
-from rig.services.history_comparison import Compared, compare_days, compare_rigs, compare_sensors
+from rig.services.history_comparison import CalibrationComparison, compare_days, compare_rigs, compare_sensors
 from rig.services.history_words import (
     agreements,
     but_stale,
@@ -146,7 +146,7 @@ class CompareBox:
             with self.result:
                 _show(compared, self.model)
 
-    def _compare(self, days: Sequence[str]) -> Compared:
+    def _compare(self, days: Sequence[str]) -> CalibrationComparison:
         if self.kind.value == SENSOR:
             return compare_sensors(self.life, days[0], self.last_of(days[0]))
         if self.kind.value == RIGS:
@@ -154,7 +154,7 @@ class CompareBox:
         return compare_days(self.life, day(days[0]), day(days[1]))
 
 
-def _show(compared: Compared, model: str) -> None:
+def _show(compared: CalibrationComparison, model: str) -> None:
     """Show a comparison in numbers; two runs have a link to the compare page."""
     differing = [name for name, (_, agreement) in compared.rows.items() if not agreement.agrees]
     with div("row-of"):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rig.services.session import ModelSession
 
 
-class Asking:
+class DocumentDialog:
     """A dialog with questions, a button that makes a document, and the answer or the error below it."""
 
     def __init__(self, title: str, explanation: str) -> None:
@@ -60,7 +60,7 @@ class Asking:
         raise NotImplementedError
 
 
-class CertificateDialog(Asking):
+class CertificateDialog(DocumentDialog):
     """`rig certificate`: the form, the number, the customer, and the model in use until now."""
 
     def __init__(self, session: ModelSession[Any], bench_file: Path | None) -> None:
@@ -82,10 +82,16 @@ class CertificateDialog(Asking):
 
     def made(self) -> tuple[bytes | str, str, list[str]]:
         """The certificate of the present model."""
-        from rig.services.certify import Certified, certificate_head, certified, failed_results, format_certificate
+        from rig.services.certify import (
+            CertificateInput,
+            certificate_head,
+            certified,
+            failed_results,
+            format_certificate,
+        )
 
         session, form = self.session, str(self.form.value)
-        subject = Certified(
+        subject = CertificateInput(
             session.request.data,
             session.data.table,  # type: ignore[attr-defined] # the button is enabled for rows
             session.end.model if session.steps else session.model,
@@ -101,7 +107,7 @@ class CertificateDialog(Asking):
         return format_certificate(document, form), f"{document.number}{form}", lines
 
 
-class CompensationDialog(Asking):
+class CompensationDialog(DocumentDialog):
     """`rig compensate`: language, name, precision, ranges, and effects to leave out."""
 
     def __init__(self, session: ModelSession[Any]) -> None:

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from calibrations.discovery.findings import Candidate, Step
     from calibrations.discovery.patterns import Pattern
     from calibrations.discovery.results import Diagnosis
-    from rig.services.search import Counted
+    from rig.services.search import CountedEffects
     from rig.services.session import ModelSession
     from rig.web.pages.model import Workbench
 
@@ -68,7 +68,7 @@ class Missing:
         """Unit of the outputs."""
         return self.page.session.unit if self.page.session is not None else ""
 
-    def wait(self, counted: Counted) -> None:
+    def wait(self, counted: CountedEffects) -> None:
         """Show the progress of the search."""
         self.own.begin()
         with afresh(self.cards), box():

@@ -23,7 +23,7 @@ from rig.web.parts import afresh, box, button, div, for_page, message, notify_er
 
 if TYPE_CHECKING:
     from calibrations.discovery.results import Diagnosis
-    from calibrations.presentation.parameter_table import Correlated, ParameterRow
+    from calibrations.presentation.parameter_table import CorrelatedPair, ParameterRow
     from rig.services.session import ModelSession
     from rig.web.pages.model import Workbench
 
@@ -148,7 +148,7 @@ def _page_text(text: str) -> str:
     return re.sub(r"\bu(?=[Vg]\b)", "µ", unit(for_page(text)))
 
 
-def _pairs(correlated: list[Correlated]) -> None:
+def _pairs(correlated: list[CorrelatedPair]) -> None:
     if not correlated:
         words(f"No two parameters are correlated by {STRONG:g} or more.", "quiet small")
         return

@@ -50,7 +50,7 @@ def register(desk: Desk) -> None:
                 return
             with div("run-page"):
                 with div("stack"):
-                    planning = Planning(bench_file, bench, dict(request.query_params))
+                    planning = PlanForm(bench_file, bench, dict(request.query_params))
                     Instruments(desk, bench)
                 with div("stack"):
                     live = Live()
@@ -135,7 +135,7 @@ def _url_text(url: str) -> str:
     return "simulated" if url.startswith("simulated") else url
 
 
-class Planning:
+class PlanForm:
     """The form of a procedure and its settings; every change makes a new plan."""
 
     def __init__(self, bench_file: Path | None, bench: Bench, settings: Mapping[str, str]) -> None:
