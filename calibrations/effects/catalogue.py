@@ -125,12 +125,12 @@ def read_effect(path: Path) -> Effect:
 
 def _read_folder(folder: Path, package: str | None) -> Iterable[Effect]:
     for path in sorted(folder.glob("[!_]*.py")):
-        yield _of_module(importlib.import_module(f"{package}.{path.stem}"), path) if package else _user_effect(path)
+        yield _module_effect(importlib.import_module(f"{package}.{path.stem}"), path) if package else _user_effect(path)
 
 
 def _user_effect(path: Path) -> Effect:
     """A user's effect, whose errors name the user's file."""
-    effect = _of_module(_load(path), path)
+    effect = _module_effect(_load(path), path)
     for method in (*HOOKS, "follow"):
         if method in vars(type(effect)):
             setattr(type(effect), method, guard(vars(type(effect))[method], path))
@@ -151,7 +151,7 @@ def _load(path: Path) -> ModuleType:
     return module
 
 
-def _of_module(module: ModuleType, path: Path) -> Effect:
+def _module_effect(module: ModuleType, path: Path) -> Effect:
     """The effect of the one class in a module."""
     expected_name = class_name(path)
     classes = [v for v in vars(module).values() if isinstance(v, type) and v.__module__ == module.__name__]

@@ -259,7 +259,7 @@ class _Reader:
             raise self._fault(syntax, f"{name} is a function: write {name}(...)")
         if not name.isascii():
             raise self._fault(syntax, f'"{name}": names are written in the letters a to z, such as beta')
-        return Name(name, self._at(syntax))
+        return Name(name, self._character(syntax))
 
     def _call(self, syntax: ast.expr, name: str, arguments: list[ast.expr], depth: int) -> Node:
         if name not in FUNCTIONS:
@@ -284,18 +284,18 @@ class _Reader:
             links.append(self._apply(syntax, COMPARISONS[type(op)], [lhs, rhs], depth))
         product = links[0]
         for link in links[1:]:
-            product = Apply(OPERATORS[ast.Mult], (product, link), self._at(syntax))
+            product = Apply(OPERATORS[ast.Mult], (product, link), self._character(syntax))
         return product
 
     def _apply(self, syntax: ast.expr, operation: Operation, inner: list[ast.expr], depth: int) -> Node:
-        return Apply(operation, tuple(self.node(argument, depth + 1) for argument in inner), self._at(syntax))
+        return Apply(operation, tuple(self.node(argument, depth + 1) for argument in inner), self._character(syntax))
 
-    def _at(self, syntax: ast.expr) -> int:
+    def _character(self, syntax: ast.expr) -> int:
         """The column in characters; Python counts bytes."""
         return len(self._bytes[: syntax.col_offset].decode(errors="replace"))
 
     def _fault(self, syntax: ast.expr, message: str) -> ExpressionError:
-        return fault(self._text, self._at(syntax), message)
+        return fault(self._text, self._character(syntax), message)
 
     def _syntax_error(self, syntax: ast.expr) -> ExpressionError:
         part = ast.get_source_segment(self._text, syntax) or self._text

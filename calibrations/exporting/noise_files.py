@@ -83,7 +83,7 @@ def _densities(
     for sensor in SENSORS:
         model = by_sensor[sensor]
         factor = _factor(model, sensor)
-        white, walk = (factor * _largest(model, name) for name in (WHITE, WALK))
+        white, walk = (factor * _largest_value(model, name) for name in (WHITE, WALK))
         if stated_walk := stream.walks.get(sensor):
             walk = stated_walk
         if not walk:
@@ -121,7 +121,7 @@ def _factor(model: Model, sensor: str) -> float:
     return factor or 1.0
 
 
-def _largest(model: Model, effect: str) -> float:
+def _largest_value(model: Model, effect: str) -> float:
     return max((e.value for e in model.estimates(effect) if e.identified), default=0.0)
 
 
@@ -132,7 +132,7 @@ def _other_processes(model: Model, sensor: str, factor: float) -> Iterator[Loss]
         if term.name in (WHITE, WALK) or not term.estimates:
             continue
         if term.name == "flicker-noise":
-            size = FLICKER_DEVIATION * _largest(model, term.name)
+            size = FLICKER_DEVIATION * _largest_value(model, term.name)
         elif term.name == "gauss-markov-noise":
             size = MARKOV_DEVIATION * max((e.value for e in term.estimates if e.name == "sigma"), default=0.0)
         else:

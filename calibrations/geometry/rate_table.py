@@ -48,7 +48,7 @@ def turn_axes(table: Table) -> Array:
 
 def rate_slopes(table: Table) -> Array:
     """Output of each axis per deg/s of the table's rate, shape (3,). Raises DataError where the rate never changes."""
-    rate = _changing_rate(table)
+    rate = _varied_rate(table)
     deviations = rate - rate.mean()
     return np.asarray(deviations @ table.outputs / (deviations @ deviations))
 
@@ -71,7 +71,7 @@ def rate_scales(table: Table) -> Array:
 
     Raises DataError where the rate never changes.
     """
-    rate = _changing_rate(table)[:, None] * turn_axes(table)
+    rate = _varied_rate(table)[:, None] * turn_axes(table)
     deviations = rate - rate.mean(axis=0)
     squares = np.sum(deviations**2, axis=0)
     turned = squares > LEAST_OTHER_AXIS * squares.max()
@@ -114,7 +114,7 @@ def earth_rate_warning(table: Table) -> str | None:
     )
 
 
-def _changing_rate(table: Table) -> Array:
+def _varied_rate(table: Table) -> Array:
     rate = table.column("rate_deg_s")
     if not np.ptp(rate):
         raise DataError(

@@ -87,7 +87,7 @@ class Turns(Table):
 
     def residual(self, rates_deg_s: Array) -> Array:
         """Residual of the rates of the samples (samples, 3), shape (channels, n)."""
-        predicted = _turned(self.before, self._steps(rates_deg_s))
+        predicted = _turn_directions(self.before, self._steps(rates_deg_s))
         error = np.degrees(np.cross(predicted, self.after)) / self.duration_s[:, None]
         rests = (rates_deg_s[self.bounds[:, 0]] + rates_deg_s[self.bounds[:, 1] - 1]) / 2
         rests = rests - vertical_deg_s(self) * (self.before + self.after) / 2
@@ -281,7 +281,7 @@ def _rough_calibration(samples: Table, bounds: NDArray[np.intp], before: Array, 
     largest = float(np.median(path[large] / angles[large]))
 
     def residual(theta: Array) -> Array:
-        predicted = _turned(before, steps @ theta.reshape(3, 3).T)
+        predicted = _turn_directions(before, steps @ theta.reshape(3, 3).T)
         return np.asarray(np.cross(predicted, after).ravel())
 
     starts = [np.diag(np.array(signs) / (largest * scale)) for scale in SCALES for signs in SIGNS]
@@ -299,7 +299,7 @@ def _pad(parts: Sequence[Array]) -> Array:
     return padded
 
 
-def _turned(before: Array, steps: Array) -> Array:
+def _turn_directions(before: Array, steps: Array) -> Array:
     """Fixed directions `before` (n, 3) in the sensor's frame after its rotations by vectors (n, steps, 3)."""
     return np.asarray(np.einsum("nij,nj->ni", _products(_rotations(-steps)), before))
 

@@ -50,12 +50,12 @@ def looks_like_radians(values: Array) -> bool:
     """Whether angles lie within one turn in rad and off the grid of whole arc minutes on which degrees are set."""
     distinct: Array = np.unique(np.round(np.abs(values), 6))
     distinct = distinct[distinct > ROUNDING_DEG]
-    if not len(distinct) or distinct[-1] > 2 * np.pi * 1.001 or _on_grid(distinct, ARC_MINUTE_DEG, ROUNDING_DEG):
+    if not len(distinct) or distinct[-1] > 2 * np.pi * 1.001 or _is_on_grid(distinct, ARC_MINUTE_DEG, ROUNDING_DEG):
         return False
-    return len(distinct) >= FEWEST_ANGLES or _on_grid(distinct, np.pi / 36, ROUNDING_DEG)
+    return len(distinct) >= FEWEST_ANGLES or _is_on_grid(distinct, np.pi / 36, ROUNDING_DEG)
 
 
-def _on_grid(values: Array, step: float, rounding: float) -> bool:
+def _is_on_grid(values: Array, step: float, rounding: float) -> bool:
     return bool(np.all(np.abs(values - step * np.round(values / step)) < rounding))
 
 
@@ -122,10 +122,10 @@ def _rate(values: Array) -> Doubt | None:
     if (
         len(distinct) < FEWEST_RATES
         or distinct[-1] > FASTEST_RAD_S
-        or not _on_grid(distinct, np.pi / 36, RATE_ROUNDING)
+        or not _is_on_grid(distinct, np.pi / 36, RATE_ROUNDING)
     ):
         return None
-    if _on_grid(distinct, ROUND_DEG_S, ROUNDING_DEG / 2):
+    if _is_on_grid(distinct, ROUND_DEG_S, ROUNDING_DEG / 2):
         return None
     return (
         f"runs from {values.min():.4g} to {values.max():.4g}, in whole multiples of 5 deg/s if it is in rad/s",

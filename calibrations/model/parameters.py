@@ -43,7 +43,7 @@ class Layout:
     def of(model: Model, table: Table) -> Layout:
         """The layout for `table`."""
         slots = tuple(slot for i, term in enumerate(model.terms) for slot in _slots(i, term, table))
-        return Layout(model, table.axes, slots, table.unit, _nominal(table), _from_data(model, table))
+        return Layout(model, table.axes, slots, table.unit, _nominal(table), _starts_from_data(model, table))
 
     @cached_property
     def typical(self) -> Array:
@@ -157,7 +157,7 @@ class Layout:
         return np.array([self.model.terms[s.term].name == name for s in self.slots], dtype=bool)
 
 
-def _from_data(model: Model, table: Table) -> dict[tuple[int, str, str], tuple[float, ...]]:
+def _starts_from_data(model: Model, table: Table) -> dict[tuple[int, str, str], tuple[float, ...]]:
     """Starts that effects take from the table, by term, parameter and axis; the mean of all axes for none."""
     starts: dict[tuple[int, str, str], tuple[float, ...]] = {}
     for i, term in enumerate(model.terms):

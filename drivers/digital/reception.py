@@ -142,7 +142,7 @@ class Reception:
         if not len(values):
             return
         self.clipped = self.clipped or batch.clipped
-        repeated, gaps = self._by_number(batch)
+        repeated, gaps = self._compare_numbers(batch)
         if batch.time is not None:
             first = batch.time[:1] if self._last is None else np.array([self._last])
             steps = self.base.steps(np.concatenate([first, batch.time]))
@@ -150,7 +150,7 @@ class Reception:
                 repeated = steps == 0
                 repeated[0] &= self._last is not None
             self.back = self.back or bool((steps < 0).any())
-            self.lost += self._lost(steps, gaps)
+            self.lost += self._lost_count(steps, gaps)
             self._sensor = (float(first[0]) if self._last is None else self._sensor) + float(steps.sum())
             self._last = float(batch.time[-1])
         elif gaps is not None:
@@ -186,13 +186,13 @@ class Reception:
         parts = [self._moments[:half], self._moments[half:]]
         return [min(part, key=lambda moment: moment.host_s - moment.sensor_s) for part in parts if part]
 
-    def _by_number(self, batch: Batch) -> tuple[NDArray[np.bool_], Ints | None]:
+    def _compare_numbers(self, batch: Batch) -> tuple[NDArray[np.bool_], Ints | None]:
         """Which samples are repeated, and the messages that are missing before each, both by the numbers."""
         if batch.missing is None:
             return np.zeros(len(batch.values), dtype=bool), None
         return batch.missing < 0, np.maximum(batch.missing, 0)
 
-    def _lost(self, steps: Floats, gaps: Ints | None) -> int:
+    def _lost_count(self, steps: Floats, gaps: Ints | None) -> int:
         """Samples lost. A time of low resolution only says that a missing message may be a sample."""
         if gaps is not None and self.numbered:
             return int(gaps.sum())

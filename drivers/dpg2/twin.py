@@ -54,7 +54,7 @@ class Inclinometer(Twin):
         """Send the lines that are due by `now_s`."""
         while self._running and self._next_s <= now_s:
             if listeners := [c for c in self._port.connections.values() if self._has_sent_all(c)]:
-                lines = self._reading(self._next_s)
+                lines = self._reading_lines(self._next_s)
                 for connection in listeners:
                     self._send_lines(connection, lines, self._next_s)
             self._next_s += INTERVAL_S
@@ -82,11 +82,11 @@ class Inclinometer(Twin):
         elif letter == START:
             self._running, self._next_s = True, began_s
         elif letter == ONE_READING and not self._running:
-            self._send_lines(connection, self._reading(now_s), began_s)
+            self._send_lines(connection, self._reading_lines(now_s), began_s)
         elif letter == VERSION and not self._running:
             self._send_lines(connection, IDENTITY.splitlines(keepends=True), began_s)
 
-    def _reading(self, t_s: float) -> list[bytes]:
+    def _reading_lines(self, t_s: float) -> list[bytes]:
         """Both lines at `t_s`, or at the present time of the world if that is later."""
         self._world.advance(max(t_s, self._world.now_s))
         x_deg, y_deg = self.faults.held("stale", t_s, list(self._world.level_deg()))

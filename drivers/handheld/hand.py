@@ -51,7 +51,7 @@ class Script:
         self._wanted = up
         self._wanted_north: Floats | None = None
         self._table = _perturb(np.array([0.0, 0.0, 1.0]), hand.table_deg, random)
-        direction = self._on_table(up)
+        direction = self._table_attitude(up)
         north = unit(np.array(NORTH) - (direction @ NORTH) * direction)
         self.segments = [Segment(0.0, math.inf, _floats(direction), _floats(direction), north=_floats(north))]
 
@@ -116,7 +116,7 @@ class Script:
         hand, random = self._hand, self._random
         chance, size = random.random(3), random.standard_normal(2)
         errs = chance[0] < hand.errs
-        target = self._on_table(_err(self._wanted) if errs else self._wanted)
+        target = self._table_attitude(_err(self._wanted) if errs else self._wanted)
         turning = Segment(0.0, 1.0, _floats(direction), _floats(target), 1.0, north=_floats(north))
         heading_rad, next_mm = self._aim_heading(turning, errs), place_mm
         if self._wanted_north is not None:
@@ -176,7 +176,7 @@ class Script:
         turn_rad = math.atan2(float(np.cross(north, level) @ up), float(north @ level)) + error_rad
         return math.remainder(turn_rad, 2 * math.pi)
 
-    def _on_table(self, direction: Floats) -> Floats:
+    def _table_attitude(self, direction: Floats) -> Floats:
         hand = self._hand
         leaning = np.abs(direction).max() < 0.99
         placed = _perturb(direction, hand.aim_deg if leaning else hand.side_deg, self._random)

@@ -39,7 +39,7 @@ def propose_settings(lines: Sequence[str], length_s: float) -> dict[str, Any] | 
     if not values:
         return None
     rate_hz = _round(max(len(column) for column in values.values()) / length_s)
-    names = _by_name(values) if style in ("named", "teleplot") else _columns_by_value(values)
+    names = _columns_by_name(values) if style in ("named", "teleplot") else _columns_by_value(values)
     names = {name: names[name] for name in ORDER if name in names}
     force = [values[names[name]] for name in ("ax", "ay", "az") if name in names]
     if len(force) < 3:
@@ -73,7 +73,7 @@ def _columns(lines: Sequence[str], style: str) -> Mapping[Column, NDArray[np.flo
     return {column: values[:shortest] for column, values in common.items() if np.isfinite(values).all()}
 
 
-def _by_name(values: Mapping[Column, NDArray[np.float64]]) -> dict[str, Column]:
+def _columns_by_name(values: Mapping[Column, NDArray[np.float64]]) -> dict[str, Column]:
     """Our name for each known column."""
     columns: dict[str, Column] = {}
     for column in values:

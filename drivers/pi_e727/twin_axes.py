@@ -55,7 +55,7 @@ class Axes:
             "VEL?": lambda a, _: table((axis, f"{self._velocity_um_s[axis]:.6f}") for axis in self.asked(a)),
             "MOV?": lambda a, now_s: table((axis, f"{self.commanded_um(axis, now_s):.6f}") for axis in self.asked(a)),
             "POS?": lambda a, now_s: table((axis, f"{self.shown_um(axis, now_s):.6f}") for axis in self.asked(a)),
-            "ONT?": lambda a, now_s: table((axis, int(self._on_target(axis, now_s))) for axis in self.asked(a)),
+            "ONT?": lambda a, now_s: table((axis, int(self._is_on_target(axis, now_s))) for axis in self.asked(a)),
             "TMN?": lambda a, _: table((axis, f"{TRAVEL_UM[0]:.6f}") for axis in self.asked(a)),
             "TMX?": lambda a, _: table((axis, f"{TRAVEL_UM[1]:.6f}") for axis in self.asked(a)),
         }
@@ -130,7 +130,7 @@ class Axes:
         """The position that the controller reports."""
         return float(self.measured_um(axis, now_s)[0]) + (self.faults.size("lies", now_s) or 0.0)
 
-    def _on_target(self, axis: str, now_s: float) -> bool:
+    def _is_on_target(self, axis: str, now_s: float) -> bool:
         return self._servo[axis] and not self.moving(axis, now_s)
 
     def _set_servo(self, arguments: Sequence[str], now_s: float) -> None:

@@ -93,7 +93,7 @@ class Link:
 
     def write(self, data: bytes) -> None:
         """Send all of `data`. Raises LinkRefused if the connection is lost."""
-        line = self._connected()
+        line = self._open_line()
         try:
             line.put(data)
         except LOST as error:
@@ -103,7 +103,7 @@ class Link:
 
     def read(self, timeout_s: float) -> bytes:
         """The next bytes that arrive, or none within `timeout_s`. Raises LinkRefused at the end of the connection."""
-        line = self._connected()
+        line = self._open_line()
         if not self.clock.wait_readable(line, timeout_s):
             return b""
         try:
@@ -143,7 +143,7 @@ class Link:
     def _names(self) -> str:
         return ", ".join(dict.fromkeys(self.users)) or self.url
 
-    def _connected(self) -> OpenConnection:
+    def _open_line(self) -> OpenConnection:
         if self._closed:
             raise LinkRefused(f"{self._place}: the connection is closed", "Connect again")
         if self._line is None:

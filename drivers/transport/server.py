@@ -55,7 +55,7 @@ class Connection:
         self.fileno, self.key, self.close = fileno, key, close
         self.inbox = bytearray()
         self.received = self.emitted = 0
-        self._leaving = leaving  # a message after the faults of the link
+        self._after_faults = leaving  # a message after the faults of the link
         self._outbox: list[tuple[float, int, bytes]] = []  # a heap: time, order, data
         self._order = itertools.count()
         self._last_s = -math.inf
@@ -86,7 +86,7 @@ class Connection:
         if not data:
             return
         self._last_s = max(self._last_s, due_s)
-        pieces = list(self._leaving(Message(data, self._last_s)))
+        pieces = list(self._after_faults(Message(data, self._last_s)))
         for piece in pieces:
             heapq.heappush(self._outbox, (piece.due_s, next(self._order), piece.data))
         if pieces and b"".join(piece.data for piece in pieces) == data:  # data that are only late keep their order
@@ -250,7 +250,7 @@ class Port:
             connection.inbox.clear()
         return bool(connection.inbox)
 
-    def _leaving(self, sent: Message) -> list[Message]:
+    def _after_faults(self, sent: Message) -> list[Message]:
         return disturb(sent, self._faults_of(sent.data), self.wire)
 
     def _faults_of(self, message: bytes) -> Faults:
@@ -274,7 +274,7 @@ class Port:
             if self._capacity is not None:
                 client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, self._capacity)
             key = connection_key(peer, client.getsockname())
-            self.connections[client.fileno()] = Connection(client.fileno(), key, client.close, self._leaving)
+            self.connections[client.fileno()] = Connection(client.fileno(), key, client.close, self._after_faults)
 
     def _open_datagrams(self) -> str:
         """A UDP socket that sends to an address or listens at one, and the url of the other end."""
@@ -282,7 +282,7 @@ class Port:
         udp_socket.setblocking(False)
         place = (self.timing.host, self.timing.port)
         udp_socket.bind(("", 0) if sends else place)
-        self.connections[udp_socket.fileno()] = Datagrams(udp_socket, place if sends else None, self._leaving)
+        self.connections[udp_socket.fileno()] = Datagrams(udp_socket, place if sends else None, self._after_faults)
         if sends:
             return f"udpin://{self.timing.host}:{self.timing.port}"
         return f"udpout://{self.timing.host}:{udp_socket.getsockname()[1]}"
@@ -298,7 +298,7 @@ class Port:
             os.close(inner)
             os.close(far)
 
-        self.connections[inner] = Connection(inner, path, close, self._leaving)
+        self.connections[inner] = Connection(inner, path, close, self._after_faults)
         return f"serial:{path}"
 
 

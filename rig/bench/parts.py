@@ -150,7 +150,7 @@ class Displacement(Strict):
 
     @field_validator("curve", mode="before")
     @classmethod
-    def _shipped(cls, curve: Any) -> Any:
+    def _load_shipped(cls, curve: Any) -> Any:
         return Curve.from_file(SIMULATED_CURVE) if curve == SIMULATED else curve
 
 

@@ -41,9 +41,9 @@ from rig.services.tables import average_log
 def write_look(look: Screening) -> dict[str, Any]:
     """The screening as plain values, without rounding."""
     return {
-        **_as_document(look),
-        "scores": [_as_document(score) for score in look.scores],
-        "stage": _as_document(look.stage),
+        **_document(look),
+        "scores": [_document(score) for score in look.scores],
+        "stage": _document(look.stage),
     }
 
 
@@ -72,7 +72,7 @@ def _shared_names(names: tuple[Any, ...]) -> tuple[Any, ...]:
     return names
 
 
-def _as_document(value: Any) -> dict[str, Any]:
+def _document(value: Any) -> dict[str, Any]:
     values = {field.name: getattr(value, field.name) for field in fields(value)}
     return {name: item.tolist() if isinstance(item, np.ndarray) else item for name, item in values.items()}
 

@@ -38,7 +38,7 @@ def misalignment(measured: MeasuredRun) -> dict[str, Result]:
     directions = estimate_directions(measured.table())
     results: dict[str, Result] = {}
     for direction in directions.values():
-        results |= _of_axis(direction)
+        results |= _axis_results(direction)
     value, std = non_orthogonality_deg(directions["x"], directions["y"])
     results["non-orthogonality"] = Result(value, "deg", std)
     matrix = correction_matrix(directions["x"].theta, directions["y"].theta)
@@ -47,7 +47,7 @@ def misalignment(measured: MeasuredRun) -> dict[str, Result]:
     return results | {"rounds": Result(float(directions["x"].rounds), "")}
 
 
-def _of_axis(direction: Direction) -> dict[str, Result]:
+def _axis_results(direction: Direction) -> dict[str, Result]:
     stds = np.sqrt(np.diag(direction.covariance))
     thetas = {
         f"theta-{direction.axis}{reference}": Result(float(value), "", float(std))

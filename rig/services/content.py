@@ -28,13 +28,13 @@ def content_of(data: str, model: str | None) -> Content:
 
     Reads no samples. Raises UnknownRun, RecordError, OSError.
     """
-    of_model = _of_file(Path(model)) if model and Path(model).is_file() else model or ""
+    of_model = _file_digest(Path(model)) if model and Path(model).is_file() else model or ""
     if len(names := names_of(data)) > 1:
         parts = [content_of(name, model) for name in names]
         extent = SEPARATOR.join(part.extent or "a file" for part in parts)
         return Content(_key(*(part.key for part in parts)), extent, any(part.growing for part in parts))
     if Path(data).is_file():
-        return Content(_key("file", _of_file(Path(data)), of_model))
+        return Content(_key("file", _file_digest(Path(data)), of_model))
     name, _, sensor = data.partition("/")
     with Record.to_find(name) as record:
         run = record.run(name)
@@ -49,6 +49,6 @@ def _key(*parts: object) -> str:
     return hashlib.sha256(json.dumps(parts, default=str).encode()).hexdigest()
 
 
-def _of_file(path: Path) -> str:
+def _file_digest(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -42,7 +42,7 @@ def make_charts(
     Raises RecordError where there is nothing to chart, UnknownRun where `since` is none of the check-standard runs.
     """
     checks = [run for run in reversed(list(runs)) if run.procedure == PROCEDURE and run.state == "complete"]
-    points = [point for run in _from_run(checks, since) for point in _points(run)]
+    points = [point for run in _runs_from(checks, since) for point in _points(run)]
     sensor_names = list(dict.fromkeys(point.sensor for point in points))
     if sensor is not None and sensor not in sensor_names:
         raise RecordError(f"no check-standard run of the sensor {sensor!r}.{did_you_mean(sensor, sensor_names)}")
@@ -99,7 +99,7 @@ class _Point:
     result: Mapping[str, Any]
 
 
-def _from_run(checks: list[Run], first_run: str | None) -> list[Run]:
+def _runs_from(checks: list[Run], first_run: str | None) -> list[Run]:
     names = [run.run for run in checks]
     if first_run is not None and first_run not in names:
         raise UnknownRun(f"no complete check-standard run {first_run!r}.{did_you_mean(first_run, names[-20:])}")

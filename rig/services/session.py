@@ -113,11 +113,11 @@ class ModelSession(Generic[F]):
 
     def with_step(self, step: Step[F]) -> ModelSession[F]:
         """The session with one more step."""
-        return self._with((*self.steps, step))
+        return self._with_steps((*self.steps, step))
 
     def undone(self) -> ModelSession[F]:
         """The session without its last step; the first state has none."""
-        return self._with(self.steps[:-1])
+        return self._with_steps(self.steps[:-1])
 
     def removed(self, name: str) -> ModelSession[F]:
         """The session without the added effect `name`. The later ones are fitted again.
@@ -139,7 +139,7 @@ class ModelSession(Generic[F]):
         """
         equal = takewhile(lambda pair: pair[0] == pair[1], zip(self.added, texts, strict=False))
         common = sum(1 for _ in equal)
-        session = self if common == len(self.steps) else self._with(self.steps[:common])
+        session = self if common == len(self.steps) else self._with_steps(self.steps[:common])
         for text in texts[common:]:
             name, equals, expression = text.partition("=")
             try:
@@ -156,7 +156,7 @@ class ModelSession(Generic[F]):
                 session = replace(session, notes=(*session.notes, note))
         return session
 
-    def _with(self, steps: tuple[Step[F], ...]) -> ModelSession[F]:
+    def _with_steps(self, steps: tuple[Step[F], ...]) -> ModelSession[F]:
         start, steps = self.data.in_one_floor(self.start, steps)
         return replace(self, start=start, steps=steps)
 

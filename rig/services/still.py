@@ -222,7 +222,7 @@ def _times(table: Table) -> _Times | None:
     if 0 < missing_steps.sum() < table.n and np.all(np.abs(step_s / typical - 1 - missing_steps) < WHOLE):
         raise DataError(
             f"{table.source}: {missing_steps.sum():.0f} single samples are missing, the first after row {far[0] + 2}; "
-            f"{EVEN_REMEDY}, or analyse {_longest(far, table.n)} alone"
+            f"{EVEN_REMEDY}, or analyse {_longest_stretch_text(far, table.n)} alone"
         )
     off_s = float(np.max(np.abs(t_s - np.linspace(t_s[0], t_s[-1], table.n))))
     if off_s > UNEVENNESS * length_s:
@@ -233,7 +233,7 @@ def _times(table: Table) -> _Times | None:
     return _Times((table.n - 1) / length_s, (), off_s)
 
 
-def _longest(far: NDArray[np.intp], n: int) -> str:
+def _longest_stretch_text(far: NDArray[np.intp], n: int) -> str:
     """The longest stretch of n rows without a late one, counted from 1; `far` are the last rows before these."""
     edges = np.array([-1, *far, n - 1])
     k = int(np.argmax(np.diff(edges)))

@@ -68,13 +68,13 @@ def load(data: str, kind: str | None = None, notify: Callable[[str], None] = lam
         raise DataError(f"{data}: this is a folder; give a file in it, or a run (`rig runs` lists them)")
     if Path(data).is_file():
         return average_log(read_csv(Path(data), kind), notify)
-    table = _of_run(data)
+    table = _run_table(data)
     if kind is not None and table.kind != kind:
         raise RecordError(f"run {data} is a table of {table.kind}, not of {kind}")
     return table
 
 
-def _of_run(data: str) -> Table:
+def _run_table(data: str) -> Table:
     from rig.record.measured import table_of
     from rig.record.store import Record  # a file needs no database
 

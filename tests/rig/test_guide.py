@@ -212,11 +212,11 @@ def test_scatter_is_compared_with_what_is_usual_for_such_poses(run: str) -> None
         shown_to.begun(run)
         for number in range(3):
             shown_to.kept(kept(number, 0.001, "still 1"))
-        assert "as usual" in shown(shown_to._screen())
+        assert "as usual" in shown(shown_to._render())
         shown_to.kept(kept(4, 0.005, "still 2"))
-        assert "5 times the usual value" in shown(shown_to._screen())
+        assert "5 times the usual value" in shown(shown_to._render())
         shown_to.kept(kept(5, 0.5, "motion 1"))
-        assert "usual" not in shown(shown_to._screen())
+        assert "usual" not in shown(shown_to._render())
 
 
 @pytest.mark.parametrize(

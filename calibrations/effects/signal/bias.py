@@ -5,7 +5,7 @@ from calibrations.geometry.orientation import reported_force
 from calibrations.table import Array, Table
 
 
-def _at_zero(table: Table) -> Array:
+def _zero_output(table: Table) -> Array:
     """The middle of each output; in a table of motion less what gravity gives there."""
     middle: Array = (table.outputs.max(axis=0) + table.outputs.min(axis=0)) / 2
     if table.type.moving:
@@ -26,7 +26,7 @@ class Bias(Effect):
     Source    Ang (2); Book 17.3.6; IEEE Std 1293, K0.
     """
 
-    bias = Parameter("{out}", typical=5.0, guess=_at_zero, doc="output at zero specific force")
+    bias = Parameter("{out}", typical=5.0, guess=_zero_output, doc="output at zero specific force")
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
         return np.broadcast_to(p.bias, a.shape)

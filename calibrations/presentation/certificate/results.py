@@ -184,7 +184,7 @@ class _Calibration:
     def outcome(self, k: int) -> Outcome:
         """The figures of the parameter with index k."""
         model_term, e = self.fit.model.all_estimates[k]
-        std, simulated = float(self.budget.combined[k]), self._simulated(k)
+        std, simulated = float(self.budget.combined[k]), self._simulated_interval(k)
         coverage = self._coverage(k)
         if simulated.verdict == WIDENED:
             coverage = max(coverage, (e.value - simulated.low) / std, (simulated.high - e.value) / std)
@@ -212,7 +212,7 @@ class _Calibration:
         """The coverage factor of the budget."""
         return max(CERTAIN_K, float(self.budget.coverage[k]))
 
-    def _simulated(self, k: int) -> SimulatedInterval:
+    def _simulated_interval(self, k: int) -> SimulatedInterval:
         """The interval of the trials, and its verdict on that of the budget."""
         value, trial = self.fit.model.all_estimates[k][1].value, self.trials[:, k]
         std, coverage = float(self.budget.combined[k]), self._coverage(k)

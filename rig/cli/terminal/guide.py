@@ -43,7 +43,7 @@ class Guide(RunViewer):
         self._console = console or Console(stderr=True)
         self._drawn: Attitude | None = None
         self._live = Live(
-            get_renderable=self._screen, console=self._console, refresh_per_second=FRAMES_HZ, transient=True
+            get_renderable=self._render, console=self._console, refresh_per_second=FRAMES_HZ, transient=True
         )
 
     def __enter__(self) -> Self:
@@ -134,7 +134,7 @@ class Guide(RunViewer):
         self._console.print(sketch_with_legend(attitude, file))
         self._drawn = attitude
 
-    def _screen(self) -> RenderableType:
+    def _render(self) -> RenderableType:
         return screen(self.view, time.monotonic())
 
 

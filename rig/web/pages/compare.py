@@ -72,7 +72,7 @@ class Pictures(AxisAndUnit):
             draw(plot, chart, f"{self.axis.value} {self.unit.value}")
 
 
-def _of_rows(first: Fit, second: Fit) -> Comparison:
+def _fit_comparison(first: Fit, second: Fit) -> Comparison:
     """Residuals, and the difference of the measurements at common poses."""
     shared = match_poses(first, second)
     columns, second_choices = choices(first), choices(second)
@@ -103,7 +103,7 @@ def _noise_comparison(first: NoiseFit, second: NoiseFit) -> Comparison:
 
 
 PICTURES: dict[str, Callable[[Any, Any], Comparison]] = {
-    "rows": _of_rows,
+    "rows": _fit_comparison,
     "samples": _noise_comparison,
 }  # by form of data
 

@@ -85,9 +85,9 @@ class OptimalDialog:
             table(PLANS, plan_rows(choice))
         for line in (*savings(choice), *purpose(choice)):
             words(line, "small")
-        ui.button("Use these poses", icon="done", on_click=lambda: self._used(choice))
+        ui.button("Use these poses", icon="done", on_click=lambda: self._use(choice))
 
-    async def _used(self, choice: Optimal) -> None:
+    async def _use(self, choice: Optimal) -> None:
         """Write the poses into a file, and hand over the settings of a run with them."""
         try:
             path = await off_loop(_write_file, choice)
