@@ -177,7 +177,7 @@ def places_document(result: Diagnosis[F] | Discovery[F]) -> list[Document]:
 
 
 def _curve_fields(curve: PlaceCurve | None, explained: bool) -> Document:
-    """The curve of a place, its symmetry, and an expression where its form is unknown; null where there is none."""
+    """The curve of a place, its symmetry, and an expression if its form is unknown; null without a place."""
     if curve is None:
         return {"symmetry": None, "expression": None, "curve": None}
     grid = curve.at[curve.largest]  # one grid for all axes

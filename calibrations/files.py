@@ -227,7 +227,7 @@ def _document(text: str) -> Any:
 
 
 def read_mapping(path: Path, file_kind: str, error: Callable[[str], Exception], example: str) -> dict[str, Any]:
-    """The mapping in the YAML file `path`; `file_kind` names its kind and `example` says how to get or write one.
+    """The mapping in the YAML file `path`; `file_kind` names its kind, `example` is an instruction to get one.
 
     Raises `error` with the path, the kind and the reason.
     """

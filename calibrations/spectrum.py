@@ -192,7 +192,7 @@ def _slow_grid(n: int, highest: int, sampling: Sampling, corner_hz: float) -> Ba
 
 
 def fast_bands(frequency_hz: Array, density: Array, freedom: float, rate_hz: float, corner_hz: float) -> Bands:
-    """Of ordinates (f,) with so many degrees of freedom each, up to half the corner of the output's filter.
+    """From ordinates (f,) with their degrees of freedom, up to half the corner of the output's filter.
 
     Under a Hann window neighbours have a correlation of 4/9, and their neighbours 1/36.
     """
@@ -300,7 +300,7 @@ class Means:
         self._sums = np.empty(MOST_MEANS)
         self._filled = 0
         self._remainder = np.empty(0)  # samples that fill no mean yet
-        self._offset: float | None = None  # taken off before sums, so that they keep their digits
+        self._offset: float | None = None  # subtracted before sums, so that they keep their digits
 
     def add(self, samples: Array) -> None:
         """The next samples, shape (n,)."""

@@ -36,13 +36,13 @@ OPTIONAL = (
 NUMBERS = {name for kind in KINDS.values() for wanted in kind.columns for name in wanted} | set(OPTIONAL) - {"path"}
 AXES = ("x", "y", "z")
 LIKE = 0.65  # likeness of an unknown name and a column's, at which it may be meant
-MILLI = {"g": "mg", "field": "‰ of the field", "deg/s": "mdeg/s"}  # thousandths of what is sensed
+MILLI = {"g": "mg", "field": "‰ of the field", "deg/s": "mdeg/s"}  # thousandths of the sensed quantity
 STANDARD_GRAVITY = 9.80665
 GRAVITY_M_S2 = (9.76, 9.84)  # local gravity on Earth: from the highest mountain near the equator to the poles
 FIRST, LAST = 5, 3  # rows of a long table that a terminal and a notebook show
 LENGTHS = ((7200.0, 3600.0, "h"), (180.0, 60.0, "min"), (-1.0, 1.0, "s"))  # of a time axis: longer than, unit, its name
 HOLD = "hold "  # the paths of a soak, which switches the sensor on
-LARGEST = 1e30  # in any unit: what is measured is smaller, and its fourth power must still be a number
+LARGEST = 1e30  # in any unit: measurements are smaller, and the fourth power must still be a number
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,4 +1,4 @@
-"""The kinds of measured data: a class for each, which says how the kind differs from the others.
+"""The kinds of measured data: a class for each, with its differences from the others.
 
 The residual of each kind is in `calibrations.fitting.problem_kinds`, its charts in `calibrations.presentation.charts`.
 """
@@ -22,7 +22,7 @@ class Kind:
     default_model: str = "linear"
 
     rows: str  # what its rows are called
-    size_in: str  # what the size of a table is counted in
+    size_in: str  # the unit of the size of a table, in words
 
     symbol: str = "a"  # of the sensed quantity
     sensed_in: str = "g"  # what its magnitude is given in
@@ -32,7 +32,7 @@ class Kind:
     measurement_caption: str  # of the picture of measurement beside {model}
     failure_caption: str  # of the picture of where {model} fails
     taken: str = "the means of {} still positions"  # the rows that a log of raw samples gave, by their number
-    perfect_sensor: str = "the linear model"  # what the picture of an effect is compared with
+    perfect_sensor: str = "the linear model"  # the reference in the picture of an effect
     nominal: str = " of 1 V/g"  # the sensor in that picture
     widest_form: str = ""  # whose residual is the noise where the rows give none
     note: str = ""  # what else judges such data, in words
@@ -43,7 +43,7 @@ class Kind:
     known_input: bool = False  # whether each row has a known specific force or rate: the residual is in the output
     stage_angles: bool = False  # whether stages gave each row its orientation
     moving: bool = False  # whether the sensor moves: its output filter matters, and rows are stretches that repeat
-    from_output: bool = False  # whether a model computes what is sensed from the output, and the residual is in that
+    from_output: bool = False  # a model computes the sensed quantity from the output, and the residual is in its unit
     turning: bool = False  # whether the sensor turns at a constant rate, and senses it
     magnitude: bool = False  # whether only the magnitude of the sensed quantity is known
     field: bool = False  # whether that is a field, whose strength is a parameter

@@ -107,7 +107,7 @@ def _is_known(std: float | None) -> TypeGuard[float]:
 
 
 def rounded(value: float, digits: int = 3) -> str:
-    """A value to so many significant digits, with a power of ten only where it is very small or large."""
+    """A value to this number of significant digits, with a power of ten only if it is very small or large."""
     if value == 0 or not math.isfinite(value):
         return f"{value:g}"
     power = exponent(float(f"{value:.{digits - 1}e}"))

@@ -22,7 +22,7 @@ from weakref import WeakKeyDictionary
 
 from drivers.errors import ClockStuck
 
-STUCK_S = 30.0  # real seconds after which bytes in flight are taken for lost
+STUCK_S = 30.0  # real seconds after which bytes in flight count as lost
 DROPPED_S = 0.05  # the same on a wire where the kernel drops some
 FULL_S = 0.2  # real seconds without a further byte after which the kernel is taken to have no room for more
 SLICE_S = 10.0  # longest simulated step while a stream runs: bounds what its server must hold
@@ -35,7 +35,7 @@ class Wire(Protocol):
     key: str  # names the connection; its server knows the same name
     sent: int  # bytes written so far
     received: int  # bytes read so far
-    chunk: int  # so many bytes the kernel usually holds for one read
+    chunk: int  # bytes that the kernel usually buffers for one read
     lossy: bool  # the kernel drops what finds no room
 
     def fileno(self) -> int: ...
@@ -178,7 +178,7 @@ class SimulatedClock:
 
 
 def step(peers: Sequence[Peer], now_s: float) -> None:
-    """One turn of all servers: compute the state, read what has arrived, write what is due.
+    """One turn of all servers: compute the state, read received bytes, write the due ones.
 
     All servers compute their state before any acts, so that no server sees changes of another at this instant.
     """

@@ -28,7 +28,7 @@ LOG = logging.getLogger(__name__)  # without a handler, Python prints warnings t
 
 @dataclass(frozen=True)
 class Procedure:
-    """A script that runs on a session. `summary` is one line. `doc` names what it excites and what it is blind to.
+    """A script that runs on a session. `summary` is one line. `doc` names what it excites and does not excite.
 
     `kind` is the kind of table that its poses make: KIND of its file, `poses` by default. An `adaptive` procedure
     (ADAPTIVE of its file) chooses poses by its measurements, so its plan needs simulated measurements.

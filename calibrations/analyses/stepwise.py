@@ -158,7 +158,7 @@ def _quadratic(x: Array, y: Array) -> Array:
 
 @dataclass(frozen=True)
 class Tilt:
-    """Tilt of one axis that the bias model has already taken up, as the components of Theta that (20), (21) subtract.
+    """The part of the tilt of one axis in the bias model, as the components of Theta that (20), (21) subtract.
 
     in_plane      slope of g about the other axis's zero-g output, p1 + 2 p2 B, times SF over SF: 1 is a radian
     out_of_plane  q1 over SF

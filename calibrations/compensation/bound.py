@@ -239,7 +239,7 @@ def _wave(x: Interval, phase: float = 0.0) -> Interval:
 
 
 def _without_nan(x: Interval) -> Interval:
-    """Unbounded where there is no number."""
+    """The interval, unbounded where an end is not a number."""
     is_undefined = np.isnan(x.low) | np.isnan(x.high)
     return Interval(np.where(is_undefined, -np.inf, x.low), np.where(is_undefined, np.inf, x.high))
 

@@ -139,7 +139,7 @@ def trace_model(model: Model, without: Collection[str] = ()) -> Forward:
 
 
 def _values(term: Term) -> Values:
-    """Constants and parameters by name, a parameter per axis of shape (3,); 0 where there is none."""
+    """Constants and parameters by name, a parameter per axis of shape (3,); 0 without a value."""
     if missing := [name for name in term.effect.constants if name not in term.constants]:
         raise ModelError(f"{term.name}: the constant {missing[0]} is missing; `rig fit` writes it into the model file")
     values = Values.of(term.constants)

@@ -36,7 +36,7 @@ class Level(NamedTuple):
 
 
 def without_scatter(means: Array, readings: int) -> Level:
-    """The level beneath the scatter of a column's means (m,), of which each of so many `readings` holds until the next.
+    """The level below the scatter of a column's means (m,), in which each of `readings` readings holds until the next.
 
     Frequencies above those of the readings do not show their scatter, and are left
     out.
@@ -99,7 +99,7 @@ class _Spectrum:
         return cls(level, float(optimum.x), float(np.sqrt(2 / max(curvature, FLAT))), float(optimum.fun))
 
     def share(self, stds: float) -> Array:
-        """The level's share of each ordinate (k,), where the ratio is so many standard deviations higher."""
+        """The level's share of each ordinate (k,), with the ratio increased by this number of standard deviations."""
         return np.asarray(self.level / (self.level + np.exp(self.log_ratio + stds * self.std)))
 
 

@@ -66,7 +66,7 @@ def _lines(numbers: Mapping[str, float]) -> Iterator[str]:
 def _densities(
     models: Sequence[Model], stream: Stream, program: str
 ) -> tuple[dict[str, float], tuple[Loss, ...], tuple[str, ...]]:
-    """The four densities by name, what is lost, and remarks. Raises ModelError where a sensor is missing."""
+    """The four densities by name, the losses, and remarks. Raises ModelError if a sensor is missing."""
     by_sensor: dict[str, Model] = {}
     for model in models:
         if (sensor := _sensor(model)) in by_sensor:

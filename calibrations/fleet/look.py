@@ -145,7 +145,7 @@ def _patterns(fit: Fit) -> Iterator[Group]:
 
 
 def _trials(fit: Fit, groups: list[Group]) -> float:
-    """To how many independent tests the search amounts under white noise, whatever else the first sensor has."""
+    """The number of independent tests that the search equals under white noise alone."""
     screen = Screen(without_slow(fit))
     return Search(screen, [screen.basis(group.of(fit.table)) for group in groups]).trials
 

@@ -17,7 +17,7 @@ from calibrations.table import Array, Table
 
 DEGREE = 5
 DIRECTION_DEGREE = 3
-ROWS_PER_COLUMN = 5  # at least so many rows for each column
+ROWS_PER_COLUMN = 5  # the least number of rows for each column
 
 
 @lru_cache(maxsize=8)

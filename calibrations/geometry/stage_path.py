@@ -20,7 +20,7 @@ STATED_APPROACH = -1.0  # an approach as the table states it
 
 @lru_cache(maxsize=64)
 def with_approach(table: Table, by_deg: float) -> Table:
-    """The table with an approach that begins so many degrees before each pose; the same table for `STATED_APPROACH`."""
+    """The table with an approach that begins this angle before each pose; the same table for `STATED_APPROACH`."""
     return table if by_deg < 0 else replace(table, constants={**table.constants, "approach_deg": by_deg})
 
 

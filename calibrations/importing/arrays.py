@@ -333,7 +333,7 @@ def excel_topics(path: Path) -> list[Topic]:
 
 
 def _first_row(sheet: Any) -> tuple[str, ...]:
-    """The first of the widest rows: the header, or numbers where there is none."""
+    """The first of the widest rows: the header, or numbers without a header."""
     widest: list[str] = []
     for row in sheet.iter_rows(max_row=20, values_only=True):
         cells = [str(v) for v in row if v is not None]

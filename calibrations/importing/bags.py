@@ -20,7 +20,7 @@ from calibrations.table import Array
 IMU = "sensor_msgs/msg/Imu"
 FIELD = "sensor_msgs/msg/MagneticField"
 TIME = "t_s"
-VECTORS = {  # of a message: the member, our columns, and the covariance that says whether it is measured
+VECTORS = {  # of a message: the member, our columns, and the covariance, which shows whether it is measured
     IMU: (
         ("linear_acceleration", ("ax (m/s2)", "ay (m/s2)", "az (m/s2)"), "linear_acceleration_covariance"),
         ("angular_velocity", ("gx (rad/s)", "gy (rad/s)", "gz (rad/s)"), "angular_velocity_covariance"),

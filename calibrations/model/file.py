@@ -99,7 +99,7 @@ def parse_model(text: str, source: str, effects: Mapping[str, Effect] | None = N
     try:
         content = _File.model_validate(document)
     except ValidationError as error:
-        # a misspelt key is also a missing one: the key that is there is what the person can find
+        # a misspelt key is also a missing one: name the key that is in the file
         first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
         key = ".".join(str(part) for part in first["loc"])
         raise ModelError(f"{source}, key {key}: {_fault(first)}") from None

@@ -136,7 +136,7 @@ def correct_at(response: Response, at_hz: float) -> Response:
 
 
 def periodogram(x: Array, rate_hz: float) -> tuple[Array, Array]:
-    """(frequency, one-sided density) with a Hann window, the mean taken off; shape (n // 2 + 1,)."""
+    """(frequency, one-sided density) with a Hann window, without the mean; shape (n // 2 + 1,)."""
     window = np.hanning(len(x) + 2)[1:-1]
     power = np.abs(scipy.fft.rfft((x - x.mean()) * window)) ** 2
     return scipy.fft.rfftfreq(len(x), 1 / rate_hz), 2 * power / (rate_hz * np.sum(window**2))

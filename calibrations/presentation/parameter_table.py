@@ -56,7 +56,7 @@ class CorrelatedPair:
 
 
 def parameter_rows(model: Model, earlier_model: Model | None = None) -> list[ParameterRow]:
-    """A row for each parameter of `model`, with its change since the model `earlier_model`, where there is one."""
+    """A row for each parameter of `model`, with its change since the model `earlier_model`, if it is given."""
     earlier = {_key(term, e): e for term, e in _estimates(earlier_model)} if earlier_model is not None else {}
     rows = []
     for term, e in _estimates(model):

@@ -63,7 +63,7 @@ PX = 0.6  # points of a printed marker for one pixel on a screen
 LINE = 0.8
 DASHES = {"solid": "-", "dash": "--", "dot": ":"}
 SYMBOLS = {"circle": "o", "diamond": "D", "triangle-up": "^", "triangle-down": "v", "cross": "+"}
-FEW_MARKS, LONG_MARK = 4, 200.0  # marks of an axis whose values are so many times its range
+FEW_MARKS, LONG_MARK = 4, 200.0  # marks of an axis with values larger than this multiple of its range
 MOST_LEVEL = 8  # names on a horizontal axis; more are written aslant
 DROPPED_MARKUP = (
     r"<metadata>.*?</metadata>",
@@ -225,7 +225,7 @@ def _long_marks(low: float, high: float) -> bool:
 
 
 def _mark_powers(ax: Axes, direction: c.Along) -> None:
-    """Marks of a logarithmic axis in plain text: powers of ten, and 2 and 5 where there are few of these."""
+    """Marks of a logarithmic axis in plain text: powers of ten, and 2 and 5 if there are few powers."""
     side, (low, high) = (ax.xaxis, ax.get_xlim()) if direction == "x" else (ax.yaxis, ax.get_ylim())
     side.set_major_formatter(FuncFormatter(lambda value, _: tick_text(value)))
     few_decades = abs(np.log10(high / low)) < c.FEW_DECADES

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-RESTARTED_S, RESTARTED = 1.0, 0.05  # the clocks differ by more than this, and this share: the sensor began anew
+RESTARTED_S, RESTARTED = 1.0, 0.05  # with a larger difference of the clocks, and share of it, the sensor restarted
 FRESH_S = 60.0  # age of a temperature that still describes the sensor
 FINE = 10  # counts of the sensor's time in a period of the samples: its steps count the samples
 
@@ -126,7 +126,7 @@ class Reception:
     count: int = 0
     lost: int = 0
     doubled: int = 0
-    back: bool = False  # the sensor's time went back: it began anew
+    back: bool = False  # the sensor's time went back: it restarted
     clipped: str = ""
     start_s: float = 0.0  # the host's time of the first sample
     end_s: float = 0.0  # and of the last
@@ -193,7 +193,7 @@ class Reception:
         return batch.missing < 0, np.maximum(batch.missing, 0)
 
     def _lost_count(self, steps: Floats, gaps: Ints | None) -> int:
-        """Samples lost. A time of low resolution only says that a missing message may be a sample."""
+        """Number of lost samples. A time of low resolution only shows that a missing message can be a sample."""
         if gaps is not None and self.numbered:
             return int(gaps.sum())
         missing_by_time = np.maximum(np.rint(steps * self.base.unit_s * self.rate_hz) - 1, 0).astype(np.int64)

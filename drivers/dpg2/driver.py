@@ -42,7 +42,7 @@ class Settings:
     accuracy_deg: float = 0.1  # of the rig's level (Ang V)
     unrest_deg: float = 0.02  # standard deviation of the readings above which the level still swings
     patience_s: float = 10.0  # to come to rest
-    frozen: int = 30  # so many equal readings are one that has stuck
+    frozen: int = 30  # number of equal readings that means a stuck level
     range_deg: float = 30.0  # each way; of the model NS-30 [M]
 
     def __post_init__(self) -> None:

@@ -147,7 +147,7 @@ class Script:
         bumps: bool = False,
         heading_rad: float = 0.0,
     ) -> None:
-        """Add a segment that ends with `after` upward; what is not given is as at the end of the last one."""
+        """Add a segment that ends with `after` upward; omitted arguments are as at the end of the last one."""
         last = self.segments[-1]
         start_s = last.end_s if now_s is None else now_s
         before = _floats(after) if now_s is not None else last.after

@@ -47,7 +47,7 @@ FAULTS = {
 
 
 def spoilt(data: bytes, samples: int, faults: Faults, now_s: float) -> bytes:
-    """Packets of so many samples as a stream with these faults sends them."""
+    """Packets of this number of samples, as from a stream with these faults."""
     packets = np.frombuffer(bytearray(data), packet_type(samples))
     if faults.size("stall", now_s) is not None:
         return b""

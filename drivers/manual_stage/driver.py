@@ -62,7 +62,7 @@ class ManualStage:
         self.settings = settings
         self._person = person
         self._set_deg = math.nan
-        self.read_deg: float | None = None  # what the dial showed last
+        self.read_deg: float | None = None  # the last reading of the dial
 
     def identify(self) -> Identity:
         """A general name, without a question to the person: a dial has no name."""

@@ -36,7 +36,7 @@ RESULTS = {  # of a command
     5: "in progress",
 }
 AUTOPILOTS = {0: "generic autopilot", 3: "ArduPilot", 4: "OpenPilot", 9: "Paparazzi", 12: "PX4"}
-INVALID = 8  # autopilot of what is none
+INVALID = 8  # autopilot type of a component without one
 OTHER_TYPES = (6, 18, 26, 27)  # ground station, onboard controller, gimbal, ADS-B
 GROUND_STATION = 6
 

@@ -20,7 +20,7 @@ CONTROL_METHOD = Register(0x1005, "uint16", "control method")
 METHODS = ("PID", "on/off", "manual", "ramp and soak")
 RUN_BIT = 0x0814
 ARRIVAL_K = 5.0  # from the set point: closer to it the temperature may be constant
-NO_TEMPERATURE = {  # what the process value shows instead of a temperature [M]
+NO_TEMPERATURE = {  # process values that are not a temperature [M]
     0x8002: "it has no reading yet",
     0x8003: "no thermocouple is connected",
     0x8004: "the thermocouple's signal is out of range",
@@ -31,7 +31,7 @@ NO_TEMPERATURE = {  # what the process value shows instead of a temperature [M]
 
 @dataclass(frozen=True)
 class Settings:
-    """The set points that the oven and what is in it can bear, and how far it may overshoot the upper one.
+    """The range of set points that the oven and its content allow, and the allowed overshoot above it.
 
     `stale_s` is how long the temperature may stand still on its way to a set point. Raises ValueError for what cannot
     be.

@@ -80,7 +80,7 @@ class Wave:
 
     @classmethod
     def near(cls, frequency_hz: float, cycle_s: float, most_points: int) -> Wave:
-        """The one that comes nearest to a frequency: as fine as so many points allow."""
+        """The wave nearest to a frequency, as fine as its number of points allows."""
         all_cycles = 1 / (frequency_hz * cycle_s)
         cycles = math.ceil(all_cycles / most_points)
         return cls(2 * round(all_cycles / cycles / 2), cycles, cycle_s)

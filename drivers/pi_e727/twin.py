@@ -139,7 +139,7 @@ class Controller(Twin):
         raise Refusal(OUT_OF_RANGE)
 
     def _identify(self, requests: Sequence[Sequence[str]]) -> list[tuple[str, str, int]]:
-        items = {"1", *self._axes.ids}  # the controller itself is item 1, whatever its axes are called
+        items = {"1", *self._axes.ids}  # the controller itself is item 1, for any names of its axes
         pairs = [(one_of(item, items, e727.BAD_AXIS), text) for item, text, *_ in requests]
         numbered = [(item, text, parse_integer(text, 0, math.inf)) for item, text in pairs]
         if any(parameter not in PARAMETERS for *_, parameter in numbered):

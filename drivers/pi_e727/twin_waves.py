@@ -69,7 +69,7 @@ class Recorder:
         self._start_s = math.inf
 
     def trigger(self, now_s: float, *kinds: int) -> None:
-        """Start a new recording if a table waits for one of `kinds`. The next command is taken for the next motion."""
+        """Start a new recording if a table waits for one of `kinds`. The next command counts as the next motion."""
         if any(self._triggers[k] in kinds and self._recorded[k][1] for k in TABLES):
             self._start_s = now_s
             self._data = {place: [] for place in TABLES}
@@ -149,7 +149,7 @@ class Sine:
     first: int = 0
 
     def command(self, start_s: float, point_s: float, cycles: int) -> Command:
-        """The sine from `start_s` on, so many times; 0 for endless."""
+        """The sine from `start_s` on, with this number of cycles; 0 for endless."""
         period_s = self.points * point_s
         phase = 2 * math.pi * (self.first / self.points - 0.25)
         half_um = self.width_um / 2

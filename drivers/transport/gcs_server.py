@@ -26,7 +26,7 @@ class Device(Protocol):
     """The function that answers a command."""
 
     def answer(self, command: str, now_s: float) -> str | None:
-        """The answer to a line, or to a command of one byte; None where there is none."""
+        """The answer to a line, or to a command of one byte; None without an answer."""
 
 
 def gcs_port(listen: str, device: Device) -> Port:

@@ -120,7 +120,7 @@ class Bus:
             raise LinkRefused(f"{action}: {link_error.what}", link_error.remedy) from link_error
 
     def _discard_late_answers(self, request: ModbusPDU) -> None:
-        """RTU frames do not identify their request: a late answer must not be taken for that of the next request.
+        """RTU frames do not identify their request: a late answer must not count as that of the next request.
 
         The echo of a write names its register, so a write, which may be a stop, need not wait.
         """

@@ -53,7 +53,7 @@ SERIAL, DATE = "SIM-0063", "2026-11-21"
 GAPS_UM = np.concatenate([np.arange(20.0, 420.0, 10.0), np.arange(420.0, 2001.0, 40.0)])
 WANDER_UM = 0.4  # standard deviation of a gap that is set by hand
 READINGS = 1000  # averaged at each step
-FOOT_SHARE, PEAK_SHARE = 0.02, 0.95  # of the highest reading: only what is between them is used
+FOOT_SHARE, PEAK_SHARE = 0.02, 0.95  # of the highest reading: only readings between them are used
 
 
 def measure_curve(probe: FibreProbe, random: np.random.Generator) -> tuple[Floats, Floats]:

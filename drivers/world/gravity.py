@@ -78,7 +78,7 @@ def felt_g(up: Floats, mount: Floats, alpha_rad: float, beta_rad: float) -> tupl
 
 @kernel
 def across(turn: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """A vector in another frame, `turn` (3, 3) from its own. Numbers, since arrays would be made anew at every tick."""
+    """A vector in another frame, `turn` (3, 3) from its own. Numbers, as arrays would be allocated at every tick."""
     return (
         turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z,
         turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z,
@@ -98,7 +98,7 @@ PLATE_AXES = np.eye(3)
 class Level:
     """Errors of the level itself."""
 
-    offset_x_deg: float = 0.0  # what it shows on a level plate
+    offset_x_deg: float = 0.0  # its reading on a level plate
     offset_y_deg: float = 0.0
     noise_deg: float = 0.003  # rms of one reading
 

@@ -27,7 +27,7 @@ from drivers.world.stage import Trajectory, at_rest, motion
 from drivers.world.state import State
 
 STEP_NS = 25_000_000  # of the mechanics while a stage turns: half a degree at 20 deg/s
-# Of a dwell: both outputs without noise; their slow noise, its mean square; what the floor does; thermocouple; supply
+# Of a dwell: both outputs without noise; their slow noise, its mean square; effect of the floor; thermocouple; supply
 VOLTS, SLOW, SLOW_SQUARE, SHAKEN, THERMOCOUPLE, SUPPLY, MEANS = 0, 2, 4, 6, 8, 9, 10
 
 
@@ -204,7 +204,7 @@ def sinusoids(
 
 
 def sample_variance(noise: Noise, converter: Converter, timing: Timing) -> float:
-    """Variance of single samples in V^2: filtered noise, converter, rounding to codes, what is picked up at random."""
+    """Variance of single samples in V^2: filtered noise, converter, rounding to codes, random pickup."""
     return noise.white_v**2 + _converter_variance(converter) + pickup.random_variance(noise, timing.interval_s)
 
 

@@ -57,7 +57,7 @@ class MotionTracker(FramedTwin):
         self._begin_at(now_s, float(max(self._rates.values())))
 
     def _answer(self, connection: Connection, now_s: float) -> None:
-        """Act on the messages in what has arrived."""
+        """Act on the messages in the received bytes."""
         messages = self._heard.setdefault(connection.key, Frames(xbus.Xbus())).take(bytes(connection.inbox))
         connection.inbox.clear()
         for number, data in xbus.messages(messages):

@@ -1,12 +1,12 @@
 """Recovery of a damaged record: copies every readable row into a new record, and reports the losses.
 
 SQLite stores rows in pages, so damage at one place loses some rows of one table. Each table is read from both ends up
-to the damage. A row with another checksum than at its insertion is not copied, and a pose without its samples, or
-samples without their pose, neither.
-A run with a damaged or lost entry gets a new one, with the parts that are readable, so that its poses are in reach.
+to the damage. A row with another checksum than at its insertion is not copied, nor a pose without its samples, nor
+samples without their pose. A run with a damaged or lost entry gets a new entry with the readable parts, so that its
+poses can be used.
 
-A file that lost its end is read from a copy that is filled up with zeros, and one with a damaged schema from a copy
-with a new one.
+A file without its end is read from a copy that is filled with zeros, and a file with a damaged schema from a copy with
+a new schema.
 """
 
 from __future__ import annotations
@@ -233,7 +233,7 @@ def _remove_damaged_samples(new: sqlite3.Connection) -> Iterator[str]:
 
 
 # A damaged schema: SQLite refuses every table of a file if one entry of its schema has changed. The tables are known
-# here, so only the root page of each is needed from the file. The entries are written anew in a copy, without indexes,
+# here, so only the root page of each is needed from the file. New entries are written in a copy, without indexes,
 # whose entries can be damaged too.
 
 
@@ -249,7 +249,7 @@ def is_sound(path: Path) -> bool:
 
 
 def rewrite_schema(path: Path) -> None:
-    """Write the schema of the file anew. Raises sqlite3.Error if its first page cannot be read."""
+    """Write a new schema of the file. Raises sqlite3.Error if its first page cannot be read."""
     with closing(sqlite3.connect(path, isolation_level=None)) as file:
         file.text_factory = lambda data: data.decode("utf-8", "replace")
         file.execute("PRAGMA writable_schema = ON")  # then unreadable entries are not an error

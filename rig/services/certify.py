@@ -275,7 +275,7 @@ def _remarks(run: Run | None, bench: Bench | None) -> Iterator[str]:
 
 
 def _samples(table: Table, measured: MeasuredRun | None) -> Iterator[Sample]:
-    """Every row of the table, with the digest of its block of samples, or of its own numbers where there is none."""
+    """Every row of the table, with the digest of its block of samples, or of its own numbers without samples."""
     digests: dict[int, str] = {}
     if measured is not None and measured.run.bench:  # of the whole block, also where a batch shares it
         digests = {recorded.number: digest_of(recorded.samples) for recorded in measured.record.kept(measured.run.run)}

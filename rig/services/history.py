@@ -34,7 +34,7 @@ from rig.record.measured import MeasuredRun, sensors_of
 
 
 def members(run: Run) -> dict[str, str]:
-    """Serial number (or name) -> the sensor's name in the run's batch, "" where there is one sensor."""
+    """Serial number (or name) -> the sensor's name in the run's batch, "" with one sensor."""
     if batch := sensors_of(run):
         sensors_by_member: dict[str, Mapping[str, str]] = {member: run.bench["sensors"][member] for member in batch}
         return {sensor.get("serial") or sensor["name"]: member for member, sensor in sensors_by_member.items()}

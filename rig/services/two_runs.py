@@ -130,7 +130,7 @@ def fit_both(first: Request, second: Request, notify: Callable[[str], None]) -> 
 
 
 def match_poses(first: Fit, second: Fit) -> RepeatedPoses | None:
-    """The poses that both have; None where there are none, or the orientations are not known."""
+    """The poses of both; None without any, or if the orientations are not known."""
     if not first.table.type.stage_angles or first.channels != second.channels:
         return None
     visits = _visits(second.table)

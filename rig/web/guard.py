@@ -131,7 +131,7 @@ async def _refuse(scope: Scope, send: Send, status: int, reason: str) -> None:
 
 NAME = "web-token"
 BYTES = 24
-FORM = re.compile(r"[\w-]{32}")  # of a token of so many bytes
+FORM = re.compile(r"[\w-]{32}")  # of a token
 OTHERS = 0o077  # permissions of other users
 
 

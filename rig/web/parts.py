@@ -35,7 +35,7 @@ LINKED = """<q-td :props="props">
 
 
 def dialog_with_name(title: str) -> ui.dialog:
-    """A dialog with the name that a screen reader says; the caller adds its card."""
+    """A dialog with a name for screen readers; the caller adds its card."""
     return ui.dialog().props(f'aria-label="{html.escape(title)}"')
 
 
@@ -74,7 +74,7 @@ def afresh(place: Element) -> Iterator[None]:
 
 @contextmanager
 def state(title: str, advice: str = "", kind: str = "") -> Iterator[None]:
-    """A box for missing content that says what to do; the body adds buttons."""
+    """A box in place of missing content, with an instruction; the body adds buttons."""
     with box(f"state {kind}").props("role=status"):
         words(title, "title")
         if advice:

@@ -111,7 +111,7 @@ class _Server(uvicorn.Server):
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
-        connections = core.sio.eio  # NiceGUI gives a busy browser 4 s, and makes its page anew after that
+        connections = core.sio.eio  # NiceGUI gives a busy browser 4 s, and then makes its page again
         connections.ping_interval, connections.ping_timeout = PING_S, ANSWER_S
         self._ready()
 

@@ -66,7 +66,7 @@ def _waves(u: Array) -> Array:
 
 
 def _wanders(table: Table) -> bool:
-    """Whether a line is not enough, by what the waves gain beside it for their price, log(n) each (Schwarz)."""
+    """Whether a line is not enough: the waves gain more than their price, log(n) each (Schwarz)."""
     smooth = smooth_columns(table)
     if not smooth.size or table.n < 2 * (smooth.shape[1] + len(WAVES)):
         return False

@@ -111,7 +111,7 @@ TERMS: Mapping[str, str] = {
 
 
 def term(effect: Effect, parameter: Parameter) -> str:
-    """The standards' term, else the effect's own name; with the parameter where there are several."""
+    """The term of the standards, otherwise the name of the effect, with the parameter if there are several."""
     name = TERMS.get(effect.name, effect.name.replace("-", " "))
     return name if len(effect.parameters) == 1 else f"{name}, {parameter.name.replace('_', ' ')}"
 

@@ -282,7 +282,7 @@ def _simulate_turns_at_rates() -> Table:
 
 
 RATE_HZ, SAMPLES = 10.0, 1 << 15
-SPARE = 3  # of so many bands one is drawn
+SPARE = 3  # one of this number of bands is drawn
 WHITE = {"coefficient": 1.0}
 NOISE_SHOWN: dict[str, NoiseValues] = {  # with white noise of 1 V/sqrt(Hz)
     "white-noise": {"coefficient": 2.0},

@@ -30,7 +30,7 @@ class View(ABC, Generic[F]):
         """The error of each channel, as text."""
 
     def comparison_table(self, comparison: Comparison[F]) -> Cells | None:  # noqa: ARG002
-        """Further numbers of a comparison, as text; None where there are none."""
+        """Further numbers of a comparison, as text; None without any."""
         return None
 
     @abstractmethod

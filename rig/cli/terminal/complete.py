@@ -53,7 +53,7 @@ def _shipped_models() -> Iterable[str]:
 
 
 def complete_model(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
-    """Files and the shipped models. The item for files comes first: bash forgets what is before it."""
+    """Files and the shipped models. The item for files is first, because bash drops the items before it."""
     return [CompletionItem(begun, type="file"), *_shipped_models(context, parameter, begun)]
 
 
@@ -82,5 +82,5 @@ def complete_sensor() -> Iterable[str]:
 
 
 def complete_data(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
-    """Files and runs. The item for files comes first: bash forgets what is before it."""
+    """Files and runs. The item for files is first, because bash drops the items before it."""
     return [CompletionItem(begun, type="file"), *complete_run(context, parameter, begun)]

@@ -102,7 +102,7 @@ class Choice:
             unknown = await off_loop(lambda: needs_person(open_file(path)))
         except SeveralTopics:
             unknown = True
-        except CalibrationError:  # the page says what is wrong
+        except CalibrationError:  # the page shows the error
             unknown = False
         if unknown:
             ui.navigate.to(address(IMPORT, str(path)))

@@ -67,7 +67,7 @@ class VerdictBox:
             visit.doing = activity
 
     def _tick(self) -> None:
-        """Show what the analysis does; the seconds from the first one on."""
+        """Show the step of the analysis, and its seconds after the first."""
         if self.watched is not None and (seconds := int(monotonic() - self.begun_s)):
             self.headline.set_text(f"{self.watched.doing} ... {seconds} s")
 
