@@ -209,7 +209,7 @@ class ModelSession(Generic[F]):
         `watched` makes the effects of the search, which report its progress and may end it.
         """
         if self.search_made is None and not any(effect.expression for effect in self.effects.values()):
-            self._with(()).with_effects(watched(self.effects)).diagnosed()
+            self._with_steps(()).with_effects(watched(self.effects)).diagnosed()
         return self.search_made
 
     def _search(self) -> Findings[F]:

@@ -11,7 +11,7 @@ import pytest
 from calibrations.errors import ExpressionError, ModelError
 from calibrations.importing.foreign import write_csv
 from calibrations.presentation.charts.discovery import levels
-from calibrations.progress import shown_by
+from calibrations.progress import show_progress
 from rig.services.report import make_report
 from rig.services.request import Request
 from rig.services.session import ModelSession, model_session
@@ -111,7 +111,7 @@ def test_of_two_pages_that_search_the_second_waits_for_the_first(
             doing.set()
 
     def diagnose_second() -> Any:
-        with shown_by(show):
+        with show_progress(show):
             return turned.with_effects(dict(turned.effects)).diagnosed()
 
     real = ModelSession._search
