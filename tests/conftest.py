@@ -24,7 +24,11 @@ if platform.machine() == "x86_64":  # one arithmetic everywhere: its last bits d
 # A shell that runs the tests in the background lets SIGINT be ignored, and every process they start inherits that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-SET_BY_LIBRARIES = {"PYTEST_CURRENT_TEST", "KMP_DUPLICATE_LIB_OK"}  # pytest itself; threadpoolctl where it is imported
+SET_BY_LIBRARIES = {  # pytest by itself, the others where they are imported
+    "PYTEST_CURRENT_TEST",
+    "KMP_DUPLICATE_LIB_OK",  # threadpoolctl
+    "MAVLINK_DIALECT",  # pymavlink
+}
 
 # The same examples in every run, however slow the machine.
 hypothesis.settings.register_profile("steady", derandomize=True, deadline=None, database=None)
