@@ -245,8 +245,9 @@ def _white_with_scatter(findings: Findings[Fit]) -> Array | None:
     Means of correlated samples scatter more than their samples say, and only the filter would tell how much. Scatter
     beside an unexplained part may belong to it.
     """
-    noise, explained = findings.end.noise, findings.final.verdict in (Verdict.ADEQUATE, Verdict.AMBIGUOUS)
-    if not explained or not noise.known or correlation_known(findings.end.table):
+    table, noise = findings.end.table, findings.end.noise
+    explained = findings.final.verdict in (Verdict.ADEQUATE, Verdict.AMBIGUOUS)
+    if not table.type.stage_angles or correlation_known(table) or not noise.known or not explained:
         return None
     return noise.fast if np.any(rms(noise.fast) > LARGER_NOISE * rms(noise.white)) else None
 

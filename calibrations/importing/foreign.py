@@ -343,7 +343,7 @@ def _with_one_clock(table: Table) -> tuple[Table, str | None]:
     days would be mixed in order of time. Parts of a file that only stand in another order are not such rows: their
     times do not overlap.
     """
-    if "t_s" not in table or table.type.moving or table.type.overlapping:
+    if "t_s" not in table or not table.type.means:
         return table, None
     t_s = table.column("t_s")
     begins = np.flatnonzero(np.diff(t_s) < 0) + 1

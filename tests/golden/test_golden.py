@@ -5,9 +5,12 @@ To add one: a line `$ rig WORDS` in a file, then `pytest tests/golden --update-g
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
+from unittest import mock
 
 import click
 import pytest
@@ -38,14 +41,15 @@ REMEDY = "if this is meant: pytest tests/golden --update-golden, and read the di
 @pytest.fixture
 def laboratory(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch, rig_home: Path
-) -> Path:
+) -> Iterator[Path]:
     """The folder to call commands in, beside the record of a small laboratory."""
     shutil.copytree(recorded.record(tmp_path_factory, "laboratory"), rig_home)
     folder = tmp_path / "work"
     shutil.copytree(FOLDER / "files", folder)
     monkeypatch.chdir(folder)
     monkeypatch.setenv("COLUMNS", "100")
-    return folder
+    with mock.patch.dict(os.environ):  # Dask sets variables for its workers here
+        yield folder
 
 
 @pytest.mark.parametrize("name", FILES)
