@@ -6,6 +6,7 @@ import signal
 import sys
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
+from threading import current_thread, main_thread
 from types import FrameType
 from typing import TYPE_CHECKING, Literal
 
@@ -48,8 +49,12 @@ def stoppable(ignored: Collection[signal.Signals] = (), inner: bool = False) -> 
     """Inside the context the first signal raises KeyboardInterrupt with its name. Later signals are ignored.
 
     `ignored` signals raise nothing. `inner`: the context lies in another one; after a SIGINT the next ones stay ignored
-    there, because a person who presses twice wants one pause. A further context hears them again.
+    there, because a person who presses twice wants one pause. A further context hears them again. Only the main thread
+    receives signals: in another one, such as that of a page's computation, the context changes nothing.
     """
+    if current_thread() is not main_thread():
+        yield
+        return
     interrupter = _Interrupter()
     hook, sys.unraisablehook = sys.unraisablehook, interrupter.recover
     nohup = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # then a closed terminal must not stop the run
