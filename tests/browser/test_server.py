@@ -10,7 +10,8 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from select import select
 from typing import Any
@@ -27,6 +28,18 @@ from tests.browser.measured import thousand
 pytestmark = pytest.mark.slow
 
 WEB = [sys.executable, "-m", "rig", "web", "--no-open"]
+
+
+@contextmanager
+def started(home: Path, *words: str) -> Iterator[dict[str, Any]]:
+    """A server with its record in `home`, by its document; it ends with the context."""
+    environment = {**os.environ, "RIG_HOME": str(home)}
+    with subprocess.Popen([*WEB, "--json", *words], stdout=subprocess.PIPE, text=True, env=environment) as server:
+        assert server.stdout is not None
+        try:
+            yield json.loads(server.stdout.readline())
+        finally:
+            server.terminate()
 
 
 def test_a_port_that_is_taken_is_refused() -> None:
@@ -127,17 +140,13 @@ def _pipe(path: Path) -> int:
 def test_a_page_says_that_its_server_is_lost_and_connects_again(
     visitor: Callable[[], BrowserContext], watch: Watch, tmp_path: Path
 ) -> None:
-    home = {**os.environ, "RIG_HOME": str(tmp_path)}
-    with subprocess.Popen([*WEB, "--json"], stdout=subprocess.PIPE, text=True, env=home) as server:
-        assert server.stdout is not None
-        said = json.loads(server.stdout.readline())
+    with started(tmp_path) as said:
         page = visitor().new_page()
         page.goto(said["url"])
         page.get_by_role("link", name="Run").click()
         expect(page.get_by_text("Takes", exact=True)).to_be_visible()
         lost = page.get_by_text("The workbench does not answer")
         expect(lost).to_be_hidden()
-        server.terminate()
     expect(lost).to_be_visible()
     page.get_by_label("step (deg)").fill("90")
     page.get_by_label("step (deg)").press("F8")
@@ -145,37 +154,26 @@ def test_a_page_says_that_its_server_is_lost_and_connects_again(
     box = page.locator("#popup").bounding_box()
     assert box is not None
     assert 0 < box["y"] < 100  # where the eye is, and no button of the head is covered
-    words = [*WEB, "--json", "--port", str(said["port"])]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=home) as server:
-        assert server.stdout is not None
-        assert server.stdout.readline()
+    with started(tmp_path, "--port", str(said["port"])):
         expect(lost).to_be_hidden()
         expect(page).to_have_url(re.compile("step_deg=90"))  # what was typed meanwhile counts
         expect(page.get_by_label("step (deg)")).to_have_value("90")
         page.context.close()
-        server.terminate()
     watch.expects("")  # requests that no server answered
 
 
 def test_text_in_an_open_dialog_outlasts_a_restart_of_the_server(
     visitor: Callable[[], BrowserContext], watch: Watch, tmp_path: Path
 ) -> None:
-    home = {**os.environ, "RIG_HOME": str(tmp_path)}
-    with subprocess.Popen([*WEB, "--json"], stdout=subprocess.PIPE, text=True, env=home) as server:
-        assert server.stdout is not None
-        said = json.loads(server.stdout.readline())
+    with started(tmp_path) as said:
         page = visitor().new_page()
         page.goto(said["url"])
         page.get_by_role("link", name="Run").click()
         expect(page.get_by_role("button", name="Start")).to_be_enabled()
         page.get_by_role("button", name="Start").click()
         page.get_by_role("dialog").get_by_label("Serial number").fill("17")
-        server.terminate()
     expect(page.get_by_text("The workbench does not answer")).to_be_visible()
-    words = [*WEB, "--json", "--port", str(said["port"])]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=home) as server:
-        assert server.stdout is not None
-        assert server.stdout.readline()
+    with started(tmp_path, "--port", str(said["port"])):
         kept = page.get_by_text("again: your text is kept")
         expect(kept).to_be_visible()
         expect(page.get_by_role("dialog")).to_have_count(0)  # no script presses Start
@@ -183,7 +181,6 @@ def test_text_in_an_open_dialog_outlasts_a_restart_of_the_server(
         expect(page.get_by_role("dialog").get_by_label("Serial number")).to_have_value("17")
         expect(kept).to_have_count(0)
         page.context.close()
-        server.terminate()
     watch.expects("")  # requests that no server answered
 
 

@@ -16,8 +16,8 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-from nicegui import Client, ui
-from nicegui.testing import User, user_simulation
+from nicegui import ui
+from nicegui.testing import User
 
 from rig.files import RECORD
 from rig.record import Record
@@ -26,6 +26,7 @@ from rig.web.pages import register
 from tests.rig.conftest import WORD, Ended
 from tests.rig.postgres import Server
 from tests.rig.pushing import a_run, pushed
+from tests.rig.test_page_left import without_browser
 
 Rig = Callable[..., Ended]
 
@@ -105,13 +106,10 @@ def visiting(path: str, visit: Callable[[User], Coroutine[Any, Any, None]]) -> N
     """Open a page without a browser, and do something there."""
 
     async def simulated() -> None:
-        async with user_simulation() as user:
+        async with without_browser() as user:
             register(Desk(None))
-            try:
-                await user.open(path)
-                await visit(user)
-            finally:  # NiceGUI would take the modules of these pages from Python, and all that they lie in
-                Client.page_routes.clear()
+            await user.open(path)
+            await visit(user)
 
     asyncio.run(simulated())
 

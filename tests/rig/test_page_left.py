@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import AsyncIterator, Iterator, Mapping
+from contextlib import asynccontextmanager
 from pathlib import Path
 from urllib.parse import quote
 
 import pytest
 from nicegui import Client, ui
-from nicegui.testing import user_simulation
+from nicegui.testing import User, user_simulation
 from starlette.types import Message, Receive, Scope, Send
 
 from procedures.catalogue import Procedure
@@ -29,6 +30,16 @@ from tests.browser.measured import two_faults
 SEARCH = "diagnosed"  # the thread of a search has the name of what it computes
 
 
+@asynccontextmanager
+async def without_browser() -> AsyncIterator[User]:
+    """Pages that a person visits without a browser."""
+    async with user_simulation() as user:
+        try:
+            yield user
+        finally:  # NiceGUI would take the modules of these pages from Python, and all that they lie in
+            Client.page_routes.clear()
+
+
 def searches() -> list[threading.Thread]:
     return [thread for thread in threading.enumerate() if thread.name == SEARCH]
 
@@ -45,18 +56,15 @@ def test_a_closed_page_ends_its_search(closed: bool, tmp_path: Path, monkeypatch
     monkeypatch.setattr(CountedEffects, "__iter__", held)
 
     async def simulated() -> None:
-        async with user_simulation() as user:
+        async with without_browser() as user:
             register(desk)
-            try:
-                client = await user.open(f"/?data={quote(data)}&model=linear")
-                await user.should_see("Searching for missing effects", retries=200)
-                [search] = searches()
-                if closed:
-                    client.delete()
-                go.set()
-                await asyncio.to_thread(search.join)
-            finally:  # NiceGUI would take the modules of these pages from Python, and all that they lie in
-                Client.page_routes.clear()
+            client = await user.open(f"/?data={quote(data)}&model=linear")
+            await user.should_see("Searching for missing effects", retries=200)
+            [search] = searches()
+            if closed:
+                client.delete()
+            go.set()
+            await asyncio.to_thread(search.join)
 
     asyncio.run(simulated())
     assert not searches()
@@ -67,30 +75,27 @@ def test_a_closed_page_ends_its_search(closed: bool, tmp_path: Path, monkeypatch
 @pytest.mark.parametrize(("code", "left"), [(LEFT, True), (1005, False), (1006, False)])
 def test_a_page_ends_at_once_if_its_browser_leaves_it_but_not_if_the_connection_is_lost(code: int, left: bool) -> None:
     async def simulated() -> None:
-        async with user_simulation() as user:
-            try:
+        async with without_browser() as user:
 
-                @ui.page("/visited")
-                def visited() -> None:
-                    ui.label("visited")
+            @ui.page("/visited")
+            def visited() -> None:
+                ui.label("visited")
 
-                client = await user.open("/visited")
-                messages = [{"type": "websocket.receive", "text": "2"}, {"type": "websocket.disconnect", "code": code}]
+            client = await user.open("/visited")
+            messages = [{"type": "websocket.receive", "text": "2"}, {"type": "websocket.disconnect", "code": code}]
 
-                async def receive() -> Message:
-                    return messages.pop(0)
+            async def receive() -> Message:
+                return messages.pop(0)
 
-                async def send(_: Message) -> None: ...
+            async def send(_: Message) -> None: ...
 
-                async def connection(_: Scope, receive: Receive, __: Send) -> None:
-                    while (await receive())["type"] != "websocket.disconnect":
-                        assert not client.is_deleted
+            async def connection(_: Scope, receive: Receive, __: Send) -> None:
+                while (await receive())["type"] != "websocket.disconnect":
+                    assert not client.is_deleted
 
-                scope = {"type": "websocket", "query_string": f"client_id={client.id}&EIO=4".encode()}
-                await LeftPages(connection)(scope, receive, send)
-                assert client.is_deleted is left
-            finally:
-                Client.page_routes.clear()
+            scope = {"type": "websocket", "query_string": f"client_id={client.id}&EIO=4".encode()}
+            await LeftPages(connection)(scope, receive, send)
+            assert client.is_deleted is left
 
     asyncio.run(simulated())
 
@@ -113,7 +118,7 @@ def test_a_plan_ends_with_its_page_and_with_its_settings(
     monkeypatch.setattr("rig.web.pages.run.plan", planned)
 
     async def simulated() -> None:
-        async with user_simulation() as user:
+        async with without_browser() as user:
             register(Desk(DEFAULT))
             try:
                 client = await user.open("/run?procedure=sweep&step_deg=45")
@@ -128,7 +133,6 @@ def test_a_plan_ends_with_its_page_and_with_its_settings(
                 assert not planning.is_alive()
             finally:
                 go.set()
-                Client.page_routes.clear()
 
     asyncio.run(simulated())
 
@@ -143,14 +147,11 @@ def test_a_failed_search_leaves_no_page_that_searches(tmp_path: Path, monkeypatc
     monkeypatch.setattr(ModelSession, "diagnosed", fails)
 
     async def simulated() -> None:
-        async with user_simulation() as user:
+        async with without_browser() as user:
             register(Desk(DEFAULT))
-            try:
-                await user.open(f"/?data={quote(data)}&model=linear")
-                await user.should_see("The search for effects failed", retries=200)
-                await user.should_see("Not diagnosed")
-            finally:
-                Client.page_routes.clear()
+            await user.open(f"/?data={quote(data)}&model=linear")
+            await user.should_see("The search for effects failed", retries=200)
+            await user.should_see("Not diagnosed")
 
     asyncio.run(simulated())
 
@@ -183,31 +184,28 @@ def test_nothing_follows_a_calculation_whose_page_was_closed() -> None:
             raise ValueError
 
     async def simulated() -> None:
-        async with user_simulation() as user:
-            try:
+        async with without_browser() as user:
 
-                @ui.page("/visited")
-                def visited() -> None:
-                    for fails in (False, True):
-                        ui.timer(0.0, lambda fails=fails: show(fails), once=True)
+            @ui.page("/visited")
+            def visited() -> None:
+                for fails in (False, True):
+                    ui.timer(0.0, lambda fails=fails: show(fails), once=True)
 
-                async def show(fails: bool) -> None:
-                    try:
-                        await off_loop(work, fails)
-                        said.append("result")
-                    except Exception:
-                        said.append("error")
-                    finally:
-                        ended.set()
+            async def show(fails: bool) -> None:
+                try:
+                    await off_loop(work, fails)
+                    said.append("result")
+                except Exception:
+                    said.append("error")
+                finally:
+                    ended.set()
 
-                client = await user.open("/visited")
-                await asyncio.sleep(0.2)
-                client.delete()
-                go.set()
-                await asyncio.wait_for(ended.wait(), 60)
-                await asyncio.sleep(0.1)
-            finally:
-                Client.page_routes.clear()
+            client = await user.open("/visited")
+            await asyncio.sleep(0.2)
+            client.delete()
+            go.set()
+            await asyncio.wait_for(ended.wait(), 60)
+            await asyncio.sleep(0.1)
 
     asyncio.run(simulated())
     assert said == []
@@ -218,19 +216,16 @@ def test_a_visit_ends_its_searches_and_its_steps(tmp_path: Path, monkeypatch: py
     visits: list[Visit] = []
 
     async def simulated() -> None:
-        async with user_simulation() as user:
-            try:
+        async with without_browser() as user:
 
-                @ui.page("/visited")
-                def visited() -> None:
-                    ui.label("visited")
-                    visits.append(Visit())
+            @ui.page("/visited")
+            def visited() -> None:
+                ui.label("visited")
+                visits.append(Visit())
 
-                client = await user.open("/visited")
-                visits[0].check()
-                client.delete()
-            finally:
-                Client.page_routes.clear()
+            client = await user.open("/visited")
+            visits[0].check()
+            client.delete()
 
     asyncio.run(simulated())
     with pytest.raises(Cancelled):
