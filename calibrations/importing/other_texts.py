@@ -28,7 +28,7 @@ NAMED_VALUE = re.compile(PAIR)
 _ANOTHER = re.sub(r"\?P<\w+>", "", PAIR)
 NAMED_LINE = re.compile(rf"\s*{_ANOTHER}(?:[,;\s]+{_ANOTHER})+\s*")
 LONGEST = 1 << 26  # characters: the text is held in memory
-REFUSED_FORMATS: Mapping[str, str] = {  # pattern of the first line -> format of the file, and what to do
+REFUSED_FORMATS: Mapping[str, str] = {  # by a pattern of the first line: the format, and the remedy
     r"FMT, ?128, ?": "is a DataFlash log as text; import the .bin log that it was made from",
     r"version https://git-lfs": "is a pointer of Git LFS, not the file; get it with `git lfs pull`",
     r"<(!doctype|html)": "is a web page, not measurements; download the file itself",

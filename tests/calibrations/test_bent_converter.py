@@ -1,4 +1,4 @@
-"""A bent converter behind an unknown response and rectified vibration: what is named, and what is a rival of what."""
+"""A bent converter, an unknown response and rectified vibration in one sensor: the causes named, and their rivals."""
 
 from __future__ import annotations
 

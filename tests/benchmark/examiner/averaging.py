@@ -1,4 +1,4 @@
-"""How many samples a mean has, which filter they passed, and what the file says about it; vibration of the bench.
+"""The averaging of a bench: number of samples, filter, what its file states of both; and the vibration of the bench.
 
     full                filter, sample rate, standard deviation and number of samples are stated
     other-filter        the same with another filter

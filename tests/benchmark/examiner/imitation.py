@@ -1,4 +1,4 @@
-"""Which textbook forms take up a cause: of these, no analysis can tell it apart at its size."""
+"""The textbook effects that can replace a cause: at its size, no analysis can separate it from them."""
 
 from __future__ import annotations
 

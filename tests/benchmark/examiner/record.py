@@ -1,4 +1,4 @@
-"""One drawn bench with its sensor: all that a cause may look at, and the columns that sizes are measured beyond."""
+"""One bench with its sensor, as drawn: the inputs of all causes, and the columns that a size does not contain."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the truth says about the difficulty of a set: causes that resemble each other, and what the file leaves out."""
+"""Remarks in `truth.json` on why a set is difficult: causes resemble each other, or the file lacks information."""
 
 from __future__ import annotations
 
