@@ -185,8 +185,8 @@ class ModelSession(Generic[F]):
         while (other := self.searching.setdefault(self.names, present)) is not present:
             report("Waiting for the same search on another page")
             other.join(WAIT_S)
-            if not other.is_alive():
-                self.searching.pop(self.names, None)
+            if not other.is_alive() and self.searching.get(self.names) is other:
+                self.searching.pop(self.names)
 
     def _plan(self) -> Findings[F] | None:
         """The rest of the longest earlier search that the steps have followed; None where they left all of them."""

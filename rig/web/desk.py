@@ -86,7 +86,7 @@ class Desk:
         from rig.services.request import Request
         from rig.services.session import model_session
 
-        for (other_data, other_model, other_noise), known in self.beginnings.items():
+        for (other_data, other_model, other_noise), known in list(self.beginnings.items()):  # other threads add to it
             default = known.data.default_model
             asked, other = (data, model or default, noise), (other_data, other_model or default, other_noise)
             if asked == other and known.content.key == content_of(data, other_model or None).key:

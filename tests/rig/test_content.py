@@ -11,7 +11,7 @@ import pytest
 from calibrations.discovery.findings import Findings
 from calibrations.errors import DataError
 from rig.record import Record
-from rig.services.content import content_of
+from rig.services.content import Content, content_of
 from rig.services.exclusion import exclude
 from rig.services.export import export
 from rig.web.desk import Desk
@@ -71,6 +71,20 @@ def test_pages_and_reports_share_the_searches_on_one_model_while_the_data_are_th
     assert changed.search_made is None
     desk.forget(run)
     assert desk.beginning(run).data is not changed.data
+
+
+def test_a_page_opens_while_another_thread_opens_one(run: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    desk = Desk(None)
+    opened, _ = desk.open(run, "linear"), desk.open(run, "physical")
+
+    def meanwhile(*names: Any) -> Content:
+        desk.beginnings[str(len(desk.beginnings)), "", ""] = opened
+        return content_of(*names)
+
+    monkeypatch.setattr("rig.services.content.content_of", meanwhile)
+    with Record() as record:
+        exclude(record, run, [3], "a bump")
+    assert desk.beginning(run, "linear").data is not opened.data
 
 
 def test_effects_are_restored_from_texts_also_by_another_server(run: str) -> None:
