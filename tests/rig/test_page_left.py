@@ -24,7 +24,7 @@ from rig.services.session import ModelSession
 from rig.web.calculations import Visit, begin, off_loop
 from rig.web.desk import Desk
 from rig.web.pages import register
-from rig.web.server import LEFT, LeftPages
+from rig.web.server import LeftPages
 from tests.browser.measured import two_faults
 
 SEARCH = "diagnosed"  # the thread of a search has the name of what it computes
@@ -72,7 +72,7 @@ def test_a_closed_page_ends_its_search(closed: bool, tmp_path: Path, monkeypatch
     assert bool(session.plans) is not closed
 
 
-@pytest.mark.parametrize(("code", "left"), [(LEFT, True), (1005, False), (1006, False)])
+@pytest.mark.parametrize(("code", "left"), [(1001, True), (1005, False), (1006, False)])
 def test_a_page_ends_at_once_if_its_browser_leaves_it_but_not_if_the_connection_is_lost(code: int, left: bool) -> None:
     async def simulated() -> None:
         async with without_browser() as user:
