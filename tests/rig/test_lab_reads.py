@@ -133,7 +133,7 @@ def test_a_command_prints_and_writes_the_same_from_either_record(
 def test_a_fleet_is_read_there_and_its_answers_are_kept_here(
     both: Callable[..., None], laboratory: Laboratory, monkeypatch: pytest.MonkeyPatch, rig_home: Path
 ) -> None:
-    monkeypatch.setattr("rig.fleet.cluster.connect_workers", lambda *_: nullcontext())
+    monkeypatch.setattr("rig.cli.commands.fleet.connect_workers", lambda *_: nullcontext())
     monkeypatch.setattr("rig.fleet.questions.run_tasks", lambda _, do, chunks: ((tasks, do(tasks)) for tasks in chunks))
     both("fleet", "calibrate", laboratory.runs["poses"], "--json")
     with Record() as own:

@@ -60,7 +60,6 @@ def test_a_plan_connects_to_nothing(rig_home: Path, monkeypatch: pytest.MonkeyPa
         raise AssertionError("a plan connected to something")
 
     monkeypatch.setattr("socket.socket.connect", refuse)
-    monkeypatch.setattr("rig.instruments.instruments.connect_all", refuse)
     plan(read_bench(), *small_sweep())
     assert not rig_home.exists()
 
