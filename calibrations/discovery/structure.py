@@ -10,6 +10,7 @@ describes the residual better than all effects found means that the cause is not
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -42,7 +43,7 @@ NAMED = 6  # poses that the text lists one by one
 def structure_of(fit: Fit) -> Pattern | None:
     """The best pattern in a fit's residual; None if the residual is noise."""
     screen, noise = Screen(without_slow(fit)), _excess_noise(fit)
-    all_patterns = sorted(patterns(fit.table, fit.channels), key=lambda p: score(p, screen), reverse=True)
+    all_patterns = _by_score(patterns(fit.table, fit.channels), screen)
     significant = (
         _significant(all_patterns, Screen(fit))
         or _significant_in_other_noise(all_patterns, fit)
@@ -74,9 +75,24 @@ def without_slow(fit: Fit) -> Fit:
 
 def score(pattern: Pattern, screen: Screen) -> float:
     """Twice the log-likelihood with the pattern, minus the price of its parameters, up to a constant."""
-    basis = screen.basis(pattern.columns)
-    squares = float(screen.residual @ screen.residual) - screen.statistic(basis)
-    return likelihood(squares, basis.shape[1], screen.fit) - pattern.price
+    return _scores([pattern], screen)[0]
+
+
+def _scores(all_patterns: Sequence[Pattern], screen: Screen) -> list[float]:
+    """The score of each pattern."""
+    residual_squares = float(screen.residual @ screen.residual)
+    bases = screen.bases([p.columns for p in all_patterns])
+    squares = [residual_squares - screen.statistic(basis) for basis in bases]
+    return [
+        likelihood(left, basis.shape[1], screen.fit) - p.price
+        for left, basis, p in zip(squares, bases, all_patterns, strict=True)
+    ]
+
+
+def _by_score(all_patterns: Sequence[Pattern], screen: Screen) -> list[Pattern]:
+    """The patterns, best first."""
+    scores = _scores(all_patterns, screen)
+    return [all_patterns[i] for i in sorted(range(len(scores)), key=lambda i: scores[i], reverse=True)]
 
 
 def likelihood(squares: float, parameters: int, fit: Fit) -> float:
@@ -87,7 +103,7 @@ def likelihood(squares: float, parameters: int, fit: Fit) -> float:
 
 def _significant(all_patterns: list[Pattern], screen: Screen) -> list[Pattern]:
     """The patterns that are significant against noise alone."""
-    tested = [(p, screen.basis(p.columns)) for p in all_patterns]
+    tested = list(zip(all_patterns, screen.bases([p.columns for p in all_patterns]), strict=True))
     tested = [(p, basis) for p, basis in tested if basis.shape[1]]
     chances = Search(screen, [basis for _, basis in tested]).p_values
     return [p for (p, _), chance in zip(tested, chances, strict=True) if chance < SIGNIFICANT]
@@ -189,11 +205,10 @@ def find_competing_pattern(start: Fit, end: Fit, named_fit: Fit | None = None) -
     all_patterns = patterns(white_start.table, white_start.channels)
     if white_start.table.type.moving:
         all_patterns = [p for p in at_attitudes(white_start.table, white_start.channels) if _leaves_noise(p, screen)]
-    scored = [(score(p, screen) - price, p) for p in all_patterns]
-    best, pattern = max(scored, key=lambda item: item[0], default=(-np.inf, None))
+    pattern = next(iter(_by_score(all_patterns, screen)), None)
     if (
         pattern is None
-        or not best > _likelihood_with_effects(end, white_start) + PATTERN_BETTER
+        or not score(pattern, screen) - price > _likelihood_with_effects(end, white_start) + PATTERN_BETTER
         or _contains(pattern, start, named_fit or end, screen)
     ):
         return None

@@ -57,6 +57,21 @@ def test_statistic_is_the_full_reduction(fitted: Fit, apart: float, seed: int) -
     assert screen.statistic(basis) == pytest.approx(reduction(fitted, mixed), rel=1e-9, abs=1e-9)
 
 
+def test_bases_of_many_groups_are_those_of_each_alone(fitted: Fit) -> None:
+    """Groups of several widths; one has a column of zeros, one has twice the same, one has a column of the model."""
+    rng = np.random.default_rng(6)
+    groups = [rng.standard_normal((*fitted.residual.shape, 1 + i % 3)) for i in range(40)]
+    groups[4][:, :, 0] = 0.0
+    groups[8][:, :, 2] = groups[8][:, :, 1]
+    groups[11][:, :, 0] = fitted.jacobian[:, :, 0]
+    screen = Screen(fitted)
+    alone = [screen.basis(group) for group in groups]
+    assert [alone[i].shape[1] for i in (4, 8, 11)] == [1, 2, 2]
+    for together, basis in zip(screen.bases(groups), alone, strict=True):
+        np.testing.assert_allclose(together @ together.T, basis @ basis.T, atol=1e-12)
+    assert screen.bases([]) == []
+
+
 def test_what_the_model_has_adds_nothing(fitted: Fit) -> None:
     again = fitted.jacobian @ np.random.default_rng(0).standard_normal((4, 2))
     assert Screen(fitted).basis(again).shape[1] == 0
