@@ -45,6 +45,7 @@ KINDS: dict[str, Callable[[], Table]] = {
     "step at t = 802 s": lambda: changed(6.0 * (TIME > 800)),
     "step at temperature = 24.5 C": lambda: changed(6.0 * (WARM > 24.5)),
     "ramp from t = 1": lambda: changed(9 * np.maximum(0, TIME - 1500) / 2100),
+    "oscillation in time, period 51 s": lambda: changed(4 * np.sin(2 * np.pi * TIME / 51)),
     "sector of beta around 200 deg": lambda: changed(12 * BUMP),
     "inclination alpha = 60 deg": lambda: changed(6.0 * (SWEEP.alpha_deg == 60)),
     "follows direction of turning": lambda: changed(3 * SWEEP.direction),
