@@ -16,7 +16,8 @@ import numpy as np
 from calibrations.discovery.findings import Findings
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.identifiability import covariance
-from calibrations.free_forms.form import CROSS
+from calibrations.free_forms.effect import FreeForm
+from calibrations.free_forms.form import CROSS, TILT
 from calibrations.free_forms.place_names import PREFIX, place_of_effect
 from calibrations.geometry.orientation import out_of_plane
 from calibrations.model.chain import forward, static_force
@@ -38,6 +39,7 @@ DRIVERS = {  # place -> driver, its unit, factor of the curve
     "z-response": ("force out of the plane", "g", ""),
     "scale-over-cross": ("force along the other axis", "g", "force"),
     "scale-over-z": ("force out of the plane", "g", "force"),
+    "beta-bias": ("beta_deg", "deg", ""),
     "temperature-bias": ("temperature_c", "degC", ""),
     "temperature-scale": ("temperature_c", "degC", "force"),
     "time-bias": ("t_s", "s", ""),
@@ -50,8 +52,8 @@ DRIVERS = {  # place -> driver, its unit, factor of the curve
 class PlaceCurve:
     """The curve of a place. `value` and `std` by axis, shape (m,), over `at` by axis, (m,), in `unit`.
 
-    Stage angles have one curve for all axes, under the name of the angle. `explained` has the part of the effects of
-    the catalogue alone.
+    Stage angles have one curve for all axes, under the name of the angle; turns of the base have one about each axis.
+    `explained` has the part of the effects of the catalogue alone.
     """
 
     place: str
@@ -77,6 +79,8 @@ class PlaceCurve:
     @cached_property
     def expression(self) -> str | None:
         """An expression that describes the largest curve and can be added; None where none does."""
+        if self.place == TILT:  # no expression turns the base
+            return None
         axis = self.largest
         return _propose_expression(self, axis, self.at[axis], self.value[axis], self.std[axis])
 
@@ -90,6 +94,8 @@ def place_curves(findings: Findings[Fit]) -> dict[str, PlaceCurve]:
 
 def place_curve(end: Fit, place: str) -> PlaceCurve | None:
     """The curve of a place in a fitted model; None without an effect there, or without a single driver."""
+    if place == TILT:
+        return _turns_over_time(end)
     names = [term.name for term in end.model.terms if place_of_effect(term.name) == place]
     place_driver = DRIVERS.get(place) or _find_logged_column(place, end.table)
     if not names or place_driver is None:
@@ -109,6 +115,26 @@ def place_curve(end: Fit, place: str) -> PlaceCurve | None:
     unit = {"": end.problem.unit, "force": f"{end.problem.unit}/g", "angle": "deg"}[factor]
     driver_unit = driver_unit.replace("{out}", end.problem.unit)
     return PlaceCurve(place, driver, driver_unit, unit, abscissas, values, bands, parts)
+
+
+def _turns_over_time(end: Fit) -> PlaceCurve | None:
+    """The turn about each axis of a base that turns slowly, from its mean; None without it."""
+    effect = next((term.effect for term in end.model.terms if term.name == f"{PREFIX}{TILT}"), None)
+    if not isinstance(effect, FreeForm):
+        return None
+    mask = end.problem.layout.of_effect(effect.name)
+    theta, cov = end.theta[mask], covariance(end.information, end.problem.layout.typical)[0][np.ix_(mask, mask)]
+    t = np.linspace(end.table.time_s.min(), end.table.time_s.max(), MOST_POINTS)
+    values, bands, start = {}, {}, 0
+    for form in effect.forms:
+        columns = form.columns_at(t, 0)
+        columns = columns - columns.mean(axis=0)
+        of_form = slice(start, start + form.count(0))
+        start = of_form.stop
+        values[form.name] = np.degrees(columns @ theta[of_form])
+        bands[form.name] = np.degrees(np.sqrt(np.sum((columns @ cov[of_form, of_form]) * columns, axis=1)))
+    none = {name: np.zeros(len(t)) for name in values}
+    return PlaceCurve(TILT, "t_s", "s", "deg", dict.fromkeys(values, t), values, bands, none)
 
 
 def _find_logged_column(place: str, table: Table) -> tuple[str, str, str] | None:

@@ -88,8 +88,9 @@ def estimate_form(smaller: Solution, effect: RequestedForm) -> Effect:
     data, model_effects = PoseData.of(table), effects_beyond_base(smaller)
     first = state_at(data, model_effects, start(data, model_effects), ())
     all_components = components(data, first)
-    forms = [c for c in all_components if c.place == effect.place and c.form is not None and not c.general]
-    forms = [*_completing_components(effect.place, data, first), *forms]
+    forms = [c for c in all_components if c.place == effect.place and c.form is not None]
+    simple_forms = [c for c in forms if not c.general] or forms
+    forms = [*_completing_components(effect.place, data, first), *simple_forms]
     if not forms:
         raise ModelError(f"{effect.name} cannot be estimated from {table.source}: its driver does not change there")
     result = _estimate_forms(smaller, data, model_effects, [c for c in all_components if c.noise], forms)

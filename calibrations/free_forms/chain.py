@@ -92,12 +92,11 @@ def state_at(
     """All signals; `components` must hold every component that has a coefficient."""
     c = data.channels
     bias, rows = values.base[:c], values.base[c : 4 * c].reshape(c, 3)
-    tilt = values.base[4 * c + 1]
     active = [comp for comp in components if comp.name in values.of and not comp.noise]
-    alpha, beta = _true_angles(data, values, active)
+    alpha, beta, tilt = _true_angles(data, values, active)
 
-    def at(alpha: Array, beta: Array, tilt: float) -> Array:
-        up = np.array([0.0, -np.sin(tilt), np.cos(tilt)])
+    def at(alpha: Array, beta: Array, tilt: Array) -> Array:
+        up = np.stack([0 * tilt, -np.sin(tilt), np.cos(tilt)])
         return specific_force(Pose(alpha, beta, data.mount, data.flip, up))
 
     a = at(alpha, beta, tilt)
@@ -111,16 +110,19 @@ def state_at(
     return _with_output(undrifted, _response(undrifted, rows, values, active), values, active)
 
 
-def _true_angles(data: PoseData, values: Coefficients, active: Sequence[Component]) -> tuple[Array, Array]:
-    """Stage angles with their offsets and errors, rad, shape (n,) each."""
+def _true_angles(data: PoseData, values: Coefficients, active: Sequence[Component]) -> tuple[Array, Array, Array]:
+    """Stage angles and tilt of the base with their offsets and errors, rad, shape (n,) each."""
     c = data.channels
     beta0 = values.base[4 * c + 2] if data.remounted else 0.0
-    alpha, beta = data.alpha + values.base[4 * c], data.beta + beta0
+    angles = {
+        "alpha": data.alpha + values.base[4 * c],
+        "beta": data.beta + beta0,
+        "tilt": np.full(data.n, values.base[4 * c + 1]),
+    }
     for comp in active:
         if comp.angle is not None:
-            error = comp.angle @ values.of[comp.name]
-            alpha, beta = (alpha + error, beta) if comp.stage == "alpha" else (alpha, beta + error)
-    return alpha, beta
+            angles[comp.stage] = angles[comp.stage] + comp.angle @ values.of[comp.name]
+    return angles["alpha"], angles["beta"], angles["tilt"]
 
 
 def _response(undrifted: State, rows: Array, values: Coefficients, active: Sequence[Component]) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 
 from calibrations.free_forms.bases import Preisach
 from calibrations.free_forms.chain import State
-from calibrations.free_forms.form import ANGLES, Form
+from calibrations.free_forms.form import Form
 from calibrations.table import Array
 
 PLACES_OF_FORCE = (
@@ -27,7 +27,7 @@ Basis = Callable[[State, int], Array]  # (n, m) of one channel
 class Component:
     """One group of columns with one variance.
 
-    stage     "alpha", "beta" (an angle's error, `angle` (n, m)), "response" or "output" (`columns`)
+    stage     "alpha", "beta", "tilt" (an angle's error, `angle` (n, m)), "response" or "output" (`columns`)
     cause     the catalogue effect that it is a form of; "" for a free form
     family    components of which one at most acts: one form at several values of its shape
     price     of twice the log-likelihood, above that of the search: products and general forms cost more
@@ -77,7 +77,7 @@ class Component:
     def jacobian(self, state: State) -> Array:
         """d output / d coefficients, (channels, n, m)."""
         if self.angle is not None:
-            by_angle = state.by_alpha if self.stage == "alpha" else state.by_beta
+            by_angle = {"alpha": state.by_alpha, "beta": state.by_beta, "tilt": state.by_tilt}[self.stage]
             return np.asarray((by_angle * state.gain)[:, :, None] * self.angle[None])
         assert self.columns is not None  # noqa: S101 every other component has columns
         return self.columns(state) if self.stage == "output" else self.columns(state) * state.gain[:, :, None]
@@ -105,10 +105,10 @@ def free(form: Form, data_state: State, cause: str = "", price: float = 0.0, **o
     """The component of a free form."""
     table = data_state.data.table
     name = f"{form.place}/{form.name}"
-    if form.driver in ANGLES:
+    if form.angle:
         no_force = np.zeros((table.n, 3))
         angle = form.columns(table, no_force, no_force[:, 0], 0)
-        return Component(name, form.place, form.driver, cause, price=price, angle=angle, form=form, **options)
+        return Component(name, form.place, form.angle, cause, price=price, angle=angle, form=form, **options)
 
     def basis(state: State, k: int) -> Array:
         return form.columns(table, state.force, state.response[k], k)

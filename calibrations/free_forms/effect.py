@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 
 from calibrations.effects import Effect, Parameter, Values
 from calibrations.errors import ModelError, nearest
-from calibrations.free_forms.form import ANGLES, Form
+from calibrations.free_forms.form import ANGLES, TILT, TURNED, Form
 from calibrations.free_forms.place_names import EFFECTS_AT, GEOMETRY_PLACE, PLACES, PREFIX
 from calibrations.geometry.orientation import Pose, reported_force
 from calibrations.table import AXES, Array, Table
@@ -46,6 +46,8 @@ def check_forms(forms: tuple[Form, ...], place: str) -> tuple[Form, ...]:
         subject = f"the form {form.name}"
         if form.place != place:
             raise ModelError(f"{subject} acts at {form.place}, and the effect at {place}; each place has one effect")
+        if place == TILT and form.name not in TURNED:
+            raise ModelError(f"{subject} turns the base about no axis; its forms are {', '.join(TURNED)}")
         if not form.sizes or min(form.sizes) < 0 or max(form.sizes) == 0:
             raise ModelError(f"{subject} has no size; the size is the standard deviation of its coefficients")
         counts = {"bases": len(form.bases), "kept": len(form.kept) or 1}
@@ -79,7 +81,7 @@ def dump_forms(effect: Effect) -> list[dict[str, Any]]:
 @lru_cache(maxsize=128)
 def free_form(forms: tuple[Form, ...]) -> Effect:
     """The effect of these forms, which act at one place and have sizes."""
-    if forms[0].driver in ANGLES:
+    if forms[0].angle:
         return _OnAngle(forms)
     return _AtOutput(forms) if forms[0].driver == "output" else _OnResponse(forms)
 
@@ -193,10 +195,22 @@ class _OnAngle(FreeForm):
     """Adds to a stage angle; coefficients are in rad."""
 
     def pose(self, pose: Pose, table: Table, p: Values) -> Pose:
-        error = self._cache_columns(table, reported_force(table))[0] @ self._coefficients(p, 0)
-        if self.forms[0].driver == "alpha":
-            return replace(pose, alpha=pose.alpha + error)
-        return replace(pose, beta=pose.beta + error)
+        columns, coefficients, start = self._cache_columns(table, reported_force(table))[0], self._coefficients(p, 0), 0
+        for form in self.forms:
+            used = slice(start, start + form.count(0))
+            pose, start = _turn(pose, form.angle, columns[:, used] @ coefficients[used]), used.stop
+        return pose
+
+
+def _turn(pose: Pose, angle: str, error: Array) -> Pose:
+    """The pose with an error of one of its angles, rad, shape (n,)."""
+    if angle == "tilt":
+        x, y, z = pose.up
+        return replace(
+            pose,
+            up=np.stack([x + 0 * error, y * np.cos(error) - z * np.sin(error), y * np.sin(error) + z * np.cos(error)]),
+        )
+    return replace(pose, **{angle: getattr(pose, angle) + error})
 
 
 def coefficients_of(form: Form, p: Values, k: int) -> Array:
@@ -211,7 +225,7 @@ def _name(form: Form, j: int) -> str:
 
 def _parameters(form: Form) -> list[Parameter]:
     """A parameter for each column that an axis uses."""
-    unit = "rad" if form.driver in ANGLES else "{out}"
+    unit = "rad" if form.angle else "{out}"
     if not form.sizes:
         raise ModelError(f"the free form {form.place}/{form.name} has no sizes yet; a search of `rig add` finds them")
     axes = ("",) if form.shared else AXES[: len(form.sizes)]
@@ -231,8 +245,10 @@ def _parameters(form: Form) -> list[Parameter]:
 
 def _explain_exclusion(forms: tuple[Form, ...]) -> str:
     """Why the sensor's product cannot undo the effect; "" where it can."""
-    if forms[0].driver in ANGLES:
+    if forms[0].angle:
         return "it is an error of the stage"
+    if forms[0].driver in ANGLES:
+        return "it follows the angle of the stage, which a product does not have"
     if forms[0].driver == "time":
         return "the drift of one record does not predict the next"
     if any(form.driver == "variance" for form in forms):

@@ -38,6 +38,8 @@ from calibrations.table import Array, Table
 Factor = Literal["", "force", "side", "load", "pressed"]
 CROSS = (1, 0, 0)  # of x, y, z: the other axis in the plane
 ANGLES = ("alpha", "beta")
+TILT = "tilt-over-time"  # the place of a base that turns slowly, and of a sensor that turns on its stage
+TURNED = {"about-x": "tilt", "about-y": "alpha", "about-z": "beta"}  # the angle that each of its forms changes
 OF_FORCE = ("own", "cross", "out-of-plane", "force", "way")  # drivers of what the sensor makes of the force
 MODELLED = ("own", "cross", "out-of-plane", "output")  # drivers that the parameters of a model change
 
@@ -83,6 +85,13 @@ class Form:
         return (*required, *(("direction",) if self.factor == "side" and self.approach_deg else ()))
 
     @property
+    def angle(self) -> str:
+        """The angle that it changes: "alpha", "beta", "tilt" (of the base about its x axis), or "" for none."""
+        if self.place == TILT:
+            return TURNED[self.name]
+        return self.driver if self.place == f"stage-angle-{self.driver}" else ""
+
+    @property
     def of_force(self) -> bool:
         """Whether a drift of the sensitivity multiplies it."""
         return self.driver in OF_FORCE
@@ -102,7 +111,7 @@ class Form:
 
         From the force along the sensing axes (n, 3), g, and the output of the axis before the form (n,).
         """
-        basis, count = self.basis(k), self.count(k)
+        basis = self.basis(k)
         if isinstance(basis, Products):
             columns = basis(force)
         elif isinstance(basis, Preisach):
@@ -114,11 +123,17 @@ class Form:
                 np.asarray(_slip_forces(table, basis, self.approach_deg, is_pressed)[k]) if lagging is None else lagging
             )
         elif self.driver in MODELLED:
-            columns = basis(self.drive(table, force, response, k))[:, :count]
+            columns = self.columns_at(self.drive(table, force, response, k), k)
         else:
-            columns = _of_table(self, table, k)[:, :count]
+            columns = _of_table(self, table, k)[:, : self.count(k)]
         multiplied = self.factor not in ("", "pressed")
         return np.asarray(columns * self._factor(table, force, k)[:, None]) if multiplied else columns
+
+    def columns_at(self, x: Array, k: int) -> Array:
+        """Columns of axis k at values of the driver (n,), shape (n, count)."""
+        basis = self.basis(k)
+        assert not isinstance(basis, (Play, Preisach, Products))  # noqa: S101 more than one value drives these
+        return np.asarray(basis(x)[:, : self.count(k)])
 
     def sum_columns(self, table: Table, force: Array, response: Array, k: int, coefficients: Array) -> Array:
         """The sum of the columns of axis k with these coefficients, shape (n,)."""

@@ -37,6 +37,7 @@ STEPS = 4  # of Gauss-Newton: angles of some degrees need three
 SMALL_DEG = 1e-3  # of a numerical derivative
 OVER_CROSS = ("cross-response", "scale-over-cross", "force")
 OVER_Z = ("z-response", "scale-over-z", "force", "stage-angle-alpha")
+OVER_BETA = ("beta-bias",)  # in one wave a turn, a quarter of a turn apart on x and y, it is a tilt of the base
 
 
 @dataclass(frozen=True)
@@ -179,7 +180,7 @@ def _angles(result: SearchResult, gain: Array) -> tuple[Array, list[tuple[str, .
         row = np.zeros(own_base_size(data))
         row[i] = 1.0
         rows.append(row)
-        hidden_by.append(())
+        hidden_by.append(OVER_BETA if i == 4 * c + 1 else ())
     return np.array(rows), hidden_by
 
 

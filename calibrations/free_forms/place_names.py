@@ -6,6 +6,7 @@ PREFIX = "free:"  # of the name of an effect of unknown form: free:PLACE
 PLACES = {
     "stage-angle-alpha": "error of the angle alpha over alpha",
     "stage-angle-beta": "error of the angle beta over beta, and over the side from which it came",
+    "tilt-over-time": "tilt and turn of the base over the time",
     "own-response": "output over the specific force along the own axis",
     "cross-response": "output over the specific force along the other axis in the plane",
     "z-response": "output over the specific force along the axis out of the plane",
@@ -13,6 +14,7 @@ PLACES = {
     "scale-over-z": "scale factor over the specific force along the axis out of the plane",
     "force": "output over products of forces along several axes",
     "history": "output over the forces passed on the way: slip elements and branches",
+    "beta-bias": "output over the angle beta, whatever the force: a field of the room, a cable",
     "temperature-bias": "output over the temperature",
     "temperature-scale": "scale factor over the temperature",
     "time-bias": "output over the time",
@@ -24,6 +26,7 @@ AT_REST = ("temperature-bias", "time-bias")  # and column:NAME: what one orienta
 EFFECTS_AT = {
     "stage-angle-alpha": (),
     "stage-angle-beta": ("stage-eccentricity", "stage-backlash"),
+    "tilt-over-time": (),
     "own-response": ("quadratic-nonlinearity", "cubic-nonlinearity", "odd-quadratic-nonlinearity",
                      "scale-factor-asymmetry", "dead-zone", "saturation"),
     "cross-response": ("cross-axis-bias",),
@@ -32,6 +35,7 @@ EFFECTS_AT = {
     "scale-over-z": ("z-axis-scale",),
     "force": (),
     "history": ("hysteresis",),
+    "beta-bias": (),
     "temperature-bias": ("temperature-bias", "temperature-hysteresis"),
     "temperature-scale": ("temperature-scale",),
     "time-bias": ("warm-up-bias", "bias-drift"),

@@ -22,9 +22,9 @@ from calibrations.free_forms.components import (
     free,
     per_axis,
 )
-from calibrations.free_forms.form import CROSS, Factor, Form
+from calibrations.free_forms.form import CROSS, TILT, TURNED, Factor, Form
 from calibrations.free_forms.place_names import acts_at_rest
-from calibrations.free_forms.places_in_time import over_temperature, over_time, slow_noise
+from calibrations.free_forms.places_in_time import FEWEST_TIMED, over_temperature, over_time, slow_noise
 from calibrations.free_forms.places_of_columns import over_columns, over_output
 from calibrations.free_forms.poses import LOGGED_DEG, SIDES, PoseData
 from calibrations.geometry.orientation import out_of_plane
@@ -54,6 +54,7 @@ def components(data: PoseData, first: State, flicker: bool = False) -> list[Comp
         *_response_components(data, first),
         *_cross_axis_components(data, first),
         *_history(data, first),
+        *_over_beta(data, first),
         *over_temperature(data, first),
         *over_time(data, first),
         *over_output(data, first),
@@ -93,6 +94,12 @@ def _stages(data: PoseData, first: State) -> list[Component]:
     if len(np.unique(np.round(data.alpha, 4))) >= FEWEST_INCLINATIONS:
         form = Form("stage-angle-alpha", "curve", "alpha", (spline(data.alpha, 10, order=1),), shared=True)
         components.append(free(form, first, price=PRODUCT))
+    if data.timed and data.n >= FEWEST_TIMED:
+        over_time = (spline(data.table.time_s, 10, order=1),)  # a base that sinks turns in a straight line
+        components += [
+            free(Form(TILT, name, "time", over_time, shared=True), first, price=GENERAL, general=True)
+            for name in TURNED
+        ]
     return components
 
 
@@ -288,6 +295,23 @@ def _loops(first: State, has_approach: bool) -> Make:
         return free(form, first, "hysteresis", GENERAL, constants=(("approach_deg", approach),))
 
     return at
+
+
+def _over_beta(data: PoseData, first: State) -> list[Component]:
+    """Bias over the angle beta of the stage, whatever the force: a field of the room, a cable that winds up.
+
+    At one inclination the force is a function of beta as well, so that other inclinations must tell them apart.
+    """
+    inclinations, angles = (len(np.unique(np.round(np.mod(a, 2 * np.pi), 3))) for a in (data.alpha, data.beta))
+    if inclinations < FEWEST_INCLINATIONS or angles <= FEWEST_ANGLES:
+        return []
+    turning = Form("beta-bias", "curve", "beta", (Harmonics(1, 6),))
+    components = [free(turning, first, price=GENERAL, general=True)]
+    if np.ptp(data.beta) > np.pi:
+        components.append(
+            free(Form("beta-bias", "winding", "beta", (spline(data.beta, 10),)), first, price=GENERAL, general=True)
+        )
+    return components
 
 
 def _general(first: State) -> list[Component]:

@@ -14,7 +14,7 @@ from calibrations.effects import Effect
 from calibrations.effects.catalogue import find
 from calibrations.errors import nearest
 from calibrations.free_forms.effect import FreeForm, place_of
-from calibrations.free_forms.form import ANGLES
+from calibrations.free_forms.form import ANGLES, TILT
 from calibrations.free_forms.place_names import PLACES, PREFIX
 from calibrations.geometry.stage_path import last_turn, with_approach
 from calibrations.table import Table
@@ -22,7 +22,8 @@ from calibrations.table import Table
 FEWEST_VALUES = 8  # of what drives a curve
 FEWEST_TEMPERATURES = 4
 FEWEST_INCLINATIONS = 4
-OF_STAGES = ("stage-angle-alpha", "stage-angle-beta", "history")  # places that only poses of a rig can show
+# places that only poses of a rig can show
+OF_STAGES = ("stage-angle-alpha", "stage-angle-beta", "tilt-over-time", "beta-bias", "history")
 COLUMN = "column:"
 KNOWN_AS = {"temperature_c": "temperature-bias", "t_s": "time-bias", "alpha_deg": "stage-angle-alpha",
             "beta_deg": "stage-angle-beta"}  # columns whose place has a name of its own  # fmt: skip
@@ -39,6 +40,7 @@ class _Driver:
 DRIVERS = {
     "stage-angle-alpha": _Driver("pose", "inclinations"),
     "stage-angle-beta": _Driver("pose", "beta"),
+    "tilt-over-time": _Driver("pose", "time"),
     "own-response": _Driver("transduction", "beta"),
     "cross-response": _Driver("transduction", "beta"),
     "z-response": _Driver("transduction", "inclinations"),
@@ -46,6 +48,7 @@ DRIVERS = {
     "scale-over-z": _Driver("transduction", "inclinations"),
     "force": _Driver("transduction", "inclinations"),
     "history": _Driver("transduction", "sides"),
+    "beta-bias": _Driver("transduction", "inclinations"),
     "temperature-bias": _Driver("transduction", "temperature"),
     "temperature-scale": _Driver("transduction", "temperature"),
     "time-bias": _Driver("transduction", "time"),
@@ -165,8 +168,10 @@ def _formula(place: str) -> str:
     if place in ("stage-angle-alpha", "stage-angle-beta"):
         angle = next(a for a in ANGLES if place.endswith(a))
         return f"{angle} <- {angle} + f({angle})"
+    if place == TILT:
+        return "the base turns about x, y, z by f_x(t), f_y(t), f_z(t)"
     x = {"own-response": "a_i", "cross-response": "a_j", "z-response": "a_z", "output": "V", "force": "a"}
     factor = "a_i " if place.startswith("scale-over") or place.endswith("-scale") else ""
     arguments = {"scale-over-cross": "a_j", "scale-over-z": "a_z", "history": "a, on the way to the pose"}
-    end = {"temperature-bias": "T", "temperature-scale": "T", "time-bias": "t", "time-scale": "t"}
+    end = {"temperature-bias": "T", "temperature-scale": "T", "time-bias": "t", "time-scale": "t", "beta-bias": "beta"}
     return f"V += {factor}f_i({(x | arguments | end).get(place, place.removeprefix(COLUMN))})"

@@ -166,7 +166,7 @@ class Structure:
 
     def _line(self, place: str) -> tuple[Form, ...]:
         """The linear part of what acts over another axis, where geometry alone does not bear it."""
-        if place not in self.geometry.lines:
+        if place not in LINEAR or place not in self.geometry.lines:  # a form over beta has its first wave in itself
             return ()
         state, c = self.result.state, self.result.data.channels
         forces = state.force[:, list(CROSS)] if place == "cross-response" else out_of_plane(state.force)

@@ -23,7 +23,10 @@ UPRIGHT_DEG = {"x": (0.0, 180.0), "y": (90.0, 270.0)}  # beta at +1 g and at -1 
 
 @dataclass(frozen=True)
 class Pose:
-    """True stage angles and the true vertical. Angles in rad, shape (n,); `up` a unit vector, shape (3,)."""
+    """True stage angles and the true vertical. Angles in rad, shape (n,).
+
+    `up` is a unit vector, (3,), or one of each pose, (3, n).
+    """
 
     alpha: Array
     beta: Array

@@ -334,7 +334,8 @@ class LinearisedChain:
             return sensed(self.static, self.table, steps)
         pose, by_angle, by_up = self._pose, self._by_angle, self._by_up
         pose_changed = true_pose(self.table, steps)
-        static = self.static + by_up @ (pose_changed.up - pose.up)
+        change_of_up = np.broadcast_to((pose_changed.up - pose.up).T, self.static.shape)
+        static = self.static + np.einsum("nij,nj->ni", by_up, change_of_up)
         for change, derivative in zip(
             (pose_changed.alpha - pose.alpha, pose_changed.beta - pose.beta), by_angle, strict=True
         ):

@@ -32,7 +32,7 @@ from calibrations.free_forms.bases import (
     Waves,
     spline,
 )
-from calibrations.free_forms.effect import FreeForm, free_form, place_of
+from calibrations.free_forms.effect import FreeForm, check_forms, free_form, place_of
 from calibrations.free_forms.form import Form
 from calibrations.free_forms.stairs import _steps
 from calibrations.geometry.orientation import nominal_pose, specific_force
@@ -233,6 +233,12 @@ def test_a_model_file_with_an_impossible_form_is_refused(change: dict[str, objec
     document["effects"][-1]["forms"] = TypeAdapter(tuple[Form, ...]).dump_python((broken,), mode="json")
     with pytest.raises(ModelError, match=message):
         parse_model(yaml.safe_dump(document), "broken")
+
+
+def test_a_turn_of_the_base_about_an_unknown_axis_is_refused() -> None:
+    form = Form("tilt-over-time", "about-w", "time", (Spline(0.0, 1.0, 4),), sizes=(1e-3,), shared=True)
+    with pytest.raises(ModelError, match="its forms are about-x, about-y, about-z"):
+        check_forms((form,), form.place)
 
 
 def test_an_unknown_place_is_refused_with_the_nearest() -> None:

@@ -8,6 +8,9 @@ import pytest
 from calibrations.effects import Values
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.problem_kinds import make_problem
+from calibrations.free_forms.bases import spline
+from calibrations.free_forms.effect import free_form
+from calibrations.free_forms.form import TILT, TURNED, Form
 from calibrations.model.chain import LinearisedChain, forward
 from calibrations.model.file import read_model
 from calibrations.table import Table
@@ -56,6 +59,9 @@ def test_derivatives_are_those_of_the_whole_chain(stairs: bool) -> None:
     for each in (*EVERY, *others, "z-axis-scale", "cross-axis-scale"):
         if each != "quantisation" or stairs:
             model = model.with_effect(catalogue()[each])
+    over_time = (spline(COLUMNS["t_s"], 4),)
+    turning = (Form(TILT, name, "time", over_time, sizes=(1e-3,), shared=True) for name in TURNED)
+    model = model.with_effect(free_form(tuple(turning)))
     problem = make_problem(model, TABLE)
     theta = problem.layout.starts()[0] + problem.layout.typical / 10
     found, steps = problem.jacobian(theta, stairs=stairs), 1e-3 * np.diag(problem.layout.typical)

@@ -57,6 +57,17 @@ def test_harmonics_of_the_stage_are_counted() -> None:
     assert np.ptp(curve.value["beta"]) == pytest.approx(np.degrees(1e-2), rel=0.05)
 
 
+def test_a_slow_turn_of_the_base_has_a_curve_in_degrees_for_each_axis() -> None:
+    data = table(CURVES["tilt-over-time"])
+    curve = place_curve(with_form("tilt-over-time", data), "tilt-over-time")
+    assert curve is not None
+    assert (curve.unit, curve.driver, curve.largest, curve.expression) == ("deg", "t_s", "about-x", None)
+    t = curve.at["about-x"]
+    tilt = np.degrees(1e-3 * np.interp(t, data.time_s, np.linspace(-1, 1, data.n)) ** 3)
+    assert np.std(curve.value["about-x"] - tilt) < 0.03 * np.ptp(tilt)
+    assert np.mean(curve.std["about-x"]) < 0.03 * np.ptp(tilt)
+
+
 def test_a_place_without_an_effect_or_without_one_driver_has_no_curve() -> None:
     found = with_form("history", table())
     assert place_curve(found, "own-response") is None

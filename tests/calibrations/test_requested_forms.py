@@ -24,10 +24,14 @@ from tests.calibrations.test_free_forms import forces_of_sweep, poses
 
 FORCES = forces_of_sweep()
 WARMING = np.linspace(20.0, 35.0, len(FORCES))
+HEADINGS = np.radians(poses(np.zeros((len(FORCES), 2))).column("beta_deg"))
+TILTED = np.column_stack([np.sin(HEADINGS), -np.cos(HEADINGS)])  # by a tilt of the base about its x axis
 CURVES: dict[str, Array] = {
     "own-response": 1e-3 * np.sin(4 * FORCES[:, :2]),
     "cross-response": 1e-3 * np.cos(4 * FORCES[:, [1, 0]]),
     "temperature-bias": 1e-3 * np.tanh((WARMING - 28) / 3)[:, None] * [1.0, -0.5],
+    "tilt-over-time": 1e-3 * np.linspace(-1, 1, len(FORCES))[:, None] ** 3 * TILTED,
+    "beta-bias": 1e-3 * np.cos(HEADINGS)[:, None] * [1.0, -0.4],
     "time-bias": 1e-3 * np.exp(-np.linspace(0, 5, len(FORCES)))[:, None] * [1.0, 2.0],
     "column:humidity": 1e-3 * ((WARMING - 27) / 8)[:, None] ** 2 * [1.0, 1.0],
 }

@@ -33,6 +33,31 @@ def rippling(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Arr
     return v + VOLTS * (np.cos(6.0 * q) + 1.2 * q) * np.array([1.0, -0.6])
 
 
+def magnetised(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """A magnetic field of the room, in which the stage beta turns the sensor."""
+    heading = np.radians(poses.beta_deg)[:, None]
+    return v + VOLTS * np.cos(heading - np.array([0.7, 1.2]))
+
+
+def wound(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """A cable that winds up with beta: 0 and 360 deg differ."""
+    turns = poses.beta_deg[:, None] / 180 - 1
+    return v + VOLTS * (turns + 0.6 * turns**3) * np.array([1.0, 0.5])
+
+
+def sagging(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """A floor that tilts in the course of the day, and turns the base by 0.1 deg about its x axis."""
+    tilt = np.radians(0.1) * np.sin(2 * np.pi * poses.t_s / poses.t_s.max() + 0.4)
+    heading = np.radians(poses.beta_deg)
+    return v + tilt[:, None] * np.column_stack([np.sin(heading), -np.cos(heading)])
+
+
+def hummed(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """Mains, as the pace of the poses shows them: a wave in 7.3 poses."""
+    phase = 2 * np.pi * poses.t_s[:, None] / (7.3 * sampled.PERIOD_S)
+    return v + VOLTS * np.sin(phase + np.array([0.0, 1.0]))
+
+
 def bent(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
     return v + VOLTS * poses.a**3 * np.array([1.0, 0.8])
 
@@ -75,6 +100,31 @@ def test_a_curve_that_no_line_follows_has_no_name() -> None:
     found = found_with(rippling)
     assert (found.verdict, found.causes) == ("unexplained", ())
     assert [place.name for place in found.findings.places if place.unknown] == ["temperature-bias"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cause", [magnetised, wound])
+def test_a_bias_over_the_angle_of_the_stage_has_a_place_and_no_name(cause: sampled.Cause) -> None:
+    found = found_with(cause)
+    assert (found.verdict, found.causes) == ("unexplained", ())
+    assert [place.name for place in found.findings.places if place.unknown] == ["beta-bias"]
+    assert found.steps[-1].held_out_after < 1.15
+
+
+@pytest.mark.slow
+def test_a_floor_that_tilts_is_neither_a_drift_nor_a_tilted_base() -> None:
+    found = found_with(sagging)
+    assert (found.verdict, found.causes) == ("unexplained", ())
+    assert [place.name for place in found.findings.places if place.unknown] == ["tilt-over-time"]
+    assert found.steps[-1].held_out_after < 1.15
+
+
+@pytest.mark.slow
+def test_a_fast_wave_in_time_is_no_drift() -> None:
+    """A random walk follows a wave of 7 poses; the wave itself describes the residual better."""
+    found = found_with(hummed)
+    assert (found.verdict, found.causes) == ("unexplained", ())
+    assert "oscillation in time, period 51 s" in found.judgement.text
 
 
 @pytest.mark.slow
