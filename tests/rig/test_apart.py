@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -281,6 +283,22 @@ def test_a_second_start_is_refused_while_a_run_is_in_progress() -> None:
         pytest.raises(Busy, match="sweep is in progress since"),
     ):
         control.begin("sweep", SMALL, None, attended=False)
+
+
+def test_a_process_that_fails_at_its_start_does_not_block_the_next_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = tmp_path / "program"
+    program.write_text(f"#!/bin/sh\ncat {folder()}/*.answers\necho out of memory >&2\nexit 1\n")
+    program.chmod(0o700)
+    monkeypatch.setattr(sys, "executable", str(program))
+    first = control.begin("sweep", SMALL, None, attended=False)
+    assert when("starting").key == first
+    file(first, "answers").open("w").close()  # now the process goes on, and fails
+    assert when("ended").error.endswith("out of memory")
+    program.write_text("#!/bin/sh\n")
+    second = control.begin("sweep", SMALL, None, attended=False)
+    assert when("ended").key == second
 
 
 def test_of_two_answers_at_once_the_first_counts() -> None:

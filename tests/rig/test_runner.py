@@ -7,8 +7,9 @@ import signal
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from datetime import datetime, timedelta, tzinfo
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from procedures.session import Limits
 from procedures.sweep import grid
 from rig.bench import Bench, read_bench
 from rig.errors import Busy, InstrumentFailed, RunMismatch
+from rig.instruments.instruments import Rig
 from rig.instruments.wiring import open_wires
 from rig.lease import lease
 from rig.record import KeptPose, Record
@@ -108,6 +110,29 @@ def test_time_counts_from_the_sensors_power(whole: Undisturbed) -> None:
         cold = run_small(record, read_bench().model_copy(update={"world": {"heat": {"powered_for_s": 0.0}}}))
         assert table_of(record, cold.run.run).column("t_s")[0] < 60
     assert whole.table.column("t_s")[0] > 12 * 3600
+
+
+class NextDay(datetime):
+    """The clock of a computer, one day later."""
+
+    @classmethod
+    def now(cls, tz: tzinfo | None = None) -> Self:
+        return super().now(tz) + timedelta(days=1)
+
+
+def test_a_run_of_a_real_bench_is_resumed_unless_the_clock_was_set_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its time counts from the begin of the run. The clock of a simulated bench begins again: it is set back."""
+    monkeypatch.setattr(Rig, "power_on_s", lambda rig: None)
+    monkeypatch.setattr(Rig, "state", lambda rig: None)
+    with Record() as record:
+        run = run_small(record, watch=Interrupting(1, raising(KeyboardInterrupt()))).run.run
+        refused = resume(record, run, Onlooker())
+        assert isinstance(refused.error, RunMismatch)
+        assert refused.run.rows == 1
+        monkeypatch.setattr("rig.runs.host.datetime", NextDay)
+        resume(record, run, Interrupting(1, raising(KeyboardInterrupt())))
+        first_s, second_s = table_of(record, run).column("t_s")
+    assert first_s < 3600 < 24 * 3600 < second_s
 
 
 def test_the_same_seed_gives_the_same_run_sample_for_sample(whole: Undisturbed) -> None:
