@@ -133,6 +133,19 @@ def test_the_inverse_of_one_axis_takes_the_other_axes_as_inputs() -> None:
     assert error(made, fitted) < 1e-9
 
 
+def test_the_inverse_of_one_straight_axis_takes_its_output_alone() -> None:
+    fitted = model({"bias": {"bias": (2.5,)}, "scale-factor": {"scale": (1.1,)}})
+    made = invert_model(fitted)
+    assert made.program.inputs == ("vx",)
+    assert error(made, fitted) < 1e-9
+
+
+def test_an_input_has_the_unit_of_the_sensors_output() -> None:
+    digital = invert_model(replace(model(LINEAR), unit="LSB"))
+    inputs = {given["name"]: given["unit"] for given in summary(digital, ORIGIN)["inputs"]}
+    assert inputs == {"vx": "LSB", "vy": "LSB"}
+
+
 def test_magnetometers_and_gyroscopes() -> None:
     iron = {
         "hard-iron": {"offset": (10.0, -5.0, 3.0)},
@@ -197,6 +210,16 @@ def test_the_result_has_the_uncertainty_of_its_parameters() -> None:
     assert size.most == pytest.approx(1e-3 * np.sqrt(2) / 0.98, rel=0.02)  # bias and scale factor, at 1 g
     assert size.largest == pytest.approx(1e-3 * np.sqrt(1 + 1.5**2) / 0.98, rel=0.001)  # at 1.5 g
     assert invert_model(model(LINEAR, std=None)).costs.parameters is None
+
+
+def test_the_uncertainty_follows_the_slope_of_a_bent_output() -> None:
+    """A bias counts most at 0 g, where the slope is the scale factor: with a cube the slope is greater elsewhere."""
+    bias, *others = model({**LINEAR, "cubic-nonlinearity": {"cube": (0.1, 0.1)}}, std=1e-9).terms
+    uncertain = replace(bias, estimates=tuple(replace(e, std=1e-3) for e in bias.estimates))
+    fitted = replace(model(LINEAR), terms=(uncertain, *others))
+    size = invert_model(fitted, Range.for_model(fitted, 1.0)).costs.parameters
+    assert size is not None
+    assert size.largest == pytest.approx(1e-3 / 0.98, rel=0.01)
 
 
 def test_an_uncertain_temperature_coefficient_tells_the_more_the_further_the_range_goes() -> None:

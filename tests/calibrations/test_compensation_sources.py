@@ -81,6 +81,12 @@ def test_python_and_json_compute_the_same(python: Any, tmp_path: Path) -> None:
         assert names["compensate"](**values) == pytest.approx(expected, abs=1e-9)
 
 
+def test_the_self_test_of_a_model_is_the_same_at_every_export() -> None:
+    made = invert_model(model(LINEAR))
+    first, second = (sources.python_files(made, ORIGIN, make_vectors(made)) for _ in range(2))
+    assert first == second
+
+
 def interpreted(read: dict[str, Any], values: dict[str, float]) -> list[float]:
     """The program of a JSON document, as a stranger would run it."""
 

@@ -67,6 +67,16 @@ def test_a_jump_by_what_is_sought_has_no_slope() -> None:
     assert prove_bound([apply_operation("+", X, jump)], ("x",), 1.0, {}, 1e-9) is None
 
 
+def test_a_choice_that_is_sure_has_the_slope_of_its_branch() -> None:
+    """x where y > 0.2, else 3 x: only a range of y with the corner in it has both slopes."""
+    choice = apply_operation("where", apply_operation(">", Y, number(0.2)), X, apply_operation("*", number(3.0), X))
+    x, y = Interval(np.zeros(3), np.ones(3)), Interval(np.array([0.0, 0.1, 0.3]), np.array([0.1, 0.3, 0.4]))
+    ((value, slopes),) = evaluate_interval([choice], {"x": x, "y": y}, ("x",))
+    assert slopes.low[0] == pytest.approx([3.0, 1.0, 1.0])
+    assert slopes.high[0] == pytest.approx([3.0, 3.0, 1.0])
+    assert value.high == pytest.approx([3.0, 3.0, 1.0])
+
+
 def test_the_factor_is_the_one_that_is_known() -> None:
     bent = apply_operation(
         "+", X, apply_operation("*", number(0.1), power(X, 2))
