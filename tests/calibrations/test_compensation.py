@@ -15,17 +15,18 @@ from hypothesis import strategies as st
 
 from calibrations.compensation.document import Origin, coverage_text, header_lines, summary, uncertainty_text
 from calibrations.compensation.forward import INVERTED, LEFT_OUT, NOISE, OF_THE_RIG, steps_of, trace_model
-from calibrations.compensation.inverse import Compensation, Range, invert_model
+from calibrations.compensation.inverse import Compensation, Range, compensate_residual, invert_model
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue, read_effect
 from calibrations.effects.expression_effect import own_effect
-from calibrations.errors import ModelError
+from calibrations.errors import DataError, ModelError
 from calibrations.model import Model
 from calibrations.model.chain import respond, sensed
 from calibrations.model.correlations import Correlations
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations.fitted import LINEAR, PHYSICAL, model
+from tests.calibrations.synthetic import components, turns
 
 ORIGIN = Origin("made", "made.yaml", "0" * 64, "inertial-rig", "2026-01-01")
 THERMAL = {"temperature-bias": {"slope": (0.001, -0.002)}, "temperature-scale": {"slope": (3e-4, -2e-4)}}
@@ -268,6 +269,25 @@ def test_what_the_calibration_covered_is_where_its_uncertainty_is_told() -> None
     assert "goes beyond in temperature_c." in coverage_text(made)
     assert "does not give" in coverage_text(invert_model(model(LINEAR)))
     assert "temperature_c 10 to 85 C;" in uncertainty_text(made)
+
+
+def test_the_supply_may_differ_by_5_percent_from_its_reference() -> None:
+    fitted = model({**LINEAR, "supply-sensitivity": {"share": (0.9, 1.1)}})
+    assert Range.for_model(fitted).input_limits["supply_v"] == pytest.approx((4.75, 5.25))
+
+
+def test_a_wrong_bias_is_the_residual_of_a_compensation() -> None:
+    """The sensor has 2.5 V at 0 g, the model of x 2.501 V: 1 mg, which is 9.80665 mm/s^2."""
+    columns = turns(step_deg=30.0)
+    x, y, z = components(columns)
+    wrong = invert_model(model({"bias": {"bias": (2.501, 2.5)}, "scale-factor": {"scale": (1.0, 1.0)}}))
+    measured = Table.from_columns("poses", {**columns, "vx_v": 2.5 + x, "vy_v": 2.5 + y})
+    residual = compensate_residual(wrong, measured)
+    assert residual.compensated[:, 0] == pytest.approx(np.full(len(x), -9.80665), rel=1e-4)
+    assert residual.linear == pytest.approx(np.zeros((len(x), 2)), abs=1e-6)
+    without_stages = Table.from_columns("positions", {"ax": x, "ay": y, "az": z})
+    with pytest.raises(DataError, match="is compared with poses of an accelerometer"):
+        compensate_residual(wrong, without_stages)
 
 
 def test_an_effect_left_out_costs_what_it_does_over_the_stated_range() -> None:
