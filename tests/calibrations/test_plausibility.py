@@ -163,6 +163,15 @@ def test_two_groups_of_rows_that_differ_in_direction_are_an_effect() -> None:
     assert findings(replace(table, columns={**table.columns, "direction": direction})) == ()
 
 
+def test_two_groups_of_rows_that_differ_in_the_stage_angle_are_an_effect() -> None:
+    """The poses are in a random order, so that the groups have no pattern in time."""
+    d = healthy()
+    offset = 0.02 * (np.floor(d.beta / 90) % 2)
+    order = np.random.default_rng(3).permutation(len(d.vx))
+    spoiled = Data(d.alpha[order], d.beta[order], (d.vx + offset)[order], (d.vy + offset)[order])
+    assert findings(spoiled.table()) == ()
+
+
 def test_an_effect_at_a_few_poses_of_a_soak_is_no_second_sensor() -> None:
     """Both groups are the same at the orientation of the soak, whose rows the noise divides between them."""
     alpha = np.r_[np.tile(90.0, 88), np.zeros(540)]
