@@ -1,6 +1,7 @@
-"""Values that repeat exactly: a stand-in for a missing reading, and coarse readings that meet by chance."""
+"""Values that repeat exactly: a stand-in for a missing reading, and coarse readings that meet by chance. Wrong units."""
 
 import numpy as np
+import pytest
 
 from calibrations.discovery.input_doubts import doubts
 from calibrations.table import Array, Table
@@ -31,3 +32,11 @@ def test_coarse_readings_that_meet_by_chance_are_not() -> None:
     volts[[3, 40, 77, 100]] = volts.max()
     volts[[5, 41, 78]] = volts.min()
     assert not any("supply_v" in doubt for doubt in doubts(with_supply(volts)))
+
+
+@pytest.mark.parametrize(("unit", "size"), [("nT", 48_000.0), ("mG", 480.0), ("G", 0.48), ("mT", 0.048)])
+def test_the_unit_in_which_a_field_is_that_of_the_earth_is_named(unit: str, size: float) -> None:
+    directions = np.random.default_rng(4).standard_normal((30, 3))
+    field = size * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    table = Table.from_columns("positions", dict(zip(("mx", "my", "mz"), field.T, strict=True)), {"unit": "uT"})
+    assert f"the outputs look like {unit}:" in " ".join(doubts(table))
