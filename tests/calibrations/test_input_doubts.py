@@ -1,4 +1,4 @@
-"""Values that repeat exactly: a stand-in for a missing reading, and coarse readings that meet by chance. Wrong units."""
+"""Wrong units, values that stand for a missing reading, and coarse readings that are equal by chance."""
 
 import numpy as np
 import pytest
