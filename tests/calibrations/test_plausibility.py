@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from calibrations.discovery.plausibility import _stuck, doubt, findings, refusal
+from calibrations.discovery.readings import zero_doubt
 from calibrations.discovery.verdict import Verdict
 from calibrations.documents import comparison_document, diagnosis_document, discovery_document, fit_document
 from calibrations.effects.catalogue import catalogue
@@ -222,6 +223,13 @@ def test_no_stage_zero_is_off_by_tens_of_degrees() -> None:
     assert found.verdict == "unexplained"
     assert "the zero of alpha_deg is +30 deg off" in (found.residual_structure or "")
     assert "stage-zero-offset" not in found.causes
+
+
+def test_a_stage_zero_that_is_off_by_some_degrees_is_named() -> None:
+    d = healthy()
+    doubt = zero_doubt(replace(d, alpha=d.alpha - 5.0).table(), residual_share=0.01)
+    assert "if the zero of alpha_deg is +5 deg off;" in (doubt or "")
+    assert zero_doubt(d.table(), residual_share=0.01) is None
 
 
 def test_an_output_that_gravity_explains_in_no_row_is_not_stuck() -> None:
