@@ -152,8 +152,9 @@ def _oscillation(t: Array, waves: float) -> Pattern:
     period = (float(np.ptp(t)) or 1.0) / waves
     rate = 2 * np.pi / period
     expression = f"a*sin({rate:.6g}*t) + b*cos({rate:.6g}*t)"
+    seconds = f"{period:.3g}" if period < 100 else f"{period:.0f}"
     return Pattern(
-        f"oscillation in time, period {period:.0f} s", _waves(rate * t), expression, price=PATTERN_BETTER, slow=True
+        f"oscillation in time, period {seconds} s", _waves(rate * t), expression, price=PATTERN_BETTER, slow=True
     )
 
 

@@ -44,12 +44,12 @@ def structure_of(fit: Fit) -> Pattern | None:
     """The best pattern in a fit's residual; None if the residual is noise."""
     screen, noise = Screen(without_slow(fit)), _excess_noise(fit)
     all_patterns = _by_score(patterns(fit.table, fit.channels), screen)
-    significant = (
-        _significant(all_patterns, Screen(fit))
-        or _significant_in_other_noise(all_patterns, fit)
-        or ([p for p in all_patterns if p.slow] if noise else [])
-    )[:FINALISTS]
-    finalists = [sharpen(pattern, screen) for pattern in (*significant, *_outlier_pattern(fit))]
+    significant = _significant(all_patterns, Screen(fit))
+    if all(p.slow and not p.sudden for p in significant):  # the fitted noise may contain a step
+        significant = [*_significant_in_other_noise(all_patterns, fit), *significant]
+    if not significant and noise:
+        significant = [p for p in all_patterns if p.slow]
+    finalists = [sharpen(pattern, screen) for pattern in (*significant[:FINALISTS], *_outlier_pattern(fit))]
     finalists = [
         p for p in finalists if not (p.slow and noise) or _remaining_share(p, screen) < MOST_UNDER_SLOW_PATTERN
     ]
