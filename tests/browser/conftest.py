@@ -34,8 +34,6 @@ TABLET = {"width": 768, "height": 1024}
 PATIENCE_MS = 150_000  # for a search of missing effects, while other tests run
 LEFT = "net::ERR_ABORTED"  # the page was left, or the answer is a download
 LOCAL = ("http://127.0.0.", "ws://127.0.0.", "data:", "blob:")  # addresses on this computer
-# NiceGUI changes an element while its script still loads. Nothing is lost: the script draws the changed element.
-NOT_LOADED = "[element.update_method] is not a function"
 expect.set_options(timeout=PATIENCE_MS)
 
 
@@ -64,7 +62,7 @@ class Watch:
         self.faults.append(f"an error in the page: {error}")
 
     def _written(self, message: ConsoleMessage) -> None:
-        if message.type == "error" and NOT_LOADED not in message.text:
+        if message.type == "error":
             self.faults.append(f"an error in the console: {message.text} ({message.location.get('url', '')})")
 
     def _asked(self, request: Request) -> None:

@@ -135,6 +135,14 @@ def test_a_plan_that_cannot_be_says_why_and_does_not_start(workbench: Workbench)
     expect(page.get_by_role("button", name="Start")).to_be_disabled()
 
 
+def test_the_live_picture_is_ready_before_a_run_begins(workbench: Workbench) -> None:
+    """A script that comes with the first dwell would come after later changes where the connection was lost."""
+    page = workbench.visit("/run?procedure=sweep&step_deg=45")
+    picture = page.locator("[aria-label='the run over time']")
+    expect(picture.locator(".plot-container")).to_be_attached()
+    expect(picture).to_be_hidden()
+
+
 @pytest.mark.parametrize("way", ["key", "button"])
 def test_a_stop_while_the_connection_is_lost_acts_when_it_is_back(workbench: Workbench, way: str) -> None:
     page = started(workbench, NIGHT)

@@ -133,16 +133,18 @@ class OverTime:
         for select in (self.kind, self.name):
             select.style("min-width: 150px")
         self.head.set_visibility(False)
-        self.place = div("")
+        with div("") as self.place:  # with the page: a script that loads later is late where the connection was lost
+            self.plot = empty_plot("the run over time", "live-plot")
+        self.place.set_visibility(False)
         self.time = RunTime()
         self.units: dict[str, str] = {}
-        self.plot: ui.plotly | None = None
 
     async def follow(self, run: str) -> None:
         """Add the new dwells of `run`."""
         if run != self.run:
-            self.run, self.last, self.courses, self.plot, self.chosen = run, -1, {}, None, False
-            self.place.clear()
+            if self.run:  # the picture shows another run
+                self.place.set_visibility(False)
+            self.run, self.last, self.courses, self.chosen = run, -1, {}, False
             self.head.set_visibility(False)
         if not run:
             return
@@ -179,15 +181,13 @@ class OverTime:
             return
         name = str(self.name.value)
         chart = course_chart(course, name, self.time, self.units)
-        remember(self.lay_out(), chart)
-        self.lay_out().update_figure(figure(chart, name))
+        remember(self.plot, chart)
+        self.plot.update_figure(figure(chart, name))
+        self.show()
 
-    def lay_out(self) -> ui.plotly:
-        """The plot; made at the first call, so that the browser loads Plotly early."""
-        if self.plot is None:
-            with self.place:
-                self.plot = empty_plot("the run over time", "live-plot")
-        return self.plot
+    def show(self) -> None:
+        """Show the picture, or its place before the first dwell is there."""
+        self.place.set_visibility(True)
 
 
 def _new_dwells(run: str, after_number: int) -> tuple[list[tuple[int, Any]], RunTime, dict[str, str]]:
@@ -261,7 +261,7 @@ class OneRun:
         with box("stack"):
             words("Over time", "title")
             over_time = OverTime()
-            over_time.lay_out()
+            over_time.show()
         ui.timer(0.0, partial(over_time.follow, self.run.run), once=True)
 
     def _head(self) -> None:
