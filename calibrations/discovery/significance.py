@@ -53,9 +53,9 @@ class Screen:
     def bases(self, columns: Sequence[Array]) -> list[Array]:
         """The same for each of `columns`; many together take a fraction of the time."""
         parts = (columns[i : i + STACKED] for i in range(0, len(columns), STACKED))
-        return [basis for part in parts for basis in self._bases(part)]
+        return [basis for part in parts for basis in self._bases_of_part(part)]
 
-    def _bases(self, columns: Sequence[Array]) -> list[Array]:
+    def _bases_of_part(self, columns: Sequence[Array]) -> list[Array]:
         white = self.fit.noise.whiten(np.concatenate(columns, axis=2))
         ends = np.cumsum([block.shape[2] for block in columns])[:-1]
         size = np.linalg.norm(white, axis=0)
@@ -191,13 +191,11 @@ def _bases(blocks: Sequence[Array]) -> list[Array]:
 
 
 def _stacked_bases(stack: Array) -> list[Array]:
-    """Orthonormal basis of each of a stack of columns, (blocks, rows, k)."""
+    """Orthonormal basis of each of a stack of columns, (blocks, rows, k), of which none is zero."""
     count, rows, k = stack.shape
     if not k:
         return [np.zeros((rows, 0))] * count
-    norm = np.sqrt(np.einsum("bij,bij->bj", stack, stack))
-    if np.any(norm == 0):
-        return [_basis(columns) for columns in stack]
+    norm = np.linalg.norm(stack, axis=1)
     Q, R = np.linalg.qr(stack / norm[:, None])
     U, s, _ = np.linalg.svd(R)
     ranks = np.sum(s > RANK * s[:, :1], axis=1)
@@ -205,13 +203,7 @@ def _stacked_bases(stack: Array) -> list[Array]:
 
 
 def _basis(columns: Array) -> Array:
-    if not columns.size:
-        return np.zeros((len(columns), 0))
-    norm = np.sqrt(np.einsum("ij,ij->j", columns, columns))
-    Q, R = np.linalg.qr(columns[:, norm > 0] / norm[norm > 0])
-    U, s, _ = np.linalg.svd(R)
-    rank = int(np.sum(s > RANK * s[0])) if len(s) else 0
-    return Q if rank == Q.shape[1] else Q @ U[:, :rank]
+    return _stacked_bases(columns[None, :, np.any(columns != 0, axis=0)])[0]
 
 
 def _project_off(columns: Array, basis: Array) -> Array:

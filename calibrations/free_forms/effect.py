@@ -205,11 +205,9 @@ class _OnAngle(FreeForm):
 def _turn(pose: Pose, angle: str, error: Array) -> Pose:
     """The pose with an error of one of its angles, rad, shape (n,)."""
     if angle == "tilt":
-        x, y, z = pose.up
-        return replace(
-            pose,
-            up=np.stack([x + 0 * error, y * np.cos(error) - z * np.sin(error), y * np.sin(error) + z * np.cos(error)]),
-        )
+        x, y, z = np.broadcast_to(np.reshape(pose.up, (3, -1)), (3, len(error)))
+        cosine, sine = np.cos(error), np.sin(error)
+        return replace(pose, up=np.stack([x, y * cosine - z * sine, y * sine + z * cosine]))
     return replace(pose, **{angle: getattr(pose, angle) + error})
 
 

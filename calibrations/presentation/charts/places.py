@@ -153,7 +153,8 @@ def curve_panel(curve: PlaceCurve, axis: str, forms: Sequence[FittedForm] = ()) 
         form_curve = form.curve
         label = f"{form.name}: {100 * max(form.share, 0.0):.0f} %"
         series.append(Line(form_curve.at[axis], scale * form_curve.value[axis], label, colour, 1.4, "dash"))
-    driver = {"t_s": "time"}.get(curve.driver, curve.driver).removesuffix("_deg").removesuffix("_c").replace("_", " ")
+    name = "time" if curve.driver == "t_s" else curve.driver.removesuffix("_deg").removesuffix("_c")
+    driver = name.replace("_", " ")
     x = Axis(f"{driver}, {curve.driver_unit}" if curve.driver_unit else driver)
     first = axis == next(iter(curve.value))
     y = Axis(f"{curve.place}, {unit}" if first else "")
