@@ -15,6 +15,7 @@ from calibrations.free_forms.requested import resolve_effect
 from calibrations.loop import discover
 from calibrations.model.file import read_model
 from calibrations.presentation.answers import discovery_text
+from calibrations.presentation.charts.places import curve_panel
 from tests.calibrations.test_requested_forms import CURVES, FORCES, WARMING, table, with_form
 
 
@@ -66,6 +67,7 @@ def test_a_slow_turn_of_the_base_has_a_curve_in_degrees_for_each_axis() -> None:
     tilt = np.degrees(1e-3 * np.interp(t, data.time_s, np.linspace(-1, 1, data.n)) ** 3)
     assert np.std(curve.value["about-x"] - tilt) < 0.03 * np.ptp(tilt)
     assert np.mean(curve.std["about-x"]) < 0.03 * np.ptp(tilt)
+    assert curve_panel(curve, "about-x").x.label == "time, s"
 
 
 def test_a_place_without_an_effect_or_without_one_driver_has_no_curve() -> None:

@@ -9,6 +9,7 @@ import pytest
 
 import calibrations as cal
 from calibrations.discovery.rows import Rows
+from calibrations.discovery.structural import structure
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import CalibrationError, ModelError
 from calibrations.fitting.fit import Fit, evaluate, fit
@@ -131,6 +132,16 @@ def test_a_model_with_a_form_that_the_data_cannot_show_is_refused() -> None:
     model = read_model("linear").with_effect(resolve_effect("free:own-response", {}))
     with pytest.raises(ModelError, match="needs 24 poses"):
         fit(model, table().rows(few))
+
+
+def test_a_curve_over_beta_has_no_line_beside_it() -> None:
+    """It has its first wave, which is that of a tilted base, in itself."""
+    start = fit(read_model("linear"), table(CURVES["beta-bias"]))
+    found = structure(start, catalogue())
+    (over_beta,) = found.free_forms
+    with_line = replace(found, geometry=replace(found.geometry, lines={"beta-bias": 1e-3}))
+    assert with_line.free_forms == (over_beta,)
+    assert {form.place for form in over_beta} == {"beta-bias"}
 
 
 def test_every_place_has_a_driver_and_an_entry_of_effects() -> None:
