@@ -3,33 +3,47 @@
     python -m tests.mutation rig/record rig/instruments/guard.py --tests tests/rig/test_store.py --count 20 --seed 1
 
 A change flips a comparison, moves a number by one, exchanges + and -, `and` and `or`, True and False, or drops a `not`.
-It is made in a copy of the tree. The tests run once without a change, where `tests/mutation_lines.py` sees which test
-executes which line, and for how long; then with each change those alone that execute its line, the shortest first. Look
-at each survivor: it is a missing test, or a change that means nothing. A line that no test executes is listed as well.
+It is made in a copy of the tree. The tests run once without a change, where coverage.py sees which test executes which
+line; then with each change those alone that execute its line, the shortest first. They are collected once: each run is
+a fork, where the functions of the file get their changed code. Look at each survivor: it is a missing test, or a change
+that means nothing. A line that no test executes is listed as well; a line that runs once for all tests, because its
+result is kept, belongs to the first of them, and what runs at an import, in a compiled kernel or in another process is
+not seen. `--lines FILE` with `--skip N` goes on where an earlier call was stopped.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import gc
 import json
+import multiprocessing
 import os
 import random
 import shutil
-import subprocess
+import signal
 import sys
 import tempfile
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
 from pathlib import Path
+from types import CodeType, FunctionType
+from typing import TextIO
+
+import coverage
+import pytest
 
 ROOT = Path(__file__).parents[1]
-PARTS = ("rig", "procedures", "drivers", "calibrations", "tests", "pyproject.toml")
+PARTS = ("rig", "procedures", "drivers", "calibrations", "tests", "docs", "pyproject.toml")
 COMPARISONS = {"<": ">=", ">": "<=", "<=": ">", ">=": "<", "==": "!=", "!=": "==", "is not": "is", "is": "is not"}
 COMPARISONS |= {"not in": "in", "in": "not in"}
-STARTS_S = 20.0  # Python and the imports, on a busy machine
-PATIENCE = 10.0  # times as long as without a change: then a test hangs
+STARTS_S = 30.0  # imports and collection, on a busy machine
+PATIENCE = 3.0  # times as long as without a change: then a test hangs
 SWAPS = {"+": "-", "-": "+", "and": "or", "or": "and"}
 
 
@@ -107,63 +121,143 @@ def _between(
 
 @dataclass(frozen=True)
 class Traced:
-    """A test without a change: how long it takes, and the lines that it executes, by file."""
+    """A test without a change: how long it takes, whether it passes, and the lines that it executes, by file."""
 
     test: str
     seconds: float
-    lines: Mapping[str, frozenset[int]]
+    passes: bool
+    lines: Mapping[str, Sequence[int]]
 
 
-def traced(tree: Path, files: Sequence[str], tests: Sequence[str]) -> list[Traced]:
-    """Run all tests in the tree once. Raises SystemExit if one fails."""
-    out = tree / "lines.json"
-    more = {"MUTATION_FILES": json.dumps([str(tree / file) for file in files]), "MUTATION_OUT": str(out)}
-    words = ["-p", "no:xdist", "-p", "tests.mutation_lines", *tests]
-    ended = subprocess.run(_pytest(words), cwd=tree, env=_environment(tree) | more, check=False, capture_output=True)
-    if ended.returncode:
-        raise SystemExit(f"The tests fail without any change:\n{ended.stdout.decode()[-2000:]}")
-    return [
-        Traced(test, seconds, {str(Path(file).relative_to(tree)): frozenset(each) for file, each in lines.items()})
-        for test, seconds, lines in json.loads(out.read_text(encoding="utf-8"))
-    ]
+class Judge:
+    """A plugin of pytest: each change is tested in a fork of this process, which has collected all tests."""
+
+    def __init__(self, tree: Path, files: Sequence[str], kept: Path, most_s: float) -> None:
+        self.tree, self.files, self.kept, self.most_s = tree, files, kept, most_s
+        self.changes: Sequence[Change] = ()
+        self.out: TextIO = sys.stdout
+
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """Print each change, and whether a test notices it; the numbers at the end."""
+        if session.testsfailed:
+            raise session.Interrupted("a file of tests cannot be imported")
+        if not self.kept.exists():
+            _forked(partial(_trace, session, self.tree, self.files, self.kept))
+        tests, modules = json.loads(self.kept.read_text(encoding="utf-8"))
+        for name in modules:
+            with suppress(Exception):
+                import_module(name)  # once, not in each fork
+        traced = sorted((Traced(*test) for test in tests), key=lambda test: test.seconds)
+        for test in traced:
+            if not test.passes:
+                print(f"LEFT OUT  {test.test}: it fails without a change", file=self.out, flush=True)
+        ends = Counter[str]()
+        for change in self.changes:
+            end = self.judged(session, change, [test for test in traced if test.passes])
+            ends[end] += 1
+            line = change.made((self.tree / change.file).read_text(encoding="utf-8")).splitlines()[change.line - 1]
+            print(f"{end:8}  {change.file}:{change.line}  {line.strip()}", file=self.out, flush=True)
+        noticed = f"{ends['noticed']} of {ends.total()} changes noticed"
+        print(f"{noticed}, {ends['NO TEST']} in lines that no test executes", file=self.out, flush=True)
+        return True
+
+    def judged(self, session: pytest.Session, change: Change, tests: Sequence[Traced]) -> str:
+        """`noticed`, `SURVIVED` or `NO TEST`, by the tests that execute the changed line: the first, up to `most_s`."""
+        chosen, left_s = list[str](), self.most_s
+        for test in tests:
+            if change.line in test.lines.get(change.file, ()) and (left_s > 0 or not chosen):
+                chosen.append(test.test)
+                left_s -= test.seconds
+        if not chosen:
+            return "NO TEST"
+        path = self.tree / change.file
+        text = path.read_text(encoding="utf-8")
+        path.write_text(change.made(text), encoding="utf-8")
+        try:
+            timeout_s = STARTS_S + PATIENCE * (self.most_s - left_s)
+            return "SURVIVED" if _forked(partial(_passes, session, chosen, path, text), timeout_s) else "noticed"
+        finally:
+            path.write_text(text, encoding="utf-8")
 
 
-def judged(tree: Path, change: Change, tests: Sequence[Traced], most_s: float) -> str:
-    """`noticed`, `SURVIVED` or `NO TEST`, by the tests that execute the changed line: the shortest, up to `most_s`."""
-    chosen, left_s = list[str](), most_s
-    for test in sorted(tests, key=lambda each: each.seconds):
-        if change.line in test.lines.get(change.file, ()) and (left_s > 0 or not chosen):
-            chosen.append(test.test)
-            left_s -= test.seconds
-    if not chosen:
-        return "NO TEST"
-    path = tree / change.file
-    text = path.read_text(encoding="utf-8")
-    path.write_text(change.made(text), encoding="utf-8")
-    try:
-        survives = passes(tree, chosen, STARTS_S + PATIENCE * (most_s - left_s))
-    finally:
-        path.write_text(text, encoding="utf-8")
-    return "SURVIVED" if survives else "noticed"
+def _forked(act: Callable[[], bool], timeout_s: float | None = None) -> bool:
+    """Whether a function is true in a fork of this process; false if it takes too long."""
+
+    def answer() -> None:
+        os.setsid()  # its own children end with it
+        is_true = False
+        try:
+            is_true = act()
+        finally:
+            os._exit(not is_true)
+
+    fork = multiprocessing.get_context("fork").Process(target=answer)
+    fork.start()
+    fork.join(timeout_s)
+    if fork.exitcode is None and fork.pid:
+        os.killpg(fork.pid, signal.SIGKILL)
+        fork.join()
+    return fork.exitcode == 0
 
 
-def passes(tree: Path, tests: Sequence[str], timeout_s: float) -> bool:
-    """Whether all tests pass; a run that takes too long does not."""
-    words = _pytest(["-x", "-p", "no:xdist", *tests])
-    try:
-        return not subprocess.run(
-            words, cwd=tree, env=_environment(tree), capture_output=True, timeout=timeout_s, check=False
-        ).returncode
-    except subprocess.TimeoutExpired:
-        return False
+def _passes(session: pytest.Session, tests: Sequence[str], path: Path, text: str) -> bool:
+    """Whether the tests pass after the text of this file has changed."""
+    _change_functions(path, text)
+    items = {item.nodeid: item for item in session.items}
+    for item, following in _with_following([items[test] for test in tests]):
+        item.ihook.pytest_runtest_protocol(item=item, nextitem=following)
+        if session.testsfailed:
+            session._setupstate.teardown_exact(None)
+            return False
+    return True
 
 
-def _pytest(words: Sequence[str]) -> list[str]:
-    return [sys.executable, "-m", "pytest", "-q", "-m", "not slow", *words]
+def _change_functions(path: Path, text: str) -> None:
+    """Give the functions of this file, which were made from `text`, the code that the file has now."""
+    before, after = (compile(each, path, "exec") for each in (text, path.read_text(encoding="utf-8")))
+    pairs = zip(_codes(before), _codes(after), strict=True)
+    changed = {(old.co_qualname, old.co_firstlineno): new for old, new in pairs if old != new}
+    for made in gc.get_objects():
+        if isinstance(made, FunctionType) and made.__code__.co_filename == str(path):
+            code = made.__code__
+            made.__code__ = changed.get((code.co_qualname, code.co_firstlineno), code)
 
 
-def _environment(tree: Path) -> dict[str, str]:
-    return os.environ | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    """The code and all that is inside it."""
+    yield code
+    for value in code.co_consts:
+        if isinstance(value, CodeType):
+            yield from _codes(value)
+
+
+def _trace(session: pytest.Session, tree: Path, files: Sequence[str], kept: Path) -> bool:
+    """Run all tests; write what each of them executes, and the modules that they need."""
+    measured = coverage.Coverage(data_file=None, include=[str(tree / file) for file in files])
+    seconds, failed = dict[str, float](), set[str]()
+    measured.start()
+    for item, following in _with_following(session.items):
+        measured.switch_context(item.nodeid)
+        began, failed_before = time.perf_counter(), session.testsfailed
+        item.ihook.pytest_runtest_protocol(item=item, nextitem=following)
+        seconds[item.nodeid] = time.perf_counter() - began
+        if session.testsfailed > failed_before:
+            failed.add(item.nodeid)
+    measured.stop()
+    lines = defaultdict[str, dict[str, list[int]]](dict)
+    data = measured.get_data()
+    for file in data.measured_files():
+        for line, tests in data.contexts_by_lineno(file).items():
+            for test in tests:
+                lines[test].setdefault(str(Path(file).relative_to(tree)), []).append(line)
+    traced = [(test, taken_s, test not in failed, lines[test]) for test, taken_s in seconds.items()]
+    kept.write_text(json.dumps([traced, sorted(sys.modules)]), encoding="utf-8")
+    return True
+
+
+def _with_following(items: Sequence[pytest.Item]) -> Iterator[tuple[pytest.Item, pytest.Item | None]]:
+    """Each test and the next one, which decides which fixtures stay."""
+    return zip(items, [*items[1:], None], strict=True)
 
 
 def _files(place: str) -> list[str]:
@@ -180,24 +274,30 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--most-s", type=float, default=60.0, help="of tests for one change")
+    parser.add_argument("--lines", type=Path, help="file that keeps the lines of each test for the next call")
+    parser.add_argument("--skip", type=int, default=0, help="changes that an earlier call has judged")
     asked = parser.parse_args()
     files = [file for place in asked.places for file in _files(place)]
     possible = [change for file in files for change in changes(file, (ROOT / file).read_text(encoding="utf-8"))]
     chosen = random.Random(asked.seed).sample(possible, min(asked.count, len(possible)))
     with tempfile.TemporaryDirectory() as folder:
-        tree = Path(folder)
+        tree = Path(folder).resolve()
         for part in PARTS:
             copy = shutil.copytree if (ROOT / part).is_dir() else shutil.copy2
             copy(ROOT / part, tree / part)
-        tests = traced(tree, files, asked.tests)
-        ends = Counter[str]()
-        for change in chosen:
-            end = judged(tree, change, tests, asked.most_s)
-            ends[end] += 1
-            text = (ROOT / change.file).read_text(encoding="utf-8")
-            line = change.made(text).splitlines()[change.line - 1].strip()
-            print(f"{end:8}  {change.file}:{change.line}  {line}", flush=True)
-    print(f"{ends['noticed']} of {ends.total()} changes noticed, {ends['NO TEST']} in lines that no test executes")
+        judge = Judge(tree, files, asked.lines or tree / "lines.json", asked.most_s)
+        judge.changes = chosen[asked.skip :]
+        judge.out = os.fdopen(os.dup(1), "w")
+        output = os.open(tree / "output.txt", os.O_WRONLY | os.O_CREAT)
+        os.dup2(output, 1)
+        os.dup2(output, 2)
+        os.chdir(tree)
+        os.environ["PYTHONPATH"] = str(tree)
+        sys.path.insert(0, str(tree))
+        del sys.modules["tests"]  # of the repository
+        words = ["-m", "not slow", "-p", "no:xdist", "--basetemp", str(tree / "tmp"), *asked.tests]
+        if pytest.main(words, plugins=[judge]):
+            print((tree / "output.txt").read_text(encoding="utf-8")[-2000:], file=judge.out)
 
 
 if __name__ == "__main__":
