@@ -184,10 +184,7 @@ def _open_damaged(source: Path) -> sqlite3.Connection:
 def _copy_rows(old: sqlite3.Connection, new: sqlite3.Connection, table: str) -> tuple[int, bool]:
     """The number of copied rows of a table, and whether these are all."""
     columns = {row[1] for row in new.execute(f"PRAGMA table_info({table})")}
-    try:
-        names = [row[1] for row in old.execute(f"PRAGMA table_info({table})") if row[1] in columns]
-    except UNREADABLE:
-        return 0, False
+    names = [row[1] for row in old.execute(f"PRAGMA table_info({table})") if row[1] in columns]  # read at opening
     if not names:
         return 0, True  # this table is newer than the record
     places = ", ".join("?" * len(names))
