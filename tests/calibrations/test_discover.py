@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from calibrations.discovery.results import Discovery
+from calibrations.discovery.row_search import _is_explained
 from calibrations.discovery.search import find_path, first_order_cost
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import fit
@@ -169,3 +170,11 @@ def test_effects_that_the_data_cannot_separate_are_tested_together() -> None:
     end = fit(model, table)
     alone, together = first_order_cost(end, "stage-zero-offset")[0], first_order_cost(end, *names)[0]
     assert alone < 10 < 1000 < together
+
+
+def test_only_a_known_noise_tells_that_nothing_but_noise_is_left() -> None:
+    columns = turns((90, 30), step_deg=30.0)
+    x, y, _ = components(columns)
+    known = poses(columns, 2.5 + x, 2.5 + y)
+    unknown = Table.from_columns("poses", {k: v for k, v in known.columns.items() if "std" not in k}, source="made")
+    assert [_is_explained(find_path(fit(LINEAR, table), (), {})) for table in (known, unknown)] == [True, False]

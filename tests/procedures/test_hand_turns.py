@@ -17,8 +17,9 @@ from procedures.hand_turns import TURN, hand_turns
 from procedures.instruments import Samples
 from procedures.session import Session
 from rig.instruments.by_hand import HandAnalysis
+from rig.record.measured import turns_table
 from rig.record.turns import is_turn, turn_columns
-from rig.record.values import Block
+from rig.record.values import Block, Run
 from tests.handling import SlowAdc, turn_errors, turn_world, turns_by_procedure
 from tests.procedures.bench import Book, session
 
@@ -83,6 +84,12 @@ def test_each_turn_is_a_row_with_its_axis(calm: Book) -> None:
     angle_deg = turns.column("rate_deg_s") * turns.duration_s
     between_deg = np.degrees(np.arccos(np.sum(turns.before * turns.after, axis=1)))
     assert angle_deg == pytest.approx(between_deg, abs=3)  # without a wanted north the hand takes the shortest way
+
+
+def test_the_table_of_a_run_has_the_constants_that_turns_need(calm: Book) -> None:
+    constants = {"latitude_deg": 40.4, "filter_corner_hz": 15.07, "approach_deg": 5.0}
+    run = Run("a", "turns", "hand-turns", "complete", {"rest_s": 2.0}, {}, {}, "", constants, "", "", None, None, {}, 0)
+    assert turns_table(run, calm.blocks).constants.keys() == {"latitude_deg", "unit", "sample_rate_hz"}
 
 
 def test_a_run_that_was_interrupted_goes_on_with_its_turns(calm: Book) -> None:

@@ -196,11 +196,14 @@ def test_a_failed_recovery_does_not_block_the_next(tmp_path: Path) -> None:
 
 def test_poses_without_the_entry_of_their_run_are_in_reach(tmp_path: Path) -> None:
     run = recorded(tmp_path / "old", 2)
+    with Record(tmp_path / "old") as record:
+        procedure = record.run(run).procedure
     change(tmp_path / "old", "DELETE FROM runs")
     shutil.rmtree(tmp_path / "new", ignore_errors=True)
     assert recover(tmp_path / "old" / "record.db", tmp_path / "new").changed
     with Record(tmp_path / "new") as record:
-        assert (record.run(run).state, table_of(record, run).n) == ("failed", 2)
+        assert (record.run(run).state, record.run(run).procedure) == ("failed", procedure)
+        assert table_of(record, run).n == 2
 
 
 @pytest.mark.parametrize("table", ["poses", "blocks"])

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from drivers.world.gravity import Base, Package, felt_g, mounting, vertical
 from procedures.session import Pose
-from rig.record.measured import sensor_from_base, sensor_from_table, specific_force_g
+from rig.record.measured import FORCE, positions_table, sensor_from_base, sensor_from_table, specific_force_g
+from rig.record.values import Block, KeptPose, Run
 
 ANGLES = st.floats(-360.0, 360.0)
 POSES = st.builds(Pose, ANGLES, ANGLES, mount_deg=ANGLES, flip=st.sampled_from([0, 1]), up=st.sampled_from("xyz"))
@@ -32,3 +33,10 @@ def test_the_force_in_a_turn_is_its_mean_over_the_turn(pose: Pose) -> None:
     stops = [Pose(**{**pose.__dict__, "beta_deg": pose.beta_deg + k * 45.0}) for k in range(8)]
     mean = np.mean([specific_force_g(stop) for stop in stops], axis=0)
     assert specific_force_g(turn) == pytest.approx(mean, abs=1e-11)
+
+
+def test_one_position_makes_a_table() -> None:
+    samples = Block(np.array([[0.1, 0.2, 1.0], [0.3, 0.2, 1.0]]), FORCE, 1000.0, 2.5)
+    run = Run("a", "positions", "hand", "running", {}, {}, {}, "", {}, "", "", None, None, {}, 1)
+    table = positions_table(run, [KeptPose(Pose(0.0, 0.0), samples, 3.5, None)])
+    assert [table.column(name).tolist() for name in FORCE] == [pytest.approx([0.2]), [0.2], [1.0]]

@@ -14,6 +14,7 @@ import pytest
 
 from rig.record import Record
 from rig.record.measured import table_of
+from rig.record.recover import recover
 from rig.record.schema import MIGRATIONS, SCHEMA, metadata
 from tests.docs.markdown import ROOT
 
@@ -66,3 +67,9 @@ def test_an_older_record_becomes_one_of_this_version(file: Path, tmp_path: Path)
     with closing(sqlite3.connect(old / "record.db")) as connection:
         assert connection.execute("PRAGMA user_version").fetchone() == (SCHEMA,)
         assert connection.execute("PRAGMA foreign_key_check").fetchall() == []
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_a_table_that_is_newer_than_the_record_is_no_loss(file: Path, tmp_path: Path) -> None:
+    recovered = recover(restored(file, tmp_path / "old") / "record.db", tmp_path / "new")
+    assert (recovered.rows["poses"], recovered.damaged) == (4, ())
