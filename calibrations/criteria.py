@@ -88,8 +88,11 @@ LEAST_GAINS = {  # gain, by process
     "quantisation-noise": 12.0,  # one record in 4000: it changes the white noise that it is taken for most
     "gauss-markov-noise": 22.0,  # other processes together nearly have its shape
 }
-TWO_LEVELS_BETTER = 14.0  # gain beyond the price of the path: chance in one of 1000 records
-FEWEST_JUMPS = 4  # between two levels: each is reached again, which a step does not do
+LEVELS_BETTER = 14.0  # gain beyond the price of the path: chance in one of 1000 records
+JUMPS_PER_LEVEL = 2  # at least, and as many stays at each level: it is reached again, which a step does not do
+MOST_BESIDE_LEVELS = 0.02  # of the slow variance: five levels leave 0.04 or more of noise of any level
+MANY_JUMPS = 10  # to each level: fewer random steps, put into five levels, can leave as little
+MOST_LEVELS = 5  # of random telegraph noise: more are noise of any level
 MOST_PATTERNS = 4  # of a channel: a line, a curvature and a branch over temperature, and a step; more are noise
 FALSE_LINE = 1e-3  # chance of a line over all frequencies of a record
 FALSE_MINIMUM = 0.05  # chance of a minimum over all pairs of averaging times of a level Allan deviation

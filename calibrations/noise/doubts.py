@@ -4,7 +4,7 @@ A disturbance is everything in a still record that is not a noise process:
 
 pattern          a step, a drift, a settling, an output that follows a logged column; removed before the fit
 odd samples      wild samples, a stretch of equal samples, noise below one converter step; reported
-two levels       random telegraph noise, which has the spectrum of a Gauss-Markov process; reported
+two levels       random telegraph noise of two or more, which has the spectrum of a Gauss-Markov process; reported
 misfit           a line, a noise level that changes with time, a stretch of the spectrum that no process explains
 
 Two noise processes are separated by a longer record. Its bands are computed as one explanation expects them, and the
@@ -20,8 +20,8 @@ Source  Kullback and Leibler, Ann. Math. Statist. 22 (1951).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Set
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,7 @@ from calibrations.noise.patterns import DRIFT, FOLLOWS, SETTLING, STEP, Pattern
 from calibrations.noise.record import Channel
 from calibrations.noise.samples import hidden_in
 from calibrations.noise.search import Search
-from calibrations.noise.telegraph import TWO_LEVELS
+from calibrations.noise.telegraph import Telegraph
 from calibrations.spectrum import GAUSS_MARKOV, Bands, slow_bands
 from calibrations.table import Array
 
@@ -51,9 +51,10 @@ FEWEST_MEANS, FEWEST_BESIDE_JUMP = 50, 5
 class Disturbance:
     """One disturbance of one channel.
 
-    kind     such as `step`, `follows`, `wild-samples`, `level`
-    matters  whether it changes the noise coefficients by more than their uncertainty
-    pattern  the part removed from the record, if any
+    kind       such as `step`, `follows`, `wild-samples`, `level`
+    matters    whether it changes the noise coefficients by more than their uncertainty
+    pattern    the part removed from the record, if any
+    telegraph  the levels of random telegraph noise
     """
 
     kind: str
@@ -61,23 +62,25 @@ class Disturbance:
     text: str
     matters: bool = True
     pattern: Pattern | None = None
+    telegraph: Telegraph | None = None
 
 
 def disturbances(search: Search) -> tuple[Disturbance, ...]:
-    """All disturbances: removed patterns, two levels, odd samples; a misfit only where none of these matters."""
+    """All disturbances: removed patterns, levels, odd samples; a misfit only where none of these matters."""
     patterns = list(map(as_disturbance, search.patterns))
-    two_levels = [
-        Disturbance(TWO_LEVELS, disturbance.axis, disturbance.text, False) for disturbance in search.telegraphs
+    levels = [
+        Disturbance(telegraph.kind, telegraph.axis, telegraph.text, False, telegraph=telegraph)
+        for telegraph in search.telegraphs
     ]
     odd = [
         Disturbance(disturbance.kind, channel.axis, f"of {channel.axis}, {disturbance.text}", disturbance.matters)
         for channel in search.still.channels
         for disturbance in channel.oddities
     ]
-    entries = (*patterns, *two_levels, *odd)
+    entries = (*patterns, *levels, *odd)
     if any(disturbance.matters for disturbance in entries):
         return entries
-    misfit = misfit_of(search.end.channels)
+    misfit = misfit_of(search.end.channels, {telegraph.axis for telegraph in search.telegraphs})
     return entries if misfit is None else (*entries, misfit)
 
 
@@ -86,17 +89,26 @@ def as_disturbance(pattern: Pattern) -> Disturbance:
     return Disturbance(pattern.kind, pattern.axis, pattern.text, True, pattern)
 
 
-def misfit_of(channels: tuple[ChannelFit, ...]) -> Disturbance | None:
-    """The first misfit that chance does not explain, over all channels."""
+def misfit_of(channels: tuple[ChannelFit, ...], jumping: Set[str] = frozenset()) -> Disturbance | None:
+    """The first misfit that chance does not explain, over all channels.
+
+    jumping  axes with random telegraph noise: a part of the record with more jumps than another has more noise
+    """
     limit = SIGNIFICANT / (len(MISFITS) * len(channels))
-    misfits = (_line(fit) or _level(fit, limit) or _stretch(fit, limit) for fit in channels)
+    misfits = (
+        _line(fit) or (None if fit.channel.axis in jumping else _level(fit, limit)) or _stretch(fit, limit)
+        for fit in channels
+    )
     return next((misfit for misfit in misfits if misfit is not None), None)
 
 
 def disturbance_document(disturbance: Disturbance) -> dict[str, Any]:
     """One entry of `disturbances` in every JSON document on a still record."""
     entry = {name: getattr(disturbance, name) for name in ("kind", "axis", "text", "matters")}
-    pattern = disturbance.pattern
+    pattern, telegraph = disturbance.pattern, disturbance.telegraph
+    if telegraph is not None:
+        levels = [asdict(level) for level in telegraph.levels]
+        return entry | {"levels": levels, "jumps": telegraph.jumps, "traps": list(telegraph.traps)}
     if pattern is None:
         return entry
     return entry | {
@@ -238,7 +250,7 @@ def possible_corner_hz(search: Search, name: str) -> float | None:
     """The corner of a low-pass that would explain the process `name`; None where no low-pass can."""
     if name != GAUSS_MARKOV:
         return None
-    jumping = {telegraph.axis for telegraph in search.telegraphs}  # no filter makes two levels
+    jumping = {telegraph.axis for telegraph in search.telegraphs}  # no filter makes levels
     free = (fit for fit in search.mixture.channels if not np.isfinite(fit.channel.corner_hz))
     corners = [_channel_corner_hz(fit) for fit in free if fit.channel.axis not in jumping]
     return next((corner for corner in corners if corner is not None), None)

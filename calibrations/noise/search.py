@@ -208,7 +208,7 @@ def _search_without(
 
 
 def _patterns(search: Search, channels: tuple[ChannelFit, ...]) -> tuple[Pattern, ...]:
-    """The pattern of each channel that has one. A channel that jumps between two levels has steps anyway."""
+    """The pattern of each channel that has one. A channel that jumps between levels has steps anyway."""
     jumping = {telegraph.axis for telegraph in search.telegraphs}
     free = (fit for fit in channels if fit.channel.axis not in jumping)
     return tuple(filter(None, (pattern_of(fit, search.patterns) for fit in free)))

@@ -11,7 +11,7 @@ from calibrations.noise.deviations import minimum_s
 from calibrations.noise.doubts import Disturbance
 from calibrations.noise.record import Sensed
 from calibrations.noise.samples import COARSE
-from calibrations.noise.telegraph import TWO_LEVELS
+from calibrations.noise.telegraph import SEVERAL_LEVELS, TWO_LEVELS
 from calibrations.text import PREFIX_UNITS, Cells, columns, concise, duration, prefix, rounded, sentence
 
 MEANS = {
@@ -22,7 +22,7 @@ MEANS = {
     "sinusoidal-noise": "amplitude",
     "gauss-markov-noise": "standard deviation",
 }
-NOISE = (COARSE, TWO_LEVELS)  # noise that the coefficients alone do not describe
+NOISE = (COARSE, TWO_LEVELS, SEVERAL_LEVELS)  # noise that the coefficients alone do not describe
 
 
 def summary(analysis: NoiseAnalysis) -> str:

@@ -26,10 +26,10 @@ def traps(random: Random, n: int = SAMPLES) -> Array:
     """Two traps to each decade of holding times, from half a sample to ten records: S(f) = 1 / (2 pi f)."""
     times = np.geomspace(0.5, 10 * n, 2 * int(np.log10(20 * n)) + 1)
     size = np.sqrt(np.log(times[1] / times[0]) / np.pi)
-    return size * np.sum([_relaxing(random, n, each) for each in times], axis=0)
+    return size * np.sum([relaxing(random, n, each) for each in times], axis=0)
 
 
-def _relaxing(random: Random, n: int, time: float) -> Array:
+def relaxing(random: Random, n: int, time: float) -> Array:
     """Many traps of one holding time, as one: what they hold together forgets exponentially."""
     kept = np.exp(-1 / time)
     driven = random.standard_normal(n) * np.sqrt(1 - kept**2)
@@ -55,6 +55,12 @@ def telegraph(random: Random, n: int = SAMPLES, stay: float = 1000.0) -> Array:
     return np.where(np.cumsum(random.random(n) < 1 / stay) % 2, 1.0, -1.0)
 
 
+def levels(random: Random, n: int, stay: float, count: int) -> Array:
+    """One trap of several levels 0, 1, 2, ..., that stays `stay` samples on average, and goes to any other level."""
+    steps = np.where(random.random(n) < 1 / stay, random.integers(1, count, n), 0)
+    return np.cumsum(steps) % count * 1.0
+
+
 def walk(random: Random, n: int = SAMPLES) -> Array:
     """A step of +10 or -10 with every hundredth sample: of unit variance to a sample."""
     return np.cumsum(10.0 * random.choice([-1.0, 1.0], n) * (random.random(n) < 0.01))
@@ -78,7 +84,7 @@ RECORDS: Mapping[str, tuple[Callable[[Random], Array], frozenset[str]]] = {
     "fractional": (lambda r: white(r) + 0.5 * fractional(r), frozenset({"flicker-noise"})),
     "walk": (lambda r: white(r) + 0.005 * walk(r), frozenset({"rate-random-walk"})),
     "telegraph": (lambda r: white(r) + 0.7 * telegraph(r), frozenset({"gauss-markov-noise"})),
-    "relaxation": (lambda r: white(r) + 0.5 * _relaxing(r, SAMPLES, 200.0), frozenset({"gauss-markov-noise"})),
+    "relaxation": (lambda r: white(r) + 0.5 * relaxing(r, SAMPLES, 200.0), frozenset({"gauss-markov-noise"})),
     "counter": (lambda r: 2 * counted(r), frozenset({"quantisation-noise"})),
     "hum": (lambda r: white(r) + 0.2 * hum(r), frozenset({"sinusoidal-noise"})),
     "traps and walk": (
