@@ -18,7 +18,7 @@ from calibrations.compensation.program import Program
 from calibrations.effects.logged import RATE
 from calibrations.errors import CalibrationError, ModelError
 from calibrations.geometry.orientation import reported_force
-from calibrations.geometry.stage_path import turning_points
+from calibrations.geometry.stage_path import sensed_turning_points
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.chain import Step, respond, sensed
 from calibrations.table import AXES, Array, Table
@@ -173,7 +173,7 @@ def memory_at(table: Table, a: Array, forward: Forward) -> dict[str, Array]:
 def _memories_by_row(table: Table, a: Array, steps: Sequence[Step]) -> Iterator[list[Array]]:
     """The memory before each row, (3,) for every slot."""
     stored = [[np.zeros((1, 3))] * effect.memory for effect, _ in steps]
-    paths = turning_points(table) if "alpha_deg" in table else np.empty((table.n, 0, 3))
+    paths = sensed_turning_points(table, a) if "alpha_deg" in table else np.empty((table.n, 0, 3))
     for i in range(table.n):
         row = table.rows(np.array([i]))
         for force in paths[i]:

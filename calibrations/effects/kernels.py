@@ -46,17 +46,18 @@ def slip_elements(a: Array, on_the_way: Array, limit_factors: Array, limits: Arr
 
 @njit(cache=True, nogil=True)
 def slip(a: Array, on_the_way: Array, limit_factors: Array, limits: Array, first_shares: Array) -> Array:
-    """Force held by all elements of `slip_elements`, shape (n, 3), 1 where all slip."""
+    """Force held by all elements of `slip_elements`, shape (n, 3), 1 where all slip; limits (elements, 3)."""
     n, axes = a.shape
-    total = limits.sum()
     shares = np.empty((n, axes))
     for k in range(axes):
-        forces = first_shares[k] * limits
+        limits_of_axis = np.ascontiguousarray(limits[:, k])
+        total = limits_of_axis.sum()
+        forces = first_shares[k] * limits_of_axis
         previous = 0.0
         for i in range(n):
-            previous = _follow(forces, previous, on_the_way[i, :, k], a[i, k], limits, limit_factors[i, k])
+            previous = _follow(forces, previous, on_the_way[i, :, k], a[i, k], limits_of_axis, limit_factors[i, k])
             total_force = forces[0]
-            for e in range(1, len(limits)):
+            for e in range(1, len(forces)):
                 total_force += forces[e]
             shares[i, k] = total_force / total
     return shares

@@ -12,9 +12,10 @@ from functools import lru_cache
 import numpy as np
 
 from calibrations.criteria import SHORTEST_APPROACH_DEG
-from calibrations.geometry.orientation import Pose, specific_force
+from calibrations.geometry.orientation import Pose, nominal_pose, reported_force, specific_force
 from calibrations.table import Array, Table
 
+SAME_DIRECTION = 1e-6  # of the largest singular value: products below that the poses do not tell apart
 STATED_APPROACH = -1.0  # an approach as the table states it
 
 
@@ -26,23 +27,73 @@ def with_approach(table: Table, by_deg: float) -> Table:
 
 @lru_cache(maxsize=8)
 def turning_points(table: Table) -> Array:
-    """Specific force along each axis at its turning points on the way to each pose, shape (n, points, 3).
+    """Specific force along each axis of an ideal rig at its turning points on the way to each pose, (n, points, 3), g.
 
     Rows in order of time. Other points on the way are included; they have no effect.
     """
+    mount, flip = _repeat(table, "mount_deg"), _repeat(table, "flip")
+    forces = [_force(alpha, beta, mount, flip)[..., k] for k, (alpha, beta) in enumerate(_angles_of_axes(table))]
+    return np.stack(forces, axis=2)
+
+
+def sensed_turning_points(table: Table, a: Array) -> Array:
+    """The turning points of the force that a sensor with these values at the poses senses, shape (n, points, 3), g.
+
+    `a` is the specific force along the sensing axes at the poses, (n, 3), g. A sensor at an angle in its package, a
+    tilted base and offsets of the stages change the force at the poses and between them alike: the change is a linear
+    function of the products of the sines and cosines of both stage angles, which follows from its values at the poses.
+    What is left, such as the play of a gear, is that of the pose that the way leads to. Without this change the force
+    would jump to that of an ideal rig on each way, and slip elements would follow it.
+    """
+    change = a - reported_force(table)
+    if not change.any():
+        return turning_points(table)
+    at_poses, solving, at_turns = _products_of_angles(table)
+    coefficients = solving @ change
+    left = change - at_poses @ coefficients
+    return np.asarray(turning_points(table) + np.einsum("npkm,mk->npk", at_turns, coefficients) + left[:, None])
+
+
+@lru_cache(maxsize=8)
+def _products_of_angles(table: Table) -> tuple[Array, Array, Array]:
+    """Products of sines and cosines of the angles, of which errors of the geometry are linear functions.
+
+    At the poses, (n, m); the matrix that solves for the coefficients, (m, n); where the force along each axis turns,
+    (n, points, 3, m).
+    """
+    mount, flip = _repeat(table, "mount_deg"), _repeat(table, "flip")
+    alpha, beta = nominal_pose(table).alpha, nominal_pose(table).beta
+    at_turns = [_products(alpha, beta + mount, flip) for alpha, beta in _angles_of_axes(table)]
+    at_poses = _products(alpha, beta + mount[:, 0], flip[:, 0])
+    return at_poses, np.asarray(np.linalg.pinv(at_poses, rcond=SAME_DIRECTION), float), np.stack(at_turns, axis=2)
+
+
+def _products(alpha: Array, turn: Array, flip: Array) -> Array:
+    """Products of sines and cosines of both angles, of both mountings, shape (..., 16)."""
+    ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(turn), np.sin(turn)
+    products = np.stack([cb * ca, cb * sa, cb, sb * ca, sb * sa, sb, ca, sa], axis=-1)
+    return np.concatenate([products, products * np.where(flip > 0, -1.0, 1.0)[..., None]], axis=-1)
+
+
+@lru_cache(maxsize=8)
+def _angles_of_axes(table: Table) -> tuple[tuple[Array, Array], ...]:
+    """alpha and beta, rad, where the force along each axis turns on the way to each pose, shape (n, points) each."""
     alpha, beta = np.radians(table.column("alpha_deg")), np.radians(table.column("beta_deg"))
     beta_start = beta - np.radians(_approach_deg(table)) * table.optional("direction", 0.0)
+    none = np.zeros(table.n)
     if "t_s" not in table:  # the order is not known: each pose is reached from its approach alone
-        last = _forces_between_poses(table, alpha, beta_start, np.zeros(table.n), beta - beta_start)
-        return np.concatenate([_at(table, alpha, beta_start)[:, None], last[:, :-1]], axis=1)
-    before_alpha, before_beta = np.append(0.0, alpha[:-1]), np.append(0.0, beta[:-1])
-    by_way = np.where(_needs_approach(table, beta - before_beta), beta_start, before_beta)
-    moves = (
-        _forces_between_poses(table, before_alpha, before_beta, alpha - before_alpha, np.zeros(table.n)),
-        _forces_between_poses(table, alpha, before_beta, np.zeros(table.n), by_way - before_beta),
-        _forces_between_poses(table, alpha, by_way, np.zeros(table.n), beta - by_way),
-    )
-    return np.ascontiguousarray(np.concatenate(moves, axis=1)[:, :-1])  # the last point is the pose itself
+        ways = [(alpha, beta_start, none, none), (alpha, beta_start, none, beta - beta_start)]
+    else:
+        before_alpha, before_beta = np.append(0.0, alpha[:-1]), np.append(0.0, beta[:-1])
+        by_way = np.where(_needs_approach(table, beta - before_beta), beta_start, before_beta)
+        ways = [
+            (before_alpha, before_beta, alpha - before_alpha, none),
+            (alpha, before_beta, none, by_way - before_beta),
+            (alpha, by_way, none, beta - by_way),
+        ]
+    passed = [_angles_between_poses(table, *way) for way in ways]
+    joined = [np.concatenate(each, axis=1)[:, :-1] for each in zip(*passed, strict=True)]  # without the pose itself
+    return tuple((joined[0][:, :, k], joined[1][:, :, k]) for k in range(3))
 
 
 @lru_cache(maxsize=8)
@@ -71,14 +122,17 @@ def _needs_approach(table: Table, move: Array) -> Array:
     return np.asarray((direction != 0) & (np.degrees(move) * direction < SHORTEST_APPROACH_DEG))
 
 
-def _forces_between_poses(table: Table, alpha: Array, beta: Array, by_alpha: Array, by_beta: Array) -> Array:
-    """Specific force at its turning points while one of the stages moves, and at the end, shape (n, turns + 1, 3).
+def _angles_between_poses(
+    table: Table, alpha: Array, beta: Array, by_alpha: Array, by_beta: Array
+) -> tuple[Array, Array]:
+    """alpha and beta at the turning points of each axis while one stage moves, and at the end, (n, turns + 1, 3) each.
 
-    Along each axis it is m + A cos s + B sin s, with s the angle gone through: it turns every half turn.
+    The force along each axis is m + A cos s + B sin s, with s the angle gone through: it turns every half turn.
     """
+    mount, flip = np.radians(table.optional("mount_deg", 0.0)), table.optional("flip", 0.0)
 
     def after(s: float) -> Array:
-        return _at(table, alpha + s * np.sign(by_alpha), beta + s * np.sign(by_beta))
+        return _force(alpha + s * np.sign(by_alpha), beta + s * np.sign(by_beta), mount, flip)
 
     start, quarter, opposite = after(0.0), after(np.pi / 2), after(np.pi)
     middle = (start + opposite) / 2
@@ -87,10 +141,17 @@ def _forces_between_poses(table: Table, alpha: Array, beta: Array, by_alpha: Arr
     turns = np.arange(max(1, int(np.ceil(np.max(end) / np.pi))))[:, None]
     s = np.minimum((np.arctan2(B, A) % np.pi)[:, None] + np.pi * turns, end)
     s = np.concatenate([s, np.broadcast_to(end, (table.n, 1, 3))], axis=1)
-    return np.asarray(middle[:, None] + A[:, None] * np.cos(s) + B[:, None] * np.sin(s))
+    return tuple(x[:, None, None] + s * np.sign(by)[:, None, None] for x, by in ((alpha, by_alpha), (beta, by_beta)))
 
 
-def _at(table: Table, alpha: Array, beta: Array) -> Array:
-    """Specific force with the stages at these angles, shape (n, 3)."""
-    mount, flip = np.radians(table.optional("mount_deg", 0.0)), table.optional("flip", 0.0)
-    return specific_force(Pose(alpha, beta, mount, flip, np.array([0.0, 0.0, 1.0])))
+def _force(alpha: Array, beta: Array, mount: Array, flip: Array) -> Array:
+    """Specific force with the stages at these angles, rad, shape (..., 3)."""
+    alpha, beta, mount, flip = np.broadcast_arrays(alpha, beta, mount, flip)
+    pose = Pose(alpha.ravel(), beta.ravel(), mount.ravel(), flip.ravel(), np.array([0.0, 0.0, 1.0]))
+    return specific_force(pose).reshape(*alpha.shape, 3)
+
+
+def _repeat(table: Table, name: str) -> Array:
+    """A column of the mounting, angles in rad, of shape (n, 1)."""
+    values = table.optional(name, 0.0)
+    return np.asarray(np.radians(values) if name.endswith("_deg") else values)[:, None]

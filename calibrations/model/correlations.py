@@ -6,7 +6,7 @@ needs the correlations too (GUM 5.2.2).
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,6 +50,12 @@ class Correlations:
             return None
         names = [self.names[i] for i in indices]
         return Correlations.of(names, self.matrix[np.ix_(indices, indices)])
+
+    def split(self, parts: Mapping[str, Sequence[str]]) -> Correlations:
+        """The same where some parameters are given by several of the same value and error: their keys by its key."""
+        pairs = [(key, i) for i, name in enumerate(self.names) for key in parts.get(name, [name])]
+        indices = [i for _, i in pairs]
+        return Correlations.of([key for key, _ in pairs], self.matrix[np.ix_(indices, indices)])
 
     def submatrix(self, keys: Sequence[str]) -> Array:
         """The matrix for `keys`, in their order; 0 where nothing is known."""

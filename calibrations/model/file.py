@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 SHIPPED = Path(__file__).parents[1] / "models"
 SCHEMA = "rig.model/1"
+COMMON_BEFORE = {"hysteresis.reach"}  # parameters that earlier versions wrote with one value for all axes
 MOST = 1e12  # of a value in any unit: a fit that starts farther away resolves no change of the outputs
 
 
@@ -122,7 +123,9 @@ def _correlations(content: _Correlations | None, params: Parameters, source: str
         rows = tuple(tuple(map(float, row.split())) for row in content.lower)
     except ValueError as error:
         raise ModelError(f"{source}: a row has numbers with blanks between them: {error}") from None
-    return check_correlations(Correlations(tuple(content.parameters), rows), params, source)
+    checked = check_correlations(Correlations(tuple(content.parameters), rows), [*params, *COMMON_BEFORE], source)
+    of_axes = {name: [key for key in params if key.startswith(f"{name}.")] for name in COMMON_BEFORE}
+    return checked.split({name: keys for name, keys in of_axes.items() if keys})
 
 
 def _fault(error: Any) -> str:
@@ -140,6 +143,7 @@ def _fault(error: Any) -> str:
 def _term(entry: _Effect, source: str, effects_by_name: Mapping[str, Effect], unit: str) -> Term:
     """`unit` is that of the model's outputs, "" where the file gives none."""
     effect = _effect(entry, source, effects_by_name)
+    entry = _with_value_for_each_axis(entry, effect)
     _check_parameters(entry, effect, f"{source}: {entry.effect}")
     units = {p.name: _unit(p, effect, unit, f"{source}: {entry.effect}") for p in entry.parameters}
     for name in entry.constants:
@@ -198,6 +202,21 @@ def _expression_effect(entry: _Effect, source: str, effects_by_name: Mapping[str
         return own_effect(entry.effect, entry.expression or "", tuple(entry.columns))
     except ModelError as error:
         raise type(error)(f"{source}: {entry.effect}: {error}") from None
+
+
+def _with_value_for_each_axis(entry: _Effect, effect: Effect) -> _Effect:
+    """The entry with a value for each axis of parameters that an earlier version wrote with one for all axes."""
+    axes = sorted({p.axis for p in entry.parameters if p.axis is not None})
+    parameters = [
+        copy
+        for p in entry.parameters
+        for copy in (
+            [p.model_copy(update={"axis": axis}) for axis in axes]
+            if p.axis is None and not entry.tied and f"{effect.name}.{p.name}" in COMMON_BEFORE
+            else [p]
+        )
+    ]
+    return entry.model_copy(update={"parameters": parameters})
 
 
 def _check_parameters(entry: _Effect, effect: Effect, label: str) -> None:

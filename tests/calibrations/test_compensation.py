@@ -188,7 +188,7 @@ def fates(fitted: Model) -> Any:
 
 
 def test_what_is_left_out_comes_with_its_cost() -> None:
-    slips = {"hysteresis": {"height": (0.003, 0.002), "reach": 0.1, "spread": 0.5, "pressing": 0.0}}
+    slips = {"hysteresis": {"height": (0.003, 0.002), "reach": (0.1, 0.12), "spread": 0.5, "pressing": 0.0}}
     fitted = model({**PHYSICAL, **slips, "stage-zero-offset": {"alpha": 0.1, "beta": 0.2}})
     assert invert_model(fitted).forward.left_out == ()
     made = invert_model(fitted, without=["hysteresis"])

@@ -23,7 +23,15 @@ from calibrations.table import Table
 from tests.calibrations.compiled import COMPILERS, FOLLOWING, ORIGIN, build, through, written
 from tests.calibrations.fitted import LINEAR, PHYSICAL, model
 
-SLIPS = {"hysteresis": {"height": (0.003, 0.002), "reach": 0.1, "spread": 0.5, "pressing": 0.4}}
+SLIPS = {
+    "hysteresis": {
+        "height": (0.003, 0.002),
+        "reach": (0.1, 0.14),
+        "spread": 0.5,
+        "pressing": 0.4,
+        "pressing_square": 0.2,
+    }
+}
 LAGS = {"temperature-hysteresis": {"slope": (0.001, -0.002), "play": 0.6}}
 BOTH = {**PHYSICAL, **SLIPS, **LAGS}
 
@@ -43,8 +51,9 @@ def test_what_an_effect_remembers_is_what_its_kernel_does() -> None:
     for row in a:
         part, held = effect.follow(row[None], table, p, held)
         found.append(part[0])
-    limits = p["reach"] * (1 + p["spread"] * (np.arange(6) + 0.5 - 3) / 3)
-    pressed = 1 + p["pressing"] * np.abs(a[:, [1, 0, 0]])
+    limits = np.array([0.1, 0.14, 0.1]) * (1 + p["spread"] * ((np.arange(6) + 0.5 - 3) / 3)[:, None])
+    load = np.abs(a[:, [1, 0, 0]])
+    pressed = 1 + p["pressing"] * load + p["pressing_square"] * load**2
     direct = slip(a, np.empty((len(a), 0, 3)), pressed, limits, np.zeros(3)) * p["height"]
     assert np.abs(np.array(found) - direct).max() < 1e-15
 
@@ -56,7 +65,9 @@ def test_on_the_way_of_the_stages_it_remembers_what_the_model_has() -> None:
     columns = {"alpha_deg": np.full(len(beta), 90.0), "beta_deg": beta, "t_s": t_s, "vx_v": 0 * beta, "vy_v": 0 * beta}
     columns |= {"direction": np.repeat([1.0, -1.0], len(beta) // 2), "temperature_c": 25 + 2 * np.sin(t_s / 60)}
     table = Table.from_columns("poses", columns)
-    made = invert_model(model({**LINEAR, **LAGS, "hysteresis": {**SLIPS["hysteresis"], "pressing": 0.0}}))
+    made = invert_model(
+        model({**LINEAR, **LAGS, "hysteresis": {**SLIPS["hysteresis"], "pressing": 0.0, "pressing_square": 0.0}})
+    )
     a = specific_force(nominal_pose(table))
     v = respond(a, table, steps_of(made.model))
     inputs = {"vx": v[:, 0], "vy": v[:, 1], "temperature_c": table.column("temperature_c")}
@@ -100,8 +111,8 @@ def test_the_proof_holds_whatever_is_remembered() -> None:
     assert worst < made.bound.within + 1e-14
     half_held = invert_model(
         model({**LINEAR, **SLIPS})
-    ).bound.C  # friction may hold, 0.03 V/g, or slip, whatever was before
-    assert np.diag(half_held) == pytest.approx([1 / (1.01 + 0.03 / 2), 1 / (0.98 + 0.02 / 2)])
+    ).bound.C  # friction may hold, 0.03 and 0.014 V/g, or slip, whatever was before
+    assert np.diag(half_held) == pytest.approx([1 / (1.01 + 0.03 / 2), 1 / (0.98 + 0.002 / 0.14 / 2)])
 
 
 def test_gravity_gives_a_missing_axis_and_the_memory_is_stored_once() -> None:

@@ -123,7 +123,7 @@ def _outputs(made: Compensation, a: Array) -> list[float]:
 
 
 def test_the_head_says_what_a_user_must_know() -> None:
-    slips = {"hysteresis": {"height": (0.003, 0.002), "reach": 0.1, "spread": 0.5, "pressing": 0.0}}
+    slips = {"hysteresis": {"height": (0.003, 0.002), "reach": (0.1, 0.12), "spread": 0.5, "pressing": 0.0}}
     made = invert_model(model({**PHYSICAL, **slips, "stage-backlash": {"half_play": 0.1}}), without=["hysteresis"])
     head = " ".join(" ".join(header_lines(made, ORIGIN)).split())
     assert f"q <= {round_up(made.bound.q)}, proved over the whole range" in head

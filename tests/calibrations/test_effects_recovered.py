@@ -160,21 +160,30 @@ def _supply(columns: Columns, a: Array) -> Array:
     return linear(a) * (1 + np.array([0.9, 1.1])[:, None] * relative)
 
 
-@made("hysteresis", height__x=0.012, height__y=0.008, reach=0.15, spread=0.5, pressing=0.0)
+@made(
+    "hysteresis",
+    height__x=0.012,
+    height__y=0.008,
+    reach__x=0.15,
+    reach__y=0.1,
+    spread=0.5,
+    pressing=0.0,
+    pressing_square=0.0,
+)
 def _hysteresis(columns: Columns, a: Array) -> Array:
-    return linear(a) + np.array([0.012, 0.008])[:, None] * hysteretic(columns, reach=0.15, spread=0.5)
+    return linear(a) + np.array([0.012, 0.008])[:, None] * hysteretic(columns, reach=(0.15, 0.1), spread=0.5)
 
 
-def hysteretic(columns: Columns, reach: float, spread: float) -> Array:
+def hysteretic(columns: Columns, reach: float | tuple[float, float], spread: float) -> Array:
     """Force in springs with sliders, dragged along the whole way from pose to pose; 1 where all slide; shape (2, n)."""
-    limits = reach * (1 + spread * np.array([-5, -3, -1, 1, 3, 5]) / 6)
+    limits = np.reshape(reach, (-1, 1)) * np.broadcast_to(1 + spread * np.array([-5, -3, -1, 1, 3, 5]) / 6, (2, 6))
     held, last = np.zeros((2, 6)), np.zeros(2)
     found = []
     for way in _ways(columns):
         for here in way:
             held = np.clip(held + (here - last)[:, None], -limits, limits)
             last = here
-        found.append(held.sum(axis=1) / limits.sum())
+        found.append(held.sum(axis=1) / limits.sum(axis=1))
     return np.transpose(found)
 
 

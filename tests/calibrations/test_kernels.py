@@ -94,19 +94,19 @@ def test_elements_that_slip_hold_what_a_play_leaves(seed: int) -> None:
     rng = np.random.default_rng(seed)
     n, turns = 15, 4
     a, on_the_way = rng.uniform(-1, 1, (n, 3)), rng.uniform(-1, 1, (n, turns, 3))
-    limits = rng.uniform(0.05, 0.5, 6)
+    limits = rng.uniform(0.05, 0.5, (6, 3))
     found = slip(a, on_the_way, np.ones((n, 3)), limits, np.zeros(3))
     way = np.concatenate([on_the_way, a[:, None]], axis=1)
     for i, k in np.ndindex(n, 3):
         u = way[: i + 1, :, k].ravel()
-        held = sum(u[-1] - play(u, limit) for limit in limits)
-        assert found[i, k] == pytest.approx(held / limits.sum(), abs=1e-12)
+        held = sum(u[-1] - play(u, limit) for limit in limits[:, k])
+        assert found[i, k] == pytest.approx(held / limits[:, k].sum(), abs=1e-12)
 
 
 def test_pressing_widens_the_limits() -> None:
     a = np.array([[0.1, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
     pressed = np.array([[1.0, 1.0, 1.0], [1.0, 1.0, 1.0], [1.5, 1.0, 1.0]])
-    found = slip(a, np.repeat(a[:, None], 2, axis=1), pressed, np.array([0.2]), np.zeros(3))
+    found = slip(a, np.repeat(a[:, None], 2, axis=1), pressed, np.full((1, 3), 0.2), np.zeros(3))
     np.testing.assert_allclose(found[:, 0], [0.5, 1.0, -1.5])
     np.testing.assert_array_equal(found[:, 1:], 0.0)
 
@@ -116,7 +116,7 @@ def test_an_element_forgets_its_first_state_where_it_slips() -> None:
     a[:, 0] = [0.1, -0.1, 0.3, -0.3]
     begun = np.array([-1.0, 0.0, 0.0])
     from_below, from_rest = (
-        slip(a, np.empty((4, 0, 3)), np.ones((4, 3)), np.array([0.2]), each)[:, 0] for each in (begun, np.zeros(3))
+        slip(a, np.empty((4, 0, 3)), np.ones((4, 3)), np.full((1, 3), 0.2), each)[:, 0] for each in (begun, np.zeros(3))
     )
     np.testing.assert_allclose(from_below, [-0.5, -1.0, 1.0, -1.0])
     np.testing.assert_allclose(from_rest, [0.5, -0.5, 1.0, -1.0])

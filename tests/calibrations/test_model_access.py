@@ -11,13 +11,13 @@ from calibrations.model.file import read_model
 from tests.calibrations import synthetic
 from tests.calibrations.fitted import LINEAR, PHYSICAL, model
 
-FITTED = model({**PHYSICAL, "hysteresis": {"height": (0.003, 0.002), "reach": 0.1}})
+FITTED = model({**PHYSICAL, "hysteresis": {"height": (0.003, 0.002), "spread": 0.1}})
 
 
 def test_a_key_is_effect_parameter_axis() -> None:
     assert FITTED["bias.x"].value == PHYSICAL["bias"]["bias"][0]
     assert FITTED["z-axis-scale.slope.y"].value == PHYSICAL["z-axis-scale"]["slope"][1]
-    assert FITTED["hysteresis.reach"].value == 0.1
+    assert FITTED["hysteresis.spread"].value == 0.1
     assert FITTED["hysteresis.height.y"].axis == "y"
 
 
@@ -41,7 +41,7 @@ def test_every_estimate_has_one_key() -> None:
     [
         ("bais.x", 'the model has no parameter "bais.x"; did you mean "bias.x"?'),
         ("bias", 'the model has no parameter "bias"; it has bias.x, bias.y'),
-        ("hysteresis.raech", 'did you mean "hysteresis.reach"?'),
+        ("hysteresis.spraed", 'did you mean "hysteresis.spread"?'),
     ],
 )
 def test_an_unknown_key_names_what_is_there(key: str, says: str) -> None:

@@ -2,7 +2,8 @@
 
 `tests/data/models` has, of each program that wrote other keys, a model file and a table whose outputs are that
 program's answers of the model. Keys that came later are optional. Since then, z-axis-scale and cross-axis-scale also
-multiply the nonlinear part of the response. This changes the answers of the model `first` by 4 uV.
+multiply the nonlinear part of the response. This changes the answers of the model `first` by 4 uV. A hysteresis follows
+the force that a sensor at an angle senses on its way; the sensor of `common-reach` is square, so that its answers stay.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ FILES = sorted((ROOT / "tests" / "data" / "models").glob("*.yaml"))
 
 
 def test_there_is_a_file_of_each_format() -> None:
-    assert [file.stem for file in FILES] == ["covered", "expressions", "first"]
+    assert [file.stem for file in FILES] == ["common-reach", "covered", "expressions", "first"]
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
@@ -32,3 +33,11 @@ def test_an_older_model_answers_as_before(file: Path) -> None:
     evaluated = evaluate(model, read_csv(file.with_suffix(".csv")))
     assert evaluated is not None
     assert np.max(np.abs(evaluated.residual)) < SECOND_ORDER_V.get(file.stem, 1e-12)
+
+
+def test_a_value_of_all_axes_becomes_that_of_each_axis() -> None:
+    model = read_model(ROOT / "tests" / "data" / "models" / "common-reach.yaml")
+    assert [model[f"hysteresis.reach.{axis}"].value for axis in "xy"] == [0.15, 0.15]
+    assert model.correlations is not None
+    keys = ["hysteresis.reach.x", "hysteresis.reach.y", "hysteresis.height.x"]
+    assert model.correlations.submatrix(keys).tolist() == [[1, 1, 0.5], [1, 1, 0.5], [0.5, 0.5, 1]]

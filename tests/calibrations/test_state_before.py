@@ -21,9 +21,10 @@ from tests.calibrations.fitted import LINEAR, Numbers, model
 
 HELD: Mapping[str, Numbers] = {
     "height": (0.006, 0.004),
-    "reach": 0.15,
+    "reach": (0.15, 0.2),
     "spread": 0.5,
-    "pressing": 0.3,
+    "pressing": 0.1,
+    "pressing_square": 0.2,
     "begin": (0.0, 0.8),
 }
 
