@@ -120,8 +120,7 @@ def _part(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, k: i
         if isinstance(basis, Spline):
             f = look_up(spline_table(basis, u), x) if len(u) else number(0.0)
         elif isinstance(basis, Line):
-            half = (basis.high - basis.low) / 2 or 1.0
-            slope = float(np.sum(u)) / half
+            slope = float(np.sum(u)) / basis.half_width
             f = number(slope) * x + number(-slope * (basis.low + basis.high) / 2)
         elif isinstance(basis, Ramp):
             f = _weighted_sum(u, [ONE, abs(x), x])

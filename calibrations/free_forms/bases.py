@@ -144,7 +144,12 @@ class Line:
 
     def __call__(self, x: Array) -> Array:
         """The column at x (n,), shape (n, 1)."""
-        return np.asarray((x - (self.low + self.high) / 2)[:, None] / ((self.high - self.low) / 2 or 1.0))
+        return np.asarray((x - (self.low + self.high) / 2)[:, None] / self.half_width)
+
+    @property
+    def half_width(self) -> float:
+        """Half of high - low; 1 if they are equal."""
+        return (self.high - self.low) / 2 or 1.0
 
 
 @dataclass(frozen=True)

@@ -135,3 +135,11 @@ def test_gravity_gives_a_missing_axis_and_the_memory_is_stored_once() -> None:
 def test_the_head_says_that_samples_come_in_order() -> None:
     head = " ".join(" ".join(header_lines(both(), ORIGIN)).split())
     assert "With a history: hysteresis, temperature-hysteresis. Give every sample, in order: 14 numbers" in head
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_an_axis_that_nothing_remembers_is_no_warning(compiler: str, tmp_path: Path) -> None:
+    made = invert_model(
+        model({**LINEAR, "hysteresis": {**SLIPS["hysteresis"], "height": (0.003, 0.0), "pressing": 0.0}})
+    )
+    assert build(compiler, written(made, tmp_path), tmp_path / "test", "-DSENSOR_MAIN").exists()

@@ -55,6 +55,10 @@ def test_c_agrees_with_python_over_the_whole_range(compiler: str, values: Any, t
     assert np.abs(found[:500] - [compensate(*row) for row in inputs[:500].tolist()]).max() < 1e-9
 
 
+def test_the_head_names_the_function_for_the_axis_that_is_not_measured() -> None:
+    assert "function in_gravity" in "".join(header_lines(invert_model(model(PHYSICAL)), ORIGIN))
+
+
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_the_self_test_passes_and_can_fail(compiler: str, tmp_path: Path) -> None:
     made = invert_model(model(EVERYTHING), precision="float") if compiler == "clang" else everything()

@@ -84,6 +84,8 @@ def test_bounds_of_a_table_hold_every_value_and_slope(seed: int) -> None:
     assert np.all(~inside | ((flattest - 1e-7 <= slope) & (slope <= steepest + 1e-7)))
     wide = high - low > 0.09
     assert np.median((most - least)[wide]) < 2 * np.median(np.ptp(value, axis=0)[wide])
+    measured = np.where(inside, slope, np.median(slope, axis=0))
+    assert np.median((steepest - flattest)[wide]) < 2 * np.median(np.ptp(measured, axis=0)[wide])
 
 
 @pytest.mark.parametrize("form", [*FORMS.values(), THRESHOLDS], ids=lambda form: f"{form.place}/{form.name}")

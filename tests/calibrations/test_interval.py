@@ -60,6 +60,11 @@ def _ends(pair: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
     return np.array([pair[0]]), np.array([pair[0] + pair[1]])
 
 
+def test_the_interval_of_a_quotient_is_no_wider_than_its_values() -> None:
+    quotient = Interval(*_ends((1.0, 1.0))) / Interval(*_ends((4.0, 1.0)))
+    assert quotient.ends == (pytest.approx([0.2]), pytest.approx([0.5]))
+
+
 def test_a_jump_by_what_is_sought_has_no_slope() -> None:
     jump = apply_operation(">=", X, number(0.0))
     ((_, slopes),) = evaluate_interval([jump], {"x": Interval(np.array([-1.0, 0.5]), np.array([1.0, 1.0]))}, ("x",))
