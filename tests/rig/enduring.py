@@ -48,6 +48,7 @@ OTHER_FAULTS = [(driver, roles[-1], what) for driver, (roles, _) in OTHER_PARTS.
 NEEDS_A_GUARD = {"open-interlock"}  # felt only by a bench that has interlocks
 FREE_RUNNING = {"imu_lines", "mavlink_imu", "xsens_mti"}  # a resumed run meets other samples of the same sensor
 OTHER_NOISE = {"delay", "endless", "trickle"}  # after which a run may go on, at other times: as good, but not the same
+AS_GOOD = {("level", "lies"), ("adc", "frozen")}  # a level is read again; the last 5 % of the readings of a dwell may repeat
 NEAR_V = 5e-3  # of a dwell's mean: ten times its noise
 NEAR_DIGITAL = 0.05  # of a mean in g or m/s^2
 NEAR = {"deg": 0.05, "s": 1.0}  # of a reading; what is done again after a lost packet happens that much later
@@ -114,9 +115,7 @@ def endured(procedure: str, role: str, fault: Fault, driver: str = "", guided: b
                 kept.pose for kept in undisturbed(procedure, driver=driver)[1]
             ]
             return "stopped"
-        if (
-            fault.what in OTHER_NOISE or driver in FREE_RUNNING or (role, fault.what) == ("level", "lies")
-        ):  # what the level said is read again
+        if fault.what in OTHER_NOISE or driver in FREE_RUNNING or (role, fault.what) in AS_GOOD:
             _require_right(record, done, undisturbed(procedure, guarded, driver), driver in FREE_RUNNING)
         else:
             assert digest(record, done.run.run) == undisturbed(procedure, guarded, driver)[0], (
