@@ -48,7 +48,8 @@ OTHER_FAULTS = [(driver, roles[-1], what) for driver, (roles, _) in OTHER_PARTS.
 NEEDS_A_GUARD = {"open-interlock"}  # felt only by a bench that has interlocks
 FREE_RUNNING = {"imu_lines", "mavlink_imu", "xsens_mti"}  # a resumed run meets other samples of the same sensor
 OTHER_NOISE = {"delay", "endless", "trickle"}  # after which a run may go on, at other times: as good, but not the same
-AS_GOOD = {("level", "lies"), ("adc", "frozen")}  # a level is read again; the last 5 % of the readings of a dwell may repeat
+# By role: a level is read again, and the last 5 % of the readings of a dwell may repeat.
+AS_GOOD = {("level", "lies"), ("adc", "frozen")}
 NEAR_V = 5e-3  # of a dwell's mean: ten times its noise
 NEAR_DIGITAL = 0.05  # of a mean in g or m/s^2
 NEAR = {"deg": 0.05, "s": 1.0}  # of a reading; what is done again after a lost packet happens that much later
