@@ -51,7 +51,8 @@ def sensed_turning_points(table: Table, a: Array) -> Array:
     at_poses, solving, at_turns = _products_of_angles(table)
     coefficients = solving @ change
     left = change - at_poses @ coefficients
-    return np.asarray(turning_points(table) + np.einsum("npkm,mk->npk", at_turns, coefficients) + left[:, None])
+    changes = np.matmul(at_turns, coefficients.T[:, :, None]).reshape(3, table.n, -1)
+    return np.ascontiguousarray(turning_points(table) + np.moveaxis(changes, 0, 2) + left[:, None])
 
 
 @lru_cache(maxsize=8)
@@ -59,13 +60,17 @@ def _products_of_angles(table: Table) -> tuple[Array, Array, Array]:
     """Products of sines and cosines of the angles, of which errors of the geometry are linear functions.
 
     At the poses, (n, m); the matrix that solves for the coefficients, (m, n); where the force along each axis turns,
-    (n, points, 3, m).
+    (3, n * points, m).
     """
     mount, flip = _repeat(table, "mount_deg"), _repeat(table, "flip")
     alpha, beta = nominal_pose(table).alpha, nominal_pose(table).beta
     at_turns = [_products(alpha, beta + mount, flip) for alpha, beta in _angles_of_axes(table)]
     at_poses = _products(alpha, beta + mount[:, 0], flip[:, 0])
-    return at_poses, np.asarray(np.linalg.pinv(at_poses, rcond=SAME_DIRECTION), float), np.stack(at_turns, axis=2)
+    return (
+        at_poses,
+        np.asarray(np.linalg.pinv(at_poses, rcond=SAME_DIRECTION), float),
+        np.stack([p.reshape(-1, p.shape[-1]) for p in at_turns]),
+    )
 
 
 def _products(alpha: Array, turn: Array, flip: Array) -> Array:
