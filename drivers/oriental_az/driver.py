@@ -192,7 +192,6 @@ class RotaryStage:
 
     def halt(self) -> None:
         """Start braking and return at once. `stop` must follow."""
-        self._holds_target = False
         self._unit.write(az.INPUTS, az.STOP, retries=0)  # the other drives wait for their commands
 
     def stop(self) -> None:

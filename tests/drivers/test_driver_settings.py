@@ -24,6 +24,8 @@ from drivers.pi_e727 import driver as pi_e727
         (manual_stage, {"tolerance_deg": 0.01}, "tolerance_deg must not be less than resolution_deg"),
         (manual_stage, {"limits_deg": (1.0, 1.0)}, "limits_deg must be the lower limit, then the upper one"),
         (omega_cn7500, {"limits_c": (50.0, 50.0)}, "limits_c must be the lower limit, then the upper one"),
+        (omega_cn7500, {"overshoot_k": -1.0}, "overshoot_k must not be negative"),
+        (omega_cn7500, {"stale_s": 0.0}, "stale_s must be positive"),
         (pi_e727, {"axes": {}}, "axes must name the controller's axes, each once, and at least one"),
         (pi_e727, {"axes": {"x": "1", "y": "1"}}, "each once"),
         (pi_e727, {"limits_um": (90.0, 10.0)}, "limits_um must be the lower limit, then the upper one"),

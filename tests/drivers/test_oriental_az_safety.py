@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -71,6 +72,27 @@ def test_limits_that_the_drive_does_not_take_are_found_before_the_first_move(
     monkeypatch.setattr(oriental_az_twin.Drive, "write_words", lambda *_: None)
     with pytest.raises(Interlocked, match=r"has not accepted its limits of -9000 .. 10000 steps: it shows 0 in reg"):
         limited.start(50.0)
+
+
+@pytest.mark.parametrize(
+    ("action", "high", "low", "plausible"),
+    [(3, 10000, -9000, True), (0, 0, 0, True), (3, -9000, 10000, False), (77, 10000, -9000, False)],
+)
+def test_limits_of_the_drive_that_cannot_be_are_shown(
+    stage: Make, monkeypatch: pytest.MonkeyPatch, action: int, high: int, low: int, plausible: bool
+) -> None:
+    limited = stage()
+    monkeypatch.setattr(limited._unit, "read_block", lambda *_: [action, high, low])
+    assert {check.name: check.ok for check in limited._parameters()}["own limits"] == plausible
+
+
+@pytest.mark.parametrize(("found_s", "plausible"), [(0.0, True), (0.5, True), (1.0, False)])
+def test_a_time_out_of_the_drive_that_nobody_set_is_shown(
+    stage: Make, monkeypatch: pytest.MonkeyPatch, found_s: float, plausible: bool
+) -> None:
+    watched = stage(replace(CARELESS, communication_timeout_s=0.5))
+    monkeypatch.setattr(watched._unit, "read", lambda *_: found_s)
+    assert {check.name: check.ok for check in watched._parameters()}["time-out"] == plausible
 
 
 def test_a_stop_input_brakes_the_stage_and_keeps_it_from_starting(

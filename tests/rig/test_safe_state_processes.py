@@ -22,7 +22,7 @@ from drivers.oriental_az import driver as oriental_az
 from drivers.transport import Address, Links
 from rig.bench import DEFAULT
 from rig.errors import Busy
-from rig.lease import lease
+from rig.lease import is_held, lease
 
 pytestmark = pytest.mark.sockets
 STALLED_S = 1.5  # of a controller that is stopped and not dead
@@ -30,7 +30,8 @@ HOLDS = """
 import sys
 from pathlib import Path
 from rig.lease import lease
-with lease(Path(sys.argv[1]), "wire-x", "serial:/dev/ttyUSB0"), lease(Path(sys.argv[1]), "r1", "run r1"):
+folder = Path(sys.argv[1])
+with lease(folder, "wire-x", "serial:/dev/ttyUSB0"), lease(folder, "r1", "run r1"), lease(folder, "wire-y", "tcp:b"):
     print("holding", flush=True)
     sys.stdin.read()
 """
@@ -67,6 +68,11 @@ def said(child: subprocess.Popen[str]) -> str:
     line = child.stdout.readline().strip()
     assert line, child.stderr.read()
     return line
+
+
+def test_a_lock_makes_its_folder(tmp_path: Path) -> None:
+    with lease(tmp_path / "new" / "home", "r1", "run r1"):
+        assert is_held(tmp_path / "new" / "home", "r1")
 
 
 def test_who_is_refused_is_told_who_holds_it_and_a_kill_sets_it_free(tmp_path: Path) -> None:
