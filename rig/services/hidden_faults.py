@@ -26,6 +26,7 @@ from calibrations.model.chain import forward
 from calibrations.table import Array, Table
 from calibrations.text import columns, quantity
 from drivers.world.config import WorldConfig
+from drivers.world.visit import Timing
 from drivers.world.world import World
 from rig.bench import Bench
 
@@ -260,17 +261,24 @@ def _correlation(a: Curve, b: Curve) -> float:
 
 
 def _simulate_poses(config: WorldConfig, seed: int, table: Table) -> Table:
-    """The poses of a table, visited without noise."""
+    """The poses of a table, visited without noise, each from the start of its approach, as the stages went.
+
+    Half of the time of a pose passes where its approach starts, so that the temperature has the same course.
+    """
+    direction = table.optional("direction", 1.0)
+    approach_starts = table.column("beta_deg") - table.number("approach_deg", 0.0) * direction
     columns_visited = World(config, seed).dwell_mean(
-        table.column("alpha_deg"),
-        table.column("beta_deg"),
-        direction=table.optional("direction", 1.0),
-        mount_deg=table.optional("mount_deg", 0.0),
-        flip=table.optional("flip", 0.0),
+        np.repeat(table.column("alpha_deg"), 2),
+        np.column_stack([approach_starts, table.column("beta_deg")]).ravel(),
+        direction=np.repeat(direction, 2),
+        mount_deg=np.repeat(table.optional("mount_deg", 0.0), 2),
+        flip=np.repeat(table.optional("flip", 0.0), 2),
         noise_free=True,
         interval_s=QUIET_S,
+        dwell_s=Timing.dwell_s / 2,
+        settle_s=Timing.settle_s / 2,
     )
-    columns = {name: np.asarray(values, float) for name, values in columns_visited.items() if name in table}
+    columns = {name: np.asarray(values, float)[1::2] for name, values in columns_visited.items() if name in table}
     return Table.from_columns(table.kind, columns, table.constants, table.source)
 
 
