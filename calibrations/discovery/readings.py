@@ -124,7 +124,7 @@ def _find_better_columns(table: Table, residual_shares: Array) -> str | None:
     floor = UNTOUCHED_BY_READINGS if noise is None else 9 * float(np.max(rms(noise.T) ** 2 / np.var(table.outputs, 0)))
     if stated_share < max(floor, UNTOUCHED_BY_READINGS) or table.n < 2 * FEWEST_RESPONSE_ROWS:
         return None
-    limit = min(FAR_BETTER_GEOMETRY * stated_share, 1 - EXPLAINED_BY_GEOMETRY)
+    limit = FAR_BETTER_GEOMETRY * stated_share
     return _check_angle_scale(table, limit) or _check_row_shift(table, limit) or _response_change(table, limit)
 
 

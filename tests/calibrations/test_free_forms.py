@@ -35,6 +35,7 @@ from calibrations.free_forms.bases import (
 from calibrations.free_forms.effect import FreeForm, check_forms, free_form, place_of
 from calibrations.free_forms.form import Form
 from calibrations.free_forms.stairs import _steps
+from calibrations.free_forms.structure import FloorSource, Structure
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.loop import dataset
 from calibrations.model.file import dump_model, parse_model, read_model
@@ -312,6 +313,23 @@ def test_forces_of_the_chain_drive_the_form() -> None:
     forces = specific_force(nominal_pose(table))
     form = Form("z-response", "line", "out-of-plane", (Line(-1.0, 1.0),), sizes=(1.0, 1.0))
     assert form.columns(table, forces, forces[:, 0], 0)[:, 0] == pytest.approx(forces[:, 2])
+
+
+def test_relays_of_a_width_close_at_any_force_alike() -> None:
+    """The prior: what a step of the force closes has one variance, and steps have nothing in common."""
+    closed = np.diff(Preisach((0.1,), -1.0, 1.0, 10).columns_of(np.linspace(-0.8, 0.8, 9)[:, None]), axis=0)
+    variances = closed @ closed.T / np.sum(closed[0] ** 2)
+    assert np.diagonal(variances) == pytest.approx(1.0, abs=0.03)
+    assert abs(variances[0, 4]) < 0.03
+
+
+@pytest.mark.parametrize(
+    ("flicker", "component", "follows"),
+    [(True, "time-bias/curve", True), (False, "time-bias/walk-0", True), (False, "time-bias/curve", False)],
+)
+def test_flicker_or_a_walk_follows_noise(flicker: bool, component: str, follows: bool) -> None:
+    result = SimpleNamespace(setting=SimpleNamespace(flicker=flicker), active=[component])
+    assert Structure(result, (), None, np.zeros((1, 1)), FloorSource.SAMPLES).follows_noise == follows
 
 
 def test_in_few_poses_effects_are_searched_without_places() -> None:

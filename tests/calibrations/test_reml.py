@@ -34,6 +34,14 @@ def test_gains_are_the_greatest_falls_of_the_deviance() -> None:
         assert gained > max(falls) - 0.05
 
 
+def test_a_component_that_is_in_the_base_gains_nothing() -> None:
+    X = np.random.default_rng(7).standard_normal((50, 7))
+    X[:, 2:4] = X[:, :2]
+    g = gram(X, {"in the base": slice(0, 2), "acting": slice(2, 4)}, {"in the base": 1.0, "acting": 1.0}, 2)
+    gained, _ = gains(g, estimate(g, {"acting": 1.0}, {}), ["in the base"])["in the base"]
+    assert gained == 0.0
+
+
 def test_the_inverse_of_many_products_is_their_inverse() -> None:
     rng = np.random.default_rng(6)
     X = rng.standard_normal((300, 203))
