@@ -88,8 +88,9 @@ def test_poses_that_stand_out_are_listed_in_part() -> None:
     assert found(changed(off))[1].text.endswith("and 4 more")  # type: ignore[union-attr]
 
 
-def test_a_walk_is_a_drift_and_no_step() -> None:
-    _, pattern = found(sampled.measured(3, sampled.kicks(20 * FLOOR_V)))
+@pytest.mark.parametrize("floors", [8, 20])
+def test_a_walk_is_a_drift_and_no_step(floors: float) -> None:
+    _, pattern = found(sampled.measured(3, sampled.kicks(floors * FLOOR_V)))
     assert pattern is not None
     assert pattern.text.startswith("slow drift without a pattern")
 
