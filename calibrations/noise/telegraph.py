@@ -181,7 +181,7 @@ def _best_path(values: Array, count: int, size: int, fewer: Path | None) -> Path
         return None
     starts = (start for start in _starts(values, count, fewer) if start[0][-1] > start[0][0])
     paths = (_direct(likeliest_path(values, levels, spread, jump_share), size) for levels, jump_share in starts)
-    found = (path for path in paths if len(np.unique(path)) == count)
+    found = (path for path in paths if len(np.unique(path)) == count and (count == 2 or _returns(path)))
     return min(found, key=lambda path: _path_price(path, size) + _path_deviance(values, path, size), default=None)
 
 
@@ -191,6 +191,12 @@ def _direct(path: Path, size: int) -> Path:
         between = np.flatnonzero((path[1:-1] - path[:-2]) * (path[2:] - path[1:-1]) > 0) + 1
         path[between] = path[between - 1]
     return path
+
+
+def _returns(path: Path) -> bool:
+    """Whether each level is reached in both halves of the record: levels that follow a drift are not."""
+    first, second = np.array_split(path, 2)
+    return np.array_equal(np.unique(first), np.unique(second))
 
 
 def _starts(values: Array, count: int, fewer: Path | None) -> Iterator[tuple[Array, float]]:

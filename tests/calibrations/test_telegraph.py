@@ -137,6 +137,13 @@ def test_levels_beside_a_slight_random_walk_are_found(count: int) -> None:
     assert [level.height for level in found.levels] == pytest.approx(3.0 * np.arange(count), abs=0.15)
 
 
+@pytest.mark.parametrize("seed", [1, 3])
+def test_two_levels_beside_a_drift_as_large_as_the_jumps_are_not_five_levels(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    drift = 3.0 * np.arange(2 * N) / (2 * N)
+    assert told(white(random, 2 * N) + 3.0 * levels(random, 2 * N, 300.0, 2) + drift, SLOW[0], SLOW[2]) is None
+
+
 @pytest.mark.parametrize("count", [2, 3])
 def test_a_long_record_whose_means_lie_between_levels_at_each_jump_has_no_more_levels(count: int) -> None:
     """Means of 16 samples. The noise level does not change with time, though some parts have more jumps."""
