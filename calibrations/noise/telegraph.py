@@ -47,6 +47,7 @@ TWO_LEVELS, SEVERAL_LEVELS = "two-levels", "several-levels"
 WIDTHS = (1, 8, 64, 512)  # means over which levels are looked for
 ROUNDS = 6  # of path and levels in turn
 MOST_AT_ONCE = 0.1  # of the jumps: traps that depend on each other jump at once in a third
+SHORTEST_DWELL = 3  # means of several samples: of stays shorter than a mean, one or two lie between levels
 LEAST = 1e-6  # noise beside the levels, as a share of their distance: rounding
 Path = NDArray[np.int64]
 
@@ -181,7 +182,7 @@ def _best_path(values: Array, count: int, size: int, fewer: Path | None) -> Path
         return None
     starts = (start for start in _starts(values, count, fewer) if start[0][-1] > start[0][0])
     paths = (_direct(likeliest_path(values, levels, spread, jump_share), size) for levels, jump_share in starts)
-    found = (path for path in paths if len(np.unique(path)) == count and (count == 2 or _returns(path)))
+    found = (path for path in paths if len(np.unique(path)) == count and (count == 2 or _is_resolved(path, size)))
     return min(found, key=lambda path: _path_price(path, size) + _path_deviance(values, path, size), default=None)
 
 
@@ -193,10 +194,15 @@ def _direct(path: Path, size: int) -> Path:
     return path
 
 
-def _returns(path: Path) -> bool:
-    """Whether each level is reached in both halves of the record: levels that follow a drift are not."""
+def _is_resolved(path: Path, size: int) -> bool:
+    """Whether a third level, or a further one, is no drift, and no means that lie between levels.
+
+    Levels that follow a drift are not reached in both halves of the record. Means of several samples lie between levels
+    where a stay is shorter than a mean.
+    """
     first, second = np.array_split(path, 2)
-    return np.array_equal(np.unique(first), np.unique(second))
+    dwells = np.bincount(path) / np.bincount(path[np.append(np.flatnonzero(np.diff(path)), -1)])
+    return np.array_equal(np.unique(first), np.unique(second)) and (size == 1 or dwells.min() >= SHORTEST_DWELL)
 
 
 def _starts(values: Array, count: int, fewer: Path | None) -> Iterator[tuple[Array, float]]:

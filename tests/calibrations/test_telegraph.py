@@ -144,16 +144,16 @@ def test_two_levels_beside_a_drift_as_large_as_the_jumps_are_not_five_levels(see
     assert told(white(random, 2 * N) + 3.0 * levels(random, 2 * N, 300.0, 2) + drift, SLOW[0], SLOW[2]) is None
 
 
-@pytest.mark.parametrize("count", [2, 3])
-def test_a_long_record_whose_means_lie_between_levels_at_each_jump_has_no_more_levels(count: int) -> None:
+@pytest.mark.parametrize(("count", "stay"), [(2, 10_000.0), (3, 10_000.0), (2, 160.0)])
+def test_a_long_record_whose_means_lie_between_levels_has_no_more_levels(count: int, stay: float) -> None:
     """Means of 16 samples. The noise level does not change with time, though some parts have more jumps."""
     random = np.random.default_rng(1)
-    path = levels(random, 1 << 20, 10_000.0, count)
+    path = levels(random, 1 << 20, stay, count)
     analysis = analyse(still(white(random, 1 << 20) + 4.0 * path))
     assert analysis.record.channels[0].size == 16
     (found,) = analysis.search.telegraphs
-    assert [level.height for level in found.levels] == pytest.approx(4.0 * np.arange(count), abs=0.01)
-    assert found.jumps == pytest.approx(np.count_nonzero(np.diff(path)), rel=0.1)
+    assert [level.height for level in found.levels] == pytest.approx(4.0 * np.arange(count), abs=0.05)
+    assert found.jumps == pytest.approx(np.count_nonzero(np.diff(path)), rel=0.15)
     assert len(analysis.disturbances) == 1
 
 
