@@ -98,7 +98,7 @@ class Telegraph:
         factor, unit = add_prefix(self.unit, self.levels[-1].height)
         unit = unit.replace("µ", "u")
         above, traps = (
-            join_words(f"{height * factor:.3g}" for height in heights)
+            join_words(rounded(height * factor) for height in heights)
             for heights in ([level.height for level in self.levels[1:]], self.traps)
         )
         dwells_s = join_words(rounded(level.dwell_s) for level in self.levels)
