@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.stats import norm
 
 import calibrations as cal
-from calibrations.free_forms.stairs import before_stairs, find_stairs, fit_stairs
+from calibrations.free_forms.stairs import before_stairs, find_saw, find_stairs, fit_stairs
 from calibrations.table import Array, Table
 from tests.calibrations.synthetic import components, turns
 
@@ -80,6 +81,17 @@ def test_outputs_before_their_rounding_are_within_their_stated_uncertainty() -> 
     assert np.sqrt(np.mean(pull**2)) < 1.5
     assert np.max(std) < 0.4 * step
     assert np.quantile(std, 0.1) < 0.05 * step
+
+
+@pytest.mark.parametrize("steps", [3.5, 40.0])
+def test_a_saw_of_few_steps_or_of_many_is_proposed(steps: float) -> None:
+    """Steps of the converter over the range of the output."""
+    output = np.random.default_rng(2).uniform(0.0, 1.0, (1, 400))
+    data = SimpleNamespace(table=SimpleNamespace(left_out=()), outputs=output, spread=None)
+    residual = np.round(output * steps) / steps - output
+    saw = find_saw(data, SimpleNamespace(response=output), np.full(output.shape, 1e-3), residual, (), 8.0)
+    assert saw is not None
+    assert saw.shape == (pytest.approx(steps, abs=0.25),)
 
 
 @pytest.mark.slow
