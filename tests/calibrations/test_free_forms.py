@@ -35,7 +35,6 @@ from calibrations.free_forms.bases import (
 from calibrations.free_forms.effect import FreeForm, check_forms, free_form, place_of
 from calibrations.free_forms.form import Form
 from calibrations.free_forms.stairs import _steps
-from calibrations.free_forms.structure import FloorSource, Structure
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.loop import dataset
 from calibrations.model.file import dump_model, parse_model, read_model
@@ -321,15 +320,6 @@ def test_relays_of_a_width_close_at_any_force_alike() -> None:
     variances = closed @ closed.T / np.sum(closed[0] ** 2)
     assert np.diagonal(variances) == pytest.approx(1.0, abs=0.03)
     assert abs(variances[0, 4]) < 0.03
-
-
-@pytest.mark.parametrize(
-    ("flicker", "component", "follows"),
-    [(True, "time-bias/curve", True), (False, "time-bias/walk-0", True), (False, "time-bias/curve", False)],
-)
-def test_flicker_or_a_walk_follows_noise(flicker: bool, component: str, follows: bool) -> None:
-    result = SimpleNamespace(setting=SimpleNamespace(flicker=flicker), active=[component])
-    assert Structure(result, (), None, np.zeros((1, 1)), FloorSource.SAMPLES).follows_noise == follows
 
 
 def test_in_few_poses_effects_are_searched_without_places() -> None:

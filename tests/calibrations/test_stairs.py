@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import norm
 
 import calibrations as cal
-from calibrations.free_forms.stairs import before_stairs, find_saw, find_stairs, fit_stairs
+from calibrations.free_forms.stairs import SAW_REJECTIONS, before_stairs, find_saw, find_stairs, fit_stairs
 from calibrations.table import Array, Table
 from tests.calibrations.synthetic import components, turns
 
@@ -89,9 +89,12 @@ def test_a_saw_of_few_steps_or_of_many_is_proposed(steps: float) -> None:
     output = np.random.default_rng(2).uniform(0.0, 1.0, (1, 400))
     data = SimpleNamespace(table=SimpleNamespace(left_out=()), outputs=output, spread=None)
     residual = np.round(output * steps) / steps - output
-    saw = find_saw(data, SimpleNamespace(response=output), np.full(output.shape, 1e-3), residual, (), 8.0)
+    given = data, SimpleNamespace(response=output), np.full(output.shape, 1e-3), residual
+    saw = find_saw(*given, (), 8.0)
     assert saw is not None
     assert saw.shape == (pytest.approx(steps, abs=0.25),)
+    other = find_saw(*given, saw.shape * (SAW_REJECTIONS + 1), 8.0)
+    assert other is None or abs(other.shape[0] - steps) > 0.5, "a rejected saw comes back"
 
 
 @pytest.mark.slow

@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from calibrations.criteria import MOST_UNSEEN
+from calibrations.criteria import MOST_UNSEEN, MUCH_MORE_THAN_NOISE
+from calibrations.discovery.fit_doubts import _misfit
 from calibrations.discovery.patterns import Pattern
 from calibrations.discovery.structure import poorly_predicted, structure_of
 from calibrations.effects.expression_effect import effect_for
@@ -106,3 +107,11 @@ def test_only_a_motion_with_a_large_error_on_unseen_stretches_is_doubtful(
     table = SimpleNamespace(type=SimpleNamespace(moving=moving))
     fitted = SimpleNamespace(table=table, held_out_excess=factor * MOST_UNSEEN)
     assert (poorly_predicted(fitted) is not None) == doubtful
+
+
+@pytest.mark.parametrize(("known", "factor", "doubted"), [(True, 1.1, True), (True, 0.9, False), (False, 1.1, False)])
+def test_a_model_that_does_not_follow_a_motion_is_doubted(known: bool, factor: float, doubted: bool) -> None:
+    table = SimpleNamespace(type=SimpleNamespace(moving=True))
+    noise = SimpleNamespace(known=known)
+    fitted = SimpleNamespace(table=table, noise=noise, pooled_excess=factor * MUCH_MORE_THAN_NOISE)
+    assert bool(list(_misfit(fitted))) == doubted

@@ -1,0 +1,32 @@
+"""Places where a residual may act: what is offered there, how large it is, and what it follows."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from calibrations.free_forms.naming import _size_of_unshared_part
+from calibrations.free_forms.places import _stages
+from calibrations.free_forms.structure import FloorSource, Structure
+
+
+def test_angles_that_differ_by_readings_alone_show_no_eccentricity() -> None:
+    beta = np.tile(0.1 + 0.7 * np.arange(8), 4) + np.repeat([-2e-4, -1e-4, 1e-4, 2e-4], 8)  # rad
+    data = SimpleNamespace(beta=beta, alpha=np.zeros(32), sides={}, timed=False)
+    assert _stages(data, None) == []
+
+
+@pytest.mark.parametrize(("gain", "size"), [(0.25, 0.05), (-1.0, 0.0)])
+def test_a_size_is_the_root_of_a_gain_a_row(gain: float, size: float) -> None:
+    assert _size_of_unshared_part(SimpleNamespace(columns=np.ones((100, 3))), gain) == size
+
+
+@pytest.mark.parametrize(
+    ("flicker", "component", "follows"),
+    [(True, "time-bias/curve", True), (False, "time-bias/walk-0", True), (False, "time-bias/curve", False)],
+)
+def test_flicker_or_a_walk_follows_noise(flicker: bool, component: str, follows: bool) -> None:
+    result = SimpleNamespace(setting=SimpleNamespace(flicker=flicker), active=[component])
+    assert Structure(result, (), None, np.zeros((1, 1)), FloorSource.SAMPLES).follows_noise == follows
