@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from calibrations.free_forms.geometry import _fit_angles
 from calibrations.free_forms.naming import _size_of_unshared_part
 from calibrations.free_forms.places import _stages
 from calibrations.free_forms.structure import FloorSource, Structure
@@ -30,3 +31,8 @@ def test_a_size_is_the_root_of_a_gain_a_row(gain: float, size: float) -> None:
 def test_flicker_or_a_walk_follows_noise(flicker: bool, component: str, follows: bool) -> None:
     result = SimpleNamespace(setting=SimpleNamespace(flicker=flicker), active=[component])
     assert Structure(result, (), None, np.zeros((1, 1)), FloorSource.SAMPLES).follows_noise == follows
+
+
+def test_without_effects_the_angles_determine_nothing() -> None:
+    values, remaining, rank = _fit_angles(lambda _: np.ones(3), {})
+    assert (values, remaining.tolist(), rank) == ({}, [1.0] * 3, 0.0)

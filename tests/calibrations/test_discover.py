@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from calibrations.discovery.candidates import _is_similar
 from calibrations.discovery.results import Discovery
 from calibrations.discovery.row_search import _is_explained
 from calibrations.discovery.search import find_path, first_order_cost
@@ -178,3 +181,14 @@ def test_only_a_known_noise_tells_that_nothing_but_noise_is_left() -> None:
     known = poses(columns, 2.5 + x, 2.5 + y)
     unknown = Table.from_columns("poses", {k: v for k, v in known.columns.items() if "std" not in k}, source="made")
     assert [_is_explained(find_path(fit(LINEAR, table), (), {})) for table in (known, unknown)] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("contained", "contained_in_best", "similar"), [((), (), True), (("b",), (), False), ((), ("a",), False)]
+)
+def test_an_effect_and_its_part_are_no_similar_effects(
+    contained: tuple[str, ...], contained_in_best: tuple[str, ...], similar: bool
+) -> None:
+    candidate = SimpleNamespace(name="a", effect=SimpleNamespace(contains=contained), rank=1, gain=99.0)
+    best = SimpleNamespace(name="b", effect=SimpleNamespace(contains=contained_in_best), rank=1, gain=100.0)
+    assert _is_similar(candidate, best) == similar
