@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from calibrations.discovery.candidates import _is_similar
+from calibrations.discovery.outliers import gross
+from calibrations.discovery.refinements import _cost_of_removal
 from calibrations.discovery.results import Discovery
 from calibrations.discovery.row_search import _is_explained
 from calibrations.discovery.search import find_path, first_order_cost
@@ -16,7 +18,7 @@ from calibrations.fitting.fit import fit
 from calibrations.loop import add, diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
-from tests.calibrations.synthetic import components, poses, turns
+from tests.calibrations.synthetic import NOISE_V, components, poses, turns
 from tests.slow import first_fast
 
 LINEAR = read_model("linear")
@@ -173,6 +175,17 @@ def test_effects_that_the_data_cannot_separate_are_tested_together() -> None:
     end = fit(model, table)
     alone, together = first_order_cost(end, "stage-zero-offset")[0], first_order_cost(end, *names)[0]
     assert alone < 10 < 1000 < together
+    no_forms = np.zeros((len(end.whitened), 0))
+    assert _cost_of_removal(end, names[0], no_forms)[0] == pytest.approx(alone, rel=1e-6)
+
+
+def test_outliers_are_found_beside_a_missing_effect_of_their_size() -> None:
+    columns = turns()
+    x, y, z = components(columns)
+    off = np.zeros(len(x))
+    off[[20, 70]] = 60 * NOISE_V
+    table = poses(columns, 2.5 + x + 100 * NOISE_V * z**2 + off, 2.5 + y)
+    assert gross(fit(LINEAR, table)).tolist() == [20, 70]
 
 
 def test_only_a_known_noise_tells_that_nothing_but_noise_is_left() -> None:
