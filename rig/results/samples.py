@@ -51,6 +51,8 @@ def _inclination(upright: list[KeptPose], axis: str, channel: str, rms: float, s
             return Missing(f"there is no pose at alpha 90, beta {beta_deg:g} deg; `rig show RUN --poses` lists all")
         outputs.append(float(np.mean(at_pose)))
     plus, minus = outputs
+    if plus == minus:
+        return Missing("the output is the same at both poses; check that it is connected, and measure again")
     inclination = hidden_inclination_deg(PEAK_TO_PEAK * rms, (plus - minus) / 2)
     return Result(inclination, "deg", inclination * std / rms if rms else None)
 

@@ -79,6 +79,12 @@ def test_a_sweep_with_another_instrument_endures_a_fault(driver: str, what: str)
     assert endured("sweep", role, Fault(what, at_s=at_s), driver) in ("complete", "stopped", "not begun")
 
 
+def test_a_stuck_axis_leaves_a_noise_floor_without_its_inclination() -> None:
+    """The output is the same at +1 g and at -1 g: there is no scale factor to divide by."""
+    at_s = moment("noise-floor", "adc", "stuck-axis", driver="imu_lines")
+    assert endured("noise-floor", "adc", Fault("stuck-axis", at_s=at_s), "imu_lines") == "stopped"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("procedure", "role", "what"), GUIDED)
 def test_a_guided_run_asks_when_all_is_at_rest(procedure: str, role: str, what: str) -> None:
