@@ -6,9 +6,11 @@ A change flips a comparison, moves a number by one, exchanges + and -, `and` and
 It is made in a copy of the tree. The tests run once without a change, where coverage.py sees which test executes which
 line; then with each change those alone that execute its line, the shortest first. They are collected once: each run is
 a fork, where the functions of the file get their changed code. Look at each survivor: it is a missing test, or a change
-that means nothing. A line that no test executes is listed as well; a line that runs once for all tests, because its
-result is kept, belongs to the first of them, and what runs at an import, in a compiled kernel or in another process is
-not seen. `--lines FILE` with `--skip N` goes on where an earlier call was stopped.
+that means nothing. A line that no test executes is listed as well.
+
+The result of some lines is kept for all tests: such a line counts for the test that executed it first. The tool does
+not see lines that run at an import, in a compiled kernel or in another process. `--lines FILE` with `--skip N` goes on
+where an earlier call was stopped.
 """
 
 from __future__ import annotations

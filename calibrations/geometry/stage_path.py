@@ -42,8 +42,9 @@ def sensed_turning_points(table: Table, a: Array) -> Array:
     `a` is the specific force along the sensing axes at the poses, (n, 3), g. A sensor at an angle in its package, a
     tilted base and offsets of the stages change the force at the poses and between them alike: the change is a linear
     function of the products of the sines and cosines of both stage angles, which follows from its values at the poses.
-    What is left, such as the play of a gear, is that of the pose that the way leads to. Without this change the force
-    would jump to that of an ideal rig on each way, and slip elements would follow it.
+    The rest of the change, for example by the play of a gear, is not linear: all points on the way to a pose get the
+    rest at this pose. Without the change, the force would jump to that of an ideal rig and back between two poses, and
+    the slip elements would follow these jumps.
     """
     change = a - reported_force(table)
     if not change.any():
@@ -90,7 +91,7 @@ def _angles_of_axes(table: Table) -> tuple[tuple[Array, Array], ...]:
         ways = [(alpha, beta_start, none, none), (alpha, beta_start, none, beta - beta_start)]
     else:
         before_alpha, before_beta = np.append(0.0, alpha[:-1]), np.append(0.0, beta[:-1])
-        by_way = np.where(_needs_approach(table, beta - before_beta), beta_start, before_beta)
+        by_way = last_starts(table)
         ways = [
             (before_alpha, before_beta, alpha - before_alpha, none),
             (alpha, before_beta, none, by_way - before_beta),
@@ -99,6 +100,14 @@ def _angles_of_axes(table: Table) -> tuple[tuple[Array, Array], ...]:
     passed = [_angles_between_poses(table, *way) for way in ways]
     joined = [np.concatenate(each, axis=1)[:, :-1] for each in zip(*passed, strict=True)]  # without the pose itself
     return tuple((joined[0][:, :, k], joined[1][:, :, k]) for k in range(3))
+
+
+def last_starts(table: Table) -> Array:
+    """beta, rad, where its last move to each pose starts, (n,): at the pose before, or where the approach starts."""
+    beta = np.radians(table.column("beta_deg"))
+    before = np.append(0.0, beta[:-1])
+    approach_starts = beta - np.radians(_approach_deg(table)) * table.optional("direction", 0.0)
+    return np.where(_needs_approach(table, beta - before), approach_starts, before)
 
 
 @lru_cache(maxsize=8)

@@ -123,9 +123,9 @@ def _correlations(content: _Correlations | None, params: Parameters, source: str
         rows = tuple(tuple(map(float, row.split())) for row in content.lower)
     except ValueError as error:
         raise ModelError(f"{source}: a row has numbers with blanks between them: {error}") from None
-    checked = check_correlations(Correlations(tuple(content.parameters), rows), [*params, *COMMON_BEFORE], source)
     of_axes = {name: [key for key in params if key.startswith(f"{name}.")] for name in COMMON_BEFORE}
-    return checked.split({name: keys for name, keys in of_axes.items() if keys})
+    of_axes = {name: keys for name, keys in of_axes.items() if keys}
+    return check_correlations(Correlations(tuple(content.parameters), rows), [*params, *of_axes], source).split(of_axes)
 
 
 def _fault(error: Any) -> str:
@@ -212,7 +212,7 @@ def _with_value_for_each_axis(entry: _Effect, effect: Effect) -> _Effect:
         for p in entry.parameters
         for copy in (
             [p.model_copy(update={"axis": axis}) for axis in axes]
-            if p.axis is None and not entry.tied and f"{effect.name}.{p.name}" in COMMON_BEFORE
+            if axes and p.axis is None and not entry.tied and f"{effect.name}.{p.name}" in COMMON_BEFORE
             else [p]
         )
     ]

@@ -21,6 +21,7 @@ import numpy as np
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.identifiability import covariance
 from calibrations.free_forms.place_names import PREFIX, place_of_effect
+from calibrations.geometry.stage_path import last_starts
 from calibrations.means.noise import rms
 from calibrations.model.chain import forward
 from calibrations.table import Array, Table
@@ -261,15 +262,14 @@ def _correlation(a: Curve, b: Curve) -> float:
 
 
 def _simulate_poses(config: WorldConfig, seed: int, table: Table) -> Table:
-    """The poses of a table, visited without noise, each from the start of its approach, as the stages went.
+    """The poses of a table, visited without noise, each by the last move of beta as in the run.
 
-    Half of the time of a pose passes where its approach starts, so that the temperature has the same course.
+    Half of the time of a pose passes where this move starts, so that the temperature has the same course.
     """
     direction = table.optional("direction", 1.0)
-    approach_starts = table.column("beta_deg") - table.number("approach_deg", 0.0) * direction
     columns_visited = World(config, seed).dwell_mean(
         np.repeat(table.column("alpha_deg"), 2),
-        np.column_stack([approach_starts, table.column("beta_deg")]).ravel(),
+        np.column_stack([np.degrees(last_starts(table)), table.column("beta_deg")]).ravel(),
         direction=np.repeat(direction, 2),
         mount_deg=np.repeat(table.optional("mount_deg", 0.0), 2),
         flip=np.repeat(table.optional("flip", 0.0), 2),

@@ -1,4 +1,4 @@
-"""Places where a residual may act: what is offered there, how large it is, and what it follows."""
+"""Places that may explain a residual: their free forms, the size of an effect there, and what its curve follows."""
 
 from __future__ import annotations
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from calibrations.errors import ModelError
 from calibrations.fitting.fit import evaluate
 from calibrations.importing.foreign import read_csv
 from calibrations.model.file import dump_model, parse_model, read_model
@@ -41,3 +42,12 @@ def test_a_value_of_all_axes_becomes_that_of_each_axis() -> None:
     assert model.correlations is not None
     keys = ["hysteresis.reach.x", "hysteresis.reach.y", "hysteresis.height.x"]
     assert model.correlations.submatrix(keys).tolist() == [[1, 1, 0.5], [1, 1, 0.5], [0.5, 0.5, 1]]
+
+
+def test_a_value_of_all_axes_needs_the_axes_of_another_parameter() -> None:
+    text = (
+        "schema: rig.model/1\nname: alone\neffects:\n- effect: hysteresis\n  parameters:\n"
+        "  - {name: reach, value: 0.15}\n"
+    )
+    with pytest.raises(ModelError, match='"reach" has one value for each axis'):
+        parse_model(text, "alone.yaml")

@@ -48,10 +48,6 @@ OTHER_FAULTS = [(driver, roles[-1], what) for driver, (roles, _) in OTHER_PARTS.
 NEEDS_A_GUARD = {"open-interlock"}  # felt only by a bench that has interlocks
 FREE_RUNNING = {"imu_lines", "mavlink_imu", "xsens_mti"}  # a resumed run meets other samples of the same sensor
 OTHER_NOISE = {"delay", "endless", "trickle"}  # after which a run may go on, at other times: as good, but not the same
-# By role: a level is read again, and the last 5 % of the readings of a dwell may repeat.
-AS_GOOD = {("level", "lies"), ("adc", "frozen")}
-# Before the notice, what is kept is hotter, and says so, or has equal samples: fewer than the 100 that show a fault.
-NOTICED_LATE = {("oven", "runaway"), ("adc", "stuck-axis")}
 NEAR_V = 5e-3  # of a dwell's mean: ten times its noise
 NEAR_DIGITAL = 0.05  # of a mean in g or m/s^2
 NEAR = {"deg": 0.05, "s": 1.0}  # of a reading; what is done again after a lost packet happens that much later
@@ -113,12 +109,14 @@ def endured(procedure: str, role: str, fault: Fault, driver: str = "", guided: b
         assert (done.run.state, done.error) == ("complete", None)
         if procedure in STRETCHES:
             return "stopped"
-        if (role, fault.what) in NOTICED_LATE:
-            expected = [kept.pose for kept in undisturbed(procedure, driver=driver)[1]]
-            chosen_by_measurement = procedure == "misalignment" and role == "adc"
-            assert chosen_by_measurement or [kept.pose for kept in record.kept(done.run.run)] == expected
+        if (role, fault.what) == ("oven", "runaway"):  # what was kept before it was noticed is hotter, and says so
+            assert [kept.pose for kept in record.kept(done.run.run)] == [
+                kept.pose for kept in undisturbed(procedure, driver=driver)[1]
+            ]
             return "stopped"
-        if fault.what in OTHER_NOISE or driver in FREE_RUNNING or (role, fault.what) in AS_GOOD:
+        if (
+            fault.what in OTHER_NOISE or driver in FREE_RUNNING or (role, fault.what) == ("level", "lies")
+        ):  # what the level said is read again
             _require_right(record, done, undisturbed(procedure, guarded, driver), driver in FREE_RUNNING)
         else:
             assert digest(record, done.run.run) == undisturbed(procedure, guarded, driver)[0], (
