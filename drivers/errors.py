@@ -16,7 +16,7 @@
     │   ├── StreamError    scans were lost, or packets are not the requested ones
     │   ├── OverRange      the converter was at an end of its range
     │   ├── OverTemperature  the oven is hotter than its limit
-    │   └── SensorFault    the thermometer gives no temperature, the displacement sensor no distance
+    │   └── SensorFault    the thermometer gives no temperature, the displacement sensor no distance; an output is stuck
     └── ClockStuck         a simulated instrument's bytes never arrived: a bound in real time, a defect of ours
 
 Each message gives what happened, where (instrument and register), and what to do.
@@ -110,7 +110,14 @@ class OverTemperature(InstrumentError):
 
 
 class SensorFault(InstrumentError):
-    """A thermometer without a temperature, a displacement sensor without a distance."""
+    """A thermometer without a temperature, a displacement sensor without a distance, an output that is stuck.
+
+    `since_s`: time on the clock since when its values are wrong; None if no earlier value is.
+    """
+
+    def __init__(self, what: str, remedy: str, since_s: float | None = None) -> None:
+        super().__init__(what, remedy)
+        self.since_s = since_s
 
 
 class ClockStuck(DriverError):

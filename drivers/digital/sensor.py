@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -54,6 +55,15 @@ class Decoder(Protocol):
 Decoding = TypeVar("Decoding", bound=Decoder)
 
 
+@dataclass(frozen=True)
+class EqualSamples:
+    """Successive equal samples of an output, up to its last one; the first of them was taken at `since_s`."""
+
+    value: float
+    count: int
+    since_s: float
+
+
 class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
     """A sensor that sends samples without requests.
 
@@ -71,7 +81,7 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         self.name, self.settings = name, settings
         self._link, self._clock = link, link.clock
         self._tally, self._warmth = self._new_tally(), Thermometer()
-        self._equal: dict[str, tuple[float, int]] = {}  # of outputs: the last value, and its successive samples
+        self._equal: dict[str, EqualSamples] = {}  # by output
 
     @property
     @abstractmethod
@@ -193,9 +203,9 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
                         raise self._unreadable(decoder) if decoder.damaged > damaged else self._silence(quiet_s)
                 self._require_complete(reception, decoder)
                 lost_before, lost = lost, self._lost(reception, decoder)
-                values = reception.pull(due)
-                self._require_alive(values, names, reception)
-                start_s, temperature_c = reception.start_s + sent / rate_hz, self._warmth.pull_c(self._clock.now())
+                values, start_s = reception.pull(due), reception.start_s + sent / rate_hz
+                self._require_alive(values, names, reception, start_s)
+                temperature_c = self._warmth.pull_c(self._clock.now())
                 yield Samples(values, names, rate_hz, start_s, temperature_c, lost - lost_before)
                 sent += due
         finally:
@@ -254,7 +264,9 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         """Number of samples that are missing in the record so far."""
         return reception.lost
 
-    def _require_alive(self, values: NDArray[np.float64], names: Sequence[str], reception: Reception) -> None:
+    def _require_alive(
+        self, values: NDArray[np.float64], names: Sequence[str], reception: Reception, start_s: float
+    ) -> None:
         """Raises OverRange for an output at the end of its range, SensorFault for a stuck one."""
         if reception.clipped:
             raise OverRange(
@@ -270,23 +282,29 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
                 f"{end:g} {self.settings.units[saturated[0]]}",
                 "Keep the sensor still, set a wider range in it, or correct `range` in the bench file",
             )
-        if stuck := self._stuck(values, names):
+        if stuck := self._stuck(values, names, start_s):
+            equal = self._equal[stuck]
             raise SensorFault(
-                f"{self.name}: {stuck} gave the same value {self._equal[stuck][1]} times while others changed: it is "
-                "stuck",
-                "Switch the sensor off and on; check that the output is the right one; measure the poses since then "
-                "again",
+                f"{self.name}: {stuck} gave the same value {equal.count} times while others changed: it is stuck",
+                "Switch the sensor off and on, and check that the output is the right one; then resume the run, which "
+                "measures the poses since then again",
+                equal.since_s,
             )
 
-    def _stuck(self, values: NDArray[np.float64], names: Sequence[str]) -> str:
+    def _stuck(self, values: NDArray[np.float64], names: Sequence[str], start_s: float) -> str:
         """The first output with STUCK equal samples; "" for none. Successive short records count together."""
-        still = np.ptp(values, axis=0) == 0
-        if still.all():  # of a coarse sensor at rest; it says nothing
+        differs = values[::-1] != values[-1]  # from the last sample backwards
+        if not differs.any():  # of a coarse sensor at rest; it says nothing
             return ""
-        for name, value, is_constant in zip(names, values[0].tolist(), still.tolist(), strict=True):
-            previous, count = self._equal.get(name, (value, 0))
-            self._equal[name] = (value, count * (previous == value) + len(values)) if is_constant else (value, 0)
-        return next((name for name in names if self._equal[name][1] >= STUCK), "")
+        counts = np.where(differs.any(axis=0), differs.argmax(axis=0), len(values))
+        for name, value, count in zip(names, values[-1].tolist(), counts.tolist(), strict=True):
+            earlier = self._equal.get(name)
+            if count == len(values) and earlier is not None and earlier.value == value:
+                self._equal[name] = replace(earlier, count=earlier.count + count)
+            else:
+                since_s = start_s + (len(values) - count) / self.settings.rate_hz
+                self._equal[name] = EqualSamples(value, count, since_s)
+        return next((name for name in names if self._equal[name].count >= STUCK), "")
 
 
 def _largest(values: NDArray[np.float64]) -> float:

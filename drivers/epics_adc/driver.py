@@ -27,6 +27,7 @@ __all__ = ["AnalogRecords", "Settings", "connect"]
 
 UNITS_V = {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "µv": 1e-6}
 MOST_REPEATED = 0.05  # of the readings of a record: two clocks that differ a little cause some
+OLDEST = 1.5  # periods since the first reading with a time stamp: two such clocks repeat it for little more than one
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,7 @@ class AnalogRecords(Recorder[Settings]):
         self.name, self.settings = name, settings
         self._records, self._clock = records, links.clock
         self._volts = {channel: self._volts_per_unit(record) for channel, record in settings.wired.items()}
+        self._stamps: dict[str, Stamp] = {}  # the last one of each channel, also of the record before
 
     def identify(self) -> Identity:
         """The names of the records: they have no field for the maker of the converter."""
@@ -87,7 +89,7 @@ class AnalogRecords(Recorder[Settings]):
         """
         scans, block = self.scans(duration_s), self.scans(block_s)
         channels, rate_hz = tuple(self.settings.channels), self.settings.rate_hz
-        start_s, fresh = self._clock.now(), Freshness(channels)
+        start_s, fresh = self._clock.now(), Freshness(channels, self._stamps, OLDEST / rate_hz)
         for first in range(0, scans, block):
             last = min(first + block, scans)
             volts = np.array([self._volts_of_scan(scan, start_s, fresh) for scan in range(first, last)])
@@ -112,7 +114,7 @@ class AnalogRecords(Recorder[Settings]):
             )
         for channel, reading in readings.items():
             self._require_sound(channel, reading)
-        fresh.note(readings)
+        fresh.note(readings, self._clock.now())
         return np.array([reading.value * self._volts[channel] for channel, reading in readings.items()])
 
     def _require_sound(self, channel: str, reading: Reading) -> None:
@@ -128,7 +130,7 @@ class AnalogRecords(Recorder[Settings]):
             )
 
     def _require_fresh(self, fresh: Freshness, scans: int) -> None:
-        """Raises StreamError for a record that the IOC processes less often than it is read."""
+        """Raises StreamError for a record that the IOC processes less often than it is read, or not any more."""
         channel, repeated = fresh.worst()
         if repeated > max(1, MOST_REPEATED * scans):
             rate_hz = self.settings.rate_hz * (scans - repeated) / scans
@@ -137,6 +139,12 @@ class AnalogRecords(Recorder[Settings]):
                 f"stamp in {scans - repeated} of {scans} readings: the IOC processes it about {rate_hz:.2g} times a "
                 "second",
                 "Lower rate_hz in the bench file below that, or have the IOC process it more often (its field SCAN)",
+            )
+        if fresh.stopped:
+            raise StreamError(
+                f"{self.name}: {fresh.stopped} ({self._records.beginning}{self.settings.channels[fresh.stopped]}) kept "
+                f"its time stamp for more than {OLDEST} periods of the readings: the IOC stopped processing it",
+                "Check the IOC, its load and the device behind the record",
             )
 
     def _volts_per_unit(self, record: str) -> float:
@@ -151,18 +159,35 @@ class AnalogRecords(Recorder[Settings]):
         return UNITS_V[units.lower()]
 
 
+@dataclass(frozen=True)
+class Stamp:
+    """A time stamp of the IOC, and the clock's time when it was first read."""
+
+    stamp_s: float
+    read_s: float
+
+
 class Freshness:
-    """Number of readings of each channel that repeat the reading before."""
+    """Number of readings of each channel that repeat the reading before.
 
-    def __init__(self, channels: Sequence[str]) -> None:
-        self._stamps: dict[str, float] = {}
+    `stopped`: a channel with a time stamp that was first read more than `oldest_s` before; "" for none.
+    """
+
+    def __init__(self, channels: Sequence[str], stamps: dict[str, Stamp], oldest_s: float) -> None:
+        self._stamps, self._oldest_s = stamps, oldest_s
         self._repeated = dict.fromkeys(channels, 0)
+        self.stopped = ""
 
-    def note(self, readings: Mapping[str, Reading]) -> None:
+    def note(self, readings: Mapping[str, Reading], now_s: float) -> None:
         """Count the readings whose time stamp is that of the reading before."""
         for channel, reading in readings.items():
-            self._repeated[channel] += self._stamps.get(channel) == reading.stamp_s
-            self._stamps[channel] = reading.stamp_s
+            stamp = self._stamps.get(channel)
+            if stamp is None or stamp.stamp_s != reading.stamp_s:
+                self._stamps[channel] = Stamp(reading.stamp_s, now_s)
+                continue
+            self._repeated[channel] += 1
+            if now_s - stamp.read_s > self._oldest_s:
+                self.stopped = self.stopped or channel
 
     def worst(self) -> tuple[str, int]:
         """The channel with most repeated readings, and their number."""

@@ -175,20 +175,22 @@ class Record:
             with self.engine.begin() as connection:
                 self._put_lines(connection)
 
-    def exclude(self, run: str, number: int, reason: str | None) -> None:
-        """Exclude a pose from every analysis, with a reason that stays as an event; None includes it again.
+    def exclude(self, run: str, numbers: Iterable[int], reason: str | None) -> None:
+        """Exclude poses from every analysis, with a reason that stays as an event; None includes them again.
 
-        For a row of an imported table only the event is written. Raises RecordError for an unknown pose.
+        For a row of an imported table only the event is written. All are excluded in one transaction. Raises
+        RecordError for an unknown pose.
         """
-        is_pose = (poses.c.run == run) & (poses.c.number == number)
         with self.engine.begin() as connection:
-            updated = connection.execute(update(poses).where(is_pose).values(excluded=reason)).rowcount
-            if not updated and not 0 <= number < select_imported_rows(connection, run):
-                raise RecordError(f"run {run} has no pose {number}; `rig show {run} --poses` lists its poses")
-            change = f"pose {number} {'included' if reason is None else 'excluded'}"
-            connection.execute(
-                insert(events), {"run": run, "at": timestamp(), "what": change, "text": reason or "again"}
-            )
+            for number in numbers:
+                is_pose = (poses.c.run == run) & (poses.c.number == number)
+                updated = connection.execute(update(poses).where(is_pose).values(excluded=reason)).rowcount
+                if not updated and not 0 <= number < select_imported_rows(connection, run):
+                    raise RecordError(f"run {run} has no pose {number}; `rig show {run} --poses` lists its poses")
+                change = f"pose {number} {'included' if reason is None else 'excluded'}"
+                connection.execute(
+                    insert(events), {"run": run, "at": timestamp(), "what": change, "text": reason or "again"}
+                )
 
     def keep_state(self, run: str, state: Mapping[str, Any]) -> None:
         """Store the state of the simulated bench before the first pose."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
@@ -15,6 +16,7 @@ from rig.instruments.person import answer, follow
 from rig.record import KeptPose, Record, Run
 from rig.record.measured import MeasuredRun, of_sensor
 from rig.runs.observer import Observer
+from rig.runs.stuck import StuckOutputs
 
 
 def leave_as(rig: Rig, record: Record, run: str) -> None:
@@ -56,6 +58,8 @@ class RunHost:
         self._counted: dict[str, tuple[float, str]] = {}
         self._readings: Sequence[Reading] | None = record.readings(run.run)
         self._before = {reading.name: reading.value for reading in self._readings}
+        self._outputs, self._rate_hz = StuckOutputs(run.kind), math.inf
+        self._outputs.recall((dwell for _, dwell in record.dwells(run.run)), self._zero_s)
         if state is None:  # a restored clock is right
             _require_rising_time(rig.clock.now() - self._zero_s, record, run)
 
@@ -79,6 +83,8 @@ class RunHost:
         self._observer.expect(missing + len(self._poses), len(self._poses))
 
     def keep(self, pose: Pose, samples: Samples, temperature_c: float | None) -> None:
+        self._rate_hz = samples.rate_hz
+        self._outputs.require_alive(pose, samples)
         middle_s = samples.start_s + len(samples.volts) / samples.rate_hz / 2
         dials = self._rig.read_deg()
         recorded = KeptPose(
@@ -97,6 +103,14 @@ class RunHost:
         if self._dwells is not None:
             self._dwells.append(of_sensor(recorded, self._measured.sensor).dwell)
         self._observer.kept(recorded)
+
+    def exclude_since(self, since_s: float, reason: str) -> None:
+        """Exclude the poses with samples from `since_s` of the clock on: a resumed run measures them again."""
+        t_s = since_s - self._zero_s
+        spoilt = [
+            number for number, dwell in self._record.dwells(self._run) if dwell.t_s + dwell.n / self._rate_hz / 2 >= t_s
+        ]
+        self._record.exclude(self._run, spoilt, reason)
 
     def keep_readings(self, *readings: Reading) -> None:
         for reading in readings:

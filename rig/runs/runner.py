@@ -17,7 +17,7 @@ from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from typing import Any
 
-from drivers.errors import DriverError, Interlocked
+from drivers.errors import DriverError, Interlocked, SensorFault
 from procedures.catalogue import Procedure, find
 from procedures.errors import Declined, NoAnswer, ProcedureError, SafetyLimit
 from procedures.questions import Confirm
@@ -143,7 +143,7 @@ def _after_decision(record: Record, outcome: Outcome, observer: Observer, trace:
         run = outcome.run.run
         try:
             if wish == "repeat" and outcome.run.rows:
-                record.exclude(run, record.next_number(run) - 1, REPEATED)
+                record.exclude(run, [record.next_number(run) - 1], REPEATED)
             outcome = _resume(record, run, observer, trace=trace)
         except (DriverError, RigError) as error:  # such as an instrument that still does not answer
             outcome = Outcome(record.run(run), error, outcome.moving)  # nothing has stopped these since
@@ -261,8 +261,10 @@ def _perform(
                 session.reference()
                 host.keep_state()
             results = procedure.function(session, **settings) or {}
-    except BaseException:
+    except BaseException as failure:
         with suppress(RecordError):  # the record itself may have failed
+            if isinstance(failure, SensorFault) and failure.since_s is not None:
+                host.exclude_since(failure.since_s, failure.what)
             host.keep_tally()
         raise
     host.keep_tally()

@@ -31,8 +31,7 @@ def exclude(record: Record, name: str, numbers: Sequence[int], reason: str | Non
             "excluded; remove it from the file and import the file again"
         )
     with lease(record.folder, run.run, f"run {run.run}"):
-        for number in numbers:
-            record.exclude(run.run, number, reason)
+        record.exclude(run.run, numbers, reason)
         if run.state == "complete" and run.bench:  # an imported table has no results
             _evaluate_again(record, run)
     return record.run(run.run)

@@ -28,11 +28,26 @@ def test_a_stuck_axis_is_noticed_over_short_records(digital: DigitalSensors, dri
     adc = digital.connect(driver, settings, Fault("stuck-axis", at_s=2.0))
     adc.acquire(0.2)
     adc._clock.sleep(4.0)
+    records = []
     for _ in range(4):
-        adc.acquire(0.2)
+        records.append(adc.acquire(0.2))
         adc._clock.sleep(3.0)
-    with pytest.raises(SensorFault, match="ax gave the same value 100 times while others changed"):
+    with pytest.raises(SensorFault, match="ax gave the same value 100 times while others changed") as raised:
         adc.acquire(0.2)
+    assert raised.value.since_s == records[0].start_s
+
+
+@pytest.mark.parametrize("driver", ["imu_lines", *SETTINGS])
+def test_the_equal_samples_at_the_end_of_a_record_count(digital: DigitalSensors, driver: str) -> None:
+    settings = (SETTINGS | {"imu_lines": imu_lines.Settings})[driver](rate_hz=100.0)
+    adc = digital.connect(driver, settings, Fault("stuck-axis", at_s=5.3))
+    adc.acquire(1.0)
+    adc._clock.sleep(5.0 - adc._clock.now())
+    for _ in range(4):
+        adc.acquire(0.5 if adc._clock.now() < 5.2 else 0.2)
+    with pytest.raises(SensorFault, match=r"ax gave the same value 1\d\d times") as raised:
+        adc.acquire(0.2)
+    assert raised.value.since_s == pytest.approx(5.3, abs=0.02)
 
 
 @pytest.mark.parametrize("driver", ["imu_lines", *SETTINGS])

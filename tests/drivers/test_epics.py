@@ -261,19 +261,48 @@ ADC_FAILURES = [
         StreamError,
         r"had a new time stamp in 1\d of 40 .* about \d\.?\d* times a second.*SCAN",
     ),
+    (
+        Fault("frozen", at_s=1.86),
+        StreamError,
+        r"\(sim:ai1\) kept its time stamp for more than 1\.5 periods of .* stopped processing it\. Check the IOC",
+    ),
     (Fault("silence"), LinkTimeout, r"adc: no answer to sim:ai1 within 1 s on tcp://"),
     (Fault("disconnect", at_s=0.5), LinkRefused, r"adc: tcp://.*connection is lost"),
     (Fault("delay", size=0.4), StreamError, r"scan 1 is 0\.\d+ s late"),
 ]
 
 
-@pytest.mark.parametrize(("fault", "error", "told"), ADC_FAILURES, ids=[f.what for f, *_ in ADC_FAILURES])
+@pytest.mark.parametrize(
+    ("fault", "error", "told"), ADC_FAILURES, ids=[f"{f.what} {f.at_s:g}" for f, *_ in ADC_FAILURES]
+)
 def test_a_failure_of_a_converter_says_what_where_and_what_to_do(
     bench: Bench, fault: Fault, error: type[DriverError], told: str
 ) -> None:
     with pytest.raises(error, match=told) as raised:
         bench.adc(fault).acquire(2.0)
     assert str(raised.value).startswith("adc: ")
+
+
+@pytest.mark.parametrize("scans", [1, 2, 200])
+def test_records_that_stopped_are_noticed_in_the_next_dwell_of_any_length(bench: Bench, scans: int) -> None:
+    adc = bench.adc(Fault("frozen", at_s=12.0))
+    adc.acquire(scans / 20)
+    bench.clock.sleep(13.0)
+    with pytest.raises(StreamError, match=r"the IOC (stopped processing|processes) it"):
+        adc.acquire(scans / 20)
+
+
+def test_a_reading_that_is_repeated_once_is_no_failure(bench: Bench) -> None:
+    """The clocks of the rig and of the IOC differ a little."""
+    adc = bench.adc(Fault("frozen", at_s=4.91, for_s=0.05))
+    time_s = adc.acquire(10.0).volts[:, 0] / 0.01
+    assert np.count_nonzero(np.diff(time_s) == 0) == 1
+
+
+@pytest.mark.parametrize(("at_s", "for_s"), [(9.86, 60.0), (4.0, 0.3)])
+def test_a_few_old_readings_in_a_long_dwell_are_a_failure(bench: Bench, at_s: float, for_s: float) -> None:
+    with pytest.raises(StreamError, match="stopped processing it"):
+        bench.adc(Fault("frozen", at_s=at_s, for_s=for_s)).acquire(10.0)
 
 
 def test_an_alarm_that_the_bench_file_allows_is_no_failure(bench: Bench) -> None:

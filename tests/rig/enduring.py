@@ -25,6 +25,7 @@ from tests.rig.misbehaving import (
     afflicted,
     digest,
     guarded_bench,
+    included,
     looking_on,
     short,
     watched_bench,
@@ -63,7 +64,7 @@ def undisturbed(
         state = record.state(run.run)
         assert run.state == "complete"
         assert state
-        kept = list(record.kept(run.run))
+        kept = included(record, run.run)
         return digest(record, run.run), kept, record.readings(run.run), state["rig"]["clock_s"]
 
 
@@ -110,7 +111,7 @@ def endured(procedure: str, role: str, fault: Fault, driver: str = "", guided: b
         if procedure in STRETCHES:
             return "stopped"
         if (role, fault.what) == ("oven", "runaway"):  # what was kept before it was noticed is hotter, and says so
-            assert [kept.pose for kept in record.kept(done.run.run)] == [
+            assert [kept.pose for kept in included(record, done.run.run)] == [
                 kept.pose for kept in undisturbed(procedure, driver=driver)[1]
             ]
             return "stopped"
@@ -131,7 +132,7 @@ def _require_right(
     """A run that noticed nothing has measured what an undisturbed one does, or a result of it says so."""
     assert outcome.run.state == "complete"
     _, sound, readings, _ = expected
-    kept = list(record.kept(outcome.run.run))
+    kept = included(record, outcome.run.run)
     assert [each.pose for each in kept] == [each.pose for each in sound]
     means = [[list(each.dwell.means.values()) for each in run] for run in (kept, sound)]
     wrong = bool(kept) and bool(np.abs(np.subtract(*means)).max() > (NEAR_DIGITAL if digital else NEAR_V))

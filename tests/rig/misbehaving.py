@@ -13,7 +13,7 @@ from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import Bench, read_bench
 from rig.instruments.instruments import Rig
-from rig.record import Record
+from rig.record import KeptPose, Record
 from rig.runs.runner import Outcome, start
 from tests.rig.rigging import Onlooker
 
@@ -67,8 +67,14 @@ def short(record: Record, bench: Bench, name: str, onlooker: Onlooker | None = N
 
 def digest(record: Record, run: str) -> list[Any]:
     """All that was measured, comparable bit for bit."""
-    kept = [(k.pose, k.samples.volts.tobytes(), k.samples.start_s, k.t_s, k.temperature_c) for k in record.kept(run)]
+    poses = included(record, run)
+    kept = [(k.pose, k.samples.volts.tobytes(), k.samples.start_s, k.t_s, k.temperature_c) for k in poses]
     return [*kept, *record.readings(run)]
+
+
+def included(record: Record, run: str) -> list[KeptPose]:
+    """The poses of a run without the excluded ones."""
+    return [kept for kept in record.kept(run) if kept.excluded is None]
 
 
 @dataclass

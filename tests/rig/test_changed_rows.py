@@ -140,7 +140,7 @@ def test_a_changed_pose_is_named_until_it_is_excluded(tmp_path: Path, statement:
         with pytest.raises(RecordError, match="pose 1: its values changed on the disk"):
             table_of(record, run)
         assert len(record.damaged_rows()) == 1
-        record.exclude(run, 1, "damaged")
+        record.exclude(run, [1], "damaged")
         assert list(table_of(record, run).column("beta_deg")) == [0, 2]
     done = recover(tmp_path / "record.db", tmp_path / "new")
     assert "1" in done.changed[0]

@@ -171,7 +171,7 @@ def test_rigs_whose_runs_share_a_name_keep_them_apart(own: Record, lab: Record, 
     with Record(Path(shutil.copytree(own.folder, tmp_path / "other"))) as other:
         with other.engine.begin() as to:
             to.exec_driver_sql("UPDATE runs SET uid = 'cafe1234cafe1234'")
-        other.exclude(run, 1, "of the other rig")
+        other.exclude(run, [1], "of the other rig")
         assert [each.name for each in pushed(own, lab.where)] == [run]
         (theirs,) = pushed(other, lab.where)
         assert theirs.name == f"{run}-cafe1234"
@@ -183,7 +183,7 @@ def test_rigs_whose_runs_share_a_name_keep_them_apart(own: Record, lab: Record, 
 def test_an_excluded_row_of_an_imported_table_is_excluded_by_the_next_push(own: Record, lab: Record) -> None:
     run = a_table(own)
     push(own, lab, run)
-    own.exclude(run, 1, "bumped")
+    own.exclude(run, [1], "bumped")
     assert unsent(own, lab) == [run]
     push(own, lab, run)
     assert lab.excluded(run) == own.excluded(run) == {1: "bumped"}
@@ -192,14 +192,14 @@ def test_an_excluded_row_of_an_imported_table_is_excluded_by_the_next_push(own: 
 def test_a_pose_that_is_excluded_later_is_excluded_by_the_next_push(own: Record, lab: Record) -> None:
     run = a_run(own)
     pushed(own, lab.where)
-    own.exclude(run, 3, "a lorry passed")
+    own.exclude(run, [3], "a lorry passed")
     own.set_results(run, {"bias-x": {"value": 2.4}})
     assert unsent(own, lab) == [run]
     assert [each.how for each in pushed(own, lab.where)] == ["pushed"]
     own.note(run, "note", "the door was open")
     assert unsent(own, lab) == [run]
-    own.exclude(run, 3, None)
-    own.exclude(run, 4, "another")
+    own.exclude(run, [3], None)
+    own.exclude(run, [4], "another")
     pushed(own, lab.where)
     assert held(lab, run) == held(own, run)
 
@@ -207,10 +207,10 @@ def test_a_pose_that_is_excluded_later_is_excluded_by_the_next_push(own: Record,
 def test_what_was_changed_in_the_lab_is_not_overwritten(own: Record, lab: Record) -> None:
     run = a_run(own)
     pushed(own, lab.where)
-    lab.exclude(run, 3, "by the lab")
+    lab.exclude(run, [3], "by the lab")
     assert verify(lab).changed == (run,)
     assert unsent(own, lab) == []
-    own.exclude(run, 4, "by the rig")
+    own.exclude(run, [4], "by the rig")
     with pytest.raises(RecordError, match="is different from the run of this rig, so nothing was replaced"):
         push(own, lab, run)
     assert lab.excluded(run) == {3: "by the lab"}
@@ -253,8 +253,8 @@ def test_a_locked_run_is_said_and_not_waited_for(own: Record, lab: Record, monke
 def test_a_refused_run_does_not_hinder_the_newer_ones(own: Record, lab: Record) -> None:
     run = a_run(own, 1)
     pushed(own, lab.where)
-    lab.exclude(run, 3, "by the lab")
-    own.exclude(run, 4, "by the rig")
+    lab.exclude(run, [3], "by the lab")
+    own.exclude(run, [4], "by the rig")
     newer = a_run(own, 2)
     refused, sent = push_all(own, lab, unsent(own, lab))
     assert isinstance(refused, RecordError)

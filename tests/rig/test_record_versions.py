@@ -55,7 +55,7 @@ def test_an_older_record_becomes_one_of_this_version(file: Path, tmp_path: Path)
         table = table_of(record, run.run)
         assert table.n == 4
         assert list(table.column("alpha_deg")) == [90.0] * 4
-        record.exclude(run.run, 0, "touched")
+        record.exclude(run.run, [0], "touched")
         record.log(run.run, 0.0, "run", "doing", "nothing")
         record.set_state(run.run, "stopped")
         assert record.lines(run.run)[-1].text == "nothing"

@@ -184,7 +184,7 @@ def test_a_record_of_the_first_version_is_brought_up_to_date(tmp_path: Path) -> 
         connection.executescript("DROP TABLE readings; PRAGMA user_version = 1")
     with Record(tmp_path) as record:
         record.keep_readings(run, [Reading("level-x", 0.02, "deg", 0.001)], None)
-        record.exclude(run, 0, "touched")
+        record.exclude(run, [0], "touched")
         assert [kept.excluded for kept in record.kept(run)] == ["touched"]
     with closing(sqlite3.connect(tmp_path / "record.db")) as connection:
         assert connection.execute("PRAGMA user_version").fetchone() == (SCHEMA,)
@@ -214,16 +214,16 @@ def test_an_excluded_pose_stays_with_its_reason_and_is_left_out() -> None:
         for number in range(3):
             kept = KeptPose(Pose(90, 10.0 * number), block([[number, 1.0], [number, 1.0]]), number, 21.5)
             record.keep(run, number, kept, None)
-        record.exclude(run, 1, "a lorry passed")
+        record.exclude(run, [1], "a lorry passed")
         assert [kept.excluded for kept in record.kept(run)] == [None, "a lorry passed", None]
         assert [pose.beta_deg for pose in record.poses(run)] == [0.0, 20.0]
         assert list(table_of(record, run).column("beta_deg")) == [0.0, 20.0]
         assert list(table_of(record, run).numbered(np.array([0, 1]))) == [0, 2]  # as `rig exclude` takes them
         assert record.next_number(run) == 3
-        record.exclude(run, 1, None)
+        record.exclude(run, [1], None)
         assert len(record.poses(run)) == 3
         with pytest.raises(RecordError, match=f"run {run} has no pose 7"):
-            record.exclude(run, 7, "nothing")
+            record.exclude(run, [7], "nothing")
 
 
 def test_means_and_scatter_come_without_the_samples() -> None:
@@ -231,7 +231,7 @@ def test_means_and_scatter_come_without_the_samples() -> None:
         run = begin(record)
         for number in range(3):
             record.keep(run, number, KeptPose(Pose(90, number), block([[2.0, 1.0], [4.0, number]]), 3.5, 21.5), None)
-        record.exclude(run, 1, "touched")
+        record.exclude(run, [1], "touched")
         first, last = record.dwells(run)
         assert first == (0, next(record.kept(run)).dwell)
         assert last[0] == 2
