@@ -5,12 +5,13 @@ to the damage. A row with another checksum than at its insertion is not copied, 
 samples without their pose. A run with a damaged or lost entry gets a new entry with the readable parts, so that its
 poses can be used.
 
-A file without its end is read from a copy that is filled with zeros, and a file with a damaged schema from a copy with
-a new schema.
+A file without its end is read from a copy that is filled with zeros, and a file with a damaged header or schema from a
+copy with a new one.
 """
 
 from __future__ import annotations
 
+import re
 import shutil
 import sqlite3
 import struct
@@ -19,7 +20,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from sqlalchemy import Column, Connection, Integer, Table, delete, insert, select, union, update
 from sqlalchemy.dialects import sqlite as dialect
@@ -94,30 +95,40 @@ def _recover_rows(source: Path, target: Path) -> Recovered:
     return Recovered(rows, tuple(damaged), damaged_samples, replaced_runs)
 
 
-_HEADER = struct.Struct(">16x H 10x I")  # of SQLite's file: bytes of a page, number of pages
+_MAGIC = b"SQLite format 3\0"
+_PAGE = 4096  # bytes
+_START = _MAGIC + struct.pack(">H 6B", _PAGE, 2, 2, 0, 64, 32, 32)  # of the file of every record: page, with a log
+_HEADER = struct.Struct(f">{len(_START)}x 4x I")  # the number of pages
 
 
 def _complete_copy(source: Path, padded: Path) -> Path:
     """The file, or a copy that is filled up with zeros if the end is missing, and has a sound schema."""
     with source.open("rb") as file:
         head = file.read(_HEADER.size)
-    if len(head) < _HEADER.size or not head.startswith(b"SQLite format 3"):
+    if len(head) < _HEADER.size or not head.startswith(_MAGIC):
         return source  # is refused when it is opened
-    page, pages = _HEADER.unpack(head)
-    size = (65536 if page == 1 else page) * pages
-    is_complete, sound = source.stat().st_size >= size, is_sound(source)
-    if is_complete and sound:
+    pages, present = _HEADER.unpack(head)[0], -(-source.stat().st_size // _PAGE)
+    is_whole, sound = present == pages, is_sound(source)
+    if is_whole and sound:
         return source
     shutil.copyfile(source, padded)
     if (log := source.with_name(f"{source.name}-wal")).exists():
         shutil.copyfile(log, padded.with_name(f"{padded.name}-wal"))
-    if not is_complete:
-        with padded.open("r+b") as file:
-            file.truncate(size)
+    with padded.open("r+b") as file:
+        _set_pages(file, max(present, pages))
     if not sound:
         with suppress(*UNREADABLE):  # else nothing is readable, and opening the record reports that
             rewrite_schema(padded)
     return padded
+
+
+def _set_pages(file: BinaryIO, pages: int) -> None:
+    """Write the header of a file with so many pages, and fill it up with zeros."""
+    file.truncate(pages * _PAGE)
+    file.seek(0)
+    file.write(_START)
+    file.seek(_HEADER.size - 4)
+    file.write(pages.to_bytes(4))
 
 
 def _remove_damaged_rows(target: Path) -> Iterator[str]:
@@ -246,15 +257,42 @@ def is_sound(path: Path) -> bool:
 
 
 def rewrite_schema(path: Path) -> None:
-    """Write a new schema of the file. Raises sqlite3.Error if its first page cannot be read."""
+    """Write a new schema of the file. Raises sqlite3.Error if that is not possible."""
     with closing(sqlite3.connect(path, isolation_level=None)) as file:
         file.text_factory = lambda data: data.decode("utf-8", "replace")
         file.execute("PRAGMA writable_schema = ON")  # then unreadable entries are not an error
-        tables = dict(_tables(file.execute("SELECT name, rootpage, sql FROM sqlite_master").fetchall()))
-        file.execute("DELETE FROM sqlite_master")
+        entries = [row for row in _readable(file, "SELECT name, rootpage, sql FROM sqlite_master") if row is not None]
+    found, pages = _clear_schema(path)  # SQLite has moved the log into the file when it closed it
+    tables = dict(_tables(entries)) | found
+    with closing(sqlite3.connect(path, isolation_level=None)) as file:
+        file.execute("PRAGMA writable_schema = ON")
         for name, root in tables.items():
-            row = ("table", name, name, root, _statement(metadata.tables[name]))
+            place = root if 1 < root < pages else pages  # unreadable, so that its rows are reported as lost
+            row = ("table", name, name, place, _statement(metadata.tables[name]))
             file.execute("INSERT INTO sqlite_master VALUES (?, ?, ?, ?, ?)", row)
+
+
+_SCHEMA = 100  # where the schema begins in the first page, after the header of the file
+_EMPTY_PAGE = struct.Struct(
+    ">B H H H B"
+)  # a leaf of a table: its type, free block, cells, start of the cells, fragments
+
+
+def _clear_schema(path: Path) -> tuple[dict[str, int], int]:
+    """Make the schema of the file empty, and add a page of zeros. Returns the root page of each table with an entry in
+    the first page, and the number of pages.
+
+    An entry is found by its text, so that damage to the lists of the page has no effect: names, root page, statement.
+    """
+    pages = path.stat().st_size // _PAGE + 1
+    with path.open("r+b") as file:
+        page = file.read(_PAGE)
+        _set_pages(file, pages)
+        file.seek(_SCHEMA)
+        file.write(_EMPTY_PAGE.pack(13, 0, 0, _PAGE, 0).ljust(_PAGE - _SCHEMA, b"\0"))
+    texts = {name: b"table" + 2 * name.encode() + b"(.{1,4})CREATE TABLE " for name in KNOWN}
+    found = {name: re.search(text, page, re.DOTALL) for name, text in texts.items()}
+    return {name: int.from_bytes(entry[1]) for name, entry in found.items() if entry is not None}, pages
 
 
 def _tables(entries: list[tuple[Any, ...]]) -> Iterator[tuple[str, int]]:

@@ -269,6 +269,60 @@ def test_a_damaged_schema_costs_no_row(tmp_path: Path, right: bytes, wrong: byte
         assert table_of(record, run).digest == whole
 
 
+PLACES: dict[str, Callable[[bytes], int]] = {  # of one changed bit in the first page
+    "the kind of the page": lambda _: 100,
+    "the list of its entries": lambda _: 108 + 2 * 5,
+    "the length of an entry": lambda page: page.index(b"tableposesposes") - 6,
+    "the number of pages in the file": lambda _: 31,
+    "the bytes of a page": lambda _: 16,
+}
+
+
+def with_bit(data: bytes, at: int, bit: int) -> bytes:
+    return data[:at] + bytes([data[at] ^ 1 << bit]) + data[at + 1 :]
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("bit", [0, 4])
+def test_one_changed_bit_beside_the_texts_of_the_schema_costs_no_row(tmp_path: Path, place: str, bit: int) -> None:
+    run = recorded(tmp_path, 3)
+    with Record(tmp_path) as record:
+        whole = table_of(record, run).digest
+    path = tmp_path / "record.db"
+    data = path.read_bytes()
+    path.write_bytes(with_bit(data, PLACES[place](data[:PAGE]), bit))
+    recovered = recover(path, tmp_path / "new")
+    assert (recovered.damaged, recovered.changed, recovered.spoilt) == ((), (), ())
+    with Record(tmp_path / "new") as record:
+        assert table_of(record, run).digest == whole
+
+
+def test_rows_of_a_table_whose_place_is_lost_are_reported(tmp_path: Path) -> None:
+    run = recorded(tmp_path, 3)
+    path = tmp_path / "record.db"
+    data = path.read_bytes()
+    path.write_bytes(with_bit(data, data.index(b"readingsreadings") + 16, 6))
+    assert recover(path, tmp_path / "new").damaged == ("readings",)
+    with Record(tmp_path / "new") as record:
+        assert (table_of(record, run).n, record.readings(run)) == (3, [])
+
+
+def test_rows_in_the_log_of_a_file_with_a_damaged_schema_are_recovered(tmp_path: Path) -> None:
+    run = recorded(tmp_path / "old", 3)
+    path = tmp_path / "old" / "record.db"
+    with closing(sqlite3.connect(path)) as open_file:
+        open_file.execute("PRAGMA wal_autocheckpoint = 0")
+        open_file.execute("UPDATE runs SET state = 'stopped', message = 'in the log'")
+        open_file.commit()
+        shutil.copytree(path.parent, tmp_path / "crashed")
+    assert (tmp_path / "crashed" / "record.db-wal").stat().st_size
+    crashed = tmp_path / "crashed" / "record.db"
+    crashed.write_bytes(with_bit(crashed.read_bytes(), 100, 3))
+    recover(crashed, tmp_path / "new")
+    with Record(tmp_path / "new") as record:
+        assert (record.run(run).message, table_of(record, run).n) == ("in the log", 3)
+
+
 def test_a_sound_schema_stays_as_it_is(tmp_path: Path) -> None:
     folder = tmp_path / "a" / "new" / "folder"
     run = recorded(folder, 1)
