@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from drivers.digital.frames import Frames
 from drivers.digital.reception import Batch, Reception, Tally, Thermometer, TimeBase
-from drivers.digital.settings import FORCES, DigitalSettings
+from drivers.digital.settings import FIELDS, FORCES, RATES, DigitalSettings
 from drivers.errors import BadFrame, DriverError, LimitError, LinkTimeout, OverRange, SensorFault, StreamError
 from drivers.instrument import Check
 from drivers.recorder import Recorder, Samples
@@ -25,7 +25,10 @@ from drivers.transport.link import Link
 Settings = TypeVar("Settings", bound=DigitalSettings)
 QUIET_S = 2.0  # silence that ends a record; at least ten samples
 POLL_S = 0.4  # samples that wait in the buffers of the system are read so often
-STUCK = 100  # equal samples of one axis in successive records, while another changes
+STUCK = 100  # equal samples of one axis in successive records, while another axis of the same kind changes
+LIVELY = (
+    4  # different values in a record: with less noise, a sound axis is constant between two steps of the resolution
+)
 RATE_OFF = 0.05  # of the stated rate
 TEST_S = 2.0
 ONE_G = {"g": 1.0, "m/s^2": 9.80665}
@@ -304,7 +307,10 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
             else:
                 since_s = start_s + (len(values) - count) / self.settings.rate_hz
                 self._equal[name] = EqualSamples(value, count, since_s)
-        return next((name for name in names if self._equal[name].count >= STUCK), "")
+        lively = {name for name, column in zip(names, values.T, strict=True) if len(np.unique(column)) >= LIVELY}
+        kinds = [kind for kind in (FORCES, RATES, FIELDS) if lively.intersection(kind)]
+        stuck = (name for kind in kinds for name in kind if name in names and self._equal[name].count >= STUCK)
+        return next(stuck, "")
 
 
 def _largest(values: NDArray[np.float64]) -> float:

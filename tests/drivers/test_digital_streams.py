@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from drivers.errors import SensorFault
 from drivers.imu_lines import driver as imu_lines
@@ -13,7 +16,7 @@ from drivers.transport.faults import Fault
 from drivers.world.config import WorldConfig
 from drivers.world.world import World
 from drivers.xsens_mti import driver as xsens_mti
-from tests.drivers.digital import DigitalSensors
+from tests.drivers.digital import DigitalSensors, Ramp
 
 SETTINGS = {"mavlink_imu": mavlink_imu.Settings, "xsens_mti": xsens_mti.Settings}
 
@@ -48,6 +51,37 @@ def test_the_equal_samples_at_the_end_of_a_record_count(digital: DigitalSensors,
     with pytest.raises(SensorFault, match=r"ax gave the same value 1\d\d times") as raised:
         adc.acquire(0.2)
     assert raised.value.since_s == pytest.approx(5.3, abs=0.02)
+
+
+class Coarse(Ramp):
+    """Outputs in steps of 0.01 with a noise of 0.1 steps; `ay` and `gy` are between two steps, `az` is noisier."""
+
+    def __init__(self, noise_az: float = 0.1) -> None:
+        self._random, self._noise_az = np.random.default_rng(1), noise_az
+
+    def sensed(self, outputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:
+        steps = self._random.normal(size=(n, len(outputs)))
+        steps *= [self._noise_az if name == "az" else 0.1 for name in outputs]
+        return 0.01 * np.round(steps + [0.5 if name[1] == "y" else 0.0 for name in outputs])
+
+
+@pytest.mark.parametrize("outputs", ["ax ay az", "gx gy gz", "ax ay supply"])
+def test_a_quiet_axis_in_coarse_steps_is_not_stuck(digital: DigitalSensors, outputs: str) -> None:
+    columns = {name: k for k, name in enumerate(["time", *outputs.split()], 1)}
+    adc = digital.connect("imu_lines", imu_lines.Settings(columns=columns, rate_hz=100.0), world=Coarse())
+    samples = adc.acquire(20.0)
+    assert (np.ptp(samples.volts, axis=0) == 0).tolist() == [name[1] != "y" for name in outputs.split()]
+
+
+def test_a_constant_axis_beside_a_noisy_one_is_stuck_and_a_constant_supply_is_not(digital: DigitalSensors) -> None:
+    columns = {"time": 1, "ax": 2, "az": 3, "supply": 4}
+    adc = digital.connect("imu_lines", imu_lines.Settings(columns=columns, rate_hz=100.0), world=Coarse(noise_az=3.0))
+    with pytest.raises(SensorFault, match="ax gave the same value"):
+        adc.acquire(2.0)
+    assert np.ptp(adc.only("az").acquire(2.0).volts) > 0
+    columns = {"time": 1, "az": 2, "supply": 3}
+    adc = digital.connect("imu_lines", imu_lines.Settings(columns=columns, rate_hz=100.0), world=Coarse(noise_az=3.0))
+    assert np.ptp(adc.acquire(2.0).volts, axis=0)[1] == 0
 
 
 @pytest.mark.parametrize("driver", ["imu_lines", *SETTINGS])
