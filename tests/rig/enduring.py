@@ -4,17 +4,17 @@ and goes on to the same end once the fault is gone. Used by a sample in the test
 
 from __future__ import annotations
 
+import math
 import random
 import zlib
 from functools import cache
 from typing import Any, Literal
 
-import numpy as np
-
+from drivers.digital.settings import FORCES
 from drivers.errors import DriverError
 from drivers.transport.faults import Fault, kinds_of
 from procedures.errors import ProcedureError
-from procedures.session import Reading
+from procedures.session import Dwell, Reading
 from rig.bench import Bench
 from rig.cli.terminal.failure import status_of
 from rig.record import KeptPose, Record
@@ -36,9 +36,11 @@ End = Literal["complete", "stopped", "not begun"]
 PROCEDURES = ON_STAGES
 BENCH = watched_bench()
 FAULTS = [(role, what) for role, part in BENCH.instruments.items() for what in kinds_of(part.driver)]
-SENSOR = {"outputs": ["ax", "ay"], "rate_hz": 100, "most_lost": 0.05}
+OUTPUTS = ["ax", "ay", "gx", "gy", "gz", "mx", "my", "mz"]
+SENSOR = {"outputs": OUTPUTS, "rate_hz": 100, "most_lost": 0.05}
+COLUMNS = {name: column for column, name in enumerate(["time", *OUTPUTS], 1)}
 OTHER_PARTS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {  # roles and settings of further drivers
-    "imu_lines": (("adc",), {"columns": {"time": 1, "ax": 2, "ay": 3}, "rate_hz": 100, "most_lost": 0.05}),
+    "imu_lines": (("adc",), {"columns": COLUMNS, "rate_hz": 100, "most_lost": 0.05}),
     "mavlink_imu": (("adc",), SENSOR),
     "xsens_mti": (("adc",), SENSOR),
     "scpi_meter": (("adc",), {"channels": {"vx": 101, "vy": 102}, "rate_hz": 10, "range_v": 10.0, "nplc": 0.02}),
@@ -51,6 +53,7 @@ FREE_RUNNING = {"imu_lines", "mavlink_imu", "xsens_mti"}  # a resumed run meets 
 OTHER_NOISE = {"delay", "endless", "trickle"}  # after which a run may go on, at other times: as good, but not the same
 NEAR_V = 5e-3  # of a dwell's mean: ten times its noise
 NEAR_DIGITAL = 0.05  # of a mean in g or m/s^2
+NEAR_NOISES = 8.0  # of a mean of a gyroscope or magnetometer in any unit: standard errors of a difference
 NEAR = {"deg": 0.05, "s": 1.0}  # of a reading; what is done again after a lost packet happens that much later
 
 
@@ -134,13 +137,23 @@ def _require_right(
     _, sound, readings, _ = expected
     kept = included(record, outcome.run.run)
     assert [each.pose for each in kept] == [each.pose for each in sound]
-    means = [[list(each.dwell.means.values()) for each in run] for run in (kept, sound)]
-    wrong = bool(kept) and bool(np.abs(np.subtract(*means)).max() > (NEAR_DIGITAL if digital else NEAR_V))
+    wrong = not all(_is_near(one.dwell, other.dwell, digital) for one, other in zip(kept, sound, strict=True))
     found = {reading.name: reading.value for reading in record.readings(outcome.run.run)}
     same = (reading for reading in readings if reading.unit in NEAR)  # not counts of lost samples
     wrong = wrong or any(abs(found[reading.name] - reading.value) > NEAR[reading.unit] for reading in same)
     marked = any(result["verdict"] == "fail" for result in outcome.run.results.values()) or outcome.run.message
     assert not wrong or marked, "a wrong number without a mark"
+
+
+def _is_near(one: Dwell, other: Dwell, digital: bool) -> bool:
+    """Whether two means of the same pose differ by no more than their noise allows."""
+
+    def most(name: str) -> float:
+        if not digital or name in FORCES:
+            return NEAR_DIGITAL if digital else NEAR_V
+        return NEAR_NOISES * math.hypot(one.stds[name], other.stds[name]) / math.sqrt(min(one.n, other.n))
+
+    return all(abs(mean - other.means[name]) <= most(name) for name, mean in one.means.items())
 
 
 def _require_safe(outcome: Outcome, role: str, fault: Fault, aftermath: Aftermath, driver: str) -> None:
