@@ -64,22 +64,62 @@ def profile(grams: Array, other_gram: Array, free: int, least: float) -> tuple[A
     free        rows; the parameters that this channel determines are subtracted
     least       smallest level
 
+    Columns that are zero in this channel, or in all others, do not depend on the level: they are eliminated before.
+
     Returns levels, sums of squares of this channel (before its level) and of the others, log det of the normal matrix.
     """
     n, p = len(grams), len(other_gram) - 1
+    in_own, in_others = np.zeros(p, dtype=np.bool_), np.zeros(p, dtype=np.bool_)
+    for k in range(p):
+        in_own[k], in_others[k] = grams[:, k, k].max() > 0, other_gram[k, k] > 0
+    own, others = np.flatnonzero(~in_others), np.flatnonzero(in_others & ~in_own)
+    shared = np.flatnonzero(in_own & in_others)
+    q = len(shared)
+    rounds = LEVEL_ROUNDS if q else 2  # parameters of one channel alone let its level settle at once
+    other_part, other_logdet = set_aside(other_gram, others, shared)
     levels, own_left, other_left, logdets = np.ones(n), np.zeros(n), np.zeros(n), np.zeros(n)
     for g in range(n):
-        gram = grams[g].copy()
-        for _ in range(LEVEL_ROUNDS):
-            scaled = gram / levels[g] ** 2
-            normal = scaled[:p, :p] + other_gram[:p, :p]
-            sides = np.hstack((scaled[:p, p:] + other_gram[:p, p:], scaled[:p, :p]))
-            solved, logdets[g] = eliminate(normal, sides)
+        own_part, own_logdet = set_aside(grams[g], own, shared)
+        for _ in range(rounds):
+            scaled = own_part / levels[g] ** 2
+            normal = scaled[:q, :q] + other_part[:q, :q]
+            sides = np.hstack((scaled[:q, q:] + other_part[:q, q:], scaled[:q, :q]))
+            solved, logdet = eliminate(normal, sides)
             theta = np.append(-solved[:, 0], 1.0)
-            own_left[g], other_left[g] = theta @ gram @ theta, theta @ other_gram @ theta
-            variance = max(own_left[g], 0.0) / max(free - np.trace(solved[:, 1:]), 1.0)
+            own_left[g], other_left[g] = theta @ own_part @ theta, theta @ other_part @ theta
+            logdets[g] = logdet + other_logdet + own_logdet - 2 * len(own) * np.log(levels[g])
+            variance = max(own_left[g], 0.0) / max(free - len(own) - np.trace(solved[:, 1:]), 1.0)
             levels[g] = max(np.sqrt(variance), least)
     return levels, own_left, other_left, logdets
+
+
+@njit(cache=True, nogil=True)
+def set_aside(gram: Array, first: NDArray[np.intp], others: NDArray[np.intp]) -> tuple[Array, float]:
+    """Products (k + 1, k + 1) of `others` and the last column after elimination of the columns `first` (Schur).
+
+    Also log |det| of `first`. Columns are brought to one size, as in `eliminate`.
+    """
+    m, count = len(first), len(first) + len(others) + 1
+    picked = np.append(np.append(first, others), len(gram) - 1)
+    size, U = np.empty(count), np.empty((count, count))
+    for i in range(count):
+        size[i] = np.sqrt(max(gram[picked[i], picked[i]], TINY))
+    for i in range(count):
+        for j in range(i, count):
+            U[i, j] = gram[picked[i], picked[j]] / (size[i] * size[j])
+        U[i, i] += RIDGE if i < count - 1 else 0.0
+    logdet = 0.0
+    for i in range(m):
+        logdet += np.log(abs(U[i, i])) + 2 * np.log(size[i])
+        for r in range(i + 1, count):
+            share = U[i, r] / U[i, i]
+            for j in range(r, count):
+                U[r, j] -= share * U[i, j]
+    left = np.empty((count - m, count - m))
+    for i in range(m, count):
+        for j in range(i, count):
+            left[i - m, j - m] = left[j - m, i - m] = U[i, j] * size[i] * size[j]
+    return left, logdet
 
 
 @njit(cache=True, nogil=True)
@@ -226,16 +266,16 @@ class NoiseSearch:
         return columns * fast, tuple(origin.tolist())
 
     def _extend_basis(self, group: Array, smooth: list[Array], first: Array) -> Array:
-        """Orthonormal columns (channels * n, rank) of the part that a group adds."""
+        """Orthonormal columns (channels * n, rank) of the part that a group adds.
+
+        Columns of few channels come first, so that they stay zero in the others: `profile` needs less time for these.
+        """
         free, shape = group / self.noise.fast[:, :, None], (self.residual.size, group.shape[2])
         size = np.linalg.norm(free.reshape(shape), axis=0)
         free = np.stack([free[c] - Q @ (Q.T @ free[c]) for c, Q in enumerate(smooth)]).reshape(shape)
-        basis = first
-        for k in range(free.shape[1]):
-            column = free[:, k] - basis @ (basis.T @ free[:, k])
-            column -= basis @ (basis.T @ column)
-            if np.linalg.norm(column) > NOT_SHOWN * size[k] > 0:
-                basis = np.column_stack([basis, column / np.linalg.norm(column)])
+        shown, _ = _orthonormalise(free, range(shape[1]), first, NOT_SHOWN * size)
+        channels = np.count_nonzero(group.any(axis=1), axis=0)
+        _, basis = _orthonormalise(free, sorted(shown, key=lambda k: channels[k]), first, np.zeros(shape[1]))
         return basis[:, first.shape[1] :]
 
     @cached_property
@@ -304,6 +344,22 @@ class NoiseSearch:
         return Best(np.array(ratio), taus_s, scale, deviance + square, tuple(pick))
 
 
+def _orthonormalise(columns: Array, order: Sequence[int], basis: Array, least: Array) -> tuple[list[int], Array]:
+    """The columns (n, k) that are longer than `least` (k,) beside the basis and those before, and the basis with them.
+
+    Gram and Schmidt's way, twice for each column: where columns are zero, their part of the basis is zero.
+    """
+    taken = []
+    for k in order:
+        column = columns[:, k] - basis @ (basis.T @ columns[:, k])
+        column -= basis @ (basis.T @ column)
+        length = np.linalg.norm(column)
+        if length > least[k]:
+            basis = np.column_stack([basis, column / length])
+            taken.append(k)
+    return taken, basis
+
+
 @dataclass(frozen=True)
 class Grams:
     """One channel's [J r]^T Sigma^-1 [J r], (grid, p + 1, p + 1), smooth columns set aside, and determinants."""
@@ -324,7 +380,11 @@ def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[Point], k: int,
     by_point = [processes(ratio * w, taus, known_noise) for ratio, taus in grid]
     counts = np.array([len(point) for point in by_point])
     padded = np.array([(*point, *((0.0, 1.0),) * (counts.max() - len(point))) for point in by_point])
-    gram, logdet = products(np.ascontiguousarray(columns), gap_s, fast, padded[..., 0], padded[..., 1], counts)
+    used = np.flatnonzero(columns.any(axis=0))  # parameters of other channels change nothing in this one
+    slow, tau_s = padded[..., 0], padded[..., 1]
+    part, logdet = products(np.ascontiguousarray(columns[:, used]), gap_s, fast, slow, tau_s, counts)
+    gram = np.zeros((len(grid), columns.shape[1], columns.shape[1]))
+    gram[:, used[:, None], used] = part
     if not k:
         return Grams(gram, logdet, np.zeros(len(grid)))
     S, cross = gram[:, :k, :k], gram[:, :k, k:]

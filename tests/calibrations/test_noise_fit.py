@@ -120,11 +120,13 @@ def test_the_likelihood_is_that_of_dense_matrices(seed: int) -> None:
     assert twice == pytest.approx(max(0.0, without.deviance - beside.deviance), abs=1e-7)
 
 
-def test_levels_of_two_channels_with_parameters_in_common() -> None:
+@pytest.mark.parametrize("own", [0, 1, 2], ids=lambda own: f"{own} of each channel alone")
+def test_levels_of_two_channels_with_parameters_in_common(own: int) -> None:
     """Too few rows for slow noise: the two levels alone, against a minimum over both by dense matrices."""
     rng = np.random.default_rng(6)
     n = 15
     J, r = rng.standard_normal((2, n, 5)), np.array([[1.0], [4.0]]) * rng.standard_normal((2, n))
+    J[0, :, 5 - own :], J[1, :, 1 : 1 + own] = 0.0, 0.0
 
     def restricted(log_std: Array) -> float:
         w = np.repeat(np.exp(-log_std), n)
