@@ -225,6 +225,11 @@ class LinearisedChain:
         return any("output" in effect.places for effect, _ in self.steps)
 
     @cached_property
+    def _needs_output_stage(self) -> bool:
+        """Whether the slope of the output stage at each row is not enough: it has memory, or makes a staircase."""
+        return self.table.type.moving or any(effect.rounds for effect, _ in self.steps)
+
+    @cached_property
     def _slope(self) -> Array:
         """d output / d the sum of all parts, where the output stage has no memory, shape (n, axes)."""
         total, axes = self._total, len(self.table.axes)
@@ -291,7 +296,7 @@ class LinearisedChain:
         part = stage_contribution(
             stage, partial(_apply_transduction, effect, self.table, values), self._sensed_force, self._forces[stage]
         )
-        return np.asarray(part * self._drift_of(effect))
+        return np.asarray(part * self._drift_of(effect) if self._scales else part)
 
     def output(self, term: int, values: Values) -> Array:
         """Output of the measured axes with other `values` of one effect, up to a constant, shape (n, axes).
@@ -383,7 +388,7 @@ class LinearisedChain:
     def _read_out(self, change: Array) -> Array:
         """Change of the output, shape (n, axes), by a small change of the sum of all parts, (n, 3)."""
         axes, n = len(self.table.axes), self.table.n
-        if self.table.type.moving or any(effect.rounds for effect, _ in self.steps):
+        if self._needs_output_stage:
             plus, minus = (
                 convert_output([self._total + s * change / 2], n, self.table, self.steps) for s in (1.0, -1.0)
             )
