@@ -127,9 +127,15 @@ def _sharpen_step(values: Array, step: float, offset: float, middle: float, widt
 
 
 def _measure_concentration(values: Array, frequencies: Array) -> Array:
-    """|mean of exp(2 pi i f V)| at each frequency."""
-    parts = [np.exp(2j * np.pi * np.outer(part, values)).mean(axis=1) for part in np.array_split(frequencies, 40)]
-    return np.asarray(np.abs(np.concatenate(parts)))
+    """|mean of exp(2 pi i f V)| at each of the frequencies, which are equally spaced.
+
+    Each is the sum of a coarse and a fine one, so that few exponentials and a product of matrices give all.
+    """
+    few = int(np.ceil(np.sqrt(len(frequencies))))
+    coarse, fine = (
+        np.exp(2j * np.pi * np.outer(part, values)) for part in (frequencies[::few], frequencies[:few] - frequencies[0])
+    )
+    return np.asarray(np.abs(coarse @ fine.T).ravel()[: len(frequencies)] / len(values))
 
 
 def before_stairs(table: Table, white: Array, stairs: Stairs) -> Table:
