@@ -325,11 +325,21 @@ def _frames_to_end(steps: Array) -> Array:
 
 
 def _rotations(vectors: Array) -> Array:
-    """Rotations by vectors (..., 3), rad, as matrices (..., 3, 3)."""
-    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
-    cross = np.cross(np.eye(3), vectors[..., None, :])
-    square = cross @ cross
-    return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * np.sinc(angle / 2 / np.pi) ** 2 * square)
+    """Rotations by vectors (..., 3), rad, as matrices (..., 3, 3): 1 + p [v] + q [v]^2, where [v] u = v x u."""
+    angle = np.sqrt(np.sum(vectors * vectors, axis=-1))
+    p, q = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / 2 / np.pi) ** 2
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    px, py, pz, qx, qy, qz = p * x, p * y, p * z, q * x, q * y, q * z
+    rows = (
+        (1 - qy * y - qz * z, qx * y - pz, qx * z + py),
+        (qx * y + pz, 1 - qx * x - qz * z, qy * z - px),
+        (qx * z - py, qy * z + px, 1 - qx * x - qy * y),
+    )
+    matrices = np.empty((*vectors.shape, 3))
+    for i, row in enumerate(rows):
+        for j, element in enumerate(row):
+            matrices[..., i, j] = element
+    return matrices
 
 
 def _rotation_vectors(matrices: Array) -> Array:
