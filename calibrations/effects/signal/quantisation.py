@@ -12,6 +12,7 @@ LEAST_NOISE = 1e-3  # of a step
 FINEST = 4.0  # points in a resolved interval of frequency
 MOST = 20_000  # frequencies
 CODES = 3  # to either side of the nearest one, that noise may reach
+UNREACHED = 9.0  # standard deviations of the noise: codes beyond have a share below rounding
 TOGETHER = 64  # frequencies of one block
 VISIBLE = 0.6  # of a step: more noise leaves a thousandth of the saw
 
@@ -74,6 +75,8 @@ def mean_of_rounded(values: Array, step: float, offset: float, noise: float) -> 
     deviation, spread = codes - nearest, noise / step
     mean = nearest
     for j in range(CODES):
+        if j > UNREACHED * spread:
+            break
         above, below = (deviation - 0.5 - j) / spread, (-deviation - 0.5 - j) / spread
         mean = mean + scipy.special.ndtr(above) - scipy.special.ndtr(below)
     return np.asarray(offset + step * mean)
