@@ -151,7 +151,13 @@ class Displacement(Strict):
     @field_validator("curve", mode="before")
     @classmethod
     def _load_shipped(cls, curve: Any) -> Any:
-        return Curve.from_file(SIMULATED_CURVE) if curve == SIMULATED else curve
+        return _simulated_curve() if curve == SIMULATED else curve
+
+
+@cache
+def _simulated_curve() -> Curve:
+    """The curve of the simulated sensor, which every simulated bench has."""
+    return Curve.from_file(SIMULATED_CURVE)
 
 
 class Folders(Strict):
