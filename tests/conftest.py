@@ -5,12 +5,13 @@ Where RIG_NO_SKIP is set, a skipped test fails the session.
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import os
 import platform
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from html import escape
 from pathlib import Path
 
@@ -83,6 +84,17 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     if os.environ.get("RIG_NO_SKIP") and reporter and reporter.stats.get("skipped") and not session.exitstatus:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
         reporter.write_line("RIG_NO_SKIP: a skipped test counts as failed", red=True)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Garbage is looked for in what the tests make, and not in the modules, which stay until the end."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 KNOWN_FAILURES = Path(__file__).with_name("known_failures.txt")
