@@ -15,17 +15,15 @@ demo: .venv/program
 
 # Worksteal: neighbours in a file run in one process, which then works out only once what they share.
 test: setup lint
-	$(BIN)/pytest -n auto --dist worksteal -m "not slow" --ignore tests/docs
+	$(BIN)/pytest -n auto --dist worksteal -m "not slow"
 
 test-all: test
 	$(BIN)/pytest -n auto --dist worksteal -m slow
 
-# The documentation is checked here: its links, its generated pages, the dependencies' ranges.
 lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
-	$(BIN)/pytest -m "not slow" tests/docs
 
 docs: setup
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
@@ -43,7 +41,7 @@ audit: setup
 setup: .venv/ready
 
 # Each stamp is newer than what it was made from, so that a second call starts at once. The demo needs the program alone,
-# and compiles those kernels that it uses.
+# and compiles those kernels that it uses. Mypy reads the types of the dependencies once, which takes it a minute.
 .venv/program: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
@@ -54,6 +52,7 @@ setup: .venv/ready
 	for tool in mbpoll gcc clang chromium; do [ "$$(id -u)" != 0 ] || command -v $$tool >/dev/null || { apt-get -qq update && apt-get -qq install -y $$tool || true; }; done
 	command -v chromium >/dev/null || $(BIN)/python -m playwright install chromium || true
 	$(BIN)/python -m rig.warm
+	$(BIN)/mypy >/dev/null || true
 	touch $@
 
 clean:
