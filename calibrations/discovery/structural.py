@@ -36,7 +36,7 @@ from calibrations.fitting.problem_kinds import make_problem
 from calibrations.fitting.requested_forms import BASE, effects_beyond_base
 from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
 from calibrations.free_forms.place_names import PREFIX
-from calibrations.free_forms.stairs import before_stairs, find_stairs, fit_stairs
+from calibrations.free_forms.stairs import before_stairs, find_stairs, fit_stairs, noise_of_rounded
 from calibrations.free_forms.structure import FloorSource, Structure, find_structure, with_stairs
 from calibrations.means.noise import rms, with_white
 from calibrations.model import Estimate
@@ -116,7 +116,9 @@ def _best_structure(base: Fit, effects: Mapping[str, Effect]) -> tuple[Fit, _Str
 
     With the fit that it is based on, and the source of the noise floor if the stated floor does not hold.
     """
-    from_stairs, remaining_share = _fit_before_stairs(base, effects)
+    stairs_base, from_stairs, remaining_share = _fit_before_stairs(base, effects)
+    if from_stairs is not None and stairs_base is not base:
+        return stairs_base, from_stairs, FloorSource.ROUNDED
     if from_stairs is not None and (from_stairs.end.held_out_excess <= MATERIAL or remaining_share < MOST_UNEXPLAINED):
         return base, from_stairs, None
     places = structure(base, effects)
@@ -243,32 +245,37 @@ def _with_renewed_forms(base: Fit, found: _StructureFit, effects: Mapping[str, E
     return renewed if renewed.end.held_out_excess < end.held_out_excess else found
 
 
-def _fit_before_stairs(base: Fit, effects: Mapping[str, Effect]) -> tuple[_StructureFit | None, float]:
-    """(fit of the effects before a coarse converter, remaining share of the excess variance); (None, 1) without stairs.
+def _fit_before_stairs(base: Fit, effects: Mapping[str, Effect]) -> tuple[Fit, _StructureFit | None, float]:
+    """The base, the fit of the effects before a coarse converter, and the remaining share of the excess variance.
+
+    None and 1 without stairs. Means that were rounded have a noise of their own, and so has the base.
 
     The search uses the outputs before their rounding. The share is that of the same effects without the converter. The
     edges of a coarse converter's steps magnify noise in front of it, so that the error may exceed the noise floor.
     """
     white = base.problem.white
     if STAIRS not in effects or base.model.holds(STAIRS) or white is None or "output" in base.table.left_out:
-        return None, 1.0
+        return base, None, 1.0
     stairs = find_stairs(base.table, base.table.outputs.T - base.residual, white)
     if stairs is None:
-        return None, 1.0
+        return base, None, 1.0
     smooth = fit(base.model, before_stairs(base.table, white, stairs))
     places = structure(smooth, effects)
     causes = fit_separately(smooth, places, additions(places, smooth.model, effects))
     forms = free_additions(places, smooth.model)
     stairs = fit_stairs(base.table, places.result.state.predicted, white, stairs)
+    if stairs.of_means:
+        white = noise_of_rounded(places.result.state.predicted, white, stairs)
+        base = fit(base.model, with_white(base.table, white))
     values = {"step": stairs.step, "offset": stairs.offset, "noise": stairs.noise}
     rounding = Addition(
         effects[STAIRS], {}, tuple(Estimate(name, "", value, None, "") for name, value in values.items())
     )
     end, unconverted = (fit_together(base, [*causes, *stage, *forms]) for stage in ([rounding], []))
     if unconverted.pooled_excess < NO_WORSE * end.pooled_excess:
-        return None, 1.0  # as well without: a regular sweep gathers outputs by itself
+        return base, None, 1.0  # as well without: a regular sweep gathers outputs by itself
     structure_fit = _StructureFit(with_stairs(places, base.residual, stairs, white), [*causes, rounding], forms, end)
-    return structure_fit, end.share_left(unconverted)
+    return base, structure_fit, end.share_left(unconverted)
 
 
 def _fit_each_axis(start: Fit, names: list[str], effects: Mapping[str, Effect]) -> Fit:

@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 import scipy  # its room of interpolation is loaded where it is first entered
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from calibrations.table import Array
 
@@ -198,6 +199,25 @@ class Clips:
 
 
 @dataclass(frozen=True)
+class Steps:
+    """A step of height 1 at each of `positions`, as the mean of samples with the standard deviation `width` has it."""
+
+    positions: tuple[float, ...]
+    width: float = 0.0
+    kind: Literal["steps"] = "steps"
+
+    @property
+    def count(self) -> int:
+        """Number of columns."""
+        return len(self.positions)
+
+    def __call__(self, x: Array) -> Array:
+        """Columns at x (n,), from -1/2 below to 1/2 above each step, shape (n, count)."""
+        beyond = x[:, None] - np.array(self.positions)
+        return np.asarray(ndtr(beyond / self.width) - 0.5 if self.width > 0 else np.sign(beyond) / 2)
+
+
+@dataclass(frozen=True)
 class Play:
     """Slip elements that follow x and slip at their widths, over the widths: hysteresis of any shape.
 
@@ -290,4 +310,4 @@ class Ramp:
         return np.column_stack([np.ones(len(x)), np.abs(x), x])
 
 
-Basis = Spline | Harmonics | Waves | Line | Settling | Clips | Play | Preisach | Products | Ramp
+Basis = Spline | Harmonics | Waves | Line | Settling | Clips | Steps | Play | Preisach | Products | Ramp

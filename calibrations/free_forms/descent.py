@@ -6,13 +6,15 @@ rounds take only large components: a small one may be a second-order remainder o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from calibrations.free_forms.chain import Coefficients, ModelEffects, State, base_size, start, state_at
 from calibrations.free_forms.components import Component
+from calibrations.free_forms.jumps import STEPS, find_jumps
 from calibrations.free_forms.places import components as all_components
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.reml import (
@@ -20,13 +22,13 @@ from calibrations.free_forms.reml import (
     Sizes,
     coefficients,
     estimate,
-    gain_of_columns,
     gram,
     scale_components,
     whiten,
     without,
 )
 from calibrations.free_forms.selection import ENTER, pools_of, prices, select
+from calibrations.free_forms.shapes import refine_shapes
 from calibrations.free_forms.stairs import find_saw
 from calibrations.progress import report
 from calibrations.table import Array
@@ -40,6 +42,8 @@ HALVINGS = 6  # of a step that overshoots
 SLOW_BEGIN = 0.1  # slow noise, in noise floors (rms): where its estimate starts
 SLOW_FIRST = 0.15  # the most slow noise while the first components are found: more would explain a part of them
 SLOW_MOST = 0.5  # at most
+JUMP_TRIALS = 2  # of steps over the output, in one descent
+MISFIT = 1.08  # mean square of the residual over the noise: from there on steps over the output are tried
 CAUTION = 30.0  # times the gain that a component needs after a step that failed
 
 
@@ -80,6 +84,21 @@ class Setting:
             point.state, self.model_effects, point.values, point.components, scales, self.white
         )
         return X, gram(X, blocks, all_scales, self.base_size)
+
+    @cached_property
+    def first_jumps(self) -> Component | None:
+        """Steps over the output beside everything smooth that these poses can show, whether it acts or not."""
+        values = start(self.data, self.model_effects)
+        state = self.state_at(values, ())
+        misfit = self.misfit(state)
+        if misfit < MISFIT:
+            return None
+        components = [c for c in all_components(self.data, state) if not c.general and not c.has_loops]
+        X, g = self.linearise(Point(components, {}, values, state), {})
+        X, scales = scale_components(X, g, self.base_size)
+        g = gram(X, g.blocks, scales, self.base_size)
+        sizes = estimate(g, {c.name: misfit * self.floor**2 for c in components}, {}, rounds=0)
+        return find_jumps(state, self.white, X, g, sizes)
 
     def misfit(self, state: State) -> float:
         """Mean square of the residual over the noise."""
@@ -233,10 +252,13 @@ def descend(
     """
     point = _begin(setting, general, loops) if origin is None else origin.point
     progress = _Progress(point, {})
-    first = 0 if origin is None else len(COARSE)
+    first, trials = 0 if origin is None else len(COARSE), 0
     for number in range(first, ROUNDS):
         report(f"searching for places ({step}), pass {number - first + 1} of at most {ROUNDS - first}")
         progress = _advance(setting, progress, number, catalogue_first)
+        if general and trials < JUMP_TRIALS and (progress.converged or number == ROUNDS - 3):
+            trials += 1
+            progress = _with_jumps(setting, progress)
         if progress.converged:
             break
     return finish(setting, progress.point, progress.scales, progress.limits or {})
@@ -261,8 +283,9 @@ def _begin(setting: Setting, general: bool, loops: bool) -> Point:
         if (general or not c.general) and (loops or not c.has_loops)
     ]
     saw = find_saw(data, state, setting.white, data.outputs - state.predicted, (), ENTER)
+    steps = setting.first_jumps
     slow = {c.name: (SLOW_BEGIN * setting.floor) ** 2 for c in components if c.noise}
-    return Point([*components, *([saw] if saw else [])], slow, values, state)
+    return Point([*components, *([saw] if saw else []), *([steps] if steps else [])], slow, values, state)
 
 
 def _advance(setting: Setting, progress: _Progress, number: int, catalogue_first: bool) -> _Progress:
@@ -303,12 +326,31 @@ def _advance(setting: Setting, progress: _Progress, number: int, catalogue_first
     return replace(progress, converged=not is_coarse and is_same and progress.change < CONVERGED)
 
 
+def _with_jumps(setting: Setting, progress: _Progress) -> _Progress:
+    """The descent with steps over the output to try, where the residual shows other ones than those that act."""
+    point = progress.point
+    if setting.misfit(point.state) < MISFIT:
+        return progress
+    X, g = setting.linearise(point, progress.scales)
+    sizes = estimate(g, point.variances, progress.limits or {})
+    beside = without(g, sizes, STEPS) if STEPS in sizes.variances else sizes
+    steps = find_jumps(point.state, setting.white, X, g, beside)
+    before = next((c for c in point.components if c.name == STEPS), None)
+    if steps is None or (before is not None and before.form == steps.form):
+        return progress
+    others = point.without({STEPS})
+    components = [*others.components, steps]
+    state = setting.state_at(others.values, others.components)
+    scales = {name: scale for name, scale in progress.scales.items() if name != STEPS}
+    return replace(progress, point=replace(others, components=components, state=state), scales=scales, converged=False)
+
+
 def _take_step(setting: Setting, point: Point, X: Array, g: Gram, sizes: Sizes, limits: Mapping[str, float]) -> Point:
     """The point after a Gauss-Newton step, with the shapes of the active components changed where that leaves less."""
     target = coefficients(g, sizes)
     values, state = take_damped_step(setting, point.values, target, point.components)
     moved = Point(point.components, sizes.variances, values, state)
-    reshaped = _refine_shapes(point, g, sizes, X, setting)
+    reshaped = refine_shapes(point.components, point.state, setting.white, X, g, sizes)
     if reshaped is None:
         return moved
     reshaped_g = setting.linearise(replace(point, components=reshaped), g.scales)[1]
@@ -348,46 +390,3 @@ def _midpoint(origin: Coefficients, end: Coefficients) -> Coefficients:
     zero = np.zeros(1)
     coefficients_by_name = {name: (origin.of.get(name, zero) + end.of.get(name, zero)) / 2 for name in names}
     return Coefficients((origin.base + end.base) / 2, coefficients_by_name)
-
-
-def _refine_shapes(point: Point, g: Gram, sizes: Sizes, X: Array, setting: Setting) -> list[Component] | None:
-    """The active components at their likeliest shapes, the others held; None: no change."""
-    reshaped_components = list(point.components)
-    is_reshaped = False
-    for i, comp in enumerate(point.components):
-        if comp.name not in sizes.variances or comp.reshaped is None:
-            continue
-        gain = gain_of_columns(g, without(g, sizes, comp.name), X, setting.base_size)
-
-        def gained(shape: tuple[float, ...], comp: Component = comp, gain: Callable[[Array], float] = gain) -> float:
-            assert comp.reshaped is not None  # noqa: S101 checked above
-            J = comp.reshaped(shape).jacobian(point.state) / g.scales[comp.name] / setting.white[:, :, None]
-            return gain(J.reshape(-1, J.shape[2]))
-
-        best = climb(gained, comp.shape, comp.step)
-        if best != comp.shape:
-            reshaped_components[i] = comp.reshaped(best)
-            is_reshaped = True
-    return reshaped_components if is_reshaped else None
-
-
-def climb(
-    gained: Callable[[tuple[float, ...]], float], shape: tuple[float, ...], step: tuple[float, ...]
-) -> tuple[float, ...]:
-    """The shape of greatest gain nearby: each value in turn, by a parabola through three points, steps halved."""
-    best, top = list(shape), gained(shape)
-    for _ in range(3):
-        for k in range(len(best)):
-            size = step[k]
-            for _ in range(5):
-                sides = []
-                for sign in (-1.0, 1.0):
-                    trial = tuple(v + sign * size if j == k else v for j, v in enumerate(best))
-                    sides.append((gained(trial), trial))
-                value, trial = max(sides)
-                if value > top:
-                    top, best = value, list(trial)
-                else:
-                    size *= 0.4
-        step = tuple(0.2 * s for s in step)
-    return tuple(best)

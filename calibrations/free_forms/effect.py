@@ -253,6 +253,8 @@ def _explain_exclusion(forms: tuple[Form, ...]) -> str:
         return "it follows the standard deviation of the samples of a mean"
     if any(form.driver == "temperature" and form.bases[0].kind == "play" for form in forms):
         return "it remembers earlier temperatures; add temperature-hysteresis in its stead"
+    if any(form.bases[0].kind == "steps" for form in forms):
+        return "it jumps where bits of the converter change, and a jump has no inverse"
     if any(form.factor == "side" or form.bases[0].kind in ("play", "preisach") for form in forms):
         return "it follows the way of the stage to each pose"
     return ""

@@ -9,8 +9,10 @@ import numpy as np
 from scipy.special import chdtrc  # scipy.stats takes 0.4 s to load
 
 from calibrations.free_forms.components import Component
-from calibrations.free_forms.descent import SearchResult, climb
+from calibrations.free_forms.descent import SearchResult
+from calibrations.free_forms.jumps import STEPS
 from calibrations.free_forms.rivals import gain_and_rivals, replacements_of
+from calibrations.free_forms.shapes import climb
 from calibrations.table import Array
 
 FIRST_FORM = 0.2  # of a place's variance: the least that the first form must explain
@@ -31,7 +33,11 @@ CLEARLY_LESS = 1.5  # ratio of the rms residuals of two effects from which one o
 READING_ERRORS = 1.5  # times the residual by the errors of noisy columns, whose size is uncertain
 FOLLOWS = 0.97  # of the variance of a curve over time that a line over a column explains: then the column is the cause
 FOLLOWERS = {"time-bias": ("temperature-bias", "column:std"), "time-scale": ("temperature-scale",)}
-FORM_OF = 0.25  # of a larger place's size: a smaller place may be a part of its form
+CANCELLED = 3.0  # of what the base leaves: a larger place is cancelled by another one, and neither has the true curve
+FORM_OF = 0.25  # of another place's size: a place of which no more is its own may be a part of that place's form
+
+
+Curves = Mapping[str, Array]  # of each place, over the noise, without its projection on the base
 
 
 @dataclass(frozen=True)
@@ -83,27 +89,38 @@ def places(result: SearchResult) -> list[ActingPlace]:
         place: _project_off(Q, np.sum([_part(result, n, b) for n in names], axis=0))
         for place, names in by_place.items()
     }
-    acting_places = [_acting_place(result, place, names, curves, Q) for place, names in by_place.items()]
+    sizes = {place: float(np.sqrt(np.mean(curve**2))) for place, curve in curves.items()}
+    own_sizes = {place: _size_of_unshared_part(result, result.cost_without(names)) for place, names in by_place.items()}
+    sizes |= {place: own_sizes[place] for place, curve in curves.items() if _is_cancelled(result, curve)}
+    acting_places = [_acting_place(result, place, names, curves, sizes, Q) for place, names in by_place.items()]
     return _with_substitutes(result, sorted(acting_places, key=lambda p: -p.size))
 
 
+def _is_cancelled(result: SearchResult, curve: Array) -> bool:
+    """Whether a place adds far more than there is to explain, which another place takes off again."""
+    return float(curve @ curve) > CANCELLED**2 * result.gram.squares
+
+
 def _acting_place(
-    result: SearchResult, place: str, names: Sequence[str], curves: Mapping[str, Array], Q: Array
+    result: SearchResult, place: str, names: Sequence[str], curves: Curves, sizes: Mapping[str, float], Q: Array
 ) -> ActingPlace:
     """One place, of which the components `names` act, with its causes and what the data cannot separate from them."""
-    sizes = {each: float(np.sqrt(np.mean(curve**2))) for each, curve in curves.items()}
     size, largest = sizes[place], max(sizes.values())
     causes, share, constants = _causes_of_place(result, place, names, curves, Q)
-    gain, alternatives = gain_and_rivals(result, names, {other for other in sizes if size < FORM_OF * sizes[other]})
+    causes = () if _is_cancelled(result, curves[place]) else causes
+    own = _size_of_unshared_part(result, result.cost_without(names))
+    part = own if all(result.component(name).form for name in names) else size  # a curve was preferred to a known form
+    gain, alternatives = gain_and_rivals(result, names, {other for other in sizes if part < FORM_OF * sizes[other]})
     replacements = [replacements_of(result, names, causes, cause) for cause in causes] if len(names) > 1 else []
     alternatives = tuple(sorted({*alternatives, *(name for each in replacements for name in each)} - set(causes)))
-    own = _size_of_unshared_part(result, gain)
     least = LEAST_SHARE * largest
     if _all_walk(names):
         least = max(LEAST_UNKNOWN_SHARE * largest, READING_ERRORS * _reading_errors(result, sizes))
+    elif STEPS in names:  # their positions are those of the residual: they also follow the corners of a larger place
+        least = LEAST_UNKNOWN_SHARE * largest
     # a place without a form of the catalogue, or smaller than the excess of the residual, is more often a remainder
     least_own = min(LEAST_SIZE, max(LEAST_OWN, _excess(result))) if causes else LEAST_SIZE
-    material = own >= least_own and size >= max(LEAST_SIZE, least)
+    material = own >= least_own and size >= max(least_own, least)
     curve = curves[place].reshape(result.white.shape) * result.white
     return ActingPlace(
         place, size, own, largest, tuple(names), causes, share, material, gain, alternatives, curve, constants
@@ -116,12 +133,12 @@ def _all_walk(names: Sequence[str]) -> bool:
 
 
 def _causes_of_place(
-    result: SearchResult, place: str, names: Sequence[str], curves: Mapping[str, Array], Q: Array
+    result: SearchResult, place: str, names: Sequence[str], curves: Curves, Q: Array
 ) -> tuple[tuple[str, ...], float, tuple[tuple[str, float], ...]]:
     """The causes of a place's curve, their share of its variance, and constants of a cause that is of another place."""
     causes, share = _name_effects(result, place, names, curves[place], Q, result.setting.base_size)
     walks = _all_walk(names)
-    if walks or not any(result.component(name).cause for name in names):  # no form of the catalogue acts
+    if walks or not causes or not any(result.component(name).cause for name in names):
         followed = _find_followed_column(result, curves, place, Q, 0.0 if walks else share)
         if followed is not None:
             return (followed[0].cause,), followed[1], followed[0].constants
@@ -281,7 +298,7 @@ def _one_name(
 
 
 def _find_followed_column(
-    result: SearchResult, curves: Mapping[str, Array], place: str, Q: Array, share: float
+    result: SearchResult, curves: Curves, place: str, Q: Array, share: float
 ) -> tuple[Component, float] | None:
     """The line over a temperature or a logged column that a curve over time follows, and its share of the variance.
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from calibrations.effects.signal.saturation import beyond
 from calibrations.free_forms.bases import Clips, Harmonics, Play, Preisach, Products, Ramp, spline
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import (
@@ -36,6 +37,7 @@ LOOPS_G = (0.02, 0.06, 0.15, 0.35, 0.8)  # half widths of the loops of a Preisac
 LOOP_INTERVALS = 8
 DEAD_G = (0.003, 0.012, 0.05)
 THRESHOLDS_G = tuple(np.geomspace(0.002, 0.2, 8).tolist())  # of dead zones that are not all of one width
+KNEE_G = 0.005  # width of the bend where the search for it starts
 ENDS = (0.75, 0.9, 0.97, 0.99)  # of an axis's range, where saturation begins
 DEGREE = 4  # of a general function of the force's direction
 FEWEST_ANGLES, FINE_ANGLES = 8, 33  # different angles beta that can show harmonics, and fine ones
@@ -148,7 +150,7 @@ def _saturations(data: PoseData, first: State) -> list[Component]:
     def make_saturation(name: str, side: int) -> Make:
         return lambda shape: Component(
             name, place, "response", "saturation", f"{place}/saturation", price, _saturation_columns(shape, side),
-            shape=shape, step=(0.02,) * len(shape), reshaped=make_saturation(name, side),
+            shape=shape, step=(*(0.02,) * (len(shape) - 1), KNEE_G), reshaped=make_saturation(name, side),
             starts=lambda loss: (*_levels(first, shape, side), ("loss", "", float(np.clip(-loss[0], 0.01, 1.0)))),
         )  # fmt: skip
 
@@ -161,13 +163,17 @@ def _saturations(data: PoseData, first: State) -> list[Component]:
                 for high, low in levels
                 for level in ((high, low) if side == 0 else (high,) if side > 0 else (low,))
             )
-            components.append(make_saturation(f"{place}/saturation@{name}{end}", side)(shape))
+            components.append(make_saturation(f"{place}/saturation@{name}{end}", side)((*shape, KNEE_G)))
     return components
 
 
 def _levels(first: State, shape: tuple[float, ...], side: int) -> tuple[tuple[str, str, float], ...]:
-    """The outputs at which saturation begins, from its specific forces, g; the end of the outputs on the other side."""
-    start_values: list[tuple[str, str, float]] = []
+    """The outputs at which saturation begins, from its specific forces, g; the end of the outputs on the other side.
+
+    And the width of the bend, the last value of the shape.
+    """
+    gain = float(np.mean([abs(np.polyfit(f, v, 1)[0]) for f, v in zip(first.force.T, first.response, strict=False)]))
+    start_values: list[tuple[str, str, float]] = [("knee", "", gain * abs(shape[-1]))]
     for k, axis in enumerate(first.data.axes):
         slope, offset = np.polyfit(first.force[:, k], first.response[k], 1)
         outputs = first.data.outputs[k]
@@ -181,11 +187,15 @@ def _levels(first: State, shape: tuple[float, ...], side: int) -> tuple[tuple[st
     return tuple(start_values)
 
 
-def _saturation_columns(levels: tuple[float, ...], side: int) -> Columns:
+def _saturation_columns(shape: tuple[float, ...], side: int) -> Columns:
     """Loss of output above the high level and below the low one of each channel, g; one share for all levels.
+
+    `shape`: the levels, and the width of the bend there.
 
     Often a single pose at the end of an axis's range shows a level: so the share of loss is common to all ends.
     """
+
+    levels, knee = shape[:-1], abs(shape[-1])
 
     def columns(s: State) -> Array:
         matrices = np.zeros((s.data.channels, s.data.n, 1))
@@ -193,9 +203,9 @@ def _saturation_columns(levels: tuple[float, ...], side: int) -> Columns:
             a = s.force[:, k]
             gain = float(np.polyfit(a, s.response[k], 1)[0]) if np.ptp(a) > 0 else 1.0
             if side == 0:
-                clipped = np.maximum(a - levels[2 * k], 0.0) + np.minimum(a - levels[2 * k + 1], 0.0)
+                clipped = beyond(a - levels[2 * k], knee) - beyond(levels[2 * k + 1] - a, knee)
             else:
-                clipped = np.maximum(a - levels[k], 0.0) if side > 0 else np.minimum(a - levels[k], 0.0)
+                clipped = side * beyond(side * (a - levels[k]), knee)
             matrices[k, :, 0] = gain * clipped
         return matrices
 

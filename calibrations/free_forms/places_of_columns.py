@@ -81,7 +81,8 @@ def over_columns(data: PoseData, first: State) -> list[Component]:
     components: list[Component] = []
     if "supply_v" in table and np.ptp(table.column("supply_v")) > 0:
         for supply in _readings(table, ("supply_v",)):
-            components += [_supply_component(supply), *_over_column("column:supply_v", supply, first)]
+            cause = "supply-sensitivity"  # IEEE Std 1293: of the bias, and of the scale factor
+            components += [_supply_component(supply), *_over_column("column:supply_v", supply, first, cause)]
     if data.spread is not None and np.all(np.ptp(data.spread, axis=1) > 0):
         for squares in _readings(table, table.std_names, power=2):
             components += _vibration_components(squares, first)
@@ -118,8 +119,8 @@ def _vibration_components(squares: Reading, first: State) -> list[Component]:
     ]  # fmt: skip
 
 
-def _over_column(place: str, reading: Reading, first: State) -> list[Component]:
-    """Bias and scale factor over a logged column, as a line and as a curve."""
+def _over_column(place: str, reading: Reading, first: State, cause: str = "") -> list[Component]:
+    """Bias and scale factor over a logged column, as a line, which is a form of the `cause`, and as a curve."""
     (x,) = reading.values
     line, curve = (Line(float(x.min()), float(x.max())),), (spline(x, 8),)
     factors: tuple[tuple[str, Factor, float], ...] = (("", "", 0.0), ("scale-", "force", PRODUCT))
@@ -128,5 +129,10 @@ def _over_column(place: str, reading: Reading, first: State) -> list[Component]:
         for kind, bases in (("line", line), ("curve", curve)):
             form = Form(place, reading.component_name(f"{prefix}{kind}"), place, bases, factor, level=reading.is_level)
             family = f"{place}/{prefix}{kind}"
-            components.append(free(form, first, price=price + reading.price, family=family, error=reading.error))
+            components.append(
+                free(
+                    form, first, cause if kind == "line" else "",
+                    price=price + reading.price, family=family, error=reading.error,
+                )
+            )  # fmt: skip
     return components

@@ -9,6 +9,7 @@ import numpy as np
 from calibrations.free_forms.chain import Coefficients
 from calibrations.free_forms.components import Component
 from calibrations.free_forms.descent import SearchResult
+from calibrations.free_forms.jumps import STEPS
 from calibrations.free_forms.reml import Sizes, gain_of_columns, gains
 
 CLOSE = 10.0  # of -2 log likelihood: the data cannot separate two causes that differ by less
@@ -61,7 +62,7 @@ def _gain_at_state_without(result: SearchResult, reduced: Sizes, names: Sequence
 def replacements_of(result: SearchResult, names: Sequence[str], causes: Sequence[str], cause: str) -> tuple[str, ...]:
     """Catalogue effects of other places whose gain, with the other causes present, is nearly that of `cause` or more.
 
-    Free forms are left out, because with them no form of the catalogue is needed.
+    Free forms are left out, because with them no form of the catalogue is needed; but not steps, the converter's own.
     """
     acting_components = [result.component(name) for name in names]
     other_causes = {c.name for c in acting_components if c.form is None and c.cause in causes and c.cause != cause}
@@ -71,7 +72,7 @@ def replacements_of(result: SearchResult, names: Sequence[str], causes: Sequence
         c
         for c in result.components
         if c.cause
-        and c.form is None
+        and (c.form is None or c.name == STEPS)
         and not c.noise
         and (c.name in names or c.name not in result.sizes.variances)
         and (c.cause == cause if c.place == place else c.name not in names)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from calibrations.effects.signal.quantisation import mean_of_rounded
 from calibrations.free_forms.chain import State
@@ -26,6 +27,10 @@ POINTS = 4.0  # in a resolved interval of frequency
 MOST_FREQUENCIES = 20_000  # frequencies
 GATHERED = 0.28  # more than the linear model's outputs gather at the same codes: |mean of exp(2 pi i V / step)|
 BY_CHANCE = 3.0  # times the most that outputs at random gather: sqrt(log(frequencies) / outputs)
+SAME_CODE = 1e-9  # of the range: a smaller difference is one of rounded numbers
+VISIBLE_ROUNDING = 1.0  # noise of a mean, in a step from which its rounding error is not small beside the noise
+REACHED = 3  # codes to either side of the nearest one, that noise may reach
+AT_CODE = 0.02  # of a step: how far a mean at a code may be away from it
 FINEST = 3.0  # sample noises in a step: the mean of finer steps has no visible error
 SAME_REMAINDER = (
     0.4  # of the outputs, beyond an equal share: at codes of one remainder; some lie on the edge between two
@@ -45,11 +50,15 @@ SAW_VISIBLE = 2.0  # steps' frequency times the noise of a sample: beyond, nothi
 
 @dataclass(frozen=True)
 class Stairs:
-    """Height of a step, offset of a code, and the noise of a sample, in the output's unit."""
+    """Height of a step, offset of a code, and the noise before the rounding, in the output's unit.
+
+    `of_means`: whether means were rounded, as in a file with few digits; else samples, of which a mean is taken.
+    """
 
     step: float
     offset: float
     noise: float
+    of_means: bool = False
 
     @property
     def rms(self) -> float:
@@ -64,6 +73,9 @@ def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
 
     A sweep's own regular angles gather outputs as well: the linear model has the same angles and no stairs.
     """
+    rounded_means = _stairs_of_means(table.outputs, float(np.sqrt(np.mean(white**2))))
+    if rounded_means is not None:
+        return rounded_means
     noise = float(np.median(table.optional(table.std_names[0], 0.0)))
     values, span = table.outputs.T.ravel(), float(np.ptp(table.outputs)) or 1.0
     highest = min(1 / (FINEST * noise) if noise > 0 else np.inf, MOST_FREQUENCIES / POINTS / span)
@@ -82,6 +94,40 @@ def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
     width = max(3 * float(np.sqrt(np.mean(white**2))), 0.01 * step)
     step, offset = _sharpen_step(values, step, offset, middle, width)
     return Stairs(step, offset, noise or _sample_noise(table.outputs.T, white, step, offset))
+
+
+def _stairs_of_means(outputs: Array, white: float) -> Stairs | None:
+    """The stairs where every mean is at a code itself: means that were logged with few digits; else None.
+
+    `white`: noise of a mean, which is then the noise before the rounding. Steps whose rounding error is small beside it
+    are those of the digits of any file.
+    """
+    values = np.unique(outputs)
+    gaps = np.diff(values)
+    gaps = gaps[gaps > SAME_CODE * np.ptp(values)]
+    if not len(gaps) or gaps.min() < VISIBLE_ROUNDING * white:
+        return None
+    codes = np.concatenate([[0.0], np.cumsum(np.round(np.diff(values) / gaps.min()))])
+    if codes[-1] < FEWEST_STEPS:
+        return None
+    step, offset = np.polyfit(codes, values, 1)
+    if np.abs(values - offset - step * codes).max() > AT_CODE * step:
+        return None
+    return Stairs(float(step), float(offset), white, of_means=True)
+
+
+def noise_of_rounded(values: Array, white: Array, stairs: Stairs) -> Array:
+    """Standard deviation of a rounded mean about its expectation, and at least the noise before the rounding.
+
+    values, white   expected mean before the rounding, and its noise, (channels, n)
+    """
+    deviation = (values - stairs.offset) / stairs.step
+    deviation, spread = deviation - np.round(deviation), white / stairs.step
+    codes = np.arange(-REACHED, REACHED + 1)
+    edges = (np.append(codes, REACHED + 1) - 0.5 - deviation[..., None]) / spread[..., None]
+    shares = np.diff(ndtr(edges), axis=-1)
+    variance = shares @ codes**2 - (shares @ codes) ** 2
+    return np.asarray(np.maximum(stairs.step * np.sqrt(np.maximum(variance, 0.0)), white))
 
 
 def _sample_noise(outputs: Array, white: Array, step: float, offset: float) -> float:
@@ -173,7 +219,7 @@ def fit_stairs(table: Table, unrounded: Array, white: Array, stairs: Stairs) -> 
     grid = np.linspace(-0.1, 0.1, 21)
     start = min(((a, b) for a in grid for b in grid), key=lambda u: float(np.sum(np.abs(residual(np.array(u))))))
     step = stairs.step * (1 + start[1] * stairs.step / float(np.ptp(outputs)))
-    return Stairs(step, code + start[0] * stairs.step - begins * step, stairs.noise)
+    return replace(stairs, step=step, offset=code + start[0] * stairs.step - begins * step)
 
 
 def find_saw(

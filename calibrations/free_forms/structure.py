@@ -43,6 +43,7 @@ class FloorSource(StrEnum):
 
     SAMPLES = "the standard deviation and the number of samples of each mean"
     NEIGHBOURS = "neighbouring poses differ by so much, and the noise of a mean is not stated"
+    ROUNDED = "the means are logged in steps so large that noise moves them from one code to the next"
     CONTRADICTED = "the standard deviations of the samples contain more than noise"
 
 
@@ -65,12 +66,15 @@ class Structure:
         and a geometry only if it is larger than the linear part that the unknown curve may have.
         """
         largest = max((place.size for place in self.unknown), default=0.0)
+        least_own = max((place.own for place in self.unknown), default=0.0)
         cause_names: list[str] = []
-        for place in self.places:
-            if place.material and (place.size >= largest or (place.share >= SEEN_FORM and not self._follows(place))):
+        for place in sorted(self.places, key=lambda p: -p.own):  # of two that share a curve, the one that explains more
+            is_larger = place.size >= largest and place.own >= least_own
+            if place.material and (is_larger or (place.share >= SEEN_FORM and not self._follows(place))):
                 cause_names += [c for c in place.causes if not self._is_confounded(c, cause_names)]
+        by_size = [c for place in self.places for c in place.causes if c in cause_names]
         visible = [c for c in self.geometry.causes if self.geometry.sizes[c] >= LINEAR_PART * largest]
-        return tuple(dict.fromkeys([*cause_names, *visible]))
+        return tuple(dict.fromkeys([*by_size, *visible]))
 
     def _follows(self, place: ActingPlace) -> bool:
         """Whether a place acts by components that follow many things: branches, slip elements, a random walk."""
@@ -198,7 +202,7 @@ def with_size(form: Form, size: float, mean_squares: Array, channels: int) -> Fo
     for k in range(channels):
         count = form.count(k)
         tail_squares = np.cumsum(mean_squares[start : start + count][::-1])[::-1]  # from each column on
-        is_indivisible = form.basis(k).kind in ("clips", "play", "preisach", "products", "ramp")
+        is_indivisible = form.basis(k).kind in ("clips", "steps", "play", "preisach", "products", "ramp")
         sizes.append(size if count else 0.0)
         counts.append(count if is_indivisible else max(min(count, 1), int(np.sum(tail_squares > KEPT**2))))
         start += count

@@ -204,9 +204,12 @@ def _dead_zone(columns: Columns, a: Array) -> Array:
     return linear(np.sign(a[:2]) * np.maximum(np.abs(a[:2]) - width, 0.0))
 
 
-@made("saturation", high__x=3.3, high__y=3.25, low__x=1.7, low__y=1.8, loss=1.0)
+@made("saturation", high__x=3.3, high__y=3.25, low__x=1.7, low__y=1.8, loss=1.0, knee=0.02)
 def _saturation(columns: Columns, a: Array) -> Array:
-    return np.clip(linear(a), [[1.7], [1.8]], [[3.3], [3.25]])
+    q = (np.arange(2000) + 0.5) / 2000
+    shifts = 0.02 * np.log(q / (1 - q))  # the levels of 2000 parts of the amplifier, spread about their mean
+    low, high = np.array([1.7, 1.8])[:, None, None], np.array([3.3, 3.25])[:, None, None]
+    return np.asarray(np.mean(np.clip(linear(a)[..., None], low + shifts, high + shifts), axis=-1))
 
 
 @made("warm-up-bias", amplitude__x=0.004, amplitude__y=-0.003, time_constant=300.0)

@@ -10,7 +10,15 @@ import pytest
 from scipy.stats import norm
 
 import calibrations as cal
-from calibrations.free_forms.stairs import SAW_REJECTIONS, before_stairs, find_saw, find_stairs, fit_stairs
+from calibrations.free_forms.stairs import (
+    SAW_REJECTIONS,
+    Stairs,
+    before_stairs,
+    find_saw,
+    find_stairs,
+    fit_stairs,
+    noise_of_rounded,
+)
 from calibrations.table import Array, Table
 from tests.calibrations.synthetic import components, turns
 
@@ -57,6 +65,43 @@ def test_the_noise_of_samples_that_mostly_are_one_code_is_that_of_the_means() ->
     found = find_stairs(replace(measured, columns=columns), values, white(values, 0.001))
     assert found is not None
     assert found.noise == pytest.approx(0.001, rel=0.3)
+
+
+def few_digits(values: Array, step: float, noise: float) -> Table:
+    """Means with such noise of a sample, logged as multiples of the step."""
+    measured = table(values, 0.0, noise)
+    rounded = {name: step * np.round(measured.column(name) / step) for name in ("vx_v", "vy_v")}
+    return replace(measured, columns={**measured.columns, **rounded})
+
+
+@pytest.mark.parametrize("step", [0.002, 0.01])
+def test_means_that_were_logged_with_few_digits_are_stairs(step: float) -> None:
+    found = find_stairs(few_digits(before(), step, 0.004), before(), white(before(), 0.004))
+    assert found is not None
+    assert found.of_means
+    assert found.step == pytest.approx(step, rel=1e-4)
+
+
+def test_the_digits_of_a_file_are_no_stairs_where_noise_is_larger() -> None:
+    assert find_stairs(few_digits(before(), 1e-5, 0.004), before(), white(before(), 0.004)) is None
+
+
+def test_the_noise_of_rounded_means_is_that_of_draws() -> None:
+    stairs = Stairs(0.01, 0.003, 0.001, of_means=True)
+    values = 0.003 + 0.01 * np.linspace(-0.5, 0.5, 11)[None]
+    draws = values[..., None] + 0.001 * NORMAL
+    drawn = np.std(stairs.offset + stairs.step * np.round((draws - stairs.offset) / stairs.step), axis=2)
+    noise = noise_of_rounded(values, np.full(values.shape, 0.001), stairs)
+    np.testing.assert_allclose(noise, np.maximum(drawn, 0.001), rtol=0.02)
+
+
+def test_a_tilt_is_found_behind_means_of_few_digits() -> None:
+    x, y, z = components(POSES)
+    values = np.stack([2.5 + 0.98 * (a + 0.004 * z + 0.002 * b) for a, b in ((x, y), (y, -x))])
+    found = cal.discover(few_digits(values, 0.004, 0.004), "linear")
+    assert set(found.causes) == {"quantisation", "axis-misalignment"}
+    assert found.findings.end.held_out_excess < 1.25
+    assert any("logged in steps" in remark for remark in found.findings.remarks)
 
 
 def test_outputs_that_are_not_rounded_have_no_stairs() -> None:

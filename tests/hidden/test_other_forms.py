@@ -70,6 +70,13 @@ def bent(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
     return v + VOLTS * poses.a**3 * np.array([1.0, 0.8])
 
 
+def limited(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """A servo loop whose force ends gradually at 0.96 g, as the 25-norm of the demand and the limit."""
+    limit_v = 0.96
+    demand = v - 2.5
+    return 2.5 + demand / (1 + np.abs(demand / limit_v) ** 25) ** (1 / 25)
+
+
 def found_with(cause: sampled.Cause) -> Discovery:
     return discover(sampled.measured(4, cause), read_model("linear"))
 
@@ -87,6 +94,26 @@ def test_a_place_of_one_effect_names_it_in_another_form() -> None:
     found = found_with(leaking)
     assert found.causes == ("temperature-bias",)
     assert found.steps[-1].name == "free:temperature-bias"
+    assert found.steps[-1].held_out_after < 1.15
+
+
+def test_a_limit_that_is_reached_gradually_is_a_saturation_with_a_wide_bend() -> None:
+    found = found_with(limited)
+    assert found.causes == ("saturation",)
+    assert found.steps[-1].held_out_after < 1.15
+    assert found.model.value("saturation.knee") > 0.005
+
+
+def test_a_supply_that_changes_bias_and_scale_factor_apart_has_one_name() -> None:
+    table = sampled.measured(6)
+    supply = 5 + 0.02 * np.sin(np.linspace(0, 9, table.n)) + 0.01 * np.cos(np.linspace(0, 31, table.n))
+    forces = (table.outputs - 2.5) / table.outputs.std(axis=0)
+    added = (supply - 5)[:, None] * (np.array([0.1, -0.06]) + 0.04 * forces)
+    found = discover(
+        replace(table, columns={**table.columns, "supply_v": supply}).with_outputs(table.outputs + added),
+        read_model("linear"),
+    )
+    assert found.causes == ("supply-sensitivity",)
     assert found.steps[-1].held_out_after < 1.15
 
 
