@@ -25,7 +25,7 @@ import numpy as np
 from scipy.special import chdtri  # scipy.stats takes 0.4 s to load
 
 from calibrations.criteria import LEAST_NOISE, NO_SCATTER, SIGNIFICANT
-from calibrations.means.whitening import whiten, whiten_transposed
+from calibrations.means.kernels import whiten, whiten_transposed
 from calibrations.table import Array, Table, std_column
 
 Processes = tuple[tuple[float, float], ...]  # (standard deviation, time constant in s) of Gauss-Markov processes

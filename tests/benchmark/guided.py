@@ -14,7 +14,7 @@ from pathlib import Path
 import atheris
 
 # by numba, which does not know what Atheris adds
-COMPILED = ["drivers.world", "calibrations.effects.kernels", "calibrations.means.whitening"]
+COMPILED = ["drivers.world", "calibrations.effects.kernels", "calibrations.means.kernels"]
 
 with atheris.instrument_imports(include=["calibrations", "drivers", "rig", "pymodbus", "yaml"], exclude=COMPILED):
     from tests.fuzz.files import remove

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from calibrations.effects.kernels import slip
+from calibrations.means.kernels import whiten, whiten_transposed
 from calibrations.means.noise import Noise, rms, white_only
-from calibrations.means.whitening import whiten, whiten_transposed
 from calibrations.table import Array
 
 

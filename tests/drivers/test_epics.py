@@ -272,9 +272,7 @@ ADC_FAILURES = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("fault", "error", "told"), ADC_FAILURES, ids=[f"{f.what} {f.at_s:g}" for f, *_ in ADC_FAILURES]
-)
+@pytest.mark.parametrize(("fault", "error", "told"), ADC_FAILURES, ids=range(len(ADC_FAILURES)))
 def test_a_failure_of_a_converter_says_what_where_and_what_to_do(
     bench: Bench, fault: Fault, error: type[DriverError], told: str
 ) -> None:
