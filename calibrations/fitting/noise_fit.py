@@ -199,7 +199,7 @@ class NoiseSearch:
         """
         best = int(np.argmin(score))
         flicker = int(np.argmin(np.where(self._flickers, score, np.inf)))
-        return flicker if score[flicker] - score[best] < INSEPARABLE else best
+        return flicker if score[flicker] < score[best] + INSEPARABLE or score[flicker] == score[best] else best
 
     def best(self, group: int = 0) -> Best:
         """The noise of greatest likelihood with the first group in the model, and another; channels in turn."""

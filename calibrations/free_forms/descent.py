@@ -241,6 +241,7 @@ def descend(
     step: str,
     catalogue_first: bool = False,
     loops: bool = False,
+    jumps: bool = False,
     origin: SearchResult | None = None,
 ) -> SearchResult:
     """The end of a descent from the base, or from the components of an earlier search.
@@ -249,14 +250,15 @@ def descend(
     step             which of several searches this is, for the progress
     catalogue_first  whether the first rounds prefer forms of the catalogue to free ones
     loops            whether hysteresis whose loops differ from place to place is tried
+    jumps            whether steps over the output are tried
     """
-    point = _begin(setting, general, loops) if origin is None else origin.point
+    point = _begin(setting, general, loops, jumps) if origin is None else origin.point
     progress = _Progress(point, {})
     first, trials = 0 if origin is None else len(COARSE), 0
     for number in range(first, ROUNDS):
         report(f"searching for places ({step}), pass {number - first + 1} of at most {ROUNDS - first}")
         progress = _advance(setting, progress, number, catalogue_first)
-        if general and trials < JUMP_TRIALS and (progress.converged or number == ROUNDS - 3):
+        if jumps and trials < JUMP_TRIALS and (progress.converged or number == ROUNDS - 3):
             trials += 1
             progress = _with_jumps(setting, progress)
         if progress.converged:
@@ -272,7 +274,7 @@ def finish(setting: Setting, point: Point, scales: Mapping[str, float], limits: 
     return SearchResult(setting, point.components, g, X, sizes, values, setting.state_at(values, point.components))
 
 
-def _begin(setting: Setting, general: bool, loops: bool) -> Point:
+def _begin(setting: Setting, general: bool, loops: bool, jumps: bool) -> Point:
     """The base, and all components that these poses can show."""
     data = setting.data
     values = start(data, setting.model_effects)
@@ -283,7 +285,7 @@ def _begin(setting: Setting, general: bool, loops: bool) -> Point:
         if (general or not c.general) and (loops or not c.has_loops)
     ]
     saw = find_saw(data, state, setting.white, data.outputs - state.predicted, (), ENTER)
-    steps = setting.first_jumps
+    steps = setting.first_jumps if jumps else None
     slow = {c.name: (SLOW_BEGIN * setting.floor) ** 2 for c in components if c.noise}
     return Point([*components, *([saw] if saw else []), *([steps] if steps else [])], slow, values, state)
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from calibrations.free_forms.chain import ModelEffects
 from calibrations.free_forms.descent import CONVERGED, SLOW_MOST, SearchResult, Setting, descend, take_damped_step
+from calibrations.free_forms.jumps import STEPS
 from calibrations.free_forms.places_in_time import slow_noise
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.reml import coefficients, estimate, gram
@@ -48,7 +49,8 @@ def search(
     2. If that leaves more than noise, or many components: all forms at once. This finds causes of another form.
     3. If the history acts: loops that differ from place to place as well. They resemble most curves with a corner, so
        they have to gain clearly.
-    4. If flicker of any size is likelier than the components over time: all again with such flicker. This is left out
+    4. If that leaves more than noise: steps over the output, where there are any beside all smooth forms.
+    5. If flicker of any size is likelier than the components over time: all again with such flicker. This is left out
        if a misfit may look like flicker: with effects of the given model, or with a large residual.
 
     white    standard deviation of each mean, (channels, n)
@@ -75,8 +77,11 @@ def _search_from_all(setting: Setting, general: bool, reason: str) -> SearchResu
     if any(best.component(name).place == "history" for name in best.active):
         looped = descend(setting, general, f"{reason}with loops", catalogue_first=True, loops=True)
         best = looped if looped.criterion < best.criterion - SPILL * abs(best.criterion) else best
-    step = f"{reason}without components that are not needed"
-    return _without_remainders(best, lambda origin: descend(setting, general, step, origin=origin))
+    if best.ratio >= NOISE_ALONE and setting.first_jumps is not None:
+        jumping = descend(setting, general, f"{reason}with steps of a converter", catalogue_first=True, jumps=True)
+        best = min(best, jumping, key=lambda end: end.criterion)
+    step, jumps = f"{reason}without components that are not needed", STEPS in best.active
+    return _without_remainders(best, lambda origin: descend(setting, general, step, jumps=jumps, origin=origin))
 
 
 def _without_remainders(best: SearchResult, descent: Callable[[SearchResult], SearchResult]) -> SearchResult:
