@@ -78,8 +78,10 @@ def _search_from_all(setting: Setting, general: bool, reason: str) -> SearchResu
         looped = descend(setting, general, f"{reason}with loops", catalogue_first=True, loops=True)
         best = looped if looped.criterion < best.criterion - SPILL * abs(best.criterion) else best
     if best.ratio >= NOISE_ALONE and setting.first_jumps is not None:
-        jumping = descend(setting, general, f"{reason}with steps of a converter", catalogue_first=True, jumps=True)
-        best = min(best, jumping, key=lambda end: end.criterion)
+        for first, way in ((True, "effects first"), (False, "all forms together")):
+            step = f"{reason}with steps of a converter, {way}"
+            jumping = descend(setting, general, step, catalogue_first=first, jumps=True)
+            best = min(best, jumping, key=lambda end: end.criterion)
     step, jumps = f"{reason}without components that are not needed", STEPS in best.active
     return _without_remainders(best, lambda origin: descend(setting, general, step, jumps=jumps, origin=origin))
 
