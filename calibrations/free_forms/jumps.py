@@ -58,7 +58,7 @@ def _positions(response: Array) -> Array:
     """Middles between neighbouring outputs, without the outermost; at most `POSITIONS`, fewer of many rows."""
     ordered = np.unique(response)
     middles = (ordered[1:] + ordered[:-1])[FEWEST_BESIDE - 1 : 1 - FEWEST_BESIDE] / 2
-    most = min(POSITIONS, ELEMENTS // response.size)
+    most = min(POSITIONS, max(1, ELEMENTS // response.size))
     return middles[:: max(1, -(-len(middles) // most))]
 
 

@@ -38,6 +38,7 @@ FORM_OF = 0.25  # of another place's size: a place of which no more is its own m
 
 
 Curves = Mapping[str, Array]  # of each place, over the noise, without its projection on the base
+PlaceSizes = Mapping[str, float]  # of each place, rms in noise floors
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,9 @@ def places(result: SearchResult) -> list[ActingPlace]:
     sizes = {place: float(np.sqrt(np.mean(curve**2))) for place, curve in curves.items()}
     own_sizes = {place: _size_of_unshared_part(result, result.cost_without(names)) for place, names in by_place.items()}
     sizes |= {place: own_sizes[place] for place, curve in curves.items() if _is_cancelled(result, curve)}
-    acting_places = [_acting_place(result, place, names, curves, sizes, Q) for place, names in by_place.items()]
+    acting_places = [
+        _acting_place(result, place, names, curves, sizes, own_sizes[place], Q) for place, names in by_place.items()
+    ]
     return _with_substitutes(result, sorted(acting_places, key=lambda p: -p.size))
 
 
@@ -102,13 +105,12 @@ def _is_cancelled(result: SearchResult, curve: Array) -> bool:
 
 
 def _acting_place(
-    result: SearchResult, place: str, names: Sequence[str], curves: Curves, sizes: Mapping[str, float], Q: Array
+    result: SearchResult, place: str, names: Sequence[str], curves: Curves, sizes: PlaceSizes, own: float, Q: Array
 ) -> ActingPlace:
     """One place, of which the components `names` act, with its causes and what the data cannot separate from them."""
     size, largest = sizes[place], max(sizes.values())
     causes, share, constants = _causes_of_place(result, place, names, curves, Q)
     causes = () if _is_cancelled(result, curves[place]) else causes
-    own = _size_of_unshared_part(result, result.cost_without(names))
     part = own if all(result.component(name).form for name in names) else size  # a curve was preferred to a known form
     gain, alternatives = gain_and_rivals(result, names, {other for other in sizes if part < FORM_OF * sizes[other]})
     replacements = [replacements_of(result, names, causes, cause) for cause in causes] if len(names) > 1 else []

@@ -1,4 +1,4 @@
-"""Places that may explain a residual: their free forms, the size of an effect there, and what its curve follows."""
+"""A place can explain a residual. These tests check its free forms, its size, and the noise that its curve follows."""
 
 from __future__ import annotations
 

@@ -247,6 +247,15 @@ def test_samples_whose_pose_is_lost_are_not_recovered(tmp_path: Path) -> None:
         assert record.damaged_rows() == []
 
 
+def recorded_file(folder: Path) -> tuple[int, str, Path, bytes]:
+    """A run of three poses: its number, the digest of its table, and the file of the record with its bytes."""
+    run = recorded(folder, 3)
+    with Record(folder) as record:
+        whole = table_of(record, run).digest
+    path = folder / "record.db"
+    return run, whole, path, path.read_bytes()
+
+
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -257,11 +266,7 @@ def test_samples_whose_pose_is_lost_are_not_recovered(tmp_path: Path) -> None:
     ],
 )
 def test_a_damaged_schema_costs_no_row(tmp_path: Path, right: bytes, wrong: bytes) -> None:
-    run = recorded(tmp_path, 3)
-    with Record(tmp_path) as record:
-        whole = table_of(record, run).digest
-    path = tmp_path / "record.db"
-    data = path.read_bytes()
+    run, whole, path, data = recorded_file(tmp_path)
     assert right in data[:PAGE]
     path.write_bytes(data[:PAGE].replace(right, wrong, 1) + data[PAGE:])
     assert not recover(path, tmp_path / "new").changed
@@ -285,11 +290,7 @@ def with_bit(data: bytes, at: int, bit: int) -> bytes:
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("bit", [0, 4])
 def test_one_changed_bit_beside_the_texts_of_the_schema_costs_no_row(tmp_path: Path, place: str, bit: int) -> None:
-    run = recorded(tmp_path, 3)
-    with Record(tmp_path) as record:
-        whole = table_of(record, run).digest
-    path = tmp_path / "record.db"
-    data = path.read_bytes()
+    run, whole, path, data = recorded_file(tmp_path)
     path.write_bytes(with_bit(data, PLACES[place](data[:PAGE]), bit))
     recovered = recover(path, tmp_path / "new")
     assert (recovered.damaged, recovered.changed, recovered.spoilt) == ((), (), ())
