@@ -59,8 +59,15 @@ def test_searches_that_follow_each_other_have_different_names(monkeypatch: pytes
 
     monkeypatch.setattr(search, "descend", descended)
     for reason in ("", "with larger noise, round 1, "):
-        search._search_from_all(SimpleNamespace(), True, reason)
-    starts = ["effects first", "all forms together", "with loops"]
+        search._search_from_all(SimpleNamespace(first_jumps="the steps"), True, reason)
+    jumps = "with steps of a converter"
+    starts = [
+        "effects first",
+        "all forms together",
+        "with loops",
+        f"{jumps}, effects first",
+        f"{jumps}, all forms together",
+    ]
     assert steps == [*starts, *(f"with larger noise, round 1, {start}" for start in starts)]
 
 
