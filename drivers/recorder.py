@@ -116,6 +116,9 @@ class Recorder(Generic[Settings]):
         device.settings = self.settings.only(self.name, outputs)
         return device
 
+    def prepare(self) -> None:
+        """Set up the instrument, so that the next record begins at once. Most have nothing to set up."""
+
     def scans(self, duration_s: float) -> int:
         """The number of whole scans in a time, at least 1."""
         return max(1, round(duration_s * self.settings.rate_hz))

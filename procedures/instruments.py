@@ -70,6 +70,9 @@ class Stage(Protocol):
 class Adc(Protocol):
     """The converter of the sensor's outputs."""
 
+    def prepare(self) -> None:
+        """Set up the instrument, so that the next record begins at once."""
+
     def acquire(self, duration_s: float) -> Samples: ...
     def acquire_with(self, duration_s: float, reading: Callable[[], Read]) -> tuple[Samples, Read]:
         """The samples, and the value of `reading` in the middle of the dwell."""

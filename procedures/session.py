@@ -301,11 +301,15 @@ class Session:
         self.keep(pose, samples=samples, temperature_c=temperature_c)
 
     def turn(self, pose: Pose, turn_deg: float) -> None:
-        """Turn beta by `turn_deg` from the pose's angle at the pose's rate, and record the samples of the turn."""
+        """Turn beta by `turn_deg` from the pose's angle at the pose's rate, and record the samples of the turn.
+
+        The converter is prepared before: beta does not wait for it during the turn.
+        """
         self.mount(pose.mount_deg, pose.flip, pose.up)
         self.alpha.move_to(pose.alpha_deg)
         self.host.doing(f"turning beta at {pose.rate_deg_s:g} deg/s, alpha {pose.alpha_deg:g} deg")
         last_deg = pose.beta_deg + math.copysign(turn_deg, pose.rate_deg_s)
+        self.adc.prepare()
         with self.beta.turning(abs(pose.rate_deg_s), pose.beta_deg, last_deg) as turn:
             samples = self.adc.acquire_watched(turn_deg / abs(turn.rate_deg_s), turn.require, turn.beat_s)
         self.keep(pose, samples=samples, temperature_c=self.oven.temperature_c())

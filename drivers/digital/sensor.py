@@ -182,6 +182,10 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
         """Raises LimitError: the program cannot switch the power of this sensor."""
         raise LimitError(f"{self.name}: the program cannot switch the power of a digital sensor", "Switch it by hand")
 
+    def prepare(self) -> None:
+        """Start the samples of the sensor now, which can take seconds. Raises DriverError."""
+        self._begin()
+
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         """Record for `duration_s` without a gap, in blocks of `block_s`, both rounded to whole samples.
 

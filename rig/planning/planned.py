@@ -158,6 +158,9 @@ class PlannedAdc:
         self._name, self._settings, self._ledger = name, settings, ledger
         self._power = True
 
+    def prepare(self) -> None:
+        """Nothing to set up."""
+
     def acquire(self, duration_s: float) -> Samples:
         return next(self.stream(duration_s, duration_s))
 

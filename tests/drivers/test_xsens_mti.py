@@ -126,6 +126,16 @@ def test_a_record_shorter_than_a_second_has_the_temperature_too(connect: Connect
     assert adc.only("gx").acquire(0.2).temperature_c == 24.5
 
 
+def test_a_prepared_tracker_records_at_once(connect: Connect) -> None:
+    """Its configuration and the first temperature take a second, in which a turn of the stage would go on."""
+    adc = connect(rate_hz=200.0)
+    adc.prepare()
+    begun_s = adc._clock.now()
+    samples = adc.acquire(0.2)
+    assert 0 < samples.start_s - begun_s < 0.1
+    assert samples.temperature_c == 24.5
+
+
 def test_an_old_temperature_does_not_describe_the_sensor(connect: Connect) -> None:
     adc = connect()
     adc.acquire(0.2)

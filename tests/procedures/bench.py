@@ -71,6 +71,8 @@ class Adc:
     power_log: list[bool] = field(default_factory=list)
     channels: tuple[str, ...] = CHANNELS
 
+    def prepare(self) -> None: ...
+
     def acquire(self, duration_s: float) -> Samples:
         start_s, n = self.world.now_s, round(duration_s * RATE_HZ)
         volts = self.world.adc_volts(self.channels, start_s, 1 / RATE_HZ, n)

@@ -85,6 +85,11 @@ def test_a_stuck_axis_leaves_a_noise_floor_without_its_inclination() -> None:
     assert endured("noise-floor", "adc", Fault("stuck-axis", at_s=at_s), "imu_lines") == "stopped"
 
 
+def test_a_turn_is_resumed_with_a_tracker_that_needs_a_second_to_begin() -> None:
+    """The turns before are recorded, so the tracker's first record in the resumed run is that of a turn."""
+    assert endured("rate-turn", "adc", Fault("garbage", at_s=70.478), "xsens_mti") == "stopped"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("procedure", "role", "what"), GUIDED)
 def test_a_guided_run_asks_when_all_is_at_rest(procedure: str, role: str, what: str) -> None:
