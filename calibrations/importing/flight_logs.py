@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import re
 from array import array
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,7 @@ ULOG_FIELDS: Mapping[str, Mapping[str, str]] = {
 RAW = {"sensor_accel": "a", "sensor_gyro": "g", "sensor_mag": "m"}  # before the autopilot's correction
 ULOG_HEADER_BYTES = 16
 BLOCK_BYTES = 1 << 20  # of a log in memory at once, while its records are walked
+STANDARD_ERROR = 2  # its file descriptor
 CORRECTION_NOTE = "values after the autopilot's own correction: the fit finds the error that it left"
 
 
@@ -44,7 +46,7 @@ def ulog_topics(path: Path) -> list[Topic]:
     """The messages of a PX4 log, raw sensors first. Raises DataError."""
     core = library("pyulog.core", "robotics", path, "a PX4 ULog")
     require_size(path, path.stat().st_size)
-    with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
+    with _quiet():
         log = core.ULog(str(path))
     if not log.data_list:
         raise DataError(f"{path}: has no data: it is cut or damaged near its start; copy it again from the vehicle")
@@ -124,12 +126,29 @@ def dataflash_topics(path: Path) -> list[Topic]:
     reader = library("pymavlink.DFReader", "robotics", path, "an ArduPilot DataFlash log")
     require_size(path, path.stat().st_size)
     _require_lengths(path)
-    with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
+    with _quiet():
         log = reader.DFReader_binary(str(path))
         try:
             return _dataflash_topics(path, log)
         finally:
             log.close()
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Discard what the libraries print. Compiled parts of pymavlink write to the file descriptor, a line for a byte."""
+    with (
+        contextlib.redirect_stderr(io.StringIO()),
+        contextlib.redirect_stdout(io.StringIO()),
+        contextlib.ExitStack() as stack,
+    ):
+        with contextlib.suppress(OSError):  # a program that has no standard error
+            usual = os.dup(STANDARD_ERROR)
+            stack.callback(os.close, usual)
+            stack.callback(os.dup2, usual, STANDARD_ERROR)
+            with Path(os.devnull).open("wb") as nothing:
+                os.dup2(nothing.fileno(), STANDARD_ERROR)
+        yield
 
 
 def _require_lengths(path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import sys
 from pathlib import Path
@@ -150,13 +151,16 @@ def test_two_imus_in_a_dataflash_log_have_to_be_chosen(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_foreign(path, None, topic="ACC[0]").outputs, ACC)
 
 
-def test_damage_in_a_dataflash_log_is_told_with_its_place(tmp_path: Path) -> None:
+def test_damage_in_a_dataflash_log_is_told_with_its_place(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     path, whole = tmp_path / "a.bin", dataflash()
     middle = whole.index(b"\xa3\x95\x81", len(whole) // 2)
     path.write_bytes(whole[:middle] + b"\0" * 7 + whole[middle:])
     sheet = open_sheet(path)
     assert any(f"7 bytes are no record and were skipped, the first at {middle}" in note for note in sheet.notes)
     assert import_sheet(sheet, None).table.n == N
+    assert capfd.readouterr() == ("", ""), "the library prints a line for each byte"
+    os.write(2, b"later")
+    assert capfd.readouterr().err == "later"
     path.write_bytes(whole[:-20])
     sheet = open_sheet(path)
     assert any("ends inside a record, at byte" in note for note in sheet.notes)
