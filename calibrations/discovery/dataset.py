@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic
 
 from calibrations.discovery.findings import Candidate, F, Findings, Place, Step
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
-from calibrations.discovery.verdict import Finding, Verdict
+from calibrations.discovery.verdict import Finding, Judgement, Verdict
 from calibrations.effects import Effect
 from calibrations.errors import ModelError
 from calibrations.model import Model
@@ -229,15 +229,41 @@ class Dataset(ABC, Generic[F]):
         If only the residual measures the noise, or the rows scatter more than their samples, the method searches for
         `effects`: only a search can separate noise from an effect then.
         """
-        fit = self.evaluate(model) or self.fit(model)
-        compared = Comparison(self, fit, self.places(fit), self.rejection(fit))
-        undecided = self.fails_by_scatter_only(fit) if compared.fails else not self.is_noise_known(fit)
-        if effects is None or compared.rejection is not None or not undecided:
+        compared = self._compared(self.evaluate(model) or self.fit(model))
+        if effects is None or compared.rejection is not None or not self._needs_search(compared):
             return compared
         judgement = self.diagnose(model, effects).judgement
         if compared.fails and judgement.verdict is not Verdict.ADEQUATE:
             return compared
         return replace(compared, fails=(), given=judgement)
+
+    def judge(self, fit: F) -> Judgement | None:
+        """The judgement on a fitted model before any search: it is incomplete. None where only a search can decide.
+
+        A model that fails nowhere is not judged: an effect may be significant without a place that fails.
+        """
+        compared = self._compared(fit)
+        undecided = compared.rejection is not None or not self.is_noise_known(fit) or self._needs_search(compared)
+        if undecided or not compared.fails:
+            return None
+        return Judgement(
+            model=fit.model.name,
+            left=compared.fails[0].text,
+            share_left=1.0,
+            error=fit.pooled_excess,
+            floor=self.floor,
+            searched=False,
+        )
+
+    def _compared(self, fit: F) -> Comparison[F]:
+        """The comparison of a fitted model, without a search."""
+        return Comparison(self, fit, self.places(fit), self.rejection(fit))
+
+    def _needs_search(self, compared: Comparison[F]) -> bool:
+        """Whether only a search can separate noise from an effect."""
+        if compared.fails:
+            return self.fails_by_scatter_only(compared.fit)
+        return not self.is_noise_known(compared.fit)
 
     def diagnose(self, model: Model, effects: Mapping[str, Effect]) -> Diagnosis[F]:
         """The effects that the model misses."""

@@ -8,6 +8,7 @@ with the effects that the search added.
     ambiguous       the data cannot decide: another effect explains them as well, a small part of the residual may be
                     the form of a named cause, or the data do not determine the model
     unexplained     the residual is more than noise, and no effect of the catalogue explains it
+    incomplete      the residual is more than noise, and no search for effects was made yet (given model only)
     no-response     an output does not follow the poses; no effect is searched for
 """
 
@@ -31,6 +32,7 @@ class Verdict(StrEnum):
     EFFECT_MISSING = "effect-missing"
     AMBIGUOUS = "ambiguous"
     UNEXPLAINED = "unexplained"
+    INCOMPLETE = "incomplete"
     NO_RESPONSE = "no-response"
 
     @property
@@ -176,6 +178,8 @@ def decide(j: Judgement) -> Verdict:
     residual = Residual.of(j)
     if j.unresponsive:
         return Verdict.NO_RESPONSE
+    if _only_compared(j):
+        return Verdict.INCOMPLETE
     if residual is Residual.DOUBT or (residual is Residual.CAUSE and not j.missing):
         return Verdict.UNEXPLAINED
     if j.unknown:
@@ -199,6 +203,8 @@ def headline(j: Judgement) -> str:
     """The first sentence."""
     if j.verdict is Verdict.NO_RESPONSE:
         return f"No response: {j.left}."
+    if j.verdict is Verdict.INCOMPLETE:
+        return f'The model "{j.model}" is incomplete: its error is {j.error:.3g} times {j.floor}.'
     if j.verdict is Verdict.UNEXPLAINED and j.unknown and not j.spoilt:
         return f"An effect that is not in the catalogue acts at {join_words(j.unknown)}."
     if j.verdict is Verdict.UNEXPLAINED and not j.searched:
@@ -225,6 +231,9 @@ def _details(j: Judgement) -> Iterator[str]:
     """Further sentences."""
     if j.verdict is Verdict.NO_RESPONSE:
         return
+    if j.verdict is Verdict.INCOMPLETE:
+        yield f"It is largest here: {j.left}. Only a search can show which effects are missing."
+        return
     if j.verdict is Verdict.UNEXPLAINED:
         if j.missing:
             yield f'The model "{j.model}" also misses {join_words(j.missing)}.'
@@ -249,6 +258,11 @@ def _details(j: Judgement) -> Iterator[str]:
             yield f"This data cannot separate {name} from {join_words(rivals, 'or')}."
     if j.provisional and j.missing:
         yield "Provisional: the names may change when further effects are added."
+
+
+def _only_compared(j: Judgement) -> bool:
+    """Whether the residual is more than noise, and nothing is known of effects: no search was made, none was added."""
+    return j.left is not None and not (j.searched or j.added or j.missing)
 
 
 def _incomplete(j: Judgement) -> bool:

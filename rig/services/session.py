@@ -17,6 +17,7 @@ from typing import Any, Generic
 from calibrations.discovery.dataset import Dataset
 from calibrations.discovery.findings import F, Findings, Step
 from calibrations.discovery.results import Comparison, Diagnosis
+from calibrations.discovery.verdict import Judgement
 from calibrations.effects import Effect
 from calibrations.errors import CalibrationError, ModelError
 from calibrations.free_forms.place_names import PREFIX
@@ -169,6 +170,10 @@ class ModelSession(Generic[F]):
         report(f"Testing the model on {self.data.unseen}")
         return self.kept.compare(self.end.model if self.steps else self.model)
 
+    def judged(self) -> Judgement | None:
+        """The judgement on the present model before its search; None where only a search can decide, or has decided."""
+        return None if self._followed() is not None else self.kept.judge(self.end)
+
     def diagnosed(self) -> Diagnosis[F]:
         """The effects that the present model misses. Of two threads that ask, the second waits for the first."""
         self._wait_for_same_search()
@@ -190,11 +195,18 @@ class ModelSession(Generic[F]):
 
     def _plan(self) -> Findings[F] | None:
         """The rest of the longest earlier search that the steps have followed; None where they left all of them."""
+        if (followed := self._followed()) is None:
+            return None
+        plan, count = followed
+        return self.data.follow_plan(plan, count, self.effects) if count else plan
+
+    def _followed(self) -> tuple[Findings[F], int] | None:
+        """The longest earlier search that the steps have followed, and the number of its steps that they took."""
         for k in range(len(self.names), -1, -1):
             plan = self.plans.get(self.names[:k])
             remaining = self.names[k:]
             if plan is not None and plan.names[: len(remaining)] == remaining:
-                return plan if not remaining else self.data.follow_plan(plan, len(remaining), self.effects)
+                return plan, len(remaining)
         return None
 
     @property

@@ -146,12 +146,41 @@ def test_a_search_is_told_cancelled_and_begun_again(
     context.request.get(said["url"])
     page = context.new_page()
     page.goto(f"{said['url'].partition('/?')[0]}/?data={quote(thousand(tmp_path))}")
+    progress = page.locator(".verdict [aria-live=off]")
+    expect(progress).to_have_text(re.compile(r"^Round 1.*, \d+ s$"))
+    expect(page.locator(".verdict .headline").first).to_have_text("Searching for missing effects ...")
+    expect(page.locator(".verdict .chip")).to_be_hidden()  # only the search can judge a model that fails nowhere
     page.locator(".side").get_by_role("button", name="Cancel").click()
     expect(page.get_by_text("The search was cancelled.")).to_be_visible()
+    expect(progress).to_be_hidden()
     expect(page.locator(".verdict .headline").first).to_have_text("Not diagnosed")
     (tmp_path / "go").touch()
     page.get_by_role("button", name="Search for missing effects").click()
     expect(page.locator(".verdict .headline").first).to_contain_text("o effect is missing")
+    page.close()
+
+
+def test_a_failing_model_is_told_before_the_search_ends(
+    served: Callable[..., Any], context: BrowserContext, tmp_path: Path, workbench: Workbench
+) -> None:
+    said, _ = served("--bench", str(held_up(tmp_path)))
+    context.request.get(said["url"])
+    page = context.new_page()
+    page.goto(f"{said['url'].partition('/?')[0]}/?data={quote(hidden(tmp_path, 'package turned'))}")
+    box, provisional = page.locator(".verdict"), page.locator(".verdict .chip")
+    headline, progress = box.locator(".headline"), box.locator("[aria-live=off]")
+    expect(headline).to_have_text(
+        re.compile(r'^The model "linear" is incomplete: its error is \d[\d.]* times the noise floor\.$')
+    )
+    expect(box).to_have_class(re.compile("bad"))
+    expect(provisional).to_have_text("provisional")
+    expect(progress).to_have_text(re.compile(r"^Searching for missing effects\. Round 1.*, \d+ s$"))
+    expect(page.locator(".places")).to_be_visible()
+    workbench.shot(page, "provisional")
+    (tmp_path / "go").touch()
+    expect(headline).to_have_text('The model "linear" misses axis-misalignment.')
+    for part in (provisional, progress):
+        expect(part).to_be_hidden()
     page.close()
 
 

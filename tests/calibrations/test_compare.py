@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from calibrations.criteria import MATERIAL
+from calibrations.discovery.verdict import Judgement, Verdict
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import fit, scales
 from calibrations.loop import compare, dataset, diagnose
@@ -107,8 +108,36 @@ def test_scatter_from_row_to_row_is_judged_by_the_search(apart_v: float, words: 
     compared = dataset(scattered).compare(read_model("linear"), effects)
     diagnosed = diagnose(scattered, read_model("linear"), effects)
     assert compared.fit.pooled_excess > MATERIAL
+    assert dataset(scattered).judge(compared.fit) is None  # the search decides
     assert compared.adequate is (diagnosed.verdict == "adequate")
     assert words in compared.report()
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_noise_alone_is_not_judged_before_a_search(seed: int) -> None:
+    assert judged_before_search(table(seed=seed)) is None
+
+
+def test_a_clear_misfit_is_judged_before_a_search_and_the_search_confirms_it() -> None:
+    bent = table(0.004 * A_Z**2)
+    judgement = judged_before_search(bent)
+    assert judgement is not None
+    assert judgement.verdict is Verdict.INCOMPLETE
+    compared = compare(bent, read_model("linear"))
+    assert judgement.error == compared.fit.pooled_excess
+    assert judgement.left == compared.fails[0].text
+    assert diagnose(bent, read_model("linear")).missing
+
+
+def test_data_that_cannot_be_used_are_not_judged_before_a_search() -> None:
+    dead = table().with_outputs(table().outputs * [1.0, 0.0] + [0.0, 2.5])
+    assert judged_before_search(dead) is None
+    assert diagnose(dead, read_model("linear")).verdict is Verdict.NO_RESPONSE
+
+
+def judged_before_search(measured: Table) -> Judgement | None:
+    data = dataset(measured)
+    return data.judge(data.fit(read_model("linear")))
 
 
 def positions(scale_y: float) -> Table:
@@ -123,6 +152,7 @@ def test_a_residual_that_measures_its_own_noise_is_judged_by_the_search() -> Non
     data, model = positions(1.003), read_model("common-scale")
     found, asked = compare(data, model), diagnose(data, model)
     assert found.fails == ()
+    assert dataset(data).judge(found.fit) is None
     assert asked.missing
     assert found.given == asked.judgement
     assert not found.adequate

@@ -74,6 +74,7 @@ def test_an_effect_that_noise_may_explain_as_well_is_no_form_of_a_cause() -> Non
         ({"added": ("a",), "left": "a step", "share_left": 0.01}, Verdict.AMBIGUOUS),
         ({"added": ("a",), "left": "a step", "share_left": 0.1}, Verdict.UNEXPLAINED),
         ({"left": "a step", "share_left": 1.0}, Verdict.UNEXPLAINED),
+        ({"left": "a step", "share_left": 1.0, "searched": False}, Verdict.INCOMPLETE),
         ({"left": "2 poses stand out", "spoilt": True}, Verdict.UNEXPLAINED),
         ({"undetermined": "too few orientations"}, Verdict.AMBIGUOUS),
         ({"left": "vy is constant", "unresponsive": True}, Verdict.NO_RESPONSE),
@@ -103,6 +104,13 @@ def test_without_a_search_no_text_speaks_of_the_whole_catalogue() -> None:
     judgement = Judgement(**facts, searched=False)
     assert judgement.verdict is Verdict.UNEXPLAINED
     assert judgement.text == "With a, the residual is still more than noise: follows temperature."
+
+
+def test_before_a_search_a_verdict_names_the_error_and_no_effect() -> None:
+    facts: dict[str, Any] = {"left": "beta 0 to 30 deg", "share_left": 1.0, "searched": False, "error": 12.34}
+    judgement = Judgement(model="linear", **facts)
+    assert judgement.headline == 'The model "linear" is incomplete: its error is 12.3 times the noise floor.'
+    assert judgement.text.endswith("Only a search can show which effects are missing.")
 
 
 def test_noise_above_the_floor_is_said_to_be_noise() -> None:

@@ -237,8 +237,8 @@ class Workbench:
         if key not in self.diagnoses:
             search = self.visit.searched(session.effects)
             self.missing.wait(search)
-            self.verdict.wait("Searching for missing effects")
             try:
+                self.verdict.searching(await self.visit.work(session.judged), search)
                 self.diagnoses[key] = await self.visit.work(session.with_effects(search).diagnosed)
             except Cancelled:
                 return
