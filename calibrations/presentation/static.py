@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
+import pickle
 import re
 from collections.abc import Callable, Mapping
-from functools import singledispatch
+from dataclasses import dataclass, field
+from functools import lru_cache, singledispatch
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -64,6 +67,7 @@ LINE = 0.8
 DASHES = {"solid": "-", "dash": "--", "dot": ":"}
 SYMBOLS = {"circle": "o", "diamond": "D", "triangle-up": "^", "triangle-down": "v", "cross": "+"}
 FEW_MARKS, LONG_MARK = 4, 200.0  # marks of an axis with values larger than this multiple of its range
+MOST_DRAWN = 64  # charts in memory: those of some reports
 MOST_LEVEL = 8  # names on a horizontal axis; more are written aslant
 DROPPED_MARKUP = (
     r"<metadata>.*?</metadata>",
@@ -124,9 +128,22 @@ def png(chart: c.Chart) -> bytes:
 def inline(chart: c.Chart, name: str, words: str) -> str:
     """The chart as an SVG element for a page: it loads nothing, and those ids that it uses begin with `name`.
 
-    `words` describe it for screen readers.
+    `words` describe it for screen readers. A chart of the same content is drawn once.
     """
-    text = svg(chart).decode()
+    return _inline(_Content(hashlib.sha256(pickle.dumps(chart)).digest(), chart), name, words)
+
+
+@dataclass(frozen=True)
+class _Content:
+    """A chart that equals another one of the same content."""
+
+    digest: bytes
+    chart: c.Chart = field(compare=False)
+
+
+@lru_cache(maxsize=MOST_DRAWN)
+def _inline(content: _Content, name: str, words: str) -> str:
+    text = svg(content.chart).decode()
     text = text[text.index("<svg") :].strip()
     for pattern in DROPPED_MARKUP:
         text = re.sub(pattern, "", text, flags=re.DOTALL)

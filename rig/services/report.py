@@ -20,6 +20,7 @@ from rig.services.provenance import today
 from rig.services.request import Request
 
 if TYPE_CHECKING:
+    from calibrations.design.experiment import Experiment
     from calibrations.discovery.findings import Findings
     from calibrations.effects import Effect
     from calibrations.presentation.chart import Picture
@@ -94,13 +95,15 @@ def make_report(
     notify: Callable[[str], None],
     searched: Searched,
     session: Callable[[], ModelSession[Any]] | None = None,
+    plans_next: bool = True,
 ) -> Page:
     """On a model, or on a soak where no model is named.
 
     Raises what `load_request` and `fit` raise, UnusableData.
 
     `searched` makes the effects of the search, which report its progress and may end it. `session`: opens that of a
-    page, so that the page and its report show the same rows, and share the search.
+    page, so that the page and its report show the same rows, and share the search. `plans_next`: whether the report on
+    rows has the next experiment, whose plan takes longer than all else; without it, a page shows `next_of` beside it.
     """
     if request.model is None and request.channel is None:
         soak_report = soak_report_of(request.data, today(), program())
@@ -116,16 +119,23 @@ def make_report(
         shared = opened.first_search(searched) if opened is not None else None
         return shared or question.data.search(question.model, searched(question.effects))
 
-    return _model_page(request, question, notify, search)
+    return _model_page(request, question, notify, search, plans_next)
 
 
 def _model_page(
-    request: Request, question: AnalysisInput, notify: Callable[[str], None], search: Callable[[], Findings[Any]]
+    request: Request,
+    question: AnalysisInput,
+    notify: Callable[[str], None],
+    search: Callable[[], Findings[Any]],
+    plans_next: bool,
 ) -> Page:
     comparison = question.data.compare(question.model)
     if (reason := comparison.rejection) is not None and reason.verdict == Verdict.NO_RESPONSE:
         raise UnusableData(f"{question.data.source}: no report is written: {reason.verdict}: {reason.text}")
-    discovery = planned(Discovery.of(search()), request, question.effects, notify)
+    discovery = Discovery.of(search())
+    is_planned = plans_next or discovery.next_experiment is None or question.data.form == "samples"
+    if is_planned:
+        discovery = planned(discovery, request, question.effects, notify)
     if question.data.form == "samples":
         from calibrations.presentation.charts.noise import still_album
         from calibrations.presentation.report.still import still_report
@@ -137,4 +147,14 @@ def _model_page(
 
     motion, results = of_run(request.data)
     pictures = album(discovery, comparison, motion)
-    return pictures, lambda: report(discovery, comparison, today(), program(), pictures, motion, results)
+    return pictures, lambda: report(discovery, comparison, today(), program(), pictures, motion, results, is_planned)
+
+
+def next_of(session: ModelSession[Any], notify: Callable[[str], None]) -> Experiment | None:
+    """The planned next experiment of a report that was made without it; None where it needs none.
+
+    `notify` receives a remark if the experiment is planned for another bench than that of the data.
+    """
+    if session.data.form == "samples" or session.search_made is None:
+        return None
+    return session.with_next(Discovery.of(session.search_made), notify).next_experiment

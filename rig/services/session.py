@@ -27,7 +27,7 @@ from calibrations.progress import report
 from rig.errors import RecordError
 from rig.services.content import Content, content_of
 from rig.services.load import load_request
-from rig.services.next_experiment import planned
+from rig.services.next_experiment import Answer, planned
 from rig.services.provenance import with_provenance
 from rig.services.request import Request
 
@@ -229,8 +229,8 @@ class ModelSession(Generic[F]):
             return self.data.search(self.model, self.effects)
         return self.data.search_on(self.end, self.start, self.effects)
 
-    def with_next(self, result: Diagnosis[F], notify: Callable[[str], None]) -> Diagnosis[F]:
-        """The diagnosis with its next experiment planned on the bench; `notify` is called if it is another bench."""
+    def with_next(self, result: Answer, notify: Callable[[str], None]) -> Answer:
+        """The result with its next experiment planned on the bench; `notify` is called if it is another bench."""
         return planned(result, self.request, self.effects, notify)
 
 

@@ -99,6 +99,10 @@ class Desk:
             self.beginnings.popitem(last=False)
         return session
 
+    def opened(self, data: str) -> ModelSession[Any] | None:
+        """The beginning with the default model that a page or report on these data has used; None without one."""
+        return self.beginnings.get((data, "", ""))
+
     def keep_report(self, key: str, text: str) -> None:
         """Store a report by the content that it is of."""
         self.reports[key] = text

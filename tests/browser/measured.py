@@ -6,9 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from calibrations.design.experiment import Experiment
 from calibrations.importing.foreign import write_csv
 from calibrations.table import Array, Table
 from drivers.world.world import World
+from rig.bench import read_bench
+from tests.hidden.quick_rig import QuickRig
 from tests.hidden.rigs import IDEAL, rig_with, unexplained_rig
 
 CONSTANTS = {"filter_corner_hz": 15.07, "sample_rate_hz": 1000.0}
@@ -38,6 +41,14 @@ def two_faults(folder: Path) -> str:
     load = np.sin(np.radians(alpha)) * np.array([np.cos(direction), np.sin(direction)])
     vx, vy = 2.5 + load + 0.004 * load**2 + 5e-5 * rng.standard_normal(load.shape)
     return _written(folder, "two-faults", {"alpha_deg": alpha, "beta_deg": beta, "vx_v": vx, "vy_v": vy})
+
+
+def ambiguous(folder: Path) -> str:
+    """Poses of a sensor that is turned about z, which a stage's zero explains as well."""
+    config = IDEAL.changed({"sensor": {"package": {"turn_z_deg": 0.05}}})
+    steps = Experiment("sweep", {"step_deg": 45.0, "inclinations_deg": [90.0, 30.0, 150.0]}, (), "")
+    write_csv(QuickRig(config, 8, read_bench(None)).measure(steps)[1], path := folder / "turned.csv")
+    return str(path)
 
 
 def hundred_thousand(folder: Path) -> str:

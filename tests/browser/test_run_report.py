@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,7 +18,9 @@ from rig.bench import read_bench
 from rig.cli.terminal.watch import Quiet
 from rig.record import Record
 from rig.runs.runner import start
+from tests import recorded
 from tests.browser.conftest import Workbench
+from tests.browser.measured import ambiguous
 
 pytestmark = pytest.mark.slow
 
@@ -55,6 +59,22 @@ def _brightness(page: Page) -> float:
     """The mean brightness of the report on the screen, 0 to 1."""
     picture = imread(BytesIO(page.locator(".report iframe").screenshot()))
     return float(picture[..., :3].mean())
+
+
+def test_the_next_experiment_is_planned_below_the_report(workbench: Workbench, tmp_path: Path) -> None:
+    _, imported, problem = recorded.command("import", ambiguous(tmp_path), "--json")
+    assert imported, problem
+    page = workbench.visit(f"/record/{json.loads(imported)['run']}")
+    report = page.frame_locator(".report iframe")
+    expect(report.get_by_role("heading", name="Candidates")).to_be_visible()
+    expect(report.get_by_role("heading", name="Next experiment")).to_have_count(0)
+    note = page.locator(".report .next-experiment")
+    expect(note).to_contain_text("To separate stage-zero-offset from axis-misalignment, run sweep with face = both")
+    expect(page.locator(".verdict .headline")).to_contain_text("misses stage-zero-offset")
+    note.scroll_into_view_if_needed()
+    workbench.shot(page, "run-report-next")
+    note.get_by_role("button", name="Prepare this run").click()
+    expect(page.get_by_label("face")).to_be_visible()
 
 
 def test_the_figure_of_a_motion_test_is_in_its_page_without_commands(workbench: Workbench) -> None:

@@ -11,6 +11,7 @@ import pytest
 from calibrations.discovery.results import Discovery
 from calibrations.fitting.fit import fit
 from calibrations.model import Model
+from calibrations.presentation import static
 from calibrations.presentation.chart import Chart, Panel, Points, single_chart
 from calibrations.presentation.charts import fit as charts
 from calibrations.presentation.charts.discovery import levels, waterfall
@@ -49,6 +50,17 @@ def test_words_of_users_are_not_taken_for_formulas() -> None:
     model = Model("a$b$ & <c>", warm().start.model.terms)
     found = Discovery.of(replace(warm().findings, start=fit(model, warm_table())))
     assert b"a$b$ &amp; &lt;c&gt;" in svg(waterfall(levels(found)))
+
+
+def test_an_inline_picture_of_the_same_content_is_drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn, draw = list[Chart](), static.svg
+    monkeypatch.setattr(static, "svg", lambda chart: drawn.append(chart) or draw(chart))
+    texts = [
+        inline(single_chart(Panel((Points(np.array([1.0, 2.0]), np.array([0.5, at])),))), name, "two points")
+        for at, name in ((7.25, "a"), (7.25, "a"), (7.25, "b"), (8.5, "a"))
+    ]
+    assert texts[0] == texts[1]
+    assert len(set(texts)) == len(drawn) == 3
 
 
 def test_an_inline_picture_reaches_nowhere_and_owns_its_names() -> None:

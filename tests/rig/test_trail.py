@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
@@ -11,12 +12,13 @@ import pytest
 from calibrations.errors import ExpressionError, ModelError
 from calibrations.importing.foreign import write_csv
 from calibrations.presentation.charts.discovery import levels
+from calibrations.presentation.report.report import next_words
 from calibrations.progress import show_progress
-from rig.services.report import make_report
+from rig.services.report import make_report, next_of
 from rig.services.request import Request
 from rig.services.session import ModelSession, model_session
 from rig.web.calculations import begin
-from tests.browser.measured import hidden, wandering
+from tests.browser.measured import ambiguous, hidden, wandering
 from tests.calibrations.test_common_floor import magnetometer
 
 
@@ -93,6 +95,30 @@ def test_a_report_takes_the_search_that_its_session_has_made(turned: ModelSessio
     assert turned.search_made is not None
     _, page = make_report(turned.request, pytest.fail, pytest.fail, lambda: turned)
     assert "misses axis-misalignment" in page()
+
+
+def test_a_page_plans_the_next_experiment_beside_its_report(tmp_path: Path, undrawn: None) -> None:
+    session = model_session(Request(ambiguous(tmp_path)))
+    assert next_of(session, pytest.fail) is None  # before the search
+    session.diagnosed()
+    whole, brief = (
+        make_report(session.request, pytest.fail, pytest.fail, lambda: session, plans_next=plans)[1]()
+        for plans in (True, False)
+    )
+    assert "Next experiment" not in brief
+    before, _, section = whole.partition("Next experiment")
+    assert brief.startswith(before[: before.rindex("</section>")])
+    experiment = next_of(session, pytest.fail)
+    assert experiment is not None
+    assert escape(next_words(experiment)) in section
+    assert escape(experiment.command) in section
+
+
+def test_a_report_without_anything_to_plan_says_so(turned: ModelSession, undrawn: None) -> None:
+    turned.diagnosed()
+    _, page = make_report(turned.request, pytest.fail, pytest.fail, lambda: turned, plans_next=False)
+    assert "No further experiment is needed" in page()
+    assert next_of(turned, pytest.fail) is None
 
 
 def test_of_two_pages_that_search_the_second_waits_for_the_first(

@@ -149,11 +149,13 @@ def report(
     pictures: Iterable[Picture] | None = None,
     motion: MotionResult | None = None,
     results: Mapping[str, Any] = MappingProxyType({}),
+    is_planned: bool = True,
 ) -> str:
     """The page as HTML text. `comparison` is that of the given model with the data; `pictures` are those of `album`.
 
     `motion` is the comparison with the displacement sensor, for a run of that procedure. `results` are those of a run,
-    by name, each with value, std, unit, limit and verdict.
+    by name, each with value, std, unit, limit and verdict. `is_planned`: the next experiment was planned; else a page
+    shows its plan later beside the report, which leaves it out.
     `date` and `program` (name and version) go into the provenance: the same arguments give the same page.
     """
     album_of_all = album(discovery, comparison, motion) if pictures is None else pictures
@@ -165,14 +167,14 @@ def report(
         subject=f"Calibration report, model {comparison.fit.model.name}",
         summary=keep_units_together(summary(discovery)),
         figures=key_figures(discovery),
-        sections=[*verdicts(results), *_sections(discovery, comparison, by_name)],
+        sections=[*verdicts(results), *_sections(discovery, comparison, by_name, is_planned)],
         provenance=_provenance(discovery, date, program),
     )
     return html(page if motion is None else motion_page(page, motion, by_name["evaluation"]))
 
 
 def _sections(
-    discovery: Discovery[Fit], comparison: Comparison[Fit], pictures: Mapping[str, Picture]
+    discovery: Discovery[Fit], comparison: Comparison[Fit], pictures: Mapping[str, Picture], is_planned: bool
 ) -> Iterable[Section]:
     end, given_model = discovery.end, brief(comparison.fit.model.name)
     yield Section("Error by model", (pictures["waterfall"], _steps(discovery), _held_out_remark(discovery)))
@@ -187,7 +189,8 @@ def _sections(
         if section is not None:
             yield section
     yield Section("Noise", ((WHITE_KNOWN if end.noise.known else WHITE_UNKNOWN) + SLOW, _noise(end)))
-    yield Section("Next experiment", _next(discovery))
+    if is_planned:
+        yield Section("Next experiment", _next(discovery))
 
 
 def _steps(discovery: Discovery[Fit]) -> Table:

@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any
-from urllib.parse import urlencode
 
 from nicegui import ui
 
 from calibrations.criteria import SIGNIFICANT
 from calibrations.discovery.verdict import Verdict
 from calibrations.presentation.formula import formula_html
-from calibrations.presentation.report.report import next_takes, next_words
 from calibrations.presentation.views import view_of
 from calibrations.text import capital, probability, rounded
-from procedures.settings import setting_text
-from rig.services.search import Cancelled
 from rig.web.calculations import off_loop
+from rig.web.pages.next_experiment import show_next
 from rig.web.parts import (
     PROGRESS_S,
     afresh,
     box,
     button,
-    buttons,
     div,
     facts,
     message,
     notify_error,
-    setting_label,
     show_error,
     waiting,
     words,
@@ -148,7 +142,12 @@ class Missing:
             await self.look_at(cards[0].c)
         if result.next_experiment is not None and not self.page.discovering:  # the steps do not wait for a plan
             with candidate_box:
-                await self._next(result)
+                await self._show_next(result)
+
+    async def _show_next(self, result: Diagnosis[Any]) -> None:
+        session = self.page.session
+        assert session is not None  # noqa: S101 a diagnosis is of a trail
+        await show_next(self.page.visit, lambda notify: session.with_next(result, notify).next_experiment)
 
     def _show_nothing_to_add(self, result: Diagnosis[Any]) -> None:
         is_adequate = result.verdict is Verdict.ADEQUATE
@@ -179,35 +178,6 @@ class Missing:
         with ui.expansion(f"{len(further)} more, less likely").props("dense"):
             for c in further:
                 Card(self, c, result, best=False)
-
-    async def _next(self, result: Diagnosis[Any]) -> None:
-        """The next experiment, planned on the bench."""
-        page, notes = self.page, list[str]()
-        assert page.session is not None  # noqa: S101 a diagnosis is of a trail
-        with box("note"):
-            words("Next experiment", "title")
-            place = div("stack")
-            with place:
-                waiting("Planning on the bench")
-        try:
-            planned = await page.visit.work(page.session.with_next, result, notes.append)
-        except Cancelled:  # a person adds an effect, which must not wait
-            return
-        except Exception as error:
-            if not place.is_deleted:  # else the page shows another model by now
-                with afresh(place):
-                    words(message(error), "quiet")
-            return
-        if place.is_deleted:
-            return
-        experiment = planned.next_experiment
-        assert experiment is not None  # noqa: S101 it had one before
-        settings = {name: setting_text(value) for name, value in experiment.settings.items()}
-        labelled = replace(experiment, settings={setting_label(name): text for name, text in settings.items()})
-        run_address = f"/run?{urlencode({'procedure': experiment.procedure, **settings})}"
-        with afresh(place):
-            words(" ".join([next_words(labelled), next_takes(experiment), *notes]), "quiet")
-            buttons({"Prepare this run": run_address})
 
     async def look_at(self, c: Candidate, look: bool = False) -> None:
         """Draw the candidate in the residual; with `look`, against the column that it follows."""

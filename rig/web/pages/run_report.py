@@ -1,4 +1,7 @@
-"""The report of a run inside its page: sentences, tables and pictures, as `rig report` writes them."""
+"""The report of a run inside its page: sentences, tables and pictures, as `rig report` writes them.
+
+The plan of the next experiment takes longer than the report. The page shows it below, when it is known.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +16,13 @@ from nicegui.element import Element
 
 from rig.record import Run
 from rig.services.content import content_of
-from rig.services.report import make_report
+from rig.services.report import make_report, next_of
 from rig.services.request import Request
 from rig.services.search import Cancelled
 from rig.services.session import ModelSession
 from rig.web.calculations import Visit
 from rig.web.desk import Desk
+from rig.web.pages.next_experiment import show_next
 from rig.web.parts import box, button, div, notify_error, shown, words
 
 # the frame is as high as the report; a report has no scripts, and the page's policy lets it load nothing
@@ -43,6 +47,7 @@ class RunReport:
                 self.sensor = ui.toggle(run.data, value=run.data[0], on_change=self.show).props("dense no-caps")
                 self.sensor.set_visibility(len(run.data) > 1)
             self.place = div("")
+            self.following = div("")
         ui.timer(0.0, self.show, once=True)
 
     @property
@@ -53,6 +58,7 @@ class RunReport:
     async def show(self) -> None:
         """Make the report, unless it is made already, and show it."""
         data, hint = self.data, "Fitting the model, searching for missing effects, drawing"
+        self.following.clear()
         work = self.visit.work(self.text, data)
         text = await shown(self.place, hint, "This run has no report", work, lambda: data == self.data, self.run.run)
         if text is None:
@@ -64,6 +70,9 @@ class RunReport:
             with self.headline, box("row-of verdict").props("role=status"):
                 words(html.unescape(re.sub(r"<[^>]*>", "", headline[1])).strip(), "headline grow")
                 button("Report below", "south", self.see, "flat dense")
+        if (session := self.desk.opened(data)) is not None:
+            with self.following:
+                await show_next(self.visit, lambda notify: next_of(session, notify))
 
     def see(self) -> None:
         """Scroll to the report."""
@@ -72,7 +81,7 @@ class RunReport:
     def text(self, data: str) -> str:
         """The report as HTML. Raises what `report_html` raises."""
         request = Request(data, None, self.desk.bench_file)
-        return report_html(self.desk, request, self.visit, partial(self.desk.beginning, data))
+        return report_html(self.desk, request, self.visit, partial(self.desk.beginning, data), plans_next=False)
 
 
 def report_html(
@@ -81,14 +90,16 @@ def report_html(
     visit: Visit,
     session: Callable[[], ModelSession[Any]] | None,
     own_effects: Sequence[str] = (),
+    plans_next: bool = True,
 ) -> str:
     """A report as `rig report` makes it, once for each content of data and model, noise model and effects of a user.
 
-    `session` as in `make_report`. Raises what `make_report` raises, Cancelled.
+    `session` and `plans_next` as in `make_report`. Raises what `make_report` raises, Cancelled.
     """
-    key = " ".join([content_of(request.data, request.model).key, request.noise or "", *own_effects])
+    form = "with the next experiment" if plans_next else "without it"
+    key = " ".join([content_of(request.data, request.model).key, request.noise or "", form, *own_effects])
     if key not in desk.reports:
-        _, make = make_report(request, lambda _: None, visit.searched, session)
+        _, make = make_report(request, lambda _: None, visit.searched, session, plans_next)
         desk.keep_report(key, make())
     return desk.reports[key]
 
